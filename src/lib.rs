@@ -8,32 +8,73 @@
 //! config → scene → accel → gpu → integrator → measure → report
 //! ```
 //!
+//! Each of these is a crate of its own below this one, which has the command line and names them all.
+//!
 //! Every figure is gated for truth before it is printed: a structure whose hits differ from the
 //! judge's gets no speed.
 #![warn(missing_docs)]
 
-pub mod accel;
-pub mod atomic;
-pub mod coherence;
-pub mod compaction;
-pub mod compare;
-pub mod config;
-pub mod discrepancy;
-pub mod export;
-pub mod geometry;
-pub mod gpu;
-pub mod history;
-pub mod image;
-pub mod integrator;
-pub mod measure;
-pub mod oracle;
-pub mod params;
-pub mod peers;
-pub mod random;
-pub mod report;
-pub mod repro;
-pub mod run;
-pub mod sampling;
-pub mod scene;
-pub mod stress;
-pub mod text;
+#[path = "confirm.rs"]
+pub mod confirm;
+mod reproduce;
+
+pub use raystone_accel as accel;
+pub use raystone_accel::oracle;
+pub use raystone_bench::{coherence, peers, run};
+pub use raystone_config as config;
+pub use raystone_core::{
+    __parameter, atomic, geometry, parameters, params, program, random, structure, text,
+};
+pub use raystone_discrepancy as discrepancy;
+pub use raystone_gpu as gpu;
+pub use raystone_gpu::compaction;
+pub use raystone_image as image;
+pub use raystone_render as integrator;
+pub use raystone_report as report;
+pub use raystone_report::{export, history};
+pub use raystone_sampling as sampling;
+pub use raystone_scene as scene;
+pub use raystone_stress as stress;
+
+/// Comparisons of records, and the runs that confirm them.
+pub mod compare {
+    pub use crate::confirm;
+    pub use raystone_report::compare::*;
+}
+
+/// What is measured and how it is judged: checks, figures, statistics, records.
+pub mod measure {
+    pub use raystone_bench::{
+        animation, compaction, environment, figure_registry, memory, sampler_cost, spectrum,
+        stopping, stream, timing, words,
+    };
+    pub use raystone_record as record;
+    pub use raystone_record::{figure, replicates};
+    pub use raystone_stats::{
+        adaptive, bias, comparison, flip, growth, heavy_tails, hypothesis, interval, metrics,
+        statistics,
+    };
+    pub use raystone_verify::*;
+}
+
+/// Tables of theses: the runs behind them, and verdicts on what they claim.
+pub mod repro {
+    pub use raystone_report::repro::*;
+
+    /// Tables, run and judged.
+    pub mod run {
+        pub use crate::reproduce::{ReproError, reproduce};
+        pub use raystone_report::repro::table::*;
+    }
+}
+
+/// This program: what it was built from.
+pub const PROGRAM: program::Program = program::Program {
+    version: env!("CARGO_PKG_VERSION"),
+    commit: option_env!("RAYSTONE_COMMIT"),
+    dirty: match option_env!("RAYSTONE_DIRTY") {
+        // "true" or "false": constants compare no texts.
+        Some(text) => Some(text.len() == 4),
+        None => None,
+    },
+};

@@ -20,7 +20,7 @@ impl Bounds {
     };
 
     /// Contains every box.
-    pub const EVERYTHING: Bounds = Bounds {
+    pub(crate) const EVERYTHING: Bounds = Bounds {
         min: [f32::NEG_INFINITY; 3],
         max: [f32::INFINITY; 3],
     };
@@ -75,7 +75,7 @@ impl Bounds {
 }
 
 /// Distances at which the ray's line enters and leaves the slab of each axis.
-pub fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+pub(crate) fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let low = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
     let high = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
     let (x1, x2) = (low(0), high(0));
@@ -87,7 +87,7 @@ pub fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 
 }
 
 /// Distances at which the ray's line enters and leaves the box (enter > exit: it misses).
-pub fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
+pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
     let (near, far) = slabs(bounds, ray, inverse);
     let enter = near[0].max(near[1]).max(near[2]);
     let exit = far[0].min(far[1]).min(far[2]);
@@ -96,7 +96,12 @@ pub fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
 
 /// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the default
 /// pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
-pub fn enter_box(bounds: &Bounds, ray: &Ray, inverse: Reciprocal, t_best: f32) -> Option<f32> {
+pub(crate) fn enter_box(
+    bounds: &Bounds,
+    ray: &Ray,
+    inverse: Reciprocal,
+    t_best: f32,
+) -> Option<f32> {
     let (enter, exit) = slab(bounds, ray, *inverse);
     let enter = enter.max(ray.t_min);
     (enter <= exit.min(t_best) * inverse.pad).then_some(enter)

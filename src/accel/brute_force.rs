@@ -129,7 +129,7 @@ fn mask(inside: [u32; LANES]) -> u32 {
 /// A triangle is passed over only if its test cannot accept it. Hits are clamped into the slabs of the
 /// triangle's box, so the slabs of a wider box around its group, widened further, hold every hit; what is
 /// left has to pass the sign tests by the same products as the test; and the test itself decides.
-pub struct EveryTriangle<'a> {
+pub(crate) struct EveryTriangle<'a> {
     soup: &'a TriangleSoup,
     groups: Groups,
     blocks: Vec<Block>,
@@ -137,7 +137,7 @@ pub struct EveryTriangle<'a> {
 
 impl<'a> EveryTriangle<'a> {
     /// `many` rays are worth the time that it takes to put triangles in order.
-    pub fn new(soup: &'a TriangleSoup, many: bool) -> Self {
+    pub(crate) fn new(soup: &'a TriangleSoup, many: bool) -> Self {
         let records = &soup.records;
         let groups = Groups::new(records.len(), many, |id| records[id].vertices());
         let block = |group| Block::new(records, groups.members(group));
@@ -149,7 +149,7 @@ impl<'a> EveryTriangle<'a> {
     }
 
     /// Tests all triangles, whose indices count from `first`; a nearer hit replaces `hit`.
-    pub fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
+    pub(crate) fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
         let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let masks = self.soup.masks.as_deref();

@@ -2,25 +2,25 @@
 
 use super::TriangleSoup;
 use super::triangle::TriangleRecord;
-use crate::geometry::Triangle;
-use crate::random::Pcg32;
 use glam::Vec3;
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
 
 /// The record of triangle `id` of any material.
-pub fn record(id: u32, vertices: [[f32; 3]; 3]) -> TriangleRecord {
+pub(crate) fn record(id: u32, vertices: [[f32; 3]; 3]) -> TriangleRecord {
     let vertices = vertices.map(Vec3::from);
     TriangleRecord::new(&Triangle { vertices }, id, 0)
 }
 
 /// These triangles.
-pub fn soup(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> TriangleSoup {
+pub(crate) fn soup(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> TriangleSoup {
     let numbered = (0..).zip(triangles);
     let records: Vec<_> = numbered.map(|(id, t)| record(id, t)).collect();
     records.into()
 }
 
 /// A 6 × 6 lattice of triangles in so many layers, each across planes between cells.
-pub fn lattice(layers: usize) -> TriangleSoup {
+pub(crate) fn lattice(layers: usize) -> TriangleSoup {
     soup((0..36 * layers).map(|i| {
         let [x, y, z] = [i % 6, i / 6 % 6, i / 36].map(|k| k as f32);
         [
@@ -32,7 +32,7 @@ pub fn lattice(layers: usize) -> TriangleSoup {
 }
 
 /// A triangle around a random place in the cube of side `spread`, so large.
-pub fn random_triangle(random: &mut Pcg32, spread: f32, size: f32) -> [[f32; 3]; 3] {
+pub(crate) fn random_triangle(random: &mut Pcg32, spread: f32, size: f32) -> [[f32; 3]; 3] {
     let mut point = |s: f32| [0; 3].map(|_| s * random.uniform() as f32);
     let at = point(spread);
     let mut corner = || {

@@ -3,12 +3,12 @@
 
 use super::ray::{Ray, raised};
 use super::triangle::{AnyTriangleTest, Watertight};
-use crate::gpu::{ArithmeticProbe, Composition};
-use crate::params::Named;
+use raystone_core::params::Named;
+use raystone_gpu::{ArithmeticProbe, Composition};
 use std::ops::Deref;
 
 /// The tests of one run. Hits of every structure equal those of brute force with the same choice to
-/// the bit, if [`BoxTest`] is padded by [`BoxTest::PROVEN_ULPS`] or more; less is there to be measured.
+/// the bit, if [`BoxTest`] is padded by `PROVEN_ULPS` or more; less is there to be measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// The ray–triangle test.
@@ -47,6 +47,10 @@ impl Default for BoxTest {
 }
 
 impl Named for BoxTest {
+    fn built_in() -> Vec<&'static Self> {
+        Self::ALL.iter().collect()
+    }
+
     fn name(&self) -> &'static str {
         self.name
     }
@@ -59,10 +63,10 @@ impl Named for BoxTest {
 impl BoxTest {
     /// The least pad for which the theorem of [`super::triangle`] holds: (1 + p) / (1 − p) for the pad p
     /// of triangles, and their roundings.
-    pub const PROVEN_ULPS: u32 = 9;
+    pub(crate) const PROVEN_ULPS: u32 = 9;
 
     /// Every box test of the program. The first one is the default: 2⁻¹⁹ is more than twice
-    /// [`super::triangle::TRIANGLE_PAD`].
+    /// `TRIANGLE_PAD`.
     pub const ALL: [BoxTest; 6] = [
         Self::padded(
             16,
@@ -190,8 +194,8 @@ impl Deref for Reciprocal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::ray::SMALLEST_SLOPE;
-    use crate::accel::triangle::Compensated;
+    use crate::ray::SMALLEST_SLOPE;
+    use crate::triangle::Compensated;
 
     #[test]
     fn the_default_pad_is_two_to_the_minus_nineteen() {
@@ -201,7 +205,7 @@ mod tests {
 
     #[test]
     fn what_an_experiment_says_nothing_of_are_the_default_tests() {
-        use crate::config::Axis;
+        use raystone_config::Axis;
         let tests = Intersection::default();
         let names = [Axis::Triangle, Axis::BoxTest].map(Axis::default_name);
         assert_eq!(

@@ -9,21 +9,21 @@ use super::watch;
 use super::{AccelError, NamedWords, TriangleSoup};
 
 /// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
-pub const LEAF: u32 = 0x8000_0000;
+pub(crate) const LEAF: u32 = 0x8000_0000;
 /// Where the count of a leaf stands in its reference.
-pub const COUNT_SHIFT: u32 = 26;
+pub(crate) const COUNT_SHIFT: u32 = 26;
 /// Most triangles in a leaf.
-pub const COUNT_MASK: u32 = 31;
+pub(crate) const COUNT_MASK: u32 = 31;
 /// Greatest first place.
-pub const FIRST_MASK: u32 = 0x03ff_ffff;
+pub(crate) const FIRST_MASK: u32 = 0x03ff_ffff;
 
 /// The reference to a leaf.
-pub fn leaf_reference(first: u32, count: u32) -> u32 {
+pub(crate) fn leaf_reference(first: u32, count: u32) -> u32 {
     LEAF | count << COUNT_SHIFT | first
 }
 
 /// First place and number of triangles of a leaf.
-pub fn leaf_range(reference: u32) -> (usize, usize) {
+pub(crate) fn leaf_range(reference: u32) -> (usize, usize) {
     (
         (reference & FIRST_MASK) as usize,
         (reference >> COUNT_SHIFT & COUNT_MASK) as usize,
@@ -32,7 +32,7 @@ pub fn leaf_range(reference: u32) -> (usize, usize) {
 
 /// The triangles of all leaves, leaf by leaf.
 #[derive(Debug, Clone)]
-pub enum Leaves {
+pub(crate) enum Leaves {
     /// Copies of the records.
     Gathered(Vec<TriangleRecord>),
     /// Indices of the scene's triangles.
@@ -44,7 +44,11 @@ impl Leaves {
     ///
     /// # Errors
     /// More entries than a reference can address, with both numbers.
-    pub fn new(soup: &TriangleSoup, order: &[u32], indexed: bool) -> Result<Self, AccelError> {
+    pub(crate) fn new(
+        soup: &TriangleSoup,
+        order: &[u32],
+        indexed: bool,
+    ) -> Result<Self, AccelError> {
         AccelError::check_limit("triangles in the leaves", order.len() as u64, FIRST_MASK)?;
         let record = |&id: &u32| soup.records[id as usize];
         Ok(if indexed {
@@ -55,7 +59,7 @@ impl Leaves {
     }
 
     /// Features of kernels that read these leaves.
-    pub fn features(&self) -> &'static [&'static str] {
+    pub(crate) fn features(&self) -> &'static [&'static str] {
         match self {
             Self::Gathered(_) => &[],
             Self::Indexed(_) => &["indexed_triangles"],
@@ -63,7 +67,7 @@ impl Leaves {
     }
 
     /// The array for the GPU.
-    pub fn words(&self) -> NamedWords<'_> {
+    pub(crate) fn words(&self) -> NamedWords<'_> {
         match self {
             Self::Gathered(records) => NamedWords::new("leaf_triangles", records),
             Self::Indexed(indices) => NamedWords::new("leaf_indices", indices),
@@ -71,7 +75,7 @@ impl Leaves {
     }
 
     /// Bytes of the array.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Gathered(records) => size_of_val(&records[..]),
             Self::Indexed(indices) => size_of_val(&indices[..]),
@@ -82,7 +86,7 @@ impl Leaves {
     ///
     /// # Errors
     /// The leaf lies outside the array, or what [`Coverage::leaf`] finds.
-    pub fn cover(
+    pub(crate) fn cover(
         &self,
         coverage: &mut Coverage,
         soup: &TriangleSoup,
@@ -105,7 +109,7 @@ impl Leaves {
 
 /// The leaves of a structure with the triangles they were built over, as twins read them.
 #[derive(Clone, Copy)]
-pub struct LeafReader<'a> {
+pub(crate) struct LeafReader<'a> {
     /// The leaves.
     pub leaves: &'a Leaves,
     /// The scene's triangles.
@@ -114,7 +118,7 @@ pub struct LeafReader<'a> {
 
 impl LeafReader<'_> {
     /// The triangle at a place.
-    pub fn load_leaf_triangle(&self, place: usize) -> &TriangleRecord {
+    pub(crate) fn load_leaf_triangle(&self, place: usize) -> &TriangleRecord {
         match self.leaves {
             Leaves::Gathered(records) => &records[place],
             Leaves::Indexed(indices) => &self.soup.records[*watch::read(&indices[place]) as usize],
@@ -122,7 +126,7 @@ impl LeafReader<'_> {
     }
 
     /// Tests the triangles of the leaf that `reference` names.
-    pub fn test_leaf(self, reference: u32, walk: &mut Walk) {
+    pub(crate) fn test_leaf(self, reference: u32, walk: &mut Walk) {
         let (first, count) = leaf_range(reference);
         for place in first..first + count {
             walk.test(self.load_leaf_triangle(place));

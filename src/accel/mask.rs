@@ -8,12 +8,12 @@
 //! of 8 bits, the comparison with the threshold. Kernels and twins cannot differ where weights do not.
 
 use super::triangle::TriangleRecord;
-use crate::scene::{AlphaMask, SceneData, Texture, Wrap};
 use glam::DVec2;
+use raystone_scene::{AlphaMask, SceneData, Texture, Wrap};
 use std::collections::BTreeMap;
 
 /// Set in the word of the material where a record's triangle has a mask: the place of its words then.
-pub const MASKED: u32 = 0x8000_0000;
+pub(crate) const MASKED: u32 = 0x8000_0000;
 const MIRRORED: u32 = 1;
 const CLAMPED: u32 = 2;
 /// The weight of a corner in its own point.
@@ -130,7 +130,7 @@ impl Masks {
     }
 
     /// Whether two triangles, given by the words of their materials, have the same parts cut out.
-    pub fn cut_alike(&self, one: u32, other: u32) -> bool {
+    pub(crate) fn cut_alike(&self, one: u32, other: u32) -> bool {
         let cut = |word: u32| {
             let own = (word >= MASKED).then_some(word & !MASKED)?;
             let [x2, y2, image, _] = self.row(own + 1);

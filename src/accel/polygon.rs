@@ -13,7 +13,7 @@ pub(super) struct Polygon {
 
 impl Polygon {
     /// A triangle.
-    pub fn new(triangle: &TriangleRecord) -> Self {
+    pub(crate) fn new(triangle: &TriangleRecord) -> Self {
         let mut corners = [[0.0; 3]; 9];
         for (corner, vertex) in corners.iter_mut().zip(triangle.vertices()) {
             *corner = vertex.map(f64::from);
@@ -22,12 +22,12 @@ impl Polygon {
     }
 
     /// Its corners; none if nothing is left.
-    pub fn corners(&self) -> &[[f64; 3]] {
+    pub(crate) fn corners(&self) -> &[[f64; 3]] {
         &self.corners[..self.count]
     }
 
     /// Its area.
-    pub fn area(&self) -> f64 {
+    pub(crate) fn area(&self) -> f64 {
         let [origin, rest @ ..] = self.corners() else {
             return 0.0;
         };
@@ -41,7 +41,7 @@ impl Polygon {
 
     /// The part inside a box that is grown by `margin` (I. Sutherland, G. Hodgman, "Reentrant polygon
     /// clipping", 1974).
-    pub fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
+    pub(crate) fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
         let mut polygon = *self;
         for axis in 0..3 {
             for (border, sign) in [
@@ -58,7 +58,7 @@ impl Polygon {
     }
 
     /// Leaves the part where `sign · (x − border)` is not negative.
-    pub fn cut(&mut self, axis: usize, border: f64, sign: f64) {
+    pub(crate) fn cut(&mut self, axis: usize, border: f64, sign: f64) {
         let before = *self;
         self.count = 0;
         let mut push = |corner| {
@@ -94,7 +94,7 @@ impl Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::fixtures::record;
+    use crate::fixtures::record;
 
     const UNIT: Bounds = Bounds {
         min: [0.0; 3],

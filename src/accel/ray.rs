@@ -1,24 +1,20 @@
 //! Rays and hits as kernels see them. Twin of `kernels/accel/ray.wesl`.
 
-pub use crate::geometry::Ray;
 use bytemuck::{Pod, Zeroable};
+pub use raystone_core::geometry::{Ray, SMALLEST_DIRECTION};
 use std::fmt;
 
 /// Triangle index of a miss.
 pub const NO_HIT: u32 = u32::MAX;
 
-/// A direction needs a component of this length, 2⁻⁵⁶: what [`SMALLEST_COMPONENT`] adds to a shorter one
-/// would be more than rounding.
-pub const SMALLEST_DIRECTION: f32 = 1.387_778_8e-17;
-
 /// The least component of a raised direction, 2⁻⁸⁴, so that the reciprocal is finite: WGSL promises no
 /// infinity. With coordinates up to 1e12 (checked when a scene is loaded), twice that for a cell around
 /// them, `(bounds - origin) / SMALLEST_COMPONENT` stays below the largest f32.
-pub const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
+pub(crate) const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
 
 /// The least component of a raised direction against its longest, 2⁻⁶⁰: far less than rounding, and its
 /// square is not yet denormal.
-pub const SMALLEST_SLOPE: f32 = 8.673_617_4e-19;
+pub(crate) const SMALLEST_SLOPE: f32 = 8.673_617_4e-19;
 
 /// The nearest hit, 16 bytes, the layout of the hit buffers.
 #[repr(C)]
@@ -32,20 +28,6 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric weight of the third vertex.
     pub v: f32,
-}
-
-impl Ray {
-    /// Whether it is a ray at all: origin and direction finite, a component of the direction at least
-    /// [`SMALLEST_DIRECTION`], ends that are numbers. Anything else hits nothing. Twin: `is_ray` in
-    /// `kernels/integrator/trace_rays.wesl`.
-    pub fn is_ray(&self) -> bool {
-        let greatest = |x: [f32; 3]| x.map(f32::abs).into_iter().fold(0.0, f32::max);
-        let finite = self.origin.iter().chain(&self.direction);
-        finite.into_iter().all(|x| x.is_finite())
-            && greatest(self.direction) >= SMALLEST_DIRECTION
-            && !self.t_min.is_nan()
-            && !self.t_max.is_nan()
-    }
 }
 
 impl Hit {

@@ -5,7 +5,7 @@ use super::triangle::{
     BaldwinWeber, Compensated, MoellerTrumbore, Pluecker, TriangleTest, Watertight,
 };
 use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
-use crate::params::{Kinds, Named, ParameterSchema, Sources};
+use raystone_core::params::{Kinds, Named, ParameterSchema, Sources};
 
 /// Everything that can be named on the `accel` axis.
 pub type AccelRegistry = Kinds<dyn AccelKind>;
@@ -14,10 +14,10 @@ pub type TriangleRegistry = Kinds<dyn TriangleTest>;
 /// Everything that can be named on the `box_test` axis.
 pub type BoxRegistry = Kinds<BoxTest>;
 
-impl Default for AccelRegistry {
-    fn default() -> Self {
-        Self::new([
-            &BruteForce as &dyn AccelKind,
+impl Named for dyn AccelKind {
+    fn built_in() -> Vec<&'static Self> {
+        vec![
+            &BruteForce,
             &super::Bvh,
             &RopedBvh,
             &super::Bvh4,
@@ -29,29 +29,9 @@ impl Default for AccelRegistry {
             &KdTree,
             &super::ObjectList,
             &super::MetaBvh,
-        ])
+        ]
     }
-}
 
-impl Default for TriangleRegistry {
-    fn default() -> Self {
-        Self::new([
-            &MoellerTrumbore as &dyn TriangleTest,
-            &BaldwinWeber,
-            &Pluecker,
-            &Watertight,
-            &Compensated,
-        ])
-    }
-}
-
-impl Default for BoxRegistry {
-    fn default() -> Self {
-        Self::new(&BoxTest::ALL)
-    }
-}
-
-impl Named for dyn AccelKind {
     fn name(&self) -> &'static str {
         AccelKind::name(self)
     }
@@ -70,6 +50,16 @@ impl Named for dyn AccelKind {
 }
 
 impl Named for dyn TriangleTest {
+    fn built_in() -> Vec<&'static Self> {
+        vec![
+            &MoellerTrumbore,
+            &BaldwinWeber,
+            &Pluecker,
+            &Watertight,
+            &Compensated,
+        ]
+    }
+
     fn name(&self) -> &'static str {
         TriangleTest::name(self)
     }

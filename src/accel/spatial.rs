@@ -37,7 +37,7 @@ pub(super) struct Margin {
 
 impl Margin {
     /// Margins in a scene with this box.
-    pub fn new(bounds: &Bounds) -> Self {
+    pub(crate) fn new(bounds: &Bounds) -> Self {
         let extent = bounds.extent().map(f64::from);
         let diagonal = extent.iter().map(|e| e * e).sum::<f64>().sqrt();
         let far = (0..3)
@@ -51,7 +51,7 @@ impl Margin {
     }
 
     /// The margin of one triangle, scene units; beyond everything if it has no area.
-    pub fn of(&self, record: &TriangleRecord) -> f64 {
+    pub(crate) fn of(&self, record: &TriangleRecord) -> f64 {
         let [e1, e2] = record.edges();
         let (mut products, mut normal) = (0.0, 0.0);
         for a in 0..3 {
@@ -90,7 +90,7 @@ pub(super) struct Overlap {
 
 impl Overlap {
     /// For boxes with these half extents.
-    pub fn new(corners: &Corners, half: [f64; 3]) -> Self {
+    pub(crate) fn new(corners: &Corners, half: [f64; 3]) -> Self {
         let edges: Corners = std::array::from_fn(|i| {
             std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
         });
@@ -117,7 +117,7 @@ impl Overlap {
     }
 
     /// Whether the triangle touches the box around `centre`.
-    pub fn touches(&self, centre: [f64; 3]) -> bool {
+    pub(crate) fn touches(&self, centre: [f64; 3]) -> bool {
         let within = |[low, high]: [f64; 2], x: f64| low <= x && x <= high;
         within(self.on_normal, dot(centre, self.normal))
             && self
@@ -189,7 +189,7 @@ fn rounded_down(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::fixtures::record;
+    use crate::fixtures::record;
 
     const CORNER: Corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn clipped_bounds_are_those_of_exact_arithmetic_rounded_outwards() {
-        let mut random = crate::random::Pcg32::new(3);
+        let mut random = raystone_core::random::Pcg32::new(3);
         let mut at = |range: usize| random.below(range) as i128 - 40;
         let (mut cut, mut missed, mut touches) = (0, 0, 0);
         for _ in 0..4000 {

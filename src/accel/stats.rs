@@ -1,64 +1,11 @@
 //! What building a structure took, and static figures of what was built.
 
 use super::AccelError;
-use crate::gpu::{Gpu, Played, Player, Recording};
-use crate::scene::LEAST_BINDING;
-use serde::{Deserialize, Serialize};
+use raystone_core::clock::Instant;
+use raystone_core::structure::Phase;
+use raystone_gpu::{Gpu, Played, Player, Recording};
+use raystone_scene::LEAST_BINDING;
 use std::sync::Arc;
-use std::time::Instant;
-
-/// A timed phase of a build.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Phase {
-    /// For instance `bounds`, `binned-sah`, `layout`.
-    pub name: String,
-    /// Milliseconds: wall time, or GPU time of a pass on the device.
-    pub ms: f64,
-}
-
-/// Static figures of a built structure.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct StructureStats {
-    /// Nodes (inner and leaf) or cells.
-    pub nodes: u64,
-    /// Leaves or non-empty cells.
-    pub leaves: u64,
-    /// Triangle references held by leaves or cells.
-    pub references: u64,
-    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
-    /// index is counted there. Empty where not known.
-    #[serde(default)]
-    pub leaf_histogram: Vec<u64>,
-    /// Deepest leaf (root = 0); absent for flat structures.
-    pub depth: Option<u32>,
-    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
-    pub sah_cost: Option<f64>,
-    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
-    /// an estimate from a part of the triangles.
-    #[serde(default)]
-    pub epo: Option<f64>,
-    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
-    pub bytes: u64,
-}
-
-impl StructureStats {
-    /// Leaves, references and histogram of leaves or cells that list so many triangles; all else is left 0.
-    /// Those that list none are no leaves.
-    pub(super) fn of_leaves(counts: impl Iterator<Item = usize>) -> Self {
-        let mut stats = Self::default();
-        let histogram = &mut stats.leaf_histogram;
-        for count in counts {
-            let place = count.min(LEAF_HISTOGRAM_END);
-            if histogram.len() <= place {
-                histogram.resize(place + 1, 0);
-            }
-            histogram[place] += 1;
-            stats.leaves += u64::from(count > 0);
-            stats.references += count as u64;
-        }
-        stats
-    }
-}
 
 /// Timed phases of a build, and the device for those that use it.
 #[derive(Clone, Default)]
@@ -90,7 +37,7 @@ impl BuildLog {
     }
 
     /// Words that an array may have: what the adapter binds, or every adapter where there is none.
-    pub fn most_words(&self) -> u64 {
+    pub(crate) fn most_words(&self) -> u64 {
         let limits = self.gpu().map(|gpu| &gpu.limits);
         let bound = limits.map(|l| l.max_storage_buffer_binding_size.min(l.max_buffer_size));
         self.binding.or(bound).unwrap_or(LEAST_BINDING) / 4
@@ -98,7 +45,7 @@ impl BuildLog {
 
     /// A log without phases for parts that are built side by side, on the same device.
     #[must_use]
-    pub fn of_a_part(&self) -> Self {
+    pub(crate) fn of_a_part(&self) -> Self {
         Self {
             phases: Vec::new(),
             player: self.player.clone(),
@@ -168,6 +115,3 @@ impl BuildLog {
         self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
     }
 }
-
-/// Longest entry of a leaf histogram; more references than this are counted there.
-pub const LEAF_HISTOGRAM_END: usize = 32;

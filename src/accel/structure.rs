@@ -2,7 +2,7 @@
 
 use super::tree::Tree;
 use super::{AccelError, AccelKind, BuildLog, BuildResult, TriangleSoup};
-use crate::params::{ParameterSchema, Parameters, Params, Sources};
+use raystone_core::params::{ParameterSchema, Parameters, Params, Sources};
 
 /// A registry entry whose name and parameters are known at compile time. Every one is an [`AccelKind`].
 pub trait Structure: Sync {
@@ -12,7 +12,7 @@ pub trait Structure: Sync {
     const DESCRIPTION: &'static str;
     /// See [`AccelKind::sources`].
     const SOURCES: Sources = &[];
-    /// What it can be set to, declared by [`parameters!`](crate::parameters).
+    /// What it can be set to, declared by [`parameters!`](raystone_core::parameters).
     type Parameters: Parameters;
 
     /// Builds the structure; phases are timed in `log`.
@@ -82,14 +82,14 @@ impl<S: Structure> AccelKind for S {
 
 /// What the files of structures name, whatever they build.
 pub(super) mod prelude {
-    pub use super::super::bounds::Bounds;
-    pub use super::super::ray::{Hit, Ray};
-    pub use super::super::twin::{CpuTwin, Traverse, Twin, Walk};
-    pub use super::super::{
+    pub(crate) use super::super::bounds::Bounds;
+    pub(crate) use super::super::ray::{Hit, Ray};
+    pub(crate) use super::super::twin::{CpuTwin, Traverse, Twin, Walk};
+    pub(crate) use super::super::{
         AccelError, BuildLog, BuildResult, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
         TriangleSoup, limits,
     };
-    pub use super::{OverTree, Structure};
-    pub use crate::parameters;
-    pub use crate::params::{Parameters as _, Params};
+    pub(crate) use super::{OverTree, Structure};
+    pub(crate) use raystone_core::parameters;
+    pub(crate) use raystone_core::params::{Parameters as _, Params};
 }

@@ -10,19 +10,7 @@ use super::mask::Masks;
 use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::{TriangleRecord, intersect_triangle};
 use super::watch;
-
-/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Nodes or cells visited.
-    pub nodes: u32,
-    /// Ray–box tests.
-    pub box_tests: u32,
-    /// Ray–triangle tests.
-    pub triangle_tests: u32,
-    /// Deepest stack, entries.
-    pub stack_high_water: u32,
-}
+use raystone_core::structure::Counters;
 
 /// One ray on its way through a structure, with what is asked and what was found so far.
 pub struct Walk<'a> {
@@ -74,12 +62,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Notes how many entries the stack has.
-    pub fn count_stack(&mut self, entries: usize) {
+    pub(crate) fn count_stack(&mut self, entries: usize) {
         let highest = &mut self.counters.stack_high_water;
         *highest = (*highest).max(entries as u32);
     }
 
-    /// Distance at which the ray enters a box before the hit so far, or `None`; see [`enter_box`].
+    /// Distance at which the ray enters a box before the hit so far, or `None`; see `enter_box`.
     pub fn enter(&mut self, bounds: &Bounds) -> Option<f32> {
         self.counters.box_tests += 1;
         enter_box(bounds, &self.ray, self.inverse, self.hit.t)
@@ -93,7 +81,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Tests the triangles of a list.
-    pub fn test_list(&mut self, soup: &TriangleSoup, ids: &[u32]) {
+    pub(crate) fn test_list(&mut self, soup: &TriangleSoup, ids: &[u32]) {
         for id in watch::each(ids) {
             self.test(&soup.records[id as usize]);
         }

@@ -29,7 +29,7 @@ parameters! {
 }
 
 /// The registry entry.
-pub struct TwoLevelGrid;
+pub(crate) struct TwoLevelGrid;
 
 impl Structure for TwoLevelGrid {
     const NAME: &'static str = "two-level-grid";

@@ -30,7 +30,7 @@ parameters! {
     }
 
     /// How empty space is left.
-    pub enum Skip {
+    pub(crate) enum Skip {
         /// Cell by cell.
         None = "none",
         /// By the Chebyshev distance to the nearest list.
@@ -39,7 +39,7 @@ parameters! {
 }
 
 /// The registry entry.
-pub struct UniformGrid;
+pub(crate) struct UniformGrid;
 
 impl Structure for UniformGrid {
     const NAME: &'static str = "uniform-grid";

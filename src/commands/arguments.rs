@@ -26,6 +26,7 @@ impl DeviceArguments {
     /// Options of the library; a progress bar needs a terminal.
     pub fn options(&self, out: PathBuf, values: &ValueArguments, quiet: bool) -> RunOptions {
         RunOptions {
+            program: raystone::PROGRAM,
             out,
             allow_outside: values.allow_outside,
             adapter: self.adapter.clone().unwrap_or_default(),

@@ -199,6 +199,7 @@ impl Compare {
         let adapter = self.adapter.as_deref().map(str::parse::<AdapterChoice>);
         let adapter = adapter.transpose().map_err(|e| anyhow!("--adapter: {e}"))?;
         let options = RunOptions {
+            program: raystone::PROGRAM,
             out,
             existing: if self.out.is_some() {
                 Existing::Refuse

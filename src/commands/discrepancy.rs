@@ -4,7 +4,7 @@ use super::output::print_json;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use raystone::discrepancy::{Budget, DiscrepancyError, Measure, PointSet, Value, measure};
-use raystone::text::nearest;
+use raystone::text::{nearest, plain_text};
 use serde_json::{Map, json};
 use std::io::Read as _;
 use std::path::PathBuf;
@@ -66,7 +66,9 @@ impl Discrepancy {
             (self.file.display().to_string(), std::fs::read(&self.file))
         };
         let bytes = bytes.with_context(|| format!("cannot read {name}"))?;
-        let points = PointSet::from_bytes(&bytes).map_err(|error| match error {
+        let text = plain_text(bytes)
+            .map_err(|error| anyhow!("{name}:{}: it is not UTF-8 text", error.line))?;
+        let points = PointSet::parse(&text).map_err(|error| match error {
             DiscrepancyError::Line { line, reason } => anyhow!("{name}:{line}: {reason}"),
             error => anyhow!("{name}: {error}"),
         })?;

@@ -33,6 +33,7 @@ impl Explain {
         let inventory = Inventory::read(&self.dir, &registries)?;
         let state = self.find(&inventory)?;
         let options = RunOptions {
+            program: raystone::PROGRAM,
             allow_outside: self.allow_outside,
             ..RunOptions::default()
         };

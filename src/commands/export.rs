@@ -5,8 +5,9 @@ use super::output::{print, warn};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use raystone::config::{Axis, Experiment};
+use raystone::measure::mitsuba::{MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 use raystone::run::Registries;
-use raystone::scene::{LoadOptions, MITSUBA_FILE, MitsubaSettings, export_mitsuba, load};
+use raystone::scene::{LoadOptions, load};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -78,7 +79,7 @@ impl ExportMitsuba {
         })?;
         let own = || scene.view(experiment.aspect());
         let camera = experiment.camera.unwrap_or_else(own);
-        camera.validate()?;
+        raystone::scene::check_camera(&camera)?;
         let settings = MitsubaSettings {
             camera,
             size: experiment.resolution,

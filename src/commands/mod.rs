@@ -35,6 +35,7 @@ mod verify_run;
 mod compare;
 
 use clap::{Parser, Subcommand};
+use raystone::program::Program;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
@@ -57,9 +58,13 @@ Examples:
 
 /// Version, commit and whether the sources differed from it.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let version = env!("CARGO_PKG_VERSION");
-    let dirty = option_env!("RAYSTONE_DIRTY") == Some("true");
-    match option_env!("RAYSTONE_COMMIT") {
+    let Program {
+        version,
+        commit,
+        dirty,
+    } = raystone::PROGRAM;
+    let dirty = dirty == Some(true);
+    match commit {
         Some(commit) if dirty => format!("{version} (commit {commit} with changes)"),
         Some(commit) => format!("{version} (commit {commit})"),
         None => version.to_owned(),

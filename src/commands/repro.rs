@@ -80,7 +80,9 @@ impl Repro {
             force: self.force,
         };
         let registries = Registries::default();
+        let catalogue = registries.catalogue();
         let options = RunOptions {
+            program: raystone::PROGRAM,
             adapter: self.adapter.clone().unwrap_or_default(),
             warn: Some(super::output::warn),
             cache: user_cache(),
@@ -93,7 +95,7 @@ impl Repro {
         for (index, source) in sources.iter().enumerate() {
             let mine = self.shard.is_none_or(|[i, n]| index % n == i);
             let found = match self.pages || !mine {
-                true => recorded(source, &settings, &registries),
+                true => recorded(source, &settings, &catalogue).map_err(ReproError::from),
                 false => {
                     tell(&format!(
                         "{} ({} of {})",

@@ -100,6 +100,7 @@ impl Stress {
 
     fn settings(&self) -> StressOptions {
         let mut settings = StressOptions::new(self.quick);
+        settings.program = raystone::PROGRAM;
         settings.seed = self.seed;
         settings.families = self.family.clone();
         settings.accels = self.accel.clone();

@@ -1,6 +1,6 @@
 //! The machine: operating system, processor, and how a driver is installed there.
 
-use raystone::gpu::cpu_model;
+use raystone::measure::environment::cpu_model;
 use std::fmt::Write as _;
 
 /// Environment variables that change which adapter answers and how fast it is.

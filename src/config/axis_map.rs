@@ -12,7 +12,7 @@ impl<T> AxisMap<T> {
     ///
     /// # Errors
     /// The first one of `make`.
-    pub fn try_new<E>(make: impl FnMut(Axis) -> Result<T, E>) -> Result<Self, E>
+    pub(crate) fn try_new<E>(make: impl FnMut(Axis) -> Result<T, E>) -> Result<Self, E>
     where
         T: Default,
     {

@@ -2,7 +2,7 @@
 
 use super::axis_map::AxisMap;
 use super::keys::Axis;
-use crate::params::{Params, Variant};
+use raystone_core::params::{Params, Variant};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Index;
@@ -59,7 +59,7 @@ impl Cell {
     /// What the times of a ray caster of others depend on.
     pub const PEER: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Peer];
     /// What an image and its time depend on.
-    pub const FULL: [Axis; 11] = [
+    pub(crate) const FULL: [Axis; 11] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
@@ -73,7 +73,7 @@ impl Cell {
         Axis::Kernels,
     ];
     /// What the compaction of a stream depends on.
-    pub const COMPACTION: [Axis; 2] = [Axis::Integrator, Axis::Kernels];
+    pub(crate) const COMPACTION: [Axis; 2] = [Axis::Integrator, Axis::Kernels];
     /// What the words that a sampler draws depend on.
     pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
     /// What is loaded, uploaded and judged once for all cells on it.

@@ -1,6 +1,6 @@
 //! What can be wrong with an experiment, said with the key, the place and what to do.
 
-use crate::text::nearest;
+use raystone_core::text::nearest;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;

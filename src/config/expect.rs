@@ -6,7 +6,7 @@
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
-use crate::text::nearest;
+use raystone_core::text::nearest;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -101,7 +101,7 @@ pub struct Expect {
     /// Hypotheses of the digest that it tests, for instance `H5`.
     #[serde(default)]
     pub claims: Vec<String>,
-    /// The figure, see [`crate::measure`]'s table of figures.
+    /// The figure, see `measure`'s table of figures.
     pub figure: String,
     /// How values are compared.
     pub compare: Compare,

@@ -322,7 +322,8 @@ pub const KEYS: &[KeyRow] = &[
 ];
 
 /// Sections that may be absent altogether; their defaults apply only when they are used.
-pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "include", "coherence", "animation"];
+pub(crate) const OPTIONAL_SECTIONS: &[&str] =
+    &["camera", "exclude", "include", "coherence", "animation"];
 
 /// The row of a key, if there is one.
 pub fn find(section: &str, name: &str) -> Option<&'static KeyRow> {
@@ -339,7 +340,7 @@ pub fn sections() -> Vec<&'static str> {
 }
 
 /// Names of the keys of one section.
-pub fn names_in(section: &str) -> Vec<&'static str> {
+pub(crate) fn names_in(section: &str) -> Vec<&'static str> {
     KEYS.iter()
         .filter(|key| key.section == section)
         .map(|key| key.name)

@@ -14,8 +14,8 @@ use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
 use super::variants::WHEN;
 use super::{Catalogue, expect, variants};
-use crate::geometry::Camera;
-use crate::params::{Entry, Variant};
+use raystone_core::geometry::Camera;
+use raystone_core::params::{Entry, Variant};
 use std::path::{Path, PathBuf};
 
 /// Parses and checks an experiment; see [`Experiment::parse`].

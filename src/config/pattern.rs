@@ -1,6 +1,6 @@
 //! Patterns that choose variants: names with `*`, optionally negated.
 
-use crate::params::Variant;
+use raystone_core::params::Variant;
 use std::fmt;
 
 /// Chooses variants of one axis: a name, a label, or either with `*` for any text; a leading `!`
@@ -67,7 +67,7 @@ fn glob_matches(glob: &str, text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::Params;
+    use raystone_core::params::Params;
 
     #[test]
     fn a_star_stands_for_any_text() {

@@ -11,7 +11,7 @@ use super::keys::Axis;
 use super::product::{
     Filter, Point, asked_once, check_size, excluded, included, product, refused, shared, unmet,
 };
-use crate::params::Variant;
+use raystone_core::params::Variant;
 use std::collections::HashSet;
 use std::fmt::{self, Write as _};
 
@@ -37,13 +37,13 @@ pub struct Plan {
     pub structures: Vec<Cell>,
     /// Samplers whose error is measured: see [`Cell::SAMPLER`].
     pub samplers: Vec<Cell>,
-    /// Full cells whose time is measured: see [`Cell::FULL`].
+    /// Full cells whose time is measured: see `FULL`.
     pub times: Vec<Cell>,
     /// Ray casters of others that are timed: see [`Cell::PEER`].
     pub peers: Vec<Cell>,
     /// Streams whose discrepancy is measured: see [`Cell::STREAM`].
     pub streams: Vec<Cell>,
-    /// Compactions of streams that are judged and timed: see [`Cell::COMPACTION`].
+    /// Compactions of streams that are judged and timed: see `COMPACTION`.
     pub compactions: Vec<Cell>,
     /// What is left out.
     pub skipped: Vec<Skipped>,

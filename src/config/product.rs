@@ -8,8 +8,8 @@ use super::experiment::{Axes, CellSet, Condition, Experiment};
 use super::keys::Axis;
 use super::pattern::Pattern;
 use super::plan::Skipped;
-use crate::params::Variant;
-use crate::text::nearest;
+use raystone_core::params::Variant;
+use raystone_core::text::nearest;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -74,12 +74,12 @@ impl Point<'_> {
     }
 
     /// Why its sequence and decorrelation make no sense together, if it has both and they do not.
-    pub fn refusal(&self, is_randomised: &impl IsRandomised) -> Option<String> {
+    pub(crate) fn refusal(&self, is_randomised: &impl IsRandomised) -> Option<String> {
         let sequence = self.get(Axis::Sequence)?;
         is_randomised(sequence, self.get(Axis::Decorrelation)?).err()
     }
 
-    pub fn cell(&self, is_randomised: &impl IsRandomised) -> Cell {
+    pub(crate) fn cell(&self, is_randomised: &impl IsRandomised) -> Cell {
         let variants = self.0.iter();
         let variants = variants.filter_map(|(axis, variant)| Some((axis, (*variant)?)));
         let mut cell = variants.fold(Cell::default(), |cell, (axis, variant)| {
@@ -224,7 +224,7 @@ impl Experiment {
 pub(super) struct Filter(Vec<(Axis, Vec<Pattern>)>);
 
 impl Filter {
-    pub fn parse(only: &[String], axes: &Axes) -> Result<Self, ConfigError> {
+    pub(crate) fn parse(only: &[String], axes: &Axes) -> Result<Self, ConfigError> {
         let mut filter: Vec<(Axis, Vec<Pattern>)> = Vec::new();
         for text in only.iter().flat_map(|text| split_outside_brackets(text)) {
             let fault = |problem: String| ConfigError::Only {
@@ -262,7 +262,7 @@ impl Filter {
     }
 
     /// Whether the point fits on every filtered axis that it has.
-    pub fn fits(&self, point: &Point) -> bool {
+    pub(crate) fn fits(&self, point: &Point) -> bool {
         self.0.iter().all(|(axis, patterns)| {
             let variant = point.get(*axis);
             variant.is_none_or(|variant| patterns.iter().any(|p| p.matches(variant)))

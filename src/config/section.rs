@@ -15,17 +15,17 @@ pub(super) struct Section<'t> {
 }
 
 impl<'t> Section<'t> {
-    pub fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.table.contains_key(name)
     }
 
     /// Where a key was written; where its section was, if the key is absent.
-    pub fn place(&self, name: &str) -> Place {
+    pub(crate) fn place(&self, name: &str) -> Place {
         let item = self.table.get(name);
         item.map_or_else(|| self.at.clone(), |item| item.at.clone())
     }
 
-    pub fn item(&self, name: &str) -> Result<&'t Item, ConfigError> {
+    pub(crate) fn item(&self, name: &str) -> Result<&'t Item, ConfigError> {
         let key = self.key(name);
         self.table.get(name).ok_or_else(|| ConfigError::Missing {
             at: match &self.at {
@@ -72,7 +72,7 @@ impl<'t> Section<'t> {
     }
 
     /// The error for a value that its own range allows and another key forbids.
-    pub fn not_allowed(&self, name: &str, expected: &str) -> ConfigError {
+    pub(crate) fn not_allowed(&self, name: &str, expected: &str) -> ConfigError {
         let value = self.table.get(name).map(|item| item.value.describe());
         ConfigError::OutOfRange {
             at: self.place(name),
@@ -82,7 +82,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    pub fn text(&self, name: &str) -> Result<&'t str, ConfigError> {
+    pub(crate) fn text(&self, name: &str) -> Result<&'t str, ConfigError> {
         let item = self.item(name)?;
         match &item.value {
             Value::Text(text) if text.is_empty() => Err(self.out_of_range(name, &item.at, "\"\"")),
@@ -91,7 +91,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    pub fn flag(&self, name: &str) -> Result<bool, ConfigError> {
+    pub(crate) fn flag(&self, name: &str) -> Result<bool, ConfigError> {
         let item = self.item(name)?;
         match item.value {
             Value::Flag(flag) => Ok(flag),
@@ -99,7 +99,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    pub fn number(&self, name: &str) -> Result<f64, ConfigError> {
+    pub(crate) fn number(&self, name: &str) -> Result<f64, ConfigError> {
         let item = self.item(name)?;
         let x = number(item).ok_or_else(|| self.wrong_type(name, item))?;
         match self.key(name).kind {
@@ -108,7 +108,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    pub fn integer(&self, name: &str) -> Result<i64, ConfigError> {
+    pub(crate) fn integer(&self, name: &str) -> Result<i64, ConfigError> {
         let item = self.item(name)?;
         let Value::Integer(x) = item.value else {
             return Err(self.wrong_type(name, item));
@@ -124,13 +124,13 @@ impl<'t> Section<'t> {
         }
     }
 
-    pub fn unsigned(&self, name: &str) -> Result<u32, ConfigError> {
+    pub(crate) fn unsigned(&self, name: &str) -> Result<u32, ConfigError> {
         let x = self.integer(name)?;
         u32::try_from(x).map_err(|_| self.out_of_range(name, &self.place(name), x))
     }
 
     /// Place of a word among those of its key.
-    pub fn word(&self, name: &str) -> Result<usize, ConfigError> {
+    pub(crate) fn word(&self, name: &str) -> Result<usize, ConfigError> {
         let word = self.text(name)?;
         let place = match self.key(name).kind {
             ValueKind::Word(words) => words.iter().position(|known| *known == word),
@@ -139,7 +139,7 @@ impl<'t> Section<'t> {
         place.ok_or_else(|| self.out_of_range(name, &self.place(name), format!("\"{word}\"")))
     }
 
-    pub fn unsigned_pair(&self, name: &str) -> Result<[u32; 2], ConfigError> {
+    pub(crate) fn unsigned_pair(&self, name: &str) -> Result<[u32; 2], ConfigError> {
         let item = self.item(name)?;
         let ValueKind::IntegerPair { min, max } = self.key(name).kind else {
             return Err(self.wrong_type(name, item));
@@ -165,7 +165,7 @@ impl<'t> Section<'t> {
         Ok([unsigned(first)?, unsigned(second)?])
     }
 
-    pub fn counts(&self, name: &str) -> Result<SppCounts, ConfigError> {
+    pub(crate) fn counts(&self, name: &str) -> Result<SppCounts, ConfigError> {
         let item = self.item(name)?;
         let ValueKind::Counts { max_exponent: max } = self.key(name).kind else {
             return Err(self.wrong_type(name, item));
@@ -211,7 +211,7 @@ impl<'t> Section<'t> {
         SppCounts::new(counts).ok_or_else(|| self.out_of_range(name, &list.at, written))
     }
 
-    pub fn stop_rule(&self, name: &str) -> Result<StopRule, ConfigError> {
+    pub(crate) fn stop_rule(&self, name: &str) -> Result<StopRule, ConfigError> {
         let item = self.item(name)?;
         let Value::Table(table) = &item.value else {
             return Err(self.wrong_type(name, item));
@@ -248,7 +248,7 @@ impl<'t> Section<'t> {
         })
     }
 
-    pub fn dimension_pairs(&self, name: &str) -> Result<Vec<[u32; 2]>, ConfigError> {
+    pub(crate) fn dimension_pairs(&self, name: &str) -> Result<Vec<[u32; 2]>, ConfigError> {
         let item = self.item(name)?;
         let (Value::List(items), ValueKind::DimensionPairs { max }) =
             (&item.value, self.key(name).kind)
@@ -273,7 +273,7 @@ impl<'t> Section<'t> {
         Ok(pairs)
     }
 
-    pub fn vector(&self, name: &str) -> Result<Vec3, ConfigError> {
+    pub(crate) fn vector(&self, name: &str) -> Result<Vec3, ConfigError> {
         let item = self.item(name)?;
         let Value::List(items) = &item.value else {
             return Err(self.wrong_type(name, item));

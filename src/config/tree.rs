@@ -19,7 +19,7 @@ pub(super) struct Item {
 
 impl Item {
     /// Whether any part of the item was written on the command line.
-    pub fn has_override(&self) -> bool {
+    pub(crate) fn has_override(&self) -> bool {
         let inside = match &self.value {
             Value::Table(table) => table.values().any(Item::has_override),
             _ => false,
@@ -46,7 +46,7 @@ pub(super) enum Value {
 
 impl Value {
     /// The value in words, for "must be …, not …".
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         match self {
             Self::Text(text) => format!("the text \"{text}\""),
             Self::Integer(x) => format!("the integer {x}"),

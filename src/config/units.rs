@@ -230,7 +230,7 @@ mod tests {
     }
 
     fn sampler(name: &str) -> Unit {
-        let variant = crate::params::Variant {
+        let variant = raystone_core::params::Variant {
             name: name.to_owned(),
             label: name.to_owned(),
             ..Default::default()

@@ -4,7 +4,7 @@ use super::Catalogue;
 use super::error::ConfigError;
 use super::keys::Axis;
 use super::tree::{Item, Table, Value};
-use crate::params::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant};
+use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.
@@ -215,7 +215,7 @@ pub(super) fn shorten_labels(scenes: &mut [Variant]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::Params;
+    use raystone_core::params::Params;
 
     #[test]
     fn short_labels_stay_distinct() {

@@ -31,7 +31,7 @@ impl Metric {
 ///
 /// A sweep over the first coordinate looks no further than the least distance so far: about N^(3/2)
 /// steps for even sets in two dimensions.
-pub fn minimum_distance(points: &PointSet, metric: Metric) -> Option<f64> {
+pub(crate) fn minimum_distance(points: &PointSet, metric: Metric) -> Option<f64> {
     let mut sorted: Vec<&[f64]> = points.points().collect();
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     let mut least: Option<f64> = None;

@@ -14,7 +14,10 @@ const NAME: &str = "dispersion";
 ///
 /// # Errors
 /// The time of the budget is spent first; points that are not pairs.
-pub fn largest_empty_box(points: &PointSet, budget: &Budget) -> Result<f64, DiscrepancyError> {
+pub(crate) fn largest_empty_box(
+    points: &PointSet,
+    budget: &Budget,
+) -> Result<f64, DiscrepancyError> {
     let pairs = points.pairs_for(NAME)?;
     let mut ys: Vec<f64> = pairs.iter().map(|p| p[1]).chain([0.0, 1.0]).collect();
     ys.sort_unstable_by(f64::total_cmp);

@@ -46,10 +46,10 @@ pub fn star(points: &PointSet, budget: &Budget) -> Bracket {
 /// Cost: about N log N time and memory for some 10 N numbers.
 ///
 /// ```
-/// # use raystone::discrepancy::star_2d;
+/// # use raystone_discrepancy::star_2d;
 /// // One point in the middle: the closed box up to it holds everything on a quarter of the area.
 /// assert_eq!(star_2d(&[[0.5, 0.5]])?, 0.75);
-/// # Ok::<(), raystone::discrepancy::DiscrepancyError>(())
+/// # Ok::<(), raystone_discrepancy::DiscrepancyError>(())
 /// ```
 ///
 /// # Errors

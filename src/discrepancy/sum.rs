@@ -12,7 +12,7 @@ pub(super) struct Sum {
 }
 
 impl Sum {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             total: [0.0; LANES],
             error: [0.0; LANES],
@@ -21,7 +21,7 @@ impl Sum {
 
     /// Adds a number to every lane.
     #[inline]
-    pub fn add(&mut self, terms: &[f64; LANES]) {
+    pub(crate) fn add(&mut self, terms: &[f64; LANES]) {
         for (i, &term) in terms.iter().enumerate() {
             let total = self.total[i];
             let sum = total + term;
@@ -32,14 +32,14 @@ impl Sum {
     }
 
     /// Adds one number.
-    pub fn add_one(&mut self, term: f64) {
+    pub(crate) fn add_one(&mut self, term: f64) {
         let mut terms = [0.0; LANES];
         terms[0] = term;
         self.add(&terms);
     }
 
     /// The sum of all lanes in two parts: rounded, and what rounding left out.
-    pub fn parts(&self) -> [f64; 2] {
+    pub(crate) fn parts(&self) -> [f64; 2] {
         let mut all = Self::new();
         for part in self.total.iter().chain(&self.error) {
             all.add_one(*part);
@@ -48,7 +48,7 @@ impl Sum {
     }
 
     /// The sum, rounded once.
-    pub fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         let [total, error] = self.parts();
         total + error
     }

@@ -363,7 +363,7 @@ impl Gpu {
     }
 
     /// Whether kernels may vote and shuffle within subgroups. How large those are is not for kernels to assume.
-    pub fn has_subgroups(&self) -> bool {
+    pub(crate) fn has_subgroups(&self) -> bool {
         self.device.features().contains(wgpu::Features::SUBGROUP)
     }
 
@@ -372,5 +372,16 @@ impl Gpu {
         // The driver tells of a loss only when it is polled; what else it says is told elsewhere.
         let _ = self.device.poll(wgpu::PollType::Poll);
         self.lost.lock().ok().and_then(|slot| slot.clone())
+    }
+}
+
+/// The name of a device type in records.
+pub fn device_type(kind: wgpu::DeviceType) -> &'static str {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => "discrete-gpu",
+        wgpu::DeviceType::IntegratedGpu => "integrated-gpu",
+        wgpu::DeviceType::VirtualGpu => "virtual-gpu",
+        wgpu::DeviceType::Cpu => "cpu",
+        wgpu::DeviceType::Other => "other",
     }
 }

@@ -12,7 +12,7 @@ use std::sync::{Arc, OnceLock};
 const TEXEL_BYTES: u64 = 16;
 
 /// Parts that an array may have at most; kernels declare as many.
-pub const MAX_PARTS: usize = 4;
+pub(crate) const MAX_PARTS: usize = 4;
 
 /// A storage buffer: one that the caller keeps, or one of the player's own.
 #[derive(Debug, Clone, PartialEq)]

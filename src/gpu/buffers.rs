@@ -58,7 +58,7 @@ impl Gpu {
     /// and the number of `vec4`s in each but the last. Parts end between elements of 16 to 64 bytes.
     ///
     /// # Errors
-    /// It needs more than [`MAX_PARTS`] parts, or the device is lost or out of memory.
+    /// It needs more than `MAX_PARTS` parts, or the device is lost or out of memory.
     pub fn storage_parts(
         &self,
         name: &str,

@@ -7,13 +7,13 @@
 use super::GpuError;
 use super::diagnose;
 use super::pipeline::WORKGROUP_EDGE;
-use crate::text::{cell_hash, nearest, plain_text};
+use raystone_core::files::{self, files};
+use raystone_core::text::{cell_hash, nearest, plain_text};
+use raystone_kernels::EMBEDDED;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
-
-include!(concat!(env!("OUT_DIR"), "/embedded_kernels.rs"));
 
 /// Kernel sources: those embedded in the program, with files of override folders on top.
 #[derive(Debug, Clone)]
@@ -259,19 +259,18 @@ fn collect(
 ) -> Result<(), GpuError> {
     let fault =
         |path: &Path, what: &dyn Display| GpuError::Kernel(format!("{}: {what}", path.display()));
-    let entries = std::fs::read_dir(folder).map_err(|e| fault(folder, &e))?;
-    for entry in entries {
-        let path = entry.map_err(|e| fault(folder, &e))?.path();
+    let paths = files().list(folder).map_err(|e| fault(folder, &e))?;
+    for path in paths {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         if name.starts_with('.') {
             continue;
-        } else if path.is_dir() {
+        } else if files().is_folder(&path) {
             let levels = levels.checked_sub(1);
             let levels = levels.ok_or_else(|| fault(&path, &"too deep a kernel folder"))?;
             collect(&path, levels, found)?;
         } else if extension == "wesl" {
-            let bytes = std::fs::read(&path).map_err(|e| fault(&path, &e))?;
+            let bytes = files::read(&path).map_err(|e| fault(&path, &e))?;
             let text = plain_text(bytes).map_err(|e| {
                 let problem = format!("line {} is not UTF-8 text", e.line);
                 fault(&path, &problem)

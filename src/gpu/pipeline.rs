@@ -3,9 +3,9 @@
 use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
+use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::Instant;
 
 /// Edge of a workgroup of pixels where no other shape was chosen, invocations.
 pub const WORKGROUP_EDGE: u32 = 8;

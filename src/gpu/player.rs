@@ -6,9 +6,9 @@ use super::bindings::{Resource, Storage};
 use super::clock::{Elapsed, Stopwatch};
 use super::pipeline::{BindingKind, Pipeline};
 use super::recording::{Groups, Played, Recording, Run, Step};
+use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 /// Runs of one submission at most: as many as a set of timestamps has pairs.
 const MAX_RUNS: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;

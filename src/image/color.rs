@@ -49,7 +49,7 @@ pub fn categorical(index: usize) -> [u8; 3] {
 }
 
 /// `#rrggbb`.
-pub fn hex([r, g, b]: [u8; 3]) -> String {
+pub(crate) fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 

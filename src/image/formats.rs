@@ -1,11 +1,11 @@
 //! Files for rendered images. The ending of the file name decides: PNG is a picture to look at, the
 //! others keep the linear radiance of every pixel.
 
-use super::exr_file::{encode_exr, read_exr};
+use super::exr_file::encode_exr;
 use super::read::{Decode, read_hdr, read_npy, read_pfm};
 use super::{Attribute, Image, ImageError, automatic_exposure, encode_png, tone_map};
-use crate::atomic::write_atomic;
 use ::image::{ExtendedColorType, ImageFormat};
+use raystone_core::atomic::write_atomic;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -20,8 +20,13 @@ pub struct FileFormat {
     pub(super) decode: Option<Decode>,
 }
 
+#[cfg(feature = "exr")]
+const READ_EXR: Option<Decode> = Some(super::exr_read::read_exr);
+#[cfg(not(feature = "exr"))]
+const READ_EXR: Option<Decode> = None;
+
 /// Every format, in the order in which messages name them.
-pub const FILE_FORMATS: [FileFormat; 5] = [
+pub(crate) const FILE_FORMATS: [FileFormat; 5] = [
     FileFormat {
         ending: "png",
         description: "tone-mapped sRGB with 8 bits",
@@ -32,7 +37,7 @@ pub const FILE_FORMATS: [FileFormat; 5] = [
         ending: "exr",
         description: "OpenEXR, linear radiance as 32-bit floats, with attributes",
         encode: |image, attributes| Ok(encode_exr(image, attributes)),
-        decode: Some(read_exr),
+        decode: READ_EXR,
     },
     FileFormat {
         ending: "hdr",

@@ -4,8 +4,7 @@ use super::{FileFormat, Image, ImageError};
 use ::image::ImageDecoder;
 use ::image::codecs::hdr::HdrDecoder;
 use half::f16;
-use std::fs;
-use std::io::Cursor;
+use std::io::{self, Cursor, ErrorKind};
 use std::path::Path;
 
 /// Pixels of the largest image that is read: 1.5 GiB as three floats.
@@ -46,11 +45,10 @@ pub fn read_linear(path: &Path) -> Result<Image, ImageError> {
         path: path.to_owned(),
         source,
     };
-    // A pipe would never end.
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(unreadable(std::io::Error::other("it is no regular file")));
-    }
-    let bytes = fs::read(path).map_err(unreadable)?;
+    let bytes = raystone_core::files::read(path).map_err(|error| match error.kind() {
+        ErrorKind::IsADirectory => unreadable(io::Error::other("it is no regular file")),
+        _ => unreadable(error),
+    })?;
     decode(&bytes).map_err(|reason| ImageError::Decode {
         path: path.to_owned(),
         reason,
@@ -217,6 +215,7 @@ pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn read(name: &str, bytes: &[u8]) -> Result<Image, ImageError> {
         let folder = tempfile::tempdir().unwrap();

@@ -3,10 +3,9 @@
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
-use crate::measure::bias::BiasVerdict;
-use crate::measure::figure::{FIGURES, Figure, figure};
-use crate::measure::gate::fault_text;
-use crate::measure::record::*;
+use raystone_record::figure::{FIGURES, Figure, figure};
+use raystone_record::*;
+use raystone_stats::bias::BiasVerdict;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::ops::Deref;
@@ -115,7 +114,7 @@ const VIEW_AXES: [&str; 4] = [
 ];
 
 /// What tells the structures of a scene apart.
-pub const STRUCTURE_AXES: [&str; 5] = [
+pub(crate) const STRUCTURE_AXES: [&str; 5] = [
     axis::ACCEL,
     axis::KERNELS,
     axis::TRIANGLE,
@@ -124,7 +123,7 @@ pub const STRUCTURE_AXES: [&str; 5] = [
 ];
 
 /// What tells the samplers of a view apart.
-pub const SAMPLER_ROW: [&str; 4] = [
+pub(crate) const SAMPLER_ROW: [&str; 4] = [
     axis::SEQUENCE,
     axis::DECORRELATION,
     axis::KERNELS,
@@ -132,7 +131,7 @@ pub const SAMPLER_ROW: [&str; 4] = [
 ];
 
 /// What a sampler's errors are of, and what an image depends on: all but the structure.
-pub const SAMPLER_AXES: [&str; 8] = [
+pub(crate) const SAMPLER_AXES: [&str; 8] = [
     axis::SCENE,
     axis::INTEGRATOR,
     axis::SEQUENCE,
@@ -144,7 +143,7 @@ pub const SAMPLER_AXES: [&str; 8] = [
 ];
 
 /// The key of a line; a structure that ran without the driver's checks has another label.
-pub fn competitor(line: &Line) -> Key {
+pub(crate) fn competitor(line: &Line) -> Key {
     let accel = line.key.label(axis::ACCEL);
     match line.ran.unchecked && !accel.is_empty() {
         true => (line.key.clone()).with(axis::ACCEL, format!("{accel} (unchecked)")),
@@ -336,12 +335,12 @@ impl<'a> RunData<'a> {
     }
 
     /// Look of a structure in plots.
-    pub fn structure_look(&self, name: &str) -> usize {
+    pub(crate) fn structure_look(&self, name: &str) -> usize {
         STRUCTURES + place(&self.structures, name)
     }
 
     /// Look of a sampler in plots.
-    pub fn sampler_look(&self, name: &str) -> usize {
+    pub(crate) fn sampler_look(&self, name: &str) -> usize {
         place(&self.samplers, name) % STRUCTURES
     }
 
@@ -397,12 +396,12 @@ impl<'a> RunData<'a> {
 
 impl View<'_> {
     /// Times that may be used.
-    pub fn valid_times(&self) -> impl Iterator<Item = &Measured<'_, TimeRecord>> {
+    pub(crate) fn valid_times(&self) -> impl Iterator<Item = &Measured<'_, TimeRecord>> {
         self.times.iter().filter(|time| is_valid_time(time))
     }
 
     /// Names of the structures that were timed, in the order measured.
-    pub fn timed_structures(&self) -> Vec<String> {
+    pub(crate) fn timed_structures(&self) -> Vec<String> {
         let names = self.times.iter().map(|time| time.structure.clone());
         without_repeats(names.collect())
     }
@@ -420,7 +419,7 @@ impl View<'_> {
 
     /// The structure under which samplers are compared per second: of those timed with the most
     /// samplers the one with the least geometric mean of the times.
-    pub fn fastest_structure(&self) -> Option<String> {
+    pub(crate) fn fastest_structure(&self) -> Option<String> {
         let score = |name: &String| {
             let samplers = self.samplers.iter();
             let times = samplers.filter_map(|s| self.ms_per_spp(name, &s.name));
@@ -437,24 +436,8 @@ impl View<'_> {
 }
 
 /// Whether a time may be used: the cell ran, and its image is the one all structures give.
-pub fn is_valid_time(time: &TimeRecord) -> bool {
+pub(crate) fn is_valid_time(time: &TimeRecord) -> bool {
     time.failure.is_none() && time.image_equal && time.ms_per_spp.is_some()
-}
-
-impl StructureRecord {
-    /// Whether it was built at all.
-    pub fn is_built(&self) -> bool {
-        !self.build.is_empty() || self.gate.is_some()
-    }
-
-    /// Why the structure gets no figures; `None` when it passed the gate.
-    pub fn fault(&self) -> Option<String> {
-        match (&self.failure, &self.gate) {
-            (Some(failure), _) => Some(failure.clone()),
-            (None, None) => Some("not gated".into()),
-            (None, Some(gate)) => (!gate.passed).then(|| fault_text(gate, None)),
-        }
-    }
 }
 
 fn place(names: &[String], name: &str) -> usize {

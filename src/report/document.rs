@@ -3,8 +3,8 @@
 use super::ReportError;
 use super::plot::drawing::Drawing;
 use super::plot::paint::{to_png, to_svg};
-use crate::measure::record::Verdict;
 use rayon::prelude::*;
+use raystone_record::Verdict;
 use serde::Serialize;
 
 /// Figures whose PNG files are as fine as print wants them, and those that have one at all: with hundreds, painting and packing
@@ -37,7 +37,7 @@ impl Document {
     ///
     /// # Errors
     /// If the drawing backend fails, or `write` does.
-    pub fn paint(
+    pub(crate) fn paint(
         &mut self,
         mut write: impl FnMut(&str, &Painted) -> Result<(), ReportError>,
     ) -> Result<(), ReportError> {
@@ -67,7 +67,7 @@ impl Document {
 }
 
 /// The files of a figure.
-pub struct Painted {
+pub(crate) struct Painted {
     /// SVG document.
     pub svg: String,
     /// PNG file.
@@ -193,7 +193,7 @@ impl Block {
     }
 
     /// Pictures, if there are any.
-    pub fn gallery(
+    pub(crate) fn gallery(
         caption: impl Into<String>,
         items: Vec<Picture>,
         scale: Option<ColorScale>,
@@ -308,7 +308,7 @@ pub struct TableCell {
 
 impl TableCell {
     /// A figure with its interval or another smaller text.
-    pub fn with_detail(text: impl Into<String>, detail: impl Into<String>) -> Self {
+    pub(crate) fn with_detail(text: impl Into<String>, detail: impl Into<String>) -> Self {
         Self {
             text: text.into(),
             detail: detail.into(),
@@ -323,13 +323,13 @@ impl TableCell {
     }
 
     /// How many replicates or seeds there are.
-    pub fn repeats(n: usize, randomised: bool) -> Self {
+    pub(crate) fn repeats(n: usize, randomised: bool) -> Self {
         let detail = if randomised { "" } else { "deterministic" };
         Self::with_detail(n.to_string(), detail)
     }
 
     /// The same cell with a tone.
-    pub fn toned(mut self, tone: Tone) -> Self {
+    pub(crate) fn toned(mut self, tone: Tone) -> Self {
         self.tone = tone;
         self
     }
@@ -398,7 +398,7 @@ pub struct Illustration {
     /// What is painted.
     #[serde(skip)]
     pub drawing: Drawing,
-    /// SVG document; empty until [`Document::paint`].
+    /// SVG document; empty until `paint`.
     pub svg: String,
     /// Whether the page holds it; else it leads to the file.
     pub inline: bool,

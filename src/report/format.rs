@@ -1,12 +1,12 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
-use crate::gpu::Environment;
-use crate::measure::figure::{Figure, Shown};
-use crate::measure::record::{Interval, RayClass};
-use crate::measure::statistics::LEAST_FOR_MEDIAN;
+use raystone_record::Environment;
+use raystone_record::figure::{Figure, Shown};
+use raystone_record::{Interval, RayClass};
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// What stands for an absent value.
-pub const ABSENT: &str = "–";
+pub(crate) const ABSENT: &str = "–";
 
 /// A number with `digits` significant digits and a true minus; `6.33·10⁻⁴` below 10⁻³ and from 10⁶ on, the dash for
 /// what is no number.
@@ -77,7 +77,7 @@ fn with_bounds(i: &Interval, text: impl Fn(f64) -> String) -> String {
 }
 
 /// What the bounds of medians of so many samples are.
-pub fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
+pub(crate) fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
     match samples.filter(|n| *n > 0).min() {
         Some(few) if few < LEAST_FOR_MEDIAN => {
             format!("range of {few} samples, {LEAST_FOR_MEDIAN} are needed for a 95 % interval")
@@ -87,7 +87,7 @@ pub fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
 }
 
 /// A slope with its interval; the interval is left out where it has no width.
-pub fn slope(interval: &Interval) -> String {
+pub(crate) fn slope(interval: &Interval) -> String {
     with_bounds(interval, exponent)
 }
 
@@ -136,7 +136,7 @@ pub fn figure(figure: &Figure, value: f64) -> String {
 }
 
 /// A share as whole percent, one decimal below ten.
-pub fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     let value = share * 100.0;
     if value.abs() < 10.0 {
         format!("{value:.1} %")
@@ -146,7 +146,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// `1 sampler`, `3 samplers`.
-pub fn plural(n: usize, noun: &str) -> String {
+pub(crate) fn plural(n: usize, noun: &str) -> String {
     if n == 1 {
         format!("1 {noun}")
     } else {
@@ -183,7 +183,7 @@ pub fn where_and_when(e: &Environment, unix_s: u64) -> String {
 }
 
 /// Seconds since 1970 as `YYYY-MM-DD hh:mm UTC` (days to civil date by Hinnant's algorithm).
-pub fn utc(unix_s: u64) -> String {
+pub(crate) fn utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     let shifted = days + 719_468;
     let era = shifted / 146_097;

@@ -1,6 +1,6 @@
 //! What competitors are called: by their main label, and by the further axes on which their run varies.
 
-use crate::measure::record::{Body, Key, Line, axis};
+use raystone_record::{Body, Key, Line, axis};
 
 /// Axes that are named only where a run has more than one value of them.
 const NAMED_IF_VARIED: [&str; 5] = [

@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Loads a picture that a record names relative to the run's folder `dir`. A missing file, or a name
 /// that leads out of the folder, gives a placeholder with the reason.
-pub fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Picture {
+pub(crate) fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Picture {
     let (data, missing) = match read(dir, path) {
         Ok(bytes) => {
             let text = base64::engine::general_purpose::STANDARD.encode(bytes);
@@ -34,7 +34,7 @@ impl Picture {
 }
 
 /// The place of a file that a record names; `None` where the name leads out of the folder.
-pub fn inside(dir: &Path, path: &str) -> Option<PathBuf> {
+pub(crate) fn inside(dir: &Path, path: &str) -> Option<PathBuf> {
     let mut parts = Path::new(path).components();
     let stays = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     stays.then(|| dir.join(path))

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::document::{Table, TableCell};
 use super::format;
 use super::values::Value;
-use crate::measure::record::Key;
+use raystone_record::Key;
 
 /// A part of a key, as a column is called; empty where the figure names it.
 pub type Part<'a> = &'a dyn Fn(&Key) -> String;
@@ -105,7 +105,7 @@ impl<'a> Rows<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::record::{Interval, axis};
+    use raystone_record::{Interval, axis};
 
     #[test]
     fn a_pivot_puts_each_value_where_its_key_says_and_a_dash_where_there_is_none() {

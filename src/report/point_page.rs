@@ -7,11 +7,11 @@ use super::plot::heat::HeatMap;
 use super::plot::panels::{self, Panel};
 use super::plot::points::{Cloud, Domain, Pair, drawn_in_words, interval_counts};
 use super::plot::spectrum::{ColorBar, PeriodogramMap, RadialCurve, highest_frequency};
-use crate::discrepancy::{Budget, DiscrepancyError, PointSet, periodogram, star_2d};
 use rayon::prelude::*;
+use raystone_discrepancy::{Budget, DiscrepancyError, PointSet, periodogram, star_2d};
 
 /// Dimensions whose projections are drawn at most.
-pub const MOST_PROJECTED: usize = 8;
+pub(crate) const MOST_PROJECTED: usize = 8;
 /// Points for which elementary intervals are drawn at most: more lines would hide the points.
 const MOST_INTERVALS: usize = 1024;
 /// Points of the first pixel that are drawn upon those of the others at most.

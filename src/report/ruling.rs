@@ -1,16 +1,16 @@
 //! Who wins: named only where a test of the difference says so.
 
 use super::format;
-use crate::measure::comparison::{LogFigure, Pairs};
-use crate::measure::figure::Better;
-use crate::measure::record::Interval;
+use raystone_record::Interval;
+use raystone_record::figure::Better;
+use raystone_stats::comparison::{LogFigure, Pairs};
 
 /// Names in an answer without a winner; the others are only counted.
 const MOST_NAMES: usize = 5;
 
 /// One competitor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contender {
+pub(crate) struct Contender {
     /// Its name.
     pub name: String,
     /// Its figure.
@@ -22,7 +22,7 @@ pub struct Contender {
 
 /// The outcome of a comparison.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Ruling {
+pub(crate) enum Ruling {
     /// Nothing was measured.
     Nobody,
     /// There are figures that may not be ranked, for this reason.
@@ -37,7 +37,7 @@ pub enum Ruling {
 
 /// Judges the contenders: the best one wins if it differs from every other by Welch's test on logarithms, corrected
 /// for all pairs ([`Pairs`]).
-pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
+pub(crate) fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
     if let [only] = &contenders[..] {
         return Ruling::Alone(only.clone());
@@ -81,7 +81,7 @@ pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
 
 impl Ruling {
     /// The answer: a name, or why there is none.
-    pub fn answer(&self) -> String {
+    pub(crate) fn answer(&self) -> String {
         match self {
             Self::Nobody => "nothing measured".into(),
             Self::Withheld(reason) => format!("no winner: {reason}"),
@@ -100,12 +100,12 @@ impl Ruling {
     }
 
     /// Whether there was any competition: two contenders, or a reason that none may win.
-    pub fn is_contest(&self) -> bool {
+    pub(crate) fn is_contest(&self) -> bool {
         !matches!(self, Self::Nobody | Self::Alone(_))
     }
 
     /// The best figure.
-    pub fn figure(&self) -> String {
+    pub(crate) fn figure(&self) -> String {
         match self {
             Self::Nobody | Self::Withheld(_) => format::ABSENT.into(),
             Self::Alone(best) | Self::Winner(best, ..) => format::interval(&best.figure),
@@ -116,7 +116,7 @@ impl Ruling {
     }
 
     /// The next one with its figure and, of positive figures, the ratio of the two.
-    pub fn runner_up(&self) -> String {
+    pub(crate) fn runner_up(&self) -> String {
         let (best, next) = match self {
             Self::Winner(best, next, _) => (best, next),
             Self::Unclear(close, _) if close.len() > 1 => (&close[0], &close[1]),
@@ -131,7 +131,7 @@ impl Ruling {
     }
 
     /// How many pairs were compared.
-    pub fn comparisons(&self) -> usize {
+    pub(crate) fn comparisons(&self) -> usize {
         match self {
             Self::Nobody | Self::Withheld(_) | Self::Alone(_) => 0,
             Self::Winner(_, _, pairs) | Self::Unclear(_, pairs) => *pairs,
@@ -142,7 +142,7 @@ impl Ruling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::statistics::Spread;
+    use raystone_stats::statistics::Spread;
 
     /// What is said of contenders with these figures, relative standard errors and known spreads, called a, b, c.
     fn said(better: Better, figures: &[(f64, f64, bool)]) -> [String; 3] {

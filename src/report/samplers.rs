@@ -2,34 +2,34 @@
 
 use super::data::View;
 use super::format;
-use crate::measure::bias::BiasVerdict;
-use crate::measure::comparison::LogFigure;
-use crate::measure::figure::figure;
-use crate::measure::heavy_tails::is_heavy;
-use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
-use crate::measure::replicates::{Replicates, Without};
-use crate::measure::statistics::{
+use raystone_record::figure::figure;
+use raystone_record::replicates::{Replicates, Without};
+use raystone_record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
+use raystone_stats::bias::BiasVerdict;
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::heavy_tails::is_heavy;
+use raystone_stats::statistics::{
     LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, mean_interval, positive_interval,
 };
 
 use std::sync::OnceLock;
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
-pub const UNRESOLVED: &str = "below what the reference can resolve";
+pub(crate) const UNRESOLVED: &str = "below what the reference can resolve";
 
 /// What an interval is that a single pixel decides over.
-pub const HEAVY_TAILED: &str =
+pub(crate) const HEAVY_TAILED: &str =
     "a single pixel, of which the replicates may have missed what is bright, decides over it";
 
 /// The part of the least measured error that the reference's own may be.
-pub const REFERENCE_SHARE: f64 = 0.01;
+pub(crate) const REFERENCE_SHARE: f64 = 0.01;
 
 /// A sampler under one scene, integrator, triangle test and box test.
 #[derive(Debug)]
 pub struct MeasuredSampler<'a> {
     /// What it draws for what.
     pub key: Key,
-    /// `sequence × decorrelation`, with what else tells it from others, see [`super::names`].
+    /// `sequence × decorrelation`, with what else tells it from others, see `names`.
     pub name: String,
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,
@@ -78,7 +78,7 @@ impl Metric {
     }
 
     /// The row of its slope.
-    pub fn slope_figure(self) -> &'static str {
+    pub(crate) fn slope_figure(self) -> &'static str {
         self.words()[1]
     }
 
@@ -88,7 +88,7 @@ impl Metric {
     }
 
     /// How files are named after it.
-    pub fn stem(self) -> &'static str {
+    pub(crate) fn stem(self) -> &'static str {
         self.words()[2]
     }
 
@@ -112,7 +112,7 @@ impl Metric {
 
 /// Metrics beside those that samplers are ranked by: figure and recorded id. They hold the noise of the
 /// reference.
-pub const FURTHER_METRICS: [(&str, &str); 7] = [
+pub(crate) const FURTHER_METRICS: [(&str, &str); 7] = [
     ("mae/v1", "mae/v1"),
     ("relmse-trimmed/v1", "relmse-trimmed/top=0.1%/eps=1e-2/v1"),
     ("mse-luminance/v1", "mse-luminance/v1"),
@@ -133,14 +133,14 @@ pub struct MeanError {
     /// Whether the estimate is clearly above 0 for the noise of this reference. Otherwise only the upper
     /// end says something.
     pub resolved: bool,
-    /// Whether the interval is not to be trusted, since a single pixel decides over it: see [`crate::measure::heavy_tails`]. Never said of
+    /// Whether the interval is not to be trusted, since a single pixel decides over it: see [`raystone_stats::heavy_tails`]. Never said of
     /// roots of the MSE, in which dark pixels count for little.
     pub heavy_tailed: bool,
 }
 
 impl<'a> MeasuredSampler<'a> {
     /// Whether no seed changes it, so that its one replicate is exact.
-    pub fn is_deterministic(&self) -> bool {
+    pub(crate) fn is_deterministic(&self) -> bool {
         self.replicates
             .first()
             .is_some_and(|replicate| !replicate.randomised)
@@ -155,7 +155,7 @@ impl<'a> MeasuredSampler<'a> {
 
     /// Whether a single pixel decides over the interval of its relMSE at the most samples, so that neither this interval nor what
     /// follows from it is to be trusted.
-    pub fn is_heavy_tailed(&self) -> bool {
+    pub(crate) fn is_heavy_tailed(&self) -> bool {
         let means = self.mean_errors(Metric::RelMse);
         means.last().is_some_and(|mean| mean.heavy_tailed)
     }
@@ -188,7 +188,7 @@ impl<'a> MeasuredSampler<'a> {
     }
 
     /// The full id of a metric as recorded.
-    pub fn metric_id(&self, metric: Metric) -> Option<&'a str> {
+    pub(crate) fn metric_id(&self, metric: Metric) -> Option<&'a str> {
         let errors = self
             .replicates
             .iter()
@@ -200,7 +200,7 @@ impl<'a> MeasuredSampler<'a> {
     }
 
     /// Mean error by growing spp, over the replicates that have it; computed once they are all there.
-    pub fn mean_errors(&self, metric: Metric) -> Vec<MeanError> {
+    pub(crate) fn mean_errors(&self, metric: Metric) -> Vec<MeanError> {
         let place = &self.means[usize::from(metric == Metric::Rmse)];
         place.get_or_init(|| self.computed_means(metric)).clone()
     }
@@ -235,12 +235,15 @@ impl<'a> MeasuredSampler<'a> {
     }
 
     /// The highest spp.
-    pub fn highest_spp(&self) -> Option<u32> {
+    pub(crate) fn highest_spp(&self) -> Option<u32> {
         Some(self.replicates.first()?.errors.last()?.spp)
     }
 
     /// The figures of [`FURTHER_METRICS`] at this spp: means over replicates.
-    pub fn further(&self, spp: u32) -> [(&'static str, Option<Interval>); FURTHER_METRICS.len()] {
+    pub(crate) fn further(
+        &self,
+        spp: u32,
+    ) -> [(&'static str, Option<Interval>); FURTHER_METRICS.len()] {
         let of = |id: &str| -> Vec<f64> {
             let errors = self.replicates.iter().flat_map(|r| &r.errors);
             let errors = errors.filter(|error| error.spp == spp);
@@ -259,7 +262,12 @@ impl<'a> MeasuredSampler<'a> {
 
     /// What error is compared by that lies between those at two numbers of samples, with this share of the way on
     /// logarithms. `None` unless both are positive, whatever is left out.
-    pub fn log_error(&self, metric: Metric, spps: [u32; 2], share: f64) -> Option<LogFigure> {
+    pub(crate) fn log_error(
+        &self,
+        metric: Metric,
+        spps: [u32; 2],
+        share: f64,
+    ) -> Option<LogFigure> {
         let id = self.metric_id(metric)?;
         let power = if metric == Metric::Rmse { 0.5 } else { 1.0 };
         self.all().log_figure(id, |without| {
@@ -272,7 +280,7 @@ impl<'a> MeasuredSampler<'a> {
 
     /// Samples per pixel at which the error falls to `target`, between the two neighbours where its mean does: by
     /// interpolation on logarithms. `None` where it is above or below at all numbers of samples.
-    pub fn spp_to(&self, metric: Metric, target: f64) -> Option<LogFigure> {
+    pub(crate) fn spp_to(&self, metric: Metric, target: f64) -> Option<LogFigure> {
         let id = self.metric_id(metric)?;
         let means = self.mean_errors(metric);
         let means: Vec<&MeanError> = means.iter().filter(|mean| mean.resolved).collect();
@@ -330,7 +338,7 @@ impl<'a> MeasuredSampler<'a> {
 impl View<'_> {
     /// Why the errors of this view may not be ranked: the reference is absent, or too noisy for the
     /// least of them.
-    pub fn reference_fault(&self) -> Option<String> {
+    pub(crate) fn reference_fault(&self) -> Option<String> {
         let errors = || {
             let of = |s: &MeasuredSampler| s.mean_errors(Metric::Rmse);
             self.samplers.iter().flat_map(of)
@@ -381,7 +389,7 @@ impl View<'_> {
     }
 
     /// The highest spp at which every measured sampler has an error.
-    pub fn common_spp(&self) -> Option<u32> {
+    pub(crate) fn common_spp(&self) -> Option<u32> {
         let measured = self
             .samplers
             .iter()
@@ -410,7 +418,7 @@ const MEDIAN_VARIANCE: f64 = 1.4;
 
 /// The median time per sample per pixel, milliseconds, with its noise: none where it was not measured often
 /// enough.
-pub fn log_time(time: &TimeRecord) -> Option<LogFigure> {
+pub(crate) fn log_time(time: &TimeRecord) -> Option<LogFigure> {
     let log = time.ms_per_spp?.value.ln();
     let often = time.ms.len() >= LEAST_FOR_MEDIAN;
     let trimmed = LogFigure::of_times(&time.ms).filter(|_| often);
@@ -421,7 +429,7 @@ pub fn log_time(time: &TimeRecord) -> Option<LogFigure> {
 
 /// Where `seconds` lies on a curve of growing seconds: the indices of the neighbours, and the share of the way
 /// between them on logarithms; `None` outside the curve.
-pub fn place_on(curve: &[f64], seconds: f64) -> Option<([usize; 2], f64)> {
+pub(crate) fn place_on(curve: &[f64], seconds: f64) -> Option<([usize; 2], f64)> {
     let exact = |x: &f64| (x / seconds - 1.0).abs() < 1e-9;
     if let Some(i) = curve.iter().position(exact) {
         return Some(([i, i], 0.0));

@@ -1,10 +1,10 @@
 //! Errors over replicates against simulations of known truth.
 
 use super::*;
-use crate::image::Image;
-use crate::measure::metrics::{Reference, measure};
-use crate::measure::record::ErrorAtSpp;
-use crate::random::Pcg32;
+use raystone_core::random::Pcg32;
+use raystone_image::Image;
+use raystone_record::ErrorAtSpp;
+use raystone_stats::metrics::{Reference, measure};
 
 const PIXELS: usize = 40;
 /// What every pixel should have.
@@ -105,7 +105,7 @@ fn the_noise_of_the_reference_is_in_the_interval_and_not_in_the_figure() {
         .iter()
         .map(|r| r.errors[2].metrics["relmse/eps=1e-2/v1"])
         .collect();
-    assert!(crate::measure::statistics::mean(&plain).unwrap() > 1.6 * relmse);
+    assert!(raystone_stats::statistics::mean(&plain).unwrap() > 1.6 * relmse);
     let Interval { value, low, high } = mean.error;
     assert!((value / relmse - 1.0).abs() < 0.6, "{mean:?}");
     assert!(low < relmse && relmse < high, "{mean:?}");

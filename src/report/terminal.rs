@@ -7,7 +7,7 @@ use super::sections::{
     animation, belief, compactions, kernels, rendering, run, samplers, structures, verdict,
 };
 use super::values::{of_structures, of_view};
-use crate::measure::record::{Line, Verdict};
+use raystone_record::{Line, Verdict};
 
 /// Where text is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

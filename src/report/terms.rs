@@ -156,7 +156,7 @@ fn texts(block: &Block) -> Vec<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::document::Section;
+    use crate::document::Section;
 
     #[test]
     fn a_word_is_explained_once_behind_the_block_that_first_uses_it() {

@@ -6,9 +6,9 @@ mod names;
 mod rendering;
 
 use super::*;
-use crate::measure::bias::BiasVerdict;
-use crate::measure::record::*;
 use fixture::*;
+use raystone_record::*;
+use raystone_stats::bias::BiasVerdict;
 use sections::verdict::{Race, best_per_sample, fastest};
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ fn report(name: &str, lines: &[Line]) -> (String, String) {
     let is_shown = |part: &&str| part.starts_with("images/") && part.contains("cornell");
     for path in text.split('"').filter(is_shown).collect::<BTreeSet<_>>() {
         let colour =
-            |x: u32, y: u32| image::Rgb(crate::image::viridis((x * y) as f32 / (96.0 * 72.0)));
+            |x: u32, y: u32| image::Rgb(raystone_image::viridis((x * y) as f32 / (96.0 * 72.0)));
         let picture = image::RgbImage::from_fn(96, 72, colour);
         picture.save(dir.join(path)).unwrap();
     }

@@ -2,10 +2,10 @@
 
 use super::data::{SceneGroup, View};
 use super::samplers::MeasuredSampler;
-use crate::measure::record::GateVerdict;
+use raystone_record::GateVerdict;
 
 /// Why no structure may be called the fastest on a scene.
-pub fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
+pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
     let gates = || scene.structures.iter().filter_map(|s| s.gate.as_ref());
     let differs = |gate: &GateVerdict| gate.brute_force.wrong > 0 || gate.oracle.wrong > 0;
     if gates().any(differs) {
@@ -18,7 +18,7 @@ pub fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
 }
 
 /// Why no structure may be called the fastest for rendering.
-pub fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<String> {
+pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<String> {
     let unequal = view.times.iter().find(|time| !time.image_equal);
     let unequal = unequal.map(|time| {
         format!(
@@ -30,7 +30,7 @@ pub fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<String> {
 }
 
 /// Why no sampler may be called the best: the reference, the judgement of the integrator, or a check of its images.
-pub fn doubt_of_errors(view: &View) -> Option<String> {
+pub(crate) fn doubt_of_errors(view: &View) -> Option<String> {
     let judged = || {
         let fault = view.paths_fault.as_ref()?;
         Some(format!("the integrator differs from its judge: {fault}"))

@@ -7,8 +7,8 @@ use super::samplers::{HEAVY_TAILED, Metric};
 use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
-use crate::measure::figure::{Figure, figure};
-use crate::measure::record::*;
+use raystone_record::figure::{Figure, figure};
+use raystone_record::*;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
@@ -29,7 +29,7 @@ pub enum Reading {
     /// The value, with an interval that has no width where none is known.
     Known(Interval),
     /// The value, with an interval that is not to be trusted: one pixel decides over it, see
-    /// [`crate::measure::heavy_tails`].
+    /// [`raystone_stats::heavy_tails`].
     HeavyTailed(Interval),
     /// Only that it is below this: the reference resolves no more.
     Below(f64),
@@ -93,12 +93,12 @@ impl Value<'_> {
     }
 
     /// Whether the reference is too noisy for it.
-    pub fn is_unresolved(&self) -> bool {
+    pub(crate) fn is_unresolved(&self) -> bool {
         matches!(self.reading, Reading::Below(_))
     }
 
     /// Whether its interval is not to be trusted.
-    pub fn is_heavy_tailed(&self) -> bool {
+    pub(crate) fn is_heavy_tailed(&self) -> bool {
         matches!(self.reading, Reading::HeavyTailed(_))
     }
 
@@ -154,7 +154,7 @@ fn of_classes(key: &Key, coherence: &ClassCoherence) -> Vec<Value<'static>> {
 }
 
 /// Figures of all structures of a scene; those without a fault also have speeds.
-pub fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
+pub(crate) fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
     let triangles = scene.record.map_or(0, |record| record.triangles);
     let mut values = Vec::new();
     for s in &scene.structures {
@@ -246,7 +246,7 @@ fn of_rays(key: &Key, timing: &ClassTiming) -> Vec<Value<'static>> {
 }
 
 /// Errors, times and bias checks of one view.
-pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+pub(crate) fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for sampler in &view.samplers {
         let key = &sampler.key;
@@ -345,7 +345,7 @@ fn of_primary(key: &Key, primary: &PrimaryRecord) -> Vec<Value<'static>> {
 }
 
 /// What stands on the axis of rays for all of them.
-pub const ALL_RAYS: &str = "all";
+pub(crate) const ALL_RAYS: &str = "all";
 
 /// Coherence by class of rays, and of all.
 fn of_coherence(key: &Key, record: &CoherenceRecord) -> Vec<Value<'static>> {
@@ -387,7 +387,7 @@ fn of_bias(key: &Key, bias: &BiasRecord) -> Vec<Value<'static>> {
 }
 
 /// The error that shares of filtered ones are taken of; `None` if there is none.
-pub fn unfiltered(spectrum: &SpectrumRecord) -> Option<f64> {
+pub(crate) fn unfiltered(spectrum: &SpectrumRecord) -> Option<f64> {
     let at = spectrum.filtered.iter().find(|at| at.sigma == 0.0)?;
     (at.rmse.value > 0.0).then_some(at.rmse.value)
 }
@@ -413,13 +413,13 @@ fn of_spectrum(key: &Key, spectrum: &SpectrumRecord) -> Vec<Value<'static>> {
 }
 
 /// What a stream's dimensions are used for, with their numbers.
-pub fn pair_of_dimensions(stream: &StreamRecord) -> String {
+pub(crate) fn pair_of_dimensions(stream: &StreamRecord) -> String {
     let [a, b] = stream.dimensions;
     format!("{} (dimensions {a} and {b})", stream.purpose)
 }
 
 /// Figures of a stream's points.
-pub fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
+pub(crate) fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
     let key = (stream.key.clone()).with(axis::DIMENSIONS, pair_of_dimensions(stream));
     let figures = &stream.figures;
     let at = |key: &Key, id: &str, counts: &[FigureAtCount]| -> Vec<Value> {
@@ -451,7 +451,7 @@ pub fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
 }
 
 /// What drawing costs.
-pub fn of_cost(cost: &Recorded<SamplerCostRecord>) -> [Value<'static>; 2] {
+pub(crate) fn of_cost(cost: &Recorded<SamplerCostRecord>) -> [Value<'static>; 2] {
     [
         Value::new(cost.key, "ns-per-sample/v1", cost.ns_per_sample),
         Value::new(cost.key, "loop-ns/v1", cost.loop_ns_per_sample.value),
@@ -503,8 +503,8 @@ pub fn csv(values: &[Value]) -> String {
 /// A name that a spreadsheet would take for a formula has an apostrophe before it.
 fn no_formula(name: &str) -> String {
     match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
-        true => format!("'{}", crate::report::terminal::shown(name)),
-        false => crate::report::terminal::shown(name),
+        true => format!("'{}", crate::terminal::shown(name)),
+        false => crate::terminal::shown(name),
     }
 }
 

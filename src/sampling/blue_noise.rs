@@ -13,13 +13,13 @@
 
 use super::hash::{keyed_hash, pcg_hash};
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, void_and_cluster};
-use crate::parameters;
+use raystone_core::parameters;
 use std::path::Path;
 
 parameters! {
     /// shifts by a void-and-cluster mask (Georgiev & Fajardo 2016), or the tables of Heitz et al.
     /// (2019)
-    pub struct BlueNoise {
+    pub(crate) struct BlueNoise {
         /// folder with the tables of Heitz et al. 2019, whose points then replace those of sobol; none is the mask
         tables: String = String::new();
     }
@@ -66,7 +66,8 @@ fn heitz_point(table: &SamplerTable, at: Coordinate) -> u32 {
 /// The words of one file of Heitz's tables.
 fn read_words(folder: &Path, name: &str, bytes: usize) -> Result<Vec<u32>, String> {
     let path = folder.join(name);
-    let content = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let content =
+        raystone_core::files::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     if content.len() != bytes {
         return Err(format!(
             "{}: {} bytes, a table of Heitz et al. has {bytes}",

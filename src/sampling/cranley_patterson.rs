@@ -6,11 +6,11 @@
 
 use super::hash::dimension_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// a random shift modulo 1 for each pixel and dimension (Cranley & Patterson 1976)
-    pub struct CranleyPatterson {
+    pub(crate) struct CranleyPatterson {
         /// Whether pixels differ.
         seeded: Seeded;
     }

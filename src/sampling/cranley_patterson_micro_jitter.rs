@@ -11,12 +11,12 @@ use super::hash::{dimension_number, sample_number};
 use super::{
     Coordinate, Decorrelation, Demand, MicroJitter, Partner, SamplerTable, Seeded, Seeding,
 };
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// a random shift modulo 1 for each pixel and dimension (Cranley & Patterson 1976), then one of at most
     /// K·N^(-1/s) for each sample
-    pub struct CranleyPattersonMicroJitter {
+    pub(crate) struct CranleyPattersonMicroJitter {
         /// K of the amplitude; ½ moves a point within the cell that is its share of a square
         k: f64 = 0.5, in 0.0..=64.0;
         /// s of the amplitude

@@ -1,7 +1,7 @@
 //! What a decorrelation is.
 
 use super::{Coordinate, Demand, Facts, SamplerTable, Seeding};
-use crate::params::{Parameters, Registered};
+use raystone_core::params::{Parameters, Registered};
 use std::sync::Arc;
 
 /// The sequence that a decorrelation is to work on.
@@ -26,7 +26,7 @@ impl Partner<'_> {
     }
 
     /// A reason to refuse a sequence whose structure exclusive or destroys.
-    pub fn not_base_2(&self) -> Option<String> {
+    pub(crate) fn not_base_2(&self) -> Option<String> {
         let reason = || {
             format!(
                 "it works on the binary digits of points, and {} is not digital in base 2; take \
@@ -38,7 +38,7 @@ impl Partner<'_> {
     }
 
     /// A reason to refuse a sequence whose index must not be moved.
-    pub fn not_extensible(&self) -> Option<String> {
+    pub(crate) fn not_extensible(&self) -> Option<String> {
         let reason = || {
             format!(
                 "it moves the index, and {} is good from its first point on only; take a shift",
@@ -105,9 +105,9 @@ pub trait Decorrelation: Send + Sync {
     fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32;
 }
 
-impl Registered<dyn Decorrelation> {
-    /// The decorrelation that `D` declares, under this name; the doc comment of `D` describes it.
-    pub fn decorrelation<D: Decorrelation + Parameters + 'static>(name: &str) -> Self {
-        Self::new::<D>(name, |params| Ok(Arc::new(D::from_params(params)?)))
-    }
+/// The decorrelation that `D` declares, under this name; the doc comment of `D` describes it.
+pub fn decorrelation_kind<D: Decorrelation + Parameters + 'static>(
+    name: &str,
+) -> Registered<dyn Decorrelation> {
+    Registered::new::<D>(name, |params| Ok(Arc::new(D::from_params(params)?)))
 }

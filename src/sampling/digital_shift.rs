@@ -7,11 +7,11 @@
 
 use super::hash::dimension_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// random bits flipped for each pixel and dimension, keeps nets in base 2 (L'Ecuyer & Lemieux 2002)
-    pub struct DigitalShift {
+    pub(crate) struct DigitalShift {
         /// Whether pixels differ.
         seeded: Seeded;
     }

@@ -27,7 +27,7 @@ pub fn needed(max_depth: u32) -> u32 {
 }
 
 /// What the path uses a dimension for, in words.
-pub fn purpose(dimension: u32) -> String {
+pub(crate) fn purpose(dimension: u32) -> String {
     if dimension < FIRST_BOUNCE {
         return format!("pixel {}", ["x", "y"][dimension as usize]);
     }

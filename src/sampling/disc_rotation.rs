@@ -7,11 +7,11 @@
 
 use super::hash::dimension_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// a random turn of the disc of each pair of dimensions, leaves rings (Dufay 2017 §5.3.2)
-    pub struct DiscRotation {
+    pub(crate) struct DiscRotation {
         /// Whether pixels differ.
         seeded: Seeded;
     }

@@ -1,6 +1,6 @@
 //! Why a sampler cannot be had.
 
-use crate::params::ParamError;
+use raystone_core::params::ParamError;
 use thiserror::Error;
 
 /// Why a sequence and a decorrelation do not make a sampler; every message names the limit or what to

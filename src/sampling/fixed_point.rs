@@ -2,6 +2,6 @@
 //! to be had.
 
 /// The upper word of a product.
-pub fn mul_high(a: u32, b: u32) -> u32 {
+pub(crate) fn mul_high(a: u32, b: u32) -> u32 {
     ((u64::from(a) * u64::from(b)) >> 32) as u32
 }

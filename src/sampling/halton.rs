@@ -8,11 +8,11 @@
 use super::primes::{faure_permutation, primes, random_permutation};
 use super::radical_inverse::{first_weight, prepend_digit, radical_inverse};
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// radical inverses in the first 256 primes, from index 0 (Halton 1960)
-    pub struct Halton {
+    pub(crate) struct Halton {
         /// What becomes of digits.
         rule: DigitRule;
     }
@@ -20,7 +20,7 @@ parameters! {
     /// The parameter of sequences in prime bases. Plain digits of large bases run along diagonals: with a
     /// shift D* of the bases 59 and 61 is 0.121 after 1024 points, and 0.029 is the worst of the first 20
     /// dimensions with Faure's.
-    pub struct DigitRule {
+    pub(crate) struct DigitRule {
         /// digits as they are, permuted by Faure's rule (1992), or at random once and for all
         digits: Digits = Digits::Faure;
     }

@@ -8,11 +8,11 @@
 
 use super::halton::DigitRule;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// i/N and radical inverses in prime bases, for N known beforehand (Hammersley 1960)
-    pub struct Hammersley {
+    pub(crate) struct Hammersley {
         /// What becomes of digits.
         rule: DigitRule;
     }

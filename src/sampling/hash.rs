@@ -14,7 +14,7 @@ pub fn pcg_hash(x: u32) -> u32 {
 /// Wang's 32-bit hash.
 ///
 /// Source: T. Wang 1997, as in N. Reed, "Quick and easy GPU random numbers", 2013; Dufay 2017 Alg. 5.2.
-pub fn wang_hash(x: u32) -> u32 {
+pub(crate) fn wang_hash(x: u32) -> u32 {
     let mut s = (x ^ 61) ^ (x >> 16);
     s = s.wrapping_mul(9);
     s ^= s >> 4;
@@ -37,7 +37,7 @@ pub(super) fn strided(key: u32, x: u32) -> u32 {
 }
 
 /// A random number of key and x, for each key a permutation of all x; `key` has to be well mixed.
-pub fn keyed_hash(key: u32, x: u32) -> u32 {
+pub(crate) fn keyed_hash(key: u32, x: u32) -> u32 {
     pcg_hash(strided(key, x))
 }
 
@@ -52,6 +52,6 @@ pub fn dimension_number(at: Coordinate) -> u32 {
 }
 
 /// A random number of the pixel, dimension and sample.
-pub fn sample_number(at: Coordinate) -> u32 {
+pub(crate) fn sample_number(at: Coordinate) -> u32 {
     keyed_hash(dimension_number(at), at.sample)
 }

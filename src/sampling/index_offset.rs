@@ -7,11 +7,11 @@
 use super::fixed_point::mul_high;
 use super::hash::pixel_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// each pixel begins at a random index of the sequence (Dufay 2017 §5.3.2)
-    pub struct IndexOffset {
+    pub(crate) struct IndexOffset {
         /// offsets are drawn from 0 to this, excluded
         offsets: u32 = 65_536, in 2..=1 << 24;
         /// Whether pixels differ.

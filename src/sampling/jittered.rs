@@ -14,12 +14,12 @@
 use super::fixed_point::mul_high;
 use super::hash::{keyed_hash, pixel_number, sample_number};
 use super::{Coordinate, Demand, Facts, SamplerTable, Seeded, Seeding, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// a random point in each of N strata, for each pair of dimensions in an order of its own; for N known
     /// beforehand (Cook 1986, Kensler 2013)
-    pub struct Jittered {
+    pub(crate) struct Jittered {
         /// Whether pixels differ.
         seeded: Seeded;
     }

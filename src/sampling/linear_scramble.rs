@@ -9,12 +9,12 @@
 
 use super::hash::{dimension_number, pcg_hash};
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// random linear scrambling of binary digits and a digital shift, for each pixel and dimension
     /// (Matoušek 1998)
-    pub struct LinearScramble {
+    pub(crate) struct LinearScramble {
         /// Whether pixels differ.
         seeded: Seeded;
     }

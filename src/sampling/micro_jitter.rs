@@ -9,12 +9,12 @@
 use super::fixed_point::mul_high;
 use super::hash::{dimension_number, sample_number};
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// a shift of at most K·N^(-1/s) for each pixel and dimension, keeps rays coherent (Dufay 2017
     /// §5.4)
-    pub struct MicroJitter {
+    pub(crate) struct MicroJitter {
         /// K of the amplitude; 0 takes Dufay's: 1.5 for hammersley, 2.5 else
         k: f64 = 0.0, in 0.0..=64.0;
         /// s of the amplitude; Dufay takes 2 whatever the dimensions
@@ -28,7 +28,7 @@ parameters! {
     }
 
     /// What has a shift of its own.
-    pub enum Per {
+    pub(crate) enum Per {
         /// All samples of a pixel are shifted alike (Dufay 2017).
         Pixel = "pixel",
         /// Every sample.

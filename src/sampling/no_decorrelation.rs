@@ -2,11 +2,11 @@
 //! `kernels/sampling/no_decorrelation.wesl`.
 
 use super::{Coordinate, Decorrelation, Partner, SamplerTable};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// every pixel uses the same points: coherent rays, structured error (Dufay 2017)
-    pub struct NoDecorrelation {}
+    pub(crate) struct NoDecorrelation {}
 }
 
 impl Decorrelation for NoDecorrelation {

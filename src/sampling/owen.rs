@@ -6,7 +6,7 @@
 
 /// Scrambles a number whose bits are in reverse order: a bit changes only those above it. `key` has to
 /// be well mixed.
-pub fn scramble_reversed(n: u32, key: u32) -> u32 {
+pub(crate) fn scramble_reversed(n: u32, key: u32) -> u32 {
     let mut x = n;
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
@@ -17,7 +17,7 @@ pub fn scramble_reversed(n: u32, key: u32) -> u32 {
 }
 
 /// Scrambles a fraction: a digit is flipped or not as the digits before it and `key` say.
-pub fn owen_scramble(x: u32, key: u32) -> u32 {
+pub(crate) fn owen_scramble(x: u32, key: u32) -> u32 {
     scramble_reversed(x.reverse_bits(), key).reverse_bits()
 }
 
@@ -25,7 +25,7 @@ pub fn owen_scramble(x: u32, key: u32) -> u32 {
 ///
 /// Source: C. Wellons, "Prospecting for hash functions", 2018 (lowbias32); zero is moved away from
 /// itself.
-pub fn owen_key(x: u32) -> u32 {
+pub(crate) fn owen_key(x: u32) -> u32 {
     let mut n = x ^ 0xe6fe_3beb;
     n ^= n >> 16;
     n = n.wrapping_mul(0x7feb_352d);

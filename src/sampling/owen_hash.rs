@@ -8,12 +8,12 @@
 use super::hash::{dimension_number, pixel_number};
 use super::owen::owen_scramble;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// Owen scrambling and a nested shuffle of the index, by hashing, for each pixel (Burley 2020;
     /// Vegdahl 2021)
-    pub struct OwenHash {
+    pub(crate) struct OwenHash {
         /// Whether pixels differ.
         seeded: Seeded;
     }

@@ -10,11 +10,11 @@ use super::hash::pixel_number;
 use super::owen::{owen_key, scramble_reversed};
 use super::sobol::direction_numbers;
 use super::{Coordinate, Demand, Facts, SamplerTable, Seeded, Seeding, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// Sobol points Owen-scrambled and shuffled by hashing, as the crate sobol_burley (Burley 2020)
-    pub struct OwenSobol {
+    pub(crate) struct OwenSobol {
         /// Whether pixels differ.
         seeded: Seeded;
     }

@@ -4,12 +4,12 @@
 use super::hash::{pcg_hash, strided, wang_hash};
 use super::trig_hash::trig_hash;
 use super::{Coordinate, Facts, SamplerTable, Seeded, Seeding, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang
     /// 1997; Dufay 2017 Alg. 5.1)
-    pub struct PixelHash {
+    pub(crate) struct PixelHash {
         /// which hash; trig is a negative control
         hash: Hash = Hash::Pcg;
         /// Whether pixels differ.

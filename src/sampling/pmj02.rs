@@ -6,12 +6,12 @@
 
 use super::pmj02_points::shuffled_points;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// progressive multi-jittered (0,2) points, a random set in a random order for each pair of
     /// dimensions (Christensen et al. 2018)
-    pub struct Pmj02 {
+    pub(crate) struct Pmj02 {
         /// seed of the generator: which of the random sets
         set: u32 = 1, in 0..=65_535;
     }

@@ -4,7 +4,7 @@
 //! EGSR 2018, for the order of the cells; M. Pharr, "Efficient generation of points that satisfy
 //! two-dimensional elementary intervals", JCGT 8(1), 2019, for choosing the digits of x and y apart.
 
-use crate::random::SplitMix64;
+use raystone_core::random::SplitMix64;
 
 /// Which elementary intervals of area 2^-m hold a point: bit column · rows + row of shape k, which has
 /// 2^k columns and 2^(m−k) rows.

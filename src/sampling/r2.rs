@@ -11,12 +11,12 @@
 
 use super::primes::primes;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// additive recurrence: powers of a generalised golden ratio (Roberts 2018), beyond 8 dimensions
     /// square roots of primes (Richtmyer 1951)
-    pub struct R2 {
+    pub(crate) struct R2 {
         /// all dimensions that are drawn; up to 8 it is the d of the ratio's equation x^(d+1) = x + 1
         dimensions: u32 = 2, in 1..=256;
     }

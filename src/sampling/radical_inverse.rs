@@ -21,7 +21,7 @@ pub(super) fn prepend_digit(digit: u32, x: u32, base: u32) -> u32 {
 ///
 /// The digit of the least weight, which is the first one of the index, comes first: x ← ⌊(2³² d + x) / b⌋. Cutting
 /// in each step is cutting once at the end, since ⌊(m + ⌊y⌋) / b⌋ = ⌊(m + y) / b⌋ for whole m.
-pub fn radical_inverse(n: u32, base: u32) -> u32 {
+pub(crate) fn radical_inverse(n: u32, base: u32) -> u32 {
     if base == 2 {
         return n.reverse_bits();
     }

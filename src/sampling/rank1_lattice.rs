@@ -7,12 +7,12 @@
 
 use super::lattice_search::generating_vector;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// extensible rank-1 lattice, generating vector searched component by component (Sloan & Reztsov
     /// 2002)
-    pub struct Rank1Lattice {}
+    pub(crate) struct Rank1Lattice {}
 }
 
 impl Sequence for Rank1Lattice {

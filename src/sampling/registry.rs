@@ -6,7 +6,8 @@ use super::{
     NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash, Pmj02, R2, Rank1Lattice, Sampler,
     SamplerError, SamplerTable, Seeding, Sequence, Sobol, VanDerCorput,
 };
-use crate::params::{Entry, Params, Registered, Registry, Variant};
+use crate::{decorrelation_kind, sequence_kind};
+use raystone_core::params::{Entry, Params, Registry, Variant};
 use std::sync::Arc;
 
 /// Everything that can be named on the `sequence` and `decorrelation` axes; more can be added.
@@ -22,30 +23,28 @@ impl Default for SamplerRegistry {
     fn default() -> Self {
         Self {
             sequences: Registry::new(vec![
-                Registered::sequence::<PixelHash>("pixel-hash"),
-                Registered::sequence::<Jittered>("jittered"),
-                Registered::sequence::<VanDerCorput>("van-der-corput"),
-                Registered::sequence::<Hammersley>("hammersley"),
-                Registered::sequence::<Halton>("halton"),
-                Registered::sequence::<Sobol>("sobol"),
-                Registered::sequence::<OwenSobol>("owen-sobol"),
-                Registered::sequence::<Pmj02>("pmj02"),
-                Registered::sequence::<Rank1Lattice>("rank1-lattice"),
-                Registered::sequence::<R2>("r2"),
+                sequence_kind::<PixelHash>("pixel-hash"),
+                sequence_kind::<Jittered>("jittered"),
+                sequence_kind::<VanDerCorput>("van-der-corput"),
+                sequence_kind::<Hammersley>("hammersley"),
+                sequence_kind::<Halton>("halton"),
+                sequence_kind::<Sobol>("sobol"),
+                sequence_kind::<OwenSobol>("owen-sobol"),
+                sequence_kind::<Pmj02>("pmj02"),
+                sequence_kind::<Rank1Lattice>("rank1-lattice"),
+                sequence_kind::<R2>("r2"),
             ]),
             decorrelations: Registry::new(vec![
-                Registered::decorrelation::<NoDecorrelation>("none"),
-                Registered::decorrelation::<DiscRotation>("disc-rotation"),
-                Registered::decorrelation::<IndexOffset>("index-offset"),
-                Registered::decorrelation::<CranleyPatterson>("cranley-patterson"),
-                Registered::decorrelation::<DigitalShift>("digital-shift"),
-                Registered::decorrelation::<LinearScramble>("linear-scramble"),
-                Registered::decorrelation::<OwenHash>("owen-hash"),
-                Registered::decorrelation::<MicroJitter>("micro-jitter"),
-                Registered::decorrelation::<CranleyPattersonMicroJitter>(
-                    "cranley-patterson-micro-jitter",
-                ),
-                Registered::decorrelation::<BlueNoise>("blue-noise"),
+                decorrelation_kind::<NoDecorrelation>("none"),
+                decorrelation_kind::<DiscRotation>("disc-rotation"),
+                decorrelation_kind::<IndexOffset>("index-offset"),
+                decorrelation_kind::<CranleyPatterson>("cranley-patterson"),
+                decorrelation_kind::<DigitalShift>("digital-shift"),
+                decorrelation_kind::<LinearScramble>("linear-scramble"),
+                decorrelation_kind::<OwenHash>("owen-hash"),
+                decorrelation_kind::<MicroJitter>("micro-jitter"),
+                decorrelation_kind::<CranleyPattersonMicroJitter>("cranley-patterson-micro-jitter"),
+                decorrelation_kind::<BlueNoise>("blue-noise"),
             ]),
         }
     }

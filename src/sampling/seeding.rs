@@ -5,11 +5,11 @@
 //! pixels of a workgroup share a seed, and lie far apart. Here these are 8 × 8 pixels, each [`STRIDE`] from the next, of a tile of
 //! 64 × 64; [`Seeding::Workgroup`] is the same with neighbours.
 
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// The parameter of everything that hashes the pixel.
-    pub struct Seeded {
+    pub(crate) struct Seeded {
         /// random numbers differ by pixel and sample, by sample only, or by sample and group of 64 pixels (Nilsson & Otte dag 2018)
         seeding: Seeding = Seeding::PixelSample;
     }
@@ -36,7 +36,7 @@ const SPARSE: u32 = 3;
 /// Pixels of a group in each direction, as lanes of a workgroup.
 const EDGE: u32 = 8;
 /// How far the pixels of a sparse group lie apart, in each direction.
-pub const STRIDE: u32 = 8;
+pub(crate) const STRIDE: u32 = 8;
 
 impl Seeding {
     /// As kernels know it.
@@ -63,7 +63,7 @@ impl Seeding {
     }
 
     /// Twin of the kernel's `seed_pixel`: the pixel whose random numbers a pixel draws, in an image of this width.
-    pub fn seed_pixel(self, pixel: u32, width: u32) -> u32 {
+    pub(crate) fn seed_pixel(self, pixel: u32, width: u32) -> u32 {
         match self {
             Self::PixelSample => pixel,
             Self::Sample => 0,

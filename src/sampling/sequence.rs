@@ -1,7 +1,7 @@
 //! What a sequence is.
 
 use super::{Coordinate, Demand, SamplerTable, Seeding};
-use crate::params::{Parameters, Registered};
+use raystone_core::params::{Parameters, Registered};
 use std::sync::Arc;
 
 /// What others have to know of a sequence with its parameters.
@@ -53,9 +53,7 @@ pub trait Sequence: Send + Sync {
     fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32;
 }
 
-impl Registered<dyn Sequence> {
-    /// The sequence that `S` declares, under this name; the doc comment of `S` describes it.
-    pub fn sequence<S: Sequence + Parameters + 'static>(name: &str) -> Self {
-        Self::new::<S>(name, |params| Ok(Arc::new(S::from_params(params)?)))
-    }
+/// The sequence that `S` declares, under this name; the doc comment of `S` describes it.
+pub fn sequence_kind<S: Sequence + Parameters + 'static>(name: &str) -> Registered<dyn Sequence> {
+    Registered::new::<S>(name, |params| Ok(Arc::new(S::from_params(params)?)))
 }

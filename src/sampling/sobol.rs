@@ -5,8 +5,8 @@
 //! SIAM J. Sci. Comput. 30, 2008 (set D6, from the crate `sobol`).
 
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::parameters;
 use ::sobol::params::JoeKuoD6;
+use raystone_core::parameters;
 
 /// Dimensions of Joe and Kuo's file.
 const DIMENSIONS: u32 = 21_201;
@@ -15,7 +15,7 @@ const BITS: usize = 32;
 parameters! {
     /// (t, s)-sequence in base 2, 21201 dimensions of Joe & Kuo's D6 direction numbers (2008), from
     /// index 0
-    pub struct Sobol {}
+    pub(crate) struct Sobol {}
 }
 
 /// Direction numbers of the first `dimensions` dimensions: `bits` a dimension, the one of the index's

@@ -51,7 +51,7 @@ impl SamplerTable {
     }
 
     /// Width of the image, pixels.
-    pub fn image_width(&self) -> u32 {
+    pub(crate) fn image_width(&self) -> u32 {
         self.word(self.word(0) - 1)
     }
 
@@ -59,7 +59,7 @@ impl SamplerTable {
     ///
     /// # Panics
     /// Beyond the table.
-    pub fn decorrelation_word(&self, i: u32) -> u32 {
+    pub(crate) fn decorrelation_word(&self, i: u32) -> u32 {
         self.word(self.word(0) + i)
     }
 }

@@ -62,7 +62,7 @@ fn start_phase(at: Coordinate) -> u32 {
 }
 
 /// frac(sin(s + 0.1 draw) factor).
-pub fn trig_hash(at: Coordinate) -> u32 {
+pub(crate) fn trig_hash(at: Coordinate) -> u32 {
     let draw = at
         .sample
         .wrapping_mul(DRAWS)

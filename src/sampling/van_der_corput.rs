@@ -2,11 +2,11 @@
 
 use super::radical_inverse::radical_inverse;
 use super::{Coordinate, Facts, SamplerTable, Sequence};
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// radical inverse in one base, one-dimensional, from index 0 (van der Corput 1935)
-    pub struct VanDerCorput {
+    pub(crate) struct VanDerCorput {
         /// base of the digits
         base: u32 = 2, in 2..=1024;
     }

@@ -4,8 +4,8 @@ use super::{
     Assembly, Daylight, Framing, GEOMETRIC, InstanceError, Light, LightList, LoadReport, Material,
     SceneData, SceneError, Texture, Transform, WHITE, decode_color, encode_color, mask, normals,
 };
-use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
+use raystone_core::geometry::{Camera, Triangle};
 
 /// Largest absolute coordinate. Triangle tests multiply three differences of coordinates, and WGSL
 /// promises nothing of what overflows: 8 · (2 · 1e12)³ stays below the largest f32. So do distances times
@@ -14,15 +14,6 @@ pub const MAX_COORDINATE: f32 = 1e12;
 
 /// Reflectance of surfaces whose file says nothing of it.
 pub const DEFAULT_ALBEDO: f32 = 0.7;
-
-impl Triangle {
-    /// Whether no ray can hit the triangle. Differences and products of f32 are formed in f64, so
-    /// the answer does not depend on where the triangle lies.
-    pub fn has_zero_area(&self) -> bool {
-        let [a, b, c] = self.vertices.map(Vec3::as_dvec3);
-        (b - a).cross(c - a) == glam::DVec3::ZERO
-    }
-}
 
 /// What a loader knows of a scene besides its triangles.
 #[derive(Default)]
@@ -36,7 +27,7 @@ pub(super) struct Look {
 
 impl Look {
     /// Surfaces under a white sky, seen from `eye` with a vertical field of view of `fov` degrees.
-    pub fn under_sky(materials: Vec<Material>, eye: Vec3, target: Vec3, fov: f32) -> Self {
+    pub(crate) fn under_sky(materials: Vec<Material>, eye: Vec3, target: Vec3, fov: f32) -> Self {
         Self {
             materials,
             camera: Some(Camera::upright(eye, target, fov)),
@@ -70,7 +61,7 @@ pub(super) struct SceneBuilder {
 
 impl SceneBuilder {
     /// `keep_uvs` says whether texture coordinates will be of use.
-    pub fn new(keep_uvs: bool, capacity: usize) -> Self {
+    pub(crate) fn new(keep_uvs: bool, capacity: usize) -> Self {
         Self {
             triangles: Vec::with_capacity(capacity),
             uvs: Vec::with_capacity(if keep_uvs { capacity } else { 0 }),
@@ -81,19 +72,19 @@ impl SceneBuilder {
     }
 
     /// Makes room for `more` triangles.
-    pub fn reserve(&mut self, more: usize) {
+    pub(crate) fn reserve(&mut self, more: usize) {
         self.triangles.reserve(more);
         self.material_ids.reserve(more);
         self.uvs.reserve(if self.keep_uvs { more } else { 0 });
     }
 
     /// Adds a triangle without texture coordinates.
-    pub fn push(&mut self, vertices: [Vec3; 3], material: u32) {
+    pub(crate) fn push(&mut self, vertices: [Vec3; 3], material: u32) {
         self.push_corners(vertices, [Vec2::ZERO; 3], None, material);
     }
 
     /// Adds a triangle with texture coordinates and perhaps normals. A non-finite vertex drops it, a zero area is counted.
-    pub fn push_corners(
+    pub(crate) fn push_corners(
         &mut self,
         vertices: [Vec3; 3],
         uvs: [Vec2; 3],
@@ -104,7 +95,7 @@ impl SceneBuilder {
     }
 
     /// The same with perhaps linear colours, which multiply the base colour.
-    pub fn push_colored(
+    pub(crate) fn push_colored(
         &mut self,
         vertices: [Vec3; 3],
         uvs: [Vec2; 3],
@@ -138,13 +129,18 @@ impl SceneBuilder {
     }
 
     /// Adds the quadrilateral a, b, c, d as the triangles abc and acd.
-    pub fn push_quad(&mut self, [a, b, c, d]: [Vec3; 4], material: u32) {
+    pub(crate) fn push_quad(&mut self, [a, b, c, d]: [Vec3; 4], material: u32) {
         self.push([a, b, c], material);
         self.push([a, c, d], material);
     }
 
     /// Adds `edge` by `edge` quadrilaterals between the points of a grid.
-    pub fn push_grid(&mut self, edge: usize, material: u32, at: impl Fn(usize, usize) -> Vec3) {
+    pub(crate) fn push_grid(
+        &mut self,
+        edge: usize,
+        material: u32,
+        at: impl Fn(usize, usize) -> Vec3,
+    ) {
         for (i, k) in (0..edge).flat_map(|i| (0..edge).map(move |k| (i, k))) {
             let quad = [at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)];
             self.push_quad(quad, material);
@@ -153,13 +149,13 @@ impl SceneBuilder {
 
     /// Says that a transform has mirrored the triangles from number `first` on: their fronts are the sides from which their corners
     /// turn clockwise.
-    pub fn mirror_from(&mut self, first: usize) {
+    pub(crate) fn mirror_from(&mut self, first: usize) {
         self.mirrored.resize(first, false);
         self.mirrored.resize(self.triangles.len(), true);
     }
 
     /// Adds an object to the assembly. It is numbered by the order of addition.
-    pub fn add_object(&mut self, triangles: Vec<Triangle>) {
+    pub(crate) fn add_object(&mut self, triangles: Vec<Triangle>) {
         if let Err(error) = self.assembly.add_object(triangles) {
             self.misplaced.get_or_insert(error);
         }
@@ -167,12 +163,12 @@ impl SceneBuilder {
 
     /// Adds an instance of an object of the assembly, all of one material. What cannot be placed
     /// makes [`SceneBuilder::finish`] fail.
-    pub fn place(&mut self, object: u32, to_world: Transform, material: u32) {
+    pub(crate) fn place(&mut self, object: u32, to_world: Transform, material: u32) {
         self.place_textured(object, to_world, material, &[]);
     }
 
     /// The same with texture coordinates of the object's triangles.
-    pub fn place_textured(
+    pub(crate) fn place_textured(
         &mut self,
         object: u32,
         to_world: Transform,
@@ -183,7 +179,7 @@ impl SceneBuilder {
     }
 
     /// The same with a material of each of its triangles, and colours of their vertices.
-    pub fn place_looking(
+    pub(crate) fn place_looking(
         &mut self,
         object: u32,
         to_world: Transform,
@@ -212,17 +208,17 @@ impl SceneBuilder {
     }
 
     /// The triangles alone.
-    pub fn into_triangles(self) -> Vec<Triangle> {
+    pub(crate) fn into_triangles(self) -> Vec<Triangle> {
         self.triangles
     }
 
     /// The triangles so far.
-    pub fn triangles(&self) -> &[Triangle] {
+    pub(crate) fn triangles(&self) -> &[Triangle] {
         &self.triangles
     }
 
     /// How many triangles there are so far.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.triangles.len()
     }
 
@@ -239,7 +235,7 @@ impl SceneBuilder {
     /// # Errors
     /// What `refused` says, [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
     /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
-    pub fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
+    pub(crate) fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
         if let Some(error) = self.refused {
             return Err(error);
         }
@@ -273,7 +269,7 @@ impl SceneBuilder {
             });
         }
         if let Some(camera) = &look.camera {
-            camera.validate()?;
+            crate::check_camera(camera)?;
         }
         mask::settle(&mut look.materials, &look.textures);
         let textured = !look.textures.is_empty();

@@ -1,8 +1,8 @@
 //! Where the image is taken from: boxes around scenes, and cameras that see something.
 
 use super::SceneError;
-use crate::geometry::{Camera, Triangle};
 use glam::Vec3;
+use raystone_core::geometry::{Camera, Triangle};
 
 /// An axis-aligned box, scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,55 +53,46 @@ impl Bounds {
     }
 }
 
-impl Camera {
-    /// Unit viewing direction, and half the plane of an image of so many pixels at distance 1, to the right
-    /// and upwards.
-    pub fn basis(&self, [width, height]: [u32; 2]) -> [Vec3; 3] {
-        let forward = (self.target - self.eye).normalize();
-        let right = forward.cross(self.up).normalize();
-        let up = right.cross(forward);
-        let half_height = (0.5 * self.vertical_fov_degrees.to_radians()).tan();
-        let half_width = half_height * width as f32 / height as f32;
-        [forward, right * half_width, up * half_height]
+/// Checks that the camera defines an image.
+///
+/// # Errors
+/// [`SceneError::Camera`] if a component is not finite, the field of view is not in
+/// (0, 180) degrees, `eye` equals `target`, or `up` is zero or parallel to the view.
+pub fn check_camera(camera: &Camera) -> Result<(), SceneError> {
+    let error = |problem: String, advice| Err(SceneError::Camera { problem, advice });
+    let vectors = [
+        ("eye", camera.eye),
+        ("target", camera.target),
+        ("up", camera.up),
+    ];
+    if let Some((name, value)) = vectors.iter().find(|(_, v)| !v.is_finite()) {
+        return error(
+            format!("`{name}` is {value}"),
+            "all coordinates must be finite",
+        );
     }
-
-    /// Checks that the camera defines an image.
-    ///
-    /// # Errors
-    /// [`SceneError::Camera`] if a component is not finite, the field of view is not in
-    /// (0, 180) degrees, `eye` equals `target`, or `up` is zero or parallel to the view.
-    pub fn validate(&self) -> Result<(), SceneError> {
-        let error = |problem: String, advice| Err(SceneError::Camera { problem, advice });
-        let vectors = [("eye", self.eye), ("target", self.target), ("up", self.up)];
-        if let Some((name, value)) = vectors.iter().find(|(_, v)| !v.is_finite()) {
-            return error(
-                format!("`{name}` is {value}"),
-                "all coordinates must be finite",
-            );
-        }
-        let fov = self.vertical_fov_degrees;
-        if !(fov > 0.0 && fov < 180.0) {
-            return error(
-                format!("the vertical field of view is {fov} degrees"),
-                "give an angle between 0 and 180, for example 40",
-            );
-        }
-        let view = (self.target - self.eye).as_dvec3();
-        if view == glam::DVec3::ZERO {
-            return error(
-                format!("`eye` and `target` are both {}", self.eye),
-                "move one of them",
-            );
-        }
-        let up = self.up.as_dvec3().normalize_or_zero();
-        if view.normalize().cross(up).length() < 1e-6 {
-            return error(
-                format!("`up` {} is zero or parallel to the view", self.up),
-                "give a vector across the viewing direction",
-            );
-        }
-        Ok(())
+    let fov = camera.vertical_fov_degrees;
+    if !(fov > 0.0 && fov < 180.0) {
+        return error(
+            format!("the vertical field of view is {fov} degrees"),
+            "give an angle between 0 and 180, for example 40",
+        );
     }
+    let view = (camera.target - camera.eye).as_dvec3();
+    if view == glam::DVec3::ZERO {
+        return error(
+            format!("`eye` and `target` are both {}", camera.eye),
+            "move one of them",
+        );
+    }
+    let up = camera.up.as_dvec3().normalize_or_zero();
+    if view.normalize().cross(up).length() < 1e-6 {
+        return error(
+            format!("`up` {} is zero or parallel to the view", camera.up),
+            "give a vector across the viewing direction",
+        );
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -111,7 +102,7 @@ mod tests {
     #[test]
     fn cameras_that_see_nothing_are_refused() {
         let good = Camera::upright(Vec3::ONE, Vec3::ZERO, 40.0);
-        good.validate().unwrap();
+        check_camera(&good).unwrap();
         let bad: [fn(&mut Camera); 7] = [
             |c| c.vertical_fov_degrees = 0.0,
             |c| c.vertical_fov_degrees = 180.0,
@@ -124,7 +115,7 @@ mod tests {
         for (index, change) in bad.iter().enumerate() {
             let mut camera = good;
             change(&mut camera);
-            assert!(camera.validate().is_err(), "case {index}");
+            assert!(check_camera(&camera).is_err(), "case {index}");
         }
     }
 }

@@ -5,8 +5,8 @@ use super::{
     Bounds, EnvironmentMap, InstanceError, Light, LightList, SceneData, SceneError, Transform,
     normals,
 };
-use crate::geometry::Triangle;
 use glam::{Vec2, Vec3};
+use raystone_core::geometry::Triangle;
 use std::mem::size_of_val;
 use std::path::Path;
 use std::sync::Arc;
@@ -248,14 +248,14 @@ impl Hash {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::builtin::tests::load_default;
-    use crate::scene::{Daylight, Light, MIRROR, TextureUse};
+    use crate::builtin::tests::load_default;
+    use crate::{Daylight, Light, MIRROR, TextureUse};
     use glam::Vec3;
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
-        type Change = fn(&mut crate::scene::SceneData);
+        type Change = fn(&mut crate::SceneData);
         let changes: [(&str, Change); 15] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),

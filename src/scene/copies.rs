@@ -3,9 +3,9 @@
 use super::builder::{Look, SceneBuilder};
 use super::builtin::numeric::sin_cos_turns;
 use super::{SceneData, SceneError, Transform};
-use crate::geometry::{Camera, Triangle};
-use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::{Camera, Triangle};
+use raystone_core::random::Pcg32;
 use std::collections::{HashMap, HashSet};
 
 /// Most triangles of a scene of copies: all of them are stored, 36 bytes each and as many again where they are judged.
@@ -211,10 +211,10 @@ fn taken_apart(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::ParamValue;
-    use crate::scene::builtin::tests::{load_default, load_unlit, load_with};
-    use crate::scene::{Bounds, load, named};
+    use crate::builtin::tests::{load_default, load_unlit, load_with};
+    use crate::{Bounds, load, named};
     use glam::Vec2;
+    use raystone_core::params::ParamValue;
 
     fn changed(name: &str, changes: &[(&str, i64)]) -> SceneData {
         let changes: Vec<_> = (changes.iter())
@@ -233,7 +233,7 @@ mod tests {
             (2, 12)
         );
         assert_eq!(scene.triangles.len(), 11 * plain.triangles.len() + 2);
-        let bounds = |i: &crate::scene::Instance| Bounds::of(&assembly.copy(i).collect::<Vec<_>>());
+        let bounds = |i: &crate::Instance| Bounds::of(&assembly.copy(i).collect::<Vec<_>>());
         let boxes: Vec<Bounds> = assembly.instances()[..11].iter().map(bounds).collect();
         for (i, a) in boxes.iter().enumerate() {
             assert!(a.min.y > 0.0 && a.min.y < 0.01 * (a.max.y - a.min.y));
@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_had_is_refused_with_what_to_do() {
-        let entry = crate::scene::builtin_scenes()
+        let entry = crate::builtin_scenes()
             .into_iter()
             .find(|e| e.name == "city")
             .unwrap();
@@ -328,7 +328,7 @@ mod tests {
         scene.uvs = (0..scene.triangles.len())
             .map(|i| [Vec2::splat(i as f32); 3])
             .collect();
-        scene.textures.push(crate::scene::Texture {
+        scene.textures.push(crate::Texture {
             name: "t".to_owned(),
             width: 1,
             height: 1,

@@ -32,14 +32,14 @@ impl fmt::Debug for EnvironmentMap {
 }
 
 impl EnvironmentMap {
-    /// Reads a linear image of any format that [`crate::image::read_linear`] knows. Texels that are negative, infinite or NaN are taken as 0, with a warning.
+    /// Reads a linear image of any format that [`raystone_image::read_linear`] knows. Texels that are negative, infinite or NaN are taken as 0, with a warning.
     ///
     /// # Errors
     /// The file cannot be read or is no picture.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
         let malformed = |problem: String| SceneError::malformed(path, "", problem);
         super::error::open(path)?;
-        let map = crate::image::read_linear(path).map_err(|e| malformed(e.to_string()))?;
+        let map = raystone_image::read_linear(path).map_err(|e| malformed(e.to_string()))?;
         let (width, height) = (map.width, map.height);
         let texels = map.pixels.into_iter().map(Vec3::from).collect();
         Self::new(
@@ -202,7 +202,7 @@ mod tests {
         let least = map.within(0, &mut warnings);
         assert!(least.texels.len() == 1 && (light(&least) / before - 1.0).abs() < 1e-6);
         // What software adapters bind holds what it held before, and not twice that.
-        let all = crate::scene::LEAST_BINDING - (8 << 20);
+        let all = crate::LEAST_BINDING - (8 << 20);
         assert!(table_bytes([2048, 1024]) <= all && table_bytes([4096, 2048]) > all);
     }
 }

@@ -1,6 +1,7 @@
 //! What can go wrong between a scene's name and its triangles.
 
-use crate::params::ParamError;
+use raystone_core::files::files;
+use raystone_core::params::ParamError;
 use std::any::Any;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -128,11 +129,7 @@ impl SceneError {
     }
 
     /// A [`SceneError::Malformed`].
-    pub(crate) fn malformed(
-        path: &Path,
-        place: impl Into<String>,
-        problem: impl Into<String>,
-    ) -> Self {
+    pub fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Malformed {
             path: path.to_owned(),
             place: place.into(),
@@ -141,43 +138,22 @@ impl SceneError {
     }
 }
 
-/// Opens a model, telling a missing or empty file from a readable one.
-pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
-    let (file, bytes) = open_regular(path).map_err(SceneError::unreadable(path))?;
+/// Opens a model, telling a missing or empty file from a readable one, and its length in bytes.
+pub(super) fn open(path: &Path) -> Result<(Box<dyn Read + Send>, u64), SceneError> {
+    let (file, bytes) = files().open(path).map_err(SceneError::unreadable(path))?;
     if bytes == 0 {
         return Err(SceneError::Empty {
             path: path.to_owned(),
         });
     }
-    Ok(file)
+    Ok((file, bytes))
 }
 
 /// The bytes of a model that is read whole.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     let mut bytes = Vec::new();
-    let read = open(path)?.read_to_end(&mut bytes);
+    let read = open(path)?.0.read_to_end(&mut bytes);
     read.map(|_| bytes).map_err(SceneError::unreadable(path))
-}
-
-/// Opens a regular file, and tells its length in bytes. Folders are none, nor are devices and pipes,
-/// which may have no end.
-fn open_regular(path: &Path) -> std::io::Result<(std::fs::File, u64)> {
-    let meta = std::fs::metadata(path)?;
-    if meta.is_dir() {
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    if !meta.is_file() {
-        return Err(std::io::Error::other("it is no regular file"));
-    }
-    Ok((std::fs::File::open(path)?, meta.len()))
-}
-
-/// The bytes of a regular file that a model names.
-pub(super) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    let (mut file, length) = open_regular(path)?;
-    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
-    file.read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// What a third-party parser said when it panicked.

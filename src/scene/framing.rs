@@ -5,11 +5,11 @@
 //! largest triangles if there are many. The answer depends on the triangles alone.
 
 use super::{Bounds, SceneData};
-use crate::geometry::{Camera, Triangle};
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{Ray, RayHit};
+use raystone_core::geometry::{Camera, Triangle};
 use std::borrow::Cow;
 
 /// Vertical field of view outside, degrees.
@@ -101,7 +101,7 @@ impl Framing {
     }
 
     /// Whether the scene is a room.
-    pub fn is_room(&self) -> bool {
+    pub(crate) fn is_room(&self) -> bool {
         !matches!(self.place, Standpoint::Outside { room: false, .. })
     }
 

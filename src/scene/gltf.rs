@@ -12,9 +12,9 @@ use super::gltf_material;
 use super::gltf_unread::{Unread, of_document};
 use super::texture::decode_all;
 use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, Transform};
-use crate::geometry::{Camera, Triangle};
 use glam::{DMat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
+use raystone_core::geometry::{Camera, Triangle};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -372,7 +372,7 @@ impl<'a> Geometry<'a> {
             up: world.transform_vector3(Vec3::Y).normalize_or_zero(),
             vertical_fov_degrees: lens.yfov().to_degrees(),
         };
-        if let Err(problem) = found.validate() {
+        if let Err(problem) = crate::check_camera(&found) {
             let warning = format!("a camera of the file was ignored: {problem}");
             self.builder.report.warnings.push(warning);
             return None;

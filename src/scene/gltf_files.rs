@@ -1,7 +1,6 @@
 //! Files that a glTF model names by URI.
 
 use super::LoadOptions;
-use super::error::read_regular;
 use base64::Engine;
 use std::path::{Component, Path, PathBuf};
 
@@ -15,7 +14,7 @@ pub(super) struct Files {
 
 impl Files {
     /// The files of the model `model`.
-    pub fn new(model: &Path, options: &LoadOptions) -> Self {
+    pub(crate) fn new(model: &Path, options: &LoadOptions) -> Self {
         let folder = match model.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -31,7 +30,7 @@ impl Files {
     ///
     /// # Errors
     /// What is wrong, with the name of the file.
-    pub fn read(&self, uri: &str) -> Result<Vec<u8>, String> {
+    pub(crate) fn read(&self, uri: &str) -> Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let (_, encoded) = data
                 .split_once(";base64,")
@@ -41,14 +40,14 @@ impl Files {
                 .map_err(|error| format!("the data URI cannot be decoded: {error}"));
         }
         let file = self.find(uri)?;
-        read_regular(&file).map_err(|error| format!("{}: {error}", file.display()))
+        raystone_core::files::read(&file).map_err(|error| format!("{}: {error}", file.display()))
     }
 
     /// The file that a relative URI names, `%20` and the like decoded.
     ///
     /// # Errors
     /// It lies outside the model's folder, by its name or by a link, and that is not allowed.
-    pub fn find(&self, uri: &str) -> Result<PathBuf, String> {
+    pub(crate) fn find(&self, uri: &str) -> Result<PathBuf, String> {
         let file = self
             .folder
             .join(decoded(uri.strip_prefix("file://").unwrap_or(uri)));
@@ -61,7 +60,7 @@ impl Files {
             )
         };
         // Both with links resolved; what is not there is told by its reader, unless its name leads out.
-        let real = |path: &Path| path.canonicalize();
+        let real = |path: &Path| raystone_core::files::files().real(path);
         let inside = match (real(&file), real(&self.folder)) {
             (Ok(file), Ok(folder)) => file.starts_with(folder),
             _ => file.strip_prefix(&self.folder).is_ok_and(|rest| {

@@ -31,7 +31,7 @@ struct Given {
 }
 
 impl<'a> Images<'a> {
-    pub fn new(files: &'a Files, document: &gltf::Document, buffers: &'a [Vec<u8>]) -> Self {
+    pub(crate) fn new(files: &'a Files, document: &gltf::Document, buffers: &'a [Vec<u8>]) -> Self {
         Self {
             files,
             buffers,
@@ -40,7 +40,7 @@ impl<'a> Images<'a> {
         }
     }
 
-    pub fn place(&mut self, info: &gltf::texture::Info<'_>) -> Placed {
+    pub(crate) fn place(&mut self, info: &gltf::texture::Info<'_>) -> Placed {
         let given = info.texture_transform().map(|t| Given {
             offset: t.offset().into(),
             rotation: t.rotation(),
@@ -50,7 +50,7 @@ impl<'a> Images<'a> {
         self.placed(&info.texture(), info.tex_coord(), given)
     }
 
-    pub fn place_normals(&mut self, info: &gltf::material::NormalTexture<'_>) -> Placed {
+    pub(crate) fn place_normals(&mut self, info: &gltf::material::NormalTexture<'_>) -> Placed {
         let given = info
             .extension_value("KHR_texture_transform")
             .map(given_by_json);

@@ -39,7 +39,7 @@ pub(super) fn of_document(document: &gltf::Document) -> Unread {
 impl Unread {
     /// Takes note of the attributes of a primitive that are not read. Skins and morph targets, and texture coordinates without
     /// a texture, are a matter of their own: nothing is lost without the latter.
-    pub fn see(&mut self, primitive: &gltf::Primitive<'_>, set: Option<u32>) {
+    pub(crate) fn see(&mut self, primitive: &gltf::Primitive<'_>, set: Option<u32>) {
         for (semantic, _) in primitive.attributes() {
             let name = match semantic {
                 Semantic::Positions | Semantic::Normals => continue,
@@ -58,7 +58,7 @@ impl Unread {
     }
 
     /// A line for extensions, and one for the rest. `named` are those that materials have and other lines name.
-    pub fn warnings(&self, named: &[&str]) -> impl Iterator<Item = String> {
+    pub(crate) fn warnings(&self, named: &[&str]) -> impl Iterator<Item = String> {
         let extensions = self.extensions.iter();
         let extensions = extensions.filter(|name| !named.contains(&name.as_str()));
         let extensions = extensions.map(|name| format!("the extension `{name}`"));

@@ -1,9 +1,9 @@
 //! Lamps that are hung into any scene, so that the number of its lights can be varied.
 
 use super::{GEOMETRIC, Material, SceneData, WHITE};
-use crate::geometry::Triangle;
-use crate::random::Pcg32;
 use glam::{Vec2, Vec3};
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
 
 /// Edge of a lamp as a fraction of the scene's diagonal.
 const EDGE: f32 = 0.003;
@@ -60,9 +60,9 @@ pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::ParamValue;
-    use crate::scene::LightList;
-    use crate::scene::builtin::tests::{load_default, load_unlit, load_with};
+    use crate::LightList;
+    use crate::builtin::tests::{load_default, load_unlit, load_with};
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn so_many_lamps_hang_within_the_box_and_shine_down() {

@@ -5,7 +5,7 @@ mod parse;
 
 pub use parse::IesError;
 
-use crate::text::plain_text_or_latin1;
+use raystone_core::text::plain_text_or_latin1;
 use std::path::Path;
 
 /// How the two angles of a file make a direction. Axes are those of the luminaire, see [`IesProfile`].
@@ -51,7 +51,7 @@ impl IesProfile {
     /// It cannot be read, or breaks the standard: says in which line and how.
     pub fn read(path: &Path) -> Result<Self, IesError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| IesError::Read {
+        let bytes = raystone_core::files::read(path).map_err(|source| IesError::Read {
             file: name.clone(),
             source,
         })?;

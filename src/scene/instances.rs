@@ -5,13 +5,13 @@
 //! world space: the copies of all instances, one after the other. An [`Assembly`] says in addition
 //! which objects they are copies of; two-level structures trace those.
 
-use crate::geometry::Triangle;
 use glam::{DMat3, DVec3, Mat4, Vec3};
+use raystone_core::geometry::Triangle;
 use thiserror::Error;
 
 /// Transforms whose condition number (‖A‖ · ‖A⁻¹‖, greatest row sums) exceeds this are refused:
 /// f32 rounding alone would move what they place by its own thickness.
-pub const MAX_CONDITION: f64 = 1_048_576.0;
+pub(crate) const MAX_CONDITION: f64 = 1_048_576.0;
 
 /// Most triangles of a scene: indices are 32 bits wide and the last one means "no hit".
 const MAX_TRIANGLES: u64 = u32::MAX as u64;

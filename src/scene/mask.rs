@@ -61,7 +61,7 @@ pub struct AlphaMask {
 
 impl AlphaMask {
     /// The cutoff where a file says nothing of it.
-    pub const CUTOFF: f32 = 0.5;
+    pub(crate) const CUTOFF: f32 = 0.5;
 
     /// The mask of an image, with this cutoff.
     pub fn of(texture: TextureUse, channel: AlphaChannel, cutoff: f32) -> Self {

@@ -1,7 +1,6 @@
 //! Material libraries (MTL) of OBJ files.
 
 use super::builder::DEFAULT_ALBEDO;
-use super::error::read_regular;
 use super::material::{Description, Format, emitted};
 use super::mtl_texture::{Statement, statement};
 use super::obj_statements::{unread_warning, without_comment};
@@ -40,7 +39,7 @@ pub(super) struct Contents {
 
 impl Library {
     /// Libraries are looked for beside the OBJ file `obj`.
-    pub fn new(obj: &Path, options: &LoadOptions) -> Self {
+    pub(crate) fn new(obj: &Path, options: &LoadOptions) -> Self {
         Self {
             folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
             options: *options,
@@ -51,7 +50,7 @@ impl Library {
 
     /// Loads the libraries that a statement names: one whose name may have blanks in it, if there is such a file, or several. The
     /// numbers of their materials by name. A missing or broken library is a warning.
-    pub fn load(&self, names: &str) -> Vec<(String, u32)> {
+    pub(crate) fn load(&self, names: &str) -> Vec<(String, u32)> {
         let cut = without_comment(names).trim();
         let is_there = |name: &&str| self.folder.join(plain(name)).is_file();
         match [names, cut].iter().find(|name| is_there(name)) {
@@ -74,7 +73,8 @@ impl Library {
             let path = path.display();
             format!("material library {path}: {error}; its materials are drawn grey")
         };
-        let bytes = relative(Path::new(&file), &self.options).and_then(|()| read_regular(&path));
+        let bytes = relative(Path::new(&file), &self.options)
+            .and_then(|()| raystone_core::files::read(&path));
         let bytes = match bytes {
             Ok(bytes) => bytes,
             Err(error) => {
@@ -102,7 +102,7 @@ impl Library {
 
     /// All materials in the order of the libraries, the textures they refer to, and one warning for all that
     /// is drawn otherwise than the file says.
-    pub fn into_contents(self) -> Contents {
+    pub(crate) fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
         let approximated = contents
             .materials

@@ -11,9 +11,9 @@ use super::{
     CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError,
     decode_normal, obj, ply,
 };
-use crate::geometry::Camera;
-use crate::text::plain_text;
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
+use raystone_core::geometry::Camera;
+use raystone_core::text::plain_text;
 use roxmltree::{Document, Node};
 use std::path::Path;
 

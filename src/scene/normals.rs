@@ -1,8 +1,8 @@
 //! Vertex normals: two 16-bit numbers each, on an octahedron. Twin: `kernels/shading/normals.wesl`.
 
 use super::Transform;
-use crate::geometry::Triangle;
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::Triangle;
 
 /// In place of a normal: that of the triangle. No encoded normal has these bits.
 pub const GEOMETRIC: u32 = 0x8000_8000;

@@ -14,15 +14,15 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Corner([u32; 3]);
 
 impl Corner {
-    pub fn vertex(self) -> usize {
+    pub(crate) fn vertex(self) -> usize {
         self.0[0] as usize
     }
 
-    pub fn uv(self) -> Option<usize> {
+    pub(crate) fn uv(self) -> Option<usize> {
         (self.0[1] != NONE).then_some(self.0[1] as usize)
     }
 
-    pub fn normal(self) -> Option<usize> {
+    pub(crate) fn normal(self) -> Option<usize> {
         (self.0[2] != NONE).then_some(self.0[2] as usize)
     }
 }
@@ -74,7 +74,7 @@ impl Statements {
     ///
     /// # Errors
     /// The line of the first broken statement, and what is wrong with it.
-    pub fn read(text: &str, library: &Library) -> Result<Self, (u32, String)> {
+    pub(crate) fn read(text: &str, library: &Library) -> Result<Self, (u32, String)> {
         let mut found = Self {
             positions: Vec::new(),
             colors: Vec::new(),
@@ -223,7 +223,7 @@ impl Statements {
     ///
     /// # Errors
     /// What is missing.
-    pub fn check(&self, corners: Range<usize>) -> Result<(), String> {
+    pub(crate) fn check(&self, corners: Range<usize>) -> Result<(), String> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         for Corner(indices) in &self.corners[corners] {
             for ((index, count), what) in indices.iter().zip(counts).zip(WHAT) {

@@ -7,13 +7,13 @@ use super::error::{guarded, open};
 use super::obj_statements::unread_warning;
 use super::polygon::triangulate;
 use super::{Material, SceneData, SceneError};
-use crate::text::plain_text_or_latin1;
 use glam::{Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyDef,
     PropertyType, ScalarType,
 };
+use raystone_core::text::plain_text_or_latin1;
 use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
 
@@ -23,8 +23,7 @@ use std::path::Path;
 /// # Errors
 /// [`SceneError`] naming the element that could not be read.
 pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
-    let file = open(path)?;
-    let bytes = file.metadata().map_or(0, |meta| meta.len());
+    let (file, bytes) = open(path)?;
     guarded(path, || {
         let source = BufReader::with_capacity(1 << 16, file);
         let (builder, is_colored) = read(path, bytes, source)?;

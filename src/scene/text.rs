@@ -1,6 +1,6 @@
 //! Texts of the formats of Wavefront: a line goes on after a `\`.
 
-use crate::text::plain_text_or_latin1;
+use raystone_core::text::plain_text_or_latin1;
 
 /// The plain text of a file. A line that ends in
 /// `\`, unless it is a comment, goes on in the next; empty lines in place of the joined ones keep the

@@ -1,6 +1,5 @@
 //! Decoding of textures, all of a scene in parallel.
 
-use super::error::read_regular;
 use super::reduce::{Texels, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::ImageReader;
@@ -157,9 +156,9 @@ fn checked_size(bytes: &[u8]) -> Result<Size, String> {
 /// The bytes of an image and its size.
 fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String> {
     let bytes = match &source.encoded {
-        Encoded::File(path) => {
-            Cow::Owned(read_regular(path).map_err(|e| format!("{}: {e}", path.display()))?)
-        }
+        Encoded::File(path) => Cow::Owned(
+            raystone_core::files::read(path).map_err(|e| format!("{}: {e}", path.display()))?,
+        ),
         Encoded::Memory(bytes) => Cow::Borrowed(bytes.as_ref()),
         Encoded::Missing(why) => return Err(why.clone()),
     };

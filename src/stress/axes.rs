@@ -8,17 +8,17 @@ use super::placement::Placement;
 use super::record::{Findings, Line, Record, Worst, line};
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
-use crate::accel::triangle::AnyTriangleTest;
-use crate::accel::{
+use glam::Vec3;
+use raystone_accel::triangle::AnyTriangleTest;
+use raystone_accel::{
     BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
     Query, Ray, RayBatch, Traced, TriangleSoup,
 };
-use crate::gpu::Gpu;
-use crate::integrator::offset::{TransformError, position_error};
-use crate::integrator::{OffsetRegistry, RayOffset, Stage};
-use crate::measure::record::{Key, axis};
-use crate::random::Pcg32;
-use glam::Vec3;
+use raystone_core::random::Pcg32;
+use raystone_gpu::Gpu;
+use raystone_record::{Key, axis};
+use raystone_render::offset::{TransformError, position_error};
+use raystone_render::{OffsetRegistry, RayOffset, Stage};
 use std::sync::Arc;
 
 /// Families whose rays pass near the sides of boxes.
@@ -53,7 +53,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn box_tests(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
+    pub(crate) fn box_tests(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("box tests");
         let structures = match self.settings.quick {
             true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
@@ -132,7 +132,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The tree cannot be built, in words.
-    pub fn offsets(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
+    pub(crate) fn offsets(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("ray offsets");
         let mut records = Vec::new();
         let rays = OFFSET_RAYS * self.settings.rays;
@@ -162,7 +162,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn costs(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
+    pub(crate) fn costs(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("cost of triangle tests");
         let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
         let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
@@ -191,7 +191,7 @@ impl Suite<'_> {
     /// Least time of each triangle test through a structure over a sphere.
     fn times(&self, accel: &str, bands: usize, count: usize) -> Result<Vec<Timed>, StressError> {
         let scene = Arc::new(case::scene(sphere(bands, &Placement::ORDINARY), None));
-        let registry = crate::accel::AccelRegistry::default();
+        let registry = raystone_accel::AccelRegistry::default();
         let Some(kind) = registry.get(accel) else {
             return Ok(Vec::new());
         };
@@ -251,7 +251,7 @@ fn empty_record(test: BoxTest) -> Findings {
 }
 
 /// The smallest pad that loses no hit, nor does any greater one.
-pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Option<usize> {
+pub(crate) fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Option<usize> {
     let padded: Vec<[usize; 2]> = tests
         .map(|t| ["pad-ulps/v1", "lost-hits/v1"].map(|id| t.count(id)))
         .collect();
@@ -265,7 +265,7 @@ pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Opti
 fn closed_meshes(place: &Placement) -> [(&'static str, Mesh); 4] {
     let at = |tilt: f32| -> Mesh {
         let mut mesh = cube(5, place);
-        let low = crate::scene::Bounds::of(&mesh).min;
+        let low = raystone_scene::Bounds::of(&mesh).min;
         let moved = |v: Vec3| {
             let v = v - low;
             Vec3::new(v.x, v.y, v.z + tilt * v.x)
@@ -290,7 +290,7 @@ fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Find
     let built = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default())?;
     let twin = built.twin(&soup);
     let mut random = Pcg32::with_stream(seed, 80);
-    let bounds = crate::scene::Bounds::of(mesh);
+    let bounds = raystone_scene::Bounds::of(mesh);
     let [low, high] = [bounds.min, bounds.max].map(|v| v.as_dvec3());
     let (centre, reach) = (0.5 * (low + high), 0.1 * (high - low).max_element());
     let (mut traced, mut self_intersections, mut leaks, mut farthest) = (0, 0, 0, 0.0_f64);
@@ -350,7 +350,7 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrator::offset;
+    use raystone_render::offset;
 
     #[test]
     fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {

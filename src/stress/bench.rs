@@ -1,20 +1,23 @@
 //! Where cases are traced: structures built over a case, and batches on the adapter.
 
 use super::case::Case;
-use crate::accel::{
+use raystone_accel::{
     AccelKind, BuildLog, BuiltAccel, Hit, Query, Ray, Space, Traced, TriangleSoup,
     brute_force_hits, brute_force_instances,
 };
-use crate::gpu::{GpuError, kernel_errors};
-use crate::integrator::Stage;
-use crate::params::Params;
-use crate::random::Pcg32;
+use raystone_core::params::Params;
+use raystone_core::random::Pcg32;
+use raystone_gpu::{GpuError, kernel_errors};
+use raystone_render::Stage;
 
 /// Builds a structure with its default parameters and checks its invariants.
 ///
 /// # Errors
 /// What it refuses or violates, in words.
-pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
+pub(crate) fn build(
+    kind: &dyn AccelKind,
+    soup: &TriangleSoup,
+) -> Result<Box<dyn BuiltAccel>, String> {
     build_with(kind, &Params::default(), soup)
 }
 
@@ -22,7 +25,7 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltA
 ///
 /// # Errors
 /// As for [`build`].
-pub fn build_with(
+pub(crate) fn build_with(
     kind: &dyn AccelKind,
     params: &Params,
     soup: &TriangleSoup,
@@ -35,19 +38,19 @@ pub fn build_with(
 }
 
 /// The error word in words; `None` if there is no error.
-pub fn error_text(errors: u32) -> Option<String> {
+pub(crate) fn error_text(errors: u32) -> Option<String> {
     (errors != 0).then(|| kernel_errors(errors).join("; "))
 }
 
 /// Brute force's answers.
-pub struct Expected {
+pub(crate) struct Expected {
     world: Vec<Hit>,
     instances: Option<Vec<Hit>>,
 }
 
 impl Expected {
     /// What brute force on the host answers in each space.
-    pub fn new(soup: &TriangleSoup, rays: &[Ray]) -> Self {
+    pub(crate) fn new(soup: &TriangleSoup, rays: &[Ray]) -> Self {
         let placed = soup.placed.as_ref();
         Self {
             world: brute_force_hits(soup, rays),
@@ -56,7 +59,7 @@ impl Expected {
     }
 
     /// Those for a structure that meets triangles in this space.
-    pub fn of(&self, space: Space) -> &[Hit] {
+    pub(crate) fn of(&self, space: Space) -> &[Hit] {
         match (space, &self.instances) {
             (Space::Instances, Some(hits)) => hits,
             _ => &self.world,
@@ -69,7 +72,7 @@ impl Expected {
 ///
 /// # Errors
 /// As for [`Stage::closest`].
-pub fn ratio(
+pub(crate) fn ratio(
     stage: &Stage,
     traced: &Traced,
     rays: &[Ray],
@@ -92,12 +95,12 @@ pub fn ratio(
 }
 
 /// The rays over and over until there are `count`.
-pub fn repeated(rays: &[Ray], count: usize) -> Vec<Ray> {
+pub(crate) fn repeated(rays: &[Ray], count: usize) -> Vec<Ray> {
     rays.iter().copied().cycle().take(count).collect()
 }
 
 /// Ordinary rays for the mesh of a case: chords between points of its box.
-pub fn ordinary_rays(case: &Case, seed: u64, count: usize) -> Vec<Ray> {
+pub(crate) fn ordinary_rays(case: &Case, seed: u64, count: usize) -> Vec<Ray> {
     let bounds = case.scene.bounds();
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max - bounds.min).as_dvec3());
     let mut random = Pcg32::with_stream(seed, 0x0c0d);

@@ -2,11 +2,11 @@
 
 use super::placement::Placement;
 use super::shapes::{Mesh, cube, sphere};
-use crate::accel::Ray;
-use crate::geometry::Triangle;
-use crate::random::Pcg32;
-use crate::scene::{Assembly, MAX_COORDINATE, Material, SceneData};
 use glam::Vec3;
+use raystone_accel::Ray;
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
+use raystone_scene::{Assembly, MAX_COORDINATE, Material, SceneData};
 use std::fmt;
 
 /// What the right answers are.
@@ -25,7 +25,7 @@ pub enum Truth {
 
 /// How fine the meshes are on which most rays are tried: a closed sphere and a closed box.
 #[derive(Clone, Copy)]
-pub struct Meshes {
+pub(crate) struct Meshes {
     /// Bands of the sphere.
     pub bands: usize,
     /// Cells along an edge of the box.
@@ -34,7 +34,7 @@ pub struct Meshes {
 
 impl Meshes {
     /// Both with their names, at a place.
-    pub fn at(self, place: &Placement) -> [(&'static str, Mesh); 2] {
+    pub(crate) fn at(self, place: &Placement) -> [(&'static str, Mesh); 2] {
         [
             ("sphere", sphere(self.bands, place)),
             ("box", cube(self.cells, place)),
@@ -60,7 +60,7 @@ pub struct Case {
 
 /// Makes the cases of a family, each from a random stream of its own, so that one can be made again
 /// from its label and the seed.
-pub struct Maker {
+pub(crate) struct Maker {
     family: &'static str,
     seed: u64,
     /// Whether only a few rungs are wanted.
@@ -98,12 +98,12 @@ impl Maker {
     }
 
     /// The rungs of the ladder.
-    pub fn places(&self) -> Vec<Placement> {
+    pub(crate) fn places(&self) -> Vec<Placement> {
         Placement::ladder(self.quick)
     }
 
     /// Adds a case: a mesh, and rays for it, each from random numbers of its own.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         label: impl Into<String>,
         place: Placement,
@@ -119,7 +119,7 @@ impl Maker {
     }
 
     /// Adds a case whose rays are made one by one.
-    pub fn add_each(
+    pub(crate) fn add_each(
         &mut self,
         label: impl Into<String>,
         place: Placement,
@@ -133,7 +133,7 @@ impl Maker {
     }
 
     /// Adds each of these meshes at each place.
-    pub fn add_on_every_rung(
+    pub(crate) fn add_on_every_rung(
         &mut self,
         meshes: Meshes,
         suffix: &str,
@@ -155,7 +155,7 @@ impl Maker {
     }
 
     /// Adds a case of placed objects, if they can be placed.
-    pub fn add_placed(
+    pub(crate) fn add_placed(
         &mut self,
         label: impl Into<String>,
         assembly: impl FnOnce(&mut Pcg32) -> Option<Assembly>,

@@ -2,11 +2,11 @@
 
 use super::bench;
 use super::shot_meshes;
-use crate::accel::watch::{Event, watch};
-use crate::accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
-use crate::oracle::exact_truths;
-use crate::params::Params;
-use crate::scene::SceneData;
+use raystone_accel::oracle::exact_truths;
+use raystone_accel::watch::{Event, watch};
+use raystone_accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
+use raystone_core::params::Params;
+use raystone_scene::SceneData;
 use std::fmt::Write as _;
 
 /// Crossed triangles that are told one by one.
@@ -126,9 +126,9 @@ pub fn scene_of(address: &super::case::Address) -> Result<SceneData, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::AccelRegistry;
-    use crate::stress::case;
-    use crate::stress::families::Family;
+    use crate::case;
+    use crate::families::Family;
+    use raystone_accel::AccelRegistry;
 
     #[test]
     fn every_twin_tells_as_many_nodes_and_triangles_as_it_counts_and_ends_with_brute_force() {

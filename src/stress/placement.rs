@@ -29,7 +29,7 @@ impl Placement {
     };
 
     /// Every rung, or a few that tell most.
-    pub fn ladder(quick: bool) -> Vec<Self> {
+    pub(crate) fn ladder(quick: bool) -> Vec<Self> {
         let scaled = |exponent: i32| Self {
             scale: 10f64.powi(exponent),
             shift: 0.0,
@@ -61,7 +61,7 @@ impl Placement {
     }
 
     /// Whether enough of a mesh is left that it has an inside: a hundred steps of rounding across.
-    pub fn keeps_shape(&self) -> bool {
+    pub(crate) fn keeps_shape(&self) -> bool {
         2.0 * self.scale > 50.0 * self.resolution()
     }
 }

@@ -3,12 +3,12 @@
 use super::numerics::Gauge;
 use super::placement::Placement;
 use super::tally::Errors;
-use crate::gpu::Environment;
-use crate::measure::figure::figure;
-use crate::measure::record::{
+use raystone_record::Environment;
+use raystone_record::figure::figure;
+use raystone_record::{
     Key, Ran, RecordError, STRESS_FILE, SkippedRecord, Sound, Verdict, read_lines, text_of,
 };
-use crate::report::{ReportError, write_file};
+use raystone_report::{ReportError, write_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 pub const SCHEMA: &str = "raystone-stress/2";
 
 /// A line of the file.
-pub type Line = crate::measure::record::Line<Record>;
+pub type Line = raystone_record::Line<Record>;
 
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -200,7 +200,7 @@ pub struct TargetRecord {
 }
 
 /// A line of a key.
-pub fn line(key: Key, record: Record) -> Line {
+pub(crate) fn line(key: Key, record: Record) -> Line {
     Line {
         schema: SCHEMA.to_owned(),
         ..Line::new(key, Ran::default(), record)
@@ -213,7 +213,7 @@ pub fn about_all(record: Record) -> Line {
 }
 
 /// A line about what was not done, and why.
-pub fn skipped(key: Key, cell: String, reason: impl Into<String>) -> Line {
+pub(crate) fn skipped(key: Key, cell: String, reason: impl Into<String>) -> Line {
     let reason = reason.into();
     line(key, Record::Skipped(SkippedRecord { cell, reason }))
 }

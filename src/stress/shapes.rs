@@ -1,19 +1,19 @@
 //! Meshes of the suite, modelled about two units around the origin in f64 and rounded once.
 
 use super::placement::Placement;
-use crate::geometry::Triangle;
-use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
 use std::collections::{HashMap, HashSet};
 
 /// Triangles in the scene.
-pub type Mesh = Vec<Triangle>;
+pub(crate) type Mesh = Vec<Triangle>;
 
 /// Radius of the sphere and half the side of the box, units; Embree's test has the same.
-pub const RADIUS: f64 = 2.0;
+pub(crate) const RADIUS: f64 = 2.0;
 
 /// A closed grid of longitude and latitude, `bands` × 2 `bands`; the polar bands are fans.
-pub fn sphere(bands: usize, place: &Placement) -> Mesh {
+pub(crate) fn sphere(bands: usize, place: &Placement) -> Mesh {
     let sectors = 2 * bands;
     let at = |band: usize, sector: usize| {
         // Both poles and the seam are the same point to the bit however they are reached.
@@ -39,14 +39,14 @@ pub fn sphere(bands: usize, place: &Placement) -> Mesh {
 }
 
 /// A level square of `cells` × `cells` quadrilaterals, `side` units wide, through the origin.
-pub fn plane(cells: usize, side: f64, place: &Placement) -> Mesh {
+pub(crate) fn plane(cells: usize, side: f64, place: &Placement) -> Mesh {
     grid(cells, place, |u, v| {
         DVec3::new(side * (u - 0.5), 0.0, side * (v - 0.5))
     })
 }
 
 /// A closed box, each face `cells` × `cells` quadrilaterals.
-pub fn cube(cells: usize, place: &Placement) -> Mesh {
+pub(crate) fn cube(cells: usize, place: &Placement) -> Mesh {
     let face = |axis: usize, end: f64| {
         move |u: f64, v: f64| {
             let mut p = DVec3::ZERO;
@@ -77,7 +77,7 @@ fn grid(cells: usize, place: &Placement, at: impl Fn(f64, f64) -> DVec3) -> Mesh
 }
 
 /// A point of a triangle's plane, inside it, rounded.
-pub fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+pub(crate) fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     let root = random.uniform().sqrt();
     let v = random.uniform();
     let [a, b, c] = triangle.vertices.map(|p| p.as_dvec3());
@@ -85,7 +85,7 @@ pub fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
 }
 
 /// A point of an edge, as near as f32 comes.
-pub fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+pub(crate) fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     let k = random.below(3);
     let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
     // Middles are points of f32 more often than others.
@@ -97,17 +97,17 @@ pub fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
 }
 
 /// A corner of a triangle.
-pub fn vertex(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+pub(crate) fn vertex(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     random.one_of(&triangle.vertices)
 }
 
 /// A point of a random triangle, rounded.
-pub fn on_mesh(mesh: &[Triangle], random: &mut Pcg32) -> Vec3 {
+pub(crate) fn on_mesh(mesh: &[Triangle], random: &mut Pcg32) -> Vec3 {
     on(&random.one_of(mesh), random)
 }
 
 /// A model moved and scaled so that it has the sphere's size, its holes closed by fans.
-pub fn model(triangles: &[Triangle], place: &Placement) -> Mesh {
+pub(crate) fn model(triangles: &[Triangle], place: &Placement) -> Mesh {
     let points = || triangles.iter().flat_map(|t| t.vertices);
     let low = points().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
     let high = points().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
@@ -160,7 +160,8 @@ fn close_holes(triangles: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 
 /// Whether every edge belongs to an even number of triangles, whichever way they are turned. Rounding
 /// that joins vertices changes nothing of that.
-pub fn is_closed(mesh: &[Triangle]) -> bool {
+#[cfg(test)]
+fn is_closed(mesh: &[Triangle]) -> bool {
     let mut uses: HashMap<[[u32; 3]; 2], u32> = HashMap::new();
     let key = |v: Vec3| v.to_array().map(|x| (x + 0.0).to_bits());
     for triangle in mesh {

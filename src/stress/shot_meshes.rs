@@ -3,23 +3,23 @@
 use super::case::towards;
 use super::placement::Placement;
 use super::shapes::{self, Mesh, RADIUS, on, on_edge, vertex};
-use crate::accel::Ray;
-use crate::geometry::Triangle;
-use crate::oracle::{Side, exact_truths};
-use crate::random::Pcg32;
-use crate::scene::{self, Bounds};
 use glam::Vec3;
 use rayon::prelude::*;
+use raystone_accel::Ray;
+use raystone_accel::oracle::{Side, exact_truths};
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
+use raystone_scene::{self as scene, Bounds};
 
 /// What stands for a family in the address of one of these meshes.
-pub const FAMILY: &str = "shots";
+pub(crate) const FAMILY: &str = "shots";
 /// The sphere and the plane; any other name is the path of a model.
-pub const SPHERE: &str = "sphere";
+pub(crate) const SPHERE: &str = "sphere";
 /// See [`SPHERE`].
-pub const PLANE: &str = "plane";
+pub(crate) const PLANE: &str = "plane";
 
 /// What is aimed at.
-pub const AIMS: [&str; 3] = ["random", "vertices", "edges"];
+pub(crate) const AIMS: [&str; 3] = ["random", "vertices", "edges"];
 
 /// Bands of the sphere: 16,256 triangles.
 const BANDS: usize = 64;
@@ -32,7 +32,7 @@ const TRIED: usize = 384;
 const LEAST_ORIGINS: usize = 8;
 
 /// A mesh with points from which every ray that is shot hits it.
-pub struct ShotMesh {
+pub(crate) struct ShotMesh {
     name: String,
     /// Where it stands.
     pub place: Placement,
@@ -48,7 +48,7 @@ impl ShotMesh {
     ///
     /// # Errors
     /// A model that cannot be read, or that has hardly an inside; in words.
-    pub fn named(name: &str, place: Placement, seed: u64) -> Result<Self, String> {
+    pub(crate) fn named(name: &str, place: Placement, seed: u64) -> Result<Self, String> {
         let mut random = Pcg32::with_stream(seed, 77);
         let mut inside = |reach: f64, above: f64| -> Vec<Vec3> {
             (0..512)
@@ -80,7 +80,7 @@ impl ShotMesh {
     ///
     /// # Errors
     /// As for [`ShotMesh::named`], or the label is none.
-    pub fn labelled(label: &str, seed: u64) -> Result<Self, String> {
+    pub(crate) fn labelled(label: &str, seed: u64) -> Result<Self, String> {
         let place = |place: &Placement| label.ends_with(&format!(", {place}"));
         let place = [Placement::ORDINARY, Placement::FAR]
             .into_iter()
@@ -92,12 +92,12 @@ impl ShotMesh {
     }
 
     /// What it is called in an address.
-    pub fn label(&self) -> String {
+    pub(crate) fn label(&self) -> String {
         format!("{}, {}", self.name, self.place)
     }
 
     /// What it is called in tables.
-    pub fn short_name(&self) -> &str {
+    pub(crate) fn short_name(&self) -> &str {
         match self.name.as_str() {
             name @ (SPHERE | PLANE) => name,
             path => {
@@ -109,7 +109,7 @@ impl ShotMesh {
     }
 
     /// Rays at what is aimed at, [`AIMS`], from random numbers of their own.
-    pub fn shots(&self, aim: usize, seed: u64, stream: u64, count: usize) -> Vec<Ray> {
+    pub(crate) fn shots(&self, aim: usize, seed: u64, stream: u64, count: usize) -> Vec<Ray> {
         const BLOCK: usize = 4096;
         let block = |block: usize| {
             let mut random = Pcg32::with_stream(seed, stream << 16 | block as u64);
@@ -173,7 +173,7 @@ fn within_border(plane: &[Triangle]) -> Mesh {
 /// Origins of those rays that leave the mesh an odd number of times, through insides only.
 fn inside(mesh: &[Triangle], rays: &[Ray]) -> Vec<Vec3> {
     let truths = exact_truths(mesh, rays);
-    let is_inside = |truth: &crate::oracle::ExactTruth| {
+    let is_inside = |truth: &raystone_accel::oracle::ExactTruth| {
         truth.hits.len() % 2 == 1 && truth.hits.iter().all(|hit| hit.side == Side::Inside)
     };
     let pairs = rays.iter().zip(&truths);

@@ -7,11 +7,11 @@ use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
 use super::{StressError, case};
-use crate::accel::triangle::AnyTriangleTest;
-use crate::accel::{NO_HIT, Ray, Traced};
-use crate::integrator::Stage;
-use crate::measure::record::{Key, axis};
-use crate::oracle::exact_truths;
+use raystone_accel::oracle::exact_truths;
+use raystone_accel::triangle::AnyTriangleTest;
+use raystone_accel::{NO_HIT, Ray, Traced};
+use raystone_record::{Key, axis};
+use raystone_render::Stage;
 use std::sync::Arc;
 
 /// Rays traced at a time.
@@ -25,7 +25,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn shots(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
+    pub(crate) fn shots(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         let mut records = Vec::new();
         let model = self.settings.model.as_ref();
         let model = model.map(|path| path.to_string_lossy().into_owned());

@@ -7,31 +7,31 @@ use super::placement::Placement;
 use super::record::{Findings, Line, Record, Rung, line, skipped};
 use super::tally::{CaseJudge, Outcome, Tally};
 use super::{StressError, StressOptions};
-use crate::accel::triangle::AnyTriangleTest;
-use crate::accel::{
+use raystone_accel::triangle::AnyTriangleTest;
+use raystone_accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
-use crate::gpu::{Gpu, GpuError};
-use crate::integrator::Stage;
-use crate::measure::gate;
-use crate::measure::rays::RaySet;
-use crate::measure::record::{Key, RayClass, axis};
+use raystone_gpu::{Gpu, GpuError};
+use raystone_record::{Key, RayClass, axis};
+use raystone_render::Stage;
+use raystone_verify::gate;
+use raystone_verify::rays::RaySet;
 
 /// Is told what is being done, by any thread.
-pub type Progress<'a> = dyn Fn(&str) + Sync + 'a;
+pub(crate) type Progress<'a> = dyn Fn(&str) + Sync + 'a;
 
 /// A structure under test.
-pub type Kind = &'static dyn AccelKind;
+pub(crate) type Kind = &'static dyn AccelKind;
 
 /// The structure that every other one is compared with.
-pub const BRUTE_FORCE: &str = "brute-force";
+pub(crate) const BRUTE_FORCE: &str = "brute-force";
 /// The structure that stands for all where not all are tried.
-pub const PLAIN: &str = "bvh";
+pub(crate) const PLAIN: &str = "bvh";
 /// Cases that are timed if it has to be quick.
 const TIMED_IF_QUICK: usize = 3;
 
 /// What the suite runs on and with.
-pub struct Suite<'a> {
+pub(crate) struct Suite<'a> {
     /// Devices of the adapter, one at least, which work at once where nothing is timed.
     pub gpus: &'a [Gpu],
     /// Whether it computes like the host.
@@ -76,7 +76,7 @@ impl OpenCell {
 
 impl Suite<'_> {
     /// The default triangle test with the default box test.
-    pub fn with(triangle: AnyTriangleTest) -> Intersection {
+    pub(crate) fn with(triangle: AnyTriangleTest) -> Intersection {
         Intersection {
             triangle,
             ..Intersection::default()
@@ -112,7 +112,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn cells(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
+    pub(crate) fn cells(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         let chosen = |family: &&Family| self.settings.wants_family(family.name);
         let mut records = Vec::new();
         for family in FAMILIES.iter().filter(chosen) {
@@ -247,7 +247,12 @@ impl Suite<'_> {
     }
 
     /// The command that shows what a structure with a triangle test does with a ray of a family's case.
-    pub fn replay(&self, [family, label]: [&str; 2], [kind, test]: [&str; 2], ray: &Ray) -> String {
+    pub(crate) fn replay(
+        &self,
+        [family, label]: [&str; 2],
+        [kind, test]: [&str; 2],
+        ray: &Ray,
+    ) -> String {
         let address = Address {
             family: family.to_owned(),
             label: label.to_owned(),

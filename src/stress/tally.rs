@@ -2,15 +2,15 @@
 
 use super::case::{Case, Truth};
 use super::record::{Findings, Quantiles, Rung, Worst};
-use crate::accel::{Hit, NO_HIT, Ray};
-use crate::geometry::Triangle;
-use crate::oracle::{ExactTruth, ExactVerdict, exact_truths};
 use rayon::prelude::*;
+use raystone_accel::oracle::{ExactTruth, ExactVerdict, exact_truths};
+use raystone_accel::{Hit, NO_HIT, Ray};
+use raystone_core::geometry::Triangle;
 use std::collections::BTreeMap;
 
 /// Errors of right hits: of the distance, in ulp and relative, and of the hit point, in ulp of its greatest
 /// coordinate and relative to the way of the ray.
-pub type Errors<T = f64> = [T; 4];
+pub(crate) type Errors<T = f64> = [T; 4];
 
 /// What came of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Outcome {
 }
 
 /// What is right for every ray of a case: found once, whatever traces the case.
-pub struct CaseJudge<'a> {
+pub(crate) struct CaseJudge<'a> {
     case: &'a Case,
     /// Exact truths; empty where there is no exact truth.
     truths: Vec<ExactTruth>,
@@ -30,7 +30,7 @@ pub struct CaseJudge<'a> {
 
 impl<'a> CaseJudge<'a> {
     /// Looks up the truth of every ray.
-    pub fn new(case: &'a Case) -> Self {
+    pub(crate) fn new(case: &'a Case) -> Self {
         let truths = match case.truth {
             Truth::Exact | Truth::Closed => exact_truths(&case.scene.triangles, &case.rays),
             _ => Vec::new(),
@@ -39,7 +39,7 @@ impl<'a> CaseJudge<'a> {
     }
 
     /// Judges one answer.
-    pub fn judge(&self, index: usize, hit: &Hit) -> Outcome {
+    pub(crate) fn judge(&self, index: usize, hit: &Hit) -> Outcome {
         let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
         let plain = |verdict| Outcome {
             verdict,
@@ -65,7 +65,7 @@ impl<'a> CaseJudge<'a> {
     }
 
     /// Judges the answers to all rays, on all cores.
-    pub fn judge_all(&self, hits: &[Hit]) -> Vec<Outcome> {
+    pub(crate) fn judge_all(&self, hits: &[Hit]) -> Vec<Outcome> {
         (hits.par_iter().enumerate())
             .map(|(i, hit)| self.judge(i, hit))
             .collect()
@@ -73,7 +73,7 @@ impl<'a> CaseJudge<'a> {
 }
 
 /// Distance between neighbouring f32 numbers at `x`.
-pub fn ulp(x: f64) -> f64 {
+pub(crate) fn ulp(x: f64) -> f64 {
     let exponent = (x.abs().max(f64::from(f32::MIN_POSITIVE))).log2().floor();
     2f64.powi(exponent as i32 - 23)
 }
@@ -211,7 +211,7 @@ impl Tally {
     }
 
     /// The rung that this tally is of.
-    pub fn rung(&self, case: &Case) -> Rung {
+    pub(crate) fn rung(&self, case: &Case) -> Rung {
         let errors = self.quantiles();
         Rung {
             label: case.label.clone(),

@@ -3,9 +3,9 @@
 use super::axes::smallest_sound_pad;
 use super::placement::Placement;
 use super::record::{Findings, Line, Record, SuiteRecord, TargetRecord};
-use crate::accel::BoxTest;
-use crate::integrator::RayOffset;
-use crate::measure::record::{Key, Recorded, Verdict, axis};
+use raystone_accel::BoxTest;
+use raystone_record::{Key, Recorded, Verdict, axis};
+use raystone_render::RayOffset;
 
 /// Misses that Embree's own test allows at the far position, as a share of the rays.
 const FAR_MISSES: f64 = 2e-5;
@@ -49,7 +49,7 @@ pub fn targets(records: &[Line]) -> Vec<TargetRecord> {
 }
 
 /// The first record.
-pub fn suite(records: &[Line]) -> Option<&SuiteRecord> {
+pub(crate) fn suite(records: &[Line]) -> Option<&SuiteRecord> {
     all!(records, Suite).next().map(|suite| suite.body)
 }
 
@@ -223,12 +223,12 @@ fn cost_target(triangle: &str, ratio: f64) -> TargetRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stress::record::{about_all, line};
+    use crate::record::{about_all, line};
 
     #[test]
     fn one_figure_beyond_its_alarm_fails_their_target_by_name() {
         let gauge = |name: &str, passed| {
-            about_all(Record::Gauge(crate::stress::numerics::Gauge {
+            about_all(Record::Gauge(crate::numerics::Gauge {
                 name: name.into(),
                 value: 2.0,
                 alarm: Some(1.0),

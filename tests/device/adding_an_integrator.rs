@@ -17,18 +17,17 @@ use raystone::image::Image;
 use raystone::integrator::RayOffset;
 use raystone::integrator::{ConfiguredIntegrator, Integrator, RenderJob, Renderer};
 use raystone::measure::record::{Body, Line, axis};
-use raystone::params::Registered;
 use raystone::params::{ParamValue, Variant};
 use raystone::run::Registries;
-use raystone::sampling::Sequence;
+use raystone::sampling::{Sequence, decorrelation_kind, sequence_kind};
 use samplers::{Rotation, Weyl};
 use std::path::Path;
 
 fn registries() -> Registries {
     let mut registries = Registries::default();
-    let weyl = Registered::sequence::<Weyl>("weyl");
+    let weyl = sequence_kind::<Weyl>("weyl");
     registries.samplers.sequences.add(weyl);
-    let rotation = Registered::decorrelation::<Rotation>("rotation");
+    let rotation = decorrelation_kind::<Rotation>("rotation");
     registries.samplers.decorrelations.add(rotation);
     registries.integrators.register(&Facing);
     registries.integrators.register(&Deferred);

@@ -2,144 +2,30 @@
 //! default limits, carries no counters unless asked, and has structs laid out like Rust's. No
 //! adapter is needed.
 
-use crate::support::{Pcg, build, default_params, param_variants, scenes};
+mod covering;
+mod families;
+
+use covering::{Choice, pairs, pairwise};
+use families::{Chosen, Family, batches, queued, renderers};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
-use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
+use raystone::accel::{Counters, Hit, Ray};
 use raystone::gpu::{Composition, KernelLibrary};
-use raystone::integrator::{IntegratorRegistry, SceneFeatures, with_sampler};
-use raystone::params::{Entry, Variant};
-use raystone::sampling::{Demand, Sampler, SamplerRegistry};
+use std::collections::BTreeSet;
 use std::mem::{offset_of, size_of};
+use std::sync::LazyLock;
 
-/// Names of the scene's feature flags, and the flag of the counting run.
-fn render_features() -> Vec<&'static str> {
-    let mut names: Vec<_> = SceneFeatures::default()
-        .flags()
-        .into_iter()
-        .map(|(n, _)| n)
-        .collect();
-    names.extend(["carried", "ray_counts"]);
-    names
-}
+/// Kernels that answer rays, make images at once, and with queues between them.
+static FAMILIES: LazyLock<[Family; 3]> = LazyLock::new(|| [batches(), renderers(), queued()]);
 
-/// Every registered structure with its parameters, as the active one of `kernel`.
-fn with_structures(kernel: &Composition) -> Vec<Composition> {
-    let soup = scenes::lattice_soup(&mut Pcg::new(1), 50, 5);
-    let mut out = Vec::new();
-    for kind in AccelRegistry::default().iter() {
-        for params in param_variants(&kind.parameters()) {
-            let built = build(kind, &soup, &params);
-            out.push(built.buffers().activate(kernel.clone()));
-        }
-    }
-    out
-}
+/// Storage buffers that WebGPU promises.
+const BUFFERS: usize = 8;
 
-/// Every sequence and every decorrelation with every parameter, each with one partner.
-fn samplers() -> Vec<Sampler> {
-    let registry = SamplerRegistry::default();
-    let demand = Demand {
-        samples: Some(16),
-        dimensions: 1,
-        width: Some(16),
-    };
-    let variants = |entry: &Entry| -> Vec<Variant> {
-        let variant = |params| Variant {
-            name: entry.name.clone(),
-            label: entry.name.clone(),
-            params,
-        };
-        let params = param_variants(&entry.schema).into_iter();
-        params.map(variant).collect()
-    };
-    let sequences: Vec<_> = registry
-        .sequence_entries()
-        .iter()
-        .flat_map(variants)
-        .collect();
-    let decorrelations = registry.decorrelation_entries();
-    let decorrelations: Vec<_> = decorrelations.iter().flat_map(variants).collect();
-    let none = decorrelations
-        .iter()
-        .find(|d| d.name == "none")
-        .expect("none");
-    let sobol = sequences.iter().find(|s| s.name == "sobol").expect("sobol");
-    let pairs = sequences.iter().map(|s| (s, none));
-    let pairs = pairs.chain(decorrelations.iter().map(|d| (sobol, d)));
-    let sampler = |(s, d)| {
-        registry
-            .sampler(s, d, &demand)
-            .unwrap_or_else(|e| panic!("{e}"))
-    };
-    pairs.map(sampler).collect()
-}
-
-/// Every sampler as that of `kernel`.
-fn with_samplers(kernel: &Composition) -> Vec<Composition> {
-    let samplers = samplers();
-    let with = |sampler| with_sampler(kernel.clone(), sampler);
-    samplers.iter().map(with).collect()
-}
-
-/// Every integrator with every structure, and with every sampler. The two are independent imports:
-/// their full product would only repeat itself.
-fn renderers() -> Vec<Composition> {
-    let mut out = Vec::new();
-    for integrator in IntegratorRegistry::default().iter() {
-        let kernel = Composition::new("integrator/render").with("integrator", integrator.kernel());
-        let constants = integrator.constants(&default_params(&integrator.parameters()));
-        let kernel = constants.iter().fold(kernel, |k, (n, v)| k.constant(n, *v));
-        let one_structure = &with_structures(&kernel)[0];
-        let one_sampler = &with_samplers(&kernel)[0];
-        out.extend(with_samplers(one_structure));
-        out.extend(with_structures(one_sampler));
-    }
-    let mut seen = std::collections::BTreeSet::new();
-    out.retain(|kernel| seen.insert(format!("{kernel:?}")));
-    assert!(out.len() >= 3 * (3 + 4 * 2), "only {} renderers", out.len());
-    out
-}
-
-/// `kernel` refilled, if its structure exports what that takes.
-fn refilled(kernel: &Composition) -> Option<Composition> {
-    let takes_it = ["accel/bvh4", "accel/cwbvh"].contains(&&*kernel.active["accel"]);
-    takes_it.then(|| kernel.clone().feature("refill", true))
-}
-
-/// The batch kernels of every structure: closest and any hit, counting or not, refilled or not.
-fn batches() -> Vec<Composition> {
-    let feature_sets: [&[&str]; 4] = [&[], &["any"], &["counters"], &["any", "counters"]];
-    let batch = |features: &[&str]| {
-        let kernel = Composition::new("integrator/trace_rays");
-        features
-            .iter()
-            .fold(kernel, |k, name| k.feature(name, true))
-    };
-    let mut out: Vec<_> = feature_sets
-        .iter()
-        .flat_map(|features| with_structures(&batch(features)))
-        .collect();
-    let more: Vec<_> = out.iter().filter_map(refilled).collect();
-    assert!(more.len() >= 8, "only {} refilled kernels", more.len());
-    out.extend(more);
-    let mut seen = std::collections::BTreeSet::new();
-    out.retain(|kernel| seen.insert(format!("{kernel:?}")));
-    out
-}
-
-fn with_features(mut kernel: Composition, names: &[&str], mask: usize) -> Composition {
-    for (bit, name) in names.iter().enumerate() {
-        kernel = kernel.feature(name, mask >> bit & 1 == 1);
-    }
-    kernel
-}
-
-/// Why the kernel breaks WebGPU's default limits, if it does.
-fn broken_limit(wgsl: &str) -> Option<String> {
+/// Why the kernel breaks WebGPU's default limits, if it does; of storage buffers it may have so many.
+fn broken_limit(wgsl: &str, buffers: usize) -> Option<String> {
     let count = |what: &str| wgsl.matches(what).count();
     let storage = count("var<storage");
-    if storage > 8 {
+    if storage > buffers {
         return Some(format!("{storage} storage buffers"));
     }
     let group = |rest: &str| -> u32 {
@@ -162,49 +48,224 @@ fn broken_limit(wgsl: &str) -> Option<String> {
 fn compose_within_limits(library: &KernelLibrary, kernel: &Composition) -> String {
     let composed = library.compose(kernel);
     let wgsl = composed.unwrap_or_else(|e| panic!("{kernel:?}: {e}")).wgsl;
-    assert_eq!(broken_limit(&wgsl), None, "{kernel:?}");
+    assert_eq!(broken_limit(&wgsl, BUFFERS), None, "{kernel:?}");
     wgsl
 }
 
-/// Which of so many features are on: none, all, each alone, all but each, and some at random, others for each kernel.
-fn masks(features: usize, kernel: usize) -> Vec<usize> {
-    let all = (1 << features) - 1;
-    let mut random = Pcg::new(kernel as u64 + 1);
-    let mut random = || random.next_u32() as usize & all;
-    let mut masks = vec![0, all];
-    masks.extend((0..features).flat_map(|bit| [1 << bit, all & !(1 << bit)]));
-    masks.extend((0..8).map(|_| random()));
-    masks
+/// Whether a kernel counts anything.
+fn counts(wgsl: &str) -> bool {
+    ["count_", "counters", "ray_counts"]
+        .iter()
+        .any(|word| wgsl.contains(word))
+}
+
+/// What is wrong with a kernel: it does not compose, breaks a limit, or counts what nobody asked for. Whether it has to count where it is
+/// asked to, `must_count` says.
+fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Option<String> {
+    let wgsl = match library.compose(kernel) {
+        Ok(composed) => composed.wgsl,
+        Err(error) => return Some(error.to_string()),
+    };
+    let asked = ["counters", "ray_counts"]
+        .iter()
+        .any(|f| kernel.features.contains(*f));
+    // What shades in an order has one more where the scene is in no textures: adapters without it refuse that organisation.
+    let has = |feature: &str| kernel.features.contains(feature);
+    let in_order = has("sorted_hits") || has("by_kind");
+    let has_more = kernel.entry == "organisation/shade" && in_order && !has("scene_texels");
+    let buffers = BUFFERS + usize::from(has_more);
+    match (broken_limit(&wgsl, buffers), counts(&wgsl)) {
+        (Some(limit), _) => Some(limit),
+        (None, true) if !asked => Some("counters that nobody asked for".to_owned()),
+        (None, false) if asked && must_count => Some("no counters".to_owned()),
+        _ => None,
+    }
+}
+
+/// Composes all kernels of a family, of which there are so many or more.
+fn see_that_all_are_sound(family: &Family, least: usize, must_count: impl Fn(&str) -> bool + Sync) {
+    let (library, kernels) = (KernelLibrary::default(), &family.kernels);
+    println!("{} kernels: {:?}", kernels.len(), family.levels());
+    assert!(kernels.len() >= least, "only {} kernels", kernels.len());
+    let judged = kernels.par_iter().filter_map(|kernel| {
+        let fault = fault(&library, kernel, must_count(&kernel.entry))?;
+        Some(format!("{kernel:?}: {fault}"))
+    });
+    let faults: Vec<String> = judged.collect();
+    let first = &faults[..faults.len().min(3)];
+    assert!(
+        faults.is_empty(),
+        "{} of {} kernels: {first:#?}",
+        faults.len(),
+        kernels.len()
+    );
 }
 
 #[test]
-fn every_combination_composes_validates_and_stays_within_the_limits() {
-    let library = KernelLibrary::default();
-    let names = render_features();
-    let all = (1 << names.len()) - 1;
-    // Features against integrators and structures; samplers with no feature and with all.
-    let kernels: Vec<Composition> = renderers()
-        .into_iter()
-        .enumerate()
-        .flat_map(|(index, kernel)| {
-            let is_plain = kernel.active["sequence"] == "sampling/sobol"
-                && kernel.active["decorrelation"] == "sampling/cranley_patterson";
-            let masks: Vec<usize> = if is_plain {
-                masks(names.len(), index)
-            } else {
-                vec![0, all, index % (all + 1)]
-            };
-            let names = names.clone();
-            masks
-                .into_iter()
-                .map(move |mask| with_features(kernel.clone(), &names, mask))
-        })
-        .chain(batches())
-        .collect();
-    assert!(kernels.len() > 150, "only {} kernels", kernels.len());
-    kernels.par_iter().for_each(|kernel| {
-        compose_within_limits(&library, kernel);
-    });
+fn kernels_that_answer_rays_compose_stay_within_the_limits_and_count_only_when_asked() {
+    see_that_all_are_sound(&FAMILIES[0], 100, |_| true);
+}
+
+#[test]
+fn kernels_that_make_images_compose_stay_within_the_limits_and_count_only_when_asked() {
+    see_that_all_are_sound(&FAMILIES[1], 150, |_| true);
+}
+
+#[test]
+fn kernels_with_queues_between_them_compose_stay_within_the_limits_and_count_only_when_asked() {
+    see_that_all_are_sound(&FAMILIES[2], 50, |_| false);
+}
+
+#[test]
+fn any_two_choices_meet_in_a_row_unless_they_clash() {
+    let clash = |a: Choice, b: Choice| a == (0, 6) && b.0 == 3 && b.1 > 0;
+    let levels = [7, 2, 5, 4, 2, 2, 2, 3, 1];
+    let rows = pairwise(&levels, |a, b| clash(a, b) || clash(b, a));
+    let mut met = BTreeSet::new();
+    for row in &rows {
+        assert!(row.iter().zip(levels).all(|(level, count)| *level < count));
+        let choices: Vec<Choice> = row.iter().copied().enumerate().collect();
+        for (index, a) in choices.iter().enumerate() {
+            met.extend(choices[index + 1..].iter().map(|b| (*a, *b)));
+        }
+    }
+    assert_eq!(met, pairs(&levels, clash));
+    assert!(!met.contains(&((0, 6), (3, 1))) && met.contains(&((0, 6), (3, 0))));
+    // No fewer can do, and not many more are needed.
+    assert!((35..50).contains(&rows.len()), "{} rows", rows.len());
+}
+
+/// A fault that shows in kernels with both choices, and in no others.
+struct Planted<'a> {
+    family: &'a Family,
+    /// What stands in a function of a module, and is put behind its first line.
+    at: (&'static str, &'static str),
+    fault: &'static str,
+    both: [Chosen; 2],
+}
+
+impl Planted<'_> {
+    /// The kernels with the fault. One that names `PLANTED` of the module in a role is none where that has such a name: all have it but
+    /// the second choice.
+    fn library(&self) -> KernelLibrary {
+        let library = KernelLibrary::default();
+        let (module, line) = self.at;
+        let text = library.text(module).expect("a known module");
+        assert_eq!(text.matches(line).count(), 1, "`{line}` in {module}");
+        let faulty = text.replace(line, &format!("{line} {}", self.fault));
+        let mut sources = vec![(module.to_owned(), faulty)];
+        let second = self.both[1];
+        if self.fault.contains("PLANTED") {
+            let others = self.family.modules(second.factor).into_iter();
+            sources.extend(others.filter(|m| *m != second.choice).map(|module| {
+                let text = library.text(module).expect("a known module");
+                (
+                    module.to_owned(),
+                    format!("{text}\nconst PLANTED: u32 = 0u;\n"),
+                )
+            }));
+        }
+        let sources: Vec<_> = sources
+            .iter()
+            .map(|(m, t)| (m.as_str(), t.as_str()))
+            .collect();
+        library.with_sources(&sources)
+    }
+
+    /// Whether some kernel with both choices fails, and none of some others does.
+    fn is_seen(&self) -> bool {
+        let library = self.library();
+        let [a, b] = self.both;
+        let [with, without] = self.family.divided(a, b);
+        let fails = |kernel: &&Composition| library.compose(kernel).is_err();
+        let others = without.iter().step_by(1 + without.len() / 20);
+        assert!(
+            !others.copied().any(|k| fails(&k)),
+            "{a:?} × {b:?}: others fail, too"
+        );
+        with.par_iter().any(fails)
+    }
+}
+
+#[test]
+fn a_fault_that_shows_where_two_choices_meet_is_seen() {
+    const DRAW: (&str, &str) = ("sampling/sampler", "fn to_unit(x: u32) -> f32 {");
+    const HALTON: (&str, &str) = ("sampling/halton", "fn sequence(s: SamplerState) -> u32 {");
+    const KD_TREE: (&str, &str) = ("accel/kd_tree", "fn trace(ray: Ray, any: bool) -> Hit {");
+    let [batches, renderers, queued] = &*FAMILIES;
+    let chosen = |factor, choice| Chosen { factor, choice };
+    let cases = [
+        (
+            renderers,
+            DRAW,
+            "@if(phong && many_lights) let planted: u32 = 1.0;",
+            [("phong", "on"), ("many_lights", "on")],
+        ),
+        (
+            renderers,
+            DRAW,
+            "@if(!textures && normal_maps) let planted: u32 = 1.0;",
+            [("textures", "off"), ("normal_maps", "on")],
+        ),
+        (
+            renderers,
+            KD_TREE,
+            "@if(vertex_colors) let planted: u32 = 1.0;",
+            [("accel", "accel/kd_tree"), ("vertex_colors", "on")],
+        ),
+        (
+            renderers,
+            KD_TREE,
+            "let planted = package::active::integrator::PLANTED;",
+            [("accel", "accel/kd_tree"), ("integrator", "integrator/ao")],
+        ),
+        (
+            renderers,
+            KD_TREE,
+            "let planted = package::active::sequence::PLANTED;",
+            [("accel", "accel/kd_tree"), ("sequence", "sampling/halton")],
+        ),
+        (
+            renderers,
+            HALTON,
+            "let planted = package::active::offset::PLANTED;",
+            [
+                ("sequence", "sampling/halton"),
+                ("offset", "integrator/offset/fixed"),
+            ],
+        ),
+        (
+            batches,
+            KD_TREE,
+            "let planted = package::active::triangle::PLANTED;",
+            [
+                ("accel", "accel/kd_tree"),
+                ("triangle", "accel/triangle/pluecker"),
+            ],
+        ),
+        (
+            batches,
+            KD_TREE,
+            "@if(alpha_masks) let planted: u32 = 1.0;",
+            [("accel", "accel/kd_tree"), ("alpha_masks", "on")],
+        ),
+        (
+            queued,
+            HALTON,
+            "@if(!sorted_hits) let planted: u32 = 1.0;",
+            [("sequence", "sampling/halton"), ("sorted_hits", "off")],
+        ),
+    ];
+    for (family, at, fault, both) in cases {
+        let both = both.map(|(factor, choice)| chosen(factor, choice));
+        let planted = Planted {
+            family,
+            at,
+            fault,
+            both,
+        };
+        assert!(planted.is_seen(), "{both:?} is not seen");
+    }
 }
 
 #[test]
@@ -212,47 +273,14 @@ fn a_kernel_over_a_limit_is_seen() {
     let buffer = |n| format!("@group(0) @binding({n}) var<storage, read> a{n}: array<u32>;\n");
     let buffers = |n: usize| (0..n).map(buffer).collect::<String>();
     let entry = |size: &str| format!("@compute @workgroup_size({size}) fn main() {{}}");
-    assert_eq!(broken_limit(&(buffers(8) + &entry("16, 16"))), None);
-    assert!(broken_limit(&(buffers(9) + &entry("64"))).is_some());
-    assert!(broken_limit(&entry("16, 17")).is_some());
+    assert_eq!(
+        broken_limit(&(buffers(8) + &entry("16, 16")), BUFFERS),
+        None
+    );
+    assert!(broken_limit(&(buffers(9) + &entry("64")), BUFFERS).is_some());
+    assert!(broken_limit(&entry("16, 17"), BUFFERS).is_some());
     let far = "@group(4) @binding(0) var<uniform> a: vec4<u32>;\n";
-    assert!(broken_limit(&(far.to_owned() + &entry("64"))).is_some());
-}
-
-#[test]
-fn timed_kernels_carry_no_counters() {
-    let library = KernelLibrary::default();
-    let counts = |wgsl: &str| {
-        wgsl.contains("count_") || wgsl.contains("counters") || wgsl.contains("ray_counts")
-    };
-    let mut counting = 0;
-    for kernel in batches() {
-        let wgsl = compose_within_limits(&library, &kernel);
-        let asked = kernel.features.contains("counters");
-        assert_eq!(counts(&wgsl), asked, "{kernel:?}");
-        counting += usize::from(asked);
-    }
-    assert!(counting > 0);
-    let names = render_features();
-    let all = (1 << names.len()) - 1;
-    let without_counts = all
-        & !(1
-            << names
-                .iter()
-                .position(|n| *n == "ray_counts")
-                .expect("a flag"));
-    for kernel in renderers().into_iter().step_by(7) {
-        let timed = with_features(kernel.clone(), &names, without_counts);
-        assert!(
-            !counts(&compose_within_limits(&library, &timed)),
-            "{timed:?}"
-        );
-        let counted = with_features(kernel, &names, all);
-        assert!(
-            counts(&compose_within_limits(&library, &counted)),
-            "{counted:?}"
-        );
-    }
+    assert!(broken_limit(&(far.to_owned() + &entry("64")), BUFFERS).is_some());
 }
 
 /// Span and member offsets of a struct of the composed kernel, by the author's name.

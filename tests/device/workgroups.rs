@@ -221,32 +221,35 @@ fn no_dispatch_takes_long_however_slow_what_it_does() {
     );
     let traced = stage.traced(gpu(), structure("brute-force"));
     let rays = scenes::aimed_rays(&mut Pcg::new(5), &stage.soup, 1 << 15);
-    let tracer = stage.tracer(&traced, Query::Closest).expect("a tracer");
-    let batch = tracer.batch(&rays).expect("a batch");
-    let renderer = stage.renderer(
-        gpu(),
-        &traced,
-        &sampler("owen-sobol", "none"),
-        &path(4),
-        [64, 48],
-        false,
-    );
-    let total = batch.trace().expect("answers").ms();
-    renderer.render(&[4], 1).expect("an image");
-    let spent = renderer.spent().ms();
-    for (what, longest, all) in [
-        ("rays", batch.longest_slice_ms(), total),
-        ("samples", renderer.longest_slice_ms(), spent),
+    let trace = || {
+        let tracer = stage.tracer(&traced, Query::Closest).expect("a tracer");
+        let batch = tracer.batch(&rays).expect("a batch");
+        let all = batch.trace().expect("answers").ms();
+        (batch.longest_slice_ms(), all)
+    };
+    let render = || {
+        let owen = sampler("owen-sobol", "none");
+        let renderer = stage.renderer(gpu(), &traced, &owen, &path(4), [64, 48], false);
+        renderer.render(&[4], 1).expect("an image");
+        (renderer.longest_slice_ms(), renderer.spent().ms())
+    };
+    // A slice is cut by what those before took; other programs that come meanwhile lengthen it, now and then. One that is not cut is
+    // too long every time.
+    const TRIES: usize = 10;
+    for (what, run) in [
+        ("rays", &trace as &dyn Fn() -> (f64, f64)),
+        ("samples", &render),
     ] {
-        println!("{what}: {longest:.0} ms of {all:.0} ms");
-        assert!(
-            longest > 0.0 && longest < MOST_SLICE_MS,
-            "{what}: {longest} ms"
-        );
-        assert!(
-            all > longest,
-            "{what} in one slice of {all} ms: nothing is seen"
-        );
+        let is_short = |_| {
+            let (longest, all) = run();
+            println!("{what}: {longest:.0} ms of {all:.0} ms");
+            assert!(
+                longest > 0.0 && all > longest,
+                "{what} in one slice of {all} ms: nothing is seen"
+            );
+            longest < MOST_SLICE_MS
+        };
+        assert!((0..TRIES).any(is_short), "{what}: too long {TRIES} times");
     }
 }
 

@@ -13,6 +13,7 @@ use raystone::report::data::RunData;
 use raystone::report::{sections, terminal_tables};
 use raystone::run::Registries;
 use raystone::scene::{self, Bounds, LoadOptions, MAX_COORDINATE, SceneData};
+use raystone::text::plain_text;
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -115,7 +116,14 @@ pub fn points(bytes: &[u8]) -> Outcome {
             assert!(point.iter().all(|x| (0.0..=1.0).contains(x)), "{point:?}");
         }
     };
-    match PointSet::from_bytes(bytes) {
+    let text = match plain_text(bytes.to_vec()) {
+        Ok(text) => text,
+        Err(error) => {
+            let line = error.line;
+            return Outcome::Refused(format!("{FILE}.txt: line {line}: it is not UTF-8 text"));
+        }
+    };
+    match PointSet::parse(&text) {
         Ok(points) => Outcome::Accepted(Box::new(move || look(points))),
         Err(error) => Outcome::Refused(format!("{FILE}.txt: {error}")),
     }
@@ -213,7 +221,7 @@ fn check_scene(scene: &SceneData) {
         assert_eq!(texture.texels.len(), texels, "{}", texture.name);
     }
     let camera = scene.view(1.0);
-    camera.validate().expect("a camera that sees something");
+    raystone::scene::check_camera(&camera).expect("a camera that sees something");
     if let Some(assembly) = &scene.assembly {
         assert_eq!(assembly.triangles(), triangles as u64);
     }

@@ -9,7 +9,7 @@ const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/grid", "src/accel/grid/mod.rs"),
     ("accel/query", "src/accel/twin.rs"),
     ("accel/triangle", "src/accel/triangle/mod.rs"),
-    ("integrator/position_error", "src/integrator/offset/mod.rs"),
+    ("integrator/position_error", "src/render/offset/mod.rs"),
     ("accel/instance", "src/accel/instancing/instance.rs"),
     ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
     ("accel/meta_bvh", "src/accel/instancing/meta_bvh.rs"),
@@ -18,11 +18,13 @@ const OTHER_FILE: &[(&str, &str)] = &[
         "src/accel/instancing/meta_bvh_nested.rs",
     ),
     ("accel/object_list", "src/accel/instancing/object_list.rs"),
+    ("accel/bvh4", "src/accel/wide/bvh4.rs"),
+    ("accel/cwbvh", "src/accel/wide/cwbvh.rs"),
     ("accel/wide", "src/accel/wide/quantise.rs"),
     ("accel/kd_tree", "src/accel/kd_tree/mod.rs"),
-    ("shading/light/units", "src/integrator/units.rs"),
+    ("shading/light/units", "src/render/units.rs"),
     ("accel/octree", "src/accel/octree/mod.rs"),
-    ("sampling/sampler", "src/sampling/mod.rs"),
+    ("sampling/sampler", "src/sampling/lib.rs"),
 ];
 
 /// Kernel files, and folders of them, without a twin, with the reason.
@@ -463,7 +465,7 @@ fn kernels() -> Vec<String> {
             let name = format!("{name}{stem}");
             if file.is_dir() {
                 walk(&file, &format!("{name}/"), out);
-            } else {
+            } else if file.extension().is_some_and(|ending| ending == "wesl") {
                 out.push(name);
             }
         }
@@ -480,7 +482,12 @@ fn kernel_text(kernel: &str) -> String {
 
 fn twin_path(kernel: &str) -> PathBuf {
     let other = OTHER_FILE.iter().find(|(name, _)| *name == kernel);
-    root().join(other.map_or(format!("src/{kernel}.rs"), |(_, path)| (*path).to_owned()))
+    let beside = match kernel.split_once('/') {
+        Some(("integrator", rest)) => format!("src/render/{rest}.rs"),
+        Some((folder @ "compaction", rest)) => format!("src/gpu/{folder}/{rest}.rs"),
+        _ => format!("src/{kernel}.rs"),
+    };
+    root().join(other.map_or(beside, |(_, path)| (*path).to_owned()))
 }
 
 /// Text of a Rust file without its unit tests.
@@ -491,7 +498,12 @@ fn without_tests(path: &Path) -> String {
 }
 
 fn twin_text(kernel: &str) -> String {
-    without_tests(&twin_path(kernel))
+    let text = without_tests(&twin_path(kernel));
+    // What a ray is, all crates share.
+    match kernel {
+        "accel/ray" => text + &without_tests(&root().join("src/core/geometry.rs")),
+        _ => text,
+    }
 }
 
 /// Text of a twin with what all twins of its folder share, where a structure is a folder.
@@ -528,6 +540,7 @@ fn functions(text: &str, free: bool) -> BTreeSet<String> {
         let line = line.trim_start();
         let line = line.strip_prefix("pub ").unwrap_or(line);
         let line = line.strip_prefix("pub(super) ").unwrap_or(line);
+        let line = line.strip_prefix("pub(crate) ").unwrap_or(line);
         if let Some(rest) = line.strip_prefix("fn ") {
             let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_');
             out.extend(name.take(1).map(str::to_owned));
@@ -543,6 +556,7 @@ fn constants(text: &str) -> BTreeMap<String, String> {
         let line = line.trim_start();
         let line = line.strip_prefix("pub ").unwrap_or(line);
         let line = line.strip_prefix("pub(super) ").unwrap_or(line);
+        let line = line.strip_prefix("pub(crate) ").unwrap_or(line);
         let Some(declaration) = line.strip_prefix("const ") else {
             continue;
         };

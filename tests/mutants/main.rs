@@ -19,7 +19,7 @@ mod world;
 use checks::Check;
 use plan::{CheckError, Mutant, MutantError, Options};
 use plant::Plant;
-use raystone::gpu::AdapterChoice;
+use raystone::gpu::{AdapterChoice, GpuError};
 use report::{Outcome, Report, Verdict};
 use std::collections::BTreeSet;
 use std::io::IsTerminal as _;
@@ -51,6 +51,18 @@ fn run(names: &[&str]) -> (Report, Vec<String>) {
 fn every_fault_of_the_table_still_applies() {
     plan::check_table().unwrap_or_else(|e| panic!("{e}"));
     let all = mutants();
+    // One that is no kernel any more is told, too.
+    let faulty = Mutant {
+        plant: Plant::Kernel {
+            file: "integrator/path",
+            from: "*result += limited(throughput * emission * weight, depth);",
+            to: "*if (depth < 2u) { }",
+            times: 1,
+        },
+        ..all[0]
+    };
+    let told = plan::check_rows(&[faulty]).expect_err("no kernel");
+    assert!(told.to_string().contains("path.wesl"), "{told}");
     assert!(all.len() >= 40, "{} faults", all.len());
     let names: BTreeSet<_> = all.iter().map(|m| m.name).collect();
     assert_eq!(names.len(), all.len(), "two faults of one name");
@@ -73,23 +85,64 @@ fn every_fault_of_the_table_still_applies() {
     }
 }
 
+/// A row of the page's table.
+fn row(mutant: &Mutant) -> String {
+    let place = match mutant.plant {
+        Plant::Kernel { file, .. } => file.to_owned(),
+        plant => plant.place(),
+    };
+    let (name, what, subject) = (mutant.name, mutant.what, mutant.subject.label());
+    format!(
+        "| `{name}` | {what} | {place} | {subject} | {} |",
+        mutant.expected
+    )
+}
+
+/// What the page has too much or too little beside the table here: rows, and the number of faults.
+fn beside_the_table(page: &str) -> Vec<String> {
+    let rows: BTreeSet<String> = mutants().iter().map(row).collect();
+    let below = page
+        .split_once("\n## The faults\n")
+        .map_or("", |(_, below)| below);
+    let listed: Vec<&str> = below
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .collect();
+    let lacks = rows.iter().filter(|row| !listed.contains(&row.as_str()));
+    let mut faults: Vec<String> = lacks.map(|row| format!("lacks {row}")).collect();
+    let extra = listed.iter().filter(|row| !rows.contains(**row));
+    faults.extend(extra.map(|row| format!("has {row}")));
+    if listed.len() != rows.len() {
+        faults.push(format!(
+            "lists {} rows for {} faults",
+            listed.len(),
+            rows.len()
+        ));
+    }
+    let all = format!(": {0} of {0} faults killed, ", rows.len());
+    if !below.contains(&all) {
+        faults.push(format!("does not say `{all}`"));
+    }
+    faults
+}
+
 #[test]
-fn the_page_lists_every_fault_with_what_goes_wrong() {
+fn the_page_lists_every_fault_once_and_tells_how_many_there_are() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/mutants.md");
     let text = std::fs::read_to_string(&path).expect("docs/mutants.md");
-    let mut missing = Vec::new();
-    for mutant in mutants() {
-        let row = format!("| `{}` | {} | ", mutant.name, mutant.what);
-        if !text.contains(&row) {
-            missing.push(row);
-        }
+    let faults = beside_the_table(&text);
+    assert!(faults.is_empty(), "docs/mutants.md:\n{}", faults.join("\n"));
+    // The page is looked at, not only read.
+    let last = text.trim_end().rsplit_once('\n').expect("rows").1;
+    let number = format!("{} of", mutants().len());
+    for other in [
+        text.replace(last, ""),
+        format!("{text}{last}\n"),
+        text.replace("| `distance-not-compared` |", "| `no-such-fault` |"),
+        text.replace(&number, "197 of"),
+    ] {
+        assert!(!beside_the_table(&other).is_empty());
     }
-    assert!(
-        missing.is_empty(),
-        "docs/mutants.md lacks:\n{}",
-        missing.join("\n")
-    );
-    assert!(!text.contains("| `no-such-fault` |"));
 }
 
 #[test]
@@ -196,9 +249,31 @@ fn a_run_is_not_passed_with_a_survivor_or_a_red_control() {
         .red
         .push((Check::Gate, "planted".to_owned()));
     assert!(!report.is_passed(), "a red control");
+    let mut report = sound.clone();
+    // Twenty faults more that are seen: it is not for the number of those that are not.
+    let seen = report.mutants[0].clone();
+    report.mutants.extend(vec![seen; 20]);
+    report.mutants[0].verdict = plan::judged(Check::Gate, out_of_time())
+        .expect("a verdict")
+        .expect("one that decides");
+    assert!(!report.is_passed(), "time that ran out");
+    assert!(
+        report
+            .table()
+            .contains("timed out tie-broken-the-other-way"),
+        "{}",
+        report.table()
+    );
+    assert_eq!(report.records()[0].verdict, "timed-out");
+    report.mutants[0].mutant.hangs = true;
+    assert!(report.is_passed(), "{}", report.table());
     let mut report = sound;
     report.mutants.clear();
     assert!(!report.is_passed(), "nothing was run");
+}
+
+fn out_of_time() -> Result<Option<String>, CheckError> {
+    Err(GpuError::Timeout { seconds: 60 }.into())
 }
 
 #[test]

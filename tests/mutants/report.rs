@@ -17,6 +17,13 @@ pub enum Verdict {
         /// What it said.
         evidence: String,
     },
+    /// The device did not finish, or was lost: that is no answer of the check.
+    TimedOut {
+        /// Which check waited.
+        by: Check,
+        /// What the device said.
+        evidence: String,
+    },
     /// No check saw it.
     Survived,
     /// A check is red without any fault: its red means nothing.
@@ -50,6 +57,7 @@ impl Outcome {
     pub fn killed_by(&self) -> Option<Check> {
         match &self.verdict {
             Verdict::Killed { by, .. } => Some(*by),
+            Verdict::TimedOut { by, .. } if self.mutant.hangs => Some(*by),
             _ => None,
         }
     }
@@ -58,6 +66,7 @@ impl Outcome {
     pub fn record(&self, adapter: &str) -> MutantRecord {
         let (verdict, evidence) = match &self.verdict {
             Verdict::Killed { evidence, .. } => ("killed", Some(evidence.clone())),
+            Verdict::TimedOut { evidence, .. } => ("timed-out", Some(evidence.clone())),
             Verdict::Survived => ("survived", self.mutant.equivalent.map(str::to_owned)),
             Verdict::Distrusted { by } => {
                 ("distrusted", Some(format!("{by} is red without a fault")))
@@ -94,7 +103,7 @@ pub struct MutantRecord {
     pub place: String,
     /// What was put through the checks.
     pub subject: String,
-    /// `killed`, `survived`, or `distrusted`.
+    /// `killed`, `timed-out`, `survived`, or `distrusted`.
     pub verdict: String,
     /// The check that should turn red.
     pub expected: Check,
@@ -156,10 +165,9 @@ impl Report {
     /// Takes back every kill by a check that is red without a fault.
     pub fn distrust_red_controls(&mut self) {
         for outcome in &mut self.mutants {
-            let Verdict::Killed { by, .. } = &outcome.verdict else {
+            let Some(by) = outcome.killed_by() else {
                 continue;
             };
-            let by = *by;
             let own = |c: &&ControlOutcome| c.subject == outcome.mutant.subject;
             let control = self.controls.iter().find(own);
             if control.is_none_or(|c| !c.green.contains(&by)) {
@@ -209,6 +217,7 @@ impl Report {
         for m in &self.mutants {
             let by = match &m.verdict {
                 Verdict::Killed { by, .. } => by.name(),
+                Verdict::TimedOut { .. } => "timed out",
                 Verdict::Survived => "-",
                 Verdict::Distrusted { .. } => "distrusted",
             };
@@ -221,8 +230,17 @@ impl Report {
 
     fn write_exceptions(&self, out: &mut String) {
         for m in self.survivors() {
-            let why = m.mutant.equivalent.unwrap_or("no check saw it");
-            let _ = writeln!(out, "survivor {}: {}: {why}", m.mutant.name, m.mutant.what);
+            let (name, what) = (m.mutant.name, m.mutant.what);
+            // Writing to a string cannot fail.
+            let _ = match &m.verdict {
+                Verdict::TimedOut { by, evidence } => {
+                    writeln!(out, "timed out {name}: {what}: {by}: {evidence}")
+                }
+                _ => {
+                    let why = m.mutant.equivalent.unwrap_or("no check saw it");
+                    writeln!(out, "survivor {name}: {what}: {why}")
+                }
+            };
         }
         for m in self.mutants.iter() {
             if let Some(by) = m.killed_by().filter(|by| *by != m.mutant.expected) {

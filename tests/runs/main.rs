@@ -3,9 +3,6 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-// The fixture of reports is a part of the library, too, and names these from its root.
-use raystone::{gpu, measure};
-
 mod ci_kit;
 mod command_line;
 mod examples;

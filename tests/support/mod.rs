@@ -2,6 +2,7 @@
 //! renderers, kernels with planted faults, samples with their standard error, runs.
 #![allow(dead_code, unused_imports)] // Every test program uses its own part of this.
 
+pub mod cpu;
 mod hits;
 pub mod needs;
 pub mod scenes;

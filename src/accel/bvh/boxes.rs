@@ -43,7 +43,7 @@ impl BoxNode {
         link: NONE,
     };
 
-    pub fn bounds(&self) -> Bounds {
+    pub(super) fn bounds(&self) -> Bounds {
         Bounds {
             min: self.min,
             max: self.max,
@@ -76,7 +76,7 @@ pub(super) struct Boxes(pub Vec<BoxNode>);
 
 impl Boxes {
     /// Lays out a tree; links lead to parents.
-    pub fn new(tree: &Tree, order: NodeOrder) -> Self {
+    pub(super) fn new(tree: &Tree, order: NodeOrder) -> Self {
         let bounds = |node: u32| &tree.nodes[node as usize].bounds;
         let inner = InnerNodes::new(tree, order, |l, r| split_axis(bounds(l), bounds(r)).1);
         // The children of the inner node at place k lie at 2k + 2 and 2k + 3.
@@ -113,7 +113,7 @@ impl Boxes {
     ///
     /// # Errors
     /// The first violated invariant, with the node.
-    pub fn validate(
+    pub(super) fn validate(
         &self,
         soup: &TriangleSoup,
         leaves: &Leaves,

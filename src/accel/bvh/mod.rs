@@ -19,12 +19,12 @@ use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::structure::prelude::*;
 use super::tracer::RefillParameters;
 use super::tree::{Coverage, NodeKind, Tree};
-use crate::params::Parameters;
 use boxes::Boxes;
 use octant_roped::Octants;
 pub use options::BvhParameters;
 use options::{LeafTriangles, RopedParameters, Traversal};
 use pairs::Pairs;
+use raystone_core::params::Parameters;
 use std::marker::PhantomData;
 
 /// The root.

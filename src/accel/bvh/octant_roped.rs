@@ -44,7 +44,7 @@ fn ropes_of(parent: &OctantNode, child: u32) -> [u32; 8] {
 
 impl Octants {
     /// Adds ropes to boxes.
-    pub fn new(boxes: &Boxes) -> Self {
+    pub(super) fn new(boxes: &Boxes) -> Self {
         let unroped = |&node: &BoxNode| OctantNode {
             node: BoxNode { link: NONE, ..node },
             ropes: [NONE; 8],
@@ -66,7 +66,7 @@ impl Octants {
     ///
     /// # Errors
     /// The first violated invariant, with the node.
-    pub fn validate(
+    pub(super) fn validate(
         &self,
         soup: &TriangleSoup,
         leaves: &Leaves,

@@ -1,12 +1,12 @@
 //! Parameters of `bvh` and `roped-bvh` beyond those of the tree: which traversal reads which layout.
 
-use crate::accel::AccelError;
-use crate::accel::tracer::{Refill, RefillParameters};
-use crate::accel::tree::TreeParameters;
-use crate::parameters;
+use crate::AccelError;
+use crate::tracer::{Refill, RefillParameters};
+use crate::tree::TreeParameters;
+use raystone_core::parameters;
 
 /// Invocations of a workgroup, `LANES` of `kernels/common/lane.wesl`.
-const LANES: u32 = crate::gpu::WORKGROUP_SIZE;
+const LANES: u32 = raystone_gpu::WORKGROUP_SIZE;
 /// Workgroup memory that WebGPU promises, bytes.
 const WORKGROUP_BYTES: u32 = 16384;
 /// Levels that the two words of a restart trail hold.
@@ -44,7 +44,7 @@ parameters! {
     }
 
     /// Parameters that all traversals read.
-    pub struct Layout {
+    pub(crate) struct Layout {
         /// leaves: copies of the triangles in leaf order, or indices
         triangles: LeafTriangles = LeafTriangles::Gathered;
         /// order of nodes in memory (van Emde Boas: halves of the height, recursively)
@@ -52,7 +52,7 @@ parameters! {
     }
 
     /// How the tree is walked.
-    pub enum Traversal {
+    pub(crate) enum Traversal {
         /// Near child first, with a stack.
         Stack = "stack",
         /// Near child first, back by parent pointers.
@@ -66,7 +66,7 @@ parameters! {
     }
 
     /// How `roped-bvh` is walked.
-    pub enum Ropes {
+    pub(crate) enum Ropes {
         /// Skip pointers in one order.
         Roped = "roped",
         /// Skip pointers in eight orders.
@@ -74,7 +74,7 @@ parameters! {
     }
 
     /// Bytes of a node.
-    pub enum NodeBytes {
+    pub(crate) enum NodeBytes {
         /// What the traversal does best.
         Auto = "auto",
         /// Its own box.
@@ -84,7 +84,7 @@ parameters! {
     }
 
     /// Where a stack lies.
-    pub enum StackMemory {
+    pub(crate) enum StackMemory {
         /// In a variable of the function.
         Function = "function",
         /// In a private variable of the module.
@@ -94,7 +94,7 @@ parameters! {
     }
 
     /// What leaves hold.
-    pub enum LeafTriangles {
+    pub(crate) enum LeafTriangles {
         /// Copies of the triangles.
         Gathered = "gathered",
         /// Indices.
@@ -102,7 +102,7 @@ parameters! {
     }
 
     /// In what order nodes lie in memory.
-    pub enum NodeOrder {
+    pub(crate) enum NodeOrder {
         /// A node before its subtrees, one after the other.
         DepthFirst = "depth-first",
         /// Level by level.

@@ -16,7 +16,7 @@ pub(super) struct InnerNodes {
 
 impl InnerNodes {
     /// Orders the inner nodes; `swap` tells of which the right child goes first.
-    pub fn new(tree: &Tree, order: NodeOrder, swap: impl Fn(u32, u32) -> bool) -> Self {
+    pub(super) fn new(tree: &Tree, order: NodeOrder, swap: impl Fn(u32, u32) -> bool) -> Self {
         let children: Vec<_> = tree
             .nodes
             .iter()
@@ -48,7 +48,7 @@ impl InnerNodes {
     }
 
     /// Children of an inner node, first one first.
-    pub fn children(&self, node: u32) -> Option<[u32; 2]> {
+    pub(super) fn children(&self, node: u32) -> Option<[u32; 2]> {
         self.children[node as usize]
     }
 }

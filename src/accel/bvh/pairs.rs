@@ -17,7 +17,7 @@ use bytemuck::{Pod, Zeroable};
 /// Boxes of both children with what they refer to: four `vec4<u32>`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(in crate::accel) struct Pair {
+pub(crate) struct Pair {
     left_min: [f32; 3],
     left: u32,
     left_max: [f32; 3],
@@ -30,7 +30,7 @@ pub(in crate::accel) struct Pair {
 
 impl Pair {
     /// What stands for a missing child: a box of no extent with nothing in it.
-    pub const MISSING: (u32, Bounds) = (
+    pub(crate) const MISSING: (u32, Bounds) = (
         NONE,
         Bounds {
             min: [0.0; 3],
@@ -39,7 +39,7 @@ impl Pair {
     );
 
     /// A node of these children, reference and box, which has no parent yet.
-    pub fn new([(left, left_box), (right, right_box)]: [(u32, Bounds); 2]) -> Self {
+    pub(crate) fn new([(left, left_box), (right, right_box)]: [(u32, Bounds); 2]) -> Self {
         Self {
             left_min: left_box.min,
             left,
@@ -53,7 +53,7 @@ impl Pair {
     }
 
     /// References and boxes of both children.
-    pub fn children(&self) -> [(u32, Bounds); 2] {
+    pub(crate) fn children(&self) -> [(u32, Bounds); 2] {
         let bounds = |min, max| Bounds { min, max };
         [
             (self.left, bounds(self.left_min, self.left_max)),
@@ -62,13 +62,13 @@ impl Pair {
     }
 
     /// Box around both children.
-    pub fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> Bounds {
         let present = self.children().into_iter().filter(|(r, _)| *r != NONE);
         present.fold(Bounds::EMPTY, |all, (_, bounds)| all.union(&bounds))
     }
 
     /// The node after what it refers to moved up by this many places.
-    pub fn moved_by(self, nodes: u32, triangles: u32) -> Self {
+    pub(crate) fn moved_by(self, nodes: u32, triangles: u32) -> Self {
         let moved = |reference| match reference {
             NONE => NONE,
             _ if reference >= LEAF => reference + triangles,
@@ -84,11 +84,11 @@ impl Pair {
 }
 
 /// Inner nodes; leaves are references in them.
-pub(in crate::accel) struct Pairs(pub Vec<Pair>);
+pub(crate) struct Pairs(pub Vec<Pair>);
 
 impl Pairs {
     /// Lays out a tree depth first.
-    pub fn depth_first(tree: &Tree) -> Self {
+    pub(crate) fn depth_first(tree: &Tree) -> Self {
         Self::new(tree, NodeOrder::DepthFirst)
     }
 
@@ -125,7 +125,7 @@ impl Pairs {
 ///
 /// # Errors
 /// The first violated invariant, with the node.
-pub(in crate::accel) fn validate<'a>(
+pub(crate) fn validate<'a>(
     (first, nodes): (u32, &[Pair]),
     max_depth: u32,
     coverage: Coverage<'a>,

@@ -7,11 +7,14 @@
 use rayon::prelude::*;
 
 /// Distances are cut off here: they travel in the upper bits of a cell's word.
-pub const FARTHEST: u8 = 127;
+pub(crate) const FARTHEST: u8 = 127;
 
 /// For cells in the order of [`super::Grid::index`], the number of steps, diagonal ones included, to
 /// the nearest cell for which `occupied` holds; 0 there, at most [`FARTHEST`].
-pub fn chebyshev([nx, ny, nz]: [u32; 3], occupied: impl Fn(usize) -> bool + Sync) -> Vec<u8> {
+pub(crate) fn chebyshev(
+    [nx, ny, nz]: [u32; 3],
+    occupied: impl Fn(usize) -> bool + Sync,
+) -> Vec<u8> {
     let [nx, ny, nz] = [nx as usize, ny as usize, nz as usize];
     let mut field = vec![0u8; nx * ny * nz];
     field.par_chunks_mut(nx * ny).enumerate().for_each_init(
@@ -122,7 +125,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Pcg32;
+    use raystone_core::random::Pcg32;
 
     fn brute_force(size: [i32; 3], occupied: &[bool]) -> Vec<u8> {
         let cells: Vec<[i32; 3]> = (0..size[2])

@@ -7,7 +7,7 @@
 use super::super::{AccelError, TriangleSoup, triangle::TriangleRecord};
 use super::raster::Raster;
 use super::{Grid, check_words, most_words};
-use crate::accel::BuildLog;
+use crate::BuildLog;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -25,7 +25,7 @@ const RUN: usize = 64;
 
 /// Cell `c` lists `references[starts[c]..starts[c + 1]]`, triangles ascending.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Lists {
+pub(crate) struct Lists {
     /// Begin of each cell, and the end of the last.
     pub starts: Vec<u32>,
     /// Triangle indices.
@@ -40,7 +40,7 @@ impl Lists {
     ///
     /// # Errors
     /// More cells or references than [`most_words`].
-    pub fn new(
+    pub(crate) fn new(
         name: &str,
         grid: &Grid,
         soup: &TriangleSoup,
@@ -63,7 +63,7 @@ impl Lists {
     }
 
     /// The list of a cell.
-    pub fn of(&self, cell: usize) -> &[u32] {
+    pub(crate) fn of(&self, cell: usize) -> &[u32] {
         &self.references[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 }
@@ -172,7 +172,7 @@ fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
 /// Lists of one part of a grid from a few triangles, by the calling thread; keeps memory between
 /// parts.
 #[derive(Debug, Default)]
-pub struct PartLists {
+pub(crate) struct PartLists {
     raster: Raster,
     pairs: Vec<(u32, u32)>,
     /// What was filled last.
@@ -181,7 +181,7 @@ pub struct PartLists {
 
 impl PartLists {
     /// Lists `ids`, which ascend, in the cells of `grid`.
-    pub fn fill(&mut self, grid: &Grid, soup: &TriangleSoup, ids: &[u32]) {
+    pub(crate) fn fill(&mut self, grid: &Grid, soup: &TriangleSoup, ids: &[u32]) {
         let Self { raster, pairs, .. } = self;
         let Lists { starts, references } = &mut self.lists;
         pairs.clear();
@@ -202,7 +202,7 @@ impl PartLists {
 }
 
 /// What tasks make of runs of cells, in their order; the number of threads does not matter.
-pub fn in_runs<T: Send>(cells: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
+pub(crate) fn in_runs<T: Send>(cells: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let runs = (0..cells.div_ceil(RUN)).into_par_iter();
     let of_run = |run: usize| run * RUN..((run + 1) * RUN).min(cells);
     runs.map(|run| work(of_run(run))).collect()
@@ -212,7 +212,7 @@ pub fn in_runs<T: Send>(cells: usize, work: impl Fn(Range<usize>) -> T + Sync) -
 ///
 /// # Errors
 /// The first for which it does not hold.
-pub fn check_starts(
+pub(crate) fn check_starts(
     starts: impl ExactSizeIterator<Item = usize>,
     cells: usize,
     references: usize,
@@ -236,7 +236,7 @@ pub fn check_starts(
 ///
 /// # Errors
 /// The first triangle for which it does not hold, or a reference to one that does not exist.
-pub fn check_lists(
+pub(crate) fn check_lists(
     grid: &Grid,
     soup: &TriangleSoup,
     references: impl Iterator<Item = u32>,

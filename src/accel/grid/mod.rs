@@ -7,20 +7,20 @@
 //! so that a walk passes planes in order; the margin covers the rounding of positions, from which
 //! cells are found on entry and after a jump.
 
-pub mod distance;
-pub mod lists;
-pub mod raster;
+pub(crate) mod distance;
+pub(crate) mod lists;
+pub(crate) mod raster;
 
 use super::bounds::Bounds;
 use super::ray::Ray;
 use super::spatial::cross;
 use super::triangle::TriangleRecord;
 use super::{AccelError, BuildLog, TriangleSoup};
-use crate::gpu::UniformValues;
 use rayon::prelude::*;
+use raystone_gpu::UniformValues;
 
 /// Words that an array of a grid may have on the adapter of `log`, less the sentinel.
-pub fn most_words(log: &BuildLog) -> u64 {
+pub(crate) fn most_words(log: &BuildLog) -> u64 {
     log.most_words() - 1
 }
 
@@ -28,13 +28,13 @@ pub fn most_words(log: &BuildLog) -> u64 {
 ///
 /// # Errors
 /// The limit with both numbers.
-pub fn check_words(what: &str, needed: u64, log: &BuildLog) -> Result<(), AccelError> {
+pub(crate) fn check_words(what: &str, needed: u64, log: &BuildLog) -> Result<(), AccelError> {
     AccelError::check_limit(what, needed, most_words(log))
 }
 
 /// The box that a grid fills, and how exact positions in it are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GridBox {
+pub(crate) struct GridBox {
     /// Around all triangles, grown by the margin.
     pub bounds: Bounds,
     /// By how much cells are grown along each axis when triangles are listed, scene units. Positions
@@ -49,7 +49,7 @@ pub struct GridBox {
 
 impl GridBox {
     /// That of a scene; a unit box if it is empty.
-    pub fn new(soup: &TriangleSoup) -> Self {
+    pub(crate) fn new(soup: &TriangleSoup) -> Self {
         let mut bounds = bounds_of(&soup.records);
         if soup.records.is_empty() {
             bounds = Bounds {
@@ -74,7 +74,7 @@ impl GridBox {
     }
 
     /// Cells along each axis for `lambda` cells a triangle, from 1 to `most`.
-    pub fn resolution(&self, triangles: usize, lambda: f64, most: u32) -> [u32; 3] {
+    pub(crate) fn resolution(&self, triangles: usize, lambda: f64, most: u32) -> [u32; 3] {
         // A flat scene still needs a volume for Cleary's rule.
         let extent = self.bounds.extent();
         let side = std::array::from_fn(|a| {
@@ -91,13 +91,13 @@ impl GridBox {
 }
 
 /// Most cells along a side: smaller ones would be all margin.
-pub fn finest(side: f64, margin: f32) -> f64 {
+pub(crate) fn finest(side: f64, margin: f32) -> f64 {
     (side / (4.0 * f64::from(margin))).max(1.0)
 }
 
 /// Cells along each axis of a box with these sides: side · cbrt(λ · triangles / volume)
 /// (J. Cleary et al., 1986).
-pub fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
+pub(crate) fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
     let volume = side.iter().product::<f64>();
     let density = (lambda * triangles.max(1) as f64 / volume).cbrt();
     side.map(|s| s * density)
@@ -108,7 +108,7 @@ const MOST_COPIES: f64 = 8.0;
 
 /// Parts along each axis of a cell that is to be cut, before rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// By Cleary's rule.
     pub wanted: [f64; 3],
     /// At most 1: beyond this share of the wanted parts, triangles that cross the whole cell would be
@@ -118,7 +118,11 @@ pub struct Cut {
 
 impl Cut {
     /// A cell with these sides, which lists triangles of these areas.
-    pub fn new(side: [f64; 3], areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> Self {
+    pub(crate) fn new(
+        side: [f64; 3],
+        areas: impl ExactSizeIterator<Item = f32>,
+        lambda: f64,
+    ) -> Self {
         // A flat cell is no reason for ever smaller parts.
         let longest = side.iter().copied().fold(0.0, f64::max);
         let side = side.map(|s| s.max(longest / 16.0));
@@ -138,7 +142,7 @@ impl Cut {
 }
 
 /// Area of each triangle.
-pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
+pub(crate) fn areas(soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
         let [e, f] = record.edges();
         0.5 * cross(e, f).iter().map(|n| n * n).sum::<f64>().sqrt() as f32
@@ -160,7 +164,7 @@ fn bounds_of(records: &[TriangleRecord]) -> Bounds {
 
 /// A box cut into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub(crate) struct Grid {
     /// The box.
     pub bounds: Bounds,
     /// Cells along each axis.
@@ -175,7 +179,7 @@ pub struct Grid {
 
 impl Grid {
     /// A box cut into `resolution` cells.
-    pub fn new(grid_box: &GridBox, resolution: [u32; 3]) -> Self {
+    pub(crate) fn new(grid_box: &GridBox, resolution: [u32; 3]) -> Self {
         let extent = grid_box.bounds.extent();
         Self::with_cells(
             grid_box.bounds.min,
@@ -186,7 +190,7 @@ impl Grid {
     }
 
     /// The cells from `lowest` on, `size` along each axis, cut into `resolution` cells.
-    pub fn part(&self, lowest: [u32; 3], size: [u32; 3], resolution: [u32; 3]) -> Self {
+    pub(crate) fn part(&self, lowest: [u32; 3], size: [u32; 3], resolution: [u32; 3]) -> Self {
         Self::with_cells(
             std::array::from_fn(|a| self.plane(a, lowest[a])),
             std::array::from_fn(|a| self.cell[a] * (size[a] as f32 / resolution[a] as f32)),
@@ -210,34 +214,34 @@ impl Grid {
     }
 
     /// Number of cells.
-    pub fn cells(&self) -> u64 {
+    pub(crate) fn cells(&self) -> u64 {
         self.resolution.iter().map(|&r| u64::from(r)).product()
     }
 
     /// Index of a cell: x runs fastest.
-    pub fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
+    pub(crate) fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
         (z * self.resolution[1] + y) * self.resolution[0] + x
     }
 
     /// The cell of an index.
-    pub fn coordinates(&self, index: u32) -> [u32; 3] {
+    pub(crate) fn coordinates(&self, index: u32) -> [u32; 3] {
         let [nx, ny, _] = self.resolution;
         [index % nx, index / nx % ny, index / nx / ny]
     }
 
     /// Cell coordinate of a position along one axis, clamped to the grid.
-    pub fn coordinate(&self, axis: usize, position: f32) -> u32 {
+    pub(crate) fn coordinate(&self, axis: usize, position: f32) -> u32 {
         let cells = (position - self.bounds.min[axis]) * self.inverse_cell[axis];
         clamped(cells, self.resolution[axis])
     }
 
     /// The plane below cell `coordinate`.
-    pub fn plane(&self, axis: usize, coordinate: u32) -> f32 {
+    pub(crate) fn plane(&self, axis: usize, coordinate: u32) -> f32 {
         self.bounds.min[axis] + coordinate as f32 * self.cell[axis]
     }
 
     /// The uniform `grid` of the kernels.
-    pub fn uniform(&self) -> (&'static str, UniformValues) {
+    pub(crate) fn uniform(&self) -> (&'static str, UniformValues) {
         (
             "grid",
             UniformValues::new()
@@ -250,14 +254,14 @@ impl Grid {
     }
 
     /// Where the ray is at distance `t`, in cells from the low corner.
-    pub fn in_cells(&self, ray: &Ray, t: f32) -> [f32; 3] {
+    pub(crate) fn in_cells(&self, ray: &Ray, t: f32) -> [f32; 3] {
         std::array::from_fn(|a| {
             (ray.origin[a] + ray.direction[a] * t - self.bounds.min[a]) * self.inverse_cell[a]
         })
     }
 
     /// Distances to the planes `planes` of the three axes, counted in cells from the low corner.
-    pub fn distances(&self, ray: &Ray, inverse: [f32; 3], planes: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn distances(&self, ray: &Ray, inverse: [f32; 3], planes: [f32; 3]) -> [f32; 3] {
         std::array::from_fn(|a| {
             (self.bounds.min[a] + planes[a] * self.cell[a] - ray.origin[a]) * inverse[a]
         })
@@ -265,14 +269,14 @@ impl Grid {
 }
 
 /// The nearest cell of `0..resolution` to a position in cells.
-pub fn clamped(position: f32, resolution: u32) -> u32 {
+pub(crate) fn clamped(position: f32, resolution: u32) -> u32 {
     let last = (resolution - 1) as f32;
     let position = if position > 0.0 { position } else { 0.0 };
     (if position < last { position } else { last }) as u32
 }
 
 /// The axis that is left first; of equal ones the first.
-pub fn first_axis(next: [f32; 3], leave: f32) -> usize {
+pub(crate) fn first_axis(next: [f32; 3], leave: f32) -> usize {
     if next[0] == leave {
         0
     } else if next[1] == leave {
@@ -283,6 +287,6 @@ pub fn first_axis(next: [f32; 3], leave: f32) -> usize {
 }
 
 /// Whether a cell lies beside the grid.
-pub fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
+pub(crate) fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
     (0..3).any(|a| cell[a] >= resolution[a])
 }

@@ -11,7 +11,7 @@ use super::super::triangle::TriangleRecord;
 use super::Grid;
 
 /// Least and greatest coordinates.
-pub fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
+pub(crate) fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
     let pick = |first: fn(f32, f32) -> bool| {
         std::array::from_fn(|a| {
             let [p, q, r] = [corners[0][a], corners[1][a], corners[2][a]];
@@ -25,7 +25,7 @@ pub fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
 
 /// Finds the cells of triangles; keeps memory between them.
 #[derive(Debug, Default)]
-pub struct Raster {
+pub(crate) struct Raster {
     /// First and last cell in x by y, from the projection along z.
     columns: Vec<[u32; 2]>,
 }
@@ -34,7 +34,7 @@ impl Raster {
     /// Calls `row(first cell, number of cells)` for every row of cells along x that the triangle
     /// overlaps once cells are grown by the margin, more for needles ([`margin_of`]); without `exact`,
     /// for every row of its box.
-    pub fn rows(
+    pub(crate) fn rows(
         &mut self,
         grid: &Grid,
         record: &TriangleRecord,
@@ -233,9 +233,9 @@ impl Plane {
 mod tests {
     use super::super::{Grid, GridBox};
     use super::*;
-    use crate::accel::fixtures::{random_triangle, soup};
-    use crate::accel::spatial::dot;
-    use crate::random::Pcg32;
+    use crate::fixtures::{random_triangle, soup};
+    use crate::spatial::dot;
+    use raystone_core::random::Pcg32;
     use std::collections::BTreeSet;
 
     /// The separating-axis test with all 13 axes, for one cell grown by `grow` cells.

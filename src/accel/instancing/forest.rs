@@ -8,7 +8,7 @@ use super::super::leaf::{FIRST_MASK, leaf_range};
 use super::super::tree::{Coverage, Tree, TreeParameters};
 use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
-use crate::accel::StructureStats;
+use crate::StructureStats;
 use rayon::prelude::*;
 use std::ops::Range;
 

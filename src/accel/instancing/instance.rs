@@ -9,8 +9,8 @@ use super::super::ray::{Hit, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::super::twin::Walk;
 use super::forest::Forest;
-use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
+use raystone_scene::{Instance, Transform};
 
 /// `LEAF` without content: the missing child of a node with one.
 pub(super) const NOTHING: u32 = 0x8000_0000;

@@ -80,12 +80,12 @@ pub(super) struct Levels<'a> {
 
 impl<'a> Levels<'a> {
     /// The root of the upper level, behind the nodes of all objects.
-    pub fn root(&self) -> u32 {
+    pub(super) fn root(&self) -> u32 {
         self.base.forest.nodes.len() as u32
     }
 
     /// A node of either level.
-    pub fn node(&self, index: u32) -> &'a Pair {
+    pub(super) fn node(&self, index: u32) -> &'a Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;
         objects
@@ -94,7 +94,7 @@ impl<'a> Levels<'a> {
     }
 
     /// The entry behind a leaf reference of the upper level.
-    pub fn load_entry(&self, reference: u32) -> &'a Entry {
+    pub(super) fn load_entry(&self, reference: u32) -> &'a Entry {
         &self.top.entries[(reference & FIRST_MASK) as usize]
     }
 

@@ -31,10 +31,10 @@ use super::bvh::pairs::Pair;
 use super::structure::prelude::*;
 use super::tree::TreeParameters;
 use super::{Space, limits};
-use crate::gpu::UniformValues;
-use crate::scene::Instance;
 use forest::Forest;
 use placed::View;
+use raystone_gpu::UniformValues;
+use raystone_scene::Instance;
 
 /// What stands above the trees of the objects.
 trait Upper: Send + Sync + 'static {

@@ -3,10 +3,10 @@
 use super::super::triangle::TriangleRecord;
 use super::super::{Ray, TriangleSoup};
 use super::instance::object_ray;
-use crate::accel::Masks;
-use crate::accel::mask::MASKED;
-use crate::geometry::Triangle;
-use crate::scene::{Assembly, Instance, Transform};
+use crate::Masks;
+use crate::mask::MASKED;
+use raystone_core::geometry::Triangle;
+use raystone_scene::{Assembly, Instance, Transform};
 use std::borrow::Cow;
 use std::sync::Arc;
 

@@ -6,11 +6,11 @@ use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::instance::{enter_grown, level, object_ray};
 use super::world_box::BoxMap;
-use crate::geometry::Triangle;
-use crate::random::Pcg32;
-use crate::scene::{Assembly, Instance, Transform};
 use glam::{DVec3, Mat3, Quat, Vec3};
 use rayon::prelude::*;
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
+use raystone_scene::{Assembly, Instance, Transform};
 
 fn signed(rng: &mut Pcg32) -> f32 {
     2.0 * rng.uniform() as f32 - 1.0

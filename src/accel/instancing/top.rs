@@ -12,7 +12,7 @@ use super::super::leaf::{LEAF, leaf_reference};
 use super::forest::Forest;
 use super::instance::Entry;
 use super::world_box::BoxMap;
-use crate::scene::Instance;
+use raystone_scene::Instance;
 
 const BINS: usize = 16;
 /// Below this depth splits are by SAH, beyond it by the median, so that depth stays below

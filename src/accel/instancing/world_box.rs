@@ -33,8 +33,8 @@
 //! M⁻¹ and ‖·‖ are computed in f64 from the f32 entries of M; its errors are 2⁻²⁹ of ours.
 
 use super::super::bounds::Bounds;
-use crate::scene::{Instance, row_sum_norm};
 use glam::DVec3;
+use raystone_scene::{Instance, row_sum_norm};
 
 /// 32 ε of the proof, 2⁻¹⁹.
 const PAD: f64 = 1.0 / 524_288.0;

@@ -10,7 +10,7 @@ const MOST_LOG: u32 = 3;
 const RUN: usize = 64;
 
 /// The arrays of the kernel.
-pub struct Compressed {
+pub(super) struct Compressed {
     /// Four words per cell.
     pub cells: Vec<u32>,
     /// Entries of the map, then references.
@@ -20,7 +20,7 @@ pub struct Compressed {
 }
 
 /// Writes the arrays.
-pub fn compress(partition: &Partition) -> Compressed {
+pub(super) fn compress(partition: &Partition) -> Compressed {
     let mut words = entries(&partition.map);
     let first_reference = words.len();
     let mut cells = Vec::with_capacity(4 * partition.cells.len());

@@ -6,7 +6,7 @@ use super::super::grid::{Cut, Grid, GridBox, areas, finest, most_words};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Entry, GridCell, Map};
 use super::{MOST_PLACES, Options, Partition};
-use crate::accel::BuildLog;
+use crate::BuildLog;
 use rayon::prelude::*;
 
 /// Most top cells along an axis, so that cells can still be cut with 16-bit coordinates.
@@ -19,7 +19,7 @@ const LEAST_BUNCH: usize = 32;
 const BUNCHED: usize = 4;
 
 /// Cuts the scene; phases `bounds`, `insert`, `sort` and `build`.
-pub fn cut(
+pub(super) fn cut(
     name: &str,
     soup: &TriangleSoup,
     settings: &Options,

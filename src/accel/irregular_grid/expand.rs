@@ -6,7 +6,7 @@ use super::voxels::{GridCell, is_subset};
 use rayon::prelude::*;
 
 /// Grows all boxes `passes` times along each axis. Boxes of a step are computed from those before it.
-pub fn expand(partition: &mut Partition, passes: u32) {
+pub(super) fn expand(partition: &mut Partition, passes: u32) {
     // Two bits per axis: down and up are blocked for good, since lists never change.
     let mut blocked = vec![0u8; partition.cells.len()];
     for _ in 0..passes {

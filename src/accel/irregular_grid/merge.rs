@@ -14,7 +14,7 @@ const NONE: u32 = u32::MAX;
 const UNKNOWN: u32 = u32::MAX - 1;
 
 /// Merges cells, drops those that are gone, and renumbers the rest in the map.
-pub fn merge(partition: &mut Partition, alpha: f64) {
+pub(super) fn merge(partition: &mut Partition, alpha: f64) {
     let mut state = State::new(partition);
     let mut pass = 1;
     loop {

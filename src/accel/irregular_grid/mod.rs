@@ -21,7 +21,7 @@ use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, most_words, outside};
 use super::structure::prelude::*;
 use super::watch;
-use crate::gpu::UniformValues;
+use raystone_gpu::UniformValues;
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
@@ -51,7 +51,7 @@ parameters! {
 }
 
 /// The registry entry.
-pub struct IrregularGrid;
+pub(crate) struct IrregularGrid;
 
 impl Structure for IrregularGrid {
     const NAME: &'static str = "irregular-grid";
@@ -316,8 +316,8 @@ impl Traverse for Built {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::fixtures::{random_triangle, soup};
-    use crate::random::Pcg32;
+    use crate::fixtures::{random_triangle, soup};
+    use raystone_core::random::Pcg32;
 
     /// Triangles of all sizes, bunched in one corner.
     fn bunched() -> TriangleSoup {

@@ -6,7 +6,7 @@ const BLOCK: u32 = 1 << 31;
 
 /// A box of voxels with a list of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct GridCell {
+pub(super) struct GridCell {
     /// Lowest voxel.
     pub min: [u16; 3],
     /// One past the highest voxel.
@@ -19,14 +19,14 @@ pub struct GridCell {
 
 impl GridCell {
     /// The cell's list, triangles ascending.
-    pub fn list<'a>(&self, pool: &'a [u32]) -> &'a [u32] {
+    pub(super) fn list<'a>(&self, pool: &'a [u32]) -> &'a [u32] {
         &pool[self.first as usize..(self.first + self.count) as usize]
     }
 }
 
 /// A cube of entries, 2^`log` along each axis, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Block {
+pub(super) struct Block {
     /// Its first entry.
     pub first: u32,
     /// Binary logarithm of the entries along an axis.
@@ -35,7 +35,7 @@ pub struct Block {
 
 /// What an entry leads to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Entry {
+pub(super) enum Entry {
     /// A cell, by number.
     GridCell(u32),
     /// A block, by number.
@@ -44,7 +44,7 @@ pub enum Entry {
 
 /// Which cell each voxel belongs to: an entry for each top cell, each a cell or a block of entries.
 #[derive(Debug, Clone, Default)]
-pub struct Map {
+pub(super) struct Map {
     /// Top cells along each axis.
     pub top: [u32; 3],
     /// A top cell has 2^`shift` voxels along each axis.
@@ -57,7 +57,7 @@ pub struct Map {
 
 impl Map {
     /// Word of an entry.
-    pub fn encode(entry: Entry) -> u32 {
+    pub(super) fn encode(entry: Entry) -> u32 {
         match entry {
             Entry::GridCell(cell) => cell,
             Entry::Block(block) => block | BLOCK,
@@ -65,7 +65,7 @@ impl Map {
     }
 
     /// Entry of a word.
-    pub fn decode(word: u32) -> Entry {
+    pub(super) fn decode(word: u32) -> Entry {
         if word & BLOCK == 0 {
             Entry::GridCell(word)
         } else {
@@ -74,12 +74,12 @@ impl Map {
     }
 
     /// Number of top cells.
-    pub fn top_cells(&self) -> usize {
+    pub(super) fn top_cells(&self) -> usize {
         self.top.iter().map(|&n| n as usize).product()
     }
 
     /// The cell that a voxel belongs to.
-    pub fn cell_at(&self, voxel: [u32; 3]) -> u32 {
+    pub(super) fn cell_at(&self, voxel: [u32; 3]) -> u32 {
         let mut shift = self.shift;
         let [x, y, z] = voxel.map(|v| v >> shift);
         let mut word = self.entries[((z * self.top[1] + y) * self.top[0] + x) as usize];
@@ -94,7 +94,7 @@ impl Map {
 }
 
 /// Whether every entry of `part` is in `whole`; both ascend.
-pub fn is_subset(part: &[u32], whole: &[u32]) -> bool {
+pub(super) fn is_subset(part: &[u32], whole: &[u32]) -> bool {
     if part.len() > whole.len() {
         return false;
     }
@@ -104,7 +104,7 @@ pub fn is_subset(part: &[u32], whole: &[u32]) -> bool {
 }
 
 /// Length of the union of two ascending lists.
-pub fn union_length(a: &[u32], b: &[u32]) -> usize {
+pub(super) fn union_length(a: &[u32], b: &[u32]) -> usize {
     let (mut i, mut k, mut common) = (0, 0, 0);
     while i < a.len() && k < b.len() {
         let (p, q) = (a[i], b[k]);
@@ -116,7 +116,7 @@ pub fn union_length(a: &[u32], b: &[u32]) -> usize {
 }
 
 /// Appends the union of two ascending lists.
-pub fn push_union(a: &[u32], b: &[u32], out: &mut Vec<u32>) {
+pub(super) fn push_union(a: &[u32], b: &[u32], out: &mut Vec<u32>) {
     let (mut i, mut k) = (0, 0);
     while i < a.len() && k < b.len() {
         let (p, q) = (a[i], b[k]);

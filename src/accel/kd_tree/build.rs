@@ -5,11 +5,11 @@
 //! O(N log N)", 2006, algorithms 4 and 5.
 
 use super::{Node, Options};
-use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{Margin, clip};
-use crate::accel::tree::NodeKind;
-use crate::accel::tree::grow::{Grown, PARALLEL_GRAIN, grow};
-use crate::accel::{AccelError, BuildLog, TriangleSoup};
+use crate::bounds::Bounds;
+use crate::spatial::{Margin, clip};
+use crate::tree::NodeKind;
+use crate::tree::grow::{Grown, PARALLEL_GRAIN, grow};
+use crate::{AccelError, BuildLog, TriangleSoup};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -150,7 +150,7 @@ struct Split {
 
 impl Region {
     fn root(soup: &TriangleSoup, bounds: Bounds) -> Self {
-        let item = |(id, record): (usize, &crate::accel::triangle::TriangleRecord)| Item {
+        let item = |(id, record): (usize, &crate::triangle::TriangleRecord)| Item {
             bounds: record.bounds(),
             id: id as u32,
         };

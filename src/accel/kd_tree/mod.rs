@@ -11,8 +11,8 @@ mod validate;
 
 use super::bounds::{Bounds, slab};
 use super::structure::prelude::*;
-use crate::gpu::UniformValues;
 use bytemuck::{Pod, Zeroable};
+use raystone_gpu::UniformValues;
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].
 const KIND_MASK: u32 = 3;
@@ -40,7 +40,7 @@ parameters! {
 }
 
 /// The registry entry.
-pub struct KdTree;
+pub(crate) struct KdTree;
 
 impl Structure for KdTree {
     const NAME: &'static str = "kd-tree";

@@ -1,7 +1,7 @@
 //! Faults in a built tree that `validate()` must find.
 
 use super::*;
-use crate::accel::fixtures::lattice;
+use crate::fixtures::lattice;
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {
     let options = Options {

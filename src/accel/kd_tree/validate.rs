@@ -1,10 +1,10 @@
 //! What must hold of a built kd-tree.
 
 use super::{Built, Content, halves};
-use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{corners, touches};
-use crate::accel::tree::Coverage;
-use crate::accel::{AccelError, TriangleSoup};
+use crate::bounds::Bounds;
+use crate::spatial::{corners, touches};
+use crate::tree::Coverage;
+use crate::{AccelError, TriangleSoup};
 
 /// Every node is reached once, every plane lies in its cell, and every leaf lists the triangles that
 /// it must.

@@ -1,9 +1,9 @@
 //! The builder of `octree`: level by level, the cells of a level on all cores.
 
 use super::{INNER_SHIFT, LAST, LEAF, Options, RootCell};
-use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{Margin, Overlap, corners};
-use crate::accel::{AccelError, TriangleSoup};
+use crate::bounds::Bounds;
+use crate::spatial::{Margin, Overlap, corners};
+use crate::{AccelError, TriangleSoup};
 use rayon::prelude::*;
 
 /// Blocks of children are numbered with 23 bits.

@@ -11,7 +11,7 @@ mod build;
 mod validate;
 
 use super::structure::prelude::*;
-use crate::gpu::UniformValues;
+use raystone_gpu::UniformValues;
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;
@@ -41,7 +41,7 @@ parameters! {
 }
 
 /// The registry entry.
-pub struct Octree;
+pub(crate) struct Octree;
 
 impl Structure for Octree {
     const NAME: &'static str = "octree";

@@ -1,9 +1,9 @@
 //! What must hold of a built octree.
 
 use super::{Built, INNER_SHIFT, LAST, LEAF, RootCell, build};
-use crate::accel::spatial::{corners, touches};
-use crate::accel::tree::Coverage;
-use crate::accel::{AccelError, TriangleSoup};
+use crate::spatial::{corners, touches};
+use crate::tree::Coverage;
+use crate::{AccelError, TriangleSoup};
 
 /// Every block is reached once, and every cell lists the triangles that it must.
 ///

@@ -1,9 +1,9 @@
 //! Rays of the host, traced: uploaded once, answered as often as asked.
 
 use super::{Ask, Query, RayBuffers, Traced, Tracer, TriangleBuffers};
-use crate::accel::{Counters, Hit, Ray};
-use crate::gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage};
+use crate::{Counters, Hit, Ray};
 use bytemuck::Pod;
+use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage};
 use std::cell::Cell;
 
 /// What stands in the output before a trace; no answer of either query begins with it (as a distance it is

@@ -11,13 +11,14 @@ mod traced;
 mod workgroup;
 
 pub use batch::{Answers, RayBatch, count_work};
-pub use passes::{LiveRays, TracePasses, TraceSteps, rays_of_batch};
-pub use refill::{Refill, RefillParameters};
+pub use passes::{LiveRays, TracePasses, TraceSteps};
+pub(crate) use refill::Refill;
+pub use refill::RefillParameters;
 pub use traced::{Traced, TriangleBuffers};
 pub use workgroup::{GroupShape, Workgroup, WorkgroupRegistry};
 
-use crate::gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};
-use crate::text::cell_hash;
+use raystone_core::text::cell_hash;
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,7 +39,7 @@ pub struct Ask {
     pub query: Query,
     /// Whether work is counted instead of answers kept.
     pub counters: bool,
-    /// Whether neighbouring rays are alike: see [`Refill::Auto`].
+    /// Whether neighbouring rays are alike: see `Auto`.
     pub coherent: bool,
     /// Whether the driver's checks are on.
     pub runtime_checks: bool,

@@ -1,7 +1,7 @@
 //! The passes in which a structure answers a buffer of rays.
 
 use super::{Query, RayBuffers, RefillParameters, Tracer};
-use crate::gpu::{
+use raystone_gpu::{
     Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, grid_of,
 };
 use std::ops::Range;
@@ -172,7 +172,7 @@ impl<'a> TraceSteps<'a> {
     ///
     /// # Errors
     /// As [`TraceSteps::run`].
-    pub fn run_counted(
+    pub(crate) fn run_counted(
         &mut self,
         name: &str,
         kernel: Composition,
@@ -220,6 +220,6 @@ impl<'a> TraceSteps<'a> {
 }
 
 /// The uniform `batch`: which rays of the buffer a kernel looks at.
-pub fn rays_of_batch(first: u32, count: u32) -> UniformValues {
+pub(crate) fn rays_of_batch(first: u32, count: u32) -> UniformValues {
     UniformValues::new().u32("first", first).u32("count", count)
 }

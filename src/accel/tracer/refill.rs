@@ -6,7 +6,7 @@
 //! own, and each invocation its share of them. Kernel: `kernels/integrator/trace_rays.wesl`; a structure
 //! that can be refilled exports `Traversal`, `begin` and `advance` beside `trace`.
 
-use crate::parameters;
+use raystone_core::parameters;
 
 parameters! {
     /// How the batch kernel hands rays to its invocations.
@@ -19,7 +19,7 @@ parameters! {
     }
 
     /// When invocations are refilled.
-    pub enum Refill {
+    pub(crate) enum Refill {
         /// Never.
         None = "none",
         /// Where it was measured to pay.

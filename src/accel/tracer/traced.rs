@@ -2,8 +2,8 @@
 
 use super::passes::{OnePass, TracePasses};
 use super::workgroup::{GroupShape, Workgroup};
-use crate::accel::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
-use crate::gpu::{Bindings, Composition, Gpu, GpuError};
+use crate::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
 use std::sync::Arc;
 
 /// The canonical triangles on the device, and how rays meet them.

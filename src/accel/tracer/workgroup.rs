@@ -4,8 +4,8 @@
 //! the workgroup has invocations; what traces an image takes rectangles of pixels of this shape. Kernels read
 //! `GROUP_WIDTH` and `GROUP_HEIGHT` of `package::active::constants`.
 
-use crate::gpu::{Composition, Gpu, WORKGROUP_EDGE};
-use crate::params::{Kinds, Named};
+use raystone_core::params::{Kinds, Named};
+use raystone_gpu::{Composition, Gpu, WORKGROUP_EDGE};
 
 /// An entry of the axis `workgroup`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,13 +21,11 @@ pub struct Workgroup {
 /// Everything that can be named on the `workgroup` axis.
 pub type WorkgroupRegistry = Kinds<Workgroup>;
 
-impl Default for WorkgroupRegistry {
-    fn default() -> Self {
-        Self::new(&Workgroup::ALL)
-    }
-}
-
 impl Named for Workgroup {
+    fn built_in() -> Vec<&'static Self> {
+        Self::ALL.iter().collect()
+    }
+
     fn name(&self) -> &'static str {
         self.name
     }
@@ -121,7 +119,7 @@ impl GroupShape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Axis;
+    use raystone_config::Axis;
 
     #[test]
     fn what_an_experiment_says_nothing_of_is_the_default_workgroup() {
@@ -161,6 +159,6 @@ mod tests {
             chosen.clone().completed(),
             Composition::new("x").completed()
         );
-        assert_eq!(GroupShape::default().lanes(), crate::gpu::WORKGROUP_SIZE);
+        assert_eq!(GroupShape::default().lanes(), raystone_gpu::WORKGROUP_SIZE);
     }
 }

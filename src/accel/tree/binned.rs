@@ -11,7 +11,7 @@ use super::Tree;
 use super::grow::grow;
 use super::parameters::{MAX_BINS, SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
-use crate::accel::bounds::Bounds;
+use crate::bounds::Bounds;
 use glam::Vec3A;
 use rayon::prelude::*;
 
@@ -116,7 +116,7 @@ pub(super) struct BinSplit {
 
 impl BinSplit {
     /// Whether a reference belongs to the first side.
-    pub fn is_low(&self, reference: &Reference) -> bool {
+    pub(super) fn is_low(&self, reference: &Reference) -> bool {
         let (min, max) = (reference.min[self.axis], reference.max[self.axis]);
         let (origin, scale) = (self.grid.origin[self.axis], self.grid.scale[self.axis]);
         bin_of((min + max - origin) * scale) < self.bin

@@ -15,13 +15,13 @@
 //! Where triangles are clipped, the same follows if y lies within the margin of the triangle: it does
 //! unless the ray is almost in its plane (`src/accel/spatial.rs`).
 
-use crate::accel::bounds::Bounds;
-use crate::accel::polygon::Polygon;
-use crate::accel::triangle::TriangleRecord;
-use crate::accel::{AccelError, TriangleSoup};
+use crate::bounds::Bounds;
+use crate::polygon::Polygon;
+use crate::triangle::TriangleRecord;
+use crate::{AccelError, TriangleSoup};
 
 /// A node that is still to be looked at, and the box that it must lie in.
-pub type Below = (usize, Bounds);
+pub(super) type Below = (usize, Bounds);
 
 /// Bookkeeping of `validate()`: every node reached once, and every triangle in a leaf that contains
 /// it or in several that together cover it. More leaves than needed are a waste, which
@@ -52,7 +52,7 @@ impl<'a> Coverage<'a> {
     ///
     /// # Errors
     /// The first violated invariant, with the node.
-    pub fn descend(
+    pub(crate) fn descend(
         mut self,
         most_levels: u32,
         look: impl Fn(&mut Self, usize, &Bounds, &mut Vec<Below>) -> Result<(), AccelError>,
@@ -198,7 +198,7 @@ fn covers(boxes: &[Bounds], mut rest: Polygon) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::fixtures;
+    use crate::fixtures;
 
     fn soup() -> TriangleSoup {
         fixtures::soup([[[0.0; 3], [4.0, 2.0, 0.0], [0.0, 2.0, 8.0]]])

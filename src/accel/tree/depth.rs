@@ -67,7 +67,7 @@ fn leaves_below(tree: &Tree, root: u32) -> Vec<TreeNode> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::bounds::Bounds;
+    use crate::bounds::Bounds;
 
     /// A chain of so many leaves.
     fn chain(leaves: u32) -> Tree {

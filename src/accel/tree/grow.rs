@@ -1,13 +1,13 @@
 //! Growing a binary tree from the top, on all cores: what builders do the same.
 
 use super::{NodeKind, Tree, TreeNode};
-use crate::accel::bounds::Bounds;
+use crate::bounds::Bounds;
 
 /// Subtrees over no more references are built by one thread.
-pub(in crate::accel) const PARALLEL_GRAIN: usize = 4096;
+pub(crate) const PARALLEL_GRAIN: usize = 4096;
 
 /// Nodes in depth-first order, and the references of their leaves one after the other.
-pub(in crate::accel) struct Grown<N> {
+pub(crate) struct Grown<N> {
     pub nodes: Vec<(N, NodeKind)>,
     pub order: Vec<u32>,
 }
@@ -21,7 +21,7 @@ enum Subtree<N> {
 
 /// The tree over all of `whole`. `len` counts the references of a part; `split` makes the node above it, given
 /// its depth, and divides it in two, or appends what it lists as a leaf.
-pub(in crate::accel) fn grow<P: Send, N: Send>(
+pub(crate) fn grow<P: Send, N: Send>(
     whole: P,
     len: impl Fn(&P) -> usize + Sync,
     split: impl Fn(P, u32, &mut Vec<u32>) -> (N, Option<[P; 2]>) + Sync,

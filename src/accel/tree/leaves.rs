@@ -69,7 +69,7 @@ pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &TreePar
 }
 
 /// Entries without repetition, in the order of their first places.
-pub(in crate::accel) fn distinct(entries: &[u32]) -> impl Iterator<Item = u32> {
+pub(crate) fn distinct(entries: &[u32]) -> impl Iterator<Item = u32> {
     let is_first = |(place, id): &(usize, &u32)| !entries[..*place].contains(id);
     entries
         .iter()

@@ -20,12 +20,12 @@ mod sweep;
 
 pub use coverage::Coverage;
 pub(super) use leaves::distinct;
-pub use parameters::{Builder, Preset, TreeParameters};
+pub use parameters::{Builder, TreeParameters};
 
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup};
-use crate::params::Choice as _;
 use parallel::Method;
+use raystone_core::params::Choice as _;
 use sweep::Axes;
 
 /// A node; children of an inner node lie at `left` and `right`.

@@ -2,7 +2,7 @@
 
 use super::parallel::{self, Method};
 use super::reference::Box3;
-use crate::parameters;
+use raystone_core::parameters;
 
 /// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
 /// `SAH_DEPTH + log2(references) + 1` whatever the input.
@@ -79,7 +79,7 @@ parameters! {
     }
 
     /// Presets of the crate obvhs.
-    pub enum Preset {
+    pub(crate) enum Preset {
         /// `fastest_build`.
         Fastest = "fastest",
         /// `very_fast_build`.
@@ -98,7 +98,7 @@ parameters! {
 impl TreeParameters {
     /// These, with leaves of one triangle: for structures that merge leaves themselves.
     #[must_use]
-    pub fn with_single_leaves(&self) -> Self {
+    pub(crate) fn with_single_leaves(&self) -> Self {
         Self {
             leaf_size: 1,
             ..self.clone()
@@ -121,7 +121,7 @@ impl TreeParameters {
     }
 
     /// What the device is told, if it is to build.
-    pub(in crate::accel) fn on_device(&self) -> Option<parallel::Settings> {
+    pub(crate) fn on_device(&self) -> Option<parallel::Settings> {
         match self.builder {
             Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
             Builder::DevicePloc => Some(self.parallel(self.clustering())),

@@ -8,7 +8,7 @@ use super::depth::limit_depth;
 use super::grow::lay_out;
 use super::parameters::{Preset, TreeParameters};
 use super::reference::{Box3, Reference};
-use crate::accel::AccelError;
+use crate::AccelError;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;

@@ -1,10 +1,10 @@
 //! Figures that tell how good a tree is: SAH cost and end-point overlap.
 
 use super::{NodeKind, Tree, TreeNode};
-use crate::accel::StructureStats;
-use crate::accel::TriangleSoup;
-use crate::accel::polygon::Polygon;
-use crate::accel::triangle::TriangleRecord;
+use crate::StructureStats;
+use crate::TriangleSoup;
+use crate::polygon::Polygon;
+use crate::triangle::TriangleRecord;
 use rayon::prelude::*;
 
 /// Triangles whose overlap one task sums up: a constant, so that the sum does not depend on the
@@ -190,7 +190,7 @@ impl OverlapWalk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::fixtures::soup;
+    use crate::fixtures::soup;
 
     /// Two leaves, the second of them a box whose lower half the first triangle reaches into.
     fn two_leaves() -> (Tree, TriangleSoup) {

@@ -1,7 +1,7 @@
 //! Boxes in vector registers, and references: what builders move around.
 
-use crate::accel::TriangleSoup;
-use crate::accel::bounds::Bounds;
+use crate::TriangleSoup;
+use crate::bounds::Bounds;
 use glam::{Vec3A, Vec3Swizzles, Vec4};
 use rayon::prelude::*;
 
@@ -14,12 +14,12 @@ pub(super) struct Box3 {
 
 impl Box3 {
     /// The neutral element of [`Box3::union`].
-    pub const EMPTY: Box3 = Box3 {
+    pub(super) const EMPTY: Box3 = Box3 {
         min: Vec3A::INFINITY,
         max: Vec3A::NEG_INFINITY,
     };
 
-    pub fn union(self, other: Box3) -> Box3 {
+    pub(super) fn union(self, other: Box3) -> Box3 {
         Box3 {
             min: self.min.min(other.min),
             max: self.max.max(other.max),
@@ -27,14 +27,14 @@ impl Box3 {
     }
 
     /// The common part; its half area is 0 if there is none.
-    pub fn intersection(self, other: Box3) -> Box3 {
+    pub(super) fn intersection(self, other: Box3) -> Box3 {
         Box3 {
             min: self.min.max(other.min),
             max: self.max.min(other.max),
         }
     }
 
-    pub fn with_point(self, point: Vec3A) -> Box3 {
+    pub(super) fn with_point(self, point: Vec3A) -> Box3 {
         self.union(Box3 {
             min: point,
             max: point,
@@ -42,13 +42,13 @@ impl Box3 {
     }
 
     /// Half the surface area; 0 for an empty box.
-    pub fn half_area(self) -> f32 {
+    pub(super) fn half_area(self) -> f32 {
         let e = (self.max - self.min).max(Vec3A::ZERO);
         e.dot(e.yzx())
     }
 
     /// The axis of the greatest extent.
-    pub fn longest_axis(self) -> usize {
+    pub(super) fn longest_axis(self) -> usize {
         (self.max - self.min).max_position()
     }
 }
@@ -83,7 +83,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    pub fn new(bounds: Box3, id: u32) -> Self {
+    pub(super) fn new(bounds: Box3, id: u32) -> Self {
         Self {
             min: bounds.min.into(),
             id,
@@ -92,7 +92,7 @@ impl Reference {
         }
     }
 
-    pub fn bounds(&self) -> Box3 {
+    pub(super) fn bounds(&self) -> Box3 {
         // One load each; the fourth lane takes part in nothing.
         let [x, y, z] = self.min;
         let min = Vec4::new(x, y, z, f32::from_bits(self.id));
@@ -105,14 +105,14 @@ impl Reference {
     }
 
     /// Twice the centre: enough to sort and bin by, without the division.
-    pub fn centre(&self) -> Vec3A {
+    pub(super) fn centre(&self) -> Vec3A {
         let Box3 { min, max } = self.bounds();
         min + max
     }
 
     /// Sorts by centre along `axis`; ids make the order total, so that it does not depend on the
     /// order before.
-    pub fn compare(&self, other: &Self, axis: usize) -> std::cmp::Ordering {
+    pub(super) fn compare(&self, other: &Self, axis: usize) -> std::cmp::Ordering {
         let centre = |r: &Self| r.min[axis] + r.max[axis];
         centre(self)
             .total_cmp(&centre(other))
@@ -122,7 +122,7 @@ impl Reference {
 
 /// One reference for each triangle.
 pub(super) fn references(soup: &TriangleSoup) -> Vec<Reference> {
-    let reference = |record: &crate::accel::triangle::TriangleRecord| {
+    let reference = |record: &crate::triangle::TriangleRecord| {
         Reference::new(record.bounds().into(), record.id)
     };
     soup.records.par_iter().map(reference).collect()

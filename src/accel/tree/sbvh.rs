@@ -16,10 +16,10 @@ use super::binned::{best_bin_split, median_split};
 use super::grow::grow;
 use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
-use crate::accel::TriangleSoup;
-use crate::accel::bounds::Bounds;
-use crate::accel::polygon::Polygon;
-use crate::accel::spatial::{Margin, clip};
+use crate::TriangleSoup;
+use crate::bounds::Bounds;
+use crate::polygon::Polygon;
+use crate::spatial::{Margin, clip};
 use glam::Vec3A;
 
 /// The tree. There are at most twice as many references as triangles.

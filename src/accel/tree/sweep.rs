@@ -17,7 +17,7 @@ use super::Tree;
 use super::grow::grow;
 use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference};
-use crate::accel::bounds::Bounds;
+use crate::bounds::Bounds;
 use rayon::prelude::*;
 
 /// Which axes are tried.

@@ -7,8 +7,8 @@
 
 use super::watertight::turned;
 use super::{APART, DISTANCE_PAD, Meeting, TriangleRecord, TriangleTest};
-use crate::accel::ray::Ray;
-use crate::accel::spatial::cross;
+use crate::ray::Ray;
+use crate::spatial::cross;
 
 /// To the unit triangle, with axes turned so that the one along which the normal is longest comes last;
 /// the coefficient of that axis is 1 in `plane` and 0 in `u` and `v`.

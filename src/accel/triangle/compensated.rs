@@ -3,17 +3,17 @@
 //! Edge functions are differences of two-products (T. Dekker, "A floating-point technique for extending
 //! the available precision", 1971), with significands cut by a mask, which no compiler simplifies. Where
 //! an adapter computes otherwise, signs are as good as the watertight test's:
-//! [`crate::gpu::ArithmeticProbe::exact_products`] tells.
+//! [`raystone_gpu::ArithmeticProbe::exact_products`] tells.
 
 use super::watertight::{area_of, products, residual, shear, sheared};
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
-use crate::accel::ray::Ray;
+use crate::ray::Ray;
 
 /// The upper half of a significand.
 const UPPER: u32 = 0xffff_f000;
 
 /// What rounding took off the product `p` of `a` and `b`.
-pub fn product_error(a: f32, b: f32, p: f32) -> f32 {
+pub(crate) fn product_error(a: f32, b: f32, p: f32) -> f32 {
     let a1 = f32::from_bits(a.to_bits() & UPPER);
     let b1 = f32::from_bits(b.to_bits() & UPPER);
     let (a2, b2) = (a - a1, b - b1);

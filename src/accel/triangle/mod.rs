@@ -22,10 +22,11 @@ mod pluecker;
 pub(super) mod watertight;
 
 pub use baldwin_weber::BaldwinWeber;
-pub use compensated::{Compensated, product_error};
+pub use compensated::Compensated;
 pub use moeller_trumbore::MoellerTrumbore;
-pub use plane::{DISTANCE_PAD, plane_error};
-pub use pluecker::Pluecker;
+pub(crate) use plane::DISTANCE_PAD;
+pub use plane::plane_error;
+pub(crate) use pluecker::Pluecker;
 pub use watertight::Watertight;
 
 use super::bounds::{Bounds, slabs};
@@ -33,15 +34,15 @@ use super::intersection::Reciprocal;
 use super::mask::{Masks, is_cut_out};
 use super::ray::{Hit, Ray, SMALLEST_COMPONENT, SMALLEST_SLOPE};
 use super::watch::{self, Event};
-use crate::geometry::Triangle;
-use crate::params::Sources;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use raystone_core::geometry::Triangle;
+use raystone_core::params::Sources;
 use std::fmt;
 
 /// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
-pub const TRIANGLE_PAD: f32 = 4.768_371_6e-7;
+pub(crate) const TRIANGLE_PAD: f32 = 4.768_371_6e-7;
 
 /// A triangle as kernels read it: three `vec4<u32>`, 48 bytes, the vertices as they are in the scene.
 #[repr(C)]
@@ -53,7 +54,7 @@ pub struct TriangleRecord {
     pub id: u32,
     /// Second vertex.
     pub v1: [f32; 3],
-    /// Material index; of a triangle with a mask, where its words are: see [`MASKED`](super::mask::MASKED).
+    /// Material index; of a triangle with a mask, where its words are: see `MASKED`.
     pub material: u32,
     /// Third vertex.
     pub v2: [f32; 3],

@@ -4,7 +4,7 @@
 
 use super::plane::plane_error;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
-use crate::accel::ray::Ray;
+use crate::ray::Ray;
 
 /// T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
 pub struct MoellerTrumbore;

@@ -4,7 +4,7 @@
 
 use super::plane::plane_error;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
-use crate::accel::ray::Ray;
+use crate::ray::Ray;
 
 /// Embree's tolerance, one ulp of 1.
 const TOLERANCE: f32 = 1.192_092_9e-7;
@@ -30,7 +30,7 @@ fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
 }
 
 /// Plücker coordinates with Embree's tolerance.
-pub struct Pluecker;
+pub(crate) struct Pluecker;
 
 impl TriangleTest for Pluecker {
     fn name(&self) -> &'static str {

@@ -14,16 +14,16 @@
 //! no hit. A closed mesh has others there.
 
 use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord, TriangleTest};
-use crate::accel::ray::Ray;
+use crate::ray::Ray;
 
 /// The axis along which the direction is longest.
-pub fn longest(d: [f32; 3]) -> usize {
+pub(crate) fn longest(d: [f32; 3]) -> usize {
     let [x, y, z] = d.map(f32::abs);
     if z >= x.max(y) { 2 } else { usize::from(y > x) }
 }
 
 /// Axes turned so that `axis` comes last.
-pub fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
+pub(crate) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     match axis {
         0 => [y, z, x],
         1 => [z, x, y],
@@ -42,7 +42,7 @@ fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
 
 /// A ray as vertices are sheared by it: x and y for each unit of z, and 1 / direction along z.
 #[derive(Debug, Clone, Copy)]
-pub struct Shear {
+pub(crate) struct Shear {
     axis: usize,
     origin: [f32; 3],
     x: f32,
@@ -51,7 +51,7 @@ pub struct Shear {
     pub scale: f32,
 }
 
-pub fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
+pub(crate) fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
     let axis = longest(ray.direction);
     let [dx, dy, _] = turned(ray.direction, axis);
     let [_, _, scale] = turned(*inverse, axis);
@@ -65,7 +65,7 @@ pub fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
 }
 
 /// A vertex relative to the ray: across it in x and y, along it in z.
-pub fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
+pub(crate) fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
     let relative = [0, 1, 2].map(|a| vertex[a] - s.origin[a]);
     let [x, y, z] = turned(relative, s.axis);
     [x - s.x * z, y - s.y * z, z]
@@ -85,7 +85,7 @@ pub(super) fn area_of(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
 }
 
 /// Both products of the edge functions opposite to the three vertices.
-pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     (
         [c[0] * b[1], a[0] * c[1], b[0] * a[1]],
         [c[1] * b[0], a[1] * c[0], b[1] * a[0]],

@@ -6,14 +6,14 @@
 
 use super::costs::Costs;
 use super::octants::arrange;
-use crate::accel::bounds::Bounds;
-use crate::accel::tree::{NodeKind, Tree, TreeParameters, distinct};
-use crate::accel::triangle::TriangleRecord;
-use crate::accel::{StructureStats, TriangleSoup};
+use crate::bounds::Bounds;
+use crate::tree::{NodeKind, Tree, TreeParameters, distinct};
+use crate::triangle::TriangleRecord;
+use crate::{StructureStats, TriangleSoup};
 
 /// What the nodes of a wide tree are like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shape {
+pub(super) struct Shape {
     /// Most children, 2 to 8.
     pub width: usize,
     /// Whether children get slots by where they lie ([`arrange`]), of which there are 8.
@@ -22,7 +22,7 @@ pub struct Shape {
 
 /// What a child of a wide node is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum WideKind {
+pub(crate) enum WideKind {
     /// A node, by index.
     Node(u32),
     /// A range of [`WideTree::order`].
@@ -36,7 +36,7 @@ pub enum WideKind {
 
 /// A child of a wide node with its box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WideChild {
+pub(crate) struct WideChild {
     /// Box around everything below.
     pub bounds: Bounds,
     /// What is below.
@@ -45,13 +45,13 @@ pub struct WideChild {
 
 impl WideChild {
     /// No child.
-    pub const NOTHING: WideChild = WideChild {
+    pub(crate) const NOTHING: WideChild = WideChild {
         bounds: Bounds::EMPTY,
         kind: WideKind::Leaf { first: 0, count: 0 },
     };
 
     /// Whether this is [`WideChild::NOTHING`].
-    pub fn is_nothing(&self) -> bool {
+    pub(crate) fn is_nothing(&self) -> bool {
         matches!(self.kind, WideKind::Leaf { count: 0, .. })
     }
 }
@@ -59,7 +59,7 @@ impl WideChild {
 /// A tree of nodes with up to `width` children each. Node 0 is the root; the nodes among the
 /// children of one node follow each other, in the order of the children.
 #[derive(Debug, Clone, Default)]
-pub struct WideTree {
+pub(super) struct WideTree {
     /// Children of every node; one node without children for an empty scene.
     pub nodes: Vec<Vec<WideChild>>,
     /// Triangle indices, leaf by leaf in the order in which nodes list them.
@@ -70,7 +70,7 @@ pub struct WideTree {
 
 impl WideTree {
     /// Figures of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
-    pub fn stats(&self) -> StructureStats {
+    pub(super) fn stats(&self) -> StructureStats {
         let children = || self.nodes.iter().flatten().filter(|c| !c.is_nothing());
         let leaves = children().filter_map(|child| match child.kind {
             WideKind::Node(_) => None,
@@ -96,7 +96,7 @@ impl WideTree {
     }
 
     /// The triangles in the order of the leaves.
-    pub fn records(&self, soup: &TriangleSoup) -> Vec<TriangleRecord> {
+    pub(super) fn records(&self, soup: &TriangleSoup) -> Vec<TriangleRecord> {
         self.order
             .iter()
             .map(|&id| soup.records[id as usize])
@@ -104,7 +104,7 @@ impl WideTree {
     }
 
     /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles.
-    pub fn collapse(tree: &Tree, shape: Shape, settings: &TreeParameters) -> WideTree {
+    pub(super) fn collapse(tree: &Tree, shape: Shape, settings: &TreeParameters) -> WideTree {
         let mut out = WideTree {
             nodes: vec![Vec::new()],
             order: Vec::with_capacity(tree.order.len()),
@@ -174,8 +174,8 @@ fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::tree::TreeNode;
-    use crate::random::Pcg32;
+    use crate::tree::TreeNode;
+    use raystone_core::random::Pcg32;
 
     fn around(x: f32, size: f32) -> Bounds {
         Bounds {

@@ -5,12 +5,12 @@
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
 use super::WideKind;
-use crate::accel::tree::{NodeKind, Tree, TreeParameters};
+use crate::tree::{NodeKind, Tree, TreeParameters};
 
 /// Most children of a node; its table has one entry less.
 const MAX_WIDTH: usize = 8;
 /// Words of the largest table.
-pub const WORDS: u64 = MAX_WIDTH as u64 - 1;
+pub(super) const WORDS: u64 = MAX_WIDTH as u64 - 1;
 /// Larger than the cost of any tree.
 const NEVER: f32 = 3.4e38;
 /// A wide node is cheaper than a leaf.
@@ -21,7 +21,7 @@ const BITS: u32 = 3;
 const FEWEST: u32 = 2;
 
 /// C(n, i) of the paper for all nodes n and i below the width, and how many triangles each node holds.
-pub struct Costs<'a> {
+pub(super) struct Costs<'a> {
     tree: &'a Tree,
     width: u32,
     settings: &'a TreeParameters,
@@ -40,7 +40,7 @@ struct Share {
 
 impl<'a> Costs<'a> {
     /// Of nodes with so many children at most, 2 to 8.
-    pub fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
+    pub(super) fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
         let mut costs = Self {
             tree,
             width: width as u32,
@@ -137,7 +137,7 @@ impl<'a> Costs<'a> {
     }
 
     /// What a subtree that is one child is: a leaf has its binary root in place of the first triangle.
-    pub fn kind(&self, root: u32) -> WideKind {
+    pub(super) fn kind(&self, root: u32) -> WideKind {
         match self.is_leaf(root) {
             false => WideKind::Node(root),
             true => WideKind::Leaf {
@@ -148,7 +148,7 @@ impl<'a> Costs<'a> {
     }
 
     /// Binary roots of the children of the wide node in the place of `node`.
-    pub fn children(&self, node: u32) -> Vec<u32> {
+    pub(super) fn children(&self, node: u32) -> Vec<u32> {
         let mut roots = Vec::with_capacity(self.width as usize);
         // Subtrees with the children they get, the first last.
         let mut open = vec![(node, self.width)];

@@ -4,14 +4,14 @@
 
 use super::collapse::{Shape, WideChild, WideKind, WideTree};
 use super::{MAX_LEAF, costs};
-use crate::accel::tree::parallel::device::{failed, play};
-use crate::accel::tree::{Tree, TreeParameters};
-use crate::accel::{AccelError, BuildLog};
-use crate::gpu::{
+use crate::tree::parallel::device::{failed, play};
+use crate::tree::{Tree, TreeParameters};
+use crate::{AccelError, BuildLog};
+use bytemuck::{Pod, Zeroable};
+use raystone_core::clock::Instant;
+use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Recording, Storage, UniformValues, groups_for,
 };
-use bytemuck::{Pod, Zeroable};
-use std::time::Instant;
 
 /// Workgroups of a pass at most: an invocation takes several nodes of a long level.
 const MOST_GROUPS: u32 = 128;
@@ -34,7 +34,7 @@ struct Place {
 ///
 /// # Errors
 /// What the device met with, or an array does not fit it.
-pub fn collapse(
+pub(super) fn collapse(
     gpu: &Gpu,
     tree: &Tree,
     shape: Shape,

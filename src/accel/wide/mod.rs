@@ -1,14 +1,18 @@
 //! What the wide structures `bvh4` and `cwbvh` share: a binary tree, collapsed; nodes of quantised
 //! boxes; their build, validation, buffers and figures.
 
+mod bvh4;
 mod collapse;
 mod costs;
+mod cwbvh;
 mod device;
 mod octants;
 mod quantise;
 
-pub use collapse::{WideChild, WideKind};
-pub use quantise::{Quantisation, enter_four, frame, leave_four};
+pub use bvh4::Bvh4;
+pub(crate) use collapse::{WideChild, WideKind};
+pub use cwbvh::Cwbvh;
+pub(crate) use quantise::{Quantisation, enter_four, frame, leave_four};
 
 use super::structure::prelude::*;
 use super::tracer::RefillParameters;
@@ -51,7 +55,7 @@ fn wide_tree(
 }
 
 /// A node of a wide structure, as what the structures share sees it.
-pub trait WideNode: Pod + Send + Sync {
+pub(crate) trait WideNode: Pod + Send + Sync {
     /// Name of the structure.
     const STRUCTURE: &'static str;
     /// Module of the kernel.
@@ -74,7 +78,7 @@ pub trait WideNode: Pod + Send + Sync {
 }
 
 /// A built wide structure.
-pub struct Wide<N> {
+pub(crate) struct Wide<N> {
     /// The root first.
     pub nodes: Vec<N>,
     /// Triangle records, leaf by leaf.
@@ -89,7 +93,7 @@ impl<N: WideNode> Wide<N> {
     ///
     /// # Errors
     /// The tree cannot be built, or there are more nodes than an index can name.
-    pub fn build(
+    pub(crate) fn build(
         soup: &TriangleSoup,
         parameters: &WideParameters,
         log: &mut BuildLog,
@@ -147,7 +151,7 @@ impl<N: WideNode> Wide<N> {
 }
 
 /// The layout of a tree as a structure of these nodes.
-pub struct OfNodes<N>(pub PhantomData<fn() -> N>);
+pub(crate) struct OfNodes<N>(pub PhantomData<fn() -> N>);
 
 impl<N: WideNode + 'static> OverTree for OfNodes<N> {
     fn tree(

@@ -5,7 +5,7 @@
 //! compressed wide BVHs", HPG 2017, section 3.3.
 
 use super::WideChild;
-use crate::accel::bounds::Bounds;
+use crate::bounds::Bounds;
 
 /// One for each octant.
 const SLOTS: usize = 8;
@@ -21,7 +21,7 @@ fn agreement(offset: [f32; 3], slot: usize) -> f32 {
 
 /// The children of a node with this box by slots: greedily, the child and the slot of best agreement first. Slots
 /// without a child get an empty leaf.
-pub fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
+pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
     let middle = bounds.doubled_centre();
     let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(SLOTS * SLOTS);
     for (index, child) in children.iter().enumerate() {

@@ -19,13 +19,13 @@
 //! same reciprocal, whose own error does not count.
 
 use super::WideChild;
-use crate::accel::bounds::Bounds;
-use crate::accel::intersection::Reciprocal;
+use crate::bounds::Bounds;
+use crate::intersection::Reciprocal;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
-pub const FRAME_PAD: f32 = 9.536_743e-7;
+pub(super) const FRAME_PAD: f32 = 9.536_743e-7;
 /// Number of planes on an axis.
-pub const PLANES: f32 = 256.0;
+pub(super) const PLANES: f32 = 256.0;
 
 /// Quanta are at least 2⁻⁶⁰: their distances stay far from denormal numbers.
 const LEAST_EXPONENT: i32 = -60;
@@ -34,7 +34,7 @@ const MANTISSA: i32 = 24;
 
 /// The planes of a node: where the first one lies and how far they are apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantisation {
+pub(crate) struct Quantisation {
     /// First plane on each axis.
     pub low: [f32; 3],
     /// Biased exponents of the distance between planes.
@@ -44,7 +44,7 @@ pub struct Quantisation {
 impl Quantisation {
     /// That of a node with these children, and the planes of each slot at the minimum and the maximum
     /// of each axis; zeros if there are no children.
-    pub fn of_children<const WIDTH: usize>(
+    pub(crate) fn of_children<const WIDTH: usize>(
         children: &[WideChild],
     ) -> (Self, [[[u8; WIDTH]; 3]; 2]) {
         let present = || children.iter().enumerate().filter(|(_, c)| !c.is_nothing());
@@ -69,7 +69,7 @@ impl Quantisation {
     }
 
     /// The box of a slot of a node with this first plane and these exponents.
-    pub fn slot_bounds<const WIDTH: usize>(
+    pub(crate) fn slot_bounds<const WIDTH: usize>(
         low: [f32; 3],
         exponents: u32,
         [lows, highs]: [&[[u8; WIDTH]; 3]; 2],
@@ -86,7 +86,7 @@ impl Quantisation {
 
 /// A box by plane numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Planes {
+pub(crate) struct Planes {
     /// Planes at the minimum.
     pub low: [u8; 3],
     /// Planes at the maximum.
@@ -95,7 +95,7 @@ pub struct Planes {
 
 impl Quantisation {
     /// The finest that covers `bounds`.
-    pub fn new(bounds: &Bounds) -> Self {
+    pub(crate) fn new(bounds: &Bounds) -> Self {
         let mut grid = Self {
             low: [0.0; 3],
             exponents: [0; 3],
@@ -119,7 +119,7 @@ impl Quantisation {
     }
 
     /// The smallest box of planes around `bounds`, which must lie between them.
-    pub fn around(&self, bounds: &Bounds) -> Planes {
+    pub(crate) fn around(&self, bounds: &Bounds) -> Planes {
         let mut planes = Planes::default();
         for axis in 0..3 {
             let scale = 2.0_f64.powi(BIAS - i32::from(self.exponents[axis]));
@@ -132,7 +132,7 @@ impl Quantisation {
     }
 
     /// The box between planes, in the arithmetic of kernels.
-    pub fn bounds(&self, planes: &Planes) -> Bounds {
+    pub(crate) fn bounds(&self, planes: &Planes) -> Bounds {
         let at = |axis: usize, number: u8| {
             self.low[axis]
                 + f32::from(number) * f32::from_bits(u32::from(self.exponents[axis]) << 23)
@@ -144,7 +144,7 @@ impl Quantisation {
     }
 
     /// The exponents as kernels read them, a byte each; the highest byte is `top`.
-    pub fn exponent_word(&self, top: u8) -> u32 {
+    pub(crate) fn exponent_word(&self, top: u8) -> u32 {
         let [x, y, z] = self.exponents;
         u32::from_le_bytes([x, y, z, top])
     }
@@ -158,7 +158,7 @@ fn exponent(x: f32) -> i32 {
 /// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box,
 /// `+ far` where it leaves.
 #[derive(Debug, Clone, Copy)]
-pub struct PlaneDistances {
+pub(crate) struct PlaneDistances {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
@@ -167,7 +167,7 @@ pub struct PlaneDistances {
 }
 
 /// The frame of a node with first plane `low` and biased exponents in the bytes of `exponents`.
-pub fn frame(
+pub(crate) fn frame(
     low: [f32; 3],
     exponents: u32,
     origin: [f32; 3],
@@ -212,7 +212,7 @@ fn earlier(a: f32, b: f32) -> f32 {
 }
 
 /// Where the segment enters four boxes, whose near planes on the three axes are these.
-pub fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4] {
+pub(crate) fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
     std::array::from_fn(|i| {
@@ -222,7 +222,7 @@ pub fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4
 }
 
 /// Where it leaves them, padded: a box is entered if it does not leave before it enters.
-pub fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4] {
+pub(crate) fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
     std::array::from_fn(|i| {
@@ -234,10 +234,10 @@ pub fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::Intersection;
-    use crate::accel::bounds::slab;
-    use crate::accel::ray::Ray;
-    use crate::random::Pcg32;
+    use crate::Intersection;
+    use crate::bounds::slab;
+    use crate::ray::Ray;
+    use raystone_core::random::Pcg32;
 
     /// Numbers of all sizes, both signs, zero and neighbours of powers of two among them.
     fn number(random: &mut Pcg32) -> f32 {

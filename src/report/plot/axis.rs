@@ -2,7 +2,7 @@
 
 use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point};
 use super::paint::text_width;
-use crate::report::format;
+use crate::format;
 
 /// A tick: a gridline, with a label unless that is empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +145,7 @@ impl Axis {
     }
 
     /// Draws it from left to right: gridlines from `top` to `bottom`, labels and title below.
-    pub fn draw_across(
+    pub(crate) fn draw_across(
         &self,
         drawing: &mut Drawing,
         (left, right): (f64, f64),
@@ -219,7 +219,7 @@ const LONE: f64 = 2.0;
 
 /// The least and the greatest of some positive values, without lone ones that would flatten all others: at most a tenth
 /// of them at either end, with two decades of nothing beside them. `None` without a positive value.
-pub fn without_lone_points(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(crate) fn without_lone_points(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let positive = values.filter(|v| v.is_finite() && *v > 0.0);
     let mut logs: Vec<f64> = positive.map(f64::log10).collect();
     logs.sort_unstable_by(f64::total_cmp);

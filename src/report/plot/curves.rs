@@ -5,9 +5,9 @@ use super::axis::{Axes, Axis, without_lone_points};
 use super::drawing::{DIM, Drawing, INK, Ink};
 use super::legend;
 use super::marker;
-use crate::measure::record::Interval;
-use crate::report::document::Illustration;
-use crate::report::format;
+use crate::document::Illustration;
+use crate::format;
+use raystone_record::Interval;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! A drawing as a list of shapes.
 //!
-//! Plots are laid out once, in pixels of the size shown; [`super::paint`] paints them.
+//! Plots are laid out once, in pixels of the size shown; `paint` paints them.
 
 use super::raster::Raster;
 
@@ -20,7 +20,7 @@ impl Ink {
     }
 
     /// The same colour with this opacity.
-    pub const fn with_alpha(self, alpha: f64) -> Self {
+    pub(crate) const fn with_alpha(self, alpha: f64) -> Self {
         Self {
             rgb: self.rgb,
             alpha,
@@ -29,15 +29,15 @@ impl Ink {
 }
 
 /// Text and axes.
-pub const INK: Ink = Ink::solid([0x1f, 0x29, 0x33]);
+pub(crate) const INK: Ink = Ink::solid([0x1f, 0x29, 0x33]);
 /// Secondary text.
-pub const DIM: Ink = Ink::solid([0x5b, 0x67, 0x73]);
+pub(crate) const DIM: Ink = Ink::solid([0x5b, 0x67, 0x73]);
 /// Gridlines.
-pub const GRID: Ink = Ink::solid([0xe3, 0xe7, 0xeb]);
+pub(crate) const GRID: Ink = Ink::solid([0xe3, 0xe7, 0xeb]);
 /// What failed.
 pub const FAILED: Ink = Ink::solid([0xb4, 0x23, 0x18]);
 /// Font size of plots, pixels per em.
-pub const FONT_PX: f64 = 14.0;
+pub(crate) const FONT_PX: f64 = 14.0;
 
 /// Point in pixels from the top left.
 pub type Point = (f64, f64);
@@ -138,7 +138,14 @@ impl Drawing {
     }
 
     /// Adds a polyline of dashes; both lengths in pixels.
-    pub fn dashed_line(&mut self, points: &[Point], ink: Ink, width: f64, dash: f64, gap: f64) {
+    pub(crate) fn dashed_line(
+        &mut self,
+        points: &[Point],
+        ink: Ink,
+        width: f64,
+        dash: f64,
+        gap: f64,
+    ) {
         for piece in dashes(points, dash, gap) {
             self.line(piece, ink, width);
         }
@@ -160,7 +167,7 @@ impl Drawing {
     }
 
     /// Adds a line of text that reads upwards.
-    pub fn upward_text(&mut self, at: Point, text: impl Into<String>, ink: Ink) {
+    pub(crate) fn upward_text(&mut self, at: Point, text: impl Into<String>, ink: Ink) {
         self.add_text(at, text.into(), ink, Anchor::Middle, true);
     }
 

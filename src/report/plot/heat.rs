@@ -2,8 +2,8 @@
 
 use super::drawing::{Anchor, DIM, Drawing, FAILED, INK, Ink};
 use super::paint::text_width;
-use crate::image::viridis;
-use crate::report::format;
+use crate::format;
+use raystone_image::viridis;
 
 /// Height of a cell, pixels.
 const HEIGHT: f64 = 28.0;
@@ -82,7 +82,7 @@ impl HeatMap {
 
     /// What is the same of a pair with its ends exchanged, so that half a table says all: `(i, j, value)`
     /// with `i < j`, coloured from the least value to the greatest.
-    pub fn of_pairs(names: &[String], values: &[(usize, usize, f64)]) -> Self {
+    pub(crate) fn of_pairs(names: &[String], values: &[(usize, usize, f64)]) -> Self {
         let size = names.len().saturating_sub(1);
         let all = || values.iter().map(|(.., value)| *value);
         let low = all().fold(f64::INFINITY, f64::min);

@@ -5,7 +5,7 @@ use super::panels::{Area, Content};
 
 /// The p-values of one sampler's bias check.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Histogram {
+pub(crate) struct Histogram {
     /// Counts in equal bins over [0, 1].
     pub counts: Vec<usize>,
     /// Whether the check found a bias.
@@ -17,7 +17,7 @@ const CHANCE: f64 = 21.67;
 
 impl Histogram {
     /// Whether chance explains how far the bars are from equal.
-    pub fn is_flat(&self) -> bool {
+    pub(crate) fn is_flat(&self) -> bool {
         let total: usize = self.counts.iter().sum();
         let mean = total as f64 / self.counts.len().max(1) as f64;
         let square = |&n: &usize| (n as f64 - mean).powi(2) / mean;

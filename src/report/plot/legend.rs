@@ -4,15 +4,15 @@ use super::drawing::{Anchor, Drawing, Ink};
 use super::paint::fit_text;
 
 /// Height of a row, pixels.
-pub const ROW: f64 = 21.0;
+pub(crate) const ROW: f64 = 21.0;
 
 /// Height of so many rows, with white below.
-pub fn height(rows: usize) -> f64 {
+pub(crate) fn height(rows: usize) -> f64 {
     rows as f64 * ROW + 8.0
 }
 
 /// Rows from the top down, in one column of a drawing.
-pub struct Rows {
+pub(crate) struct Rows {
     /// Middle of the next row.
     pub y: f64,
     /// Where samples begin and texts end.
@@ -22,13 +22,13 @@ pub struct Rows {
 
 impl Rows {
     /// Rows from `top` on, between `left` and `right`.
-    pub fn new(top: f64, (left, right): (f64, f64)) -> Self {
+    pub(crate) fn new(top: f64, (left, right): (f64, f64)) -> Self {
         let y = top + ROW / 2.0;
         Self { y, left, right }
     }
 
     /// Adds a row: what `sample` draws at its height, and the text behind it, shortened to its place.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         drawing: &mut Drawing,
         text: &str,
@@ -43,7 +43,7 @@ impl Rows {
     }
 
     /// Adds a row of text alone.
-    pub fn title(&mut self, drawing: &mut Drawing, text: &str, ink: Ink) {
+    pub(crate) fn title(&mut self, drawing: &mut Drawing, text: &str, ink: Ink) {
         drawing.text((self.left, self.y), text, ink, Anchor::Start);
         self.y += ROW;
     }

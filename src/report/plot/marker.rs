@@ -1,14 +1,14 @@
 //! What tells categories apart: colour and marker shape, and dashes for what is exact.
 
 use super::drawing::{Drawing, Ink, Point};
-use crate::image::categorical;
+use raystone_image::categorical;
 use std::f64::consts::PI;
 
 /// Number of different marker shapes.
 const SHAPES: usize = 7;
 
 /// Looks from here on are of structures, those below of samplers and all else: no colour stands for both.
-pub const STRUCTURES: usize = 56;
+pub(crate) const STRUCTURES: usize = 56;
 
 /// Muted colours for structures.
 const MUTED: [[u8; 3]; 8] = [
@@ -23,7 +23,7 @@ const MUTED: [[u8; 3]; 8] = [
 ];
 
 /// Colour of the category.
-pub fn ink(index: usize) -> Ink {
+pub(crate) fn ink(index: usize) -> Ink {
     Ink::solid(match index.checked_sub(STRUCTURES) {
         Some(structure) => MUTED[structure % MUTED.len()],
         None => categorical(index),

@@ -3,7 +3,7 @@
 //! The only font is the embedded one, so that a machine without fonts draws the same picture.
 
 use super::drawing::{Anchor, Drawing, FONT_PX, Ink, Point, Shape, Spot};
-use crate::report::ReportError;
+use crate::ReportError;
 use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use plotters::prelude::*;
@@ -12,7 +12,7 @@ use plotters::style::{FontTransform, register_font};
 use std::sync::Once;
 
 /// Width of a text in pixels with the embedded font at [`FONT_PX`].
-pub fn text_width(text: &str) -> f64 {
+pub(crate) fn text_width(text: &str) -> f64 {
     register_fonts();
     // Measured large, because plotters answers in whole pixels.
     font(8.0)
@@ -21,7 +21,7 @@ pub fn text_width(text: &str) -> f64 {
 }
 
 /// The text, shortened with `…` to fit into `width` pixels.
-pub fn fit_text(text: &str, width: f64) -> String {
+pub(crate) fn fit_text(text: &str, width: f64) -> String {
     if text_width(text) <= width {
         return text.to_owned();
     }
@@ -51,7 +51,7 @@ fn register_fonts() {
 }
 
 /// The drawing as an SVG document of its own size.
-pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
+pub(crate) fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
     // Backends round to whole pixels: laid out eight times as large, shown at its size.
     const SCALE: f64 = 8.0;
     let (width, height) = scaled_size(drawing, SCALE);
@@ -107,7 +107,7 @@ const TALL: f64 = 1000.0;
 
 /// The drawing as a PNG file, smoothed by 2×2 samples per pixel: of twice its size `for_print` (its own above `TALL`),
 /// else of its own.
-pub fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, ReportError> {
+pub(crate) fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, ReportError> {
     let is_fine = for_print && drawing.height <= TALL;
     let scale = if is_fine { 4.0 } else { 2.0 };
     let (width, height) = scaled_size(drawing, scale);

@@ -14,7 +14,7 @@ const MARGIN: f64 = 10.0;
 
 /// The rectangle that a panel is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Area {
+pub(crate) struct Area {
     /// Left edge, pixels.
     pub left: f64,
     /// Upper edge, pixels.
@@ -25,26 +25,26 @@ pub struct Area {
 
 impl Area {
     /// Pixel of a point of the unit square, whose origin is the lower left corner.
-    pub fn at(&self, [x, y]: [f64; 2]) -> Point {
+    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> Point {
         let (width, height) = self.size;
         (self.left + x * width, self.top + (1.0 - y) * height)
     }
 
     /// Draws the edges.
-    pub fn outline(&self, drawing: &mut Drawing) {
+    pub(crate) fn outline(&self, drawing: &mut Drawing) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
         drawing.line(corners.map(|c| self.at(c)).into(), DIM, 1.0);
     }
 }
 
 /// What a panel shows.
-pub trait Content {
+pub(crate) trait Content {
     /// Draws it into the rectangle.
     fn draw(&self, drawing: &mut Drawing, area: Area);
 }
 
 /// One of the small multiples.
-pub struct Panel {
+pub(crate) struct Panel {
     /// Line above.
     pub title: String,
     /// Line below.
@@ -55,7 +55,7 @@ pub struct Panel {
 
 impl Panel {
     /// A panel with a line above and a line below.
-    pub fn new(
+    pub(crate) fn new(
         title: impl Into<String>,
         note: impl Into<String>,
         content: impl Content + 'static,
@@ -69,7 +69,7 @@ impl Panel {
 }
 
 /// Size of square panels of which `columns` fill a drawing of `width` pixels.
-pub fn square(width: f64, columns: usize) -> (f64, f64) {
+pub(crate) fn square(width: f64, columns: usize) -> (f64, f64) {
     let columns = columns.max(1) as f64;
     let side = ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor();
     (side, side)
@@ -77,7 +77,7 @@ pub fn square(width: f64, columns: usize) -> (f64, f64) {
 
 /// The panels row by row, `columns` in a row; without panels an empty drawing of the height of one
 /// margin.
-pub fn draw(panels: &[Panel], columns: usize, (width, height): (f64, f64)) -> Drawing {
+pub(crate) fn draw(panels: &[Panel], columns: usize, (width, height): (f64, f64)) -> Drawing {
     let columns = columns.clamp(1, panels.len().max(1));
     let rows = panels.len().div_ceil(columns) as f64;
     let step = (width + GAP, TITLE + height + NOTE);

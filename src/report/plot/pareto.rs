@@ -4,14 +4,14 @@ use super::axis::{Axes, Axis};
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
 use super::legend;
 use super::marker;
-use crate::measure::comparison::Place;
-use crate::measure::record::Interval;
-use crate::measure::statistics::pareto_front;
-use crate::report::format;
+use crate::format;
+use raystone_record::Interval;
+use raystone_stats::comparison::Place;
+use raystone_stats::statistics::pareto_front;
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CellPoint {
+pub(crate) struct CellPoint {
     /// Index into [`ParetoPlot::structures`]: the colour and the letter.
     pub structure: usize,
     /// Index into [`ParetoPlot::samplers`]: the marker.
@@ -26,7 +26,7 @@ pub struct CellPoint {
 
 /// The plot of one scene and integrator.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ParetoPlot {
+pub(crate) struct ParetoPlot {
     /// Title of the x axis.
     pub x_title: String,
     /// Title of the y axis.
@@ -43,7 +43,7 @@ const WIDTH: f64 = 900.0;
 const PLOT_HEIGHT: f64 = 480.0;
 
 /// Letter of a structure: a, b, …, z, then a number.
-pub fn letter(index: usize) -> String {
+pub(crate) fn letter(index: usize) -> String {
     match u8::try_from(index) {
         Ok(i) if i < 26 => char::from(b'a' + i).to_string(),
         _ => (index + 1).to_string(),
@@ -52,14 +52,14 @@ pub fn letter(index: usize) -> String {
 
 impl ParetoPlot {
     /// Indices of the points of the front as measured, by growing time: each is on it for certain, or that is open.
-    pub fn front(&self) -> Vec<usize> {
+    pub(crate) fn front(&self) -> Vec<usize> {
         let points = self.points.iter();
         let points = points.map(|p| (p.seconds.value, p.error.value));
         pareto_front(&points.collect::<Vec<_>>())
     }
 
     /// Name of a point: structure · sampler.
-    pub fn name(&self, point: &CellPoint) -> String {
+    pub(crate) fn name(&self, point: &CellPoint) -> String {
         format!(
             "{} · {}",
             self.structures[point.structure].0, self.samplers[point.sampler].0
@@ -76,7 +76,7 @@ impl ParetoPlot {
     }
 
     /// The picture; `None` without a point with positive time and error.
-    pub fn draw(&self) -> Option<Drawing> {
+    pub(crate) fn draw(&self) -> Option<Drawing> {
         let ends = |i: Interval| [i.value, i.low, i.high];
         let times = self.points.iter().flat_map(|p| ends(p.seconds));
         let errors = self.points.iter().flat_map(|p| {

@@ -4,7 +4,7 @@ use super::drawing::{DIM, Drawing, GRID, Ink, Point};
 use super::marker;
 use super::panels::{Area, Content};
 use super::raster::Canvas;
-use crate::sampling::hash::pcg_hash;
+use raystone_sampling::hash::pcg_hash;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Points that are drawn at most.
@@ -23,7 +23,7 @@ pub type Pair = [f64; 2];
 
 /// Where the points of the square go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Domain {
+pub(crate) enum Domain {
     /// They stay.
     Square,
     /// `radius = √x`, `angle = 2π y`: what the path tracer maps directions with
@@ -37,7 +37,7 @@ pub enum Domain {
 
 impl Domain {
     /// Place of a point in a square of side 1 that holds the domain.
-    pub fn place(self, [x, y]: Pair) -> Pair {
+    pub(crate) fn place(self, [x, y]: Pair) -> Pair {
         let on_disc = |radius: f64, angle: f64| [radius * angle.cos(), radius * angle.sin()];
         let [a, b] = match self {
             Self::Square => return [x, y],
@@ -122,7 +122,7 @@ pub fn thinned(n: usize, most: usize) -> Vec<usize> {
 }
 
 /// How many of `n` points are drawn, in words.
-pub fn drawn_in_words(n: usize) -> String {
+pub(crate) fn drawn_in_words(n: usize) -> String {
     match n {
         1 => "1 point".into(),
         _ if n <= MOST_DRAWN => format!("{n} points"),
@@ -132,7 +132,7 @@ pub fn drawn_in_words(n: usize) -> String {
 
 /// Counts of the elementary intervals of `2^a × 2^b` cells, row by row from below: points on the upper
 /// border count for the last cell.
-pub fn interval_counts(points: &[Pair], [a, b]: [u32; 2]) -> Vec<u32> {
+pub(crate) fn interval_counts(points: &[Pair], [a, b]: [u32; 2]) -> Vec<u32> {
     let cell = |c: f64, bits: u32| {
         let cells = 1usize << bits;
         ((c * cells as f64) as usize).min(cells - 1)
@@ -146,7 +146,7 @@ pub fn interval_counts(points: &[Pair], [a, b]: [u32; 2]) -> Vec<u32> {
 
 /// Points in a domain.
 #[derive(Debug, Clone)]
-pub struct Cloud {
+pub(crate) struct Cloud {
     /// Where they go.
     pub domain: Domain,
     /// Points of the unit square; drawn [thinned](MOST_DRAWN).
@@ -160,7 +160,7 @@ pub struct Cloud {
 
 impl Cloud {
     /// Points and nothing else.
-    pub fn new(domain: Domain, points: Vec<Pair>) -> Self {
+    pub(crate) fn new(domain: Domain, points: Vec<Pair>) -> Self {
         Self {
             domain,
             points,

@@ -1,7 +1,7 @@
 //! Pixels within a drawing, for what would be too many shapes.
 
 use super::drawing::{Ink, Point};
-use crate::report::ReportError;
+use crate::ReportError;
 use base64::Engine;
 use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -32,7 +32,7 @@ impl Raster {
 
     /// Paints it on an RGB picture of `width` pixels a row that shows the drawing `scale` times as
     /// large; every pixel takes the colour that lies under its middle.
-    pub fn blit(&self, picture: &mut [u8], width: usize, scale: f64) {
+    pub(crate) fn blit(&self, picture: &mut [u8], width: usize, scale: f64) {
         let height = picture.len() / 3 / width.max(1);
         let range = |from: f64, length: f64, end: usize| {
             let first = (from * scale).round().max(0.0) as usize;
@@ -83,7 +83,7 @@ impl Raster {
 }
 
 /// A white square on which dots of one ink are painted.
-pub struct Canvas {
+pub(crate) struct Canvas {
     at: Point,
     side: f64,
     columns: usize,
@@ -94,7 +94,7 @@ pub struct Canvas {
 
 impl Canvas {
     /// A square of `side` pixels with this upper left corner.
-    pub fn new(at: Point, side: f64, ink: Ink) -> Self {
+    pub(crate) fn new(at: Point, side: f64, ink: Ink) -> Self {
         let columns = (side * CANVAS_SCALE).round().max(1.0) as usize;
         Self {
             at,
@@ -107,7 +107,7 @@ impl Canvas {
 
     /// Paints a disc with a smooth edge; place and radius in pixels of the drawing, opacity in [0, 1].
     /// What lies outside the square is cut off.
-    pub fn dot(&mut self, (x, y): Point, radius: f64, alpha: f64) {
+    pub(crate) fn dot(&mut self, (x, y): Point, radius: f64, alpha: f64) {
         let (x, y) = (
             (x - self.at.0) * CANVAS_SCALE,
             (y - self.at.1) * CANVAS_SCALE,
@@ -128,7 +128,7 @@ impl Canvas {
     }
 
     /// What was painted.
-    pub fn into_raster(self) -> Raster {
+    pub(crate) fn into_raster(self) -> Raster {
         let color = |cover: &f32| {
             let share = (cover * SHADES).round() / SHADES;
             self.ink

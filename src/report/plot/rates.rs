@@ -4,12 +4,12 @@ use super::axis::Axis;
 use super::drawing::{Anchor, DIM, Drawing, FAILED, FONT_PX, GRID, INK};
 use super::marker;
 use super::paint::{fit_text, text_width};
-use crate::measure::record::Interval;
-use crate::report::format;
+use crate::format;
+use raystone_record::Interval;
 
 /// One bar, or what stands in its place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bar {
+pub(crate) struct Bar {
     /// Name of the structure.
     pub label: String,
     /// Category: the same structure looks the same in every plot.
@@ -22,7 +22,7 @@ pub struct Bar {
 
 /// Horizontal bars in groups.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RatePlot {
+pub(crate) struct RatePlot {
     /// Which clock the times come from.
     pub clock: &'static str,
     /// `(ray class, one bar per structure)`.
@@ -35,7 +35,7 @@ const HEADER: f64 = 30.0;
 
 impl RatePlot {
     /// The picture; `None` without a bar.
-    pub fn draw(&self) -> Option<Drawing> {
+    pub(crate) fn draw(&self) -> Option<Drawing> {
         let bars = || self.groups.iter().flat_map(|(_, bars)| bars);
         let widest = bars().map(|bar| text_width(&bar.label)).reduce(f64::max)?;
         let rates = bars().filter_map(|bar| bar.rate);

@@ -4,8 +4,8 @@ use super::drawing::{Anchor, DIM, Drawing, GRID, INK};
 use super::marker;
 use super::panels::{Area, Content};
 use super::raster::Raster;
-use crate::discrepancy::Periodogram;
-use crate::image::viridis;
+use raystone_discrepancy::Periodogram;
+use raystone_image::viridis;
 
 /// Ends of the scale of powers, as powers of ten.
 const DECADES: [f64; 2] = [-2.0, 2.0];
@@ -15,7 +15,7 @@ const LABELS: f64 = 42.0;
 
 /// The highest frequency shown for this many points: twice their mean number per unit of length, within
 /// limits.
-pub fn highest_frequency(points: usize) -> usize {
+pub(crate) fn highest_frequency(points: usize) -> usize {
     (2.0 * (points as f64).sqrt()).round().clamp(16.0, 96.0) as usize
 }
 
@@ -29,7 +29,7 @@ fn share(power: f64) -> f64 {
 /// Mean power against the length of the frequency, element 0 for frequency 1; logarithmic from 0.01 to
 /// 100, and what lies outside lies on the edge.
 #[derive(Debug, Clone)]
-pub struct RadialCurve(pub Vec<f64>);
+pub(crate) struct RadialCurve(pub Vec<f64>);
 
 impl Content for RadialCurve {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
@@ -63,7 +63,7 @@ impl Content for RadialCurve {
 
 /// Power at every frequency, frequency 0 in the middle (left white), on a logarithmic scale of colours
 /// from 0.01 to 100.
-pub struct PeriodogramMap(pub Periodogram);
+pub(crate) struct PeriodogramMap(pub Periodogram);
 
 impl Content for PeriodogramMap {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
@@ -85,7 +85,7 @@ impl Content for PeriodogramMap {
 }
 
 /// The scale of colours of [`PeriodogramMap`], upright in the middle of the square.
-pub struct ColorBar;
+pub(crate) struct ColorBar;
 
 impl Content for ColorBar {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
@@ -119,7 +119,7 @@ mod tests {
     use super::super::drawing::Shape;
     use super::super::panels::{self, Panel};
     use super::*;
-    use crate::discrepancy::{Budget, PointSet, periodogram};
+    use raystone_discrepancy::{Budget, PointSet, periodogram};
 
     #[test]
     fn powers_beyond_the_scale_lie_on_its_ends() {

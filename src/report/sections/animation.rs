@@ -1,16 +1,14 @@
 //! Taking structures over from frame to frame of a moving scene, against building them anew.
 
-use crate::config::{Animation, Motion};
-use crate::measure::record::{
-    AnimationRecord, FrameRays, FrameRecord, Interval, Key, RayClass, axis,
-};
-use crate::measure::statistics::median_interval;
-use crate::report::data::{Measured, RunData, SceneGroup};
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::values::{Reading, Value};
+use crate::data::{Measured, RunData, SceneGroup};
+use crate::document::*;
+use crate::format;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::values::{Reading, Value};
+use raystone_config::{Animation, Motion};
+use raystone_record::{AnimationRecord, FrameRays, FrameRecord, Interval, Key, RayClass, axis};
+use raystone_stats::statistics::median_interval;
 
 /// What tells rows apart.
 const ROWS: [&str; 3] = [axis::ACCEL, axis::KERNELS, axis::SUBJECT];
@@ -180,7 +178,7 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
     for cell in &scene.animations {
         for frame in &cell.frames {
             let key = key_of(cell, frame);
-            let ms = |cost: &crate::measure::record::Cost| median_interval(cost.ms(software));
+            let ms = |cost: &raystone_record::Cost| median_interval(cost.ms(software));
             let on_host = frame.refit_on_host.as_ref();
             let costs = [
                 ("frame-refit-ms/v1", ms(&frame.refit)),
@@ -229,7 +227,7 @@ fn rows<'a>(scene: &SceneGroup) -> Rows<'a> {
 }
 
 /// Trees and what they cost.
-pub fn costs_table(scene: &SceneGroup, values: &[Value]) -> Table {
+pub(crate) fn costs_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let of_trees: Vec<Value> = (values.iter().filter(|v| v.key.label(axis::RAYS).is_empty()))
         .cloned()
         .collect();

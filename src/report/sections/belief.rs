@@ -1,11 +1,11 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
-use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{GateVerdict, JudgeCheck, PathsRecord, TimeRecord, Verdict, axis};
-use crate::report::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
-use crate::report::document::*;
-use crate::report::format::{self, count, plural};
-use crate::report::samplers::REFERENCE_SHARE;
+use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
+use crate::document::*;
+use crate::format::{self, count, plural};
+use crate::samplers::REFERENCE_SHARE;
+use raystone_record::{GateVerdict, JudgeCheck, PathsRecord, TimeRecord, Verdict, axis};
+use raystone_stats::bias::BiasVerdict;
 
 /// The section.
 pub fn section(data: &RunData) -> Section {

@@ -1,15 +1,15 @@
 //! Every cell: what it is, what ran, what was found, and how to repeat it.
 
-use crate::config::Axis;
-use crate::measure::record::{Key, Ran, axis};
-use crate::report::data::RunData;
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::values::Value;
+use crate::data::RunData;
+use crate::document::*;
+use crate::format;
+use crate::values::Value;
+use raystone_config::Axis;
+use raystone_record::{Key, Ran, axis};
 use std::collections::{BTreeMap, HashMap};
 
 /// Cells that the page itself holds; more stand in a file of their own.
-pub const MOST_INSIDE: usize = 200;
+pub(crate) const MOST_INSIDE: usize = 200;
 /// That file.
 pub const FILE: &str = "cells.html";
 /// Digits of a hash that tell two kernels apart.

@@ -1,14 +1,14 @@
 //! How alike the rays of neighbouring lanes are, by the model; and what it predicts, against what was measured.
 
-use crate::coherence::Organisation;
-use crate::measure::record::{CoherenceAt, CoherenceRecord, Interval, Key, axis};
-use crate::measure::statistics::kendall_tau;
-use crate::report::data::{Measured, RunData, View};
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::values::{ALL_RAYS, Value};
+use crate::data::{Measured, RunData, View};
+use crate::document::*;
+use crate::format;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::values::{ALL_RAYS, Value};
+use raystone_record::SINGLE_KERNEL;
+use raystone_record::{CoherenceAt, CoherenceRecord, Interval, Key, axis};
+use raystone_stats::statistics::kendall_tau;
 
 /// Figures of all rays together, in the order of the columns.
 const FIGURES: [&str; 9] = [
@@ -112,7 +112,7 @@ fn table(data: &RunData, view: &View, values: &[Value]) -> Table {
 }
 
 fn is_single_kernel(at: &CoherenceAt) -> bool {
-    at.organisation == Organisation::SingleKernel.name()
+    at.organisation == SINGLE_KERNEL
 }
 
 /// SIMT efficiency of each class of rays.
@@ -166,7 +166,7 @@ fn by_bounce(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
                 "primary" => Some(0.0),
                 class => class.strip_prefix("bounce ")?.parse().ok(),
             };
-            let tally: &crate::measure::record::Tally = tally;
+            let tally: &raystone_record::Tally = tally;
             Some([bounce?, tally.efficiency()?])
         };
         classes.filter_map(point).collect()
@@ -214,7 +214,7 @@ fn against_times(data: &RunData, stem: &str, view: &View) -> Option<Illustration
     let mut curves: Vec<Curve> = Vec::new();
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     for cell in &view.coherence {
-        let timed = cell.timed(Organisation::SingleKernel.name());
+        let timed = cell.timed(SINGLE_KERNEL);
         let predicted = timed.and_then(CoherenceAt::cost_of_path);
         let measured = view.ms_per_spp(&cell.structure, &cell.sampler);
         let (Some(predicted), Some(measured)) = (predicted, measured) else {

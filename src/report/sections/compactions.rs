@@ -1,14 +1,14 @@
 //! Compactions of streams: time per element, growth with the number of elements, what parameters do.
 
-use crate::measure::growth::{Growth, growth};
-use crate::measure::record::{CompactionRecord, Interval, Key, Recorded, axis};
-use crate::measure::statistics::median_interval;
-use crate::params::ParamValue;
-use crate::report::data::RunData;
-use crate::report::document::*;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::values::Value;
+use crate::data::RunData;
+use crate::document::*;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::values::Value;
+use raystone_core::params::ParamValue;
+use raystone_record::{CompactionRecord, Interval, Key, Recorded, axis};
+use raystone_stats::growth::{Growth, growth};
+use raystone_stats::statistics::median_interval;
 use std::collections::BTreeSet;
 
 type Measured<'a> = Recorded<'a, CompactionRecord>;
@@ -29,7 +29,7 @@ const JUDGED: &str = "Each method first compacted its stream once and was judged
                       differs has no figure. Times are those of all passes of a method together.";
 
 /// The section; `None` when no compaction was measured.
-pub fn section(data: &RunData) -> Option<Section> {
+pub(crate) fn section(data: &RunData) -> Option<Section> {
     if data.compactions.is_empty() {
         return None;
     }
@@ -170,7 +170,7 @@ fn look(data: &RunData, key: &Key) -> usize {
 }
 
 /// Every figure of compactions.
-pub fn values(data: &RunData) -> Vec<Value<'static>> {
+pub(crate) fn values(data: &RunData) -> Vec<Value<'static>> {
     let sound = data.compactions.iter().filter(|c| c.failure.is_none());
     let mut values: Vec<Value> = sound.flat_map(|cell| of_cell(data, cell)).collect();
     for (key, growth) in growths(data) {
@@ -228,7 +228,7 @@ fn growths(data: &RunData) -> Vec<(Key, Growth)> {
 }
 
 /// Which model of growth fits each method better.
-pub fn growth_table(data: &RunData, values: &[Value]) -> Table {
+pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
     let row = |(key, growth): (Key, Growth)| {
         let better = growth.better.map_or("neither", |model| model.name());
         let cells = vec![key.label(axis::INTEGRATOR).into(), better.into()];
@@ -250,7 +250,7 @@ pub fn growth_table(data: &RunData, values: &[Value]) -> Table {
 }
 
 /// Every cell.
-pub fn table(data: &RunData, values: &[Value]) -> Table {
+pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
     let row = |cell: &Measured| {
         let judged = match &cell.failure {
             None => TableCell::from("passed").toned(Tone::Good),

@@ -1,18 +1,18 @@
 //! Images of a view with their linear radiance, to be compared pixel by pixel.
 
-use crate::image::{FileFormat, Image, automatic_exposure, read_linear};
-use crate::report::data::{RunData, View};
-use crate::report::document::{Block, Comparer, Layer};
-use crate::report::{format, pictures};
+use crate::data::{RunData, View};
+use crate::document::{Block, Comparer, Layer};
+use crate::{format, pictures};
 use base64::Engine;
 use half::f16;
+use raystone_image::{FileFormat, Image, automatic_exposure, read_linear};
 use std::path::Path;
 
 /// Characters of radiance that all comparers of a page may hold together: the page stays below 10 MB.
 const MOST_CHARACTERS: usize = 3_000_000;
 
 /// The reference and the first replicate of each sampler; `None` where there is nothing to compare.
-pub fn block(dir: &Path, data: &RunData, stem: &str, view: &View) -> Option<Block> {
+pub(super) fn block(dir: &Path, data: &RunData, stem: &str, view: &View) -> Option<Block> {
     let pictured = view.samplers.iter().filter_map(|sampler| {
         let first = sampler
             .replicates

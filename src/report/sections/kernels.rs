@@ -1,12 +1,12 @@
 //! What kernels were made of: features compiled in and out, and what leaving them out gained.
 
-use crate::measure::comparison::LogFigure;
-use crate::measure::record::{Interval, Key, Ran, TimeRecord, axis};
-use crate::measure::statistics::LEAST_FOR_MEDIAN;
-use crate::report::data::{SceneGroup, View};
-use crate::report::document::*;
-use crate::report::pivot::Rows;
-use crate::report::values::Value;
+use crate::data::{SceneGroup, View};
+use crate::document::*;
+use crate::pivot::Rows;
+use crate::values::Value;
+use raystone_record::{Interval, Key, Ran, TimeRecord, axis};
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// The parameter that makes a kernel carry what its scene does not need.
 const CARRY: &str = "carry";
@@ -18,7 +18,7 @@ pub fn blocks(scene: &SceneGroup, values: &[Value]) -> Vec<Block> {
 }
 
 /// Features of the kernels that full cells were timed with; cells with the same ones share a row.
-pub fn features_table(scene: &SceneGroup) -> Table {
+pub(crate) fn features_table(scene: &SceneGroup) -> Table {
     let caption = format!(
         "Kernels of full cells on {}: features compiled in, and those that other scenes need and that were compiled out",
         scene.name
@@ -58,7 +58,7 @@ pub fn features_table(scene: &SceneGroup) -> Table {
 }
 
 /// Times of kernels that carry more than their scene needs, over those of the specialised ones.
-pub fn gains_table(scene: &SceneGroup, values: &[Value]) -> Table {
+pub(crate) fn gains_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let caption = format!(
         "What compiling out gains on {}: time of the kernel that carries a group of features all the same, over that of \
          the specialised one [95 % interval]",
@@ -87,7 +87,7 @@ const GAIN: &str = "specialisation/v1";
 
 /// What each full cell of a view that carries more than its scene needs takes, over the cell of the specialised
 /// kernel: both timed in the same rounds, often enough for an interval.
-pub fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+pub(crate) fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let mut gains = Vec::new();
     for time in view.valid_times() {
         let Some(plain) = without_carry(time.key.label(axis::INTEGRATOR)) else {
@@ -105,7 +105,7 @@ pub fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
 }
 
 /// What a full cell takes over another, if both were timed often enough for an interval.
-pub fn time_over(time: &TimeRecord, base: &TimeRecord) -> Option<Interval> {
+pub(crate) fn time_over(time: &TimeRecord, base: &TimeRecord) -> Option<Interval> {
     let [own, base] = [time, base].map(|time| {
         let often = time.ms.len() >= LEAST_FOR_MEDIAN;
         LogFigure::of_times(&time.ms).filter(|_| often)

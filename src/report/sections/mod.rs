@@ -4,32 +4,32 @@ pub mod animation;
 pub mod belief;
 pub mod cells;
 pub mod coherence;
-pub mod compactions;
+pub(crate) mod compactions;
 mod comparer;
 pub mod kernels;
 mod orders;
-pub mod organisations;
+pub(crate) mod organisations;
 pub mod peers;
-pub mod point_sets;
+pub(crate) mod point_sets;
 mod primary;
-pub mod race;
-pub mod rendering;
+pub(crate) mod race;
+pub(crate) mod rendering;
 pub mod run;
-pub mod sampler_plots;
+pub(crate) mod sampler_plots;
 pub mod samplers;
 pub mod spectrum;
-pub mod streams;
+pub(crate) mod streams;
 pub mod structures;
-pub mod trade_off;
+pub(crate) mod trade_off;
 pub mod verdict;
 
 use super::data::{RunData, SceneGroup};
 use super::document::*;
 use super::{format, terms, values};
-use crate::config::expect::Thesis;
-use crate::measure::record::{Interval, KernelFolder, RunRecord};
-use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use cells::Cells;
+use raystone_config::expect::Thesis;
+use raystone_record::{Interval, KernelFolder, RunRecord};
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
@@ -270,7 +270,7 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
 }
 
 /// A name as part of a file name: lower-case letters, digits and single dashes.
-pub fn file_stem(name: &str) -> String {
+pub(crate) fn file_stem(name: &str) -> String {
     let mut stem = String::new();
     for c in name.chars() {
         if c.is_ascii_alphanumeric() {

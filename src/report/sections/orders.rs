@@ -1,11 +1,11 @@
 //! Full cells in orders of passes: how much longer they take, and how soon there is a picture.
 
-use crate::measure::record::axis;
-use crate::report::data::View;
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::values::Value;
+use crate::data::View;
+use crate::document::*;
+use crate::format;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::values::Value;
+use raystone_record::axis;
 
 /// What tells cells of a view and their orders apart.
 const ROWS: [&str; 5] = [
@@ -17,7 +17,7 @@ const ROWS: [&str; 5] = [
 ];
 
 /// A row for each cell and order; no table where none was asked for.
-pub fn table(view: &View, values: &[Value]) -> Table {
+pub(super) fn table(view: &View, values: &[Value]) -> Table {
     let rows = view.valid_times().flat_map(|time| {
         time.orders.iter().map(|at| {
             let key = time.key.clone().with(axis::SUBJECT, &at.order);

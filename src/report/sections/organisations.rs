@@ -2,14 +2,14 @@
 
 use super::file_stem;
 use super::kernels::time_over;
-use crate::integrator::RAY_QUERIES;
-use crate::measure::record::{Interval, TimeRecord, axis};
-use crate::report::data::{Measured, SceneGroup, View};
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::values::Value;
+use crate::data::{Measured, SceneGroup, View};
+use crate::document::*;
+use crate::format;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::values::Value;
+use raystone_core::structure::RAY_QUERIES;
+use raystone_record::{Interval, TimeRecord, axis};
 
 /// What tells the rows apart.
 const ROWS: [&str; 8] = [
@@ -30,7 +30,7 @@ const AGAINST: &str = "against-single-kernel/v1";
 const FIGURES: [&str; 3] = ["ms-per-spp/v1", AGAINST, "ray-query-share/v1"];
 
 /// The share of ray queries in the time of all stages, if stages were timed.
-pub fn query_share(time: &TimeRecord) -> Option<f64> {
+pub(crate) fn query_share(time: &TimeRecord) -> Option<f64> {
     let all: f64 = time.stages.values().sum();
     let queries = RAY_QUERIES
         .iter()
@@ -43,7 +43,7 @@ fn is_single(time: &Measured<TimeRecord>) -> bool {
 }
 
 /// Time of each organisation of a view over that of the single kernel with everything else the same.
-pub fn against_single(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+pub(crate) fn against_single(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let others = view.valid_times().filter(|time| !is_single(time));
     let value = |time: &Measured<TimeRecord>| {
         let wanted = time.key.clone().with(axis::ORGANISATION, SINGLE);
@@ -70,7 +70,7 @@ fn stages(time: &TimeRecord) -> String {
 }
 
 /// Table and plot; nothing where there is one kernel alone.
-pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
+pub(crate) fn blocks(scene: &SceneGroup) -> Vec<Block> {
     let times: Vec<&Measured<TimeRecord>> =
         scene.views.iter().flat_map(View::valid_times).collect();
     if times.iter().all(|time| is_single(time)) {

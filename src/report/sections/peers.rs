@@ -1,14 +1,14 @@
 //! Ray casters of others beside the structures: times of the processors, ratios, and how their answers differ. No verdict is drawn from it.
 
 use super::structures::BY_RAYS;
-use crate::measure::comparison::LogFigure;
-use crate::measure::record::{ClassTiming, Interval, PeerRecord, PeerTiming, Recorded, axis};
-use crate::measure::statistics::median_interval;
-use crate::report::data::SceneGroup;
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::Rows;
-use crate::report::values::Value;
+use crate::data::SceneGroup;
+use crate::document::*;
+use crate::format;
+use crate::pivot::Rows;
+use crate::values::Value;
+use raystone_record::{ClassTiming, Interval, PeerRecord, PeerTiming, Recorded, axis};
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::statistics::median_interval;
 
 const SPEED: &str = "peer-mrays-per-s/v1";
 const COST: &str = "cpu-ns-per-ray/v1";

@@ -1,19 +1,19 @@
 //! Pictures of the points that the kernels of a run drew, from the words in its records.
 
 use super::file_stem;
-use crate::measure::record::{Recorded, RecordedPoints, StreamRecord, axis};
-use crate::report::data::{RunData, without_repeats};
-use crate::report::document::*;
-use crate::report::plot::panels::{self, Panel};
-use crate::report::plot::points::{Cloud, Domain, Pair, interval_counts};
-use crate::report::plot::spectrum::RadialCurve;
+use crate::data::{RunData, without_repeats};
+use crate::document::*;
+use crate::plot::panels::{self, Panel};
+use crate::plot::points::{Cloud, Domain, Pair, interval_counts};
+use crate::plot::spectrum::RadialCurve;
+use raystone_record::{Recorded, RecordedPoints, StreamRecord, axis};
 
 /// Width of a row of pictures, pixels.
 const WIDTH: f64 = 900.0;
 
 /// The section; `None` when no record holds points. Of a sampler without points nothing is drawn: today's
 /// samplers need not be those of the run.
-pub fn section(data: &RunData) -> Option<Section> {
+pub(crate) fn section(data: &RunData) -> Option<Section> {
     let recorded = |name: &String| {
         let of_name = |s: &&Recorded<StreamRecord>| data.names.sampler(s.key) == *name;
         let mut streams = data.streams.iter().filter(of_name);
@@ -112,7 +112,7 @@ mod tests {
         let recorded = RecordedPoints::new([4, 2], 1, &words, vec![1.0; 64]);
         let points = recorded.points().unwrap();
         assert_eq!((points.len(), points[1].len()), (2, 4));
-        let unit = |i: usize| f64::from(crate::sampling::to_unit(words[i]));
+        let unit = |i: usize| f64::from(raystone_sampling::to_unit(words[i]));
         assert_eq!(points[1][3], [unit(14), unit(15)]);
         let panels = panels("known", &recorded).unwrap();
         assert_eq!(panels.len(), 4);

@@ -1,11 +1,11 @@
 //! Paths that begin at rasterised triangles, against rays through the same points.
 
-use crate::measure::record::axis;
-use crate::report::data::View;
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::values::Value;
+use crate::data::View;
+use crate::document::*;
+use crate::format;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::values::Value;
+use raystone_record::axis;
 
 /// What tells cells of a view apart.
 const ROWS: [&str; 5] = [
@@ -17,7 +17,7 @@ const ROWS: [&str; 5] = [
 ];
 
 /// A row for each cell that was compared; no table where none was.
-pub fn table(view: &View, values: &[Value]) -> Table {
+pub(super) fn table(view: &View, values: &[Value]) -> Table {
     let compared = view.valid_times().filter(|time| time.primary.is_some());
     let rows = compared.map(|time| {
         let cells = [&time.structure, &time.sampler];

@@ -1,17 +1,17 @@
 //! Samplers at equal time.
 
 use super::verdict::rank;
-use crate::measure::comparison::LogFigure;
-use crate::measure::record::{Interval, axis};
-use crate::measure::statistics::Spread;
-use crate::report::data::View;
-use crate::report::format;
-use crate::report::ruling::{Contender, Ruling};
-use crate::report::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
-use crate::report::values::{Reading, Value};
+use crate::data::View;
+use crate::format;
+use crate::ruling::{Contender, Ruling};
+use crate::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
+use crate::values::{Reading, Value};
+use raystone_record::axis;
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::statistics::Spread;
 
 /// Samplers at equal time, under the fastest structure.
-pub struct Race<'a> {
+pub(crate) struct Race<'a> {
     /// When the first of them ends: the time at which errors are compared.
     pub seconds: f64,
     /// The structure under which all were timed.
@@ -89,7 +89,7 @@ impl<'a> Runner<'a> {
 
 impl<'a> Race<'a> {
     /// `None` without a sampler that has both errors and a time.
-    pub fn new(view: &'a View<'a>) -> Option<Self> {
+    pub(crate) fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a MeasuredSampler<'a>| {
             let runner = Runner::new(view, &structure, sampler)?;
@@ -132,7 +132,7 @@ impl<'a> Race<'a> {
 
     /// What a second buys: error × time at the common spp, errors when the race ends, samples and seconds to an
     /// error.
-    pub fn values(&self) -> Vec<Value<'static>> {
+    pub(crate) fn values(&self) -> Vec<Value<'static>> {
         let metric = Metric::RelMse.name();
         let (common, target) = (self.view.common_spp(), self.target());
         let mut values = Vec::new();
@@ -172,14 +172,15 @@ impl<'a> Race<'a> {
     }
 
     /// Error of a sampler when the race ends.
-    pub fn error_of(&self, sampler: &str) -> Option<Interval> {
+    #[cfg(test)]
+    pub(crate) fn error_of(&self, sampler: &str) -> Option<raystone_record::Interval> {
         let is_it = |runner: &&Runner| runner.sampler.name == sampler;
         let runner = self.runners.iter().find(is_it)?;
         Some(runner.error_after(self.seconds)?.interval())
     }
 
     /// Who has the least error when the race ends.
-    pub fn ruling(&self) -> Ruling {
+    pub(crate) fn ruling(&self) -> Ruling {
         let contender = |runner: &Runner| {
             let log = runner.error_after(self.seconds)?;
             Some(Contender {

@@ -1,13 +1,13 @@
 //! Which structure renders fastest, by the times of whole cells, and where the speeds of ray classes say otherwise.
 
 use super::verdict::{class_speed, ray_classes};
-use crate::measure::comparison::{LEVEL, LogFigure, Pairs};
-use crate::measure::figure::Better;
-use crate::measure::record::{Key, axis};
-use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
-use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
-use crate::report::ruling::{Contender, Ruling, judge};
-use crate::report::{format, trust};
+use crate::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
+use crate::ruling::{Contender, Ruling, judge};
+use crate::{format, trust};
+use raystone_record::figure::Better;
+use raystone_record::{Key, axis};
+use raystone_stats::comparison::{LEVEL, LogFigure, Pairs};
+use raystone_stats::statistics::{LEAST_FOR_MEDIAN, Spread};
 
 /// What else of a sampler than its kernels, which are those of the structure.
 const POINT_AXES: [&str; 3] = [axis::SEQUENCE, axis::DECORRELATION, axis::OFFSET];
@@ -70,7 +70,7 @@ fn geometric_mean(logs: &[LogFigure]) -> LogFigure {
 }
 
 /// Which structure renders fastest.
-pub fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
+pub(crate) fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
     if let Some(reason) = trust::doubt_of_rendering(scene, view) {
         return Ruling::Withheld(reason);
     }
@@ -85,7 +85,7 @@ pub fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
 
 /// A line for each class of rays of which some structure is faster than the one that renders fastest, though it
 /// renders slower: both by a test of the difference, corrected for all pairs of the comparison.
-pub fn disagreements(scene: &SceneGroup) -> Vec<String> {
+pub(crate) fn disagreements(scene: &SceneGroup) -> Vec<String> {
     scene
         .views
         .iter()

@@ -1,10 +1,10 @@
 //! The run itself: economy of the plan, wall time, what failed, where it ran.
 
-use crate::measure::record::{FinishedRecord, StructureRecord, TimeRecord};
-use crate::report::data::{Measured, RunData, SceneGroup, View};
-use crate::report::document::*;
-use crate::report::format::{self, count, percent};
-use crate::report::samplers::MeasuredSampler;
+use crate::data::{Measured, RunData, SceneGroup, View};
+use crate::document::*;
+use crate::format::{self, count, percent};
+use crate::samplers::MeasuredSampler;
+use raystone_record::{FinishedRecord, StructureRecord, TimeRecord};
 
 /// Largest share of the wall time that the harness may take for itself.
 const OVERHEAD_TARGET: f64 = 0.1;
@@ -38,7 +38,7 @@ fn time(data: &RunData) -> Option<Section> {
 
 /// What the harness takes for itself; `None` if the run did not finish. No check, since no figure depends
 /// on it: a slow disk or a tiny experiment is no fault of the results.
-pub fn overhead(data: &RunData) -> Option<String> {
+pub(crate) fn overhead(data: &RunData) -> Option<String> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
     let share = finished.overhead_s / finished.wall_s;
     let much = match share > OVERHEAD_TARGET {
@@ -77,7 +77,7 @@ const LEFT_OUT: &str = "left out";
 const WARNING: &str = "warning";
 
 /// A cell, its state, and why.
-pub struct Failure {
+pub(crate) struct Failure {
     /// What it is of.
     pub cell: String,
     /// [`FAILED`], left out, or a warning.
@@ -98,7 +98,7 @@ impl Failure {
 }
 
 /// Everything that failed, was left out, or is warned of.
-pub fn failures(data: &RunData) -> Vec<Failure> {
+pub(crate) fn failures(data: &RunData) -> Vec<Failure> {
     let mut all: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
     all.extend(
         data.views()

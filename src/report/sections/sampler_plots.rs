@@ -1,16 +1,16 @@
 //! Plots of samplers under one scene and integrator.
 
-use crate::measure::bias::BiasVerdict;
-use crate::measure::comparison::{Place, places};
-use crate::measure::record::Interval;
-use crate::report::data::{RunData, View};
-use crate::report::document::Illustration;
-use crate::report::format;
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::plot::histogram::Histogram;
-use crate::report::plot::panels::{self, Panel};
-use crate::report::plot::pareto::{CellPoint, ParetoPlot};
-use crate::report::samplers::{MeanError, MeasuredSampler, Metric, UNRESOLVED, log_time};
+use crate::data::{RunData, View};
+use crate::document::Illustration;
+use crate::format;
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::plot::histogram::Histogram;
+use crate::plot::panels::{self, Panel};
+use crate::plot::pareto::{CellPoint, ParetoPlot};
+use crate::samplers::{MeanError, MeasuredSampler, Metric, UNRESOLVED, log_time};
+use raystone_record::Interval;
+use raystone_stats::bias::BiasVerdict;
+use raystone_stats::comparison::{Place, places};
 
 /// What a caption says of points that a logarithmic plot cannot show.
 fn not_drawn(count: usize) -> String {
@@ -21,7 +21,7 @@ fn not_drawn(count: usize) -> String {
 }
 
 /// Error against samples and against seconds.
-pub fn error_figures(
+pub(crate) fn error_figures(
     data: &RunData,
     stem: &str,
     view: &View,
@@ -96,7 +96,7 @@ fn curve(
 }
 
 /// Run time against error at the common spp.
-pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
+pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
     let spp = view.common_spp()?;
     let names = view.timed_structures().into_iter();
     let structures = names.map(|name| (name.clone(), data.structure_look(&name)));
@@ -165,7 +165,7 @@ pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustra
 }
 
 /// The p-values of every sampler that was checked.
-pub fn histograms(stem: &str, view: &View) -> Option<Illustration> {
+pub(crate) fn histograms(stem: &str, view: &View) -> Option<Illustration> {
     let panel = |sampler: &MeasuredSampler| {
         let bias = sampler.bias.as_ref()?;
         let biased = bias.verdict == BiasVerdict::Biased;

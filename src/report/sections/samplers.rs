@@ -8,16 +8,16 @@ use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
 use super::spectrum;
 use super::verdict::Race;
-use crate::image::viridis_css;
-use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{Key, axis};
-use crate::report::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time};
-use crate::report::document::*;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::plot::pareto::letter;
-use crate::report::samplers::{FURTHER_METRICS, HEAVY_TAILED, MeasuredSampler, Metric, UNRESOLVED};
-use crate::report::values::{Value, number, of_view};
-use crate::report::{format, pictures};
+use crate::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time};
+use crate::document::*;
+use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::plot::pareto::letter;
+use crate::samplers::{FURTHER_METRICS, HEAVY_TAILED, MeasuredSampler, Metric, UNRESOLVED};
+use crate::values::{Value, number, of_view};
+use crate::{format, pictures};
+use raystone_image::viridis_css;
+use raystone_record::{Key, axis};
+use raystone_stats::bias::BiasVerdict;
 use std::path::Path;
 
 /// Everything on the samplers of a view; `stem` starts the names of its plots.
@@ -91,7 +91,7 @@ pub fn blocks(
 pub const SAMPLER: [&str; 1] = ["sampler"];
 
 /// A row for each of some samplers, with further cells under further heads.
-pub fn rows<'a>(
+pub(crate) fn rows<'a>(
     samplers: impl IntoIterator<Item = &'a MeasuredSampler<'a>>,
     heads: &'a [&'a str],
     further: impl Fn(&MeasuredSampler) -> Vec<TableCell>,
@@ -211,7 +211,7 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
 }
 
 /// What a second buys: time per sample, error × time, error at equal time.
-pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
+pub(crate) fn efficiency_table(view: &View, values: &[Value]) -> Table {
     let Some(race) = Race::new(view) else {
         return Table::default();
     };

@@ -1,11 +1,11 @@
 //! What the errors of samplers look like: spectra, and what filters leave.
 
 use super::samplers::{SAMPLER, rows};
-use crate::measure::record::{FilteredError, Interval, Key, PowerAt, SpectrumRecord, axis};
-use crate::report::data::{RunData, View};
-use crate::report::document::*;
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::report::values::{Value, unfiltered};
+use crate::data::{RunData, View};
+use crate::document::*;
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::values::{Value, unfiltered};
+use raystone_record::{FilteredError, Interval, Key, PowerAt, SpectrumRecord, axis};
 
 /// Plots and table of a view; nothing without spectra.
 pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<Block> {

@@ -2,13 +2,13 @@
 //! and what drawing costs.
 
 use super::file_stem;
-use crate::measure::figure::figure;
-use crate::measure::record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
-use crate::report::data::{RunData, SAMPLER_ROW};
-use crate::report::document::*;
-use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::report::values::{Value, number, of_cost, of_stream, pair_of_dimensions};
+use crate::data::{RunData, SAMPLER_ROW};
+use crate::document::*;
+use crate::pivot::{FIGURES_ALONE, Part, Rows};
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::values::{Value, number, of_cost, of_stream, pair_of_dimensions};
+use raystone_record::figure::figure;
+use raystone_record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
@@ -22,7 +22,7 @@ const TAPPED: &str = "Tapped are a sampler's 32-bit words for (pixel, sample, di
 const PLOTTED: [&str; 2] = ["exponential", "disk"];
 
 /// The section; `None` when no stream was measured.
-pub fn section(data: &RunData) -> Option<Section> {
+pub(crate) fn section(data: &RunData) -> Option<Section> {
     if data.streams.is_empty() && data.costs.is_empty() {
         return None;
     }

@@ -3,15 +3,15 @@
 use super::file_stem;
 use super::trade_off;
 use super::verdict::ray_classes;
-use crate::accel::{Phase, Space};
-use crate::image::viridis_css;
-use crate::measure::record::{RayClass, StructureRecord, axis};
-use crate::report::data::{Measured, RunData, STRUCTURE_AXES, SceneGroup};
-use crate::report::document::*;
-use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
-use crate::report::plot::rates::{Bar, RatePlot};
-use crate::report::values::{Value, of_structures};
-use crate::report::{format, pictures};
+use crate::data::{Measured, RunData, STRUCTURE_AXES, SceneGroup};
+use crate::document::*;
+use crate::pivot::{FIGURES_ALONE, Part, Rows};
+use crate::plot::rates::{Bar, RatePlot};
+use crate::values::{Value, of_structures};
+use crate::{format, pictures};
+use raystone_core::structure::{Phase, Space};
+use raystone_image::viridis_css;
+use raystone_record::{RayClass, StructureRecord, axis};
 use std::path::Path;
 
 /// Everything on the structures of the scene with this index.
@@ -95,7 +95,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
 }
 
 /// Columns by class of rays.
-pub const BY_RAYS: Part<'static> = &|key| key.label(axis::RAYS).to_owned();
+pub(crate) const BY_RAYS: Part<'static> = &|key| key.label(axis::RAYS).to_owned();
 
 /// A row for each of some structures, with a further cell if there is a second head.
 fn rows<'a>(
@@ -120,7 +120,7 @@ fn built<'a>(scene: &'a SceneGroup) -> Rows<'a> {
 }
 
 /// Mrays/s, one row per structure and one column per ray class.
-pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
+pub(crate) fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let gate = |s: &StructureRecord| {
         let (verdict, tone) = match s.fault() {
             None => ("passed", Tone::Good),
@@ -179,7 +179,7 @@ const SHAPE_FIGURES: [&str; 9] = [
 ];
 
 /// Figures that this program does not measure itself.
-pub fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
+pub(crate) fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let from_outside = data.run.iter().flat_map(|run| &run.figures);
     let ids: Vec<&str> = from_outside.map(|figure| &*figure.id).collect();
     let caption = format!("Further figures on {}", scene.name);

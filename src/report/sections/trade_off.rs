@@ -1,14 +1,14 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
 use super::structures::BY_RAYS;
-use crate::measure::record::*;
-use crate::measure::statistics::LEAST_FOR_MEDIAN;
-use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
-use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::Rows;
-use crate::report::samplers::MeasuredSampler;
-use crate::report::values::{Reading, Value};
+use crate::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
+use crate::document::*;
+use crate::format;
+use crate::pivot::Rows;
+use crate::samplers::MeasuredSampler;
+use crate::values::{Reading, Value};
+use raystone_record::*;
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
 /// Speeds in Mrays/s.
@@ -47,7 +47,7 @@ fn by_build<'a>(
 }
 
 /// Rays after which each structure has caught up with the one that is built fastest, per class.
-pub fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
+pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
     let Some((first, others)) = by_build(scene) else {
         return Vec::new();
     };
@@ -65,7 +65,7 @@ pub fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
 }
 
 /// The table of [`break_even`].
-pub fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
+pub(crate) fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
     let (first, others) = by_build(scene)?;
     let caption = format!(
         "Break-even: thousand rays after which a structure, its build included, overtakes {}, which is built \
@@ -86,7 +86,7 @@ fn most_timed<'a>(view: &'a View) -> Option<&'a MeasuredSampler<'a>> {
 }
 
 /// Build and rendering together with that sampler, for one image of few samples and one of many.
-pub fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let errors = view.samplers.iter().flat_map(|s| &s.replicates);
     let spps = errors.flat_map(|r| &r.errors).map(|e| e.spp);
     let (Some(sampler), Some(most)) = (most_timed(view), spps.max()) else {
@@ -110,7 +110,11 @@ pub fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
 }
 
 /// The table of [`times_to_image`].
-pub fn time_to_image_table(scene: &SceneGroup, view: &View, builds: &[Value]) -> Option<Table> {
+pub(crate) fn time_to_image_table(
+    scene: &SceneGroup,
+    view: &View,
+    builds: &[Value],
+) -> Option<Table> {
     let times = times_to_image(scene, view);
     let sampler = &most_timed(view)?.name;
     let row = |value: &Value| {

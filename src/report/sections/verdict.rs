@@ -1,23 +1,23 @@
 //! What was asked, who wins, what failed, whether to believe it.
 
 use super::{belief, rendering, run};
-use crate::measure::comparison::LogFigure;
-use crate::measure::figure::{Better, figure};
-use crate::measure::hypothesis::student_t_quantile;
-use crate::measure::record::{
+use crate::data::{Measured, RunData, SceneGroup, View, without_repeats};
+use crate::document::*;
+use crate::ruling::{Contender, Ruling, judge};
+use crate::samplers::{MeasuredSampler, Metric};
+use crate::values::pair_of_dimensions;
+use crate::{format, pictures, trust};
+use raystone_record::figure::{Better, figure};
+use raystone_record::{
     ClassTiming, FigureAtCount, Interval, RayClass, Recorded, StreamRecord, StructureRecord,
     Verdict, axis,
 };
-use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
-use crate::report::data::{Measured, RunData, SceneGroup, View, without_repeats};
-use crate::report::document::*;
-use crate::report::ruling::{Contender, Ruling, judge};
-use crate::report::samplers::{MeasuredSampler, Metric};
-use crate::report::values::pair_of_dimensions;
-use crate::report::{format, pictures, trust};
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::hypothesis::student_t_quantile;
+use raystone_stats::statistics::{LEAST_FOR_MEDIAN, Spread};
 use std::path::Path;
 
-pub use super::race::Race;
+pub(crate) use super::race::Race;
 
 /// Scenes whose answers are open at first; those of further ones unfold.
 const OPEN_SCENES: usize = 3;
@@ -298,7 +298,7 @@ fn rule(data: &RunData) -> String {
 }
 
 /// Questions of one scene, each with what is ruled.
-pub fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
+pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     let mut rulings = Vec::new();
     for class in ray_classes(scene) {
         let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
@@ -465,7 +465,7 @@ fn apart(scene: &SceneGroup) -> Vec<Block> {
 }
 
 /// Ray classes that some structure was timed on.
-pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
+pub(crate) fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     let timings = scene.structures.iter().flat_map(|s| &s.timings);
     let mut classes: Vec<RayClass> = timings.map(|timing| timing.class).collect();
     classes.sort_unstable();
@@ -474,7 +474,7 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 }
 
 /// Speed in a class, Mrays/s, of a structure that passed the gate and was timed often enough.
-pub fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
+pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
     let timing = s.timings.iter().find(|timing| timing.class == class)?;
     let often = timing.ms.len() >= LEAST_FOR_MEDIAN && s.fault().is_none();
     let ms = LogFigure::of_times(&timing.ms).filter(|_| often)?;
@@ -482,7 +482,7 @@ pub fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<Log
 }
 
 /// Compares the structures that passed the gate on one ray class.
-pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
+pub(crate) fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
         s.fault().is_none().then_some(Contender {
@@ -501,7 +501,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
 }
 
 /// Compares the samplers that have no fault at one spp.
-pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
+pub(crate) fn best_per_sample(view: &View, spp: u32) -> Ruling {
     let contender = |sampler: &MeasuredSampler| {
         Some(Contender {
             name: sampler.name.clone(),

@@ -1,8 +1,8 @@
 //! Synthetic but realistic records, written as in a file of records.
 
-use crate::gpu::Environment;
-use crate::measure::bias::BiasVerdict;
-use crate::measure::record::*;
+use raystone_record::Environment;
+use raystone_record::*;
+use raystone_stats::bias::BiasVerdict;
 use serde_json::{Value, json};
 
 /// Uniform noise in [-1, 1], the same in every run.

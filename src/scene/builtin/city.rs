@@ -4,9 +4,9 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::Vec3;
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 parameters! {
     /// `city`.
@@ -252,11 +252,11 @@ impl Town {
 mod tests {
     use super::super::tests::load_with;
     use super::*;
-    use crate::geometry::Triangle;
-    use crate::params::ParamValue;
+    use raystone_core::geometry::Triangle;
+    use raystone_core::params::ParamValue;
     use std::collections::HashMap;
 
-    fn city(triangles: i64, seed: i64) -> crate::scene::SceneData {
+    fn city(triangles: i64, seed: i64) -> crate::SceneData {
         let changes = [("triangles", triangles), ("seed", seed)];
         load_with("city", &changes.map(|(k, v)| (k, ParamValue::Integer(v))))
     }

@@ -8,9 +8,9 @@ use super::super::builder::{Look, SceneBuilder};
 use super::super::{DEFAULT_IOR, Material};
 use super::BuiltinScene;
 use super::sphere::SphereGrid;
-use crate::geometry::Camera;
-use crate::parameters;
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::Camera;
+use raystone_core::parameters;
 
 parameters! {
     /// `cornell-box`.
@@ -167,8 +167,8 @@ impl BuiltinScene for CornellBox {
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
-    use crate::params::ParamValue;
-    use crate::scene::DIELECTRIC;
+    use crate::DIELECTRIC;
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn a_ball_of_glass_takes_the_place_of_one_block_and_stands_clear_of_all_else() {

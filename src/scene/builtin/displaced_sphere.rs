@@ -5,8 +5,8 @@ use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::parameters;
 use glam::{DVec3, Vec3};
+use raystone_core::parameters;
 
 parameters! {
     /// `displaced-sphere`.
@@ -45,7 +45,7 @@ fn radius(direction: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{is_closed, load_with};
-    use crate::params::ParamValue;
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn the_surface_is_closed_at_every_size_and_open_without_one_triangle() {

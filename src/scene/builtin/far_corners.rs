@@ -7,10 +7,10 @@ use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::geometry::Triangle;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::Vec3;
+use raystone_core::geometry::Triangle;
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 parameters! {
     /// `far-corners`.
@@ -128,33 +128,4 @@ fn places() -> [Transform; 6] {
         turned(0.05, even(0.25), Vec3::new(0.35, 0.35, -0.5)),
         turned(0.27, even(9.0), Vec3::new(-60.0, 35.0, -80.0)),
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::tests::load_default;
-    use super::*;
-    use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
-
-    #[test]
-    fn trees_over_it_are_deep_and_tables_take_more_than_one_row_of_texels() {
-        let scene = load_default(FarCorners::NAME);
-        assert!(scene.triangles.len() < 12_000);
-        let soup = TriangleSoup::new(&scene);
-        let registry = AccelRegistry::default();
-        let built = |name: &str| {
-            let kind = registry.get(name).expect("a structure");
-            let variants = registry.entries();
-            let entry = variants.iter().find(|e| e.name == name).expect("an entry");
-            let params = entry.default_variant().params;
-            let built = kind.build(&soup, &params, &mut BuildLog::default());
-            built.unwrap_or_else(|e| panic!("{name}: {e}"))
-        };
-        let row = 8192 * 16;
-        for name in ["bvh", "bvh4", "cwbvh"] {
-            assert!(built(name).stats().bytes > row, "{name}");
-        }
-        let depth = built("bvh").stats().depth.expect("a depth");
-        assert!(depth > 24, "{depth}");
-    }
 }

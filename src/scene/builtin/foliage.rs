@@ -4,10 +4,10 @@ use super::super::builder::{Look, SceneBuilder};
 use super::super::{AlphaChannel, AlphaMask, Material, Texture, TextureUse, Transform, Wrap};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
-use crate::geometry::{Camera, Triangle};
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::{Mat2, Vec2, Vec3};
+use raystone_core::geometry::{Camera, Triangle};
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 parameters! {
     /// `foliage`.
@@ -210,30 +210,5 @@ fn mesh_image() -> Texture {
         width: 12,
         height: 9,
         texels: (0..108).map(texel).collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::tests::{load_default, load_with};
-    use crate::accel::TriangleSoup;
-    use crate::params::ParamValue;
-
-    #[test]
-    fn plants_fence_and_lamp_are_cut_out_and_copies_stay_copies() {
-        let scene = load_default("foliage");
-        let masked = scene.materials.iter().filter(|m| m.mask.is_some());
-        assert_eq!(masked.count(), 3);
-        let soup = TriangleSoup::new(&scene);
-        assert!(soup.masks.is_some());
-        let placed = soup.placed.unwrap();
-        assert_eq!(placed.instances.len(), 51);
-        assert!(placed.objects.iter().all(|object| object.masks.is_some()));
-    }
-
-    #[test]
-    fn without_masks_no_kernel_has_any() {
-        let scene = load_with("foliage", &[("masked", ParamValue::Flag(false))]);
-        assert!(TriangleSoup::new(&scene).masks.is_none());
     }
 }

@@ -4,9 +4,9 @@ use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::sphere::SphereGrid;
-use crate::geometry::Camera;
-use crate::parameters;
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::Camera;
+use raystone_core::parameters;
 
 parameters! {
     /// `furnace-box`.
@@ -81,7 +81,7 @@ impl BuiltinScene for WhiteFurnace {
 mod tests {
     use super::super::tests::{is_closed, load_default, load_with};
     use super::*;
-    use crate::params::ParamValue;
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn both_furnaces_are_closed() {

@@ -5,9 +5,9 @@ use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 parameters! {
     /// `hairball`.
@@ -111,9 +111,9 @@ impl Strand {
 #[cfg(test)]
 mod tests {
     use super::super::tests::load_with;
-    use crate::params::ParamValue;
+    use raystone_core::params::ParamValue;
 
-    fn hairball(triangles: i64, seed: i64) -> crate::scene::SceneData {
+    fn hairball(triangles: i64, seed: i64) -> crate::SceneData {
         let changes = [("triangles", triangles), ("seed", seed)];
         load_with(
             "hairball",
@@ -128,7 +128,8 @@ mod tests {
         let bounds = scene.bounds();
         assert!(bounds.max.max_element() < 1.25 && bounds.min.min_element() > -1.25);
         assert!(bounds.max.min_element() > 0.9 && bounds.min.max_element() < -0.9);
-        let long = |t: &crate::geometry::Triangle| t.vertices[0].distance(t.vertices[1]) > 0.2;
+        let long =
+            |t: &raystone_core::geometry::Triangle| t.vertices[0].distance(t.vertices[1]) > 0.2;
         assert!(!scene.triangles.iter().any(long));
     }
 

@@ -6,10 +6,10 @@ use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::geometry::Triangle;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::{DMat3, DVec3, Mat3, Vec3};
+use raystone_core::geometry::Triangle;
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 /// Different objects.
 const OBJECTS: u32 = 4;
@@ -129,8 +129,8 @@ fn rotation([a, b, c]: [f64; 3]) -> DMat3 {
 mod tests {
     use super::super::tests::load_with;
     use super::*;
-    use crate::params::ParamValue;
-    use crate::scene::{Bounds, SceneData};
+    use crate::{Bounds, SceneData};
+    use raystone_core::params::ParamValue;
 
     fn scene(count: i64, overlap: f64) -> SceneData {
         let count = ("count", ParamValue::Integer(count));

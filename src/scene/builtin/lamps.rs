@@ -3,10 +3,10 @@
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{IesProfile, Light, Material};
 use super::BuiltinScene;
-use crate::geometry::Camera;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::{Mat3, Quat, Vec3};
+use raystone_core::geometry::Camera;
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -258,8 +258,8 @@ fn push_block(builder: &mut SceneBuilder, corner: Vec3, size: Vec3) {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{load_default, load_with, try_load_with};
-    use crate::params::ParamValue;
-    use crate::scene::LightList;
+    use crate::LightList;
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn every_lamp_is_a_light_of_its_kind_that_shines_down() {

@@ -20,7 +20,7 @@ mod triangle_soup;
 
 use super::builder::{Look, SceneBuilder};
 use super::{SceneData, SceneError, common_parameters};
-use crate::params::{Entry, ParamError, ParameterSchema, Parameters, Params, Variant};
+use raystone_core::params::{Entry, ParamError, ParameterSchema, Parameters, Params, Variant};
 
 /// A built-in scene: the struct of its parameters.
 trait BuiltinScene: Parameters {
@@ -113,19 +113,19 @@ pub(super) fn hint(name: &str) -> String {
 }
 
 #[cfg(test)]
-pub(in crate::scene) mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::params::{ParamRange, ParamValue};
-    use crate::scene::{LoadOptions, SceneError, load};
+    use crate::{LoadOptions, SceneError, load};
+    use raystone_core::params::{ParamRange, ParamValue};
     use std::collections::{BTreeMap, HashMap};
 
     /// A built-in scene with some parameters changed from their defaults.
-    pub fn load_with(name: &str, changes: &[(&str, ParamValue)]) -> SceneData {
+    pub(crate) fn load_with(name: &str, changes: &[(&str, ParamValue)]) -> SceneData {
         try_load_with(name, changes).unwrap()
     }
 
     /// A model of one triangle, without any light, with these common parameters.
-    pub fn load_unlit(changes: &[(&str, ParamValue)]) -> SceneData {
+    pub(crate) fn load_unlit(changes: &[(&str, ParamValue)]) -> SceneData {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("unlit.obj");
         std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
@@ -142,7 +142,7 @@ pub(in crate::scene) mod tests {
     }
 
     /// The same as [`load_with`] for a scene that may not be there.
-    pub fn try_load_with(
+    pub(crate) fn try_load_with(
         name: &str,
         changes: &[(&str, ParamValue)],
     ) -> Result<SceneData, SceneError> {
@@ -164,12 +164,12 @@ pub(in crate::scene) mod tests {
     }
 
     /// A built-in scene with its default parameters.
-    pub fn load_default(name: &str) -> SceneData {
+    pub(crate) fn load_default(name: &str) -> SceneData {
         load_with(name, &[])
     }
 
     /// Whether every edge is used once in each direction: closed and consistently oriented.
-    pub fn is_closed(scene: &SceneData) -> bool {
+    pub(crate) fn is_closed(scene: &SceneData) -> bool {
         let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
         let key = |v: glam::Vec3| v.to_array().map(f32::to_bits);
         for triangle in &scene.triangles {

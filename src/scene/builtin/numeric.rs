@@ -18,7 +18,7 @@ const SERIES: [[f64; 2]; 10] = {
 
 /// Sine and cosine of `turns` full turns, error below 1e-15. Only IEEE additions and
 /// multiplications in a fixed order.
-pub(in crate::scene) fn sin_cos_turns(turns: f64) -> (f64, f64) {
+pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let turns = turns - turns.floor();
     // Within an eighth of a turn of a quarter point, where the series converges fast.
     let quarter = (4.0 * turns).round();

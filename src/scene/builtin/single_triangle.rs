@@ -3,8 +3,8 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use crate::parameters;
 use glam::Vec3;
+use raystone_core::parameters;
 
 parameters! {
     /// `single-triangle`.

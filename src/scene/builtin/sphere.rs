@@ -14,7 +14,7 @@ pub(super) struct SphereGrid {
 impl SphereGrid {
     /// The grid nearest to `triangles` and not above, with cells about as wide as they are high.
     /// `triangles` is at least 8 (the octahedron).
-    pub fn with_at_most(triangles: usize) -> Self {
+    pub(super) fn with_at_most(triangles: usize) -> Self {
         let half = triangles.max(8) / 2;
         // Twice as many sectors as bands make square cells: half = sectors * (bands - 1).
         let square = ((half as f64 / 2.0).sqrt() as usize).max(1);
@@ -30,12 +30,17 @@ impl SphereGrid {
     }
 
     /// Number of triangles.
-    pub fn triangles(&self) -> usize {
+    pub(super) fn triangles(&self) -> usize {
         2 * self.sectors * (self.bands - 1)
     }
 
     /// Adds the sphere with each unit vector moved by `place`, counter-clockwise from outside.
-    pub fn push(&self, builder: &mut SceneBuilder, material: u32, place: impl Fn(DVec3) -> Vec3) {
+    pub(super) fn push(
+        &self,
+        builder: &mut SceneBuilder,
+        material: u32,
+        place: impl Fn(DVec3) -> Vec3,
+    ) {
         let turns = |k: usize, n: usize| sin_cos_turns(k as f64 / n as f64);
         let around: Vec<_> = (0..self.sectors).map(|k| turns(k, self.sectors)).collect();
         let ring = |band: usize| -> Vec<Vec3> {

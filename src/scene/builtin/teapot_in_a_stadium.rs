@@ -6,8 +6,8 @@ use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::teapot_patches::tessellate;
-use crate::parameters;
 use glam::Vec3;
+use raystone_core::parameters;
 
 parameters! {
     /// `teapot-in-a-stadium`.
@@ -87,9 +87,9 @@ fn push_rows(builder: &mut SceneBuilder) {
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
-    use crate::geometry::Triangle;
-    use crate::params::ParamValue;
-    use crate::scene::Bounds;
+    use crate::Bounds;
+    use raystone_core::geometry::Triangle;
+    use raystone_core::params::ParamValue;
 
     fn teapot(subdivision: usize) -> Vec<Triangle> {
         let triangles = tessellate(subdivision).into_iter();
@@ -126,7 +126,10 @@ mod tests {
 
     #[test]
     fn the_teapot_matches_a_public_tessellation_of_it() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/scenes/utah-teapot");
+        let folder = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../../shared/scenes/utah-teapot"
+        );
         let Ok(text) = std::fs::read_to_string(format!("{folder}/teapot.obj")) else {
             println!("skipped: {folder} is absent");
             return;

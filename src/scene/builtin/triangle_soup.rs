@@ -3,9 +3,9 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use crate::parameters;
-use crate::random::Pcg32;
 use glam::Vec3;
+use raystone_core::parameters;
+use raystone_core::random::Pcg32;
 
 parameters! {
     /// `triangle-soup`.
@@ -46,7 +46,7 @@ impl BuiltinScene for TriangleSoup {
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
-    use crate::params::ParamValue;
+    use raystone_core::params::ParamValue;
 
     #[test]
     fn triangles_fill_the_unit_cube_and_stay_within_their_size() {

@@ -1,8 +1,8 @@
 //! Where scenes are looked at from.
 
 use super::*;
-use crate::scene::Material;
-use crate::scene::builder::{Look as SceneLook, SceneBuilder};
+use crate::Material;
+use crate::builder::{Look as SceneLook, SceneBuilder};
 
 /// Corner `i` of the box from −`half` to `half`.
 fn corner(half: Vec3, i: usize) -> Vec3 {
@@ -69,7 +69,7 @@ fn an_object_fills_images_of_any_aspect_at_any_scale() {
         let scene = walls(half, &[], false);
         for aspect in [0.3, 1.0, 16.0 / 9.0, 4.0] {
             let camera = scene.view(aspect);
-            camera.validate().unwrap();
+            crate::check_camera(&camera).unwrap();
             let extent = extent(&scene, &camera, aspect);
             assert!((extent - FILL).abs() < 0.01, "{half}, {aspect}: {extent}");
         }
@@ -149,15 +149,13 @@ fn points_lines_and_planes_still_give_a_camera() {
             let corners = [0, 1, 2, 3].map(|i| center + corner(size, [0, 1, 7, 6][i]));
             builder.push_quad(corners, 0);
             let camera = finish(builder).view(1.5);
-            camera
-                .validate()
-                .unwrap_or_else(|e| panic!("{size}, {center}: {e}"));
+            crate::check_camera(&camera).unwrap_or_else(|e| panic!("{size}, {center}: {e}"));
         }
     }
 }
 
 #[test]
 fn a_scene_with_a_light_gets_no_sky() {
-    let lit = crate::scene::builtin::tests::load_default("cornell-box");
+    let lit = crate::builtin::tests::load_default("cornell-box");
     assert_eq!((lit.daylight, lit.framing), (None, None));
 }

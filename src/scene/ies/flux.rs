@@ -110,7 +110,7 @@ fn integral(degrees: &[f32], values: &[f64], [first, second]: Primitive) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Pcg32;
+    use raystone_core::random::Pcg32;
     use std::f64::consts::PI;
 
     fn even(photometry: Photometry, vertical: &[f32], horizontal: &[f32]) -> IesProfile {

@@ -2,9 +2,9 @@
 //! first triangle, then the other lights by kind.
 
 use super::{Light, LightKind, kind, luminance};
-use crate::geometry::Triangle;
-use crate::scene::{Material, SceneData};
+use crate::{Material, SceneData};
 use glam::{DVec3, Vec3};
+use raystone_core::geometry::Triangle;
 use std::f64::consts::PI;
 
 /// Two triangles of one material that are one light.
@@ -196,7 +196,7 @@ fn area(triangle: &Triangle) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::builtin::tests::load_default;
+    use crate::builtin::tests::load_default;
 
     #[test]
     fn two_triangles_with_a_common_diagonal_are_one_parallelogram_whatever_corner_comes_first() {

@@ -3,9 +3,9 @@
 use super::super::case::{Maker, Meshes, Truth, towards};
 use super::super::placement::Placement;
 use super::super::shapes::{RADIUS, on_edge, vertex};
-use crate::accel::Ray;
-use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
+use raystone_accel::Ray;
+use raystone_core::random::Pcg32;
 
 /// 528 and 300 triangles.
 const MESHES: Meshes = Meshes {
@@ -18,7 +18,7 @@ const BOUNCES: usize = 100;
 const INSIDE: f64 = 0.98;
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
-pub fn truth(place: &Placement) -> Truth {
+pub(super) fn truth(place: &Placement) -> Truth {
     match place.keeps_shape() {
         true => Truth::Closed,
         false => Truth::Exact,
@@ -26,7 +26,7 @@ pub fn truth(place: &Placement) -> Truth {
 }
 
 /// A point well inside the sphere and the box.
-pub fn inside(random: &mut Pcg32, place: &Placement) -> Vec3 {
+pub(super) fn inside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(0.45 * RADIUS * random.in_cube())
 }
 
@@ -35,13 +35,13 @@ fn outside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(3.0 * RADIUS * random.direction())
 }
 
-pub fn watertight(maker: &mut Maker) {
+pub(super) fn watertight(maker: &mut Maker) {
     maker.add_on_every_rung(MESHES, "", truth, |place, _, random| {
         Ray::new(inside(random, place), random.direction().as_vec3())
     });
 }
 
-pub fn vertices(maker: &mut Maker) {
+pub(super) fn vertices(maker: &mut Maker) {
     let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
@@ -55,7 +55,7 @@ pub fn vertices(maker: &mut Maker) {
     });
 }
 
-pub fn edges(maker: &mut Maker) {
+pub(super) fn edges(maker: &mut Maker) {
     let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
@@ -101,7 +101,7 @@ fn bounce_in_sphere(p: DVec3, d: DVec3) -> (DVec3, DVec3) {
     )
 }
 
-pub fn mirror_chains(maker: &mut Maker) {
+pub(super) fn mirror_chains(maker: &mut Maker) {
     let bounces: [Bounce; 2] = [bounce_in_sphere, bounce_in_box];
     for place in maker.places() {
         for ((name, mesh), bounce) in MESHES.at(&place).into_iter().zip(bounces) {

@@ -4,12 +4,12 @@ use super::super::case::{Maker, Truth, towards};
 use super::super::placement::Placement;
 use super::super::shapes::{Mesh, RADIUS, cube, on, on_edge, on_mesh, plane, sphere, vertex};
 use super::closed::inside;
-use crate::accel::Ray;
-use crate::geometry::Triangle;
-use crate::params::{ParamValue, Params, Variant};
-use crate::random::Pcg32;
-use crate::scene::{LoadOptions, load};
 use glam::{DVec3, Vec3};
+use raystone_accel::Ray;
+use raystone_core::geometry::Triangle;
+use raystone_core::params::{ParamValue, Params, Variant};
+use raystone_core::random::Pcg32;
+use raystone_scene::{LoadOptions, load};
 
 /// Rays at insides, edges and vertices of random triangles, from about the mesh.
 fn shots(place: Placement) -> impl Fn(&[Triangle], &mut Pcg32) -> Ray {
@@ -36,7 +36,7 @@ fn needle(random: &mut Pcg32, digits: f64) -> [DVec3; 3] {
     ]
 }
 
-pub fn needles(maker: &mut Maker) {
+pub(super) fn needles(maker: &mut Maker) {
     for place in maker.places() {
         let mesh = |random: &mut Pcg32| -> Mesh {
             let one = |i: usize| needle(random, i as f64 * 6.0 / 255.0);
@@ -65,7 +65,7 @@ pub fn needles(maker: &mut Maker) {
     }
 }
 
-pub fn slivers(maker: &mut Maker) {
+pub(super) fn slivers(maker: &mut Maker) {
     for place in maker.places() {
         let mesh = |random: &mut Pcg32| {
             let mut mesh = sphere(8, &place);
@@ -90,7 +90,7 @@ pub fn slivers(maker: &mut Maker) {
     }
 }
 
-pub fn coincident(maker: &mut Maker) {
+pub(super) fn coincident(maker: &mut Maker) {
     for place in maker.places() {
         let mesh = |random: &mut Pcg32| {
             let layer = plane(5, 2.0 * RADIUS, &place);
@@ -113,7 +113,7 @@ pub fn coincident(maker: &mut Maker) {
     }
 }
 
-pub fn huge_and_tiny(maker: &mut Maker) {
+pub(super) fn huge_and_tiny(maker: &mut Maker) {
     for place in maker.places() {
         let mesh = |_: &mut Pcg32| {
             let far = 1e6 * RADIUS;
@@ -169,7 +169,7 @@ fn stadium(scale: f32) -> Option<Mesh> {
     Some(scaled.collect())
 }
 
-pub fn deep_trees(maker: &mut Maker) {
+pub(super) fn deep_trees(maker: &mut Maker) {
     let steps = 96;
     for (name, axes) in [("one axis", 1), ("three axes", 3)] {
         let mesh = move |_: &mut Pcg32| -> Mesh {

@@ -4,12 +4,12 @@ use super::super::case::{Maker, Meshes, Truth, towards};
 use super::super::placement::Placement;
 use super::super::shapes::{RADIUS, on, on_edge, on_mesh, sphere, vertex};
 use super::closed::{inside, truth};
-use crate::accel::Ray;
-use crate::geometry::Triangle;
-use crate::oracle::ExactCrossing;
-use crate::random::Pcg32;
-use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
+use raystone_accel::Ray;
+use raystone_accel::oracle::ExactCrossing;
+use raystone_core::geometry::Triangle;
+use raystone_core::random::Pcg32;
+use raystone_scene::Bounds;
 
 /// A coarse sphere and a coarse box.
 const MESHES: Meshes = Meshes { bands: 8, cells: 4 };
@@ -19,7 +19,7 @@ fn on_every_rung(maker: &mut Maker, one: fn(&Placement, &[Triangle], &mut Pcg32)
     maker.add_on_every_rung(MESHES, "", |_| Truth::Exact, one);
 }
 
-pub fn axis_parallel(maker: &mut Maker) {
+pub(super) fn axis_parallel(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let target = match random.below(3) {
@@ -39,7 +39,7 @@ pub fn axis_parallel(maker: &mut Maker) {
     });
 }
 
-pub fn in_plane(maker: &mut Maker) {
+pub(super) fn in_plane(maker: &mut Maker) {
     on_every_rung(maker, |_, mesh, random| {
         let triangle = random.one_of(mesh);
         let [a, b, _] = triangle.vertices;
@@ -70,7 +70,7 @@ fn on_cell_border(bounds: &Bounds, random: &mut Pcg32) -> Vec3 {
     p.as_vec3()
 }
 
-pub fn origins(maker: &mut Maker) {
+pub(super) fn origins(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let bounds = Bounds::of(mesh);
@@ -88,7 +88,7 @@ pub fn origins(maker: &mut Maker) {
     });
 }
 
-pub fn interval_ends(maker: &mut Maker) {
+pub(super) fn interval_ends(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let whole = towards(inside(random, place), on(&triangle, random));
@@ -139,11 +139,11 @@ fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
 }
 
 /// A ray of any length from around the middle of a mesh.
-pub fn from_the_middle(place: &Placement, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
+pub(super) fn from_the_middle(place: &Placement, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
 }
 
-pub fn lengths(maker: &mut Maker) {
+pub(super) fn lengths(maker: &mut Maker) {
     let meshes = Meshes {
         bands: 12,
         ..MESHES
@@ -151,7 +151,7 @@ pub fn lengths(maker: &mut Maker) {
     maker.add_on_every_rung(meshes, "", truth, from_the_middle);
 }
 
-pub fn seams(maker: &mut Maker) {
+pub(super) fn seams(maker: &mut Maker) {
     let place = Placement::ORDINARY;
     for seam in [
         8.742_278e-8,

@@ -4,13 +4,13 @@ use super::super::case::{Maker, Truth, towards};
 use super::super::placement::Placement;
 use super::super::shapes::{Mesh, RADIUS, cube, on_mesh, sphere};
 use super::closed::inside;
-use crate::accel::Ray;
-use crate::accel::ray::SMALLEST_DIRECTION;
-use crate::random::Pcg32;
-use crate::scene::MAX_COORDINATE;
 use glam::Vec3;
+use raystone_accel::Ray;
+use raystone_accel::ray::SMALLEST_DIRECTION;
+use raystone_core::random::Pcg32;
+use raystone_scene::MAX_COORDINATE;
 
-pub fn denormal(maker: &mut Maker) {
+pub(super) fn denormal(maker: &mut Maker) {
     for scale in [1e-37, 1e-39, 1e-42] {
         let place = Placement { scale, shift: 0.0 };
         maker.add(
@@ -64,7 +64,7 @@ const STRANGE: [(&str, [f32; 3]); 2] = [
     ),
 ];
 
-pub fn non_finite(maker: &mut Maker) {
+pub(super) fn non_finite(maker: &mut Maker) {
     let place = Placement::ORDINARY;
     let mut add = |label: &str, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Pcg32)| {
         let sphere = |_: &mut Pcg32| sphere(12, &place);
@@ -113,7 +113,7 @@ fn shapeless(corner: impl Fn(&mut Pcg32) -> Vec3) -> impl Fn(&mut Pcg32) -> Mesh
     }
 }
 
-pub fn random_bits(maker: &mut Maker) {
+pub(super) fn random_bits(maker: &mut Maker) {
     for (name, limit) in [
         ("up to 1e9", 1e9),
         ("up to the limit of coordinates", MAX_COORDINATE),

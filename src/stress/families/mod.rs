@@ -11,7 +11,7 @@ mod placed;
 use super::case::{Case, Maker};
 
 /// A kind of trouble.
-pub struct Family {
+pub(crate) struct Family {
     /// Name as a user types it.
     pub name: &'static str,
     /// One line: what is hard.
@@ -23,7 +23,7 @@ pub struct Family {
 macro_rules! families {
     ($(#[doc = $what:literal] $name:literal => $make:path,)*) => {
         /// Every family.
-        pub const FAMILIES: &[Family] = &[$(Family {
+        pub(crate) const FAMILIES: &[Family] = &[$(Family {
             name: $name,
             description: $what.trim_ascii(),
             make: $make,
@@ -74,12 +74,12 @@ families! {
 
 impl Family {
     /// The family of this name.
-    pub fn named(name: &str) -> Option<&'static Self> {
+    pub(crate) fn named(name: &str) -> Option<&'static Self> {
         FAMILIES.iter().find(|family| family.name == name)
     }
 
     /// Its cases with about `rays` rays each.
-    pub fn cases(&self, seed: u64, quick: bool, rays: usize) -> Vec<Case> {
+    pub(crate) fn cases(&self, seed: u64, quick: bool, rays: usize) -> Vec<Case> {
         let mut maker = Maker::new(self.name, seed, quick, rays);
         (self.make)(&mut maker);
         maker.cases
@@ -105,8 +105,9 @@ mod tests {
                     .iter()
                     .all(|ray| ray.t_min >= 0.0 || ray.t_min.is_nan());
                 assert!(starts, "{} {}", family.name, case.label);
-                let finite =
-                    |t: &crate::geometry::Triangle| t.vertices.iter().all(|v| v.is_finite());
+                let finite = |t: &raystone_core::geometry::Triangle| {
+                    t.vertices.iter().all(|v| v.is_finite())
+                };
                 assert!(
                     case.scene.triangles.iter().all(finite),
                     "{} {}",
@@ -114,7 +115,7 @@ mod tests {
                     case.label
                 );
                 // A target at the origin leaves no direction, which hits nothing by any definition.
-                let none = |ray: &&crate::accel::Ray| !ray.is_ray() && ray.direction != [0.0; 3];
+                let none = |ray: &&raystone_accel::Ray| !ray.is_ray() && ray.direction != [0.0; 3];
                 let none = case.rays.iter().find(none);
                 let strange = family.name == "non-finite";
                 assert!(strange || none.is_none(), "{}: {none:?}", family.name);

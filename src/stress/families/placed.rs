@@ -4,10 +4,10 @@ use super::super::case::Maker;
 use super::super::placement::Placement;
 use super::super::shapes::{RADIUS, sphere};
 use super::directions::from_the_middle;
-use crate::accel::Ray;
-use crate::random::Pcg32;
-use crate::scene::{Assembly, Transform};
 use glam::{DMat3, DQuat, DVec3, Vec3};
+use raystone_accel::Ray;
+use raystone_core::random::Pcg32;
+use raystone_scene::{Assembly, Transform};
 
 /// Instances in a scene.
 const COPIES: usize = 12;
@@ -56,7 +56,7 @@ fn scaled(maker: &mut Maker) {
     }
 }
 
-pub fn instances(maker: &mut Maker) {
+pub(super) fn instances(maker: &mut Maker) {
     scaled(maker);
     let thicknesses: &[f64] = match maker.quick {
         true => &[1.0, 1e-5],

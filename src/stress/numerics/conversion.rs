@@ -2,8 +2,8 @@
 //! `kernels/stress/conversion.wesl`.
 
 use super::{Gauge, NumericsError, U, rig};
-use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
-use crate::integrator::with_sampler;
+use raystone_gpu::{Composition, Gpu, UniformValues, groups_for};
+use raystone_render::with_sampler;
 
 /// Words of one dispatch.
 const PART: u32 = 1 << 22;
@@ -12,7 +12,7 @@ const TOP: u32 = 512;
 
 /// Whether every draw keeps its upper 24 bits and none is 1, over all values of these bits, or over
 /// every 16th of them where it has to be quick.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let stride: u32 = if quick { 1 << 12 } else { 1 << 8 };
     let words = u32::MAX / stride + 1;
     let (mut wrong, mut largest) = (0_u64, 0.0_f64);

@@ -2,11 +2,11 @@
 
 use super::rig::{self, Rig};
 use super::{Gauge, NumericsError};
-use crate::gpu::Gpu;
-use crate::image::Image;
-use crate::run::dump_stream;
-use crate::sampling::{Coordinate, dimensions};
-use crate::scene;
+use raystone_bench::run::dump_stream;
+use raystone_gpu::Gpu;
+use raystone_image::Image;
+use raystone_sampling::{Coordinate, dimensions};
+use raystone_scene as scene;
 
 const SIZE: u32 = 48;
 const SPP: u32 = 8;
@@ -15,7 +15,7 @@ const SEED: u32 = 5;
 const POINTS: u32 = 1 << 16;
 
 /// Renders and draws everything twice.
-pub fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let mut figures = image(gpu)?;
     figures.push(stream(gpu)?);
     Ok(figures)

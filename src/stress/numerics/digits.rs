@@ -1,15 +1,15 @@
 //! Radical inverses at large indices against exact rationals.
 
 use super::{Gauge, NumericsError, rig};
-use crate::gpu::Gpu;
-use crate::run::dump_stream;
-use crate::sampling::Coordinate;
+use raystone_bench::run::dump_stream;
+use raystone_gpu::Gpu;
+use raystone_sampling::Coordinate;
 
 /// Dimensions of `halton`.
 const DIMENSIONS: u32 = 256;
 
 /// How far the adapter's words of `halton` lie from the exact points, for indices up to 2³² − 1.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let sampler = rig::sampler("halton", DIMENSIONS)?;
     let step = if quick { 16 } else { 1 };
     let coordinates: Vec<Coordinate> = (0..DIMENSIONS)

@@ -2,14 +2,14 @@
 
 use super::rig::{self, Rig};
 use super::{Gauge, NumericsError};
-use crate::gpu::Gpu;
-use crate::image::Image;
-use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
-use crate::measure::statistics::{mean, variance};
-use crate::params::{Params, Variant};
-use crate::sampling::dimensions;
-use crate::scene::{self, DEFAULT_IOR, Material, SceneData};
 use glam::Vec3;
+use raystone_core::params::{Params, Variant};
+use raystone_gpu::Gpu;
+use raystone_image::Image;
+use raystone_render::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
+use raystone_sampling::dimensions;
+use raystone_scene::{self as scene, DEFAULT_IOR, Material, SceneData};
+use raystone_stats::statistics::{mean, variance};
 
 /// Bounces of the longest walk.
 const DEPTH: u32 = 64;
@@ -63,7 +63,7 @@ fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
 }
 
 /// Energy left by walks of up to 64 bounces, and by the path tracer with light and roulette.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let spp = SPP[usize::from(quick)];
     let mut figures = walk(gpu, spp)?;
     let rig = Rig::new(gpu, white_box(1.0)?)?;

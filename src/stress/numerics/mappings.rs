@@ -2,8 +2,8 @@
 //! `kernels/shading/hemisphere.wesl` through `kernels/stress/mappings.wesl`.
 
 use super::{Gauge, NumericsError, U};
-use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use glam::DVec3;
+use raystone_gpu::{Composition, Gpu, UniformValues, groups_for};
 
 /// Points and normals drawn at random besides the ends.
 const RANDOM: [usize; 2] = [1 << 20, 1 << 16];
@@ -12,7 +12,7 @@ const WGSL_SIN: f64 = 1.0 / 2048.0;
 const TWO_PI: f32 = 6.283_185_5;
 
 /// Lengths, sides and errors of what the kernel makes of each point.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let (points, normals) = inputs(RANDOM[usize::from(quick)]);
     let (directions, functions) = map(gpu, &points, &normals)?;
     let mut worst = Worst::default();
@@ -121,7 +121,7 @@ fn inputs(random: usize) -> (Vectors, Vectors) {
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        crate::sampling::to_unit((state >> 32) as u32)
+        raystone_sampling::to_unit((state >> 32) as u32)
     };
     for _ in 0..random {
         points.push([next(), next(), 0.0, 0.0]);

@@ -11,10 +11,10 @@ mod mappings;
 mod rig;
 mod sums;
 
-use crate::gpu::{Gpu, GpuError};
-use crate::integrator::{IntegratorError, StageError};
-use crate::sampling::SamplerError;
-use crate::scene::SceneError;
+use raystone_gpu::{Gpu, GpuError};
+use raystone_render::{IntegratorError, StageError};
+use raystone_sampling::SamplerError;
+use raystone_scene::SceneError;
 use serde::{Deserialize, Serialize};
 
 /// One thing measured on an adapter, with the level from which it is an alarm.

@@ -1,14 +1,14 @@
 //! Scenes and samplers for the figures.
 
 use super::NumericsError;
-use crate::accel::{AccelRegistry, Intersection, Traced};
-use crate::gpu::Gpu;
-use crate::integrator::{
+use raystone_accel::{AccelRegistry, Intersection, Traced};
+use raystone_core::params::{ParamValue, Params, Variant};
+use raystone_gpu::Gpu;
+use raystone_render::{
     ConfiguredIntegrator, IntegratorRegistry, RayOffset, RenderJob, Renderer, Stage,
 };
-use crate::params::{ParamValue, Params, Variant};
-use crate::sampling::{Demand, Sampler, SamplerRegistry};
-use crate::scene::SceneData;
+use raystone_sampling::{Demand, Sampler, SamplerRegistry};
+use raystone_scene::SceneData;
 
 /// What is called `name`, with these parameters set.
 fn variant(name: &str, set: &[(&str, ParamValue)]) -> Variant {
@@ -23,7 +23,7 @@ fn variant(name: &str, set: &[(&str, ParamValue)]) -> Variant {
 }
 
 /// A sequence without decorrelation, for so many dimensions.
-pub fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, NumericsError> {
+pub(super) fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, NumericsError> {
     let digits = [("digits", ParamValue::Name("plain".to_owned()))];
     let set: &[_] = if sequence == "halton" { &digits } else { &[] };
     let demand = Demand {
@@ -36,27 +36,27 @@ pub fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, NumericsError
 }
 
 /// The path tracer with `depth` bounces at most.
-pub fn path(depth: Option<i64>) -> Result<ConfiguredIntegrator, NumericsError> {
+pub(super) fn path(depth: Option<i64>) -> Result<ConfiguredIntegrator, NumericsError> {
     let depth = depth.map(|depth| ("max_depth", ParamValue::Integer(depth)));
     let path = variant("path", depth.as_slice());
     Ok(IntegratorRegistry::default().configured(&path)?)
 }
 
 /// A scene on the device, traced through the plain BVH.
-pub struct Rig {
+pub(super) struct Rig {
     stage: Stage,
     traced: Traced,
 }
 
 impl Rig {
-    pub fn new(gpu: &Gpu, scene: SceneData) -> Result<Self, NumericsError> {
+    pub(super) fn new(gpu: &Gpu, scene: SceneData) -> Result<Self, NumericsError> {
         let stage = Stage::new(gpu, scene, Intersection::default())?;
         let traced = stage.structure(&AccelRegistry::default(), "bvh")?;
         Ok(Self { stage, traced })
     }
 
     /// A compiled image of `size` × `size` pixels.
-    pub fn renderer<'a>(
+    pub(super) fn renderer<'a>(
         &'a self,
         integrator: &ConfiguredIntegrator,
         sampler: &Sampler,

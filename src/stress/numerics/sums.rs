@@ -1,9 +1,9 @@
 //! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
 
 use super::{Gauge, NumericsError, U, rig};
-use crate::gpu::{Composition, Gpu, UniformValues};
-use crate::integrator::{BLOCK_SAMPLES, with_sampler};
-use crate::sampling::{Coordinate, Sampler};
+use raystone_gpu::{Composition, Gpu, UniformValues};
+use raystone_render::{BLOCK_SAMPLES, with_sampler};
+use raystone_sampling::{Coordinate, Sampler};
 
 /// Terms of a long sum: a million samples per pixel.
 const TERMS: u32 = 1 << 20;
@@ -43,7 +43,7 @@ const WAYS: [Way; 5] = [
 ];
 
 /// The largest relative error of each way, over a constant and over noise.
-pub fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
+pub(super) fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let sampler = rig::sampler("pixel-hash", 1)?;
     let terms = longest(gpu.loop_limit);
     let long = errors(gpu, &sampler, terms)?;

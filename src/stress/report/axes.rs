@@ -1,12 +1,12 @@
 //! Shots, box tests, offsets, costs, accumulation and sampling.
 
 use super::values::of_line;
-use crate::measure::record::axis;
-use crate::report::document::Table;
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
-use crate::report::values::Value;
-use crate::stress::record::{Line, Record};
+use crate::record::{Line, Record};
+use raystone_record::axis;
+use raystone_report::document::Table;
+use raystone_report::format;
+use raystone_report::pivot::{FIGURES_ALONE, Part, Rows};
+use raystone_report::values::Value;
 
 /// A table of the records of one kind.
 struct Kind {

@@ -2,15 +2,15 @@
 
 use super::values::of_line;
 use super::{cell, structures, triangles};
-use crate::measure::record::{Recorded, axis};
-use crate::report::document::{Table, TableCell, Tone};
-use crate::report::format;
-use crate::report::pivot::{FIGURES_ALONE, Rows};
-use crate::report::values::Value;
-use crate::stress::families::FAMILIES;
-use crate::stress::record::{Findings, Line, Quantiles};
-use crate::stress::suite::BRUTE_FORCE;
-use crate::stress::targets::cells;
+use crate::families::FAMILIES;
+use crate::record::{Findings, Line, Quantiles};
+use crate::suite::BRUTE_FORCE;
+use crate::targets::cells;
+use raystone_record::{Recorded, axis};
+use raystone_report::document::{Table, TableCell, Tone};
+use raystone_report::format;
+use raystone_report::pivot::{FIGURES_ALONE, Rows};
+use raystone_report::values::Value;
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
 fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, Findings>>)> {

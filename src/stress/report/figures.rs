@@ -1,14 +1,14 @@
 //! Maps of lost hits, and errors over the rungs.
 
 use super::{cell, structures, triangles};
-use crate::measure::record::Interval;
-use crate::report::document::Illustration;
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::plot::heat::HeatMap;
-use crate::stress::families::FAMILIES;
-use crate::stress::placement::Placement;
-use crate::stress::record::Line;
-use crate::stress::suite::BRUTE_FORCE;
+use crate::families::FAMILIES;
+use crate::placement::Placement;
+use crate::record::Line;
+use crate::suite::BRUTE_FORCE;
+use raystone_record::Interval;
+use raystone_report::document::Illustration;
+use raystone_report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use raystone_report::plot::heat::HeatMap;
 
 /// Families whose errors are drawn over the rungs.
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];

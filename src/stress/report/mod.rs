@@ -5,17 +5,17 @@ mod families;
 mod figures;
 mod values;
 
-use crate::measure::record::{Recorded, SkippedRecord, Verdict, axis};
-use crate::report::data::without_repeats;
-use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
-use crate::report::terminal::Screen;
-use crate::report::values::csv;
-use crate::report::{ReportError, format, terms, write_file, write_page};
-use crate::stress::families::FAMILIES;
-use crate::stress::record::{Findings, Line, Record, TargetRecord};
-use crate::stress::targets::{cells, shots, suite};
+use crate::families::FAMILIES;
+use crate::record::{Findings, Line, Record, TargetRecord};
+use crate::targets::{cells, shots, suite};
 use families::{count_table, error_table, matrix_table, worst_table};
 use figures::{curves, heat_map};
+use raystone_record::{Recorded, SkippedRecord, Verdict, axis};
+use raystone_report::data::without_repeats;
+use raystone_report::document::{Banner, Block, Check, Document, Section, Table, Tone};
+use raystone_report::terminal::Screen;
+use raystone_report::values::csv;
+use raystone_report::{ReportError, format, terms, write_file, write_page};
 use std::path::{Path, PathBuf};
 
 /// Writes `index.html`, `figures.csv` and the plots beside the `stress.jsonl` in `dir`.

@@ -1,12 +1,12 @@
 //! What the suite's records say, figure by figure.
 
-use crate::measure::figure::FIGURES;
-use crate::measure::record::axis;
-use crate::report::values::Value;
-use crate::stress::record::{Line, Record};
+use crate::record::{Line, Record};
+use raystone_record::axis;
+use raystone_record::figure::FIGURES;
+use raystone_report::values::Value;
 
 /// Everything that the suite found.
-pub fn values(lines: &[Line]) -> Vec<Value<'static>> {
+pub(super) fn values(lines: &[Line]) -> Vec<Value<'static>> {
     lines.iter().flat_map(of_line).collect()
 }
 

@@ -230,14 +230,15 @@ fn every_structure_equals_brute_force_with_every_test() {
         for kind in in_turn("structures with every triangle test", kinds.iter()) {
             let what = format!("{} with {}", kind.name(), triangle.name());
             let built = build(kind, &soup, &default_params(&kind.parameters()));
-            if let Some(twin) = built.cpu_twin(&soup) {
-                let mut counters = Counters::default();
-                let found: Vec<Hit> = rays
-                    .iter()
-                    .map(|ray| twin.closest_hit(ray, &mut counters))
-                    .collect();
-                assert_same_hits(&format!("twin of {what}"), &rays, &expected, &found);
-            }
+            let twin = built
+                .cpu_twin(&soup)
+                .expect("a structure of the program has a twin");
+            let mut counters = Counters::default();
+            let found: Vec<Hit> = rays
+                .iter()
+                .map(|ray| twin.closest_hit(ray, &mut counters))
+                .collect();
+            assert_same_hits(&format!("twin of {what}"), &rays, &expected, &found);
             if exact {
                 let found = support::trace(gpu, &*built, &soup, &rays, &[]).hits;
                 assert_same_hits(&what, &rays, &expected, &found);
@@ -268,9 +269,9 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
                 continue;
             }
             let built = build(kind, &soup, &default_params(&kind.parameters()));
-            let Some(twin) = built.cpu_twin(&soup) else {
-                continue;
-            };
+            let twin = built
+                .cpu_twin(&soup)
+                .expect("a structure of the program has a twin");
             let mut counters = Counters::default();
             let closest = |ray| twin.closest_hit(ray, &mut counters);
             let expected: Vec<Hit> = rays.iter().map(closest).collect();

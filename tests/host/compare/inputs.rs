@@ -153,7 +153,7 @@ fn times_of_another_machine_are_refused_and_all_else_is_compared() {
     let base = Made::default();
     let mut other = base.side();
     if let Body::Run(record) = &mut other.lines[0].body {
-        record.environment = raystone::gpu::Environment {
+        record.environment = raystone::measure::record::Environment {
             driver: "another".into(),
             ..environment()
         };
@@ -409,5 +409,10 @@ fn a_run_of_other_kernels_alone_is_compared_cell_by_cell() {
     let named = |line: &Line| !line.key.label("kernels").is_empty();
     assert!(!idea.lines.iter().any(named) && !idea.in_rounds);
     let found = compared(&base.side().alone(), &idea);
+    assert!(
+        found.findings.len() > 20,
+        "{} findings",
+        found.findings.len()
+    );
     assert_eq!(found.findings.len(), found.count(Verdict::Same));
 }

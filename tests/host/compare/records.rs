@@ -1,7 +1,7 @@
 //! Made-up runs with noise as it is on a shared machine.
 
 use raystone::compare::side::Side;
-use raystone::gpu::Environment;
+use raystone::measure::record::Environment;
 use raystone::measure::record::*;
 use raystone::random::Pcg32;
 use serde_json::{Value, json};

@@ -63,7 +63,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
                 scenes: PathBuf::from("nowhere"),
                 ..Settings::default()
             };
-            let prepared = prepare(source, &settings, &registries);
+            let prepared = prepare(source, &settings, &registries.catalogue());
             let prepared = prepared.unwrap_or_else(|e| panic!("{}: {e}", source.name));
             assert_eq!(prepared.experiment.name, source.name);
             // A figure that there is only with so many rounds.
@@ -125,7 +125,7 @@ fn a_whole_run_is_smaller_on_a_software_adapter_where_its_file_says_so_and_a_sho
             scenes: PathBuf::from("nowhere"),
             ..Settings::default()
         };
-        let prepared = prepare(&source, &settings, &registries).expect("a sound file");
+        let prepared = prepare(&source, &settings, &registries.catalogue()).expect("a sound file");
         let first = prepared.changes.first().cloned();
         (prepared.experiment.resolution, first)
     };
@@ -154,7 +154,7 @@ fn a_variant_of_a_built_in_scene_stands_for_a_scene() {
             scenes: PathBuf::from("nowhere"),
             ..Settings::default()
         };
-        let prepared = prepare(&source, &settings, &registries).expect("a sound file");
+        let prepared = prepare(&source, &settings, &registries.catalogue()).expect("a sound file");
         let axis = &prepared.experiment.axes[Axis::Scene];
         assert!(axis.iter().all(|scene| scene.name == "instances"));
         for (substitute, ours) in &prepared.scenes {

@@ -139,7 +139,7 @@ fn line(key: Key, body: Value) -> Line {
 }
 
 fn run(text: &str, software: bool) -> Line {
-    let environment = raystone::gpu::Environment {
+    let environment = raystone::measure::record::Environment {
         adapter: "a device".into(),
         software,
         ..Default::default()
@@ -184,7 +184,7 @@ fn finished() -> Line {
 
 /// What a run with these settings would record.
 fn lines(settings: &Settings, software: bool) -> Vec<Line> {
-    let prepared = prepare(&source(), settings, &Registries::default()).expect("sound");
+    let prepared = prepare(&source(), settings, &Registries::default().catalogue()).expect("sound");
     let at = |scene| Sitting { scene, ..HERE };
     let [box_at, ball] = ["cornell-box", "displaced-sphere"].map(at);
     let mut lines = vec![
@@ -209,7 +209,7 @@ fn judged(settings: &Settings, lines: &[Line]) -> Option<Reproduced> {
     std::fs::create_dir_all(&folder).expect("a folder");
     let text = text_of(lines).expect("lines");
     std::fs::write(folder.join("records.jsonl"), text).expect("a file");
-    recorded(&source(), settings, &Registries::default()).expect("readable")
+    recorded(&source(), settings, &Registries::default().catalogue()).expect("readable")
 }
 
 fn verdicts(table: &Reproduced) -> Vec<Verdict> {
@@ -263,7 +263,8 @@ fn records_of_another_experiment_of_a_killed_run_or_of_other_sizes_are_not_judge
     assert!(judged(&whole, &own).is_some());
     assert!(judged(&whole, &own[..own.len() - 1]).is_none());
     let text = |replaced: [&str; 2]| {
-        let prepared = prepare(&source(), &whole, &Registries::default()).expect("sound");
+        let prepared =
+            prepare(&source(), &whole, &Registries::default().catalogue()).expect("sound");
         let text = prepared.experiment.text.replace(replaced[0], replaced[1]);
         let mut lines = own.clone();
         lines[0] = run(&text, false);
@@ -453,7 +454,12 @@ fn a_report_of_a_plain_run_says_what_runs_on_the_scenes_that_stand_for_the_these
         "{plain}"
     );
     let out = tempfile::tempdir().expect("a folder");
-    let prepared = prepare(&source(), &settings(&out), &Registries::default()).expect("sound");
+    let prepared = prepare(
+        &source(),
+        &settings(&out),
+        &Registries::default().catalogue(),
+    )
+    .expect("sound");
     assert!(!banners(&prepared.experiment.text).contains("raystone repro"));
     let (head, _) = TEXT.split_once("[thesis]").expect("a head");
     assert!(!banners(head).contains("raystone repro"));

@@ -3,9 +3,9 @@
 
 use crate::support::builtin;
 use glam::Vec3;
+use raystone::measure::mitsuba::{MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 use raystone::scene::{
-    DIELECTRIC, EnvironmentMap, Light, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture,
-    encode_normal, export_mitsuba,
+    DIELECTRIC, EnvironmentMap, Light, Material, SceneData, Texture, encode_normal,
 };
 use std::fs;
 use std::process::Command;

@@ -5,11 +5,9 @@ use crate::support::*;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use raystone::geometry::Camera;
 use raystone::gpu::Gpu;
+use raystone::measure::mitsuba::{MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 use raystone::params::{ParamValue, Variant};
-use raystone::scene::{
-    Light, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture, TextureUse, Transform,
-    export_mitsuba,
-};
+use raystone::scene::{Light, Material, SceneData, Texture, TextureUse, Transform};
 use std::path::Path;
 
 const SIZE: [u32; 2] = [8, 8];

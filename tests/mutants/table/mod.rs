@@ -53,6 +53,7 @@ const fn row(
         subject,
         expected,
         equivalent: None,
+        hangs: false,
     }
 }
 

@@ -75,8 +75,8 @@ pub const MUTANTS: &[Mutant] = &[
     path(
         "last-bounce-without-emission",
         "emission that the last ray meets is left out",
-        "result += limited(throughput * emission * weight, depth);",
-        "if (depth < MAX_DEPTH) { result += limited(throughput * emission * weight, depth); }",
+        "*result += limited(throughput * emission * weight, depth);",
+        "if (depth < MAX_DEPTH) { *result += limited(throughput * emission * weight, depth); }",
     ),
     path(
         "emission-after-mirrors-weighted",
@@ -105,8 +105,8 @@ pub const MUTANTS: &[Mutant] = &[
     path(
         "deep-sky-lost",
         "rays that leave after five bounces bring nothing",
-        "result += limited(throughput * escaped_radiance(ray.direction) * weight, depth);",
-        "if (depth < 5u) { result += limited(throughput * escaped_radiance(ray.direction) * weight, depth); }",
+        "*result += limited(throughput * escaped_radiance(ray.direction) * weight, depth);",
+        "if (depth < 5u) { *result += limited(throughput * escaped_radiance(ray.direction) * weight, depth); }",
     ),
     path(
         "grazing-rays-end",

@@ -1,13 +1,14 @@
 //! The folder of a run through the program: reruns, kills, signals, two runs at once, odd names.
 
-use raystone::measure::record::{Body, Line};
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+#[cfg(unix)]
+#[path = "held.rs"]
+mod held;
 
-/// Longer than any step of the tiny experiment takes, on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(300);
+#[cfg(unix)]
+use held::{Held, Place};
+use raystone::measure::record::{Body, Line};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
 fn program(out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_raystone"));
@@ -34,25 +35,6 @@ fn whole_run(out: &Path, more: &[&str]) {
 
 fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Waits until `is_so`; panics if it never is.
-fn wait_until(what: &str, is_so: impl Fn() -> bool) {
-    let start = Instant::now();
-    while !is_so() {
-        assert!(start.elapsed() < PATIENCE, "waited too long: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
-/// Starts a run and waits until it has written some records into `partial/`.
-fn started(out: &Path, more: &[&str]) -> Child {
-    let child = program(out, more).spawn().expect("the program starts");
-    let partial = out.join("partial/records.jsonl");
-    wait_until("records", || {
-        std::fs::read_to_string(&partial).is_ok_and(|text| text.lines().count() >= 2)
-    });
-    child
 }
 
 /// Every record of a folder, each line whole.
@@ -100,18 +82,6 @@ fn results_of_another_run_are_kept_unless_force_replaces_them() {
         "{words}"
     );
 
-    // Killed at the worst moments: everything of the earlier run is as it was.
-    for _ in 0..2 {
-        let mut child = started(&out, &["--force"]);
-        child.kill().expect("a kill");
-        child.wait().expect("an end");
-        let kept = std::fs::read(out.join("records.jsonl")).expect("records");
-        assert!(kept == before, "the records changed");
-        assert!(pictures(&out).iter().all(|picture| picture.is_file()));
-        assert!(!records(&out.join("partial")).is_empty());
-    }
-    assert!(report(&out.join("partial")).contains("did not finish"));
-
     whole_run(&out, &["--number"]);
     assert_eq!(pictures(&folder.path().join("run-2")).len(), number);
     whole_run(&out, &["--force"]);
@@ -122,30 +92,64 @@ fn results_of_another_run_are_kept_unless_force_replaces_them() {
     assert!(!report(&out).contains("is missing"));
 }
 
+#[cfg(unix)]
+#[test]
+fn a_killed_rerun_leaves_the_earlier_results() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path();
+    whole_run(out, &[]);
+    let before = std::fs::read(out.join("records.jsonl")).expect("records");
+    // Before anything is measured, while records are written, and behind the structures.
+    for (place, at, least) in [
+        (Place::Judge, None, 1),
+        (Place::Reference, Some(2), 2),
+        (Place::Reference, None, 4),
+    ] {
+        let mut held = Held::start(out, &["--force"], place);
+        match at {
+            Some(number) => held.wait_for_records(out, number),
+            None => held.wait(),
+        }
+        held.kill();
+        let kept = std::fs::read(out.join("records.jsonl")).expect("records");
+        assert!(kept == before, "the records changed");
+        assert!(pictures(out).iter().all(|picture| picture.is_file()));
+        let written = records(&out.join("partial")).len();
+        assert!(written >= least, "{written} records");
+    }
+    assert!(report(&out.join("partial")).contains("did not finish"));
+    whole_run(out, &["--force"]);
+    assert!(!out.join("partial").exists());
+}
+
+#[cfg(unix)]
 #[test]
 fn what_a_killed_run_measured_can_be_read_and_is_not_thrown_away() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut child = started(folder.path(), &[]);
-    child.kill().expect("a kill");
-    child.wait().expect("an end");
+    let mut held = Held::start(folder.path(), &[], Place::Reference);
+    held.wait();
+    held.kill();
     assert!(report(folder.path()).contains("did not finish"));
     let refused = run(folder.path(), &[]);
     assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
     assert!(stderr(&refused).contains("partial"), "{}", stderr(&refused));
 }
 
+#[cfg(unix)]
 #[test]
 fn of_two_runs_into_one_folder_the_second_ends_at_once() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let first = started(folder.path(), &[]);
+    let mut first = Held::start(folder.path(), &[], Place::Reference);
+    first.wait();
     for more in [&[][..], &["--force"]] {
         let second = run(folder.path(), more);
         assert_eq!(second.status.code(), Some(2));
         let words = stderr(&second);
         assert!(words.contains("another run is writing"), "{words}");
     }
-    let first = first.wait_with_output().expect("an end");
-    assert_eq!(first.status.code(), Some(0), "{}", stderr(&first));
+    first.let_go();
+    let (code, words) = first.end();
+    assert_eq!(code, Some(0), "{words}");
     let lines = records(folder.path());
     let ends = lines.iter().filter(|r| matches!(r, Body::Finished(_)));
     assert_eq!(ends.count(), 1);
@@ -157,11 +161,17 @@ fn of_two_runs_into_one_folder_the_second_ends_at_once() {
 fn signals_end_a_run_with_its_records_and_a_report() {
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let child = started(folder.path(), &[]);
-        send(signal, &child);
-        let ended = child.wait_with_output().expect("an end");
-        let words = stderr(&ended);
-        assert_eq!(ended.status.code(), Some(code), "{words}");
+        let mut held = Held::start(folder.path(), &[], Place::Reference);
+        held.wait();
+        held.send(signal);
+        if signal == "INT" {
+            // It ends behind the cell that is being measured, and no sooner.
+            held.hear("SIGINT: the run ends behind the cell");
+            assert!(!folder.path().join("records.jsonl").exists());
+            held.let_go();
+        }
+        let (ended, words) = held.end();
+        assert_eq!(ended, Some(code), "{words}");
         assert!(words.contains("report so far"), "{words}");
         match records(folder.path()).last() {
             Some(Body::Interrupted(end)) => assert_eq!(end.reason, format!("SIG{signal}")),
@@ -179,22 +189,17 @@ fn an_interrupted_rerun_leaves_the_earlier_results() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     whole_run(folder.path(), &["--set", "axes.accel=bvh"]);
     let before = std::fs::read(folder.path().join("records.jsonl")).expect("records");
-    let child = started(folder.path(), &["--force"]);
-    send("INT", &child);
-    send("INT", &child);
-    let ended = child.wait_with_output().expect("an end");
-    assert_eq!(ended.status.code(), Some(130), "{}", stderr(&ended));
+    let mut held = Held::start(folder.path(), &["--force"], Place::Reference);
+    held.wait();
+    held.send("INT");
+    // Two signals that come at once count as one.
+    held.hear("SIGINT: the run ends behind the cell");
+    held.send("INT");
+    let (code, words) = held.end();
+    assert_eq!(code, Some(130), "{words}");
     let after = std::fs::read(folder.path().join("records.jsonl")).expect("records");
     assert!(before == after);
     assert!(!records(&folder.path().join("partial")).is_empty());
-}
-
-#[cfg(unix)]
-fn send(signal: &str, child: &Child) {
-    let sent = Command::new("kill")
-        .args([format!("-{signal}"), child.id().to_string()])
-        .status();
-    assert!(sent.is_ok_and(|status| status.success()), "no signal sent");
 }
 
 /// A model below folders with long names, as `tests/data/tiny.toml` takes it.
@@ -225,19 +230,18 @@ fn long_labels_and_names_that_differ_in_case_have_pictures_of_their_own() {
     assert!(names.iter().all(|picture| picture.is_file()));
 }
 
+#[cfg(unix)]
 #[test]
 fn a_picture_that_cannot_be_written_is_a_warning() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut child = program(folder.path(), &[]).spawn().expect("a start");
+    let mut held = Held::start(folder.path(), &[], Place::Judge);
+    held.wait();
     let images = folder.path().join("partial/images");
-    wait_until("images", || images.is_dir());
     std::fs::remove_dir(&images).expect("an empty folder");
     std::fs::write(&images, "in the way").expect("a file");
-    let status = child.wait().expect("an end");
-    let mut words = String::new();
-    let mut stderr = child.stderr.take().expect("a pipe");
-    stderr.read_to_string(&mut words).expect("text");
-    assert_eq!(status.code(), Some(0), "{words}");
+    held.let_go();
+    let (code, words) = held.end();
+    assert_eq!(code, Some(0), "{words}");
     assert!(
         words.contains("warning: ") && words.contains("heat"),
         "{words}"

@@ -2,10 +2,10 @@
 //! the same in any order, signs of zero and denormal numbers included. Twin of
 //! `kernels/accel/tree/parallel/boxes.wesl`.
 
-use crate::accel::bounds::Bounds;
-use crate::accel::triangle::TriangleRecord;
+use crate::bounds::Bounds;
+use crate::triangle::TriangleRecord;
 
-/// An axis-aligned box; see [`ordered`].
+/// An axis-aligned box; see `ordered`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OrderedBox {
     /// Least corner.
@@ -18,7 +18,7 @@ const SIGN: u32 = 0x8000_0000;
 
 impl OrderedBox {
     /// The neutral element of [`join`].
-    pub const NOTHING: Self = Self {
+    pub(crate) const NOTHING: Self = Self {
         low: [u32::MAX; 3],
         high: [0; 3],
     };
@@ -48,7 +48,7 @@ impl From<OrderedBox> for Bounds {
 }
 
 /// The bits of a number as an integer in the order of the numbers.
-pub fn ordered(bits: u32) -> u32 {
+pub(crate) fn ordered(bits: u32) -> u32 {
     if bits >= SIGN { !bits } else { bits ^ SIGN }
 }
 
@@ -58,7 +58,7 @@ pub fn number(key: u32) -> f32 {
 }
 
 /// The smallest box around both.
-pub fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
+pub(crate) fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
     OrderedBox {
         low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),
         high: std::array::from_fn(|axis| a.high[axis].max(b.high[axis])),
@@ -66,12 +66,12 @@ pub fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
 }
 
 /// Twice the centre.
-pub fn doubled_centre(around: OrderedBox) -> [f32; 3] {
+pub(crate) fn doubled_centre(around: OrderedBox) -> [f32; 3] {
     std::array::from_fn(|axis| number(around.low[axis]) + number(around.high[axis]))
 }
 
 /// Half of the surface of a box. Two products that share no factor: compilers of kernels put those together that do.
-pub fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
+pub(crate) fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| high[axis] - low[axis]);
     x * (y + z) + y * z
 }

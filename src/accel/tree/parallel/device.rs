@@ -5,13 +5,13 @@
 
 use super::rounds::Rounds;
 use super::{LinkedNode, LinkedTree, Method, Settings, too_large};
-use crate::accel::{AccelError, BuildLog, TriangleBuffers, TriangleSoup};
-use crate::gpu::{
+use crate::{AccelError, BuildLog, TriangleBuffers, TriangleSoup};
+use raystone_core::clock::Instant;
+use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pairs, Pipeline, Played, RadixSort, Recording,
     Storage, UniformValues, WORKGROUP_SIZE, groups_for,
 };
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Bits of each word of a code.
 const WORD_BITS: u32 = 30;
@@ -20,16 +20,13 @@ const BLOCK: u32 = 8;
 /// Words that `boxes.wesl` leaves of the whole scene, the last of which names a triangle that is too large.
 const SCENE_WORDS: u32 = 7;
 
-pub(in crate::accel) fn failed(error: GpuError) -> AccelError {
+pub(crate) fn failed(error: GpuError) -> AccelError {
     AccelError::Device(error.to_string())
 }
 
 /// Plays a recording. What the clock of the device does not tell is the phase `transfer`: submission, copies to the
 /// host, waiting.
-pub(in crate::accel) fn play(
-    recording: &Recording,
-    log: &mut BuildLog,
-) -> Result<Played, AccelError> {
+pub(crate) fn play(recording: &Recording, log: &mut BuildLog) -> Result<Played, AccelError> {
     let played = log.play(recording)?;
     if let Some(ms) = played.elapsed().gpu_ms {
         log.note("transfer", (played.wall_ms() - ms).max(0.0));
@@ -92,7 +89,7 @@ pub(super) struct Passes<'a> {
 
 impl<'a> Passes<'a> {
     /// Over these triangles, for so many leaves and nodes behind them.
-    pub fn new(
+    pub(super) fn new(
         gpu: &'a Gpu,
         soup: &TriangleSoup,
         [count, inner]: [u32; 2],
@@ -115,7 +112,7 @@ impl<'a> Passes<'a> {
     }
 
     /// What all passes bind.
-    pub fn bindings(&self) -> Bindings {
+    pub(super) fn bindings(&self) -> Bindings {
         let mut bindings = self.triangles.bindings.clone();
         bindings
             .uniform("size", UniformValues::new().u32("count", self.count))
@@ -137,7 +134,7 @@ impl<'a> Passes<'a> {
     }
 
     /// Runs a pass.
-    pub fn run(
+    pub(super) fn run(
         &self,
         recording: &mut Recording,
         pass: &str,
@@ -149,7 +146,7 @@ impl<'a> Passes<'a> {
     }
 
     /// The nodes, brought to the host.
-    pub fn nodes(
+    pub(super) fn nodes(
         &self,
         soup: &TriangleSoup,
         log: &mut BuildLog,
@@ -170,7 +167,7 @@ impl<'a> Passes<'a> {
     }
 
     /// The boxes of so many triangles, and the box around their centres.
-    pub fn boxes(&self, recording: &mut Recording, triangles: u32) -> Result<(), GpuError> {
+    pub(super) fn boxes(&self, recording: &mut Recording, triangles: u32) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         bindings.uniform("size", UniformValues::new().u32("count", triangles));
         self.run(recording, "boxes", &bindings, groups_for(triangles))
@@ -208,7 +205,11 @@ impl<'a> Passes<'a> {
     }
 
     /// The leaves in the order of their triangles.
-    pub fn leaves(&self, recording: &mut Recording, triangles: &Storage) -> Result<(), GpuError> {
+    pub(super) fn leaves(
+        &self,
+        recording: &mut Recording,
+        triangles: &Storage,
+    ) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         bindings.buffer("sorted_triangles", triangles);
         self.run(recording, "leaves", &bindings, groups_for(self.count))
@@ -227,7 +228,7 @@ impl<'a> Passes<'a> {
     }
 
     /// The boxes of the nodes behind the leaves, whose first and last leaves are these.
-    pub fn fit(&self, recording: &mut Recording, ranges: &Storage) -> Result<(), GpuError> {
+    pub(super) fn fit(&self, recording: &mut Recording, ranges: &Storage) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         // Level by level: a dispatch sees what those before it wrote.
         for level in levels([self.count, self.inner]) {

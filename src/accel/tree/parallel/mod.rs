@@ -1,22 +1,22 @@
 //! Trees from sorted triangles, bottom-up, by methods that a device can follow: `device-lbvh` and `device-ploc` are built
 //! there, `host-lbvh` and `host-ploc` are their twins, equal to the bit.
 //!
-//! Both sort triangles along a curve through the scene ([`morton`]). `lbvh` then reads the tree off the codes, `clusters`
+//! Both sort triangles along a curve through the scene (`morton`). `lbvh` then reads the tree off the codes, `clusters`
 //! joins neighbours in rounds. [`device`] records the passes, `refit` fits boxes to triangles that moved.
 
 pub mod boxes;
 mod clusters;
 pub mod device;
 mod lbvh;
-pub mod morton;
+pub(crate) mod morton;
 mod refit;
 mod rounds;
 
 use super::depth::limit_depth;
 use super::grow::lay_out;
 use super::{NodeKind, Tree};
-use crate::accel::triangle::TriangleRecord;
-use crate::accel::{AccelError, TriangleSoup};
+use crate::triangle::TriangleRecord;
+use crate::{AccelError, TriangleSoup};
 use boxes::{OrderedBox, doubled_centre, number, ordered};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ pub struct Settings {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct LinkedNode {
-    /// Least corner: see [`boxes::ordered`].
+    /// Least corner: see `ordered`.
     pub low: [u32; 3],
     /// First child.
     pub left: u32,
@@ -152,7 +152,7 @@ impl From<LinkedTree> for Tree {
 
 impl Tree {
     /// The nodes as passes read them; a leaf tells the first of its triangles alone.
-    pub(in crate::accel) fn linked(&self) -> Vec<LinkedNode> {
+    pub(crate) fn linked(&self) -> Vec<LinkedNode> {
         let nodes = self.nodes.par_iter().map(|node| {
             let key = |corner: [f32; 3]| corner.map(|x| ordered(x.to_bits()));
             let around = OrderedBox {

@@ -13,13 +13,13 @@ const SCALE_EXPONENT: u32 = 253;
 const LARGEST_EXPONENT: u32 = 254;
 
 /// Cells in a unit of length, if the longest side has this extent.
-pub fn grid_scale(extent: f32) -> f32 {
+pub(crate) fn grid_scale(extent: f32) -> f32 {
     let exponent = extent.to_bits() >> 23 & 255;
     f32::from_bits((SCALE_EXPONENT + AXIS_BITS - exponent).min(LARGEST_EXPONENT) << 23)
 }
 
 /// The cell of a centre, on one axis.
-pub fn cell_of(centre: f32, low: f32, scale: f32) -> u32 {
+pub(crate) fn cell_of(centre: f32, low: f32, scale: f32) -> u32 {
     (((centre - low) * scale) as u32).min((1 << AXIS_BITS) - 1)
 }
 
@@ -39,7 +39,7 @@ fn interleave(bits: [u32; 3]) -> u32 {
 }
 
 /// The code of a cell: upper and lower thirty bits.
-pub fn morton_code(cell: [u32; 3]) -> [u32; 2] {
+pub(crate) fn morton_code(cell: [u32; 3]) -> [u32; 2] {
     let lower = (1 << WORD_BITS) - 1;
     [
         interleave(cell.map(|c| c >> WORD_BITS)),

@@ -8,10 +8,10 @@
 use super::boxes::{OrderedBox, join};
 use super::check_coordinates;
 use super::device::{Passes, failed, play};
-use crate::accel::tree::{NodeKind, Tree};
-use crate::accel::{AccelError, BuildLog, TriangleSoup};
-use crate::gpu::Recording;
+use crate::tree::{NodeKind, Tree};
+use crate::{AccelError, BuildLog, TriangleSoup};
 use rayon::prelude::*;
+use raystone_gpu::Recording;
 
 impl Tree {
     /// Fits the boxes to triangles that moved since the tree was built, on the host. A triangle that was split stands

@@ -1,9 +1,9 @@
 //! The rounds of clustering on the device: some to a submission, until one cluster is left.
 
 use super::device::{Passes, failed, play};
-use crate::accel::tree::parameters::SAH_DEPTH;
-use crate::accel::{AccelError, BuildLog};
-use crate::gpu::{
+use crate::tree::parameters::SAH_DEPTH;
+use crate::{AccelError, BuildLog};
+use raystone_gpu::{
     Bindings, GpuError, Groups, Recording, Storage, UniformValues, grid_of, groups_for,
 };
 
@@ -31,7 +31,7 @@ pub(super) struct Rounds<'a> {
 
 impl<'a> Rounds<'a> {
     /// Every leaf is a cluster.
-    pub fn new(passes: &'a Passes<'a>, radius: u32) -> Result<Self, GpuError> {
+    pub(super) fn new(passes: &'a Passes<'a>, radius: u32) -> Result<Self, GpuError> {
         let (gpu, count) = (passes.gpu, passes.count);
         let mut state = [0; STATE_WORDS];
         state[CLUSTERS] = count;
@@ -57,7 +57,7 @@ impl<'a> Rounds<'a> {
     }
 
     /// Plays what was recorded before and rounds behind it, until one cluster is left; tells the root.
-    pub fn play(&self, first: Recording, log: &mut BuildLog) -> Result<u32, AccelError> {
+    pub(super) fn play(&self, first: Recording, log: &mut BuildLog) -> Result<u32, AccelError> {
         let count = self.passes.count;
         let most = FREE_ROUNDS + count.ilog2() + 2;
         let mut recording = first;

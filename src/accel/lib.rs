@@ -1,0 +1,394 @@
+//! Acceleration structures: one trait, one file per structure, one registry line each.
+//!
+//! To add one, see `docs/adding-a-structure.md`.
+#![warn(missing_docs)]
+
+/// Returns [`AccelError::Invalid`] with this text unless something holds.
+macro_rules! ensure {
+    ($holds:expr, $($what:tt)+) => {
+        let holds: bool = $holds;
+        if !holds {
+            return Err($crate::AccelError::Invalid(format!($($what)+)));
+        }
+    };
+}
+
+pub mod bounds;
+mod brute_force;
+mod bvh;
+#[cfg(test)]
+mod fixtures;
+mod grid;
+mod instancing;
+mod intersection;
+mod irregular_grid;
+mod kd_tree;
+mod leaf;
+pub mod mask;
+mod octree;
+pub mod oracle;
+mod polygon;
+pub mod ray;
+mod registry;
+#[cfg(test)]
+mod scene_tests;
+mod spatial;
+mod stats;
+mod structure;
+pub mod tracer;
+pub mod tree;
+pub mod triangle;
+pub mod twin;
+mod two_level_grid;
+mod uniform_grid;
+pub mod watch;
+mod wide;
+
+pub use brute_force::{BruteForce, brute_force_hits};
+pub use bvh::{BuiltBvh, Bvh, BvhParameters, RopedBvh};
+pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
+pub use intersection::{BoxTest, Intersection};
+pub(crate) use irregular_grid::IrregularGrid;
+pub(crate) use kd_tree::KdTree;
+pub use mask::Masks;
+pub(crate) use octree::Octree;
+pub use ray::{Hit, NO_HIT, Ray};
+pub use raystone_core::structure::{Counters, Phase, Space, StructureStats};
+pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
+pub use stats::BuildLog;
+pub use structure::{OverTree, Structure};
+pub use tracer::{
+    Answers, Ask, GroupShape, LiveRays, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
+    Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
+};
+pub use twin::CpuTwin;
+pub(crate) use two_level_grid::TwoLevelGrid;
+pub(crate) use uniform_grid::UniformGrid;
+pub use wide::{Bvh4, Cwbvh};
+
+use bytemuck::NoUninit;
+use raystone_core::params::{ParamError, ParameterSchema, Params, Sources};
+use raystone_gpu::{Composition, UniformValues};
+use raystone_scene::SceneData;
+use std::borrow::Cow;
+use std::sync::Arc;
+use thiserror::Error;
+use triangle::TriangleRecord;
+
+/// Why a structure cannot be built.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum AccelError {
+    /// A hard limit of the structure, with both numbers.
+    #[error("{what}: needs {needed}, the limit is {limit}")]
+    Limit {
+        /// Which limit.
+        what: String,
+        /// What the scene needs.
+        needed: u64,
+        /// What the structure allows.
+        limit: u64,
+    },
+    /// A parameter that the structure does not have, or a value that it does not allow.
+    #[error(transparent)]
+    Parameter(#[from] ParamError),
+    /// Parameters that contradict each other, with the reason.
+    #[error("{0}")]
+    Contradiction(String),
+    /// What a build on the device met with.
+    #[error("{0}")]
+    Device(String),
+    /// A structural invariant is violated.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+impl AccelError {
+    /// [`AccelError::Limit`] if `needed` is more than `limit`.
+    ///
+    /// # Errors
+    /// It is, with both numbers.
+    pub(crate) fn check_limit(
+        what: impl Into<String>,
+        needed: impl Into<u64>,
+        limit: impl Into<u64>,
+    ) -> Result<(), Self> {
+        let (what, needed, limit) = (what.into(), needed.into(), limit.into());
+        if needed <= limit {
+            return Ok(());
+        }
+        Err(Self::Limit {
+            what,
+            needed,
+            limit,
+        })
+    }
+}
+
+/// The triangles of a scene as structures see them: the canonical records.
+#[derive(Debug, Clone, Default)]
+pub struct TriangleSoup {
+    /// Record `i` is triangle `i` of the scene.
+    pub records: Vec<TriangleRecord>,
+    /// What they are copies of, if the scene consists of instances.
+    pub placed: Option<Placed>,
+    /// How rays meet them: see [`TriangleSoup::intersecting`].
+    pub intersection: Intersection,
+    /// What is cut out of them; the words of records lead there.
+    pub masks: Option<Arc<Masks>>,
+}
+
+impl From<Vec<TriangleRecord>> for TriangleSoup {
+    /// Triangles that are no copies.
+    fn from(records: Vec<TriangleRecord>) -> Self {
+        Self {
+            records,
+            ..Self::default()
+        }
+    }
+}
+
+impl TriangleSoup {
+    /// The records of a scene.
+    pub fn new(scene: &SceneData) -> Self {
+        let (masks, words) = match Masks::of(scene, 3 * scene.triangles.len() as u32) {
+            Some((masks, words)) => (Some(Arc::new(masks)), Cow::Owned(words)),
+            None => (None, Cow::Borrowed(&scene.material_ids)),
+        };
+        let records = scene
+            .triangles
+            .iter()
+            .zip(&*words)
+            .enumerate()
+            .map(|(id, (triangle, material))| TriangleRecord::new(triangle, id as u32, *material))
+            .collect();
+        let mut placed = scene.assembly.as_ref().map(Placed::new);
+        if let Some(masks) = &masks {
+            placed = placed.and_then(|placed| placed.masked(masks, &words));
+        }
+        Self {
+            records,
+            placed,
+            intersection: Intersection::default(),
+            masks,
+        }
+    }
+
+    /// The same triangles, met by these tests. Structures take copies of records: choose before building.
+    #[must_use]
+    pub fn intersecting(mut self, intersection: Intersection) -> Self {
+        // Behind the records and masks lie the words made of them, then those of the objects.
+        let mut place = 3 * self.records.len() as u32 + self.mask_rows().len() as u32;
+        let objects = self.placed.iter_mut().flat_map(|p| &mut p.objects);
+        let objects = objects.map(|object| {
+            object.intersection = intersection;
+            &mut object.records
+        });
+        for record in std::iter::once(&mut self.records).chain(objects).flatten() {
+            record.transformed = 0;
+            if intersection.triangle.transformed(record).is_some() {
+                record.transformed = place;
+                place += 3;
+            }
+        }
+        self.intersection = intersection;
+        self
+    }
+
+    fn mask_rows(&self) -> &[[u32; 4]] {
+        self.masks.as_ref().map_or(&[], |masks| &masks.rows)
+    }
+
+    /// The buffer `triangles` of kernels: the records, their masks, and what the triangle test made of them.
+    pub fn words(&self) -> Cow<'_, [[u32; 4]]> {
+        let records = bytemuck::cast_slice(&self.records);
+        let objects = self.placed.iter().flat_map(|p| &p.objects);
+        let objects = objects.flat_map(|object| &object.records);
+        let transformed = |record| self.intersection.triangle.transformed(record);
+        let made = self.records.iter().chain(objects).filter_map(transformed);
+        let masks = self.mask_rows().iter().copied();
+        let mut behind = masks.chain(made.flatten()).peekable();
+        match behind.peek() {
+            None => Cow::Borrowed(records),
+            Some(_) => Cow::Owned(records.iter().copied().chain(behind).collect()),
+        }
+    }
+
+    /// Box around all triangles; [`bounds::Bounds::EMPTY`] if there are none.
+    pub fn bounds(&self) -> bounds::Bounds {
+        self.records
+            .iter()
+            .fold(bounds::Bounds::EMPTY, |b, r| b.union(&r.bounds()))
+    }
+}
+
+/// One array of words for the GPU.
+#[derive(Debug, Clone)]
+pub struct NamedWords<'a> {
+    /// Name of the variable in the kernel that binds it.
+    pub name: &'static str,
+    /// Content, borrowed from the structure where its memory is laid out like the GPU's.
+    pub words: Cow<'a, [u32]>,
+    /// Bytes of one element, for the record.
+    pub element_bytes: u32,
+}
+
+impl<'a> NamedWords<'a> {
+    /// An array whose memory is laid out like the GPU's; a record names the size of its elements.
+    pub fn new<T: NoUninit>(name: &'static str, elements: &'a [T]) -> Self {
+        Self {
+            name,
+            words: bytemuck::cast_slice(elements).into(),
+            element_bytes: size_of::<T>() as u32,
+        }
+    }
+}
+
+/// What a structure hands to the GPU.
+#[derive(Debug, Clone, Default)]
+pub struct GpuBuffers<'a> {
+    /// Module of the kernel that traces it, relative to the kernel folder; empty for a pipeline that
+    /// needs none.
+    pub kernel: &'static str,
+    /// Features (`@if(...)` in the kernel) that its parameters switch on.
+    pub features: Vec<&'static str>,
+    /// Storage arrays, at most two (a path-tracing kernel has eight in all).
+    pub arrays: Vec<NamedWords<'a>>,
+    /// Uniform structs by variable name.
+    pub uniforms: Vec<(&'static str, UniformValues)>,
+    /// Constants of `package::active::constants`: kernels with other constants are other kernels, so
+    /// numbers that differ from scene to scene belong into a uniform.
+    pub constants: Vec<(&'static str, u32)>,
+}
+
+/// The uniform `limits` of `kernels/common/limits.wesl`: the greatest number of steps that a
+/// traversal can take, and the number of nodes or triangles where it ends at the last one.
+pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues) {
+    (
+        "limits",
+        UniformValues::new()
+            .u32("step_fuse", step_fuse as u32)
+            .u32("elements", elements as u32),
+    )
+}
+
+impl GpuBuffers<'_> {
+    /// `composition` with this structure as the active one.
+    #[must_use]
+    pub fn activate(&self, composition: Composition) -> Composition {
+        let active = match self.kernel {
+            "" => composition,
+            kernel => composition.with("accel", kernel),
+        };
+        let active = self
+            .features
+            .iter()
+            .fold(active, |c, name| c.feature(name, true));
+        self.constants
+            .iter()
+            .fold(active, |c, (name, value)| c.constant(name, *value))
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
+    }
+}
+
+/// A kind of structure: one static per structure, one line in the registry. [`Structure`] is the shorter way to
+/// declare one whose name is known at compile time.
+pub trait AccelKind: Sync {
+    /// Name as a user types it.
+    fn name(&self) -> &'static str;
+    /// One line: what it is and where it comes from.
+    fn description(&self) -> &'static str;
+    /// Parameters.
+    fn parameters(&self) -> ParameterSchema;
+    /// Modules that a folder of kernels may bring for it, beside those of the program.
+    fn kernels(&self) -> Vec<String> {
+        vec![format!("accel/{}", self.name().replace('-', "_"))]
+    }
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> Sources {
+        &[]
+    }
+    /// Builds the structure.
+    ///
+    /// # Errors
+    /// A limit of the structure is exceeded.
+    fn build(&self, soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> BuildResult;
+    /// The two halves of a build, if the structure is a layout of one binary tree.
+    fn over_tree(&self) -> Option<&dyn OverTree> {
+        None
+    }
+}
+
+/// A built structure, or why there is none.
+pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
+
+/// How a built structure is traced.
+#[derive(Clone)]
+pub enum Access {
+    /// Its kernel module exports `trace(ray, any)`, which other kernels call through `accel/query`.
+    Inline,
+    /// It answers buffers of rays in passes of its own; kernels with a structure in them (those of
+    /// integrators that trace) cannot use it.
+    Pipeline(Arc<dyn TracePasses>),
+}
+
+/// A built structure.
+pub trait BuiltAccel: Sync {
+    /// Checks structural invariants: reachability, containment, depth, ranges.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
+    /// The kernel with its arrays, uniforms, constants and features.
+    fn buffers(&self) -> GpuBuffers<'_>;
+    /// Arrays that a build on the device left there, by the variables that bind them: they are storage
+    /// arrays beside those of [`BuiltAccel::buffers`].
+    fn on_device(&self) -> Vec<(&'static str, wgpu::Buffer)> {
+        Vec::new()
+    }
+    /// How it is traced.
+    fn access(&self) -> Access {
+        Access::Inline
+    }
+    /// When the batch kernel refills its invocations: for inline structures whose kernel exports
+    /// `Traversal`, `begin` and `advance`.
+    fn refill(&self) -> RefillParameters {
+        RefillParameters::NONE
+    }
+    /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
+    /// see [`raystone_gpu::Bindings::parts`].
+    fn divisible(&self) -> &'static [&'static str] {
+        &[]
+    }
+    /// Static figures.
+    fn stats(&self) -> StructureStats;
+    /// Where triangles are met.
+    fn space(&self) -> Space {
+        Space::World
+    }
+    /// Takes over the transforms of the same instances from `soup`, rebuilding only what depends on
+    /// them; `None` if a full build is needed.
+    ///
+    /// # Errors
+    /// `soup` has other instances or objects.
+    fn update(&mut self, _soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
+        None
+    }
+    /// The arrays of [`BuiltAccel::buffers`] as its twin reads them, which is in place: an array made of several,
+    /// part by part.
+    fn twin_arrays(&self) -> Vec<(&'static str, Vec<&[u32]>)> {
+        let arrays = self.buffers().arrays.into_iter();
+        let in_place = arrays.filter_map(|array| match array.words {
+            Cow::Borrowed(words) => Some((array.name, vec![words])),
+            Cow::Owned(_) => None,
+        });
+        in_place.collect()
+    }
+    /// The traversal on the host, if it has one.
+    fn cpu_twin<'a>(&'a self, _soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        None
+    }
+}

@@ -1,0 +1,292 @@
+//! A scene that moves: what was built over its first frame is taken over to each further one, against building anew.
+//! Each frame has a judge of its own, and what was taken over must answer as that one does, to the bit.
+
+mod actor;
+mod motion;
+
+pub use actor::{Actor, Taken, Way};
+pub use motion::moved;
+
+use crate::timing::{Measured, interleave};
+use raystone_accel::tracer::count_work;
+use raystone_accel::{Ask, BuildLog, RayBatch, Space, Traced, Tracer, TriangleSoup};
+use raystone_config::Timing;
+use raystone_gpu::{ArithmeticProbe, Elapsed, Gpu, GpuError, Stopwatch};
+use raystone_record::fault_text;
+use raystone_record::{Cost, CountersPerRay, FrameRays, FrameRecord};
+use raystone_render::Stage;
+use raystone_verify::gate::{Judge, gate, timed_fault};
+use raystone_verify::rays::RaySet;
+use std::cell::RefCell;
+
+/// A frame, and how it is looked at.
+pub(crate) struct Frame<'a> {
+    /// Its number.
+    pub number: u32,
+    /// The triangles of the first frame.
+    pub first: &'a TriangleSoup,
+    /// The scene as it stands.
+    pub stage: &'a Stage,
+    /// Rays with their true hits in it.
+    pub judge: &'a Judge,
+    /// How the adapter computes.
+    pub probe: &'a ArithmeticProbe,
+    /// Whether kernels keep the driver's checks.
+    pub runtime_checks: bool,
+    /// Rounds.
+    pub timing: &'a Timing,
+    /// Seed of their order.
+    pub seed: u64,
+}
+
+/// Refitted and rebuilt, both judged.
+struct Pair {
+    traced: [Traced; 2],
+    sah: [Option<f64>; 2],
+    judged: usize,
+}
+
+/// Takes every structure over to a frame, on the device with its kernels: gates, then costs, all in the same rounds. What
+/// fails is told for that structure alone.
+pub(crate) fn take_over(
+    frame: &Frame,
+    actors: &[(&Actor, &Gpu)],
+) -> Vec<Result<FrameRecord, String>> {
+    let pairs = actors.iter().map(|(actor, gpu)| frame.pair(actor, gpu));
+    let mut pairs: Vec<Result<Pair, String>> = pairs.collect();
+    let mut timed = Vec::new();
+    for (place, (actor, gpu)) in actors.iter().enumerate() {
+        let Ok(pair) = &pairs[place] else { continue };
+        match frame.timed(place, actor, gpu, pair) {
+            Ok(items) => timed.extend(items),
+            Err(error) => pairs[place] = Err(error.to_string()),
+        }
+    }
+    let failures: Vec<Option<GpuError>> = match interleave(&timed, frame.timing, frame.seed, || {})
+    {
+        Ok(samples) => samples.into_iter().map(Result::err).collect(),
+        Err((_, error)) => {
+            let lost = |_: &Timed| Some(GpuError::Lost(error.to_string()));
+            timed.iter().map(lost).collect()
+        }
+    };
+    for (item, failure) in timed.iter().zip(failures) {
+        let fault = match failure {
+            Some(error) => Some(error.to_string()),
+            None => item
+                .fault(frame)
+                .unwrap_or_else(|error| Some(error.to_string())),
+        };
+        if let Some(fault) = fault {
+            pairs[item.actor] = Err(fault);
+        }
+    }
+    let finish = |(place, pair): (usize, Result<Pair, String>)| {
+        let own: Vec<&Timed> = timed.iter().filter(|item| item.actor == place).collect();
+        let (actor, gpu) = actors[place];
+        frame.record(pair?, actor.ways(), gpu, &own)
+    };
+    pairs.into_iter().enumerate().map(finish).collect()
+}
+
+impl Frame<'_> {
+    /// Takes a structure over and builds it anew, and judges both. A tree refitted on the host must equal that of the
+    /// device to the bit, and is then judged with it.
+    fn pair(&self, actor: &Actor, gpu: &Gpu) -> Result<Pair, String> {
+        let ways = actor.ways();
+        let soup = &self.stage.soup;
+        let taken = |way: Way| {
+            let mut log = BuildLog::with_gpu(gpu);
+            let from = actor.start(way, self.first);
+            let taken = from.and_then(|from| actor.take(way, from, soup, &mut log));
+            taken.map_err(|e| format!("{way:?}: {e}"))
+        };
+        let refitted = taken(ways[0])?;
+        if ways.contains(&Way::Host) {
+            match (&refitted, taken(Way::Host)?) {
+                (Taken::Tree(device), Taken::Tree(host)) if device.nodes == host.nodes => {}
+                _ => return Err("trees refitted on host and device differ".to_owned()),
+            }
+        }
+        let mut judged = 0;
+        let mut of = |taken: Taken, name: &str| {
+            let at = |fault: String| format!("{name}: {fault}");
+            let built = actor.built(taken, soup).map_err(|e| at(e.to_string()))?;
+            built.validate(soup).map_err(|e| at(e.to_string()))?;
+            let traced = Traced::upload(gpu, &*built).map_err(|e| at(e.to_string()))?;
+            judged = self.gate(gpu, &traced).map_err(at)?;
+            Ok::<_, String>((traced, built.stats().sah_cost))
+        };
+        let refitted = of(refitted, "refitted")?;
+        let rebuilt = of(taken(Way::Rebuild)?, "rebuilt")?;
+        Ok(Pair {
+            traced: [refitted.0, rebuilt.0],
+            sah: [refitted.1, rebuilt.1],
+            judged,
+        })
+    }
+
+    /// Rays that were judged.
+    fn gate(&self, gpu: &Gpu, traced: &Traced) -> Result<usize, String> {
+        let triangles = &self.stage.buffers.triangles;
+        let soup = &self.stage.soup;
+        let checks = self.runtime_checks;
+        let verdict = gate(gpu, triangles, soup, traced, self.judge, self.probe, checks);
+        let verdict = verdict.map_err(|e| e.to_string())?;
+        let judge = self.judge.of(traced.space);
+        match verdict.passed {
+            true => Ok(judge.sets.iter().map(|set| set.rays.len()).sum()),
+            false => Err(fault_text(&verdict, judge.first_wrong.as_deref())),
+        }
+    }
+
+    fn sets<'s>(&'s self, traced: &Traced) -> impl Iterator<Item = &'s RaySet> {
+        let sets = &self.judge.of(traced.space).sets;
+        sets.iter().filter(|set| set.is_timed())
+    }
+
+    /// Everything that is timed of a structure: ways, then classes of rays, each refitted and rebuilt.
+    fn timed<'a>(
+        &'a self,
+        place: usize,
+        actor: &'a Actor<'a>,
+        gpu: &'a Gpu,
+        pair: &Pair,
+    ) -> Result<Vec<Timed<'a>>, GpuError> {
+        let new = |work| Timed {
+            actor: place,
+            work,
+            notes: RefCell::default(),
+        };
+        let ways = actor.ways().iter();
+        let take = |way: &Way| new(Work::Take(actor, *way, self, gpu));
+        let mut items: Vec<Timed> = ways.map(take).collect();
+        for set in self.sets(&pair.traced[0]) {
+            for traced in &pair.traced {
+                let ask = Ask {
+                    coherent: set.is_coherent(),
+                    runtime_checks: self.runtime_checks,
+                    ..set.query().into()
+                };
+                let triangles = &self.stage.buffers.triangles;
+                let batch = Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)?;
+                items.push(new(Work::Trace(Box::new(batch), set, traced.space)));
+            }
+        }
+        Ok(items)
+    }
+
+    /// The record, of [`Frame::timed`] in its order.
+    fn record(
+        &self,
+        pair: Pair,
+        ways: &[Way],
+        gpu: &Gpu,
+        timed: &[&Timed],
+    ) -> Result<FrameRecord, String> {
+        let cost = |item: &Timed| item.cost(self.timing.rounds as usize);
+        let of_way = |way: Way| {
+            let place = ways.iter().position(|known| *known == way);
+            place
+                .and_then(|place| timed.get(place))
+                .map(|item| cost(item))
+        };
+        let mut classes = Vec::new();
+        for (set, both) in self
+            .sets(&pair.traced[0])
+            .zip(timed[ways.len()..].chunks(2))
+        {
+            let mut counters = [None; 2];
+            for (counted, traced) in counters.iter_mut().zip(&pair.traced) {
+                let triangles = &self.stage.buffers.triangles;
+                let work = count_work(gpu, triangles, traced, set.query(), &set.rays);
+                let work = work.map_err(|e| e.to_string())?;
+                *counted = work.as_deref().map(CountersPerRay::mean_of);
+            }
+            classes.push(FrameRays {
+                class: set.class,
+                rays: set.rays.len(),
+                counters,
+                cost: [0, 1].map(|place| cost(both[place])),
+            });
+        }
+        Ok(FrameRecord {
+            frame: self.number,
+            judged: pair.judged,
+            refit: of_way(ways[0]).unwrap_or_default(),
+            refit_on_host: of_way(Way::Host),
+            rebuild: of_way(Way::Rebuild).unwrap_or_default(),
+            sah: pair.sah,
+            classes,
+        })
+    }
+}
+
+/// Something that is done in every round.
+enum Work<'a> {
+    /// A structure takes a frame over.
+    Take(&'a Actor<'a>, Way, &'a Frame<'a>, &'a Gpu),
+    /// Rays of a class are traced.
+    Trace(Box<RayBatch>, &'a RaySet, Space),
+}
+
+/// What was timed of an actor, and what it took each time.
+struct Timed<'a> {
+    actor: usize,
+    work: Work<'a>,
+    notes: RefCell<Vec<Elapsed>>,
+}
+
+impl Work<'_> {
+    /// Milliseconds by all clocks. What is made before or thrown away after is not in them.
+    fn run(&self) -> Result<Elapsed, GpuError> {
+        match self {
+            Self::Trace(batch, ..) => batch.trace(),
+            Self::Take(actor, way, frame, gpu) => {
+                let failed = |e: raystone_accel::AccelError| GpuError::Driver(e.to_string());
+                let mut log = BuildLog::with_gpu(gpu);
+                let from = actor.start(*way, frame.first).map_err(failed)?;
+                let watch = Stopwatch::start();
+                let taken = actor.take(*way, from, &frame.stage.soup, &mut log);
+                let elapsed = watch.elapsed();
+                drop(taken.map_err(failed)?);
+                Ok(elapsed)
+            }
+        }
+    }
+}
+
+impl Measured for Timed<'_> {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        let elapsed = self.work.run()?.measured()?;
+        self.notes.borrow_mut().push(elapsed);
+        Ok(elapsed)
+    }
+}
+
+impl Timed<'_> {
+    /// What the last rounds took.
+    fn cost(&self, rounds: usize) -> Cost {
+        let notes = self.notes.borrow();
+        let kept = &notes[notes.len().saturating_sub(rounds)..];
+        Cost {
+            processor_ms: kept.iter().filter_map(|n| n.cpu_ms).collect(),
+            wall_ms: kept.iter().map(|n| n.wall_ms).collect(),
+            passes_ms: kept.iter().filter_map(|n| n.gpu_ms).collect(),
+        }
+    }
+
+    /// What is wrong with the answers of the last round.
+    fn fault(&self, frame: &Frame) -> Result<Option<String>, GpuError> {
+        let Work::Trace(batch, set, space) = &self.work else {
+            return Ok(None);
+        };
+        timed_fault(
+            batch,
+            set,
+            &frame.stage.soup,
+            *space,
+            frame.probe.is_exact(),
+        )
+    }
+}

@@ -1,0 +1,88 @@
+//! How a scene moves: every frame is made from the scene as it was loaded.
+
+use glam::{DVec3, Vec3};
+use raystone_config::{Animation, Motion};
+use raystone_core::random::Pcg32;
+use raystone_scene::{Assembly, SceneData, Transform};
+use std::f64::consts::TAU;
+
+/// Seed of the directions of instances.
+const SEED: u64 = 1;
+
+/// The scene in a frame; the first frame is the scene itself, to the bit.
+///
+/// # Errors
+/// Instances are to move, and there are none, or one cannot stand where it would.
+pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<SceneData, String> {
+    let time = animation.time(frame);
+    let radius = f64::from(scene.bounds().radius());
+    let amplitude = animation.amplitude * radius;
+    let mut moved = scene.clone();
+    match animation.motion {
+        Motion::Deform => {
+            let wave = Wave {
+                amplitude,
+                length: animation.wavelength * radius,
+                time,
+            };
+            // What is bent is no copy any more.
+            moved.assembly = None;
+            for triangle in &mut moved.triangles {
+                triangle.vertices = triangle.vertices.map(|v| wave.moves(v));
+            }
+        }
+        Motion::Instances => {
+            let assembly = moved.assembly.as_mut();
+            let assembly = assembly.ok_or("the scene has no instances that could move")?;
+            part(assembly, amplitude * time)?;
+            let instances = assembly.instances().iter();
+            moved.triangles = instances.flat_map(|i| assembly.copy(i)).collect();
+        }
+    }
+    moved.hash = format!("{}, frame {frame} of {animation:?}", scene.hash);
+    Ok(moved)
+}
+
+/// A wave through all space: x moves with y, y with z, z with x. It travels by one wavelength from the first frame to
+/// the last, which therefore looks like the first.
+struct Wave {
+    amplitude: f64,
+    length: f64,
+    time: f64,
+}
+
+impl Wave {
+    /// Displacement of one coordinate by another, 0 at time 0: A · (sin τ(x/Λ + t) − sin τ(x/Λ)).
+    fn displacement(&self, along: f64) -> f64 {
+        let phase = along / self.length;
+        self.amplitude * ((TAU * (phase + self.time)).sin() - (TAU * phase).sin())
+    }
+
+    fn moves(&self, vertex: Vec3) -> Vec3 {
+        let at = vertex.as_dvec3();
+        let by = DVec3::new(at.y, at.z, at.x).to_array();
+        (at + DVec3::from_array(by.map(|x| self.displacement(x)))).as_vec3()
+    }
+}
+
+/// Moves every instance straight on, so far, in a direction of its own.
+fn part(assembly: &mut Assembly, way: f64) -> Result<(), String> {
+    let mut random = Pcg32::new(SEED);
+    let directions: Vec<DVec3> = (assembly.instances().iter())
+        .map(|_| {
+            let z = 1.0 - 2.0 * random.uniform();
+            let (sine, cosine) = (TAU * random.uniform()).sin_cos();
+            let radius = (1.0 - z * z).max(0.0).sqrt();
+            DVec3::new(radius * cosine, radius * sine, z)
+        })
+        .collect();
+    for (instance, direction) in directions.into_iter().enumerate() {
+        let mut to_world: Transform = assembly.instances()[instance].to_world;
+        for (row, by) in to_world.rows.iter_mut().zip((way * direction).to_array()) {
+            row[3] += by as f32;
+        }
+        let placed = assembly.move_to(instance, to_world);
+        placed.map_err(|e| e.to_string())?;
+    }
+    Ok(())
+}

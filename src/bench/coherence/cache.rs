@@ -1,0 +1,158 @@
+//! A set-associative cache of lines that forgets the line which was used longest ago (LRU).
+
+use std::collections::{BTreeMap, HashMap};
+
+/// Size and associativity of a cache.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CacheShape {
+    /// Lines that it holds.
+    pub lines: u64,
+    /// Lines of a set; 0: all of them (fully associative).
+    pub ways: u64,
+}
+
+impl CacheShape {
+    /// A cache of so many bytes; at least one line.
+    pub(crate) fn of_bytes(bytes: u64, line_bytes: u64, ways: u64) -> Self {
+        let lines = (bytes / line_bytes).max(1);
+        Self { lines, ways }
+    }
+
+    /// Sets, and the lines of each. Lines that do not fill a set are left out.
+    fn sets(self) -> (u64, usize) {
+        match self.ways {
+            0 => (1, self.lines as usize),
+            ways => ((self.lines / ways).max(1), ways.min(self.lines) as usize),
+        }
+    }
+}
+
+/// The lines that a cache holds. A line with number n lies in set n modulo the number of sets.
+#[derive(Debug, Clone)]
+pub(crate) struct Cache {
+    ways: usize,
+    /// When each line that is held was last used.
+    used: HashMap<u64, u64>,
+    /// Lines of each set by that time.
+    sets: Vec<BTreeMap<u64, u64>>,
+    time: u64,
+}
+
+impl Cache {
+    /// An empty cache.
+    pub(crate) fn new(shape: CacheShape) -> Self {
+        let (sets, ways) = shape.sets();
+        Self {
+            ways,
+            used: HashMap::new(),
+            sets: vec![BTreeMap::new(); sets as usize],
+            time: 0,
+        }
+    }
+
+    /// Uses a line, and tells whether it was there. A line that was not takes the place of the one of its set
+    /// that was used longest ago.
+    pub(crate) fn access(&mut self, line: u64) -> bool {
+        self.time += 1;
+        let set = (line % self.sets.len() as u64) as usize;
+        let set = &mut self.sets[set];
+        let before = self.used.insert(line, self.time);
+        if let Some(before) = before {
+            set.remove(&before);
+        } else if set.len() == self.ways
+            && let Some((_, oldest)) = set.pop_first()
+        {
+            self.used.remove(&oldest);
+        }
+        set.insert(self.time, line);
+        before.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    /// The definition, word by word: each set a list, the line used last in front.
+    struct Naive(Vec<Vec<u64>>, usize);
+
+    impl Naive {
+        fn access(&mut self, line: u64) -> bool {
+            let count = self.0.len() as u64;
+            let set = &mut self.0[(line % count) as usize];
+            let place = set.iter().position(|held| *held == line);
+            place.map(|place| set.remove(place));
+            set.insert(0, line);
+            set.truncate(self.1);
+            place.is_some()
+        }
+    }
+
+    fn hits(shape: CacheShape, lines: &[u64]) -> Vec<bool> {
+        let mut cache = Cache::new(shape);
+        lines.iter().map(|line| cache.access(*line)).collect()
+    }
+
+    #[test]
+    fn what_was_used_longest_ago_goes_and_not_what_came_first() {
+        let two = CacheShape { lines: 2, ways: 0 };
+        // 1 is used again, so that 2 goes for 3; a queue would have let 1 go.
+        let expected = [false, false, true, false, true, false];
+        assert_eq!(hits(two, &[1, 2, 1, 3, 1, 2]), expected);
+        // Two sets of one line: even and odd numbers.
+        let direct = CacheShape { lines: 2, ways: 1 };
+        let expected = [false, false, true, false, true, false];
+        assert_eq!(hits(direct, &[2, 1, 2, 3, 2, 1]), expected);
+    }
+
+    #[test]
+    fn it_is_the_naive_cache_for_any_size_and_associativity() {
+        let mut random = Pcg32::new(5);
+        // Near ones, far ones, and runs, so that both ends of every cache are reached.
+        let lines: Vec<u64> = (0..4000_u64)
+            .map(|i| match i % 3 {
+                0 => random.below(12) as u64,
+                1 => random.below(300) as u64,
+                _ => i / 5,
+            })
+            .collect();
+        for (lines_held, ways) in [
+            (1, 0),
+            (7, 0),
+            (64, 0),
+            (8, 1),
+            (8, 2),
+            (24, 3),
+            (10, 4),
+            (3, 8),
+        ] {
+            let shape = CacheShape {
+                lines: lines_held,
+                ways,
+            };
+            let (sets, of_set) = shape.sets();
+            let mut naive = Naive(vec![Vec::new(); sets as usize], of_set);
+            let expected: Vec<bool> = lines.iter().map(|line| naive.access(*line)).collect();
+            assert_eq!(hits(shape, &lines), expected, "{shape:?}");
+            let hits = expected.iter().filter(|hit| **hit).count();
+            assert!(0 < hits && hits < lines.len(), "{shape:?}: {hits} hits");
+        }
+    }
+
+    #[test]
+    fn a_cache_that_holds_everything_misses_each_line_once() {
+        let mut random = Pcg32::new(9);
+        let lines: Vec<u64> = (0..1000).map(|_| random.below(200) as u64).collect();
+        let unique: std::collections::BTreeSet<_> = lines.iter().collect();
+        let all = hits(
+            CacheShape {
+                lines: 200,
+                ways: 0,
+            },
+            &lines,
+        );
+        let hits = all.into_iter().filter(|hit| *hit).count();
+        assert_eq!(hits, lines.len() - unique.len());
+    }
+}

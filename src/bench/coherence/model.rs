@@ -1,0 +1,351 @@
+//! Warps on a machine: what is issued, which cache lines it needs, and where they come from.
+//!
+//! A group of warps shares an L1, all groups share the L2. In turn, each group's next warp issues once; in a group the
+//! warps take turns, too. A warp goes through its passes one after the other. Each line of an issue is one access to the
+//! L1; one that misses is one access to the L2, and one that misses there comes from memory. Both begin empty. Counts and
+//! what is made of them: [`raystone_record::Tally`].
+
+use super::cache::{Cache, CacheShape};
+use super::simt::{Issue, issues};
+use super::trace::{Kind, Trace};
+use rayon::prelude::*;
+use raystone_config::{Coherence, Rule};
+use raystone_record::Tallies;
+use std::collections::VecDeque;
+
+/// What warps run on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Machine {
+    /// How the lanes of a warp go on.
+    pub rule: Rule,
+    /// Bytes of a cache line.
+    pub line_bytes: u64,
+    /// The cache of a group of warps.
+    pub l1: CacheShape,
+    /// The cache of all groups.
+    pub l2: CacheShape,
+}
+
+/// Rays that the lanes of a warp trace together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Pass {
+    /// What they are of: tallies are kept by class.
+    pub class: u32,
+    /// One for each lane; `None` where it has no ray.
+    pub lanes: Vec<Option<Trace>>,
+}
+
+/// What the lanes of a warp trace, pass after pass.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Warp {
+    /// In their order.
+    pub passes: Vec<Pass>,
+}
+
+/// A warp with what it will issue.
+struct Queue {
+    lanes: u64,
+    issues: VecDeque<(u32, Issue)>,
+}
+
+impl Machine {
+    /// The machine of an experiment.
+    pub fn new(settings: &Coherence) -> Self {
+        let line_bytes = u64::from(settings.line_bytes);
+        let cache = |kib: u32, ways: u32| {
+            CacheShape::of_bytes(1024 * u64::from(kib), line_bytes, ways.into())
+        };
+        Self {
+            rule: settings.rule,
+            line_bytes,
+            l1: cache(settings.l1_kib, settings.l1_ways),
+            l2: cache(settings.l2_kib, settings.l2_ways),
+        }
+    }
+}
+
+impl Queue {
+    /// What a warp issues, with what can be counted before.
+    fn new(warp: &Warp, machine: &Machine) -> (Self, Tallies) {
+        let mut tallies = Tallies::new();
+        let mut all = VecDeque::new();
+        for pass in &warp.passes {
+            let tally = tallies.entry(pass.class).or_default();
+            for trace in pass.lanes.iter().flatten() {
+                tally.rays += 1;
+                tally.nodes += u64::from(trace.count(Kind::Node));
+                tally.triangles += u64::from(trace.count(Kind::Triangle));
+            }
+            let issues = issues(&pass.lanes, machine.rule, machine.line_bytes);
+            all.extend(issues.into_iter().map(|issue| (pass.class, issue)));
+        }
+        let lanes = warp
+            .passes
+            .first()
+            .map_or(0, |pass| pass.lanes.len() as u64);
+        (Self { lanes, issues: all }, tallies)
+    }
+}
+
+/// What a machine makes of groups of warps, all together.
+pub fn run(machine: &Machine, groups: &[Vec<Warp>]) -> Tallies {
+    together(&run_groups(machine, groups))
+}
+
+/// The sums of the tallies of groups.
+pub fn together(groups: &[Tallies]) -> Tallies {
+    let mut all = Tallies::new();
+    for (class, tally) in groups.iter().flatten() {
+        *all.entry(*class).or_default() += *tally;
+    }
+    all
+}
+
+/// What a machine makes of each of these groups of warps while it runs all of them.
+pub(crate) fn run_groups(machine: &Machine, groups: &[Vec<Warp>]) -> Vec<Tallies> {
+    let queue = |warp: &Warp| Queue::new(warp, machine);
+    let of_group = |warps: &Vec<Warp>| warps.par_iter().map(queue).collect::<Vec<_>>();
+    let queues: Vec<_> = groups.par_iter().map(of_group).collect();
+    let mut groups: Vec<(Cache, VecDeque<Queue>, Tallies)> = Vec::new();
+    for of_group in queues {
+        let (queues, tallies): (VecDeque<_>, Vec<_>) = of_group.into_iter().unzip();
+        groups.push((Cache::new(machine.l1), queues, together(&tallies)));
+    }
+    let mut l2 = Cache::new(machine.l2);
+    while groups.iter().any(|(_, warps, _)| !warps.is_empty()) {
+        for (l1, warps, tallies) in &mut groups {
+            let Some((warp, (class, issue))) = next(warps) else {
+                continue;
+            };
+            let tally = tallies.entry(class).or_default();
+            tally.issues += 1;
+            tally.active += u64::from(issue.active);
+            tally.lanes += warp.lanes;
+            tally.bytes += issue.bytes;
+            tally.lines += issue.lines.len() as u64;
+            for line in issue.lines {
+                let is_near = l1.access(line);
+                tally.l1_hits += u64::from(is_near);
+                tally.l2_hits += u64::from(!is_near && l2.access(line));
+            }
+            warps.push_back(warp);
+        }
+    }
+    groups.into_iter().map(|(_, _, tallies)| tallies).collect()
+}
+
+/// The next warp of a group with what it issues; warps that are done are dropped on the way.
+fn next(warps: &mut VecDeque<Queue>) -> Option<(Queue, (u32, Issue))> {
+    loop {
+        let mut warp = warps.pop_front()?;
+        if let Some(issue) = warp.issues.pop_front() {
+            return Some((warp, issue));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coherence::Fetch;
+    use Kind::{Node, Triangle};
+    use raystone_core::random::Pcg32;
+    use raystone_record::Tally;
+
+    /// A lane that fetches 4 bytes at each of these addresses, step by step.
+    fn lane(steps: &[(Kind, u64)]) -> Option<Trace> {
+        let fetch = |first| vec![Fetch { first, bytes: 4 }];
+        Some(Trace::of(
+            steps.iter().map(|(kind, at)| (*kind, fetch(*at))),
+        ))
+    }
+
+    fn pass(class: u32, lanes: Vec<Option<Trace>>) -> Pass {
+        Pass { class, lanes }
+    }
+
+    fn machine(line_bytes: u64, [l1, l2]: [u64; 2]) -> Machine {
+        let cache = |lines| CacheShape { lines, ways: 0 };
+        Machine {
+            rule: Rule::Loop,
+            line_bytes,
+            l1: cache(l1),
+            l2: cache(l2),
+        }
+    }
+
+    #[test]
+    fn two_groups_of_four_lanes_are_what_paper_and_pencil_say() {
+        let first = Warp {
+            passes: vec![
+                pass(
+                    0,
+                    vec![
+                        lane(&[(Node, 0), (Triangle, 64)]),
+                        lane(&[(Node, 4), (Node, 20)]),
+                        None,
+                        lane(&[(Node, 32)]),
+                    ],
+                ),
+                pass(2, vec![None, lane(&[(Node, 32)]), None, None]),
+            ],
+        };
+        let second = Warp {
+            passes: vec![pass(
+                1,
+                vec![lane(&[(Node, 0), (Node, 8)]), None, None, None],
+            )],
+        };
+        // Lines of 16 bytes; an L1 holds two, the L2 three.
+        // Turn 1: the first group visits: lines 0 and 2, both from memory. The second: line 0, from the L2.
+        // Turn 2: a triangle, line 4, in the place of line 0 of the first L1. The second group: line 0 again, in its L1.
+        // Turn 3: line 1, in the place of line 2 in the L1 and in the L2, where 0 was used later than 2.
+        // Turn 4: line 2, which is in neither any more.
+        let tallies = run(&machine(16, [2, 3]), &[vec![first], vec![second]]);
+        let expected = [
+            Tally {
+                rays: 3,
+                nodes: 4,
+                triangles: 1,
+                issues: 3,
+                active: 5,
+                lanes: 12,
+                bytes: 20,
+                lines: 4,
+                l1_hits: 0,
+                l2_hits: 0,
+            },
+            Tally {
+                rays: 1,
+                nodes: 2,
+                triangles: 0,
+                issues: 2,
+                active: 2,
+                lanes: 8,
+                bytes: 8,
+                lines: 2,
+                l1_hits: 1,
+                l2_hits: 1,
+            },
+            Tally {
+                rays: 1,
+                nodes: 1,
+                triangles: 0,
+                issues: 1,
+                active: 1,
+                lanes: 4,
+                bytes: 4,
+                lines: 1,
+                l1_hits: 0,
+                l2_hits: 0,
+            },
+        ];
+        assert_eq!(tallies, (0..).zip(expected).collect());
+    }
+
+    #[test]
+    fn warps_of_a_group_take_turns_at_their_cache() {
+        let warp = |at| Warp {
+            passes: vec![pass(0, vec![lane(&[(Node, at), (Node, at)])])],
+        };
+        // Lines 0, 1, 0, 1 through a cache of one line; one warp after the other would hit twice.
+        let hits = |l1| run(&machine(16, [l1, 8]), &[vec![warp(0), warp(16)]])[&0].l1_hits;
+        assert_eq!((hits(1), hits(2)), (0, 2));
+    }
+
+    /// Rays of a few steps at random addresses, some lanes without one.
+    fn random_groups(random: &mut Pcg32) -> Vec<Vec<Warp>> {
+        let mut some_lane = |_| {
+            let count = random.below(12);
+            let mut step = |_| {
+                let kind = if random.below(3) == 0 { Triangle } else { Node };
+                let first = 16 * random.below(400) as u64;
+                (kind, vec![Fetch { first, bytes: 48 }])
+            };
+            let steps: Vec<_> = (0..count).map(&mut step).collect();
+            (count > 0).then(|| Trace::of(steps))
+        };
+        let mut warp = |class| Warp {
+            passes: vec![pass(class, (0..32).map(&mut some_lane).collect())],
+        };
+        (0..3).map(|_| (0..4).map(&mut warp).collect()).collect()
+    }
+
+    #[test]
+    fn what_must_hold_of_any_rays_holds() {
+        let mut random = Pcg32::new(11);
+        for _ in 0..20 {
+            let groups = random_groups(&mut random);
+            let tallies = run(&machine(128, [16, 40]), &groups);
+            let boundless = run(&machine(128, [1 << 20, 1 << 20]), &groups);
+            let traces = groups.iter().flatten().flat_map(|w| &w.passes);
+            let traces: Vec<&Trace> = traces.flat_map(|p| p.lanes.iter().flatten()).collect();
+            let sum = |f: fn(&Tally) -> u64| tallies.values().map(f).sum::<u64>();
+            let steps: usize = traces.iter().map(|t| t.steps.len()).sum();
+            assert_eq!(sum(|t| t.active), steps as u64);
+            assert_eq!(sum(|t| t.nodes + t.triangles), steps as u64);
+            assert_eq!(sum(|t| t.lanes), 32 * sum(|t| t.issues));
+            let fetches = traces.iter().flat_map(|t| &t.fetches);
+            let bytes: u64 = fetches.clone().map(|f| u64::from(f.bytes)).sum();
+            assert_eq!(sum(|t| t.bytes), bytes);
+            let unique: std::collections::BTreeSet<u64> =
+                fetches.clone().flat_map(|f| f.lines(128)).collect();
+            assert!(bytes >= 48 && sum(|t| t.lines) >= unique.len() as u64);
+            // A cache that holds everything misses each line once, in each group and in all.
+            let misses: u64 = boundless.values().map(Tally::misses).sum();
+            assert_eq!(misses, unique.len() as u64);
+            let l1_hits = |t: &std::collections::BTreeMap<u32, Tally>| {
+                t.values().map(|t| t.l1_hits).sum::<u64>()
+            };
+            assert!(l1_hits(&tallies) < l1_hits(&boundless));
+            // Each group has what its own warps issue, and together they are all.
+            let of_groups = run_groups(&machine(128, [16, 40]), &groups);
+            assert_eq!(together(&of_groups), tallies);
+            for (tally, warps) in of_groups.iter().zip(&groups) {
+                let passes = warps.iter().flat_map(|w| &w.passes);
+                let own = passes.flat_map(|p| p.lanes.iter().flatten());
+                let steps: usize = own.map(|t| t.steps.len()).sum();
+                assert_eq!(tally.values().map(|t| t.active).sum::<u64>(), steps as u64);
+            }
+            // Lanes that change places change nothing: a step is what they do together.
+            let mut turned = groups.clone();
+            let lanes = turned.iter_mut().flatten().flat_map(|w| &mut w.passes);
+            lanes.for_each(|p| p.lanes.reverse());
+            assert_eq!(run(&machine(128, [16, 40]), &turned), tallies);
+            // Those that change warps do.
+            let mut mixed = groups.clone();
+            for group in &mut mixed {
+                let (a, b) = (
+                    group[0].passes[0].lanes[5].take(),
+                    group[1].passes[0].lanes[9].take(),
+                );
+                group[0].passes[0].lanes[5] = b;
+                group[1].passes[0].lanes[9] = a;
+            }
+            assert_eq!(
+                run(&machine(128, [16, 40]), &mixed)
+                    .values()
+                    .map(|t| t.active)
+                    .sum::<u64>(),
+                steps as u64
+            );
+        }
+    }
+
+    #[test]
+    fn equal_rays_are_wholly_efficient_and_a_lonely_one_is_a_thirty_second() {
+        let ray = || lane(&[(Node, 0), (Triangle, 64), (Node, 128), (Node, 320)]);
+        let tally = |lanes: Vec<Option<Trace>>| {
+            let warp = Warp {
+                passes: vec![pass(0, lanes)],
+            };
+            run(&machine(128, [8, 8]), &[vec![warp]])[&0]
+        };
+        let equal = tally((0..32).map(|_| ray()).collect());
+        assert_eq!((equal.efficiency(), equal.lines), (Some(1.0), 4));
+        let mut lanes = vec![None; 32];
+        lanes[17] = ray();
+        let lonely = tally(lanes);
+        assert_eq!((lonely.efficiency(), lonely.issues), (Some(1.0 / 32.0), 4));
+    }
+}

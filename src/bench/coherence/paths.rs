@@ -1,0 +1,304 @@
+//! The rays that lanes trace: those of single paths, drawn with the words of the sampler by the oracle for
+//! images, which knows what the integrators do ([`raystone_verify::path_oracle`]).
+//!
+//! They are computed in f64 and rounded to f32 once. Where the system's sines differ in their last bit, a ray differs only
+//! if that bit decides its rounding, once in 10⁸ numbers or so.
+
+use super::trace::{Trace, trace_of};
+use super::{Memory, Pass, Warp};
+use rayon::prelude::*;
+use raystone_accel::{CpuTwin, Query, Ray};
+use raystone_render::{CountedRays, RAY_COUNT_CLASSES};
+use raystone_sampling::paired;
+use raystone_verify::path_oracle::{self, PathId, PathOracle, PathRay, Rounding};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Edge of a workgroup of the image kernel, pixels.
+pub const WORKGROUP: u32 = 8;
+
+/// The golden ratio less 1, and a half, as fractions of 2³².
+const GOLDEN: u32 = 0x9e37_79b9;
+const HALF: u32 = 0x8000_0000;
+
+/// Rays start off their surface by this fraction of the scene's diagonal.
+const OFFSET: f64 = 1e-5;
+
+/// A shadow ray ends so much before its light that it does not meet it.
+const BEFORE_LIGHT: f64 = 0.9999;
+
+/// What rays are for, and after how many bounces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RayClass {
+    /// Bounces before.
+    pub depth: u32,
+    /// What for.
+    pub rays: CountedRays,
+}
+
+impl RayClass {
+    const KINDS: [CountedRays; 4] = [
+        CountedRays::Primary,
+        CountedRays::Bounce,
+        CountedRays::Shadow,
+        CountedRays::Ao,
+    ];
+
+    /// As passes are marked with it; what is traced first has a lower word.
+    pub fn word(self) -> u32 {
+        let kind = Self::KINDS.iter().position(|kind| *kind == self.rays);
+        self.depth * 4 + kind.unwrap_or_default() as u32
+    }
+
+    /// The class that is marked so.
+    pub fn of_word(word: u32) -> Self {
+        Self {
+            depth: word / 4,
+            rays: Self::KINDS[word as usize % 4],
+        }
+    }
+}
+
+/// `primary`, `bounce 1`, `shadow 0` (from the first point), …
+impl fmt::Display for RayClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = RAY_COUNT_CLASSES[self.rays as usize];
+        match self.rays {
+            CountedRays::Primary | CountedRays::Ao => f.write_str(name),
+            _ => write!(f, "{name} {}", self.depth),
+        }
+    }
+}
+
+/// The pixel of each lane of a warp; `None` beside the image.
+pub type Pixels = Vec<Option<[u32; 2]>>;
+
+/// The warps of some groups. Each group is so many warps one after the other, in the order of workgroups and of lanes within
+/// them; the first of each are spread over the image, by rows evenly and along them by the golden ratio. Groups that hold all of an
+/// image hold each of its warps once. A warp is `[width, height]` lanes, which divide the edges of a workgroup. The pixels of
+/// neighbouring lanes lie `stride` apart: see [`paired`].
+pub fn groups_of(
+    size: [u32; 2],
+    warp: [u32; 2],
+    [groups, warps]: [u32; 2],
+    stride: u32,
+) -> Vec<Vec<Pixels>> {
+    let blocks = size.map(|edge| edge.div_ceil(WORKGROUP * stride) * stride);
+    let of_block = warp.map(|edge| WORKGROUP / edge);
+    let per_block = of_block[0] * of_block[1];
+    let all = blocks[0] * blocks[1] * per_block;
+    let lane = |number: u32, lane: u32| {
+        let (block, within) = (number / per_block, number % per_block);
+        let corner = [
+            block % blocks[0] * WORKGROUP + within % of_block[0] * warp[0],
+            block / blocks[0] * WORKGROUP + within / of_block[0] * warp[1],
+        ];
+        let place = [corner[0] + lane % warp[0], corner[1] + lane / warp[0]];
+        let pixel = paired(place, stride);
+        (pixel[0] < size[0] && pixel[1] < size[1]).then_some(pixel)
+    };
+    let pixels = |number| (0..warp[0] * warp[1]).map(|l| lane(number, l)).collect();
+    let first = |group: u32| match u64::from(groups) * u64::from(warps) >= u64::from(all) {
+        true => group.saturating_mul(warps).min(all),
+        false => {
+            let share =
+                |fraction: u32, of: u32| ((u64::from(fraction) * u64::from(of)) >> 32) as u32;
+            let column = share(group.wrapping_mul(GOLDEN).wrapping_add(HALF), blocks[0]);
+            let row = (2 * u64::from(group) + 1) * u64::from(blocks[1]) / (2 * u64::from(groups));
+            (row as u32 * blocks[0] + column) * per_block
+        }
+    };
+    let group = |index| {
+        let first = first(index);
+        (first..(first + warps).min(all)).map(pixels).collect()
+    };
+    (0..groups).map(group).collect()
+}
+
+/// Where rays come from.
+pub struct View<'a> {
+    /// What traces paths.
+    pub oracle: &'a PathOracle<'a>,
+    /// Of which image.
+    pub image: &'a path_oracle::View<'a>,
+    /// Of the scene, scene units.
+    pub diagonal: f64,
+    /// Samples that are looked at.
+    pub samples: &'a [u32],
+    /// Seed of the replicate.
+    pub seed: u32,
+}
+
+/// A place among the passes of a warp: number of the sample, bounces before, whether any hit is enough, and the light.
+type Place = (u32, u32, bool, u32);
+
+/// The rays of a pass, lane by lane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayPass {
+    /// What they are.
+    pub class: RayClass,
+    /// What is asked.
+    pub query: Query,
+    /// One for each lane, `None` where it has none.
+    pub lanes: Vec<Option<Ray>>,
+}
+
+/// The rays of groups of warps: passes of each warp.
+pub struct Rays {
+    /// Group by group, warp by warp; the warps of a group have the same passes.
+    pub groups: Vec<Vec<Vec<RayPass>>>,
+    /// Paths that they are of.
+    pub paths: u64,
+}
+
+impl Rays {
+    /// The rays of these pixels.
+    pub fn new(view: &View, groups: &[Vec<Pixels>]) -> Self {
+        let rays = groups.par_iter().map(|group| of_group(view, group));
+        let pixels = groups.iter().flatten().flatten().flatten().count();
+        Self {
+            groups: rays.collect(),
+            paths: (pixels * view.samples.len()) as u64,
+        }
+    }
+
+    /// What a structure does for them.
+    ///
+    /// # Errors
+    /// As [`trace_of`].
+    pub fn through(&self, twin: &dyn CpuTwin, memory: &Memory) -> Result<Vec<Vec<Warp>>, String> {
+        let lane = |query, ray: &Option<Ray>| -> Result<Option<Trace>, String> {
+            ray.map(|ray| trace_of(twin, memory, &ray, query))
+                .transpose()
+        };
+        let pass = |pass: &RayPass| -> Result<Pass, String> {
+            let lanes = pass.lanes.iter().map(|ray| lane(pass.query, ray));
+            Ok(Pass {
+                class: pass.class.word(),
+                lanes: lanes.collect::<Result<_, _>>()?,
+            })
+        };
+        let warp = |passes: &Vec<RayPass>| -> Result<Warp, String> {
+            let passes = passes.iter().map(pass).collect::<Result<_, _>>()?;
+            Ok(Warp { passes })
+        };
+        let group = |warps: &Vec<Vec<RayPass>>| warps.par_iter().map(warp).collect();
+        self.groups.par_iter().map(group).collect()
+    }
+}
+
+fn of_group(view: &View, warps: &[Pixels]) -> Vec<Vec<RayPass>> {
+    // Passes that any lane takes part in; the others of the group wait in them.
+    let mut classes: BTreeMap<Place, RayClass> = BTreeMap::new();
+    let mut rays: Vec<Vec<BTreeMap<Place, Ray>>> = Vec::new();
+    for pixels in warps {
+        let lane = |pixel: &Option<[u32; 2]>| pixel.map_or_else(Vec::new, |p| of_pixel(view, p));
+        let lanes: Vec<_> = pixels.par_iter().map(lane).collect();
+        for (place, class, _) in lanes.iter().flatten() {
+            classes.insert(*place, *class);
+        }
+        let by_place = |lane: Vec<(Place, RayClass, Ray)>| {
+            lane.into_iter()
+                .map(|(place, _, ray)| (place, ray))
+                .collect()
+        };
+        rays.push(lanes.into_iter().map(by_place).collect());
+    }
+    let of_warp = |lanes: Vec<BTreeMap<Place, Ray>>| {
+        let pass = |(place, class): (&Place, &RayClass)| RayPass {
+            class: *class,
+            query: if place.2 { Query::Any } else { Query::Closest },
+            lanes: lanes.iter().map(|lane| lane.get(place).copied()).collect(),
+        };
+        classes.iter().map(pass).collect()
+    };
+    rays.into_iter().map(of_warp).collect()
+}
+
+/// All rays of a pixel.
+fn of_pixel(view: &View, pixel: [u32; 2]) -> Vec<(Place, RayClass, Ray)> {
+    let mut rays = Vec::new();
+    for (number, &sample) in (0..).zip(view.samples) {
+        let id = PathId {
+            pixel,
+            sample,
+            seed: view.seed,
+        };
+        let path = view.oracle.trace(view.image, id, Rounding::none());
+        rays.extend(path.rays.iter().map(|ray| {
+            let class = RayClass {
+                depth: ray.depth,
+                rays: ray.class,
+            };
+            let is_any = matches!(ray.class, CountedRays::Shadow | CountedRays::Ao);
+            let place = (number, ray.depth, is_any, ray.light);
+            (place, class, for_structure(ray, view.diagonal))
+        }));
+    }
+    rays
+}
+
+/// The ray in f32, moved off the surface that it leaves.
+fn for_structure(ray: &PathRay, diagonal: f64) -> Ray {
+    let side = ray.direction.dot(ray.normal).signum();
+    let origin = ray.origin + ray.normal * (side * OFFSET * diagonal);
+    let length = match ray.class {
+        CountedRays::Shadow => ray.length * BEFORE_LIGHT,
+        _ => ray.length,
+    };
+    Ray::new(origin.as_vec3(), ray.direction.as_vec3()).between(0.0, length as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_have_the_pixels_that_the_image_kernel_gives_them() {
+        // Workgroups of 8 × 8: a warp of 32 is the upper or the lower half of one.
+        let all = groups_of([20, 8], [8, 4], [1, 6], 1);
+        assert_eq!((all.len(), all[0].len()), (1, 6));
+        assert_eq!(all[0][0][0], Some([0, 0]));
+        assert_eq!(all[0][0][31], Some([7, 3]));
+        assert_eq!(all[0][1][0], Some([0, 4]));
+        assert_eq!(all[0][2][9], Some([9, 1]));
+        // The third workgroup reaches beyond the image by four columns.
+        assert_eq!(all[0][4].iter().flatten().count(), 16);
+        assert_eq!(all[0][4][3..5], [Some([19, 0]), None]);
+        // Another shape of the same size gives other neighbours.
+        assert_eq!(groups_of([20, 8], [4, 8], [1, 6], 1)[0][0][4], Some([0, 1]));
+    }
+
+    #[test]
+    fn groups_are_spread_over_the_image_and_hold_each_warp_once_where_they_hold_all() {
+        let groups = groups_of([64, 64], [8, 4], [4, 2], 1);
+        assert!(groups.iter().all(|group| group.len() == 2));
+        let first: Vec<_> = groups.iter().map(|group| group[0][0]).collect();
+        // Rows 1, 3, 5, 7 of workgroups; columns ½, ½ + φ, … of eight, without the whole part.
+        let corners = [[32, 8], [0, 24], [40, 40], [16, 56]];
+        assert_eq!(first, corners.map(Some));
+        for (count, stride) in [([4, 32], 1), ([3, 50], 1), ([200, 1], 1), ([4, 32], 8)] {
+            let all: Vec<_> = groups_of([64, 64], [8, 4], count, stride).concat();
+            let pixels: std::collections::BTreeSet<_> = all.iter().flatten().flatten().collect();
+            assert_eq!((all.len(), pixels.len()), (128, 64 * 64), "{count:?}");
+        }
+        // Sparse: lanes lie eight pixels apart, and an image that ends within a tile is held as a whole.
+        let sparse = groups_of([80, 8], [8, 4], [1, 256], 8).concat();
+        assert_eq!(sparse[0][..3], [Some([0, 0]), Some([8, 0]), Some([16, 0])]);
+        let pixels: std::collections::BTreeSet<_> = sparse.iter().flatten().flatten().collect();
+        assert_eq!(pixels.len(), 80 * 8);
+    }
+
+    #[test]
+    fn a_class_is_known_by_its_word() {
+        for rays in RayClass::KINDS {
+            let class = RayClass { depth: 3, rays };
+            assert_eq!(RayClass::of_word(class.word()), class);
+        }
+        let shadow = RayClass {
+            depth: 2,
+            rays: CountedRays::Shadow,
+        };
+        assert_eq!(shadow.to_string(), "shadow 2");
+    }
+}

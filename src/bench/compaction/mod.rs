@@ -1,0 +1,241 @@
+//! Compactions of streams: judged word by word, then timed in interleaved rounds.
+//!
+//! Nothing is compared with a hand-written answer of one method: what should stay follows from the flags. Before each
+//! turn the count is set to a wrong number and what stayed is wiped out; after it, outside of what is timed, two sums
+//! over what stays are formed on the device and compared with the host's.
+
+pub mod stream;
+
+use crate::timing::Measured;
+use raystone_config::COMPACTIONS;
+use raystone_core::parameters;
+use raystone_core::params::{Entry, Parameters as _, Variant};
+use raystone_gpu::compaction::{Compaction, CompactionRegistry, Order, Passes, Stays, Stream};
+use raystone_gpu::{
+    Bindings, Composition, Elapsed, Gpu, GpuError, Player, Recording, Storage, grid_of,
+};
+use std::sync::Arc;
+
+parameters! {
+    /// What is compacted.
+    pub(crate) struct Load {
+        /// elements of the stream
+        elements: u32 = 1 << 20, in 1..=1 << 24;
+        /// share of elements that stay, each drawn by itself
+        valid: f64 = 0.5, in 0.0..=1.0;
+        /// bytes of an element, a multiple of 4
+        bytes: u32 = 16, in 4..=64;
+    }
+}
+
+/// The compactions as they are named on the axis of integrators: parameters of the stream come before their own.
+pub(crate) fn benches(registry: &CompactionRegistry) -> impl Iterator<Item = Entry> {
+    registry.0.entries().into_iter().map(|entry| Entry {
+        name: format!("{COMPACTIONS}{}", entry.name),
+        description: entry.description,
+        schema: Load::schema().into_iter().chain(entry.schema).collect(),
+    })
+}
+
+impl Load {
+    /// The stream that a variant of [`benches`] asks for; at its defaults where it asks for none.
+    pub(crate) fn of(variant: &Variant) -> Self {
+        Self::read(&variant.params).unwrap_or_default()
+    }
+}
+
+/// The method that a variant of [`benches`] names.
+///
+/// # Errors
+/// It is not registered, or has other parameters; in words.
+pub(crate) fn benched(
+    registry: &CompactionRegistry,
+    variant: &Variant,
+) -> Result<Arc<dyn Compaction>, String> {
+    let mut method = variant.clone();
+    method.name = variant.name.trim_start_matches(COMPACTIONS).to_owned();
+    let of_stream = Load::schema();
+    let is_own = |name: &String| of_stream.iter().all(|parameter| parameter.name != name);
+    method.params.0.retain(|name, _| is_own(name));
+    registry.configured(&method)
+}
+
+/// Invocations of a workgroup of the kernel that looks at what stayed.
+const DIGEST_LANES: u32 = 256;
+/// What stands in the count before a method has counted.
+const NOT_COUNTED: u32 = 0xdead_beef;
+
+/// Streams on the device, the longest of each kind; shorter ones are their beginnings.
+pub struct Inputs {
+    /// Flags on the host.
+    pub flags: Vec<u32>,
+    flags_there: Storage,
+    elements: Storage,
+    bytes: u32,
+}
+
+impl Inputs {
+    /// Uploads flags, and elements of so many bytes with them.
+    ///
+    /// # Errors
+    /// They are larger than the adapter binds, or have no whole words.
+    pub fn upload(gpu: &Gpu, flags: Vec<u32>, bytes: u32) -> Result<Self, GpuError> {
+        if bytes == 0 || !bytes.is_multiple_of(4) {
+            let text = format!("an element of {bytes} bytes has no whole words of 4 bytes");
+            return Err(GpuError::Kernel(text));
+        }
+        let elements = stream::elements(flags.len() as u32, bytes);
+        Ok(Self {
+            flags_there: (&gpu.storage("flags", &flags)?).into(),
+            elements: (&gpu.storage("elements", &elements)?).into(),
+            flags,
+            bytes,
+        })
+    }
+}
+
+/// A compaction of a stream, recorded: it can be judged, and timed again and again.
+pub struct Bench {
+    player: Arc<Player>,
+    method: Arc<dyn Compaction>,
+    flags: Vec<u32>,
+    bytes: u32,
+    /// Sets what the method has to write to what it is not.
+    prepare: Recording,
+    compact: Recording,
+    /// Brings the count, and two sums over what stayed.
+    look: Recording,
+    kept: Storage,
+    digest: [u32; 2],
+    /// Elements that stay.
+    pub kept_elements: u32,
+    /// Kernels that run.
+    pub runs: u32,
+    /// Bytes of the buffers between them.
+    pub scratch_bytes: u64,
+}
+
+impl Bench {
+    /// Records `method` over the first `length` elements of the inputs, with room for `capacity`.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, or a buffer is larger than the adapter binds.
+    pub fn new(
+        player: &Arc<Player>,
+        gpu: &Gpu,
+        method: Arc<dyn Compaction>,
+        inputs: &Inputs,
+        [length, capacity]: [u32; 2],
+    ) -> Result<Self, GpuError> {
+        let bytes = inputs.bytes;
+        let kept_bytes = u64::from(capacity.max(1)) * u64::from(bytes);
+        let stream = Stream {
+            capacity,
+            element_bytes: bytes,
+            length: (&gpu.storage("stream_length", &[length])?).into(),
+            flags: inputs.flags_there.clone(),
+            stays: Stays::All,
+            elements: inputs.elements.clone(),
+            kept: Storage::scratch(&format!("kept {kept_bytes}"), kept_bytes),
+            count: Storage::scratch("kept count", 4),
+        };
+        let mut compact = Recording::new();
+        let mut passes = Passes::new(gpu, &mut compact, &stream);
+        method.record(&mut passes)?;
+        let (runs, scratch_bytes) = (passes.runs, passes.scratch_bytes);
+        let flags = inputs.flags[..length as usize].to_vec();
+        let expected = stream::expected(&flags, &*method);
+        let not_counted: Storage = (&gpu.storage("not counted", &[NOT_COUNTED; 4])?).into();
+        let mut prepare = Recording::new();
+        prepare
+            .copy(&not_counted, &stream.count)
+            .clear(&stream.kept);
+        Ok(Self {
+            player: Arc::clone(player),
+            look: look(gpu, &stream)?,
+            kept: stream.kept,
+            digest: stream::digest(&expected, bytes),
+            kept_elements: expected.len() as u32,
+            method,
+            flags,
+            bytes,
+            prepare,
+            compact,
+            runs,
+            scratch_bytes,
+        })
+    }
+
+    /// Bytes that any method has to move: flags once, and what stays once from and once to memory.
+    pub fn least_bytes(&self) -> u64 {
+        let flags = match self.method.order() {
+            Order::WithHoles => 0,
+            _ => 4 * self.flags.len() as u64,
+        };
+        flags + 2 * u64::from(self.bytes) * u64::from(self.kept_elements)
+    }
+
+    /// What is wrong with what the method makes of the stream, word by word; `None` if nothing is.
+    ///
+    /// # Errors
+    /// The device does not play it.
+    pub fn judge(&self) -> Result<Option<String>, GpuError> {
+        self.player.play(&self.prepare)?;
+        self.player.play(&self.compact)?;
+        let mut look = self.look.clone();
+        let played = self.player.play(look.download("kept", &self.kept))?;
+        let count = played.download::<u32>("count")?[0];
+        let kept: Vec<u32> = played.download("kept")?;
+        let found = (count, &kept[..]);
+        let fault = stream::fault(&self.flags, self.bytes, &*self.method, found);
+        // The sums that every turn is judged by have to say the same.
+        let sums: Vec<u32> = played.download("digest")?;
+        Ok(fault.or_else(|| self.differs(count, &sums)))
+    }
+
+    fn differs(&self, count: u32, sums: &[u32]) -> Option<String> {
+        let ordered = self.method.order() != Order::Any;
+        let equal = sums[0] == self.digest[0] && (!ordered || sums[1] == self.digest[1]);
+        (count != self.kept_elements || !equal).then(|| {
+            format!(
+                "a turn left {count} elements with the sums {sums:?}, not {} with {:?}",
+                self.kept_elements, self.digest
+            )
+        })
+    }
+}
+
+/// Two sums over what stays, and the count.
+fn look(gpu: &Gpu, stream: &Stream) -> Result<Recording, GpuError> {
+    let digest = Storage::scratch("digest", 16);
+    let kernel = Composition::new("compaction/digest").constant("SCAN_LANES", DIGEST_LANES);
+    let kernel = stream.seen_by(kernel);
+    let mut bindings = Bindings::new();
+    bindings
+        .buffer("kept", &stream.kept)
+        .buffer("kept_count", &stream.count)
+        .buffer("digest", &digest);
+    let groups = grid_of(stream.capacity.div_ceil(DIGEST_LANES));
+    let mut recording = Recording::new();
+    recording
+        .clear(&digest)
+        .run("digest", &gpu.pipeline(&kernel, true)?, &bindings, groups)
+        .download("digest", &digest)
+        .download("count", &stream.count);
+    Ok(recording)
+}
+
+impl Measured for Bench {
+    /// The time of the method alone.
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        self.player.play(&self.prepare)?;
+        let elapsed = self.player.play(&self.compact)?.elapsed();
+        let played = self.player.play(&self.look)?;
+        let count = played.download::<u32>("count")?[0];
+        let sums: Vec<u32> = played.download("digest")?;
+        match self.differs(count, &sums) {
+            Some(fault) => Err(GpuError::Kernels(fault)),
+            None => Ok(elapsed),
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! Runs: what experiments measure, how often, in which order, and the records of it.
+#![warn(missing_docs)]
+
+pub mod animation;
+pub mod coherence;
+pub mod compaction;
+pub mod environment;
+pub mod figure_registry;
+pub mod memory;
+pub mod peers;
+pub mod run;
+pub mod sampler_cost;
+pub mod spectrum;
+pub mod stopping;
+pub mod stream;
+pub mod timing;
+pub mod words;

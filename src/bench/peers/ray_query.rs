@@ -1,0 +1,302 @@
+//! The driver's own ray tracing, through wgpu's ray queries, on a device of its own on the same adapter.
+
+use super::{BuiltPeer, Peer, PeerBatch};
+use raystone_accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
+use raystone_core::clock::Instant;
+use raystone_gpu::{Elapsed, Gpu, GpuError, RawDevice, Stopwatch};
+use std::cell::RefCell;
+use std::num::NonZeroU64;
+use wgpu::util::DeviceExt as _;
+
+/// A workgroup of the kernel.
+const LANES: u32 = 64;
+/// Rays of a dispatch: software adapters take some microseconds for one, and a dispatch of seconds looks like a hang.
+const SLICE: usize = 1 << 16;
+const KERNEL: &str = include_str!("ray_query.wgsl");
+
+/// The registry entry `ray-query`.
+pub(super) struct RayQuery;
+
+struct Built {
+    raw: RawDevice,
+    tlas: wgpu::Tlas,
+    /// What the tree refers to.
+    _blas: wgpu::Blas,
+    pipelines: [wgpu::ComputePipeline; 2],
+    build_ms: f64,
+}
+
+struct Batch<'a> {
+    built: &'a Built,
+    rays: &'a [Ray],
+    pipeline: &'a wgpu::ComputePipeline,
+    /// Of each slice, with its number of rays.
+    slices: Vec<(wgpu::BindGroup, u32)>,
+    answers: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    hits: RefCell<Vec<Hit>>,
+}
+
+impl Peer for RayQuery {
+    fn name(&self) -> &'static str {
+        "ray-query"
+    }
+
+    fn description(&self) -> &'static str {
+        "the driver's own ray tracing, where the adapter has ray queries; scenes without cut-outs"
+    }
+
+    fn build<'a>(
+        &self,
+        gpu: &Gpu,
+        soup: &'a TriangleSoup,
+    ) -> Result<Box<dyn BuiltPeer + 'a>, String> {
+        if soup.masks.is_some() {
+            return Err("surfaces of this scene are cut out by masks, which the driver's triangles do not know".into());
+        }
+        let feature = wgpu::Features::EXPERIMENTAL_RAY_QUERY;
+        let raw = gpu.open_beside(feature).map_err(|e| e.to_string())?;
+        let vertices: Vec<[[f32; 3]; 3]> = soup.records.iter().map(|r| r.vertices()).collect();
+        let start = Instant::now();
+        let (blas, tlas) = build_tree(&raw, &vertices);
+        raw.wait().map_err(|e| e.to_string())?;
+        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let module = raw
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("ray query"),
+                source: wgpu::ShaderSource::Wgsl(KERNEL.into()),
+            });
+        let pipeline = |entry: &str| {
+            raw.device
+                .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                    label: Some(entry),
+                    layout: None,
+                    module: &module,
+                    entry_point: Some(entry),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    cache: None,
+                })
+        };
+        let pipelines = [pipeline("nearest_hit"), pipeline("any_hit")];
+        raw.wait().map_err(|e| e.to_string())?;
+        Ok(Box::new(Built {
+            raw,
+            tlas,
+            _blas: blas,
+            pipelines,
+            build_ms,
+        }))
+    }
+}
+
+fn build_tree(raw: &RawDevice, vertices: &[[[f32; 3]; 3]]) -> (wgpu::Blas, wgpu::Tlas) {
+    let device = &raw.device;
+    let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("vertices"),
+        contents: bytemuck::cast_slice(vertices),
+        usage: wgpu::BufferUsages::BLAS_INPUT,
+    });
+    let size = wgpu::BlasTriangleGeometrySizeDescriptor {
+        vertex_format: wgpu::VertexFormat::Float32x3,
+        vertex_count: 3 * vertices.len() as u32,
+        index_format: None,
+        index_count: None,
+        flags: wgpu::AccelerationStructureGeometryFlags::OPAQUE,
+    };
+    let blas = device.create_blas(
+        &wgpu::CreateBlasDescriptor {
+            label: Some("triangles"),
+            flags: wgpu::AccelerationStructureFlags::PREFER_FAST_TRACE,
+            update_mode: wgpu::AccelerationStructureUpdateMode::Build,
+        },
+        wgpu::BlasGeometrySizeDescriptors::Triangles {
+            descriptors: vec![size.clone()],
+        },
+    );
+    let mut tlas = device.create_tlas(&wgpu::CreateTlasDescriptor {
+        label: Some("scene"),
+        max_instances: 1,
+        flags: wgpu::AccelerationStructureFlags::PREFER_FAST_TRACE,
+        update_mode: wgpu::AccelerationStructureUpdateMode::Build,
+    });
+    let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    tlas[0] = Some(wgpu::TlasInstance::new(&blas, identity, 0, 0xff));
+    let geometry = wgpu::BlasTriangleGeometry {
+        size: &size,
+        vertex_buffer: &buffer,
+        first_vertex: 0,
+        vertex_stride: 12,
+        index_buffer: None,
+        first_index: None,
+        transform_buffer: None,
+        transform_buffer_offset: None,
+    };
+    let entry = wgpu::BlasBuildEntry {
+        blas: &blas,
+        geometry: wgpu::BlasGeometries::TriangleGeometries(vec![geometry]),
+    };
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.build_acceleration_structures([&entry], [&tlas]);
+    raw.queue.submit([encoder.finish()]);
+    (blas, tlas)
+}
+
+impl BuiltPeer for Built {
+    fn about(&self) -> String {
+        format!("ray queries of {}", self.raw.adapter)
+    }
+
+    fn build_ms(&self) -> f64 {
+        self.build_ms
+    }
+
+    fn batch<'a>(
+        &'a self,
+        query: Query,
+        rays: &'a [Ray],
+    ) -> Result<Box<dyn PeerBatch + 'a>, String> {
+        let device = &self.raw.device;
+        let bytes = (16 * rays.len().max(1)) as u64;
+        let limit = device.limits().max_storage_buffer_binding_size;
+        if 2 * bytes > limit {
+            return Err(format!(
+                "{} rays need {} bytes in one buffer, the adapter binds {limit}",
+                rays.len(),
+                2 * bytes
+            ));
+        }
+        // What is no ray has no direction; the kernel must not be asked.
+        let words = rays.iter().map(|ray| match ray.is_ray() {
+            true => [
+                ray.origin,
+                [ray.t_min, 0.0, 0.0],
+                ray.direction,
+                [ray.t_max.min(f32::MAX), 0.0, 0.0],
+            ],
+            false => [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]],
+        });
+        let words: Vec<[f32; 8]> = words
+            .map(|[o, a, d, b]| [o[0], o[1], o[2], a[0], d[0], d[1], d[2], b[0]])
+            .collect();
+        let asked = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("rays"),
+            contents: bytemuck::cast_slice(&words),
+            usage: wgpu::BufferUsages::STORAGE,
+        });
+        let buffer = |label, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: bytes,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let answers = buffer(
+            "answers",
+            wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
+        );
+        let staging = buffer(
+            "staging",
+            wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        );
+        let pipeline = &self.pipelines[usize::from(query == Query::Any)];
+        let bind = |first: usize| {
+            let count = SLICE.min(rays.len() - first);
+            let part = |buffer, bytes: usize| {
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer,
+                    offset: (first * bytes) as u64,
+                    size: NonZeroU64::new((count * bytes) as u64),
+                })
+            };
+            let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &[
+                    entry(0, self.tlas.as_binding()),
+                    entry(1, part(&asked, 32)),
+                    entry(2, part(&answers, 16)),
+                ],
+            });
+            (group, count as u32)
+        };
+        let slices = (0..rays.len()).step_by(SLICE).map(bind).collect();
+        Ok(Box::new(Batch {
+            built: self,
+            rays,
+            pipeline,
+            slices,
+            answers,
+            staging,
+            hits: RefCell::default(),
+        }))
+    }
+}
+
+impl PeerBatch for Batch<'_> {
+    fn trace(&self) -> Result<Elapsed, GpuError> {
+        let raw = &self.built.raw;
+        let encoder = || {
+            raw.device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+        };
+        let mut wipe = encoder();
+        wipe.clear_buffer(&self.answers, 0, None);
+        raw.queue.submit([wipe.finish()]);
+        raw.wait()?;
+        let watch = Stopwatch::start();
+        for (group, rays) in &self.slices {
+            let mut commands = encoder();
+            {
+                let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                pass.set_pipeline(self.pipeline);
+                pass.set_bind_group(0, group, &[]);
+                pass.dispatch_workgroups(rays.div_ceil(LANES), 1, 1);
+            }
+            raw.queue.submit([commands.finish()]);
+            raw.wait()?;
+        }
+        let elapsed = watch.elapsed();
+        let words = self.answers()?;
+        let hit = |(ray, [kind, t, id, _]): (&Ray, &[u32; 4])| match kind {
+            // 1 is what the kernel writes for a miss; 0 stands where it wrote nothing, and is no answer.
+            1 => Hit::miss(ray),
+            _ => Hit {
+                t: f32::from_bits(*t),
+                triangle: if *kind == 2 { *id } else { NO_HIT - 1 },
+                ..Hit::miss(ray)
+            },
+        };
+        *self.hits.borrow_mut() = self.rays.iter().zip(&words).map(hit).collect();
+        Ok(elapsed)
+    }
+
+    fn hits(&self) -> Result<Vec<Hit>, GpuError> {
+        Ok(self.hits.borrow().clone())
+    }
+}
+
+impl Batch<'_> {
+    fn answers(&self) -> Result<Vec<[u32; 4]>, GpuError> {
+        let raw = &self.built.raw;
+        let mut commands = raw
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        commands.copy_buffer_to_buffer(&self.answers, 0, &self.staging, 0, None);
+        raw.queue.submit([commands.finish()]);
+        self.staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        raw.wait()?;
+        let read = self
+            .staging
+            .get_mapped_range(..)
+            .map_err(|e| GpuError::Driver(e.to_string()))?;
+        let words = bytemuck::pod_collect_to_vec(&read);
+        drop(read);
+        self.staging.unmap();
+        Ok(words)
+    }
+}

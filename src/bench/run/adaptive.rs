@@ -1,0 +1,151 @@
+//! Adaptive sampling by tile: each takes as many samples as the first ones say that it needs.
+
+use super::errors::{Pass, Replicates, add_error, blank_record, check_finite, draw, replicates};
+use super::session::Session;
+use super::{Fault, reference::Yardstick};
+use raystone_config::{Cell, StopRule};
+use raystone_image::Image;
+use raystone_record::{Body, ErrorRecord, Line};
+use raystone_render::{BLOCK_EDGE, Snapshot};
+use raystone_stats::adaptive::{LEAST_GROUP, Tiles, samples_needed, tile_error};
+
+/// Groups of replicates, each of which decides for the other.
+const GROUPS: usize = 2;
+
+/// All replicates of one sampler, each tile with the samples that it needs. Errors are recorded at the mean number of samples of a
+/// pixel.
+pub(super) fn by_tile(
+    session: &mut Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    pass: &Pass,
+    line: &impl Fn(Body) -> Line,
+    (rule, edge): (StopRule, u32),
+) -> Result<Replicates, Fault> {
+    let tiles = Tiles {
+        size: session.experiment.resolution,
+        edge,
+    };
+    let seeds = replicates(session, cell);
+    if seeds.len() < GROUPS * LEAST_GROUP {
+        return Err(Fault::Cell(format!(
+            "tiles are ended by what {} replicates or more say of each other, and there are {}: raise `run.replicates`",
+            GROUPS * LEAST_GROUP,
+            seeds.len()
+        )));
+    }
+    let mut records: Vec<ErrorRecord> = seeds
+        .iter()
+        .map(|of| blank_record(session, cell, *of))
+        .collect();
+    let mut images: Vec<Image> = Vec::new();
+    let mut needed = vec![vec![pass.spps[0]; tiles.len()]; GROUPS];
+    let mut done = 0;
+    for (step, &spp) in pass.spps.iter().enumerate() {
+        for (index, record) in records.iter().enumerate() {
+            let needed = &needed[index % GROUPS];
+            let further = || further(pass, tiles, needed, (done, spp), record.seed);
+            let image = session.clock.time("gpu", further);
+            let image = image.map_err(|e| e.to_string())?;
+            match images.get_mut(index) {
+                Some(before) => add(before, &image, tiles, needed, (done, spp)),
+                None => images.push(image),
+            }
+        }
+        if step == 0 {
+            needed = decided(&images, tiles, &pass.spps, &rule);
+        }
+        done = spp;
+        let mean = mean_samples(tiles, &needed, done);
+        for (record, image) in records.iter_mut().zip(&images) {
+            record.errors.retain(|at| at.spp < mean);
+            let snapshot = Snapshot {
+                spp: mean,
+                image: image.clone(),
+            };
+            add_error(session, cell, yardstick, record, &snapshot, None)?;
+            check_finite(record)?;
+        }
+    }
+    let spp = mean_samples(tiles, &needed, done);
+    for (mut record, image) in records.into_iter().zip(&images) {
+        record.stop = Some(rule);
+        let snapshot = Snapshot {
+            spp,
+            image: image.clone(),
+        };
+        draw(session, cell, yardstick, &mut record, &snapshot)?;
+        session.write(&line(Body::Error(record)))?;
+        session.progress.add(session.weights.replicate);
+    }
+    Ok(Replicates { spp, images })
+}
+
+/// The samples that the tiles of each group need, by what the other group says.
+fn decided(images: &[Image], tiles: Tiles, counts: &[u32], rule: &StopRule) -> Vec<Vec<u32>> {
+    let of_group = |group: usize| {
+        let others = images.iter().enumerate();
+        let others = others.filter(|(index, _)| index % GROUPS != group);
+        let others: Vec<&Image> = others.map(|(_, image)| image).collect();
+        let needs = |tile| {
+            let error = tile_error(&others, &tiles.pixels(tile));
+            samples_needed(error.as_ref(), counts, rule.relmse, rule.confidence)
+        };
+        (0..tiles.len()).map(needs).collect()
+    };
+    (0..GROUPS).map(of_group).collect()
+}
+
+/// The mean of samples `done` to `spp` in the tiles that need them; black elsewhere.
+fn further(
+    pass: &Pass,
+    tiles: Tiles,
+    needed: &[u32],
+    (done, spp): (u32, u32),
+    seed: u32,
+) -> Result<Image, raystone_gpu::GpuError> {
+    let [columns, rows] = tiles.size.map(|pixels| pixels.div_ceil(BLOCK_EDGE));
+    let all = (0..rows).flat_map(|y| (0..columns).map(move |x| [x, y]));
+    let takes = |[x, y]: &[u32; 2]| {
+        let pixel = (y * BLOCK_EDGE * tiles.size[0] + x * BLOCK_EDGE) as usize;
+        needed[tiles.of_pixel(pixel)] >= spp
+    };
+    let blocks: Vec<[u32; 2]> = all.filter(takes).collect();
+    pass.renderer.only(&blocks);
+    pass.renderer.reset()?;
+    if !blocks.is_empty() {
+        pass.renderer.add_samples(done, spp - done, seed)?;
+    }
+    match blocks.is_empty() {
+        true => Ok(Image {
+            width: tiles.size[0],
+            height: tiles.size[1],
+            pixels: vec![[0.0; 3]; (tiles.size[0] * tiles.size[1]) as usize],
+        }),
+        false => pass.renderer.image(),
+    }
+}
+
+/// Joins the samples before `done` with those up to `spp`, in the tiles that took them.
+fn add(before: &mut Image, new: &Image, tiles: Tiles, needed: &[u32], (done, spp): (u32, u32)) {
+    let share = f64::from(done) / f64::from(spp);
+    let pairs = before.pixels.iter_mut().zip(&new.pixels).enumerate();
+    for (_, (old, new)) in pairs.filter(|(pixel, _)| needed[tiles.of_pixel(*pixel)] >= spp) {
+        for (old, new) in old.iter_mut().zip(new) {
+            *old = (share * f64::from(*old) + (1.0 - share) * f64::from(*new)) as f32;
+        }
+    }
+}
+
+/// Samples of a pixel, on average over the image and the groups, after the step to `done`; rounded.
+fn mean_samples(tiles: Tiles, needed: &[Vec<u32>], done: u32) -> u32 {
+    let taken = |tile: usize| {
+        let of_groups = needed.iter().map(|of| f64::from(of[tile].min(done)));
+        of_groups.sum::<f64>() * tiles.pixels(tile).len() as f64
+    };
+    let total: f64 = (0..tiles.len()).map(taken).sum();
+    let [width, height] = tiles.size.map(f64::from);
+    (total / (needed.len() as f64 * width * height))
+        .round()
+        .max(1.0) as u32
+}

@@ -1,0 +1,153 @@
+//! Structures from frame to frame of a moving scene, where the experiment asks for it.
+
+use super::RunError;
+use super::session::{Session, content_hash};
+use super::structures::Gated;
+use super::world::World;
+use crate::animation::{Actor, Frame, moved, take_over};
+use raystone_config::{Animation, Axis, UnitKind, unit_name};
+use raystone_gpu::Gpu;
+use raystone_record::{AnimationRecord, Body, Key, Line, Outcome, Ran};
+use raystone_render::Stage;
+use raystone_verify::gate::{Checks, Judge};
+
+/// A structure whose frames are recorded.
+struct Part<'a> {
+    gated: &'a Gated,
+    actor: Actor<'a>,
+    gpu: &'a Gpu,
+    record: AnimationRecord,
+}
+
+/// All structures of a world, frame by frame.
+pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
+    let Some(animation) = session.experiment.animation else {
+        return Ok(());
+    };
+    if let Err(reason) = moved(&world.scene, &animation, 0) {
+        for structure in gated {
+            session.write_refused(name(structure), reason.clone())?;
+        }
+        return Ok(());
+    }
+    let mut parts = Vec::new();
+    for structure in gated {
+        if session.is_done(&name(structure)) {
+            continue;
+        }
+        match part(session, world, structure, animation) {
+            Ok(part) => parts.push(part),
+            Err(reason) => session.write_refused(name(structure), reason)?,
+        }
+    }
+    for number in 0..animation.frames {
+        if parts.iter().all(|part| part.record.failure.is_some()) {
+            break;
+        }
+        session.say(format!("{}: frame {number}", world.cell));
+        if let Err(reason) = frame(session, world, &animation, number, &mut parts) {
+            for part in &mut parts {
+                let failure = || format!("frame {number}: {reason}");
+                part.record.failure.get_or_insert_with(failure);
+            }
+        }
+    }
+    session.note_kernels("animation");
+    for part in parts {
+        session.failed += usize::from(part.record.failure.is_some());
+        let failure = part.record.failure.clone();
+        let name = name(part.gated);
+        let ran = Ran {
+            unchecked: !part.gated.runtime_checks,
+            ..Ran::default()
+        };
+        let line = Line::new(Key::from(&part.gated.cell), ran, part.record);
+        let settings = format!("{animation:?}");
+        let hash = content_hash(&line, &world.scene.hash, &[("animation", &settings)]);
+        session.write(&line.hashed(&hash).with_body(Body::Animation))?;
+        let ended = match &failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        session.progress.add(session.weights.animation);
+        session.close(&name, ended, vec![hash], &["animation"])?;
+    }
+    Ok(())
+}
+
+fn name(structure: &Gated) -> String {
+    unit_name(UnitKind::Animation, &structure.cell)
+}
+
+fn part<'a>(
+    session: &Session<'a>,
+    world: &'a World,
+    structure: &'a Gated,
+    settings: Animation,
+) -> Result<Part<'a>, String> {
+    let accel = &structure.cell[Axis::Accel];
+    let kind = session.registries.accel.named("structure", &accel.name)?;
+    let gpu = world.device.of(&structure.cell[Axis::Kernels]);
+    let gpu = gpu.map_err(|e| e.to_string())?;
+    Ok(Part {
+        actor: Actor::new(kind, &accel.params, settings.motion, (&world.soup, gpu))?,
+        gated: structure,
+        gpu,
+        record: AnimationRecord {
+            settings,
+            triangles: world.soup.records.len() as u64,
+            frames: Vec::new(),
+            failure: None,
+        },
+    })
+}
+
+/// Takes all that have not failed over to a frame, which gets a stage and a judge of its own.
+fn frame(
+    session: &mut Session,
+    world: &World,
+    animation: &Animation,
+    number: u32,
+    parts: &mut [Part],
+) -> Result<(), String> {
+    let experiment = session.experiment;
+    let seed = u64::from(experiment.seed);
+    let scene = moved(&world.scene, animation, number)?;
+    let tests = world.soup.intersection;
+    let stage = Stage::new(world.gpu, scene, tests).map_err(|e| e.to_string())?;
+    let judge = session.clock.time("judge", || {
+        let settings = &experiment.gate;
+        let past = Checks::Repeated;
+        Judge::new(
+            &stage.scene,
+            &stage.soup,
+            world.camera,
+            settings,
+            seed,
+            past,
+        )
+    });
+    let frame = Frame {
+        number,
+        first: &world.soup,
+        stage: &stage,
+        judge: &judge.map_err(|e| e.to_string())?,
+        probe: &world.probe,
+        runtime_checks: experiment.runtime_checks,
+        timing: &experiment.timing,
+        seed,
+    };
+    let open = parts
+        .iter_mut()
+        .filter(|part| part.record.failure.is_none());
+    let mut open: Vec<&mut Part> = open.collect();
+    let actors: Vec<(&Actor, &Gpu)> = open.iter().map(|p| (&p.actor, p.gpu)).collect();
+    let outcomes = (session.clock).time("animation", || take_over(&frame, &actors));
+    for (part, outcome) in open.iter_mut().zip(outcomes) {
+        match outcome {
+            Ok(record) => part.record.frames.push(record),
+            Err(fault) => part.record.failure = Some(format!("frame {number}: {fault}")),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,250 @@
+//! Coherence of full cells: the rays of some pixels, through the twins of the structures, on the model's machine.
+
+use super::RunError;
+use super::images::Estimator;
+use super::session::{Session, content_hash};
+use super::structures::Gated;
+use super::world::World;
+use crate::coherence::{
+    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run_groups, together,
+};
+use raystone_accel::{BuildLog, CpuTwin};
+use raystone_config::{Axis, Cell, Coherence, UnitKind, unit_name};
+use raystone_record::{
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, by_group,
+};
+use raystone_verify::path_oracle::{self, PathOracle};
+use raystone_verify::rays::RaySet;
+use std::collections::BTreeMap;
+
+/// What does not depend on the structure.
+struct Known<'a> {
+    oracle: Result<PathOracle<'a>, String>,
+    /// Rays of a sampler's cell, for each number of samples per pixel.
+    rays: BTreeMap<String, Vec<(u32, Rays)>>,
+}
+
+/// All full cells of a world, where the experiment asks for it.
+pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
+    let Some(settings) = session.experiment.coherence.clone() else {
+        return Ok(());
+    };
+    let mut cells = session.plan.modelled(session.experiment);
+    cells.retain(|cell| cell.is_on(&world.cell));
+    if cells.is_empty() {
+        return Ok(());
+    }
+    let mut known = Known {
+        oracle: (session.clock).time("coherence", || PathOracle::new(&world.scene)),
+        rays: BTreeMap::new(),
+    };
+    for structure in gated {
+        let own = cells.iter().filter(|cell| cell.is_on(&structure.cell));
+        let own: Vec<&Cell> = own.filter(|cell| !session.is_done(&name(cell))).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let records = of_structure(session, world, structure, &own, (&settings, &mut known));
+        for (cell, record) in own.into_iter().zip(records) {
+            match record {
+                Ok(record) => write(session, world, cell, record)?,
+                Err(reason) => session.write_refused(name(cell), reason)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+fn name(cell: &Cell) -> String {
+    unit_name(UnitKind::Coherence, cell)
+}
+
+fn write(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    record: CoherenceRecord,
+) -> Result<(), RunError> {
+    let line = Line::new(Key::from(cell), Ran::default(), record);
+    let settings = format!("{:?}", line.body.settings);
+    let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
+    session.write(&line.hashed(&hash).with_body(Body::Coherence))?;
+    session.progress.add(session.weights.model);
+    session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
+}
+
+/// Each cell of a structure, or why there is nothing to say of it.
+fn of_structure(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    cells: &[&Cell],
+    (settings, known): (&Coherence, &mut Known),
+) -> Vec<Result<CoherenceRecord, String>> {
+    let records = with_twin(session, world, structure, |session, twin, memory| {
+        let of_cell =
+            |cell: &&Cell| of_cell(session, world, cell, (twin, memory), (settings, known));
+        Ok(cells.iter().map(of_cell).collect())
+    });
+    records.unwrap_or_else(|reason| vec![Err(reason); cells.len()])
+}
+
+/// Something about the twin of a structure, which is built anew, and the memory that it reads.
+fn with_twin<T>(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    then: impl FnOnce(&mut Session, &dyn CpuTwin, &Memory) -> Result<T, String>,
+) -> Result<T, String> {
+    if !structure.cell[Axis::Kernels].name.is_empty() {
+        return Err("its twin is that of the embedded kernels".to_owned());
+    }
+    let accel = &structure.cell[Axis::Accel];
+    let kind = session.registries.accel.named("structure", &accel.name)?;
+    let mut log = BuildLog::with_gpu(world.gpu);
+    let built = (session.clock).time("build", || kind.build(&world.soup, &accel.params, &mut log));
+    let built = built.map_err(|e| e.to_string())?;
+    let twin = built.cpu_twin(&world.soup);
+    let twin = twin.ok_or("it has no twin on the host")?;
+    let memory = Memory::new(&*built, &world.soup)?;
+    then(session, &*twin, &memory)
+}
+
+/// Coherence of the recorded rays, in the order in which they are traced.
+///
+/// # Errors
+/// The structure has no twin that tells what it reads, in words.
+pub(super) fn of_recorded_rays(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    settings: &Coherence,
+) -> Result<ClassCoherence, String> {
+    let sets = &world.judge.of(structure.traced.space).sets;
+    with_twin(session, world, structure, |session, twin, memory| {
+        let timed: Vec<&RaySet> = sets.iter().filter(|set| set.is_timed()).collect();
+        let of_set = |set: &&RaySet| of_rays(&set.rays, set.query(), (twin, memory), settings);
+        let all = || timed.iter().map(of_set).collect::<Result<Vec<_>, _>>();
+        let all = session.clock.time("coherence", all)?;
+        let total = |groups: &Vec<_>| together(groups).into_values().next();
+        let classes = timed.iter().zip(&all);
+        Ok(ClassCoherence {
+            settings: settings.clone(),
+            classes: classes
+                .map(|(set, groups)| (set.class, total(groups).unwrap_or_default()))
+                .collect(),
+            groups: all.iter().map(|groups| by_group(groups, 0)).collect(),
+        })
+    })
+}
+
+fn of_cell(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    (twin, memory): (&dyn CpuTwin, &Memory),
+    (settings, known): (&Coherence, &mut Known),
+) -> Result<CoherenceRecord, String> {
+    session.say(name(cell));
+    let sampler = cell.on(&Cell::SAMPLER).to_string();
+    if !known.rays.contains_key(&sampler) {
+        let rays = rays(session, world, cell, (settings, known.oracle.as_ref()?))?;
+        known.rays.insert(sampler.clone(), rays);
+    }
+    let rays = &known.rays[&sampler];
+    let timed_spp = super::times::samples(session);
+    let modelled = || modelled(rays, twin, memory, settings);
+    let at = session.clock.time("coherence", modelled)?;
+    Ok(CoherenceRecord {
+        settings: settings.clone(),
+        timed_spp,
+        at,
+    })
+}
+
+/// The rays of a cell, for each number of samples per pixel.
+fn rays(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    (settings, oracle): (&Coherence, &PathOracle),
+) -> Result<Vec<(u32, Rays)>, String> {
+    let size = settings.resolution;
+    let seed = session.experiment.seeds().replicates.first().copied();
+    let bounds = world.scene.bounds();
+    let mut all = Vec::new();
+    for &spp in &settings.spp {
+        let estimator = Estimator::for_width(session, cell, spp, size[0])?;
+        let count = [settings.groups, settings.warps];
+        let groups = groups_of(size, settings.warp, count, estimator.sampler.stride());
+        let image = path_oracle::View {
+            estimator: path_oracle::Estimator::of(&estimator.integrator)?,
+            camera: world.camera,
+            size,
+            sampler: &estimator.sampler,
+        };
+        let view = View {
+            oracle,
+            image: &image,
+            diagonal: 2.0 * f64::from(bounds.radius()),
+            samples: &spread(spp, settings.samples),
+            seed: seed.unwrap_or_default(),
+        };
+        let rays = (session.clock).time("coherence", || Rays::new(&view, &groups));
+        all.push((spp, rays));
+    }
+    Ok(all)
+}
+
+/// So many of the indices below `spp`, evenly spread from the first on.
+fn spread(spp: u32, count: u32) -> Vec<u32> {
+    let count = count.min(spp).max(1);
+    let index = |i| (u64::from(i) * u64::from(spp) / u64::from(count)) as u32;
+    (0..count).map(index).collect()
+}
+
+/// What the model says of these rays.
+fn modelled(
+    rays: &[(u32, Rays)],
+    twin: &dyn CpuTwin,
+    memory: &Memory,
+    settings: &Coherence,
+) -> Result<Vec<CoherenceAt>, String> {
+    let machine = Machine::new(settings);
+    let mut at = Vec::new();
+    for (spp, rays) in rays {
+        let groups = rays.through(twin, memory)?;
+        for organisation in Organisation::ALL {
+            let warps = groups.iter().map(|warps| organisation.of(warps.clone()));
+            let of_groups = run_groups(&machine, &warps.collect::<Vec<_>>());
+            let mut known = CoherenceAt {
+                spp: *spp,
+                organisation: organisation.name().to_owned(),
+                paths: rays.paths,
+                classes: Vec::new(),
+                groups: Vec::new(),
+            };
+            for (class, tally) in together(&of_groups) {
+                known.groups.push(by_group(&of_groups, class));
+                known
+                    .classes
+                    .push((RayClass::of_word(class).to_string(), tally));
+            }
+            at.push(known);
+        }
+    }
+    Ok(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_spread_over_all_and_none_stands_twice() {
+        assert_eq!(spread(64, 4), [0, 16, 32, 48]);
+        assert_eq!(spread(64, 1), [0]);
+        assert_eq!(spread(3, 8), [0, 1, 2]);
+        assert_eq!(spread(10, 4), [0, 2, 5, 7]);
+    }
+}

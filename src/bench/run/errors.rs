@@ -1,0 +1,547 @@
+//! Error: once per scene, integrator and sampler, through the fastest gated structure.
+
+use super::adaptive;
+use super::images::{self, Estimator, IMAGE_AXES, attributes, sampler_label, write_spread};
+use super::paths;
+use super::reference::{Yardstick, reference, reference_structure};
+use super::session::{Session, content_hash};
+use super::structures::Gated;
+use super::world::World;
+use super::{Fault, RunError};
+use crate::spectrum::{ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power};
+use crate::stopping::is_met_by;
+use raystone_config::{Axis, Cell, StopRule};
+use raystone_gpu::GpuError;
+use raystone_image::{Image, Picture, tone_map, viridis};
+use raystone_record::{
+    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Outcome, Ran, SpectrumRecord,
+};
+use raystone_render::{Renderer, Snapshot, rounding_bound};
+use raystone_stats::bias::{BiasOptions, BiasVerdict, check_bias};
+use raystone_stats::heavy_tails::PixelErrors;
+use raystone_stats::metrics::{error_map, measure};
+use raystone_stats::statistics::mean_interval;
+use std::collections::BTreeMap;
+
+/// Relative error per pixel at the top of the colour scale of error maps.
+const ERROR_MAP_FULL_SCALE: f32 = 1.0;
+
+/// The fastest gated structure with the kernels of a cell that its integrator can use, or why there is none:
+/// a refusal, or a failure.
+fn fastest<'a>(
+    session: &Session,
+    gated: &'a [Gated],
+    cell: &Cell,
+) -> Result<&'a Gated, Option<String>> {
+    let same = gated
+        .iter()
+        .filter(|g| g.cell[Axis::Kernels] == cell[Axis::Kernels]);
+    let unfit = |g: &Gated| images::unfit(session, cell, &g.traced);
+    let fitting = same.clone().filter(|g| unfit(g).is_none());
+    let fastest = fitting.max_by(|a, b| a.speed.total_cmp(&b.speed));
+    fastest.ok_or_else(|| same.clone().find_map(unfit))
+}
+
+/// All samplers of a world.
+pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
+    if gated.is_empty() {
+        return Ok(());
+    }
+    let mut traced = None;
+    for integrator in &session.experiment.axes[Axis::Integrator] {
+        let wanted = world.cell.clone().with(Axis::Integrator, integrator);
+        let cells = session.plan.samplers.iter();
+        let cells = cells.filter(|c| c.is_on(&wanted) && !session.is_done(&c.to_string()));
+        let cells: Vec<Cell> = cells.cloned().collect();
+        if cells.is_empty() {
+            continue;
+        }
+        let traced = match &traced {
+            Some(known) => known,
+            None => traced.insert(match reference_structure(session, world, gated) {
+                Ok(traced) => Ok(traced),
+                Err(fault) => Err(fault.of_cell()?),
+            }),
+        };
+        let made = match traced {
+            Ok(traced) => reference(session, world, traced, &wanted),
+            Err(reason) => Err(reason.clone().into()),
+        };
+        match made {
+            Ok(yardstick) => all_errors(session, world, gated, &cells, &yardstick)?,
+            Err(fault) => {
+                let reason = fault.of_cell()?;
+                for cell in cells {
+                    session.write_failure(&cell.to_string(), format!("no reference: {reason}"))?;
+                }
+            }
+        }
+        if world.gpu.lost().is_some() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// The samplers with one reference.
+fn all_errors(
+    session: &mut Session,
+    world: &World,
+    gated: &[Gated],
+    cells: &[Cell],
+    yardstick: &Yardstick,
+) -> Result<(), RunError> {
+    for cell in cells {
+        session.go_on()?;
+        let text = cell.to_string();
+        let fastest = match fastest(session, gated, cell) {
+            Ok(fastest) => fastest,
+            Err(Some(refusal)) => {
+                session.write_refused(text, refusal)?;
+                continue;
+            }
+            Err(None) => {
+                let reason = "no structure passed the gate with these kernels";
+                session.write_failure(&text, reason.to_owned())?;
+                continue;
+            }
+        };
+        session.lose_device_on_request(world.gpu, &text);
+        if let Err(fault) = sampler_error(session, world, fastest, cell, yardstick) {
+            session.write_failure(&text, fault.of_cell()?)?;
+        }
+        if world.gpu.lost().is_some() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// One render of a replicate, and the numbers of samples at which its image is kept.
+pub(super) struct Pass<'a> {
+    pub renderer: Renderer<'a>,
+    pub spps: Vec<u32>,
+    /// Hash of the sampler's words.
+    table: String,
+}
+
+/// What a replicate is rendered in: one pass, unless each number of samples has points of its own,
+/// which makes a pass each.
+fn passes<'a>(
+    session: &mut Session,
+    world: &'a World,
+    fastest: &Gated,
+    cell: &Cell,
+) -> Result<Vec<Pass<'a>>, String> {
+    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let most = session.experiment.spp.max();
+    let whole = Estimator::new(session, cell, most)?;
+    let estimators = if whole.sampler.by_count() {
+        let single = |spp| {
+            let estimator = Estimator::new(session, cell, spp)?;
+            Ok((vec![spp], estimator))
+        };
+        spps.into_iter()
+            .map(single)
+            .collect::<Result<_, String>>()?
+    } else {
+        vec![(spps, whole)]
+    };
+    let seeds = session.experiment.seeds().replicates;
+    let is_by_tile = session
+        .experiment
+        .stop
+        .is_some_and(|rule| rule.tile.is_some());
+    let by_blocks = is_by_tile && cell.randomised;
+    let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
+        let words = bytemuck::cast_slice(estimator.sampler.table.words());
+        Ok(Pass {
+            renderer: match by_blocks {
+                true => estimator.by_blocks(session, world, &fastest.traced, &seeds)?,
+                false => {
+                    estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?
+                }
+            },
+            spps,
+            table: blake3::hash(words).to_hex().to_string(),
+        })
+    };
+    estimators.into_iter().map(pass).collect()
+}
+
+/// All replicates of one sampler.
+fn sampler_error(
+    session: &mut Session,
+    world: &World,
+    fastest: &Gated,
+    cell: &Cell,
+    yardstick: &Yardstick,
+) -> Result<(), Fault> {
+    session.say(cell.to_string());
+    let passes = passes(session, world, fastest, cell)?;
+    paths::check(session, world, &fastest.traced, cell)?;
+    let mut kernels: Vec<_> = passes.iter().map(|p| p.renderer.kernel_hash()).collect();
+    kernels.dedup();
+    let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
+    let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
+    let reference = image_hash(yardstick.reference.image());
+    let [drawn, camera] = [
+        format!(
+            "{:?}",
+            (
+                &session.experiment.spp,
+                session.experiment.seeds().replicates
+            )
+        ),
+        format!("{:?}", (world.camera, session.experiment.resolution)),
+    ];
+    let rule = session.experiment.stop;
+    let stop = rule.map(|rule| format!("{rule:?}")).unwrap_or_default();
+    let made_of = [
+        ("sampler table", tables.as_str()),
+        ("stop", &stop),
+        ("reference", &reference),
+        ("spp and seeds", &drawn),
+        ("camera and size", &camera),
+    ];
+    let hash = content_hash(&blank, &world.scene.hash, &made_of);
+    let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
+    let by_tile = rule.and_then(|rule| Some((rule, rule.tile?)));
+    let replicates = match (rule, by_tile.filter(|_| cell.randomised)) {
+        (_, Some(by_tile)) => {
+            adaptive::by_tile(session, cell, yardstick, single(&passes)?, &line, by_tile)?
+        }
+        (None, _) => all_samples(session, cell, yardstick, &passes, &line)?,
+        (Some(rule), _) => until_met(session, cell, yardstick, &passes, &line, rule)?,
+    };
+    let spp = replicates.spp;
+    let finals = replicates.images;
+    write_spread(session, cell, spp, &finals)?;
+    let bias = bias_record(session, cell, &finals, yardstick)?;
+    session.write(&line(Body::Bias(bias)))?;
+    let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
+    session.write(&line(Body::Spectrum(spectrum)))?;
+    let judged = session.judged_lines.get(&paths::key(world, cell)).cloned();
+    let mut lines = vec![hash.clone(), yardstick.line.clone()];
+    lines.extend(judged);
+    let name = cell.to_string();
+    session.close(&name, (Outcome::Done, ""), lines, &[&yardstick.name])?;
+    Ok(())
+}
+
+/// The one pass of a sampler whose points do not depend on how many there are.
+fn single<'p, 'a>(passes: &'p [Pass<'a>]) -> Result<&'p Pass<'a>, Fault> {
+    match passes {
+        [only] => Ok(only),
+        _ => Err(Fault::Cell(
+            "its points are others for each number of samples: tiles cannot take different numbers"
+                .to_owned(),
+        )),
+    }
+}
+
+/// The images of all replicates at the most samples per pixel that they took.
+pub(super) struct Replicates {
+    pub spp: u32,
+    pub images: Vec<Image>,
+}
+
+/// The seeds of a sampler's replicates, by their numbers.
+pub(super) fn replicates(session: &Session, cell: &Cell) -> Vec<(u32, u32)> {
+    let seeds = session.experiment.seeds().replicates;
+    let count = session.plan.renders(cell) as usize;
+    (0..).zip(seeds.into_iter().take(count)).collect()
+}
+
+/// Each replicate at all numbers of samples, written as soon as it is there.
+fn all_samples(
+    session: &mut Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    passes: &[Pass],
+    line: &impl Fn(Body) -> Line,
+) -> Result<Replicates, Fault> {
+    let mut images = Vec::new();
+    let mut pixels: BTreeMap<u32, PixelErrors> = BTreeMap::new();
+    for (replicate, seed) in replicates(session, cell) {
+        let mut snapshots = Vec::new();
+        for pass in passes {
+            let render = || pass.renderer.render(&pass.spps, seed);
+            let rendered = session.clock.time("gpu", render);
+            snapshots.extend(rendered.map_err(|e| e.to_string())?);
+        }
+        let mut record = blank_record(session, cell, (replicate, seed));
+        for snapshot in &snapshots {
+            let pixels = pixels.entry(snapshot.spp);
+            let pixels = pixels.or_insert_with(|| PixelErrors::new(&yardstick.reference));
+            add_error(
+                session,
+                cell,
+                yardstick,
+                &mut record,
+                snapshot,
+                Some(pixels),
+            )?;
+        }
+        let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
+        draw(session, cell, yardstick, &mut record, last)?;
+        check_finite(&record)?;
+        session.write(&line(Body::Error(record)))?;
+        images.extend(snapshots.into_iter().last().map(|s| s.image));
+        session.progress.add(session.weights.replicate);
+    }
+    Ok(Replicates {
+        spp: session.experiment.spp.max(),
+        images,
+    })
+}
+
+/// All replicates at one number of samples after the other, until the rule is met, or to the last. Their records are
+/// written at the end.
+fn until_met(
+    session: &mut Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    passes: &[Pass],
+    line: &impl Fn(Body) -> Line,
+    rule: StopRule,
+) -> Result<Replicates, Fault> {
+    let steps: Vec<(&Pass, u32)> = passes
+        .iter()
+        .flat_map(|pass| pass.spps.iter().map(move |spp| (pass, *spp)))
+        .collect();
+    let seeds = replicates(session, cell);
+    let blank = |of: &(u32, u32)| blank_record(session, cell, *of);
+    let mut records: Vec<ErrorRecord> = seeds.iter().map(blank).collect();
+    let mut last: Vec<Snapshot> = Vec::new();
+    for &(pass, spp) in &steps {
+        let mut pixels = PixelErrors::new(&yardstick.reference);
+        for (index, record) in records.iter_mut().enumerate() {
+            let before = last.get(index).filter(|_| pass.spps.len() > 1);
+            let further = || further_samples(pass, before, spp, record.seed);
+            let snapshot = session.clock.time("gpu", further);
+            let snapshot = snapshot.map_err(|e| e.to_string())?;
+            add_error(
+                session,
+                cell,
+                yardstick,
+                record,
+                &snapshot,
+                Some(&mut pixels),
+            )?;
+            check_finite(record)?;
+            match last.get_mut(index) {
+                Some(place) => *place = snapshot,
+                None => last.push(snapshot),
+            }
+        }
+        let all: Vec<&ErrorRecord> = records.iter().collect();
+        if is_met_by(&rule, &all, spp, steps.len()) {
+            break;
+        }
+    }
+    for (mut record, snapshot) in records.into_iter().zip(&last) {
+        record.stop = Some(rule);
+        draw(session, cell, yardstick, &mut record, snapshot)?;
+        session.write(&line(Body::Error(record)))?;
+        session.progress.add(session.weights.replicate);
+    }
+    Ok(Replicates {
+        spp: last.first().map_or(0, |snapshot| snapshot.spp),
+        images: last.into_iter().map(|snapshot| snapshot.image).collect(),
+    })
+}
+
+/// The image at `spp` samples: those before, and the ones that are missing.
+fn further_samples(
+    pass: &Pass,
+    before: Option<&Snapshot>,
+    spp: u32,
+    seed: u32,
+) -> Result<Snapshot, GpuError> {
+    let renderer = &pass.renderer;
+    let done = before.map_or(0, |snapshot| snapshot.spp);
+    renderer.reset()?;
+    renderer.add_samples(done, spp - done, seed)?;
+    let mut image = renderer.image()?;
+    if let Some(before) = before {
+        let share = f64::from(done) / f64::from(spp);
+        let pairs = image.pixels.iter_mut().zip(&before.image.pixels);
+        for (new, old) in pairs.flat_map(|(new, old)| new.iter_mut().zip(old)) {
+            *new = (share * f64::from(*old) + (1.0 - share) * f64::from(*new)) as f32;
+        }
+    }
+    Ok(Snapshot { spp, image })
+}
+
+pub(super) fn check_finite(record: &ErrorRecord) -> Result<(), String> {
+    match record.non_finite_pixels {
+        0 => Ok(()),
+        count => {
+            let replicate = record.replicate;
+            Err(format!(
+                "replicate {replicate} has {count} pixels that are not finite"
+            ))
+        }
+    }
+}
+
+/// The spectra of all replicates, at the highest number of samples.
+fn spectrum_record(
+    session: &Session,
+    spp: u32,
+    images: &[Image],
+    yardstick: &Yardstick,
+) -> Result<SpectrumRecord, String> {
+    let size = session.experiment.resolution.map(|edge| edge as usize);
+    let spectrum = |image: &Image| {
+        let error = luminance_error(image, yardstick.reference.image());
+        error.map(|error| error_spectrum(&error, size))
+    };
+    let spectra: Result<Vec<_>, _> = images.iter().map(spectrum).collect();
+    let spectra = spectra.map_err(|e| e.to_string())?;
+    let mean = |figure: fn(&ErrorSpectrum) -> Option<f64>| {
+        let values: Vec<f64> = spectra.iter().filter_map(figure).collect();
+        mean_interval(&values)
+    };
+    Ok(SpectrumRecord {
+        spp,
+        replicates: spectra.len(),
+        power: mean_power(&spectra),
+        low_frequency: mean(|s| s.low_frequency),
+        loudest: mean(|s| s.loudest),
+        autocorrelation: mean(|s| s.autocorrelation),
+        filtered: mean_filtered(&spectra),
+    })
+}
+
+/// The record of a replicate of which nothing was measured.
+pub(super) fn blank_record(
+    session: &Session,
+    cell: &Cell,
+    (replicate, seed): (u32, u32),
+) -> ErrorRecord {
+    ErrorRecord {
+        randomised: cell.randomised,
+        replicate,
+        seed,
+        resolution: session.experiment.resolution,
+        errors: Vec::new(),
+        stop: None,
+        non_finite_pixels: 0,
+        image_hash: String::new(),
+        image: None,
+        error_map: None,
+    }
+}
+
+/// Adds what is measured of the next image of a replicate; `pixels` are those of the replicates before it at the same number of
+/// samples, the same in all pixels.
+pub(super) fn add_error(
+    session: &Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    record: &mut ErrorRecord,
+    snapshot: &Snapshot,
+    pixels: Option<&mut PixelErrors>,
+) -> Result<(), String> {
+    let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
+    let base_2 = facts.is_ok_and(|facts| facts.base_2);
+    let report = measure(&snapshot.image, &yardstick.reference).map_err(|e| e.to_string())?;
+    record.non_finite_pixels = record.non_finite_pixels.max(report.non_finite_pixels);
+    let tail = match pixels {
+        Some(pixels) => {
+            let added = pixels.add(&snapshot.image, &yardstick.reference);
+            added.map_err(|e| e.to_string())?;
+            pixels.tail(snapshot.spp, yardstick.part_spp)
+        }
+        None => None,
+    };
+    record.image_hash = image_hash(&snapshot.image);
+    record.errors.push(ErrorAtSpp {
+        partial_net: base_2 && !snapshot.spp.is_power_of_two(),
+        spp: snapshot.spp,
+        metrics: report.metrics,
+        without_part: report.without_part,
+        tail,
+    });
+    Ok(())
+}
+
+/// Writes the pictures of the first replicate, and tells its record where.
+pub(super) fn draw(
+    session: &Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    record: &mut ErrorRecord,
+    last: &Snapshot,
+) -> Result<(), Fault> {
+    if record.replicate > 0 {
+        return Ok(());
+    }
+    let labels = cell.labels(&IMAGE_AXES);
+    let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
+    record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+    let about = attributes(
+        &session.options.program,
+        cell,
+        &sampler_label(cell),
+        last.spp,
+        record.seed,
+    );
+    session.compared("image", &labels, &last.image, &about)?;
+    let reference = &yardstick.reference;
+    let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
+    record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
+    Ok(())
+}
+
+/// The probability of a false alarm is shared out among all samplers of the run that claim to have no
+/// bias, so that a run of many sound samplers does not cry wolf.
+fn bias_record(
+    session: &Session,
+    cell: &Cell,
+    images: &[Image],
+    yardstick: &Yardstick,
+) -> Result<BiasRecord, String> {
+    let claims = |s: &Cell| s.randomised && session.registries.is_unbiased(s);
+    let tested = session.plan.samplers.iter().filter(|s| claims(s)).count();
+    let defaults = BiasOptions::default();
+    let options = BiasOptions {
+        alpha: defaults.alpha / tested.max(1) as f64,
+        rounding: rounding_bound(session.experiment.spp.max()) + yardstick.rounding,
+        ..defaults
+    };
+    let check = check_bias(images, yardstick.reference.parts(), options);
+    let check = check.map_err(|e| e.to_string())?;
+    let verdict = if cell.randomised {
+        check.verdict
+    } else {
+        BiasVerdict::NotTestable("the sampler is deterministic, its error is not noise".to_owned())
+    };
+    let [whole, weighted] = [check.whole, check.weighted].map(|t| t.filter(|_| cell.randomised));
+    Ok(BiasRecord {
+        tiles: check.tiles,
+        rejected: check.rejected.len(),
+        alpha: check.alpha,
+        alpha_of_run: Some(defaults.alpha),
+        p_of_all: Some(check.p).filter(|_| cell.randomised),
+        min_p: check.min_p,
+        p_histogram: check.p_histogram.to_vec(),
+        z: whole.map(|test| test.t).filter(|t| t.is_finite()),
+        p: whole.map(|test| test.p),
+        degrees_of_freedom: whole.map(|test| test.degrees_of_freedom),
+        weighted_p: weighted.map(|test| test.p),
+        weighted_degrees_of_freedom: weighted.map(|test| test.degrees_of_freedom),
+        detectable: check.detectable.filter(|_| cell.randomised),
+        by_design: cell.randomised && !session.registries.is_unbiased(cell),
+        verdict,
+    })
+}
+
+/// BLAKE3 of the f32 pixels.
+pub(super) fn image_hash(image: &Image) -> String {
+    blake3::hash(bytemuck::cast_slice(&image.pixels))
+        .to_hex()
+        .to_string()
+}

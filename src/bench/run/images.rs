@@ -1,0 +1,196 @@
+//! What the images of a run are made with, their compiled kernels, and what their files say of it.
+
+use super::Fault;
+use super::kernels::Device;
+use super::session::Session;
+use super::words;
+use super::world::World;
+use raystone_config::{Axis, Cell};
+use raystone_core::geometry::Camera;
+use raystone_core::params::Variant;
+use raystone_core::program::Program;
+use raystone_image::{Attribute, Image};
+use raystone_render::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
+use raystone_sampling::Sampler;
+
+/// Why an integrator cannot render through a structure, if so: such a cell is left out.
+pub(super) fn unfit(session: &Session, cell: &Cell, traced: &Traced) -> Option<String> {
+    match session.registries.integrator(cell) {
+        Ok(integrator) => integrator.refusal(traced),
+        Err(reason) => Some(reason),
+    }
+}
+
+/// What an image file says of its making: name and value, of those that are known.
+pub(super) fn attributes(
+    program: &Program,
+    cell: &Cell,
+    sampler: &str,
+    spp: u32,
+    seed: impl ToString,
+) -> Vec<Attribute<'static>> {
+    let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
+    let changed = program.dirty == Some(true);
+    let commit = program.commit.map(|commit| match changed {
+        true => format!("{commit} with uncommitted changes"),
+        false => commit.to_owned(),
+    });
+    let software = format!("raystone {}", program.version);
+    let known = [
+        ("software", Some(software)),
+        ("commit", commit),
+        ("scene", label(Axis::Scene)),
+        ("integrator", label(Axis::Integrator)),
+        ("sampler", Some(sampler.to_owned())),
+        ("spp", Some(spp.to_string())),
+        ("seed", Some(seed.to_string())),
+    ];
+    let known = known.into_iter();
+    known
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect()
+}
+
+/// The axes that tell the images of samplers apart.
+pub(super) const IMAGE_AXES: [Axis; 4] = [
+    Axis::Scene,
+    Axis::Integrator,
+    Axis::Sequence,
+    Axis::Decorrelation,
+];
+
+/// Linear images of what all replicates say together, if the run was asked for images: their mean, and the
+/// variance of one of them, by pixel and channel.
+pub(super) fn write_spread(
+    session: &Session,
+    cell: &Cell,
+    spp: u32,
+    replicates: &[Image],
+) -> Result<(), Fault> {
+    if session.options.images.is_none() || replicates.len() < 2 {
+        return Ok(());
+    }
+    let labels = cell.labels(&IMAGE_AXES);
+    let seeds = &session.experiment.seeds().replicates[..replicates.len()];
+    let seeds: Vec<String> = seeds.iter().map(u32::to_string).collect();
+    let about = attributes(
+        &session.options.program,
+        cell,
+        &sampler_label(cell),
+        spp,
+        seeds.join(" "),
+    );
+    let mean = Image::mean_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("mean", &labels, &mean, &about)?;
+    let variance = Image::variance_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("variance", &labels, &variance, &about)?;
+    Ok(())
+}
+
+/// `sequence × decorrelation`.
+pub(super) fn sampler_label(cell: &Cell) -> String {
+    let labels = [&cell[Axis::Sequence], &cell[Axis::Decorrelation]].map(|v| v.label.as_str());
+    labels.join(" × ")
+}
+
+/// What is computed per sample, what draws the samples, and the kernels of both.
+pub(super) struct Estimator {
+    pub sampler: Sampler,
+    pub integrator: ConfiguredIntegrator,
+    offset: RayOffset,
+    kernels: Variant,
+}
+
+impl Estimator {
+    /// That of a cell, for `samples` samples per pixel.
+    ///
+    /// # Errors
+    /// A name is not registered, or the sampler has too few dimensions or samples.
+    pub(super) fn new(session: &Session, cell: &Cell, samples: u32) -> Result<Self, String> {
+        Self::for_width(session, cell, samples, session.experiment.resolution[0])
+    }
+
+    /// The same for images of another width than the experiment's.
+    ///
+    /// # Errors
+    /// As [`Estimator::new`].
+    pub(super) fn for_width(
+        session: &Session,
+        cell: &Cell,
+        samples: u32,
+        width: u32,
+    ) -> Result<Self, String> {
+        let registries = session.registries;
+        let integrator = registries.integrator(cell)?;
+        let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
+        let demand = integrator.demand(samples, width);
+        let sampler = (registries.samplers).sampler(sequence, decorrelation, &demand);
+        Ok(Self {
+            sampler: sampler.map_err(|e| e.to_string())?,
+            integrator,
+            offset: registries.offset(cell)?,
+            kernels: cell[Axis::Kernels].clone(),
+        })
+    }
+
+    /// An image of the experiment's size.
+    pub(super) fn job(
+        &self,
+        session: &Session,
+        camera: Camera,
+        runtime_checks: bool,
+    ) -> RenderJob<'_> {
+        RenderJob {
+            size: session.experiment.resolution,
+            camera,
+            sampler: &self.sampler,
+            integrator: &self.integrator,
+            offset: self.offset,
+            runtime_checks,
+        }
+    }
+
+    /// The same, with samples in chosen blocks of pixels alone.
+    ///
+    /// # Errors
+    /// As [`Estimator::renderer`], or the integrator cannot do that.
+    pub(super) fn by_blocks<'a>(
+        &self,
+        session: &mut Session,
+        world: &'a World,
+        traced: &Traced,
+        seeds: &[u32],
+    ) -> Result<Renderer<'a>, String> {
+        let device: &'a Device = world.device;
+        let gpu = device.of(&self.kernels).map_err(|e| e.to_string())?;
+        words::check(session, gpu, &self.sampler, seeds)?;
+        let job = self.job(session, world.camera, true);
+        let compiled = session.clock.time("gpu", || {
+            Renderer::by_blocks(gpu, &world.buffers, traced, &job)
+        });
+        compiled.map_err(|e| e.to_string())
+    }
+
+    /// The compiled image of a world. The sampler's words were compared with those of its
+    /// twin, in all that `seeds` make of them.
+    ///
+    /// # Errors
+    /// A word differs, or the kernel does not compile.
+    pub(super) fn renderer<'a>(
+        &self,
+        session: &mut Session,
+        world: &'a World,
+        traced: &Traced,
+        seeds: &[u32],
+        [runtime_checks, ray_counts]: [bool; 2],
+    ) -> Result<Renderer<'a>, String> {
+        let device: &'a Device = world.device;
+        let gpu = device.of(&self.kernels).map_err(|e| e.to_string())?;
+        words::check(session, gpu, &self.sampler, seeds)?;
+        let job = self.job(session, world.camera, runtime_checks);
+        let compiled = session.clock.time("gpu", || {
+            Renderer::new(gpu, &world.buffers, traced, &job, ray_counts)
+        });
+        compiled.map_err(|e| e.to_string())
+    }
+}

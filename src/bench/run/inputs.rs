@@ -1,0 +1,223 @@
+//! What the figures of a cell depend on, and whether those of an earlier run still hold.
+
+use super::kernels::Kernels;
+use raystone_config::{Axis, Experiment, Unit, UnitKind, is_compaction};
+use raystone_core::text::cell_hash;
+use raystone_record::Environment;
+use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
+use std::collections::{BTreeMap, HashMap};
+use std::sync::OnceLock;
+
+/// Digits of the hashes that are kept.
+const DIGITS: usize = 16;
+
+fn short(parts: &[(&str, &str)]) -> String {
+    cell_hash(parts)[..DIGITS].to_owned()
+}
+
+/// The sources that figures depend on: the hash that the build noted, and of programs that use the library (with registries of their
+/// own) the bytes of the program.
+pub(super) fn program() -> &'static str {
+    static PROGRAM: OnceLock<String> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let own = env!("RAYSTONE_HOST");
+        let is_own = std::env::current_exe().is_ok_and(|path| {
+            let stem = path.file_stem();
+            stem.is_some_and(|stem| stem == "raystone")
+        });
+        match super::reference_cache::program().filter(|_| !is_own) {
+            Some(bytes) => short(&[("host", own), ("program", bytes)]),
+            None => own.to_owned(),
+        }
+    })
+}
+
+/// Where clocks were read: figures of other places must not be compared.
+pub fn place(environment: &Environment) -> String {
+    let e = environment;
+    format!(
+        "{} ({} {}, {}), {} × {}, {}",
+        e.adapter, e.driver, e.driver_info, e.backend, e.cpu_threads, e.cpu, e.os
+    )
+}
+
+/// The settings of an experiment that matter to a kind of cells. A field that is added to experiments has to be placed here.
+fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> String {
+    let Experiment {
+        name: _,
+        source: _,
+        text: _,
+        overrides: _,
+        excludes: _,
+        includes: _,
+        conditions: _,
+        replicates,
+        seed,
+        resolution,
+        spp,
+        stop,
+        runtime_checks,
+        camera,
+        axes,
+        reference,
+        timing,
+        gate,
+        discrepancy,
+        coherence,
+        animation,
+    } = experiment;
+    let image = (seed, camera, resolution, runtime_checks);
+    match kind {
+        UnitKind::Structure | UnitKind::Peer => format!("{:?}", (image, gate, timing, coherence)),
+        UnitKind::Animation => format!("{:?}", (image, gate, timing, animation)),
+        UnitKind::Sampler => {
+            format!(
+                "{:?}",
+                (image, replicates, spp, stop, reference, reference_file)
+            )
+        }
+        UnitKind::Time => format!("{:?}", (image, timing, spp)),
+        UnitKind::Coherence => format!("{:?}", (seed, camera, coherence)),
+        UnitKind::Compaction => format!("{:?}", (seed, timing)),
+        UnitKind::Stream => {
+            // The worst pair of dimensions is looked for among those of all integrators.
+            let drawn = axes[Axis::Integrator].iter().filter(|i| !is_compaction(i));
+            let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
+            format!("{:?}", (seed, resolution, discrepancy, drawn))
+        }
+    }
+}
+
+/// What the cells of a run depend on now.
+pub(super) struct Current<'a> {
+    settings: BTreeMap<UnitKind, String>,
+    kernels: &'a Kernels,
+    /// Label of a scene → hash of its content, or why it has none.
+    pub scenes: HashMap<String, Result<String, String>>,
+    /// Where clocks are read; unknown before a device is open.
+    pub device: Option<String>,
+}
+
+impl<'a> Current<'a> {
+    /// Of an experiment with these kernels; the hash of the image that is compared with, if it is a file's.
+    pub(super) fn new(experiment: &Experiment, reference_file: &str, kernels: &'a Kernels) -> Self {
+        let of = |kind| (kind, settings(experiment, reference_file, kind));
+        Self {
+            settings: UnitKind::ALL.into_iter().map(of).collect(),
+            kernels,
+            scenes: HashMap::new(),
+            device: None,
+        }
+    }
+
+    /// Hash of the parameters of a unit and of the settings that matter to it.
+    pub(super) fn settings_of(&self, unit: &Unit) -> String {
+        let key = serde_json::to_string(&Key::from(&unit.cell)).unwrap_or_default();
+        let settings = self.settings.get(&unit.kind).map_or("", String::as_str);
+        let kind = format!("{:?}", unit.kind);
+        short(&[("kind", &kind), ("key", &key), ("settings", settings)])
+    }
+
+    /// What a unit depends on that is known before it is measured.
+    pub(super) fn inputs(&self, unit: &Unit) -> Inputs {
+        let scene = unit.cell.get(Axis::Scene);
+        let scene = scene.and_then(|scene| self.scenes.get(&scene.label)?.clone().ok());
+        Inputs {
+            program: program().to_owned(),
+            settings: self.settings_of(unit),
+            scene: scene.unwrap_or_default(),
+            kernels: String::new(),
+            device: match unit.kind.is_timed() {
+                true => self.device.clone().unwrap_or_default(),
+                false => String::new(),
+            },
+        }
+    }
+
+    /// Of each set of modules of kernels, by its id, what changed since; `None` if nothing did.
+    pub(super) fn changed<'s>(
+        &self,
+        sets: &HashMap<&'s str, &KernelSetRecord>,
+    ) -> HashMap<&'s str, Option<String>> {
+        let sets = sets.iter();
+        sets.map(|(id, set)| (*id, self.kernels.changed(set)))
+            .collect()
+    }
+
+    /// Why what was recorded of a unit does not hold any more; `None` if it does. `sets`: see
+    /// [`Self::changed`].
+    pub(super) fn stale(
+        &self,
+        unit: &Unit,
+        record: &CellRecord,
+        sets: &HashMap<&str, Option<String>>,
+    ) -> Option<String> {
+        let was = &record.inputs;
+        if was.program != program() {
+            return Some("another program measured it".to_owned());
+        }
+        if was.settings != self.settings_of(unit) {
+            return Some("its parameters or the settings that it depends on changed".to_owned());
+        }
+        let scene = unit.cell.get(Axis::Scene);
+        let scene = scene.and_then(|scene| self.scenes.get(&scene.label));
+        match scene {
+            Some(Ok(hash)) if *hash != was.scene => return Some("its scene changed".to_owned()),
+            Some(Err(reason)) => return Some(format!("its scene cannot be loaded: {reason}")),
+            _ => {}
+        }
+        let device = self.device.as_ref().filter(|_| unit.kind.is_timed());
+        if let Some(device) = device.filter(|device| **device != was.device) {
+            let before = &was.device;
+            return Some(format!("it was timed on {before}, and this is {device}"));
+        }
+        if was.kernels.is_empty() {
+            return None;
+        }
+        match sets.get(was.kernels.as_str()) {
+            Some(changed) => changed.clone(),
+            None => Some("what its kernels were made of is not recorded".to_owned()),
+        }
+    }
+}
+
+/// What one measurement of a cell was made of: its inputs, and the modules of its kernels if they are recorded.
+pub(super) type MadeOf<'a> = (&'a Inputs, Option<&'a KernelSetRecord>);
+
+/// What two measurements of one cell were made of that must not differ, and does. Where errors are rendered through the fastest structure,
+/// two machines may take different ones: of the modules, only those that both used have to be equal.
+pub(super) fn differing((a, set_a): MadeOf, (b, set_b): MadeOf) -> Option<&'static str> {
+    let other_kernels = match (set_a, set_b) {
+        (Some(a), Some(b)) => {
+            let mut both =
+                (a.modules.iter()).filter_map(|(name, hash)| Some((hash, b.modules.get(name)?)));
+            a.kernels != b.kernels || both.any(|(a, b)| a != b)
+        }
+        _ => a.kernels != b.kernels,
+    };
+    let differs = [
+        ("the program", a.program != b.program),
+        ("the settings", a.settings != b.settings),
+        ("the scene", a.scene != b.scene),
+        ("the kernels", other_kernels),
+    ];
+    differs
+        .into_iter()
+        .find(|(_, differs)| *differs)
+        .map(|(what, _)| what)
+}
+
+/// The record of the modules that kernels were made of.
+pub(super) fn kernel_set(kernels: &str, modules: BTreeMap<String, String>) -> KernelSetRecord {
+    let mut parts = vec![("kernels", kernels)];
+    parts.extend(
+        modules
+            .iter()
+            .map(|(name, hash)| (name.as_str(), hash.as_str())),
+    );
+    KernelSetRecord {
+        id: short(&parts),
+        kernels: kernels.to_owned(),
+        modules,
+    }
+}

@@ -1,0 +1,473 @@
+//! Folders of shards joined to the folder of one run.
+//!
+//! Of a cell that several folders hold one is taken, after it was compared with the others: contradictions are errors. Figures of clocks are
+//! taken from one device alone. What does not depend on the device (errors, discrepancies, models) comes from any.
+
+use super::folder::lock_folder;
+use super::inputs::{MadeOf, differing};
+use super::resume::Earlier;
+use super::{Registries, RunError};
+use raystone_config::Unit;
+use raystone_core::atomic::write_atomic;
+use raystone_record::{
+    Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
+    RunRecord, SkippedRecord, read_records, records_file, text_of,
+};
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was joined.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Merged {
+    /// Cells that were taken.
+    pub cells: usize,
+    /// What a reader has to know: cells that several folders hold, that are missing or were left behind, in words.
+    pub notes: Vec<String>,
+    /// Whether a cell of the plan is missing or failed.
+    pub incomplete: bool,
+}
+
+/// The folder of a shard.
+struct Part {
+    dir: PathBuf,
+    earlier: Earlier,
+    run: RunRecord,
+}
+
+fn input(text: String) -> RunError {
+    RunError::Input(text)
+}
+
+impl Part {
+    fn read(dir: &Path, merged: &mut Merged) -> Result<Self, RunError> {
+        let records = read_records(dir).map_err(|e| input(e.to_string()))?;
+        let dir = dir.to_owned();
+        let told = records.warnings.iter();
+        let told = told.map(|warning| format!("{}: {warning}", dir.display()));
+        merged.notes.extend(told);
+        let run = (records.lines.iter()).find_map(|line| RunRecord::of(&line.body));
+        let run = run.cloned().ok_or_else(|| {
+            let dir = dir.display();
+            input(format!(
+                "{dir} does not say of what experiment it is: its first line is missing"
+            ))
+        })?;
+        Ok(Self {
+            earlier: Earlier::new(records.lines),
+            dir,
+            run,
+        })
+    }
+
+    /// Why its run ended early; `None` if it did not.
+    fn unfinished(&self) -> Option<String> {
+        let lines = self.earlier.lines();
+        let ended = lines
+            .iter()
+            .any(|line| matches!(line.body, Body::Finished(_)));
+        let reason = lines
+            .iter()
+            .find_map(|line| InterruptedRecord::of(&line.body));
+        match (ended, reason) {
+            (true, _) => None,
+            (false, Some(record)) => Some(record.reason.clone()),
+            (false, None) => Some("it did not end".to_owned()),
+        }
+    }
+}
+
+/// Joins the folders of shards to `out`, where nothing may be yet. Clocks speak of the devices alone whose name holds `device`, if that
+/// is given.
+///
+/// # Errors
+/// Folders of different experiments, cells that contradict each other, times of several devices without a choice, and files that cannot
+/// be read or written.
+pub fn merge(
+    dirs: &[PathBuf],
+    out: &Path,
+    device: Option<&str>,
+    registries: &Registries,
+) -> Result<Merged, RunError> {
+    let mut merged = Merged::default();
+    let parts = dirs.iter().map(|dir| Part::read(dir, &mut merged));
+    let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
+    let first = parts
+        .first()
+        .ok_or_else(|| input("nothing to join: name the folders of the shards".to_owned()))?;
+    for part in &parts[1..] {
+        same_experiment(first, part)?;
+    }
+    let (experiment, plan) = super::inventory::planned(&first.run, registries)
+        .map_err(|e| input(format!("{}: {e}", first.dir.display())))?;
+    let units = plan.units(&experiment);
+    let chosen = choose(&parts, &units, device, &mut merged)?;
+    check_devices(&parts, &units, &chosen)?;
+    let mut lines = Vec::new();
+    let mut pictures = BTreeMap::new();
+    for (part, cells) in parts.iter().zip(&chosen) {
+        let own = part.earlier.lines_of(cells);
+        for name in own.iter().flat_map(pictures_of) {
+            pictures.entry(name).or_insert_with(|| part.dir.clone());
+        }
+        lines.extend(own);
+        merged.cells += cells.len();
+    }
+    lines.extend(told_once(&parts));
+    tell_missing(&units, &chosen, &mut merged);
+    lines.push(Line::about_all(Body::Run(RunRecord {
+        shard: None,
+        ..first.run.clone()
+    })));
+    lines.push(Line::about_all(end(&parts)));
+    let _lock = lock_folder(out)?;
+    write(out, &lines, &pictures, &mut merged)?;
+    Ok(merged)
+}
+
+/// That two folders are of one experiment.
+fn same_experiment(first: &Part, other: &Part) -> Result<(), RunError> {
+    let of = |part: &Part| {
+        let run = &part.run;
+        [
+            ("the text", vec![run.experiment_text.clone()]),
+            ("the values of --set", run.overrides.clone()),
+            ("the filters of --only", run.only.clone()),
+        ]
+    };
+    for ((what, a), (_, b)) in of(first).into_iter().zip(of(other)) {
+        if a != b {
+            return Err(input(format!(
+                "{} and {} are of different experiments: {what} differ{}",
+                first.dir.display(),
+                other.dir.display(),
+                if what == "the text" { "s" } else { "" }
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The cells that are taken of each folder.
+fn choose(
+    parts: &[Part],
+    units: &[Unit],
+    device: Option<&str>,
+    merged: &mut Merged,
+) -> Result<Vec<Vec<CellRecord>>, RunError> {
+    let all: Vec<Holder> = parts.iter().map(Holder::new).collect();
+    let mut chosen = vec![Vec::new(); parts.len()];
+    let (mut twice, mut elsewhere) = (0, 0);
+    for unit in units {
+        let holders = all.iter().enumerate();
+        let holders = holders.filter_map(|(i, of)| Some((i, *of.cells.get(unit.name.as_str())?)));
+        let mut holders: Vec<(usize, &CellRecord)> = holders.collect();
+        if let Some(device) = device.filter(|_| unit.kind.is_timed()) {
+            let before = holders.len();
+            holders.retain(|(_, cell)| {
+                cell.outcome != Outcome::Done || cell.inputs.device.contains(device)
+            });
+            elsewhere += usize::from(holders.is_empty() && before > 0);
+        }
+        // What is done comes before what was left out, and that before what failed.
+        holders.sort_by_key(|(_, cell)| cell.outcome as u8 != Outcome::Done as u8);
+        holders.sort_by_key(|(_, cell)| cell.outcome == Outcome::Failed);
+        let Some(&(place, cell)) = holders.first() else {
+            continue;
+        };
+        for &(other, record) in &holders[1..] {
+            if record.outcome == Outcome::Done && cell.outcome == Outcome::Done {
+                twice += 1;
+                let fault = contradiction((&all[place], cell), (&all[other], record));
+                if let Some(what) = fault {
+                    return Err(input(format!(
+                        "{} and {} contradict each other on {}: {what}; measure it again, or leave one of them out",
+                        parts[place].dir.display(),
+                        parts[other].dir.display(),
+                        unit.name
+                    )));
+                }
+            }
+        }
+        chosen[place].push(cell.clone());
+    }
+    if twice > 0 {
+        merged.notes.push(format!(
+            "{twice} times a cell was measured in more than one folder: the first one was taken, and the others agree with it"
+        ));
+    }
+    if elsewhere > 0 {
+        merged.notes.push(format!(
+            "{elsewhere} timed cells were left behind: they were measured on other devices than {}",
+            device.unwrap_or_default()
+        ));
+    }
+    Ok(chosen)
+}
+
+/// What a folder says of its cells.
+struct Holder<'a> {
+    cells: BTreeMap<&'a str, &'a CellRecord>,
+    sets: HashMap<&'a str, &'a KernelSetRecord>,
+    evidence: Vec<Evidence>,
+}
+
+impl<'a> Holder<'a> {
+    fn new(part: &'a Part) -> Self {
+        Self {
+            cells: part.earlier.cells(),
+            sets: part.earlier.kernel_sets(),
+            evidence: evidence_of(part.earlier.lines()),
+        }
+    }
+
+    fn made_of<'c>(&'c self, cell: &'c CellRecord) -> MadeOf<'c> {
+        (&cell.inputs, self.sets.get(&*cell.inputs.kernels).copied())
+    }
+
+    /// What was found for a cell, by what it is about.
+    fn found(&self, cell: &CellRecord) -> BTreeMap<&str, BTreeSet<&str>> {
+        let lines: HashSet<&str> = cell.lines.iter().map(String::as_str).collect();
+        let mut found: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for one in self
+            .evidence
+            .iter()
+            .filter(|one| lines.contains(&*one.line))
+        {
+            found.entry(&one.about).or_default().insert(&one.value);
+        }
+        found
+    }
+}
+
+/// What two records of one cell differ in that they must not.
+fn contradiction(a: (&Holder, &CellRecord), b: (&Holder, &CellRecord)) -> Option<String> {
+    if let Some(what) = differing(a.0.made_of(a.1), b.0.made_of(b.1)) {
+        return Some(format!("{what} that it was measured with differ"));
+    }
+    let (found_a, found_b) = (a.0.found(a.1), b.0.found(b.1));
+    let differ =
+        |(about, value): (&&str, _)| found_b.get(about).is_some_and(|other| other != value);
+    found_a
+        .iter()
+        .any(differ)
+        .then(|| "figures that no clock is part of differ".to_owned())
+}
+
+/// What has to be the same whenever it is measured on one device.
+struct Evidence {
+    /// Hash of the line that has it.
+    line: String,
+    /// Device, cell, kind and number. Not the line's hash: that tells through which structure an image was rendered, and images are
+    /// equal whichever it was.
+    about: String,
+    value: String,
+}
+
+fn evidence_of(lines: &[Line]) -> Vec<Evidence> {
+    let mut found = Vec::new();
+    // Rounding may differ from device to device.
+    let mut place = String::new();
+    for line in lines {
+        if let Body::Run(run) = &line.body {
+            place = super::inputs::place(&run.environment);
+        }
+        let (kind, value) = match &line.body {
+            Body::Error(r) => (
+                format!("error {}", r.replicate),
+                json!([r.errors, r.image_hash]),
+            ),
+            Body::Bias(r) => ("bias".to_owned(), json!([r.p_of_all, r.min_p])),
+            Body::Stream(r) => (
+                format!("stream {:?}", r.dimensions),
+                json!([r.star, r.figures]),
+            ),
+            Body::Coherence(r) => ("coherence".to_owned(), json!(r)),
+            Body::Time(r) => ("time".to_owned(), json!([r.image_hash, r.rays])),
+            Body::Structure(r) => {
+                let counters: Vec<_> = r.timings.iter().map(|t| (t.class, t.counters)).collect();
+                (
+                    "structure".to_owned(),
+                    json!([r.stats.nodes, r.stats.sah_cost, counters]),
+                )
+            }
+            _ => continue,
+        };
+        found.push(Evidence {
+            line: line.hash.clone(),
+            about: format!("{place} {} {kind}", line.key),
+            value: value.to_string(),
+        });
+    }
+    found
+}
+
+/// That the clocks of one device speak.
+fn check_devices(
+    parts: &[Part],
+    units: &[Unit],
+    chosen: &[Vec<CellRecord>],
+) -> Result<(), RunError> {
+    let timed: BTreeSet<&str> = units
+        .iter()
+        .filter(|unit| unit.kind.is_timed())
+        .map(|unit| unit.name.as_str())
+        .collect();
+    let mut devices: BTreeMap<&str, &Path> = BTreeMap::new();
+    for (part, cells) in parts.iter().zip(chosen) {
+        let cells = cells
+            .iter()
+            .filter(|cell| cell.outcome == Outcome::Done && timed.contains(cell.unit.as_str()));
+        for cell in cells {
+            devices.entry(&cell.inputs.device).or_insert(&part.dir);
+        }
+    }
+    if devices.len() < 2 {
+        return Ok(());
+    }
+    let list = devices
+        .iter()
+        .map(|(device, dir)| format!("{device} ({})", dir.display()));
+    Err(input(format!(
+        "times of several devices cannot be put into one table: {}; choose one with --device, the timed cells of the others are left behind then",
+        list.collect::<Vec<_>>().join("; ")
+    )))
+}
+
+/// Lines about the plan and warnings, which several folders have.
+fn told_once(parts: &[Part]) -> Vec<Line> {
+    let mut seen = BTreeSet::new();
+    let lines = parts.iter().flat_map(|part| part.earlier.lines());
+    let lines = lines.filter(|line| {
+        let text = |record: &SkippedRecord| format!("{}: {}", record.cell, record.reason);
+        match &line.body {
+            Body::Warning(record) => seen.insert(("warning", text(record))),
+            Body::Skipped(record) if line.hash.is_empty() => seen.insert(("skipped", text(record))),
+            _ => false,
+        }
+    });
+    lines.cloned().collect()
+}
+
+/// Notes the cells of the plan that no folder holds, and those that failed.
+fn tell_missing(units: &[Unit], chosen: &[Vec<CellRecord>], merged: &mut Merged) {
+    let cells = chosen.iter().flatten();
+    let held: BTreeMap<&str, Outcome> = cells.map(|c| (c.unit.as_str(), c.outcome)).collect();
+    let missing = units
+        .iter()
+        .filter(|unit| !held.contains_key(unit.name.as_str()));
+    let missing: Vec<&str> = missing.map(|unit| unit.name.as_str()).collect();
+    let failed = held.iter().filter(|(_, o)| **o == Outcome::Failed);
+    let failed: Vec<&str> = failed.map(|(name, _)| *name).collect();
+    for (what, names) in [("missing", &missing), ("failed", &failed)] {
+        if let [first, others @ ..] = names.as_slice() {
+            let more = match others.len() {
+                0 => String::new(),
+                n => format!(" and {n} more"),
+            };
+            let (cells, are) = match names.len() {
+                1 => ("cell", "is"),
+                _ => ("cells", "are"),
+            };
+            let count = names.len();
+            merged
+                .notes
+                .push(format!("{count} {cells} {are} {what}: {first}{more}"));
+            merged.incomplete = true;
+        }
+    }
+}
+
+/// The last line: sums of all parts, or why one of them ended early.
+fn end(parts: &[Part]) -> Body {
+    let mut sum = FinishedRecord {
+        wall_s: 0.0,
+        parts_s: BTreeMap::new(),
+        overhead_s: 0.0,
+        failed: 0,
+        skipped: 0,
+        load: Default::default(),
+    };
+    for part in parts {
+        let lines = part.earlier.lines().iter();
+        for finished in lines.filter_map(|line| FinishedRecord::of(&line.body)) {
+            sum.wall_s += finished.wall_s;
+            sum.overhead_s += finished.overhead_s;
+            sum.failed += finished.failed;
+            sum.skipped += finished.skipped;
+            sum.load = finished.load;
+            for (name, seconds) in &finished.parts_s {
+                *sum.parts_s.entry(name.clone()).or_default() += seconds;
+            }
+        }
+    }
+    let early: Vec<String> = parts
+        .iter()
+        .filter_map(|part| Some(format!("{}: {}", part.dir.display(), part.unfinished()?)))
+        .collect();
+    match early.is_empty() {
+        true => Body::Finished(sum),
+        false => Body::Interrupted(InterruptedRecord {
+            reason: early.join("; "),
+            wall_s: sum.wall_s,
+        }),
+    }
+}
+
+/// Pictures that a line names: files in a folder of images beside the records, and nothing elsewhere.
+fn pictures_of(line: &Line) -> Vec<String> {
+    let named = match &line.body {
+        Body::Error(record) => vec![&record.image, &record.error_map],
+        Body::Structure(record) => vec![&record.heat_map],
+        Body::Reference(record) => return plain_picture(&record.image).into_iter().collect(),
+        _ => Vec::new(),
+    };
+    let names = named.into_iter().flatten();
+    names.filter_map(|name| plain_picture(name)).collect()
+}
+
+fn plain_picture(name: &str) -> Option<String> {
+    let (folder, file) = name.split_once('/')?;
+    let is_plain = folder.starts_with("images")
+        && !file.is_empty()
+        && !file.starts_with('.')
+        && !file.contains(['/', '\\']);
+    is_plain.then(|| name.to_owned())
+}
+
+fn write(
+    out: &Path,
+    lines: &[Line],
+    pictures: &BTreeMap<String, PathBuf>,
+    merged: &mut Merged,
+) -> Result<(), RunError> {
+    let records = records_file(out);
+    let failed = |path: &Path, error: std::io::Error| {
+        input(format!("cannot write {}: {error}", path.display()))
+    };
+    if fs::symlink_metadata(&records).is_ok() {
+        return Err(input(format!(
+            "{} holds the results of another run; choose another folder with --out",
+            records.display()
+        )));
+    }
+    let mut absent = 0;
+    for (name, dir) in pictures {
+        let target = out.join(name);
+        let Ok(bytes) = fs::read(dir.join(name)) else {
+            absent += 1;
+            continue;
+        };
+        let folder = target.parent().unwrap_or(out);
+        fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        write_atomic(&target, &bytes).map_err(|e| failed(&target, e))?;
+    }
+    if absent > 0 {
+        merged.notes.push(format!(
+            "{absent} pictures that the records name are not in their folders"
+        ));
+    }
+    let text = text_of(lines).map_err(|e| input(format!("a record cannot be written: {e}")))?;
+    write_atomic(&records, text.as_bytes()).map_err(|e| failed(&records, e))
+}

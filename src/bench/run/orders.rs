@@ -1,0 +1,76 @@
+//! Full cells whose pixels are taken in orders of passes: how long a sample takes, and how soon a picture is there.
+
+use super::errors::image_hash;
+use super::images::Estimator;
+use super::session::Session;
+use super::structures::Gated;
+use super::world::World;
+use raystone_config::{Axis, Cell};
+use raystone_core::params::Choice as _;
+use raystone_core::random::Pcg32;
+use raystone_gpu::GpuError;
+use raystone_record::OrderTime;
+use raystone_render::{InOrder, Order, PartRenderer};
+use raystone_stats::statistics::median_interval;
+
+/// Each order, timed in interleaved rounds by the wall clock, submissions that are waited for included; none if the experiment does
+/// not ask for it. `hash` is that of the image of one pass.
+///
+/// # Errors
+/// The kernel does not compile, the device is lost, or an image is another; in words.
+pub(super) fn of_cell(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    (cell, hash): (&Cell, &str),
+) -> Result<Vec<OrderTime>, String> {
+    let timing = session.experiment.timing;
+    if !timing.orders {
+        return Ok(Vec::new());
+    }
+    session.say(format!("{cell}: orders of pixels"));
+    let text = |e: GpuError| e.to_string();
+    let estimator = Estimator::new(session, cell, super::times::samples(session))?;
+    let gpu = world.device.of(&cell[Axis::Kernels]);
+    let gpu = gpu.map_err(|e| e.to_string())?;
+    let job = estimator.job(session, world.camera, structure.runtime_checks);
+    let renderer = PartRenderer::new(gpu, &world.buffers, &structure.traced, &job).map_err(text)?;
+    let of_image = (timing.spp, session.experiment.seed);
+    let mut random = Pcg32::new(u64::from(session.experiment.seed));
+    let mut turns: Vec<(Order, Vec<InOrder>)> = Order::ALL
+        .iter()
+        .map(|order| (*order, Vec::new()))
+        .collect();
+    // The first round warms up and looks at the images.
+    for round in 0..=timing.rounds {
+        for left in (1..turns.len()).rev() {
+            turns.swap(left, random.below(left + 1));
+        }
+        for (order, spent) in &mut turns {
+            let render = || renderer.render(*order, of_image, |_| Ok::<_, GpuError>(()));
+            let turn = session.clock.time("gpu", render).map_err(text)?;
+            if round > 0 {
+                spent.push(turn);
+            } else if image_hash(&renderer.image(timing.spp).map_err(text)?) != hash {
+                return Err(format!(
+                    "taken in the order {}, its image is another",
+                    order.name()
+                ));
+            }
+        }
+    }
+    turns.sort_by_key(|(order, _)| Order::ALL.iter().position(|known| known == order));
+    let spp = f64::from(timing.spp);
+    let of_order = |(order, turns): &(Order, Vec<InOrder>)| {
+        let median = |ms: &dyn Fn(&InOrder) -> f64| {
+            median_interval(&turns.iter().map(ms).collect::<Vec<_>>())
+        };
+        OrderTime {
+            order: order.name().to_owned(),
+            passes: turns.first().map_or(0, |turn| turn.passes),
+            ms_per_spp: median(&|turn| turn.total.wall_ms / spp),
+            first_picture_ms: median(&|turn| turn.first_picture.wall_ms),
+        }
+    };
+    Ok(turns.iter().map(of_order).collect())
+}

@@ -1,0 +1,47 @@
+//! A reference that is not rendered: the image of another renderer, or of an earlier run.
+
+use super::RunError;
+use raystone_config::Experiment;
+use raystone_image::read_linear;
+use raystone_stats::metrics::Reference;
+
+/// An image that was read, fit for the experiment.
+pub(super) struct ReferenceFile {
+    /// The file as the experiment names it.
+    pub name: String,
+    /// BLAKE3 of its pixels.
+    pub hash: String,
+    /// The image; its noise is not known.
+    pub reference: Reference,
+}
+
+impl ReferenceFile {
+    /// The file that an experiment names, if it names one.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is of another size than the images of the run, or has pixels that are not
+    /// finite.
+    pub(super) fn load(experiment: &Experiment) -> Result<Option<Self>, RunError> {
+        let Some(path) = &experiment.reference.file else {
+            return Ok(None);
+        };
+        let name = path.display().to_string();
+        let image = read_linear(path).map_err(|e| RunError::Input(format!("reference: {e}")))?;
+        let [width, height] = experiment.resolution;
+        if [image.width, image.height] != [width, height] {
+            let [w, h] = [image.width, image.height];
+            return Err(RunError::Input(format!(
+                "reference {name} has {w}×{h} pixels, and run.resolution is {width}×{height}: render one \
+                 of the size, or set run.resolution=[{w}, {h}]"
+            )));
+        }
+        let hash = super::errors::image_hash(&image);
+        let reference = Reference::single(image)
+            .map_err(|e| RunError::Input(format!("reference {name}: {e}")))?;
+        Ok(Some(Self {
+            name,
+            hash,
+            reference,
+        }))
+    }
+}

@@ -1,0 +1,216 @@
+//! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
+//! there at once; the structure is validated on the host.
+
+use super::images::{Estimator, attributes};
+use super::kernels::{Device, Kernels};
+use super::session::Session;
+use super::world::{load_options, table_bytes};
+use super::{Registries, RunError, RunOptions};
+use indicatif::ProgressStyle;
+use raystone_accel::{AccelError, TriangleSoup};
+use raystone_config::{Axis, Experiment, Plan};
+use raystone_core::params::Variant;
+use raystone_gpu::probe_arithmetic;
+use raystone_image::{FileFormat, Image};
+use raystone_render::{
+    InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
+};
+use raystone_scene::{self as scene, LoadReport};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Samples are added for about so long before the progress is shown.
+const STEP: Duration = Duration::from_millis(500);
+/// Least time between two writes of an unfinished picture.
+const REFRESH: Duration = Duration::from_secs(2);
+
+/// What was rendered, how fast, and what was approximated.
+#[derive(Debug, Clone)]
+pub struct Rendering {
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds from the start until the first picture was written.
+    pub first_picture_s: f64,
+    /// Seconds that the samples took, compilation of the kernel not included.
+    pub samples_s: f64,
+    /// Seconds from the start to the end.
+    pub total_s: f64,
+    /// Rays of all classes.
+    pub rays: u64,
+    /// What the loader dropped or approximated.
+    pub report: LoadReport,
+    /// Pixels that are NaN or infinite: a fault of the renderer.
+    pub non_finite_pixels: usize,
+    /// Where pixels were taken in an order of passes: how long that took.
+    pub in_order: Option<InOrder>,
+}
+
+/// Where pictures go, and in which order pixels are taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Pictures<'a> {
+    /// The picture, in the format of its ending.
+    pub file: &'a Path,
+    /// Passes, each a part of the pixels; `None` takes whole samples.
+    pub order: Option<Order>,
+    /// Where the first picture without a gap goes, if there is an order; `None`: it is the first of the file.
+    pub preview: Option<&'a Path>,
+}
+
+/// Renders the first scene, structure, sampler and integrator of the axes at `experiment.spp.max()`
+/// samples into a file, whose ending chooses the format. The file is there after the first sample
+/// and is written again while more are added; in an order of passes it is there as soon as no pixel is without a colour.
+///
+/// # Errors
+/// An unknown ending, no adapter, a scene that does not load, a structure that cannot be built or is
+/// not valid, a file that cannot be written, or an image that is not sound: see [`Renderer::image`].
+pub fn render(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+    pictures: &Pictures,
+) -> Result<Rendering, RunError> {
+    let start = Instant::now();
+    for file in [Some(pictures.file), pictures.preview]
+        .into_iter()
+        .flatten()
+    {
+        FileFormat::of(file).map_err(input)?;
+    }
+    let cell = plan
+        .times
+        .first()
+        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
+    let kernels = Kernels::load(&plan.kernels, registries)?;
+    let session = Session::unrecorded(experiment, plan, registries, options);
+    let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
+    session.say(format!("{scene}: loading"));
+    let device = Device::open(options, &kernels)?;
+    let load = load_options(options, table_bytes(&device.gpu.limits));
+    let scene_data = scene::load(scene, &load).map_err(input)?;
+    // That of the experiment, of the scene, or one that frames the scene.
+    let own = || scene_data.view(experiment.aspect());
+    let camera = experiment.camera.unwrap_or_else(own);
+    raystone_scene::check_camera(&camera).map_err(input)?;
+    let gpu = device.of(&cell[Axis::Kernels])?;
+    let tests = registries.intersection(cell).map_err(RunError::Input)?;
+    let kept = tests.kept_by(&probe_arithmetic(gpu)?);
+    kept.map_err(RunError::Input)?;
+    let mut stage = Stage::new(gpu, scene_data, tests)?;
+    session.say(format!("{scene}: building {accel}"));
+    let traced = build(&session, &stage, accel)?;
+    stage.soup = TriangleSoup::default();
+    let scene = &stage.scene;
+    session.say("compiling the kernel");
+    let spp = experiment.spp.max();
+    let estimator = Estimator::new(&session, cell, spp);
+    let estimator = estimator.map_err(RunError::Input)?;
+    if let Some(reason) = estimator.integrator.refusal(&traced) {
+        return Err(RunError::Input(format!("{accel}: {reason}")));
+    }
+    let job = estimator.job(&session, camera, true);
+    let mut rendering = Rendering {
+        triangles: scene.triangles.len(),
+        spp,
+        first_picture_s: 0.0,
+        samples_s: 0.0,
+        total_s: 0.0,
+        rays: 0,
+        report: scene.report.clone(),
+        non_finite_pixels: 0,
+        in_order: None,
+    };
+    let mut show = |image: &Image, done: u32, file: &Path| {
+        if rendering.first_picture_s == 0.0 {
+            rendering.first_picture_s = start.elapsed().as_secs_f64();
+        }
+        let sampler = estimator.sampler.label();
+        let about = attributes(&options.program, cell, &sampler, done, experiment.seed);
+        let format = FileFormat::of(file).map_err(input)?;
+        format.write(file, image, &about).map_err(input)
+    };
+    let compiled;
+    let image = if let Some(order) = pictures.order {
+        let renderer = PartRenderer::new(gpu, &stage.buffers, &traced, &job)?;
+        compiled = Instant::now();
+        let first = pictures.preview.unwrap_or(pictures.file);
+        let samples = (spp, experiment.seed);
+        let spent = renderer.render(order, samples, |renderer| match renderer.preview()? {
+            Some(preview) => show(&preview, 1, first),
+            None => Ok(()),
+        })?;
+        let image = renderer.image(spp)?;
+        show(&image, spp, pictures.file)?;
+        rendering.in_order = Some(spent);
+        image
+    } else {
+        let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
+        compiled = Instant::now();
+        let image = add_all_samples(&session, &renderer, spp, |image, done| {
+            show(image, done, pictures.file)
+        })?;
+        rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
+        image
+    };
+    rendering.samples_s = compiled.elapsed().as_secs_f64();
+    rendering.non_finite_pixels = image.non_finite_pixels();
+    rendering.total_s = start.elapsed().as_secs_f64();
+    session.progress.bar.finish_and_clear();
+    Ok(rendering)
+}
+
+fn input(error: impl ToString) -> RunError {
+    RunError::Input(error.to_string())
+}
+
+/// The structure of an experiment over the stage's scene.
+fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, RunError> {
+    let kind = session.registries.accel.get(&accel.name);
+    let kind = kind.ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;
+    stage.traced(kind, &accel.params).map_err(|e| match e {
+        StageError::Gpu(error) => error.into(),
+        StageError::Accel(AccelError::Invalid(fault)) => {
+            RunError::Wrong(format!("{accel} is not valid: {fault}"))
+        }
+        error => input(error),
+    })
+}
+
+/// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image and its samples after the first, whenever the
+/// samples have doubled and [`REFRESH`] is over, and at the end.
+fn add_all_samples(
+    session: &Session,
+    renderer: &Renderer,
+    spp: u32,
+    mut show: impl FnMut(&Image, u32) -> Result<(), RunError>,
+) -> Result<Image, RunError> {
+    let seed = session.experiment.seed;
+    let style =
+        ProgressStyle::with_template("{bar:32} {pos}/{len} spp · {elapsed} · about {eta} left");
+    if let Ok(style) = style {
+        session.progress.bar.set_style(style);
+    }
+    session.progress.bar.set_length(u64::from(spp));
+    renderer.reset()?;
+    let start = Instant::now();
+    let (mut done, mut shown, mut last) = (0, 0, start);
+    loop {
+        let speed = f64::from(done) / start.elapsed().as_secs_f64().max(1e-6);
+        let step = (speed * STEP.as_secs_f64()).max(1.0) as u32;
+        let step = step.min(spp - done);
+        renderer.add_samples(done, step, seed)?;
+        done += step;
+        session.progress.bar.set_position(u64::from(done));
+        let due = done >= 2 * shown && last.elapsed() >= REFRESH;
+        if shown == 0 || due || done == spp {
+            let image = renderer.image()?;
+            show(&image, done)?;
+            (shown, last) = (done, Instant::now());
+            if done == spp {
+                return Ok(image);
+            }
+        }
+    }
+}

@@ -1,0 +1,622 @@
+//! What lives as long as a run: records, clock, progress, cells already done.
+
+use super::estimate::Estimate;
+use super::folder::Folder;
+use super::inputs::{Current, kernel_set, place};
+use super::kernels::{Device, Kernels};
+use super::progress::{Progress, Weights, expect};
+use super::reference_file::ReferenceFile;
+use super::resume::{Earlier, Kept};
+use super::{RunError, RunOptions};
+use crate::environment::{capture, machine_load};
+use raystone_config::{Axis, Cell, Experiment, Plan, Skipped, Unit, UnitKind, shards, unit_name};
+use raystone_core::params::Variant;
+use raystone_core::text::cell_hash;
+use raystone_gpu::Gpu;
+use raystone_image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
+use raystone_record::Environment;
+use raystone_record::{
+    Body, CellRecord, FinishedRecord, KernelFolder, Line, Outcome, RunRecord, SkippedRecord, axis,
+    text_of,
+};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Instant, SystemTime};
+
+/// Pixels of images whose linear radiance is kept unasked: 1.5 MiB each.
+const MOST_KEPT_PIXELS: usize = 1 << 17;
+
+/// Where the wall time goes; what no part claims is the harness's own overhead.
+pub(super) struct Clock {
+    start: Instant,
+    /// Seconds from 1970 to `start`.
+    began_unix_s: u64,
+    parts_s: BTreeMap<String, f64>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        Self {
+            start: Instant::now(),
+            began_unix_s: since_1970.map_or(0, |since| since.as_secs()),
+            parts_s: BTreeMap::new(),
+        }
+    }
+
+    /// Runs `work` and books its time under `part`.
+    pub(super) fn time<T>(&mut self, part: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        *self.parts_s.entry(part.to_owned()).or_default() += start.elapsed().as_secs_f64();
+        result
+    }
+}
+
+/// The state of a run.
+pub(super) struct Session<'a> {
+    pub experiment: &'a Experiment,
+    pub plan: &'a Plan,
+    pub registries: &'a super::Registries,
+    pub options: &'a RunOptions,
+    pub clock: Clock,
+    pub progress: Progress,
+    /// Expected times of its steps.
+    pub weights: Weights,
+    pub failed: usize,
+    pub skipped: usize,
+    /// Whether a scene could not be loaded.
+    pub bad_input: bool,
+    /// The gate's second scene.
+    pub trial: super::trial::Trial,
+    /// Cells that need longer loops than the driver runs, with the reason.
+    pub refused: BTreeMap<String, String>,
+    /// Cells that are not measured: they have their record (and are not run again after a lost device), or another shard has them.
+    done: HashSet<String>,
+    /// Units that failed in this run: nothing else is measured through them.
+    unusable: HashSet<String>,
+    /// The units of the plan, in its order.
+    pub units: Arc<Vec<Unit>>,
+    /// Place of each unit by its name.
+    places: HashMap<String, usize>,
+    /// What cells depend on.
+    pub current: Option<Current<'a>>,
+    /// Modules of kernels that were used for a unit, or for something that several share.
+    used: BTreeMap<String, BTreeMap<String, String>>,
+    /// Kernel sets that are recorded.
+    sets: HashSet<String>,
+    /// The device that kernels run on.
+    gpu: Option<Gpu>,
+    /// Hashes of the lines that judge an integrator.
+    pub judged_lines: BTreeMap<String, String>,
+    /// Samplers whose words were compared with the twin's.
+    pub compared: HashSet<String>,
+    /// What images are compared with, if it is not rendered.
+    pub reference_file: Option<ReferenceFile>,
+    /// What is wrong with the integrators that were judged.
+    pub judged: BTreeMap<String, Option<String>>,
+    /// Whether they are judged on all trial scenes, and not on those alone that are of a scene.
+    pub judges_trials: bool,
+    /// `None`: nothing is written (gate alone, single images).
+    folder: Option<Arc<Folder>>,
+}
+
+impl<'a> Session<'a> {
+    /// Opens the folder for writing; fails before anything is measured if it cannot be written.
+    pub(super) fn new(
+        experiment: &'a Experiment,
+        plan: &'a Plan,
+        registries: &'a super::Registries,
+        options: &'a RunOptions,
+    ) -> Result<Self, RunError> {
+        let reference_file = ReferenceFile::load(experiment)?;
+        let folder = Arc::new(Folder::open(&options.out, options.existing, options.wait)?);
+        options.interrupt.begin(&folder);
+        let mut session = Self::unrecorded(experiment, plan, registries, options);
+        session.folder = Some(folder);
+        session.reference_file = reference_file;
+        Ok(session)
+    }
+
+    /// The lines of the run that is resumed.
+    pub(super) fn take_earlier(&self) -> Earlier {
+        let lines = self.folder.as_ref().map(|folder| folder.take_earlier());
+        Earlier::new(lines.unwrap_or_default())
+    }
+
+    /// Leaves the folder as it was.
+    pub(super) fn abandon(&self) {
+        if let Some(folder) = &self.folder {
+            folder.abandon();
+        }
+    }
+
+    /// The content of a scene that was loaded.
+    pub(super) fn note_scene(&mut self, scene: &Variant, hash: &str) {
+        if let Some(current) = &mut self.current {
+            let hash = Ok(hash.to_owned());
+            current.scenes.insert(scene.label.clone(), hash);
+        }
+    }
+
+    /// How many units are left to be measured beside those that are kept.
+    pub(super) fn open_beside(&self, kept: &Kept) -> usize {
+        let names: HashSet<&str> = kept.cells.iter().map(|cell| cell.unit.as_str()).collect();
+        let open = self.open_units();
+        open.filter(|unit| !names.contains(unit.name.as_str()))
+            .count()
+    }
+
+    /// Takes over what still holds of an earlier run on this device, and writes the first line of this one: how many cells hold.
+    pub(super) fn begin(
+        &mut self,
+        device: &Device,
+        kernels: &Kernels,
+        (earlier, mut current): (&Earlier, Current<'a>),
+    ) -> Result<usize, RunError> {
+        self.use_device(&device.gpu);
+        let environment = capture(&device.gpu, &self.options.program);
+        current.device = Some(place(&environment));
+        let kept = earlier.kept(&self.units, &current);
+        let count = kept.cells.len();
+        for (unit, why) in &kept.stale {
+            self.tell_progress(&format!("{unit}: again, {why}"));
+        }
+        self.current = Some(current);
+        self.take_over(kept)?;
+        expect(self);
+        self.write_start(environment, kernels.folders())?;
+        Ok(count)
+    }
+
+    /// Fails all units that are not measured yet and that `is_one`, for one reason, which is told once.
+    pub(super) fn fail_all(
+        &mut self,
+        about: &str,
+        is_one: impl Fn(&Unit) -> bool,
+        reason: String,
+    ) -> Result<(), RunError> {
+        self.write_failure(about, reason.clone())?;
+        let open = self.open_units().filter(|unit| is_one(unit));
+        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
+        for name in names {
+            self.close(&name, (Outcome::Failed, &reason), Vec::new(), &[])?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out all units of a world that are not measured yet, for one reason, which is told once.
+    pub(super) fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
+        let skipped = self.plan.all_on(world, reason.clone());
+        self.skipped += skipped.cells;
+        let hash = cell_hash(&[("left out", &skipped.cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: skipped.cell,
+            reason: skipped.reason,
+        };
+        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        let open = self.open_units().filter(|unit| unit.cell.is_on(world));
+        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
+        for name in names {
+            let lines = vec![hash.clone()];
+            self.close(&name, (Outcome::LeftOut, &reason), lines, &[])?;
+        }
+        Ok(())
+    }
+
+    /// Takes over what still holds of an earlier run.
+    fn take_over(&mut self, kept: Kept) -> Result<(), RunError> {
+        for line in &kept.lines {
+            if let Body::Kernels(set) = &line.body {
+                self.sets.insert(set.id.clone());
+            }
+        }
+        let text = text_of(&kept.lines).map_err(unwritable)?;
+        if let (Some(folder), false) = (&self.folder, text.is_empty()) {
+            folder.append(&text)?;
+        }
+        for cell in kept.cells {
+            if cell.outcome == Outcome::LeftOut {
+                self.skipped += 1;
+                self.refused.insert(cell.unit.clone(), cell.reason);
+                self.unusable.insert(cell.unit.clone());
+            }
+            self.done.insert(cell.unit);
+        }
+        Ok(())
+    }
+
+    /// Leaves all units to others that are not of the shard of the options.
+    pub(super) fn keep_shard(&mut self) {
+        let Some(shard) = self.options.shard else {
+            return;
+        };
+        let units = Arc::clone(&self.units);
+        let estimate = Estimate::new(self.experiment, self.plan, &units, self.registries);
+        let numbers = shards(&units, shard.of, |unit| estimate.seconds_of(unit));
+        for (unit, number) in units.iter().zip(numbers) {
+            if number != shard.number {
+                self.done.insert(unit.name.clone());
+            }
+        }
+    }
+
+    /// The units that are not measured yet.
+    pub(super) fn open_units(&self) -> impl Iterator<Item = &Unit> {
+        self.units.iter().filter(|unit| !self.is_done(&unit.name))
+    }
+
+    /// Whether a unit of the plan is not measured yet.
+    pub(super) fn is_open(&self, kind: UnitKind, cell: &Cell) -> bool {
+        !self.is_done(&unit_name(kind, cell))
+    }
+
+    /// Whether a unit failed, or cannot be measured here.
+    pub(super) fn is_unusable(&self, name: &str) -> bool {
+        self.unusable.contains(name)
+    }
+
+    /// Kernels run on this device from now on.
+    pub(super) fn use_device(&mut self, gpu: &Gpu) {
+        self.gpu = Some(gpu.clone());
+    }
+
+    /// Counts the kernels that were asked for since the last call as used for this: a unit, or something that several share.
+    pub(super) fn note_kernels(&mut self, used_for: &str) {
+        let modules = self.gpu.as_ref().map(Gpu::take_modules).unwrap_or_default();
+        if !modules.is_empty() {
+            let used = self.used.entry(used_for.to_owned()).or_default();
+            used.extend(modules);
+        }
+    }
+
+    /// A unit ended, and all its lines are written: those of these hashes. What was noted for `shared` counts for it, too.
+    pub(super) fn close(
+        &mut self,
+        name: &str,
+        (outcome, reason): (Outcome, &str),
+        lines: Vec<String>,
+        shared: &[&str],
+    ) -> Result<(), RunError> {
+        self.note_kernels(name);
+        self.finish(name.to_owned());
+        if outcome != Outcome::Done {
+            self.unusable.insert(name.to_owned());
+        }
+        let units = Arc::clone(&self.units);
+        let unit = self.places.get(name).and_then(|place| units.get(*place));
+        let (Some(unit), Some(current)) = (unit, &self.current) else {
+            return Ok(());
+        };
+        let mut inputs = current.inputs(unit);
+        let mut modules = self.used.remove(name).unwrap_or_default();
+        for other in shared.iter().filter_map(|name| self.used.get(*name)) {
+            modules.extend(other.clone());
+        }
+        if !modules.is_empty() {
+            let kernels = &unit.cell[Axis::Kernels];
+            let label = match kernels.name.is_empty() {
+                true => "",
+                false => &kernels.label,
+            };
+            let set = kernel_set(label, modules);
+            inputs.kernels.clone_from(&set.id);
+            if self.sets.insert(set.id.clone()) {
+                self.write(&Line::about_all(Body::Kernels(set)))?;
+            }
+        }
+        let record = CellRecord {
+            unit: name.to_owned(),
+            outcome,
+            reason: reason.to_owned(),
+            run_began_unix_s: self.clock.began_unix_s,
+            inputs,
+            lines,
+        };
+        self.write(&Line::about_all(Body::Cell(record)))?;
+        let word = match outcome {
+            Outcome::Done => "done",
+            Outcome::Failed => "failed",
+            Outcome::LeftOut => "left out",
+        };
+        let between = if reason.is_empty() { "" } else { ": " };
+        self.log(&format!("{name}: {word}{between}{reason}"));
+        if outcome == Outcome::Failed && self.options.fail_fast {
+            return Err(RunError::Wrong(format!("{name} failed: {reason}")));
+        }
+        Ok(())
+    }
+
+    /// A session that writes nothing.
+    pub(super) fn unrecorded(
+        experiment: &'a Experiment,
+        plan: &'a Plan,
+        registries: &'a super::Registries,
+        options: &'a RunOptions,
+    ) -> Self {
+        let units = plan.units(experiment);
+        let places = units.iter().enumerate();
+        let places = places.map(|(place, unit)| (unit.name.clone(), place));
+        Self {
+            places: places.collect(),
+            units: Arc::new(units),
+            unusable: HashSet::new(),
+            current: None,
+            used: BTreeMap::new(),
+            sets: HashSet::new(),
+            gpu: None,
+            judged_lines: BTreeMap::new(),
+            experiment,
+            plan,
+            registries,
+            options,
+            clock: Clock::new(),
+            progress: Progress::new(options),
+            weights: Weights::default(),
+            failed: 0,
+            skipped: 0,
+            bad_input: false,
+            trial: Default::default(),
+            refused: BTreeMap::new(),
+            done: HashSet::new(),
+            compared: HashSet::new(),
+            reference_file: None,
+            judged: BTreeMap::new(),
+            judges_trials: false,
+            folder: None,
+        }
+    }
+
+    /// Destroys the device if a test asked for it at this cell.
+    pub(super) fn lose_device_on_request(&self, gpu: &Gpu, cell: &str) {
+        if self.options.lose_device_at.as_deref() == Some(cell) {
+            gpu.device.destroy();
+        }
+    }
+
+    /// Appends one record as one whole line and flushes it to the disk.
+    pub(super) fn write(&self, line: &Line) -> Result<(), RunError> {
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        let mut text = serde_json::to_string(line).map_err(unwritable)?;
+        text.push('\n');
+        folder.append(&text)
+    }
+
+    /// Tells what went wrong beside the measuring: now, and in the report.
+    pub(super) fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
+        self.tell_warning(&format!("{about}: {reason}"));
+        let cell = about.to_owned();
+        self.write(&Line::about_all(Body::Warning(SkippedRecord {
+            cell,
+            reason,
+        })))
+    }
+
+    /// Writes a line to the log of the run. A log that cannot be written is no reason to end.
+    pub(super) fn log(&self, text: &str) {
+        if let Some(folder) = &self.folder {
+            folder.log(text);
+        }
+    }
+
+    /// Hands a warning on, above the progress bar.
+    pub(super) fn tell_warning(&self, text: &str) {
+        self.log(&format!("warning: {text}"));
+        if let Some(tell) = self.options.warn {
+            self.progress.bar.suspend(|| tell(text));
+        }
+    }
+
+    /// The first record.
+    fn write_start(
+        &mut self,
+        environment: Environment,
+        kernels: Vec<KernelFolder>,
+    ) -> Result<(), RunError> {
+        let record = RunRecord {
+            name: self.experiment.name.clone(),
+            experiment: self.experiment.source.clone(),
+            experiment_text: self.experiment.text.clone(),
+            started_unix_s: self.clock.began_unix_s,
+            environment,
+            renders_full_product: self.plan.renders_full_product(),
+            renders_planned: self.plan.renders_planned(),
+            kernels,
+            overrides: self.experiment.overrides.clone(),
+            only: self.plan.only.clone(),
+            shard: self.options.shard.map(|shard| shard.to_string()),
+            figures: self.registries.figures.rows().cloned().collect(),
+            lenient: self.options.lenient,
+            compilations: self.options.compilations.max(1),
+        };
+        self.write(&Line::about_all(Body::Run(record)))?;
+        for skipped in &self.plan.skipped {
+            self.write_skipped(skipped)?;
+        }
+        Ok(())
+    }
+
+    /// Records cells that are left out.
+    pub(super) fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
+        self.skipped += skipped.cells;
+        let record = SkippedRecord {
+            cell: skipped.cell.clone(),
+            reason: skipped.reason.clone(),
+        };
+        self.write(&Line::about_all(Body::Skipped(record)))
+    }
+
+    /// Records a cell that needs longer loops than the driver runs.
+    pub(super) fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
+        self.refused.insert(cell.clone(), reason.clone());
+        self.skipped += 1;
+        let hash = cell_hash(&[("left out", &cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: cell.clone(),
+            reason: reason.clone(),
+        };
+        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        self.close(&cell, (Outcome::LeftOut, &reason), vec![hash], &[])
+    }
+
+    /// The last record; puts the results in their place, and tells where that is.
+    pub(super) fn write_end(&mut self) -> Result<PathBuf, RunError> {
+        let wall_s = self.clock.start.elapsed().as_secs_f64();
+        let parts_s = self.clock.parts_s.clone();
+        let overhead_s = (wall_s - parts_s.values().sum::<f64>()).max(0.0);
+        let record = FinishedRecord {
+            wall_s,
+            parts_s,
+            overhead_s,
+            failed: self.failed,
+            skipped: self.skipped,
+            load: machine_load(),
+        };
+        self.progress.bar.finish_and_clear();
+        self.write(&Line::about_all(Body::Finished(record)))?;
+        let Some(folder) = &self.folder else {
+            return Ok(self.options.out.clone());
+        };
+        folder.finish()?;
+        Ok(folder.out().to_owned())
+    }
+
+    /// Ends the run here if somebody asked for it.
+    pub(super) fn go_on(&self) -> Result<(), RunError> {
+        match self.options.interrupt.is_asked() {
+            true => Err(RunError::Interrupted),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether a cell has its record.
+    pub(super) fn is_done(&self, cell: &str) -> bool {
+        self.done.contains(cell)
+    }
+
+    /// Notes that a cell has its record.
+    pub(super) fn finish(&mut self, cell: String) {
+        self.done.insert(cell);
+    }
+
+    /// Records a cell that failed without a record of its own kind.
+    pub(super) fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
+        self.failed += 1;
+        let hash = cell_hash(&[("failed", cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: cell.to_owned(),
+            reason: reason.clone(),
+        };
+        self.write(&Line::about_all(Body::Failed(record)).hashed(&hash))?;
+        self.close(cell, (Outcome::Failed, &reason), vec![hash], &[])
+    }
+
+    /// Tells how the run goes on: above the progress bar, or as a line.
+    pub(super) fn tell_progress(&self, text: &str) {
+        self.log(text);
+        if let Some(tell) = self.options.tell {
+            self.progress.bar.suspend(|| tell(text));
+        }
+    }
+
+    /// Shows what is being done.
+    pub(super) fn say(&self, message: impl Into<String>) {
+        let message = message.into();
+        self.log(&message);
+        self.progress.say(message);
+    }
+
+    /// Writes a picture of this kind, of what the labels name: its path relative to the run's folder. One that
+    /// cannot be written is a warning, and costs no figure.
+    pub(super) fn picture(
+        &self,
+        kind: &str,
+        labels: &[String],
+        picture: &Picture,
+    ) -> Result<Option<String>, RunError> {
+        self.image_file(kind, labels, "png", |path| write_png(path, picture))
+    }
+
+    /// Writes the linear radiance of a picture that the report compares pixel by pixel: in the format that the run was
+    /// asked for, else as EXR if it is small.
+    pub(super) fn compared(
+        &self,
+        kind: &str,
+        labels: &[String],
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), RunError> {
+        let is_small = image.pixels.len() <= MOST_KEPT_PIXELS;
+        let exr = || {
+            FileFormat::of(Path::new("kept.exr"))
+                .ok()
+                .filter(|_| is_small)
+        };
+        let Some(format) = self.options.images.or_else(exr) else {
+            return Ok(());
+        };
+        let write = |path: &Path| format.write(path, image, attributes);
+        self.image_file(kind, labels, format.ending, write)?;
+        Ok(())
+    }
+
+    /// Writes linear radiance beside the pictures, if the run was asked for it.
+    pub(super) fn linear(
+        &self,
+        kind: &str,
+        labels: &[String],
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), RunError> {
+        let Some(format) = self.options.images else {
+            return Ok(());
+        };
+        let write = |path: &Path| format.write(path, image, attributes);
+        self.image_file(kind, labels, format.ending, write)?;
+        Ok(())
+    }
+
+    fn image_file(
+        &self,
+        kind: &str,
+        labels: &[String],
+        ending: &str,
+        write: impl Fn(&Path) -> Result<(), ImageError>,
+    ) -> Result<Option<String>, RunError> {
+        let labels = labels.iter().map(String::as_str);
+        let parts: Vec<&str> = std::iter::once(kind).chain(labels).collect();
+        let Some(folder) = &self.folder else {
+            return Ok(None);
+        };
+        let (relative, path) = folder.image(&parts, ending);
+        match write(&path) {
+            Ok(()) => Ok(Some(relative)),
+            Err(error) => {
+                self.warn(&parts.join(", "), error.to_string())?;
+                Ok(None)
+            }
+        }
+    }
+}
+
+fn unwritable(error: serde_json::Error) -> RunError {
+    RunError::Input(format!("a record cannot be written: {error}"))
+}
+
+/// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else
+/// its figures depend on.
+pub(super) fn content_hash<B>(line: &Line<B>, scene_hash: &str, also: &[(&str, &str)]) -> String {
+    // A scene is known by its bytes, wherever it lies.
+    let key = line.key.clone().with(axis::SCENE, "");
+    let key = serde_json::to_string(&key).unwrap_or_default();
+    let parts = [
+        ("key", key.as_str()),
+        ("scene", scene_hash),
+        ("kernel", &line.ran.kernel_hash),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ];
+    cell_hash(&[&parts, also].concat())
+}

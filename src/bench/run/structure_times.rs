@@ -1,0 +1,244 @@
+//! Times, counted work and heat maps of structures that passed their gate.
+
+use super::session::Session;
+use super::structures::{Gated, write_failed};
+use super::world::World;
+use super::{Fault, RunError, peers};
+use crate::timing::{
+    Measured, Samples, Watch, empty_ms, interleave, millions_per_second, without_overhead,
+};
+use raystone_accel::tracer::count_work;
+use raystone_accel::{Ask, Query, RayBatch, Space, Tracer};
+use raystone_config::Axis;
+use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
+use raystone_image::{Picture, viridis};
+use raystone_record::{ClassTiming, CountersPerRay};
+use raystone_verify::gate::timed_fault;
+use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
+use raystone_verify::shadow_rays::unlike_shadow;
+
+/// A ray class through a structure, measured.
+struct Timed<'a> {
+    /// Place among the gated.
+    structure: usize,
+    set: &'a RaySet,
+    batch: RayBatch,
+    watch: Watch,
+}
+
+impl Measured for Timed<'_> {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        let elapsed = self.batch.trace()?;
+        self.watch.note(self.batch.digest()?);
+        Ok(elapsed)
+    }
+
+    fn device(&self) -> Option<&Gpu> {
+        Some(self.batch.gpu())
+    }
+}
+
+impl Timed<'_> {
+    /// What is wrong with the timed answers; no figure is printed then.
+    fn fault(&self, world: &World, space: Space) -> Result<Option<String>, GpuError> {
+        let exact = world.probe.is_exact();
+        let last = timed_fault(&self.batch, self.set, &world.soup, space, exact)?;
+        let fault = self.watch.fault().into_iter().chain(last);
+        Ok(fault.reduce(|a, b| format!("{a}; {b}")))
+    }
+}
+
+/// Records the structure under which the device was lost; the others get their turn on a new one.
+fn fail_lost(
+    session: &mut Session,
+    world: &World,
+    mut lost: Gated,
+    error: GpuError,
+) -> Result<Vec<Gated>, RunError> {
+    lost.record.body.failure = Some(error.to_string());
+    write_failed(session, world, &lost.cell, lost.record)?;
+    Ok(Vec::new())
+}
+
+/// Times every class through every structure in interleaved rounds, then counts the work. Structures that
+/// fail at it are recorded and left out.
+pub(super) fn time_all(
+    session: &mut Session,
+    world: &World,
+    mut gated: Vec<Gated>,
+) -> Result<Vec<Gated>, RunError> {
+    session.say(format!("{}: timing structures", world.cell));
+    let mut failures: Vec<Option<String>> = vec![None; gated.len()];
+    let mut timed = Vec::new();
+    for (structure, one) in gated.iter().enumerate() {
+        let gpu = world.device.of(&one.cell[Axis::Kernels])?;
+        let sets = &world.judge.of(one.traced.space).sets;
+        for set in sets.iter().filter(|set| set.is_timed()) {
+            match prepare(gpu, world, one, set) {
+                Ok(batch) => timed.push(Timed {
+                    structure,
+                    set,
+                    batch,
+                    watch: Watch::default(),
+                }),
+                Err(error) if world.gpu.lost().is_some() => {
+                    return fail_lost(session, world, gated.swap_remove(structure), error);
+                }
+                Err(error) => failures[structure] = Some(error.to_string()),
+            }
+        }
+        session.note_kernels(&one.cell.to_string());
+    }
+    let rivals = peers::build(session, world);
+    let (cast, refused) = peers::batches(&rivals, world);
+    session.note_kernels("peers");
+    let timing = session.experiment.timing;
+    let seed = u64::from(session.experiment.seed);
+    let (progress, weight) = (session.progress.clone(), session.weights.rays);
+    let ours = timed.iter().map(|item| item as &dyn Measured);
+    let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
+    let mut samples = match session.clock.time("gpu", || {
+        interleave(&all, &timing, seed, || progress.add(weight))
+    }) {
+        Ok(samples) => samples,
+        Err((index, error)) => {
+            let lost = gated.swap_remove(timed[index].structure);
+            return fail_lost(session, world, lost, error);
+        }
+    };
+    let theirs = samples.split_off(timed.len());
+    let theirs = session
+        .clock
+        .time("gate", || peers::judged(world, cast, theirs));
+    peers::write(session, world, rivals, refused, theirs)?;
+    for (item, samples) in timed.iter().zip(samples) {
+        let one = &mut gated[item.structure];
+        match class_timing(session, world, one, item, samples) {
+            Ok(timing) => one.record.body.timings.extend(timing),
+            Err(fault) => failures[item.structure] = Some(fault.of_cell()?),
+        }
+        one.record.ran.features = item.batch.tracer().features();
+        session.note_kernels(&one.cell.to_string());
+    }
+    let mut kept = Vec::new();
+    for (mut one, failure) in gated.into_iter().zip(failures) {
+        if let Some(failure) = failure {
+            one.record.body.failure = Some(failure);
+            one.record.body.timings.clear();
+            write_failed(session, world, &one.cell, one.record)?;
+        } else {
+            let rates = one.record.body.timings.iter().map(|t| t.mrays_s.value);
+            one.speed = rates.map(f64::ln).sum();
+            kept.push(one);
+        }
+    }
+    Ok(kept)
+}
+
+/// The rays of a class, ready to be traced through a structure.
+fn prepare(gpu: &Gpu, world: &World, one: &Gated, set: &RaySet) -> Result<RayBatch, GpuError> {
+    let ask = Ask {
+        coherent: set.is_coherent(),
+        runtime_checks: one.runtime_checks,
+        ..set.query().into()
+    };
+    Tracer::new(gpu, &world.buffers.triangles, &one.traced, ask)?.batch(&set.rays)
+}
+
+/// The figures of a class, if its answers are right; none where the time is below what can be measured.
+fn class_timing(
+    session: &mut Session,
+    world: &World,
+    one: &Gated,
+    item: &Timed,
+    samples: Result<Samples, GpuError>,
+) -> Result<Option<ClassTiming>, Fault> {
+    let text = |error: GpuError| error.to_string();
+    let set = item.set;
+    let gpu = world.device.of(&one.cell[Axis::Kernels])?;
+    if let Some(fault) = item.fault(world, one.traced.space).map_err(text)? {
+        return Err(format!("{:?} rays: {fault}", set.class).into());
+    }
+    let samples = samples.map_err(text)?;
+    if let Some(slow) = slow_slice(item.batch.longest_slice_ms()) {
+        session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
+    }
+    let empty = session
+        .clock
+        .time("gpu", || empty_ms(|| item.batch.trace_nothing()))
+        .map_err(text)?;
+    let triangles = &world.buffers.triangles;
+    let work = session
+        .clock
+        .time("gpu", || {
+            count_work(gpu, triangles, &one.traced, set.query(), &set.rays)
+        })
+        .map_err(text)?;
+    let ms = without_overhead(&samples.ms, empty);
+    let rate = millions_per_second(&ms, set.rays.len() as f64);
+    Ok(rate.map(|mrays_s| ClassTiming {
+        class: set.class,
+        rays: set.rays.len(),
+        hit_fraction: set.hit_fraction(),
+        unlike_shadow: unlike_shadow(set, &world.judge.of(one.traced.space).sets),
+        ms,
+        wall_ms: samples.wall_ms,
+        cpu_ms: match gpu.is_software() {
+            true => samples.cpu_ms,
+            false => Vec::new(),
+        },
+        mrays_s,
+        counters: work.as_deref().map(CountersPerRay::mean_of),
+    }))
+}
+
+/// Cost of every pixel's primary ray as a picture, one scale for all structures of a scene. The
+/// scale ends at the 99th percentile of the costliest structure but brute force, whose cost is the
+/// same everywhere and would leave the others black.
+pub(super) fn draw_heat_maps(
+    session: &mut Session,
+    world: &World,
+    mut gated: Vec<Gated>,
+) -> Result<Vec<Gated>, RunError> {
+    let [width, height] = session.experiment.resolution;
+    let rays = primary_rays(world.camera, width, height);
+    let pixels = primary_pixels(width, height);
+    for structure in &mut gated {
+        let gpu = world.device.of(&structure.cell[Axis::Kernels])?;
+        let work = session.clock.time("gpu", || {
+            count_work(
+                gpu,
+                &world.buffers.triangles,
+                &structure.traced,
+                Query::Closest,
+                &rays,
+            )
+        });
+        session.note_kernels(&structure.cell.to_string());
+        let Ok(Some(work)) = work else { continue };
+        structure.costs = vec![0.0; rays.len()];
+        for (pixel, counters) in pixels.iter().zip(&work) {
+            structure.costs[*pixel as usize] = (counters.nodes + counters.triangle_tests) as f32;
+        }
+    }
+    let percentile = |costs: &[f32]| {
+        let mut sorted = costs.to_vec();
+        sorted.sort_unstable_by(f32::total_cmp);
+        sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0)
+    };
+    let others = gated
+        .iter()
+        .filter(|g| g.cell[Axis::Accel].name != "brute-force");
+    let scale = others.map(|g| percentile(&g.costs)).fold(1.0, f32::max);
+    for structure in gated.iter_mut().filter(|s| !s.costs.is_empty()) {
+        let picture = Picture {
+            width,
+            height,
+            pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
+        };
+        let labels = structure.cell.labels(&[Axis::Scene, Axis::Accel]);
+        structure.record.body.heat_map = session.picture("heat", &labels, &picture)?;
+        structure.record.body.heat_map_max = Some(f64::from(scale));
+    }
+    Ok(gated)
+}

@@ -1,0 +1,335 @@
+//! Structures: build, validate, gate; what passes is timed, counted and drawn.
+
+use super::RunError;
+use super::session::{Session, content_hash};
+use super::structure_times::{draw_heat_maps, time_all};
+use super::world::World;
+use crate::memory::peak_bytes;
+use raystone_accel::tracer::kernel_hash;
+use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
+use raystone_config::{Axis, Cell, Unit, UnitKind};
+use raystone_gpu::{Gpu, GpuError};
+use raystone_record::fault_text;
+use raystone_record::{Body, GateVerdict, Key, Line, Outcome, Ran, StructureRecord};
+use raystone_verify::gate::gate;
+use std::time::Instant;
+
+/// A structure that passed its gate.
+pub(super) struct Gated {
+    pub cell: Cell,
+    pub traced: Traced,
+    /// Whether its timed kernels run with the driver's checks.
+    pub runtime_checks: bool,
+    /// Million primary and bounce rays per second, for choosing the fastest.
+    pub speed: f64,
+    pub record: Line<StructureRecord>,
+    /// Counted cost of every pixel's primary ray.
+    pub costs: Vec<f32>,
+}
+
+/// A structure on its way. What failed is not on the device, and its record says why.
+#[derive(Clone)]
+pub(super) struct Candidate {
+    cell: Cell,
+    pub traced: Option<Traced>,
+    /// What `validate` says.
+    structural: Option<String>,
+    pub record: Line<StructureRecord>,
+}
+
+impl Candidate {
+    fn failed(mut self, reason: impl ToString) -> Self {
+        self.record.body.failure = Some(reason.to_string());
+        self.traced = None;
+        self
+    }
+}
+
+/// Builds, validates, uploads and gates one structure.
+pub(super) fn build_and_gate(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+) -> Result<Candidate, RunError> {
+    let built = build(session, world, cell);
+    gate_with(session, world, built, cell)
+}
+
+/// Builds, validates and uploads: what does not depend on kernels.
+fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
+    let accel = &cell[Axis::Accel];
+    let mut candidate = Candidate {
+        cell: cell.clone(),
+        traced: None,
+        structural: None,
+        record: empty_record(cell, session.experiment.runtime_checks),
+    };
+    let kind = match session.registries.accel.named("structure", &accel.name) {
+        Ok(kind) => kind,
+        Err(reason) => return candidate.failed(reason),
+    };
+    let record = &mut candidate.record.body;
+    let mut log = BuildLog::with_gpu(world.gpu);
+    let (built, peak) = session.clock.time("build", || {
+        peak_bytes(|| kind.build(&world.soup, &accel.params, &mut log))
+    });
+    record.build_peak_bytes = peak;
+    record.build_ms = log.total_ms();
+    record.build = log.phases;
+    let updated = built.and_then(|mut built| {
+        let update = || update_ms(&mut *built, world);
+        record.update_ms = session.clock.time("build", update)?;
+        Ok(built)
+    });
+    let built = match updated {
+        Ok(built) => built,
+        Err(error) => return candidate.failed(error),
+    };
+    record.space = built.space();
+    record.stats = built.stats();
+    record.figures = (session.registries.figures).of_structure(&*built, &world.soup);
+    let valid = (session.clock).time("gate", || built.validate(&world.soup));
+    candidate.structural = valid.err().map(|e| e.to_string());
+    match Traced::upload(world.gpu, &*built) {
+        Ok(traced) => candidate.traced = Some(traced),
+        Err(error) => return candidate.failed(error),
+    }
+    candidate
+}
+
+/// Gates what was built with the kernels of a cell.
+fn gate_with(
+    session: &mut Session,
+    world: &World,
+    mut candidate: Candidate,
+    cell: &Cell,
+) -> Result<Candidate, RunError> {
+    candidate.cell = cell.clone();
+    candidate.record.key = Key::from(cell);
+    let Some(traced) = candidate.traced.clone() else {
+        return Ok(candidate);
+    };
+    let gpu = world.device.of(&cell[Axis::Kernels])?;
+    let workgroup = session.registries.workgroup(cell);
+    let traced = workgroup.map(|workgroup| traced.in_workgroups(gpu, &workgroup));
+    let traced = match traced {
+        Ok(Ok(traced)) => traced,
+        Ok(Err(error)) => return Ok(candidate.failed(error)),
+        Err(reason) => return Ok(candidate.failed(reason)),
+    };
+    candidate.traced = Some(traced.clone());
+    let checks = session.experiment.runtime_checks;
+    let gated = session.clock.time("gate", || {
+        let verdict = gate_twice(checks, world, gpu, &traced)?;
+        let hash = kernel_hash(gpu, &world.buffers.triangles, &traced)?;
+        Ok::<_, GpuError>((verdict, hash))
+    });
+    let (mut verdict, hash) = match gated {
+        Ok(gated) => gated,
+        Err(error) => {
+            candidate.record.body.refused = error.is_refusal();
+            return Ok(candidate.failed(error));
+        }
+    };
+    candidate.record.ran.kernel_hash = hash;
+    verdict.passed &= candidate.structural.is_none();
+    verdict.structural.clone_from(&candidate.structural);
+    if verdict.passed {
+        verdict.elsewhere =
+            super::trial::fault(session, world, gpu, cell).unwrap_or_else(|e| Some(e.to_string()));
+        verdict.passed = verdict.elsewhere.is_none();
+    }
+    let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
+    let fault = (!verdict.passed).then(|| fault_text(&verdict, judge_fault));
+    candidate.record.body.gate = Some(verdict);
+    Ok(match fault {
+        Some(fault) => candidate.failed(fault),
+        None => candidate,
+    })
+}
+
+/// Updates of which the median is taken.
+const UPDATES: usize = 5;
+
+/// Milliseconds of wall time to take the transforms of the scene's instances over once more, as if all
+/// had moved; the gate then judges what an update leaves. `None` for structures without updates.
+fn update_ms(built: &mut dyn BuiltAccel, world: &World) -> Result<Option<f64>, AccelError> {
+    let mut samples = Vec::new();
+    if world.soup.placed.is_none() {
+        return Ok(None);
+    }
+    for _ in 0..UPDATES {
+        let start = Instant::now();
+        match built.update(&world.soup) {
+            None => return Ok(None),
+            Some(updated) => updated?,
+        }
+        samples.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    samples.sort_by(f64::total_cmp);
+    Ok(Some(samples[UPDATES / 2]))
+}
+
+/// The gate with the driver's checks; without them only if that passed.
+fn gate_twice(
+    runtime_checks: bool,
+    world: &World,
+    gpu: &Gpu,
+    traced: &Traced,
+) -> Result<GateVerdict, GpuError> {
+    let run = |checks| {
+        gate(
+            gpu,
+            &world.buffers.triangles,
+            &world.soup,
+            traced,
+            &world.judge,
+            &world.probe,
+            checks,
+        )
+    };
+    let checked = run(true)?;
+    if runtime_checks || !checked.passed {
+        Ok(checked)
+    } else {
+        run(false)
+    }
+}
+
+fn empty_record(cell: &Cell, runtime_checks: bool) -> Line<StructureRecord> {
+    let ran = Ran {
+        unchecked: !runtime_checks,
+        ..Ran::default()
+    };
+    let record = StructureRecord {
+        refused: false,
+        space: Space::World,
+        build: Vec::new(),
+        build_ms: 0.0,
+        build_peak_bytes: None,
+        update_ms: None,
+        stats: StructureStats::default(),
+        figures: Default::default(),
+        gate: None,
+        timings: Vec::new(),
+        coherence: None,
+        heat_map: None,
+        heat_map_max: None,
+        failure: None,
+    };
+    Line::new(Key::from(cell), ran, record)
+}
+
+/// Everything about the structures of a world; returns those that may be used further.
+pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, RunError> {
+    let cells = session.plan.structures.iter();
+    let mut cells: Vec<Cell> = cells.filter(|c| c.is_on(&world.cell)).cloned().collect();
+    // What nothing else serves comes last, so that it is known whether it is needed.
+    cells.sort_by_key(|cell| !is_needed(session, world, cell));
+    let mut gated: Vec<Gated> = Vec::new();
+    // The last structure that was built: it serves all workgroups and kernels.
+    let mut last: Option<Candidate> = None;
+    for cell in cells {
+        let name = cell.to_string();
+        let is_wanted = is_needed(session, world, &cell) || carries(session, world, &cell, &gated);
+        if session.is_unusable(&name) || !is_wanted {
+            continue;
+        }
+        // What was judged so far is still timed.
+        if session.go_on().is_err() {
+            break;
+        }
+        session.say(format!("{cell}: build and gate"));
+        session.lose_device_on_request(world.gpu, &name);
+        // What cannot serve goes before the next is built.
+        let same = (last.take()).filter(|other| other.cell[Axis::Accel] == cell[Axis::Accel]);
+        let built = same.unwrap_or_else(|| build(session, world, &cell));
+        let outcome = gate_with(session, world, built.clone(), &cell)?;
+        session.note_kernels(&name);
+        last = Some(built);
+        match outcome.traced {
+            Some(traced) => gated.push(Gated {
+                runtime_checks: !outcome.record.ran.unchecked,
+                traced,
+                speed: 0.0,
+                record: hashed(world, outcome.record),
+                cell,
+                costs: Vec::new(),
+            }),
+            None if session.is_done(&name) => {}
+            None => write_failed(session, world, &cell, outcome.record)?,
+        }
+        session.progress.add(session.weights.gate);
+        if world.gpu.lost().is_some() {
+            return Ok(Vec::new());
+        }
+    }
+    drop(last);
+    // Those whose record is there serve others, and are not timed again.
+    let is_open = |g: &Gated| session.is_open(UnitKind::Structure, &g.cell);
+    let (open, mut usable): (Vec<_>, Vec<_>) = gated.into_iter().partition(is_open);
+    let timed = time_all(session, world, open)?;
+    let mut timed = draw_heat_maps(session, world, timed)?;
+    if let Some(settings) = session.experiment.coherence.clone() {
+        for structure in &mut timed {
+            let modelled = super::coherence::of_recorded_rays(session, world, structure, &settings);
+            // Why there is none is told of its cells.
+            structure.record.body.coherence = modelled.ok();
+        }
+    }
+    for structure in &timed {
+        session.write(&structure.record.clone().with_body(Body::Structure))?;
+        let lines = vec![structure.record.hash.clone()];
+        session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
+    }
+    usable.append(&mut timed);
+    Ok(usable)
+}
+
+/// Whether something that is not measured yet is of this structure.
+fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
+    let mut open = session
+        .open_units()
+        .filter(|unit| unit.cell.is_on(&world.cell));
+    open.any(|unit| match unit.kind {
+        UnitKind::Structure | UnitKind::Animation => unit.cell == *cell,
+        UnitKind::Time | UnitKind::Coherence => unit.cell.is_on(cell),
+        _ => false,
+    })
+}
+
+/// Whether a sampler that is not measured yet has nothing else to be rendered through. Hits are equal to the bit in
+/// every structure, so that any will do.
+fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bool {
+    let kernels = &cell[Axis::Kernels];
+    let serves = |g: &Gated| g.cell[Axis::Kernels] == *kernels && g.traced.is_inline();
+    let mut open = session
+        .open_units()
+        .filter(|unit| unit.cell.is_on(&world.cell));
+    let needs =
+        |unit: &Unit| unit.kind == UnitKind::Sampler && unit.cell[Axis::Kernels] == *kernels;
+    !gated.iter().any(serves) && open.any(needs)
+}
+
+fn hashed(world: &World, record: Line<StructureRecord>) -> Line<StructureRecord> {
+    let hash = content_hash(&record, &world.scene.hash, &[]);
+    record.hashed(hash)
+}
+
+pub(super) fn write_failed(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    record: Line<StructureRecord>,
+) -> Result<(), RunError> {
+    if record.body.refused {
+        return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
+    }
+    session.failed += 1;
+    let reason = record.body.failure.clone().unwrap_or_default();
+    let record = hashed(world, record);
+    let lines = vec![record.hash.clone()];
+    session.write(&record.with_body(Body::Structure))?;
+    let failed = (Outcome::Failed, &*reason);
+    session.close(&cell.to_string(), failed, lines, &[])
+}

@@ -1,0 +1,175 @@
+//! A scene made ready: loaded, uploaded, judged.
+
+use super::kernels::Device;
+use super::session::Session;
+use super::{Fault, RunError, RunOptions};
+use raystone_config::{Axis, Cell};
+use raystone_core::geometry::Camera;
+use raystone_core::params::Variant;
+use raystone_gpu::{ArithmeticProbe, Gpu};
+use raystone_record::{Body, Key, Line, Ran, SceneRecord};
+use raystone_render::Stage;
+use raystone_scene::{self as scene, LoadOptions, SceneData};
+use raystone_verify::gate::{Checks, Judge};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A scene as it was read.
+pub(super) struct Loaded {
+    scene: Arc<SceneData>,
+    camera: Camera,
+}
+
+/// A scene and the tests of its triangles and boxes, with everything that its cells share.
+pub(super) struct World<'a> {
+    pub device: &'a Device,
+    /// The device with the embedded kernels.
+    pub gpu: &'a Gpu,
+    pub probe: ArithmeticProbe,
+    /// What all cells of this world have in common: see [`Cell::WORLD`].
+    pub cell: Cell,
+    pub stage: Stage,
+    pub camera: Camera,
+    pub judge: Judge,
+}
+
+impl std::ops::Deref for World<'_> {
+    type Target = Stage;
+
+    fn deref(&self) -> &Stage {
+        &self.stage
+    }
+}
+
+/// Why there is no world.
+pub(super) enum Absent {
+    /// The scene is at fault.
+    BadInput(String),
+    /// The adapter does not keep what the experiment asks for: its cells are left out.
+    NotKept(String),
+}
+
+impl From<Absent> for RunError {
+    fn from(absent: Absent) -> Self {
+        let (Absent::BadInput(reason) | Absent::NotKept(reason)) = absent;
+        Self::Input(reason)
+    }
+}
+
+impl From<String> for Absent {
+    fn from(reason: String) -> Self {
+        Self::BadInput(reason)
+    }
+}
+
+/// Bytes that an adapter binds for the tables of a scene.
+pub(super) fn table_bytes(limits: &wgpu::Limits) -> u64 {
+    let binding = limits.max_storage_buffer_binding_size;
+    binding.min(limits.max_buffer_size)
+}
+
+/// How scenes are loaded for an adapter that binds so many bytes.
+pub(super) fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
+    LoadOptions {
+        allow_outside: options.allow_outside,
+        table_bytes,
+        ..LoadOptions::default()
+    }
+}
+
+impl Loaded {
+    /// Loads a scene for a device and records it.
+    pub(super) fn new(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<Self, Fault> {
+        session.say(format!("{variant}: loading"));
+        let start = Instant::now();
+        let options = load_options(session.options, table_bytes(&gpu.limits));
+        let loaded = session
+            .clock
+            .time("load", || scene::load(variant, &options));
+        let scene = loaded.map_err(|e| e.to_string())?;
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let own = || scene.view(session.experiment.aspect());
+        let camera = session.experiment.camera.unwrap_or_else(own);
+        raystone_scene::check_camera(&camera).map_err(|e| e.to_string())?;
+        session.note_scene(variant, &scene.hash);
+        let cell = format!("scene {variant}");
+        if !session.is_done(&cell) {
+            for line in scene.report.lines() {
+                session.tell_warning(&format!("{variant}: {line}"));
+            }
+            let key = Key::from(&Cell::default().with(Axis::Scene, variant));
+            let record = Body::Scene(scene_record(&scene, camera, load_ms));
+            session.write(&Line::new(key, Ran::default(), record).hashed(&scene.hash))?;
+            session.finish(cell);
+        }
+        Ok(Self {
+            scene: Arc::new(scene),
+            camera,
+        })
+    }
+}
+
+impl<'a> World<'a> {
+    /// Uploads and judges a scene with the tests of a cell.
+    pub(super) fn new(
+        session: &mut Session,
+        device: &'a Device,
+        loaded: &Loaded,
+        cell: &Cell,
+    ) -> Result<Self, Absent> {
+        let gpu = &device.gpu;
+        session.say(format!("{cell}: checking the judge"));
+        let tests = session.registries.intersection(cell)?;
+        let probe = match session.options.arithmetic {
+            Some(known) => known,
+            None => (session.clock)
+                .time("gate", || raystone_gpu::probe_arithmetic(gpu))
+                .map_err(|e| e.to_string())?,
+        };
+        tests.kept_by(&probe).map_err(Absent::NotKept)?;
+        let stage = session
+            .clock
+            .time("load", || Stage::new(gpu, Arc::clone(&loaded.scene), tests))
+            .map_err(|e| e.to_string())?;
+        let experiment = session.experiment;
+        let mut settings = experiment.gate;
+        settings.rays = settings.rays.max(experiment.timing.rays);
+        let judge = session.clock.time("judge", || {
+            let seed = u64::from(experiment.seed);
+            Judge::new(
+                &stage.scene,
+                &stage.soup,
+                loaded.camera,
+                &settings,
+                seed,
+                Checks::Kept,
+            )
+        });
+        Ok(Self {
+            device,
+            gpu,
+            probe,
+            cell: cell.clone(),
+            stage,
+            camera: loaded.camera,
+            judge: judge.map_err(|e| e.to_string())?,
+        })
+    }
+}
+
+fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {
+    let bounds = scene.bounds();
+    SceneRecord {
+        triangles: scene.triangles.len(),
+        bounds_min: bounds.min.to_array(),
+        bounds_max: bounds.max.to_array(),
+        load_ms,
+        bytes: scene.bytes() as u64,
+        materials: scene.materials.len(),
+        textures: scene.textures.len(),
+        emitters: scene.emitters().len(),
+        camera,
+        report: scene.report.clone(),
+        scene_hash: scene.hash.clone(),
+    }
+}

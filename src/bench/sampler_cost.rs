@@ -1,0 +1,108 @@
+//! What drawing costs: nanoseconds per two-dimensional sample, so that a difference of Mrays/s between
+//! samplers can be attributed.
+//!
+//! A kernel draws in a loop and does nothing else; a second one runs the same loop without drawing.
+//! Both run by turns, and the difference is what counts: a throughput over all units of the adapter,
+//! not a latency.
+
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
+use raystone_record::SamplerCostRecord;
+use raystone_render::with_sampler;
+use raystone_sampling::Sampler;
+use raystone_stats::statistics::median_interval;
+
+/// Invocations; each is a pixel.
+const PIXELS: u32 = 1 << 14;
+/// Pairs of dimensions that a sample draws, if the sampler has so many: a bounce of a path or two.
+const MOST_PAIRS: u32 = 4;
+/// Samples of a pixel in one dispatch, if the sampler has so many.
+const MOST_SAMPLES: u32 = 1 << 12;
+/// Turns of loops that drawing one number takes at most: a digit each of a word.
+const TURNS_PER_DRAW: u32 = 33;
+/// A dispatch should take about so long, milliseconds.
+const DISPATCH_MS: f64 = 25.0;
+const ROUNDS: usize = 9;
+
+/// The two kernels with what they read.
+struct Loop<'a> {
+    gpu: &'a Gpu,
+    bindings: Bindings,
+    pairs: u32,
+}
+
+impl Loop<'_> {
+    /// Milliseconds of one dispatch that draws `samples` samples per pixel, or does not.
+    fn run(&self, kernel: &Composition, samples: u32) -> Result<f64, GpuError> {
+        let mut bindings = self.bindings.clone();
+        let values = UniformValues::new()
+            .u32("first_sample", 0)
+            .u32("samples", samples)
+            .u32("pairs", self.pairs)
+            .u32("seed", 1);
+        bindings.uniform("cost", values);
+        let pipeline = self.gpu.pipeline(kernel, true)?;
+        let mut recording = Recording::new();
+        recording.run("cost", &pipeline, &bindings, groups_for(PIXELS));
+        Ok(self.gpu.play(&recording)?.elapsed().measured()?.ms())
+    }
+}
+
+/// Measures what a sampler costs on this adapter; also returns the BLAKE3 of the kernel that draws. Samples are those that it was made for, from the
+/// first on; dimensions the first eight of them.
+///
+/// # Errors
+/// The sampler was made for less than two dimensions, its kernel does not run, or its table is too
+/// large.
+pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<(SamplerCostRecord, String), GpuError> {
+    let pairs = (sampler.demand.dimensions / 2).min(MOST_PAIRS);
+    if pairs == 0 {
+        return Err(GpuError::Kernel(format!(
+            "the cost of {} is measured per pair of dimensions, and it was made for one",
+            sampler.label()
+        )));
+    }
+    let drawing = with_sampler(Composition::new("sampling/sampler_cost"), sampler);
+    let empty = Composition::new("sampling/sampler_cost").feature("empty", true);
+    let mut bindings = Bindings::new();
+    bindings
+        .buffer(
+            "sampler_table",
+            &gpu.storage("sampler_table", sampler.table.words())?,
+        )
+        .buffer("sums", &gpu.zeroed("sums", u64::from(PIXELS) * 4)?);
+    let work = Loop {
+        gpu,
+        bindings,
+        pairs,
+    };
+    // First runs include the driver's compiler.
+    work.run(&empty, 1)?;
+    work.run(&drawing, 1)?;
+    let most = sampler.demand.samples.unwrap_or(MOST_SAMPLES);
+    let turns = 2 * pairs * TURNS_PER_DRAW;
+    let allowed = gpu
+        .loop_limit
+        .map_or(MOST_SAMPLES, |limit| limit / 2 / turns);
+    let most = most.min(allowed).clamp(1, MOST_SAMPLES);
+    let per_sample = work.run(&drawing, most.min(8))? / f64::from(most.min(8));
+    let samples = ((DISPATCH_MS / per_sample.max(1e-6)) as u32).clamp(1, most);
+    let count = u64::from(PIXELS) * u64::from(pairs) * u64::from(samples);
+    let mut drawn = Vec::with_capacity(ROUNDS);
+    let mut looped = Vec::with_capacity(ROUNDS);
+    for _ in 0..ROUNDS {
+        let without = work.run(&empty, samples)?;
+        let with = work.run(&drawing, samples)?;
+        let ns = |ms: f64| ms * 1e6 / count as f64;
+        drawn.push(ns(with - without));
+        looped.push(ns(without));
+    }
+    let interval = |values: &[f64]| {
+        median_interval(values)
+            .ok_or_else(|| GpuError::Driver("a clock returned what is no time".to_owned()))
+    };
+    let record = SamplerCostRecord {
+        ns_per_sample: interval(&drawn)?,
+        loop_ns_per_sample: interval(&looped)?,
+    };
+    Ok((record, gpu.pipeline(&drawing, true)?.kernel.hash()))
+}

@@ -1,0 +1,301 @@
+//! Figures of the points that a pair of dimensions really drew: discrepancies, errors of analytic
+//! integrands, coherence between pixels and coverage by many pixels.
+
+use raystone_discrepancy::{
+    Budget, DiscrepancyError, PointSet, Quadratic, quadratic, star_2d_prefixes,
+};
+use raystone_record::{FigureAtCount, IntegrandFigures, Interval, StreamFigures};
+use raystone_render::integrand::{Function, functions};
+use raystone_stats::statistics::{log_log_slope, mean_interval, root_mean_interval};
+use std::f64::consts::TAU;
+
+/// Discrepancies in the mean square cost N², so they are taken up to this N.
+pub(crate) const MOST_QUADRATIC: usize = 1 << 13;
+/// Seconds that one such sum may take before something is wrong.
+const SUM_SECONDS: f64 = 600.0;
+/// Copies that are superposed for the coverage, as in Dufay 2017, Fig. 5.13.
+pub(crate) const COPIES: u32 = 150;
+/// Coordinates are multiples of this: errors below it are theirs and not the points'.
+const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
+/// Cells along a side of the coverage's grid, per √N.
+const CELLS: usize = 4;
+
+/// What the points of one seed have at each number of points.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SeedFigures {
+    star: Vec<f64>,
+    /// Square roots; shorter than `star` if N goes beyond [`MOST_QUADRATIC`].
+    l2_star: Vec<f64>,
+    /// Squares.
+    centered: Vec<f64>,
+    /// By function, then by number of points.
+    squared_errors: Vec<Vec<f64>>,
+}
+
+impl SeedFigures {
+    /// Measures the first `n` points for every `n` in `counts`, ascending, and appends the results.
+    ///
+    /// # Errors
+    /// Fewer points than the largest count, or points outside the unit square.
+    pub(crate) fn add(
+        &mut self,
+        points: &[[f64; 2]],
+        counts: &[usize],
+    ) -> Result<(), DiscrepancyError> {
+        self.star.extend(star_2d_prefixes(points, counts)?);
+        for &n in counts.iter().filter(|&&n| n <= MOST_QUADRATIC) {
+            let set = PointSet::from_points(&points[..n])?;
+            let square = |kind| quadratic(&set, kind, &Budget::seconds(SUM_SECONDS));
+            self.l2_star.push(square(Quadratic::L2Star)?.sqrt());
+            self.centered.push(square(Quadratic::Centered)?);
+        }
+        let functions = functions();
+        self.squared_errors.resize(functions.len(), Vec::new());
+        for (errors, (_, function)) in self.squared_errors.iter_mut().zip(&functions) {
+            errors.extend(squared_errors(function, points, counts));
+        }
+        Ok(())
+    }
+}
+
+/// Squared error of the mean of a function over the first `n` points, for each `n` in `counts`,
+/// ascending.
+pub(crate) fn squared_errors(
+    function: &Function,
+    points: &[[f64; 2]],
+    counts: &[usize],
+) -> Vec<f64> {
+    let (mut sum, mut taken) = (0.0, 0);
+    let mut error = |&n: &usize| {
+        sum += points[taken..n]
+            .iter()
+            .map(|&p| function.value(p))
+            .sum::<f64>();
+        taken = n;
+        (sum / n as f64 - function.integral()).powi(2)
+    };
+    counts.iter().map(&mut error).collect()
+}
+
+/// D* and all other figures over seeds. One seed has intervals of no width.
+pub(crate) fn over_seeds(
+    counts: &[usize],
+    seeds: &[SeedFigures],
+) -> (Vec<FigureAtCount>, StreamFigures) {
+    let star = means(counts, seeds, |s| &s.star);
+    let figures = StreamFigures {
+        star_slope: slope(counts, seeds, |s| &s.star),
+        l2_star: means(counts, seeds, |s| &s.l2_star),
+        l2_star_slope: slope(counts, seeds, |s| &s.l2_star),
+        centered: means(counts, seeds, |s| &s.centered),
+        integrands: integrands(counts, seeds),
+        pixels: Vec::new(),
+    };
+    (star, figures)
+}
+
+type Column = fn(&SeedFigures) -> &Vec<f64>;
+
+fn means(counts: &[usize], seeds: &[SeedFigures], column: Column) -> Vec<FigureAtCount> {
+    let mean = |(i, &n): (usize, &usize)| {
+        let values: Option<Vec<f64>> = seeds.iter().map(|s| column(s).get(i).copied()).collect();
+        mean_interval(&values?).map(|value| FigureAtCount { n, value })
+    };
+    counts.iter().enumerate().filter_map(mean).collect()
+}
+
+fn slope(counts: &[usize], seeds: &[SeedFigures], column: Column) -> Option<Interval> {
+    let curves: Vec<_> = seeds.iter().map(|s| curve(counts, column(s))).collect();
+    log_log_slope(&curves)
+}
+
+fn curve(counts: &[usize], values: &[f64]) -> Vec<(f64, f64)> {
+    let points = counts.iter().zip(values);
+    points.map(|(&n, &value)| (n as f64, value)).collect()
+}
+
+/// RMSE over seeds of every function, and its slope. The slope is half that of the mean square, so that
+/// it is the slope of the RMSE and not of a mean of absolute errors. An N at which half of the seeds or
+/// more are right to the resolution of the coordinates (16 points often halve the square exactly) says
+/// nothing of a slope and is left out of it.
+fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> {
+    let figures = |(k, (name, function)): (usize, (&str, Function))| {
+        let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
+        let rmse = counts.iter().enumerate().filter_map(|(i, &n)| {
+            let squares: Vec<f64> = errors.iter().map(|e| e[i]).collect();
+            root_mean_interval(&squares).map(|value| FigureAtCount { n, value })
+        });
+        let least = RESOLUTION.powi(2);
+        let resolved = |i: usize| {
+            let seen = errors.iter().filter(|e| e[i] > least).count();
+            2 * seen > errors.len()
+        };
+        let squares = |e: &&Vec<f64>| -> Vec<(f64, f64)> {
+            let points = curve(counts, e).into_iter().enumerate();
+            let fitted = points.filter(|(i, _)| resolved(*i));
+            fitted.map(|(_, (n, e))| (n, e.max(least))).collect()
+        };
+        let curves: Vec<_> = errors.iter().map(squares).collect();
+        let half = |slope: Interval| Interval {
+            value: 0.5 * slope.value,
+            low: 0.5 * slope.low,
+            high: 0.5 * slope.high,
+        };
+        IntegrandFigures {
+            function: name.to_owned(),
+            integral: function.integral(),
+            rmse: rmse.collect(),
+            slope: log_log_slope(&curves).map(half),
+        }
+    };
+    functions().into_iter().enumerate().map(figures).collect()
+}
+
+/// Cosine-distributed direction around the z axis; twin of `sample_cosine` in
+/// `kernels/shading/hemisphere.wesl`, in double precision.
+pub fn cosine_direction([u, v]: [f64; 2]) -> [f64; 3] {
+    let (sin, cos) = (TAU * v).sin_cos();
+    let radius = u.sqrt();
+    [radius * cos, radius * sin, (1.0 - u).sqrt()]
+}
+
+/// Mean angle between the directions of neighbouring pixels (right and below) at the same sample index,
+/// radians. `points` are those of a tile of `width` pixels a row, pixel by pixel, `samples` of each.
+pub(crate) fn neighbour_angle(points: &[[f64; 2]], width: usize, samples: usize) -> Option<f64> {
+    let directions: Vec<_> = points.iter().map(|&p| cosine_direction(p)).collect();
+    let pixels = points.len().checked_div(samples)?;
+    let mut angles = Vec::new();
+    for pixel in 0..pixels {
+        let right = Some(pixel + 1).filter(|next| next % width != 0);
+        let below = Some(pixel + width).filter(|next| *next < pixels);
+        for next in right.into_iter().chain(below) {
+            let pairs = (0..samples).map(|i| (pixel * samples + i, next * samples + i));
+            angles.extend(pairs.map(|(a, b)| angle(directions[a], directions[b])));
+        }
+    }
+    raystone_stats::statistics::mean(&angles)
+}
+
+/// Accurate for small angles too, where an arc cosine is not.
+fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let difference = length([0, 1, 2].map(|k| a[k] - b[k]));
+    let sum = length([0, 1, 2].map(|k| a[k] + b[k]));
+    2.0 * difference.atan2(sum)
+}
+
+/// Share of the cells of a square grid that at least one of the points falls into. The grid has
+/// (4 √n)² cells, n being the points of one pixel.
+pub(crate) fn coverage(points: &[[f64; 2]], n: usize) -> f64 {
+    let side = ((n as f64).sqrt() * CELLS as f64).round().max(1.0) as usize;
+    let mut hit = vec![false; side * side];
+    for point in points {
+        let [x, y] = point.map(|c| ((c * side as f64) as usize).min(side - 1));
+        hit[y * side + x] = true;
+    }
+    hit.iter().filter(|&&cell| cell).count() as f64 / hit.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    #[test]
+    fn errors_of_a_midpoint_grid_have_the_slope_of_its_theory() {
+        // The midpoint rule with N points errs by about N^(-1) where the function is smooth in 2-D.
+        let grid = |n: usize| -> Vec<[f64; 2]> {
+            let side = (n as f64).sqrt() as usize;
+            let at = |k: usize| (k as f64 + 0.5) / side as f64;
+            (0..n).map(|i| [at(i % side), at(i / side)]).collect()
+        };
+        let counts = [16, 64, 256, 1024];
+        let mut seed = SeedFigures::default();
+        for n in counts {
+            seed.add(&grid(n), &[n]).unwrap();
+        }
+        let (star, figures) = over_seeds(&counts, &[seed]);
+        assert_eq!(star.len(), 4);
+        // Half a cell along an edge is too much: D* = 1/√N − 1/(4N).
+        let expected = |n: f64| 1.0 / n.sqrt() - 0.25 / n;
+        for at in &star {
+            assert!(
+                (at.value.value - expected(at.n as f64)).abs() < 1e-12,
+                "{at:?}"
+            );
+        }
+        let exponential = &figures.integrands[0];
+        assert_eq!(exponential.function, "exponential");
+        let slope = exponential.slope.unwrap().value;
+        assert!((slope + 1.0).abs() < 0.01, "{slope}");
+        assert_eq!(figures.l2_star.len(), 4);
+    }
+
+    #[test]
+    fn random_points_have_the_slope_of_monte_carlo() {
+        let counts = [16, 64, 256, 1024];
+        let seeds: Vec<SeedFigures> = (0..64)
+            .map(|seed| {
+                let mut generator = Pcg32::new(seed);
+                let points: Vec<_> = (0..1024)
+                    .map(|_| [generator.uniform(), generator.uniform()])
+                    .collect();
+                let squared_errors = functions()
+                    .iter()
+                    .map(|(_, f)| squared_errors(f, &points, &counts))
+                    .collect();
+                SeedFigures {
+                    squared_errors,
+                    ..SeedFigures::default()
+                }
+            })
+            .collect();
+        for figures in integrands(&counts, &seeds) {
+            let slope = figures.slope.unwrap();
+            assert!((slope.value + 0.5).abs() < 0.12, "{figures:?}");
+            assert!(slope.low < slope.high);
+        }
+    }
+
+    #[test]
+    fn an_exact_hit_is_left_out_of_a_slope() {
+        let counts = [16, 32, 64, 128];
+        let law = |n: usize| if n == 16 { 1e-20 } else { 1.0 / n as f64 };
+        let seed = SeedFigures {
+            squared_errors: vec![counts.map(law).to_vec(); functions().len()],
+            ..SeedFigures::default()
+        };
+        for seeds in [vec![seed.clone()], vec![seed; 3]] {
+            for figures in integrands(&counts, &seeds) {
+                assert_eq!(figures.rmse.len(), 4);
+                let slope = figures.slope.unwrap().value;
+                assert!((slope + 0.5).abs() < 1e-12, "{slope}");
+            }
+        }
+    }
+
+    #[test]
+    fn coherence_is_zero_for_equal_pixels_and_large_for_independent_ones() {
+        let mut generator = Pcg32::new(2);
+        let mut random = |n: usize| -> Vec<[f64; 2]> {
+            (0..n)
+                .map(|_| [generator.uniform(), generator.uniform()])
+                .collect()
+        };
+        let independent = neighbour_angle(&random(64 * 16), 8, 16).unwrap();
+        assert!((0.9..1.3).contains(&independent), "{independent}");
+        let one = random(16);
+        let equal: Vec<_> = (0..64).flat_map(|_| one.clone()).collect();
+        assert_eq!(neighbour_angle(&equal, 8, 16), Some(0.0));
+        assert_eq!(neighbour_angle(&[], 8, 0), None);
+    }
+
+    #[test]
+    fn coverage_counts_cells() {
+        assert_eq!(
+            coverage(&[[0.1, 0.1], [0.12, 0.1], [0.9, 0.9]], 1),
+            2.0 / 16.0
+        );
+        assert_eq!(coverage(&[[1.0 - 1e-9, 0.0]], 4), 1.0 / 64.0);
+    }
+}

@@ -1,0 +1,194 @@
+//! The timing protocol: warm-up until the rate is stable, then all measured things in rounds of
+//! random order, so that drift of the machine hits all alike.
+
+use raystone_config::Timing;
+use raystone_core::random::Pcg32;
+use raystone_gpu::{Elapsed, Gpu, GpuError};
+use raystone_record::Interval;
+use raystone_stats::statistics::{median, median_interval};
+use std::cell::{Cell, OnceCell};
+use std::time::Instant;
+
+/// Two warm-up runs within this fraction of each other are stable.
+const STABLE: f64 = 0.05;
+
+/// Something that is measured again and again.
+pub trait Measured {
+    /// One measurement.
+    ///
+    /// # Errors
+    /// It failed; it is not measured again.
+    fn measure(&self) -> Result<Elapsed, GpuError>;
+
+    /// The device whose compilations of kernels take turns, round by round: see [`Gpu::compiled_apart`].
+    fn device(&self) -> Option<&Gpu> {
+        None
+    }
+}
+
+impl<M: Measured + ?Sized> Measured for &M {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        (**self).measure()
+    }
+
+    fn device(&self) -> Option<&Gpu> {
+        (**self).device()
+    }
+}
+
+/// What a measured thing answered, turn by turn: it must be the same each time, or the time is that of
+/// something else.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    first: OnceCell<blake3::Hash>,
+    turns: Cell<u32>,
+    differed: OnceCell<u32>,
+}
+
+impl Watch {
+    /// Takes the hash of one turn's answers.
+    pub(crate) fn note(&self, answers: blake3::Hash) {
+        self.turns.set(self.turns.get() + 1);
+        if *self.first.get_or_init(|| answers) != answers {
+            self.differed.get_or_init(|| self.turns.get());
+        }
+    }
+
+    /// The first turn that differed from the first of all, in words.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let turn = self.differed.get()?;
+        Some(format!(
+            "dispatches do not repeat: timed turn {turn} of {} answered otherwise than the first",
+            self.turns.get()
+        ))
+    }
+}
+
+/// Samples of one measured thing.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    /// Milliseconds on the GPU clock (wall clock where there is none).
+    pub ms: Vec<f64>,
+    /// Milliseconds on the wall clock.
+    pub wall_ms: Vec<f64>,
+    /// Milliseconds of all processors, where they are counted.
+    pub cpu_ms: Vec<f64>,
+}
+
+/// Measures everything `rounds` times in rounds of random order; what fails keeps its error.
+///
+/// # Errors
+/// The device is gone: the index of what was being measured, and the error. The others are as yet
+/// unmeasured, not failed.
+pub(crate) fn interleave<M: Measured>(
+    measured: &[M],
+    timing: &Timing,
+    seed: u64,
+    mut tick: impl FnMut(),
+) -> Result<Vec<Result<Samples, GpuError>>, (usize, GpuError)> {
+    let mut results: Vec<Result<Samples, GpuError>> = Vec::with_capacity(measured.len());
+    for (index, item) in measured.iter().enumerate() {
+        tick();
+        match warm_up(item, timing) {
+            Err(error @ GpuError::Lost(_)) => return Err((index, error)),
+            outcome => results.push(outcome.map(|()| Samples::default())),
+        }
+    }
+    let mut random = Pcg32::new(seed);
+    let mut order: Vec<usize> = (0..measured.len()).collect();
+    for round in 0..timing.rounds as usize {
+        for i in (1..order.len()).rev() {
+            order.swap(i, random.below(i + 1));
+        }
+        for &index in &order {
+            let Ok(samples) = &mut results[index] else {
+                continue;
+            };
+            take_turn(&measured[index], round);
+            match turn(&measured[index]) {
+                Ok(elapsed) => {
+                    samples.ms.push(elapsed.ms());
+                    samples.wall_ms.push(elapsed.wall_ms);
+                    samples.cpu_ms.extend(elapsed.cpu_ms);
+                }
+                Err(error @ GpuError::Lost(_)) => return Err((index, error)),
+                Err(error) => results[index] = Err(error),
+            }
+            tick();
+        }
+    }
+    measured.iter().for_each(|item| take_turn(item, 0));
+    Ok(results)
+}
+
+fn take_turn(measured: &impl Measured, round: usize) {
+    if let Some(gpu) = measured.device() {
+        gpu.take_turn(round);
+    }
+}
+
+/// So often a turn is taken in which a clock runs backwards.
+const TRIES: usize = 3;
+
+/// One turn. Where a clock ran backwards it is taken again: a time by another clock is none of this round's.
+fn turn(measured: &impl Measured) -> Result<Elapsed, GpuError> {
+    let mut last = Err(GpuError::Clock);
+    for _ in 0..TRIES {
+        last = measured.measure().and_then(Elapsed::measured);
+        if !matches!(last, Err(GpuError::Clock)) {
+            break;
+        }
+    }
+    last
+}
+
+/// Runs until two runs in a row agree, for at least `min_warmup_ms` and at most `max_warmup_ms`. The
+/// first run does not count: it includes the driver's compiler.
+fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
+    // Each compilation is made before it is timed.
+    for compilation in (0..measured.device().map_or(1, Gpu::compilations)).rev() {
+        take_turn(measured, compilation);
+        measured.measure()?;
+    }
+    let start = Instant::now();
+    let mut last = turn(measured)?.ms();
+    loop {
+        let spent_ms = start.elapsed().as_secs_f64() * 1e3;
+        let now = turn(measured)?.ms();
+        let stable = (now - last).abs() <= STABLE * now.max(last);
+        if (stable && spent_ms >= f64::from(timing.min_warmup_ms))
+            || spent_ms >= f64::from(timing.max_warmup_ms)
+        {
+            return Ok(());
+        }
+        last = now;
+    }
+}
+
+/// `samples` with the cost of an empty measurement taken off; never below a hundredth of what was
+/// measured, so that a rate stays finite.
+pub(crate) fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
+    samples
+        .iter()
+        .map(|ms| (ms - empty).max(0.01 * ms))
+        .collect()
+}
+
+/// Median of an empty measurement.
+///
+/// # Errors
+/// It failed.
+pub(crate) fn empty_ms(
+    mut measure: impl FnMut() -> Result<Elapsed, GpuError>,
+) -> Result<f64, GpuError> {
+    let samples = (0..9)
+        .map(|_| measure().and_then(Elapsed::measured).map(|e| e.ms()))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(median(&samples).unwrap_or(0.0))
+}
+
+/// Rate in millions per second from milliseconds for `items`, median with interval.
+pub(crate) fn millions_per_second(ms: &[f64], items: f64) -> Option<Interval> {
+    let rates: Vec<f64> = ms.iter().map(|ms| items / ms * 1e-3).collect();
+    median_interval(&rates)
+}

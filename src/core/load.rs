@@ -1,0 +1,27 @@
+//! What loading a scene has to say.
+
+use serde::{Deserialize, Serialize};
+
+/// What went wrong or was approximated while a scene was loaded: counted, shown, kept in the record.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct LoadReport {
+    /// Triangles dropped because a vertex was NaN or infinite.
+    pub dropped_non_finite: usize,
+    /// Triangles of zero area: kept, they can never be hit.
+    pub zero_area: usize,
+    /// Everything else worth a line (missing texture, material approximated as diffuse, …).
+    pub warnings: Vec<String>,
+}
+
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = match self.dropped_non_finite {
+            0 => Vec::new(),
+            1 => vec!["1 triangle dropped: a vertex is not finite".to_owned()],
+            n => vec![format!("{n} triangles dropped: a vertex is not finite")],
+        };
+        lines.extend_from_slice(&self.warnings);
+        lines
+    }
+}

@@ -1,0 +1,55 @@
+//! Declared parameters: what a registry entry can be set to.
+//!
+//! The macro [`parameters!`](crate::parameters) declares the parameters of an entry once, as a struct
+//! with types, defaults, ranges and a line of meaning each; choices are enums of the same declaration.
+//! The parser, `raystone list`, sweeps and the docs read [`Parameters::schema`], the code reads the fields
+//! of the struct that [`Parameters::from_params`] makes. A misspelt name does not compile:
+//!
+//! ```compile_fail
+//! raystone_core::parameters! {
+//!     /// A grid.
+//!     pub struct Grid {
+//!         /// cells per triangle
+//!         lambda: f64 = 3.0, in 0.1..=64.0;
+//!     }
+//! }
+//! let cells = Grid::default().lamda;
+//! ```
+//!
+//! ```
+//! use raystone_core::params::{Parameters as _, Params};
+//! raystone_core::parameters! {
+//!     /// A grid.
+//!     pub struct Grid {
+//!         /// cells per triangle
+//!         lambda: f64 = 3.0, in 0.1..=64.0;
+//!         /// what a ray does at empty cells
+//!         skip: Skip = Skip::None;
+//!     }
+//!     /// How empty cells are skipped.
+//!     pub enum Skip {
+//!         /// one by one
+//!         None = "none",
+//!         /// by the distance to the next full cell
+//!         Chebyshev = "chebyshev",
+//!     }
+//! }
+//! let grid = Grid::from_params(&Params::default())?;
+//! assert_eq!((grid.lambda, grid.skip), (3.0, Skip::None));
+//! assert_eq!(Grid::schema()[1].description, "what a ray does at empty cells");
+//! # Ok::<(), raystone_core::params::ParamError>(())
+//! ```
+
+mod declare;
+mod entry;
+mod kinds;
+mod registry;
+mod schema;
+mod value;
+
+pub use declare::{Bounded, Choice, ParameterType, Parameters, Unbounded, named, read, redeclare};
+pub use entry::{Entry, Variant};
+pub use kinds::{Kinds, Named, Sources};
+pub use registry::{Registered, Registry};
+pub use schema::{ParamError, ParamRange, Parameter, ParameterSchema};
+pub use value::{ParamValue, Params};

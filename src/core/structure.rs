@@ -1,0 +1,105 @@
+//! What is known of a built structure and of the work in it: what records keep.
+
+use serde::{Deserialize, Serialize};
+
+/// A timed phase of a build.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Phase {
+    /// For instance `bounds`, `binned-sah`, `layout`.
+    pub name: String,
+    /// Milliseconds: wall time, or GPU time of a pass on the device.
+    pub ms: f64,
+}
+
+/// Static figures of a built structure.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct StructureStats {
+    /// Nodes (inner and leaf) or cells.
+    pub nodes: u64,
+    /// Leaves or non-empty cells.
+    pub leaves: u64,
+    /// Triangle references held by leaves or cells.
+    pub references: u64,
+    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
+    /// index is counted there. Empty where not known.
+    #[serde(default)]
+    pub leaf_histogram: Vec<u64>,
+    /// Deepest leaf (root = 0); absent for flat structures.
+    pub depth: Option<u32>,
+    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
+    pub sah_cost: Option<f64>,
+    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
+    /// an estimate from a part of the triangles.
+    #[serde(default)]
+    pub epo: Option<f64>,
+    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
+    pub bytes: u64,
+}
+
+impl StructureStats {
+    /// Leaves, references and histogram of leaves or cells that list so many triangles; all else is left 0.
+    /// Those that list none are no leaves.
+    pub fn of_leaves(counts: impl Iterator<Item = usize>) -> Self {
+        let mut stats = Self::default();
+        let histogram = &mut stats.leaf_histogram;
+        for count in counts {
+            let place = count.min(LEAF_HISTOGRAM_END);
+            if histogram.len() <= place {
+                histogram.resize(place + 1, 0);
+            }
+            histogram[place] += 1;
+            stats.leaves += u64::from(count > 0);
+            stats.references += count as u64;
+        }
+        stats
+    }
+}
+
+/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Nodes or cells visited.
+    pub nodes: u32,
+    /// Ray–box tests.
+    pub box_tests: u32,
+    /// Ray–triangle tests.
+    pub triangle_tests: u32,
+    /// Deepest stack, entries.
+    pub stack_high_water: u32,
+}
+
+/// In which space a structure meets triangles, and so which judge it has to equal to the bit.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Space {
+    /// World space: the flat list of triangles.
+    #[default]
+    World,
+    /// The space of each instance's object: rays are transformed, triangles are not. Rounding then
+    /// differs from the flat list's.
+    Instances,
+}
+
+/// Longest entry of a leaf histogram; more references than this are counted there.
+pub const LEAF_HISTOGRAM_END: usize = 32;
+
+/// Under which the times of passes that answer rays are told: nearest hits, any hits.
+pub const RAY_QUERIES: [&str; 2] = ["closest hits", "any hits"];
+
+/// Names of the classes of rays that integrators count in records, in their order.
+pub const RAY_COUNT_CLASSES: [&str; 5] = ["primary", "shadow", "ao", "bounce", "skipped"];
+/// How many of them, from the first on, are traced.
+pub const TRACED_CLASSES: usize = 4;

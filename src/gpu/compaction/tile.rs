@@ -1,0 +1,28 @@
+//! The tile of a workgroup: so many invocations, each with some elements side by side.
+
+use crate::Composition;
+use raystone_core::parameters;
+
+parameters! {
+    /// A tile of elements.
+    pub(crate) struct Tile {
+        /// invocations of a workgroup
+        lanes: u32 = 256, in 1..=256;
+        /// elements of an invocation, side by side
+        per_lane: u32 = 1, in 1..=64;
+    }
+}
+
+impl Tile {
+    /// How many there are of them for so many elements.
+    pub(crate) fn count(&self, elements: u32) -> u32 {
+        elements.div_ceil(self.lanes * self.per_lane)
+    }
+
+    /// A kernel over them.
+    pub(crate) fn kernel(&self, kernel: Composition) -> Composition {
+        kernel
+            .constant("SCAN_LANES", self.lanes)
+            .constant("PER_LANE", self.per_lane)
+    }
+}

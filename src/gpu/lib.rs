@@ -1,0 +1,194 @@
+//! The GPU: adapter choice, device, kernel composition, pipelines, buffers, timestamps.
+//!
+//! Everything is bound *by name*: the composed kernel is reflected by naga, and a buffer is attached
+//! to the variable of the same name, so that no binding number, struct offset or size is typed twice.
+#![warn(missing_docs)]
+
+mod adapter;
+mod bindings;
+mod buffers;
+mod clock;
+pub mod compaction;
+mod compose;
+mod diagnose;
+mod kernel_errors;
+mod pipeline;
+mod player;
+mod probe;
+mod raster;
+mod recording;
+mod slices;
+mod sort;
+mod uniform;
+
+pub use adapter::{
+    AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, device_type, is_software, open,
+};
+pub use bindings::{Bindings, Storage};
+pub use clock::{Elapsed, Stopwatch};
+pub use compose::{ComposedKernel, Composition, KernelLibrary};
+pub(crate) use kernel_errors::LOOPS_CUT;
+pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
+pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};
+pub use player::Player;
+pub use probe::{ArithmeticProbe, probe_arithmetic};
+pub use raster::Raster;
+pub use recording::{Groups, Played, Recording, grid_of, groups_for};
+pub use slices::{MOST_SLICE_MS, Slices, slow_slice};
+pub use sort::{Pairs, RadixSort};
+pub use uniform::UniformValues;
+
+use thiserror::Error;
+
+/// What can go wrong between a kernel's text and a result on the host.
+#[derive(Debug, Error)]
+pub enum GpuError {
+    /// No adapter answers at all.
+    #[error(
+        "no GPU adapter answers on this machine. Install a driver (Debian: `scripts/install-driver`) or set WGPU_BACKEND=gl; `raystone doctor` tells what was tried"
+    )]
+    NoAdapter,
+    /// The adapter asked for does not exist.
+    #[error("no adapter matches `{asked}`; there are: {known}")]
+    UnknownAdapter {
+        /// What the user typed.
+        asked: String,
+        /// What exists.
+        known: String,
+    },
+    /// The adapter would not give a device with the limits asked for.
+    #[error("adapter `{adapter}` gives no device: {cause}")]
+    NoDevice {
+        /// Adapter name.
+        adapter: String,
+        /// The driver's words.
+        cause: String,
+    },
+    /// A kernel does not compose, parse or validate; the text names file and line.
+    #[error("{0}")]
+    Kernel(String),
+    /// A kernel wants a buffer that the caller did not give.
+    #[error(
+        "kernel `{kernel}` binds `{binding}`, but no buffer of that name was given; there are: {known}"
+    )]
+    Unbound {
+        /// Entry module.
+        kernel: String,
+        /// Variable name in the kernel.
+        binding: String,
+        /// Names that were given.
+        known: String,
+    },
+    /// A buffer is larger than the adapter can bind.
+    #[error("buffer `{name}` needs {needed} bytes, but this adapter binds at most {limit}")]
+    TooLarge {
+        /// Buffer name.
+        name: String,
+        /// Bytes needed.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// A kernel binds more buffers than the adapter allows, because arrays came in several parts.
+    #[error(
+        "kernel `{kernel}` needs {needed} storage buffers for a scene of this size, but this adapter binds at most {limit}"
+    )]
+    TooManyBuffers {
+        /// Entry module.
+        kernel: String,
+        /// Storage buffers of the kernel.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// A step of a recording asks for more workgroups than the adapter runs.
+    #[error(
+        "step `{step}` asks for {groups:?} workgroups, but this adapter runs at most {limit} in each direction"
+    )]
+    TooManyGroups {
+        /// Name of the step.
+        step: String,
+        /// Workgroups in x, y, z.
+        groups: [u32; 3],
+        /// The adapter's limit.
+        limit: u32,
+    },
+    /// A workgroup of a kernel is larger than the adapter runs.
+    #[error(
+        "kernel `{kernel}` has workgroups with {needed} {what}, but this adapter runs at most {limit}: choose a smaller one on the axis `workgroup`"
+    )]
+    WorkgroupTooLarge {
+        /// Entry module.
+        kernel: String,
+        /// Of what there are too many.
+        what: &'static str,
+        /// How many.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// The driver ended loops early, and what was computed is wrong.
+    #[error(
+        "this driver ends loops in silence once an invocation's loops together took {limit} turns, and here they need more: fewer triangles, another structure or a newer driver help (`raystone doctor`)"
+    )]
+    LoopsCut {
+        /// [`Gpu::loop_limit`].
+        limit: u32,
+    },
+    /// The driver ends loops early, and no kernel can see it.
+    #[error(
+        "adapter `{adapter}` ends loops early ({turns} of {wanted} turns) in a way that kernels cannot notice: nothing it computes can be trusted; install another driver"
+    )]
+    LoopsUnsound {
+        /// Adapter name.
+        adapter: String,
+        /// Turns it took.
+        turns: u32,
+        /// Turns asked for.
+        wanted: u32,
+    },
+    /// Kernels raised the error word.
+    #[error("wrong on the device: {0}")]
+    Kernels(String),
+    /// A picture whose pixels did not take the samples that they were to take.
+    #[error(
+        "{wrong} pixels did not take the {wanted} samples of this block; the first is ({x}, {y}), which took {taken}"
+    )]
+    Samples {
+        /// Pixels concerned.
+        wrong: usize,
+        /// Samples asked for since the last sum that was taken over to the host.
+        wanted: u32,
+        /// Column of the first such pixel.
+        x: u32,
+        /// Its row.
+        y: u32,
+        /// Samples it took.
+        taken: f32,
+    },
+    /// Validation or out-of-memory error from the driver.
+    #[error("the driver refused: {0}")]
+    Driver(String),
+    /// A clock went back while something was measured.
+    #[error(
+        "a clock of the device or of the processors ran backwards in every try, so that there is no time: update the driver, or measure on another machine"
+    )]
+    Clock,
+    /// The device is gone.
+    #[error("the device was lost: {0}")]
+    Lost(String),
+    /// Work did not end in time.
+    #[error("the device did not finish within {seconds} s")]
+    Timeout {
+        /// How long was waited.
+        seconds: u64,
+    },
+}
+
+impl GpuError {
+    /// Whether driver or adapter cannot run what was asked for, through no fault of it: such a cell is left
+    /// out.
+    pub fn is_refusal(&self) -> bool {
+        matches!(self, Self::LoopsCut { .. } | Self::WorkgroupTooLarge { .. })
+    }
+}

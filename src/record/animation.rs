@@ -1,0 +1,74 @@
+//! What is recorded of a structure whose scene moves.
+
+use super::{CountersPerRay, RayClass};
+use raystone_config::Animation;
+use serde::{Deserialize, Serialize};
+
+/// A structure over the frames of an animation: what was built over the first, taken over to each (*refitted*), and built
+/// anew for each (*rebuilt*).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct AnimationRecord {
+    /// What moves, and how.
+    pub settings: Animation,
+    /// Triangles of the scene.
+    pub triangles: u64,
+    /// By time; those before the failure, if there is one.
+    pub frames: Vec<FrameRecord>,
+    /// What went wrong, and in which frame.
+    pub failure: Option<String>,
+}
+
+/// A frame whose gates both passed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct FrameRecord {
+    /// Number, from 0.
+    pub frame: u32,
+    /// Rays of each of both gates, closest and any hit.
+    pub judged: usize,
+    /// What taking over costs, on the device where there is a way to do it there.
+    pub refit: Cost,
+    /// The same on the host, equal to the bit; absent where there is only one way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refit_on_host: Option<Cost>,
+    /// What building anew costs.
+    pub rebuild: Cost,
+    /// SAH cost: refitted, rebuilt; absent where not defined.
+    pub sah: [Option<f64>; 2],
+    /// Rays through both, by class.
+    pub classes: Vec<FrameRays>,
+}
+
+/// Rays of a class through the refitted and the rebuilt structure, in this order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct FrameRays {
+    /// What they are.
+    pub class: RayClass,
+    /// How many.
+    pub rays: usize,
+    /// Counted work.
+    pub counters: [Option<CountersPerRay>; 2],
+    /// What tracing all of them costs.
+    pub cost: [Cost; 2],
+}
+
+/// Milliseconds of the same work in each round, by several clocks.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Cost {
+    /// Of all threads of the process; empty where the system does not tell.
+    pub processor_ms: Vec<f64>,
+    /// By the wall clock.
+    pub wall_ms: Vec<f64>,
+    /// Between the timestamps around the passes that trace rays; empty for all else, and where there are none.
+    pub passes_ms: Vec<f64>,
+}
+
+impl Cost {
+    /// What counts: a software adapter computes on the processor, on which others may compute, too.
+    pub fn ms(&self, software: bool) -> &[f64] {
+        match software && !self.processor_ms.is_empty() {
+            true => &self.processor_ms,
+            false if self.passes_ms.is_empty() => &self.wall_ms,
+            false => &self.passes_ms,
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! What is recorded of the coherence of rays: counts of a model, see [`crate::coherence`].
+
+use raystone_config::Coherence;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::AddAssign;
+
+/// The organisation in which a lane keeps its pixel, the baseline of the others.
+pub const SINGLE_KERNEL: &str = "single kernel";
+
+/// Coherence of a full cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CoherenceRecord {
+    /// The machine, and what was looked at.
+    pub settings: Coherence,
+    /// Samples per pixel of the sampler with which the cell was timed.
+    pub timed_spp: u32,
+    /// By samples per pixel and organisation.
+    pub at: Vec<CoherenceAt>,
+}
+
+/// Coherence at a number of samples per pixel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CoherenceAt {
+    /// Samples per pixel that the sampler was made for.
+    pub spp: u32,
+    /// Which rays the lanes of a warp have.
+    pub organisation: String,
+    /// Paths that were looked at.
+    pub paths: u64,
+    /// Counts by class of rays (`primary`, `shadow 0`, `bounce 1`, …), in the order in which they are traced.
+    pub classes: Vec<(String, Tally)>,
+    /// For each class, rays and predicted cycles of each group of warps. Groups are a sample of the image: how far they
+    /// differ tells how far others may. Older records have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<Vec<[u64; 2]>>,
+}
+
+/// Rays and predicted cycles of a class in each group of warps.
+pub fn by_group(groups: &[Tallies], class: u32) -> Vec<[u64; 2]> {
+    let of_group = |group: &Tallies| {
+        let tally = group.get(&class).copied().unwrap_or_default();
+        [tally.rays, tally.cost()]
+    };
+    groups.iter().map(of_group).collect()
+}
+
+impl CoherenceRecord {
+    /// What is predicted of what was timed.
+    pub fn timed(&self, organisation: &str) -> Option<&CoherenceAt> {
+        let is_it = |at: &&CoherenceAt| at.spp == self.timed_spp && at.organisation == organisation;
+        self.at.iter().find(is_it)
+    }
+}
+
+impl CoherenceAt {
+    /// Counts of all rays together.
+    pub fn all(&self) -> Tally {
+        let mut all = Tally::default();
+        for (_, tally) in &self.classes {
+            all += *tally;
+        }
+        all
+    }
+
+    /// Predicted cycles of a path: see [`Tally::cost`].
+    pub fn cost_of_path(&self) -> Option<f64> {
+        ratio(self.all().cost(), self.paths)
+    }
+}
+
+/// Counts of one class of rays.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+pub struct Tally {
+    /// Rays.
+    pub rays: u64,
+    /// Visits of nodes, over all rays.
+    pub nodes: u64,
+    /// Tests of triangles, over all rays.
+    pub triangles: u64,
+    /// Issues of all warps.
+    pub issues: u64,
+    /// Lanes that took part, over all issues.
+    pub active: u64,
+    /// Lanes of the warps, over all issues.
+    pub lanes: u64,
+    /// Bytes that lanes asked for.
+    pub bytes: u64,
+    /// Cache lines that were needed, over all issues: accesses to the L1.
+    pub lines: u64,
+    /// Those that were in the L1.
+    pub l1_hits: u64,
+    /// Those that were in the L2, of those that were not in the L1.
+    pub l2_hits: u64,
+}
+
+/// Cycles of an issue, of a line from the L1, of one from the L2 and of one from memory, on a multiprocessor of a
+/// GPU like NVIDIA's H100 (132 of them, 1.7 GHz): about a hundred instructions at four a cycle; 128 bytes a cycle; about
+/// 5.5 TB/s, and 3.35 TB/s, shared by all.
+pub const COST: [u64; 4] = [25, 1, 5, 9];
+
+impl Tally {
+    /// Lines that were not in the L1.
+    pub fn l2_accesses(&self) -> u64 {
+        self.lines - self.l1_hits
+    }
+
+    /// Lines that came from memory.
+    pub fn misses(&self) -> u64 {
+        self.l2_accesses() - self.l2_hits
+    }
+
+    /// Cycles of one multiprocessor if nothing but throughput counted, by [`COST`]: to be compared, not to be
+    /// believed.
+    pub fn cost(&self) -> u64 {
+        let counts = [self.issues, self.lines, self.l2_accesses(), self.misses()];
+        counts.iter().zip(COST).map(|(n, cycles)| n * cycles).sum()
+    }
+
+    /// Share of the lanes that take part in an issue.
+    pub fn efficiency(&self) -> Option<f64> {
+        ratio(self.active, self.lanes)
+    }
+
+    /// Figures by id, those that there are.
+    pub fn figures(&self, line_bytes: u32) -> [(&'static str, Option<f64>); 9] {
+        let line = u64::from(line_bytes);
+        [
+            ("simt-efficiency/v1", self.efficiency()),
+            ("lines-per-issue/v1", ratio(self.lines, self.issues)),
+            ("l1-hits/v1", ratio(self.l1_hits, self.lines)),
+            ("l2-hits/v1", ratio(self.l2_hits, self.l2_accesses())),
+            ("issues-per-ray/v1", ratio(self.issues, self.rays)),
+            ("asked-bytes-per-ray/v1", ratio(self.bytes, self.rays)),
+            (
+                "l2-bytes-per-ray/v1",
+                ratio(self.l2_accesses() * line, self.rays),
+            ),
+            (
+                "memory-bytes-per-ray/v1",
+                ratio(self.misses() * line, self.rays),
+            ),
+            ("cycles-per-ray/v1", ratio(self.cost(), self.rays)),
+        ]
+    }
+}
+
+/// The quotient of two counts; `None` if there is none.
+fn ratio(part: u64, of: u64) -> Option<f64> {
+    (of > 0).then(|| part as f64 / of as f64)
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        let sums = [
+            (&mut self.rays, other.rays),
+            (&mut self.nodes, other.nodes),
+            (&mut self.triangles, other.triangles),
+            (&mut self.issues, other.issues),
+            (&mut self.active, other.active),
+            (&mut self.lanes, other.lanes),
+            (&mut self.bytes, other.bytes),
+            (&mut self.lines, other.lines),
+            (&mut self.l1_hits, other.l1_hits),
+            (&mut self.l2_hits, other.l2_hits),
+        ];
+        for (sum, more) in sums {
+            *sum += more;
+        }
+    }
+}
+
+/// Tallies by class.
+pub type Tallies = BTreeMap<u32, Tally>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_quotients_of_the_counts() {
+        let tally = Tally {
+            rays: 4,
+            nodes: 9,
+            triangles: 3,
+            issues: 10,
+            active: 30,
+            lanes: 40,
+            bytes: 800,
+            lines: 20,
+            l1_hits: 12,
+            l2_hits: 6,
+        };
+        assert_eq!((tally.l2_accesses(), tally.misses()), (8, 2));
+        // 10 · 25 + 20 · 1 + 8 · 5 + 2 · 9
+        assert_eq!(tally.cost(), 328);
+        let expected = [0.75, 2.0, 0.6, 0.75, 2.5, 200.0, 256.0, 64.0, 82.0];
+        let figures = tally.figures(128);
+        let values: Vec<f64> = figures.iter().map(|(_, value)| value.unwrap()).collect();
+        assert_eq!(values, expected);
+        let mut sum = Tally::default();
+        sum += tally;
+        sum += tally;
+        assert_eq!(sum.figures(128), figures);
+        assert!(
+            Tally::default()
+                .figures(128)
+                .iter()
+                .all(|(_, value)| value.is_none())
+        );
+    }
+}

@@ -1,0 +1,77 @@
+//! Where a run happened.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Machine, adapter, driver and program that produced a result.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Environment {
+    /// Adapter name as the driver gives it.
+    pub adapter: String,
+    /// `vulkan`, `gl`, `metal`, `dx12`.
+    pub backend: String,
+    /// Driver name.
+    pub driver: String,
+    /// Driver version text.
+    pub driver_info: String,
+    /// `discrete-gpu`, `integrated-gpu`, `virtual-gpu`, `cpu`, `other`.
+    pub device_type: String,
+    /// Whether the adapter is a software rasteriser: its times compare structures on it only.
+    pub software: bool,
+    /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
+    pub timestamps: bool,
+    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
+    #[serde(default)]
+    pub loop_limit: Option<u32>,
+    /// Whether denormal numbers are kept, when known.
+    #[serde(default)]
+    pub denormals: Option<bool>,
+    /// Operating system and architecture.
+    pub os: String,
+    /// Processor model.
+    pub cpu: String,
+    /// Hardware threads of the host.
+    pub cpu_threads: usize,
+    /// Version of this program.
+    pub version: String,
+    /// Commit the program was built from, when known.
+    pub commit: Option<String>,
+    /// Whether the working tree had uncommitted changes when it was built.
+    pub dirty: Option<bool>,
+    /// Where the adapter sits on the PCI bus, as `0000:65:00.0`; empty if it has no such place.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub pci: String,
+    /// Least and greatest number of invocations of a subgroup.
+    #[serde(default)]
+    pub subgroup: Option<[u32; 2]>,
+    /// Limits of the device that runs may meet, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub limits: BTreeMap<String, u64>,
+    /// Memory of the host, bytes.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
+    /// How the clocks of the processors are governed.
+    #[serde(default)]
+    pub governor: Option<String>,
+    /// The state of the machine when the run began.
+    #[serde(default)]
+    pub load: MachineLoad,
+    /// The command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
+}
+
+/// How busy a machine is, as far as it can be read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default)]
+pub struct MachineLoad {
+    /// Processes that ran or waited to, mean of a minute.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub minute: Option<f64>,
+    /// Mean clock of the processors, MHz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock_mhz: Option<f64>,
+    /// How often processors were throttled for heat since the system started.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub throttled: Option<u64>,
+}

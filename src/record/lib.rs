@@ -1,0 +1,301 @@
+//! Records: one JSON line per thing measured. A line is a [`Key`], which says what was measured by axis,
+//! and a body. Every table, plot and export derives from these lines alone; an absent value is absent,
+//! never 0.
+#![warn(missing_docs)]
+
+mod animation;
+mod cell;
+mod coherence;
+mod compaction;
+mod environment;
+mod error;
+pub mod figure;
+mod key;
+mod old;
+mod paths;
+mod peer;
+mod read;
+pub mod replicates;
+mod run;
+mod sound;
+mod stream;
+mod structure;
+
+pub use animation::*;
+pub use cell::*;
+pub use coherence::*;
+pub use compaction::CompactionRecord;
+pub use environment::{Environment, MachineLoad};
+pub use error::*;
+pub use key::{Key, axis};
+pub use paths::PathsRecord;
+pub use peer::{PeerRecord, PeerTiming};
+pub use read::{
+    PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
+    records_file, text_of,
+};
+pub use run::*;
+pub use sound::Sound;
+pub use stream::*;
+pub use structure::*;
+
+pub use raystone_stats::interval::Interval;
+use serde::{Deserialize, Serialize};
+use std::ops::Deref;
+
+/// Version tag of every line; bumped together with any change of a field's meaning.
+pub const SCHEMA: &str = "raystone/2";
+
+/// One line: of a run, or of another file of records with bodies of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Line<B = Body> {
+    /// Always [`SCHEMA`].
+    pub schema: String,
+    /// What was measured, by axis; empty for lines about the whole run.
+    #[serde(default, skip_serializing_if = "Key::is_empty")]
+    pub key: Key,
+    /// Content hash of the cell that this line belongs to (hex), see [`raystone_config`].
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub hash: String,
+    /// What it ran with.
+    #[serde(default, skip_serializing_if = "Ran::is_empty")]
+    pub ran: Ran,
+    /// What was found.
+    pub body: B,
+}
+
+impl<B> Line<B> {
+    /// A line without a hash.
+    pub fn new(key: Key, ran: Ran, body: B) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            key,
+            hash: String::new(),
+            ran,
+            body,
+        }
+    }
+
+    /// A line about the whole run.
+    pub fn about_all(body: B) -> Self {
+        Self::new(Key::default(), Ran::default(), body)
+    }
+
+    /// The same line with the hash of its cell.
+    #[must_use]
+    pub fn hashed(mut self, hash: impl Into<String>) -> Self {
+        self.hash = hash.into();
+        self
+    }
+
+    /// The same line about another body.
+    pub fn with_body<C>(self, body: impl FnOnce(B) -> C) -> Line<C> {
+        Line {
+            schema: self.schema,
+            key: self.key,
+            hash: self.hash,
+            ran: self.ran,
+            body: body(self.body),
+        }
+    }
+
+    /// One part of the body beside the key.
+    pub fn of<'a, T>(&'a self, body: &'a T) -> Recorded<'a, T> {
+        Recorded {
+            key: &self.key,
+            ran: &self.ran,
+            body,
+        }
+    }
+}
+
+/// A body with the key that it belongs to; reads like the body.
+#[derive(Debug, PartialEq)]
+pub struct Recorded<'a, T> {
+    /// What was measured.
+    pub key: &'a Key,
+    /// What it ran with.
+    pub ran: &'a Ran,
+    /// What was found.
+    pub body: &'a T,
+}
+
+impl<T> Copy for Recorded<'_, T> {}
+
+impl<T> Clone for Recorded<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Deref for Recorded<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        self.body
+    }
+}
+
+/// What a line of a run holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Body {
+    /// First line: what is run, where, and how many runs the plan saves.
+    Run(RunRecord),
+    /// A scene was loaded.
+    Scene(SceneRecord),
+    /// A structure was built, gated and traced with the recorded rays.
+    Structure(StructureRecord),
+    /// A ray caster of others was traced with the recorded rays.
+    Peer(PeerRecord),
+    /// Single paths of an integrator were judged.
+    Paths(PathsRecord),
+    /// A reference image was rendered.
+    Reference(ReferenceRecord),
+    /// Error of one replicate of a sampler against the reference, per spp.
+    Error(ErrorRecord),
+    /// Verdict on the bias of a sampler over all its replicates.
+    Bias(BiasRecord),
+    /// What the error of a sampler looks like, over all its replicates.
+    Spectrum(SpectrumRecord),
+    /// Time of a full cell (structure × sampler × integrator).
+    Time(TimeRecord),
+    /// How alike the rays of neighbouring lanes are in a full cell, by a model.
+    Coherence(CoherenceRecord),
+    /// A structure was taken from frame to frame of a moving scene.
+    Animation(AnimationRecord),
+    /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
+    /// renderer's modules.
+    Stream(StreamRecord),
+    /// What drawing from a sampler costs.
+    SamplerCost(SamplerCostRecord),
+    /// A compaction of a stream was judged and timed.
+    Compaction(CompactionRecord),
+    /// A cell that was not run, with the reason.
+    Skipped(SkippedRecord),
+    /// A cell that failed before it had a record of its own kind, with the reason.
+    Failed(SkippedRecord),
+    /// Something that went wrong beside the measuring, which is not touched by it.
+    Warning(SkippedRecord),
+    /// What kernels were made of, for the cells that name it.
+    Kernels(KernelSetRecord),
+    /// A cell is done, failed or left out: the last line of all that were written of it.
+    Cell(CellRecord),
+    /// Last line: where the wall time went, how many cells failed.
+    Finished(FinishedRecord),
+    /// Last line of a run that was ended early.
+    Interrupted(InterruptedRecord),
+}
+
+/// A kind of record of a run.
+pub trait Kind: Sized {
+    /// What a body holds of this kind.
+    fn of(body: &Body) -> Option<&Self>;
+}
+
+/// The kinds that a body holds in one way only.
+macro_rules! kinds {
+    ($($variant:ident: $record:ty),* $(,)?) => {$(
+        impl Kind for $record {
+            fn of(body: &Body) -> Option<&Self> {
+                match body {
+                    Body::$variant(record) => Some(record),
+                    _ => None,
+                }
+            }
+        }
+    )*};
+}
+
+kinds! {
+    Run: RunRecord,
+    Scene: SceneRecord,
+    Structure: StructureRecord,
+    Peer: PeerRecord,
+    Paths: PathsRecord,
+    Reference: ReferenceRecord,
+    Error: ErrorRecord,
+    Bias: BiasRecord,
+    Spectrum: SpectrumRecord,
+    Time: TimeRecord,
+    Coherence: CoherenceRecord,
+    Animation: AnimationRecord,
+    Stream: StreamRecord,
+    SamplerCost: SamplerCostRecord,
+    Compaction: CompactionRecord,
+    Kernels: KernelSetRecord,
+    Cell: CellRecord,
+    Finished: FinishedRecord,
+    Interrupted: InterruptedRecord,
+}
+
+/// All records of one kind, with their keys.
+pub fn all_of<'a, T: Kind + 'a>(lines: &'a [Line]) -> impl Iterator<Item = Recorded<'a, T>> {
+    lines
+        .iter()
+        .filter_map(|line| Some(line.of(T::of(&line.body)?)))
+}
+
+/// What figures were taken with, beyond their key.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default)]
+pub struct Ran {
+    /// BLAKE3 of the composed text of the kernels that ran; empty if it did not come to that.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub kernel_hash: String,
+    /// Feature flags of the composed kernel.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub features: Vec<String>,
+    /// Feature flags that other scenes need and that were compiled out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
+    /// Whether the driver's bounds checks and loop bounds were off: another competitor.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub unchecked: bool,
+}
+
+impl Ran {
+    /// A kernel that ran with the driver's checks.
+    pub fn kernel(kernel_hash: String) -> Self {
+        Self {
+            kernel_hash,
+            ..Self::default()
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// What a check says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// It was looked at, and holds.
+    Pass,
+    /// It does not hold.
+    Fail,
+    /// There was nothing to look at.
+    Open,
+}
+
+impl Verdict {
+    /// Fails if anything is wrong; stays open if nothing was looked at.
+    pub fn new(looked_at: bool, wrong: bool) -> Self {
+        match (wrong, looked_at) {
+            (true, _) => Self::Fail,
+            (false, true) => Self::Pass,
+            (false, false) => Self::Open,
+        }
+    }
+
+    /// `PASS`, `FAIL` or `OPEN`: what is shown must not depend on colour.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::Open => "OPEN",
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! What is recorded of a structure on a scene, and of full cells.
+
+use super::{Interval, Tally};
+use raystone_config::Coherence;
+use raystone_core::structure::{Counters, Phase, Space, StructureStats};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Ray classes of the recorded ray sets.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayClass {
+    /// Camera rays through pixel centres, 8×8 tiles; closest hit.
+    Primary,
+    /// Rays from first hits towards emitters (or towards points of the bounding sphere); any hit.
+    Shadow,
+    /// The same from the other end: from the emitter to the first hit.
+    ShadowReversed,
+    /// Those of [`RayClass::Shadow`], light by light.
+    ShadowClustered,
+    /// Those of [`RayClass::ShadowReversed`], light by light.
+    ShadowReversedClustered,
+    /// Cosine-distributed rays of limited length from first hits; any hit.
+    Ao,
+    /// Cosine-distributed rays from first hits; closest hit.
+    Bounce,
+    /// Rays between random points of the bounding box; closest hit.
+    Chord,
+    /// Rays that faults hide behind (see `hard_rays`); both queries, never timed.
+    Hard,
+}
+
+/// Gate result for one ray class.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ClassVerdict {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays compared to the bit (id, t, u, v; hit or miss for any-hit queries).
+    pub rays: usize,
+    /// Rays whose answer differs and is not a tie.
+    pub wrong: usize,
+    /// Rays whose id or t differs but both triangles lie within 4 ulp of the same distance.
+    pub ties: usize,
+    /// The first wrong ray, replayable, with both answers.
+    pub first_wrong: Option<String>,
+}
+
+/// Comparison of the judge with a slower, simpler judge.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct JudgeCheck {
+    /// Rays compared.
+    pub rays: usize,
+    /// Rays that differ.
+    pub wrong: usize,
+    /// Rays that pass within rounding error of an edge or of another surface (oracle only).
+    pub ambiguous: usize,
+    /// How many of these are hard rays, made to pass there.
+    #[serde(default)]
+    pub hard_ambiguous: usize,
+    /// When it was carried out, if that was before this run: the same rays and answers, found again on disk.
+    #[serde(default)]
+    pub reused_unix_s: Option<u64>,
+}
+
+/// The verdict of the gate on one structure and scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct GateVerdict {
+    /// Nothing wrong, no fuse blown, judge itself sound.
+    pub passed: bool,
+    /// Per ray class.
+    pub classes: Vec<ClassVerdict>,
+    /// The judge (scalar plain BVH) against brute force.
+    pub brute_force: JudgeCheck,
+    /// The judge against the f64 oracle.
+    pub oracle: JudgeCheck,
+    /// Error words raised by kernels (step fuse, stack overflow), in words.
+    pub kernel_errors: Vec<String>,
+    /// Structural faults found by `validate`.
+    pub structural: Option<String>,
+    /// What is wrong on the gate's second scene.
+    #[serde(default)]
+    pub elsewhere: Option<String>,
+}
+
+/// Work counted per ray, means over a class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CountersPerRay {
+    /// Nodes or cells visited.
+    pub nodes: f64,
+    /// Ray–box tests.
+    pub box_tests: f64,
+    /// Ray–triangle tests.
+    pub triangle_tests: f64,
+    /// Deepest stack seen in the class (entries).
+    pub stack_high_water: u32,
+}
+
+impl CountersPerRay {
+    /// Of the work of these rays.
+    pub fn mean_of(work: &[Counters]) -> Self {
+        let mean = |get: fn(&Counters) -> u32| {
+            work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
+        };
+        Self {
+            nodes: mean(|c| c.nodes),
+            box_tests: mean(|c| c.box_tests),
+            triangle_tests: mean(|c| c.triangle_tests),
+            stack_high_water: work.iter().map(|c| c.stack_high_water).max().unwrap_or(0),
+        }
+    }
+}
+
+/// Speed of one ray class through one structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ClassTiming {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays per dispatch.
+    pub rays: usize,
+    /// Fraction of the rays that hit something.
+    pub hit_fraction: f64,
+    /// Answers that differ from those of the shadow rays between the same ends; absent for classes that are not
+    /// shadow rays in another order or direction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unlike_shadow: Option<usize>,
+    /// Every kept sample, milliseconds, an empty dispatch already subtracted.
+    pub ms: Vec<f64>,
+    /// The same dispatches by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// The same in time of the processors, all threads of the process together; empty on adapters that work elsewhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cpu_ms: Vec<f64>,
+    /// Million rays per second, median with interval.
+    pub mrays_s: Interval,
+    /// Counted work, from a separate run; absent for a structure that counts none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counters: Option<CountersPerRay>,
+}
+
+/// Coherence of recorded rays, as they follow each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ClassCoherence {
+    /// The machine, and how many rays were looked at.
+    pub settings: Coherence,
+    /// Counts by class.
+    pub classes: Vec<(RayClass, Tally)>,
+    /// For each class, rays and predicted cycles of each group of warps, as in [`super::CoherenceAt::groups`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<Vec<[u64; 2]>>,
+}
+
+/// A structure on a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct StructureRecord {
+    /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
+    /// counts as skipped.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refused: bool,
+    /// Where triangles are met, which decides on the judge: see [`Space`].
+    #[serde(default)]
+    pub space: Space,
+    /// Timed build phases.
+    pub build: Vec<Phase>,
+    /// Sum of the phases, milliseconds.
+    pub build_ms: f64,
+    /// Most host memory that the build needed beyond what was in use before it, the result included,
+    /// bytes; absent where allocations are not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_peak_bytes: Option<u64>,
+    /// Milliseconds to take over new transforms of all instances, objects kept: median of several;
+    /// absent where a moved object needs a full build.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update_ms: Option<f64>,
+    /// Static figures.
+    pub stats: StructureStats,
+    /// Figures from outside the crate, by id.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub figures: BTreeMap<String, Interval>,
+    /// Verdict; `None` only if the build failed.
+    pub gate: Option<GateVerdict>,
+    /// Speeds; empty unless the gate passed.
+    pub timings: Vec<ClassTiming>,
+    /// Coherence of the recorded rays; absent where it is not modelled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coherence: Option<ClassCoherence>,
+    /// Heat map of traversal cost of primary rays, a PNG relative to the run's folder.
+    pub heat_map: Option<String>,
+    /// Cost (nodes + triangle tests) at the top of the heat map's colour scale.
+    pub heat_map_max: Option<f64>,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}
+
+/// Time of a full cell whose pixels are taken in an order of passes: see `Order`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct OrderTime {
+    /// Which.
+    pub order: String,
+    /// Passes of a sample, each a submission of its own.
+    pub passes: usize,
+    /// Wall milliseconds per sample per pixel for the whole image, median with interval.
+    pub ms_per_spp: Option<Interval>,
+    /// Wall milliseconds until the first picture without a gap, median with interval.
+    pub first_picture_ms: Option<Interval>,
+}
+
+/// Paths that begin at rasterised triangles, against rays through the same points with the same samples behind them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct PrimaryRecord {
+    /// Pixels that were compared.
+    pub pixels: u64,
+    /// Those that see another triangle.
+    pub other_triangle: u64,
+    /// Those whose value is another.
+    pub other_value: u64,
+    /// Of these, those that see the same triangle.
+    pub unexplained: u64,
+    /// Mean of the differences of all channels, over the mean by rays.
+    pub mean_difference: f64,
+    /// Root of the mean of their squares, over the mean by rays.
+    pub rms_difference: f64,
+    /// Wall milliseconds to rasterise all pixels, median with interval.
+    pub raster_ms: Option<Interval>,
+    /// Wall milliseconds to trace a ray through each, median with interval.
+    pub traced_ms: Option<Interval>,
+}
+
+/// Time of a full cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct TimeRecord {
+    /// Image size in pixels.
+    pub resolution: [u32; 2],
+    /// Samples per pixel of each timed render.
+    pub spp: u32,
+    /// Every kept sample, milliseconds per render on the GPU clock.
+    pub ms: Vec<f64>,
+    /// The same renders by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// The same in time of the processors, all threads of the process together; empty on adapters that work elsewhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cpu_ms: Vec<f64>,
+    /// Milliseconds per sample per pixel for the whole image, median with interval; absent if the
+    /// cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ms_per_spp: Option<Interval>,
+    /// Rays of each class in one render, from a separate counting run of the same seed.
+    pub rays: BTreeMap<String, u64>,
+    /// All rays over time, million per second; absent if the cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mrays_s: Option<Interval>,
+    /// Paths of one render that sent a ray from the camera, after one bounce, …; empty for integrators without paths.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub live_paths: Vec<u64>,
+    /// GPU milliseconds of each stage of a render, medians; only where the passes are several.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub stages: BTreeMap<String, f64>,
+    /// The same cell in orders of passes; empty where these were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<OrderTime>,
+    /// Of paths that begin at rasterised triangles: what that changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub primary: Option<PrimaryRecord>,
+    /// BLAKE3 of the image.
+    pub image_hash: String,
+    /// Whether the image equals to the bit that of the scene's first gated structure.
+    pub image_equal: bool,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}
+
+impl StructureRecord {
+    /// Whether it was built at all.
+    pub fn is_built(&self) -> bool {
+        !self.build.is_empty() || self.gate.is_some()
+    }
+
+    /// Why the structure gets no figures; `None` when it passed the gate.
+    pub fn fault(&self) -> Option<String> {
+        match (&self.failure, &self.gate) {
+            (Some(failure), _) => Some(failure.clone()),
+            (None, None) => Some("not gated".into()),
+            (None, Some(gate)) => (!gate.passed).then(|| fault_text(gate, None)),
+        }
+    }
+}
+
+/// What is wrong, in words.
+pub fn fault_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
+    let mut parts = Vec::new();
+    let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
+    if wrong > 0 {
+        let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
+        let first = verdict
+            .classes
+            .iter()
+            .find_map(|c| c.first_wrong.as_deref())
+            .unwrap_or_default();
+        parts.push(format!(
+            "{wrong} of {rays} rays differ from the judge; first: {first}"
+        ));
+    }
+    parts.extend(verdict.kernel_errors.iter().cloned());
+    parts.extend(verdict.structural.clone());
+    parts.extend(verdict.elsewhere.clone());
+    if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
+        parts.push(format!(
+            "the judge itself is wrong on {} rays against brute force and {} against f64; first: {}",
+            verdict.brute_force.wrong,
+            verdict.oracle.wrong,
+            judge_fault.unwrap_or_default()
+        ));
+    }
+    parts.join("; ")
+}

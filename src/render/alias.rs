@@ -1,0 +1,75 @@
+//! Alias tables: a number chooses one of n in constant time (A. Walker 1977; M. Vose, "A linear algorithm for generating
+//! random numbers with a given distribution", 1991), here in whole numbers: as many parts as a power of two, so that the
+//! upper bits of a value are the part and the lower ones the place in it.
+
+use super::units::UNITS;
+
+/// The first `threshold` values of a part choose its own number, the others `alias`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AliasEntry {
+    pub threshold: u32,
+    pub alias: u32,
+}
+
+/// Parts of a table of so many choices.
+pub(super) fn alias_parts(count: usize) -> usize {
+    count.next_power_of_two()
+}
+
+/// A table in which each choice has as many of the values as `units` says, which are [`UNITS`] in all.
+pub(super) fn alias_table(units: &[u32]) -> Vec<AliasEntry> {
+    let parts = alias_parts(units.len());
+    let size = UNITS / parts as u32;
+    let mut left = units.to_vec();
+    left.resize(parts, 0);
+    let mut table: Vec<AliasEntry> = (0..parts as u32)
+        .map(|alias| AliasEntry {
+            threshold: size,
+            alias,
+        })
+        .collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+        (0..parts).partition(|i| left[*i] < size);
+    while let (Some(low), Some(&high)) = (small.pop(), large.last()) {
+        table[low] = AliasEntry {
+            threshold: left[low],
+            alias: high as u32,
+        };
+        left[high] -= size - left[low];
+        if left[high] < size {
+            large.pop();
+            small.push(high);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::units::shared_out;
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    #[test]
+    fn every_entry_has_as_many_of_all_values_as_it_should() {
+        let mut random = Pcg32::new(9);
+        for count in [1, 2, 3, 17, 1000, 100_000] {
+            let mut weights: Vec<f64> = (0..count).map(|_| random.uniform().powi(12)).collect();
+            weights[0] = if count > 1 { 0.0 } else { 2.0 };
+            let units = shared_out(&weights);
+            let table = alias_table(&units);
+            let size = UNITS as usize / table.len();
+            let mut found = vec![0_u32; table.len()];
+            for value in 0..UNITS as usize {
+                let (part, place) = (value / size, value % size);
+                let own = place < table[part].threshold as usize;
+                found[if own {
+                    part
+                } else {
+                    table[part].alias as usize
+                }] += 1;
+            }
+            assert_eq!(found[..count], units);
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The lights of a scene as kernels read them: the part of `shading_tables` that
+//! `kernels/shading/light/table.wesl` takes apart.
+
+use super::environment_tables::environment_rows;
+use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
+use super::tables::emits_in_front;
+use super::units::{shared_out, unit_share};
+use glam::Vec3;
+use raystone_gpu::UniformValues;
+use raystone_scene::{
+    IesProfile, LIGHT_KINDS, Light, LightList, ListedLight, Photometry, SceneData, Source,
+};
+use std::f64::consts::FRAC_PI_2;
+
+/// `vec4` a light: its head and three of its kind.
+const LIGHT_ROWS: usize = 4;
+
+/// Words for the lights of a scene, and where they stand.
+#[derive(Debug, Clone, Default)]
+pub struct LightTables {
+    /// Number of lights, and how many of them, the last ones, have no place.
+    pub lights: u32,
+    infinite: u32,
+    /// Number of emissive triangles.
+    emitters: u32,
+    /// First of the spheres among the lights, and how many they are.
+    spheres: [u32; 2],
+    /// Which of [`LIGHT_KINDS`] there are.
+    pub kinds: [bool; LIGHT_KINDS.len()],
+    /// Whether some surface emits from its front alone.
+    pub one_sided: bool,
+    /// Where the tree over lights with a place begins among the rows, and the leaves of the lights in it.
+    tree: [u32; 2],
+    /// Rows of the lights, then of the emissive triangles, each of which knows its light, of profiles and maps, and
+    /// of the tree.
+    rows: Vec<[u32; 4]>,
+    /// Where the rows begin in `shading_tables`, in `vec4`.
+    first: u32,
+}
+
+fn row(v: Vec3, w: f32) -> [u32; 4] {
+    [v.x, v.y, v.z, w].map(f32::to_bits)
+}
+
+impl LightTables {
+    /// The tables of the lights of `list`.
+    pub fn of(scene: &SceneData, list: &LightList) -> Self {
+        let powers: Vec<f64> = list.lights.iter().map(|light| light.power).collect();
+        let shares = shared_out(&powers);
+        let mut tables = Self {
+            lights: list.lights.len() as u32,
+            one_sided: scene.materials.iter().any(emits_in_front),
+            ..Self::default()
+        };
+        let mut owners = Vec::new();
+        let mut extras = Vec::new();
+        let mut bounds = Vec::new();
+        let mut below = 0;
+        for ((number, light), share) in (0..).zip(&list.lights).zip(shares) {
+            below += share;
+            let kind = light.kind(scene).number();
+            let link = match light.source {
+                Source::Triangle(id) => {
+                    owners.push([id, number, 0, 0]);
+                    id
+                }
+                Source::Parallelogram(of) => {
+                    owners.extend(of.triangles.map(|id| [id, number, 0, 0]));
+                    scene.material_ids[of.triangles[0] as usize]
+                }
+                Source::Light(place) => {
+                    let light = &scene.lights[place as usize];
+                    tables.infinite += u32::from(light.is_infinite());
+                    let link = LIGHT_ROWS * list.lights.len() + owners.len() + extras.len();
+                    extras.extend(extra_rows(light));
+                    link as u32
+                }
+            };
+            let [upto, own] = [below, share].map(|units| unit_share(units).to_bits());
+            tables.rows.push([kind, link, upto, own]);
+            tables.rows.extend(own_rows(scene, light));
+            tables.kinds[kind as usize] = true;
+            bounds.extend(light_bounds(scene, light));
+        }
+        tables.emitters = owners.len() as u32;
+        tables.rows.append(&mut owners);
+        tables.rows.append(&mut extras);
+        let mut tree = tree_rows(&bounds);
+        let leaves = tables.rows.len() + tree.len() - bounds.len();
+        tables.tree = [tables.rows.len() as u32, leaves as u32];
+        tables.rows.append(&mut tree);
+        let is_sphere = |light: &ListedLight| light.kind(scene).name == "sphere";
+        let first = list.lights.iter().position(is_sphere).unwrap_or_default();
+        let spheres = list.lights.iter().filter(|light| is_sphere(light)).count();
+        tables.spheres = [first as u32, spheres as u32];
+        tables
+    }
+
+    /// Appends the rows to `shading_tables`, which is whole in `vec4`.
+    pub fn append(&mut self, words: &mut Vec<u32>) {
+        self.first = words.len() as u32 / 4;
+        words.extend_from_slice(self.rows.as_flattened());
+        self.rows = Vec::new();
+    }
+
+    /// Whether one of them is a map of the environment.
+    pub(super) fn has_map(&self) -> bool {
+        let mut kinds = LIGHT_KINDS.iter().zip(self.kinds);
+        kinds.any(|(kind, there)| there && kind.name == "environment")
+    }
+
+    /// Whether there is more than one light, or some triangle emits that is not of the one.
+    pub(super) fn are_chosen(&self, scene: &SceneData) -> bool {
+        let emits = |of: &&u32| scene.materials[**of as usize].emission != Vec3::ZERO;
+        let emissive = scene.material_ids.iter().filter(emits).count();
+        self.lights > 1 || emissive != self.emitters as usize
+    }
+
+    /// Features of the kinds that there are.
+    pub fn flags(kinds: &[bool; LIGHT_KINDS.len()]) -> impl Iterator<Item = (&'static str, bool)> {
+        LIGHT_KINDS.iter().map(|kind| kind.feature).zip(*kinds)
+    }
+
+    /// What `kernels/integrator/frame.wesl` is told.
+    pub fn uniform(&self, values: UniformValues) -> UniformValues {
+        let [first_sphere, spheres] = self.spheres;
+        values
+            .u32("lights", self.lights)
+            .u32("infinite_lights", self.infinite)
+            .u32("first_light", self.first)
+            .u32("emitters", self.emitters)
+            .u32(
+                "first_emitter",
+                self.first + self.lights * LIGHT_ROWS as u32,
+            )
+            .u32("first_tree", self.first + self.tree[0])
+            .u32("first_leaf", self.first + self.tree[1])
+            .u32("first_sphere", first_sphere)
+            .u32("spheres", spheres)
+    }
+}
+
+/// The rows of a light behind its head.
+fn own_rows(scene: &SceneData, listed: &ListedLight) -> [[u32; 4]; LIGHT_ROWS - 1] {
+    let none = [0; 4];
+    let sides = |triangle: u32| {
+        let material = scene.material_ids[triangle as usize] as usize;
+        f32::from(u8::from(scene.materials[material].emits_both_sides))
+    };
+    let area = listed.area as f32;
+    match listed.source {
+        Source::Triangle(id) => [row(Vec3::ZERO, area), row(Vec3::ZERO, sides(id)), none],
+        Source::Parallelogram(of) => [
+            row(of.corner, area),
+            row(of.edges[0], sides(of.triangles[0])),
+            row(of.edges[1], 0.0),
+        ],
+        Source::Light(place) => light_rows(&scene.lights[place as usize]),
+    }
+}
+
+fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
+    let unit = |v: &Vec3| v.as_dvec3().normalize_or_zero().as_vec3();
+    let none = [0; 4];
+    match light {
+        Light::Sphere {
+            center,
+            radius,
+            radiance,
+        } => [row(*center, *radius), row(*radiance, 0.0), none],
+        Light::Point {
+            position,
+            intensity,
+        } => [row(*position, 0.0), row(*intensity, 0.0), none],
+        Light::Spot {
+            position,
+            direction,
+            intensity,
+            inner,
+            outer,
+            decay,
+        } => [
+            row(*position, outer.cos()),
+            row(*intensity, inner.cos()),
+            row(unit(direction), f32::from(u8::from(*decay))),
+        ],
+        Light::Directional {
+            direction,
+            irradiance,
+        } => [row(unit(direction), 0.0), row(*irradiance, 0.0), none],
+        Light::Ies {
+            position,
+            rotation,
+            color,
+            ..
+        } => [
+            row(*position, 0.0),
+            row(*color, 0.0),
+            rotation.to_array().map(f32::to_bits),
+        ],
+        Light::Environment { scale, turn, .. } => [
+            row(Vec3::new(turn.cos(), turn.sin(), 0.0), 0.0),
+            row(Vec3::splat(*scale), 0.0),
+            none,
+        ],
+    }
+}
+
+/// What a light has beyond its rows.
+fn extra_rows(light: &Light) -> Vec<[u32; 4]> {
+    match light {
+        Light::Ies { profile, .. } => ies_rows(profile),
+        Light::Environment { map, .. } => environment_rows(map),
+        _ => Vec::new(),
+    }
+}
+
+/// Type of photometry and numbers of angles; vertical and horizontal angles; candela.
+fn ies_rows(profile: &IesProfile) -> Vec<[u32; 4]> {
+    let photometry = match profile.photometry {
+        Photometry::C => 0,
+        Photometry::B => 1,
+        Photometry::A => 2,
+    };
+    let counts = [&profile.vertical, &profile.horizontal].map(|angles| angles.len() as u32);
+    let mut rows = vec![[photometry, counts[0], counts[1], 0]];
+    let lists = [&profile.vertical, &profile.horizontal, &profile.candela];
+    let words: Vec<u32> = lists.into_iter().flatten().map(|x| x.to_bits()).collect();
+    rows.extend(words.chunks(4).map(|four| {
+        let mut row = [0; 4];
+        row[..four.len()].copy_from_slice(four);
+        row
+    }));
+    rows
+}
+
+/// The nodes of the tree over the lights of a scene that have a place: see `light_tree`.
+pub fn light_branches(scene: &SceneData, list: &LightList) -> Vec<TreeNode> {
+    let lights = list.lights.iter();
+    let bounds: Vec<LightBounds> = lights.filter_map(|l| light_bounds(scene, l)).collect();
+    light_tree(&bounds).0
+}
+
+/// Where a light is and shines, if it has a place.
+fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> {
+    let power = listed.power;
+    let flat = |corners: &[Vec3], normal: Vec3, triangle: u32| {
+        let corners = || corners.iter().map(|c| c.as_dvec3());
+        let material = scene.material_ids[triangle as usize] as usize;
+        LightBounds {
+            min: corners().reduce(|a, b| a.min(b)).unwrap_or_default(),
+            max: corners().reduce(|a, b| a.max(b)).unwrap_or_default(),
+            power,
+            axis: normal.as_dvec3().normalize_or_zero(),
+            normals: 0.0,
+            spread: FRAC_PI_2,
+            both_sides: scene.materials[material].emits_both_sides,
+        }
+    };
+    let place = match listed.source {
+        Source::Triangle(id) => {
+            let [a, b, c] = scene.outward(id as usize);
+            return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
+        }
+        Source::Parallelogram(of) => {
+            let (a, [u, v]) = (of.corner, of.edges);
+            let corners = [a, a + u, a + v, a + u + v];
+            return Some(flat(&corners, u.cross(v), of.triangles[0]));
+        }
+        Source::Light(place) => place,
+    };
+    let around = |center: &Vec3, radius: f32| {
+        let [center, radius] = [center.as_dvec3(), glam::DVec3::splat(radius.into())];
+        LightBounds::everywhere(center - radius, center + radius, power)
+    };
+    match &scene.lights[place as usize] {
+        Light::Sphere { center, radius, .. } => Some(around(center, *radius)),
+        Light::Point { position, .. } | Light::Ies { position, .. } => Some(around(position, 0.0)),
+        Light::Spot {
+            position,
+            direction,
+            inner,
+            outer,
+            ..
+        } => Some(LightBounds {
+            axis: direction.as_dvec3().normalize_or_zero(),
+            normals: f64::from(*inner),
+            spread: f64::from(outer - inner),
+            ..around(position, 0.0)
+        }),
+        Light::Directional { .. } | Light::Environment { .. } => None,
+    }
+}

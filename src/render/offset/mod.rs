@@ -1,0 +1,184 @@
+//! Where rays that leave a surface start, so that they do not meet it again.
+
+mod error_bound;
+mod fixed;
+mod integer;
+mod none;
+
+pub use error_bound::ERROR_BOUND;
+pub(crate) use fixed::FIXED;
+pub(crate) use integer::INTEGER;
+pub use none::NONE;
+
+use raystone_accel::TriangleSoup;
+use raystone_core::params::{Kinds, Named, Sources};
+use raystone_gpu::Composition;
+use raystone_scene::{Instance, row_sum_norm};
+use std::fmt;
+
+/// How the origin of a ray is moved off the surface that it leaves.
+#[derive(Clone, Copy)]
+pub struct RayOffset {
+    /// Name as a user types it.
+    pub name: &'static str,
+    /// One line: what it is and where it comes from.
+    pub description: &'static str,
+    /// Module of the kernel, relative to the kernel folder: it exports `offset_point`.
+    pub kernel: &'static str,
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    pub sources: Sources,
+    /// Whether images are claimed to be free of light that leaks and of surfaces that shadow themselves. The
+    /// bias of others is measured, and is no fault.
+    pub is_unbiased: bool,
+    /// The origin of a ray that leaves the point p on the side of the unit normal n, from p, n and what
+    /// [`position_error`] says of the point. Twin of the kernel's.
+    pub offset_point: fn([f32; 3], [f32; 3], [f32; 3]) -> [f32; 3],
+}
+
+/// Everything that can be named on the `offset` axis.
+pub type OffsetRegistry = Kinds<RayOffset>;
+
+impl Default for RayOffset {
+    fn default() -> Self {
+        ERROR_BOUND
+    }
+}
+
+/// Offsets are known by their names.
+impl PartialEq for RayOffset {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for RayOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl Named for RayOffset {
+    fn built_in() -> Vec<&'static Self> {
+        vec![&NONE, &FIXED, &INTEGER, &ERROR_BOUND]
+    }
+
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn description(&self) -> &'static str {
+        self.description
+    }
+
+    fn sources(&self) -> Sources {
+        self.sources
+    }
+}
+
+impl RayOffset {
+    /// `composition` with this offset, unless it chose another before.
+    #[must_use]
+    pub fn activate(self, composition: Composition) -> Composition {
+        if composition.active.contains_key("offset") {
+            composition
+        } else {
+            composition.with("offset", self.kernel)
+        }
+    }
+}
+
+/// Eight roundings, 8 · 2⁻²⁴; see [`position_error`].
+pub(crate) const POSITION_ERROR: f32 = 4.768_371_6e-7;
+
+/// What instances add to the error of a point: a factor of its greatest coordinate, and scene units,
+/// both to be multiplied by `POSITION_ERROR`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TransformError {
+    /// Greatest ‖M‖·‖M⁻¹‖ of all maps to objects; 0 if no ray is transformed.
+    pub scale: f32,
+    /// Greatest ‖M⁻¹‖ times the greatest coordinate of the translation.
+    pub shift: f32,
+}
+
+impl TransformError {
+    /// That of the instances of a scene.
+    pub fn of(soup: &TriangleSoup) -> Self {
+        let instances = soup.placed.iter().flat_map(|p| &p.instances);
+        let moved = instances.filter(|instance| !instance.is_identity());
+        moved.fold(Self::default(), |worst, instance: &Instance| {
+            let (linear, offset) = instance.to_object.parts();
+            let inverse = row_sum_norm(linear.inverse());
+            let scale = (row_sum_norm(linear) * inverse) as f32;
+            let shift = (inverse * offset.abs().max_element()) as f32;
+            Self {
+                scale: worst.scale.max(scale),
+                shift: worst.shift.max(shift),
+            }
+        })
+    }
+}
+
+/// Bound on the distance, per axis, between a triangle and a point v₀ − u·e₁ + v·e₂ that was computed
+/// on it, with e₁ = v₀ − v₁ and e₂ = v₂ − v₀, as a triangle test sees it.
+///
+/// Two products and two sums make at most four roundings of |v₀| + |e₁| + |e₂|; a test takes differences
+/// of vertices and shears them, at most four more. A point that is taken to an object's space adds a
+/// transform of four products, forth, and its vertices one back: see [`TransformError`].
+///
+/// A ray that leaves must not meet the triangle either, although its distance to the plane errs by up to
+/// sixteen roundings of the triangle's extent: a plane through 0 along an axis has an exact position, and
+/// one that is nearly so an almost exact one. So twice `POSITION_ERROR` of the extent come on top.
+/// Twin of `kernels/integrator/position_error.wesl`.
+pub fn position_error(
+    v0: [f32; 3],
+    e1: [f32; 3],
+    e2: [f32; 3],
+    transform: &TransformError,
+) -> [f32; 3] {
+    let reach = [0, 1, 2].map(|a| v0[a].abs() + e1[a].abs() + e2[a].abs());
+    let far = reach[0].max(reach[1]).max(reach[2]);
+    let [x, y, z] = [0, 1, 2].map(|a| e1[a].abs() + e2[a].abs());
+    let extent = x.max(y).max(z);
+    let moved = transform.scale * far + transform.shift;
+    reach.map(|r| POSITION_ERROR * (r + (2.0 * extent + moved)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    #[test]
+    fn what_an_experiment_says_nothing_of_is_the_default_offset() {
+        let default = raystone_config::Axis::Offset.default_name();
+        assert_eq!(default, Some(RayOffset::default().name));
+    }
+
+    #[test]
+    fn a_point_computed_on_a_triangle_lies_within_the_bound_and_not_within_a_sixteenth() {
+        let mut rng = Pcg32::new(7);
+        let mut next = || rng.uniform() as f32;
+        let (mut beyond, mut beyond_part) = (0, 0);
+        for _ in 0..100_000 {
+            let corners: [[f32; 3]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| 10.0 * next() - 5.0));
+            let [v0, v1, v2] = corners;
+            let (e1, e2) = (
+                [0, 1, 2].map(|a| v0[a] - v1[a]),
+                [0, 1, 2].map(|a| v2[a] - v0[a]),
+            );
+            let (u, v) = (next(), next());
+            let error = position_error(v0, e1, e2, &TransformError::default());
+            for a in 0..3 {
+                let computed = v0[a] - u * e1[a] + v * e2[a];
+                let [x, y, z, u, v] = [v0[a], v1[a], v2[a], u, v].map(f64::from);
+                let exact = x - u * (x - y) + v * (z - x);
+                let off = (f64::from(computed) - exact).abs();
+                beyond += usize::from(off > f64::from(error[a]));
+                beyond_part += usize::from(off > f64::from(error[a]) / 16.0);
+            }
+        }
+        assert_eq!(beyond, 0);
+        assert!(beyond_part > 0, "the bound is far from tight");
+    }
+}

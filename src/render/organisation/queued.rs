@@ -1,0 +1,372 @@
+//! Organisations of several kernels: camera, trace, shade, trace shadow rays, finish, and again; at last the results are added
+//! to the sums.
+
+use super::{Organisation, shading, sorting};
+use crate::{ImageSteps, Integrator};
+use raystone_accel::{LiveRays, Query};
+use raystone_core::parameters;
+use raystone_core::params::{Choice as _, Params, Variant};
+use raystone_gpu::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Groups, Storage, UniformValues, grid_of};
+use std::sync::Arc;
+
+/// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
+const PATH_BYTES: u64 = 7 * 16;
+/// Batches of a slice at most: what is submitted at once has a limit, and an end within a second.
+const BATCHES: u64 = 4;
+/// Words of `counts`, as in `kernels/organisation/queue.wesl`.
+const LIVE: u32 = 0;
+const SHADOWS: u32 = 1;
+/// Bytes of them, with words to spare.
+const COUNTS_BYTES: u64 = 32;
+
+parameters! {
+    /// How the queue of live paths is kept without holes.
+    pub(crate) enum CompactionMethod {
+        /// What measured best: `atomic` on software adapters, where a workgroup's barriers are dear, else `workgroup`.
+        Auto = "auto",
+        /// An atomic for each path.
+        Atomic = "atomic",
+        /// A scan and one atomic for each workgroup.
+        Workgroup = "workgroup",
+        /// A ballot and one atomic for each subgroup.
+        Subgroup = "subgroup",
+        /// Counts, a scan of them, and each path to its place: stable.
+        ReduceScanScatter = "reduce-scan-scatter",
+        /// Horn 2005: stable.
+        Horn = "horn",
+        /// Blelloch 1990: stable.
+        Blelloch = "blelloch",
+        /// Roger 2008: stable.
+        Roger = "roger",
+    }
+
+    /// What is brought side by side.
+    pub(crate) enum Sorting {
+        /// Nothing.
+        Never = "none",
+        /// Paths that have met the same material, before they are shaded.
+        Material = "material",
+        /// Rays of one octant of directions, along the Morton code of their origins, before they are traced.
+        RayKey = "ray-key",
+    }
+
+    /// How many kernels shade.
+    pub(crate) enum Shading {
+        /// One, with every kind of material of the scene in it.
+        One = "one",
+        /// One for each kind of material, with that alone in it and a queue of its own, and one for what has met nothing.
+        PerMaterial = "per-material",
+    }
+
+    /// a kernel each for sampling, tracing and adding, run for all paths at every bounce, also for those that have
+    /// ended (Dufay 2017, algorithm 3)
+    pub(crate) struct MultiKernel {}
+
+    /// queues of live paths and of shadow rays between kernels, kept dense by a compaction (Laine, Karras & Aila 2013)
+    pub(crate) struct Wavefront {
+        /// paths in flight at most; more wait for their turn
+        capacity: u32 = 262_144, in 1024..=4_194_304;
+        /// how the queue of live paths is kept without holes
+        compaction: CompactionMethod = CompactionMethod::Auto;
+        /// what is brought side by side: paths of one material, or rays of one direction and place
+        sorting: Sorting = Sorting::Never;
+        /// whether one kernel shades everything, or one each kind of material (BSDF), from a queue of its own
+        shading: Shading = Shading::One;
+        /// whether the slot of a path that has ended is taken by the next at once; else all in flight end first
+        regeneration: bool = true;
+    }
+}
+
+/// What the passes of a batch share.
+pub(super) struct Queues<'a> {
+    /// Slots for paths.
+    pub capacity: u32,
+    /// Invocations of a workgroup.
+    lanes: u32,
+    /// None where all slots are looked at at every bounce.
+    wavefront: Option<&'a Wavefront>,
+    integrator: &'static str,
+    pub bindings: Bindings,
+}
+
+impl<'a> Queues<'a> {
+    fn new(
+        steps: &ImageSteps,
+        first: u32,
+        wavefront: Option<&'a Wavefront>,
+        integrator: &'static str,
+    ) -> Self {
+        let total = steps.count();
+        let capacity = wavefront.map_or(total, |w| w.capacity.min(total)).max(1);
+        let mut queues = Self {
+            capacity,
+            lanes: steps.shape().lanes(),
+            wavefront,
+            integrator,
+            bindings: Bindings::new(),
+        };
+        for (name, bytes) in [
+            ("paths", PATH_BYTES),
+            ("rays", 64),
+            ("answers", 32),
+            ("queue", 4),
+            ("flags", 4),
+        ] {
+            let scratch = queues.scratch(name, bytes * u64::from(capacity));
+            queues.bindings.buffer(name, scratch);
+        }
+        for name in ["counts", "live_groups", "kept_count"] {
+            let scratch = queues.scratch(name, COUNTS_BYTES);
+            queues.bindings.buffer(name, scratch);
+        }
+        let results = queues.scratch("results", 16 * u64::from(total.max(1)));
+        queues.bindings.buffer("results", results);
+        let batch = UniformValues::new()
+            .u32("capacity", capacity)
+            .u32("total", total)
+            .u32("first", first);
+        queues.bindings.uniform("batch", batch);
+        queues
+    }
+
+    pub(super) fn scratch(&self, name: &str, bytes: u64) -> Storage {
+        Storage::scratch(&format!("image {name}"), bytes)
+    }
+
+    /// A kernel that sees paths, queues and the integrator.
+    pub(super) fn kernel(&self, entry: &str) -> Composition {
+        let is = |of: fn(&Wavefront) -> bool| self.wavefront.is_some_and(of);
+        Composition::new(entry)
+            .with("integrator", self.integrator)
+            .feature("queued", true)
+            .feature("compacted", self.wavefront.is_some())
+            .feature("regenerated", is(|w| w.regeneration))
+            .feature("by_kind", is(|w| w.shading == Shading::PerMaterial))
+            .feature("sorted_hits", is(|w| w.sorting == Sorting::Material))
+    }
+
+    /// An invocation for each slot.
+    pub(super) fn all(&self) -> Groups {
+        grid_of(self.capacity.div_ceil(self.lanes)).into()
+    }
+
+    /// An invocation for each live path.
+    pub(super) fn live_groups(&self) -> Groups {
+        match self.wavefront {
+            Some(_) => Groups::Indirect(self.scratch("live_groups", COUNTS_BYTES), 0),
+            None => self.all(),
+        }
+    }
+
+    /// How many rays of a half of `rays` there are.
+    fn live(&self, word: u32) -> Option<LiveRays> {
+        self.wavefront.map(|_| LiveRays {
+            counts: self.scratch("counts", COUNTS_BYTES),
+            word,
+            groups: self.live_groups(),
+        })
+    }
+
+    fn run(&self, steps: &mut ImageSteps, name: &str, groups: Groups) -> Result<(), GpuError> {
+        let kernel = self.kernel(&format!("organisation/{name}"));
+        steps.run(name, kernel, groups, &self.bindings)
+    }
+
+    fn trace(
+        &self,
+        steps: &mut ImageSteps,
+        query: Query,
+        half: u32,
+        word: u32,
+    ) -> Result<(), GpuError> {
+        let buffers = ["rays", "answers"].map(|name| {
+            let bytes = if name == "rays" { 64 } else { 32 };
+            self.scratch(name, bytes * u64::from(self.capacity))
+        });
+        let range = half * self.capacity..(half + 1) * self.capacity;
+        steps.trace_live(query, buffers, range, self.live(word))
+    }
+
+    /// The compaction of a wavefront.
+    pub(super) fn method(
+        &self,
+        gpu: &Gpu,
+        wavefront: &Wavefront,
+    ) -> Result<Arc<dyn Compaction>, GpuError> {
+        let method = match wavefront.compaction {
+            CompactionMethod::Auto if gpu.is_software() => CompactionMethod::Atomic,
+            CompactionMethod::Auto => CompactionMethod::Workgroup,
+            chosen => chosen,
+        };
+        let method = Variant {
+            label: String::new(),
+            name: method.name().to_owned(),
+            params: Params::default(),
+        };
+        let method = CompactionRegistry::default().configured(&method);
+        let method = method.map_err(GpuError::Kernel)?;
+        match method.refusal(gpu) {
+            Some(reason) => Err(GpuError::Kernel(reason)),
+            None => Ok(method),
+        }
+    }
+
+    /// Brings what is flagged side by side: words of `elements`, one for each live path, go to `kept`, and how many are there to `count`.
+    pub(super) fn keep(
+        &self,
+        steps: &mut ImageSteps,
+        method: &dyn Compaction,
+        stays: Stays,
+        [elements, kept, count]: [&Storage; 3],
+    ) -> Result<(), GpuError> {
+        let gpu = steps.gpu().clone();
+        let stream = Stream {
+            capacity: self.capacity,
+            element_bytes: 4,
+            length: self.scratch("counts", COUNTS_BYTES),
+            flags: self.scratch("flags", 4 * u64::from(self.capacity)),
+            stays,
+            elements: elements.clone(),
+            kept: kept.clone(),
+            count: count.clone(),
+        };
+        method.record(&mut Passes::new(&gpu, steps.recording(), &stream))
+    }
+
+    /// Keeps the slots of live paths side by side.
+    fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
+        let place = steps.recording().len();
+        let queue = self.scratch("queue", 4 * u64::from(self.capacity));
+        let method = self.method(steps.gpu(), wavefront)?;
+        let kept = self.scratch("kept queue", 4 * u64::from(self.capacity));
+        let count = self.scratch("kept_count", COUNTS_BYTES);
+        self.keep(steps, &*method, Stays::All, [&queue, &kept, &count])?;
+        steps.recording().copy(&kept, &queue);
+        self.run(steps, "plan", Groups::Direct([1, 1, 1]))?;
+        steps.recording().name_since(place, "compaction");
+        Ok(())
+    }
+
+    /// Shades what was met, in this order if there is one.
+    fn shade(&self, steps: &mut ImageSteps, order: Option<Storage>) -> Result<(), GpuError> {
+        if let Some(wavefront) = self.wavefront
+            && wavefront.shading == Shading::PerMaterial
+        {
+            return shading::by_kind(steps, self, wavefront, order);
+        }
+        let mut bindings = self.bindings.clone();
+        if let Some(order) = order {
+            bindings.buffer("order", order);
+        }
+        let kernel = self.kernel("organisation/shade");
+        steps.run("shade", kernel, self.live_groups(), &bindings)
+    }
+
+    /// One ray of each live path.
+    fn bounce(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        let sorting = self.wavefront.map_or(Sorting::Never, |w| w.sorting);
+        if sorting == Sorting::RayKey {
+            sorting::by_ray(steps, self)?;
+        }
+        self.run(steps, "extend", self.live_groups())?;
+        self.trace(steps, Query::Closest, 0, LIVE)?;
+        let order = match sorting {
+            Sorting::Material => Some(sorting::by_material(steps, self)?),
+            _ => None,
+        };
+        self.shade(steps, order)?;
+        self.trace(steps, Query::Any, 1, SHADOWS)?;
+        self.run(steps, "finish", self.live_groups())?;
+        match self.wavefront {
+            Some(wavefront) => self.compact(steps, wavefront),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Rays of a path at most.
+fn rays_of_path(integrator: &dyn Integrator, params: &Params) -> u32 {
+    let constants = integrator.constants(params);
+    let depth = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");
+    depth.map_or(1, |(_, depth)| depth + 1)
+}
+
+/// All batches of a slice, and its results into the sums.
+fn record(
+    steps: &mut ImageSteps,
+    wavefront: Option<&Wavefront>,
+    integrator: &dyn Integrator,
+    params: &Params,
+) -> Result<(), GpuError> {
+    let total = steps.count();
+    let rays = rays_of_path(integrator, params);
+    let mut first = 0;
+    let results = loop {
+        let queues = Queues::new(steps, first, wavefront, integrator.kernel());
+        let batches = total.div_ceil(queues.capacity);
+        if first == 0 {
+            steps
+                .recording()
+                .clear(queues.scratch("results", 16 * u64::from(total.max(1))));
+        }
+        queues.run(steps, "generate", queues.all())?;
+        // With regeneration no path waits while a slot is free, and none takes longer than its rays: all have ended by then.
+        let is_refilled = wavefront.is_some_and(|w| w.regeneration);
+        let bounces = if is_refilled {
+            batches.max(1) * rays
+        } else {
+            rays
+        };
+        for _ in 0..bounces {
+            queues.bounce(steps)?;
+        }
+        first += queues.capacity;
+        if is_refilled || first >= total {
+            break queues;
+        }
+    };
+    let kernel = results.kernel("organisation/accumulate");
+    steps.run("accumulate", kernel, steps.pixels(), &results.bindings)
+}
+
+impl Organisation for MultiKernel {
+    fn samples_at_once(&self, bytes: u64) -> u64 {
+        bytes / PATH_BYTES
+    }
+
+    fn record(
+        &self,
+        steps: &mut ImageSteps,
+        integrator: &dyn Integrator,
+        params: &Params,
+    ) -> Result<(), GpuError> {
+        record(steps, None, integrator, params)
+    }
+}
+
+impl Organisation for Wavefront {
+    fn samples_at_once(&self, bytes: u64) -> u64 {
+        (bytes / 16).min(u64::from(self.capacity) * BATCHES)
+    }
+
+    fn record(
+        &self,
+        steps: &mut ImageSteps,
+        integrator: &dyn Integrator,
+        params: &Params,
+    ) -> Result<(), GpuError> {
+        let (bytes, limit) = (
+            u64::from(self.capacity) * PATH_BYTES,
+            steps.gpu().limits.max_storage_buffer_binding_size,
+        );
+        if bytes > limit {
+            return Err(GpuError::Kernel(format!(
+                "wavefront with capacity = {}: {bytes} bytes of paths, and a buffer of this adapter has at most {limit}; at most {} fit",
+                self.capacity,
+                limit / PATH_BYTES
+            )));
+        }
+        record(steps, Some(self), integrator, params)
+    }
+}

@@ -1,0 +1,101 @@
+//! A queue and a kernel for each kind of material (Laine, Karras & Aila 2013, section 4).
+
+use super::queued::{Queues, Wavefront};
+use crate::ImageSteps;
+use raystone_gpu::compaction::{Compaction, Stays};
+use raystone_gpu::{Bindings, GpuError, Groups, Storage};
+use raystone_scene::MATERIAL_KINDS;
+use std::sync::Arc;
+
+/// Queues: of what has met nothing, and of each kind by its number. Flags are one more: `kernels/organisation/kinds.wesl`.
+const QUEUES: u32 = MATERIAL_KINDS.len() as u32 + 1;
+
+/// The queue of a kind, or of what has met nothing.
+fn queue_of(kind: Option<usize>) -> u32 {
+    kind.map_or(0, |kind| kind as u32 + 1)
+}
+
+/// Where the places of paths are brought, kind by kind.
+struct Kinds<'a> {
+    queues: &'a Queues<'a>,
+    method: Arc<dyn Compaction>,
+    /// Places of all live paths.
+    places: Storage,
+    /// Those of the queues, and how long they are: of all, where the compaction keeps them apart, else of one after the other.
+    kept: Storage,
+    count: Storage,
+}
+
+/// Shades what each kind of material was met by, and what has met nothing, kind after kind. In a queue paths stand in `order`, if
+/// there is one and the compaction is stable.
+pub(super) fn by_kind(
+    steps: &mut ImageSteps,
+    queues: &Queues,
+    wavefront: &Wavefront,
+    order: Option<Storage>,
+) -> Result<(), GpuError> {
+    let method = queues.method(steps.gpu(), wavefront)?;
+    let words = |of: u32| 4 * u64::from(queues.capacity) * u64::from(of);
+    let parts = if method.keeps_apart() { QUEUES } else { 1 };
+    let kinds = Kinds {
+        queues,
+        method,
+        places: order.unwrap_or_else(|| queues.scratch("places", words(1))),
+        kept: queues.scratch("kind queues", words(parts)),
+        count: queues.scratch("kind counts", 4 * u64::from(QUEUES)),
+    };
+    kinds.fill(steps)?;
+    let met = steps.material_kinds().into_iter().map(Some);
+    for kind in met.chain([None]) {
+        kinds.shade(steps, kind)?;
+    }
+    Ok(())
+}
+
+impl Kinds<'_> {
+    /// Flags all live paths by what they have met, and fills all queues if that can be done at once.
+    fn fill(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        let place = steps.recording().len();
+        let mut bindings = self.queues.bindings.clone();
+        bindings.buffer("places", &self.places);
+        let kernel = self.queues.kernel("organisation/kinds");
+        steps.run("kinds", kernel, self.queues.live_groups(), &bindings)?;
+        if self.method.keeps_apart() {
+            self.keep(steps, Stays::Apart(QUEUES))?;
+        }
+        steps.recording().name_since(place, "kinds");
+        Ok(())
+    }
+
+    fn keep(&self, steps: &mut ImageSteps, stays: Stays) -> Result<(), GpuError> {
+        let buffers = [&self.places, &self.kept, &self.count];
+        self.queues.keep(steps, &*self.method, stays, buffers)
+    }
+
+    /// Shades the paths that have met this kind of material, by its number, or nothing.
+    fn shade(&self, steps: &mut ImageSteps, kind: Option<usize>) -> Result<(), GpuError> {
+        let place = steps.recording().len();
+        let mut queue = queue_of(kind);
+        if !self.method.keeps_apart() {
+            self.keep(steps, Stays::Bucket(queue + 1))?;
+            queue = 0;
+        }
+        let groups = self.queues.scratch("kind groups", 16);
+        let mut bindings: Bindings = self.queues.bindings.clone();
+        bindings
+            .buffer("order", &self.kept)
+            .buffer("kind_counts", &self.count)
+            .buffer("live_groups", &groups);
+        let name = kind.map_or("nothing", |kind| MATERIAL_KINDS[kind].name);
+        let plan = self.queues.kernel("organisation/plan_kind");
+        let plan = plan.constant("QUEUE", queue);
+        steps.run(&format!("plan {name}"), plan, [1, 1, 1], &bindings)?;
+        steps.recording().name_since(place, "kinds");
+        let kernel = self.queues.kernel("organisation/shade");
+        let kernel = kernel
+            .constant("QUEUE", queue)
+            .feature("nothing_met", kind.is_none());
+        let groups = Groups::Indirect(groups, 0);
+        steps.run_on(kind, &format!("shade {name}"), kernel, groups, &bindings)
+    }
+}

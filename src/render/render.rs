@@ -1,0 +1,589 @@
+//! The renderer: plays the passes of an integrator in slices of about a quarter of a second and keeps the
+//! sum at every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
+//!
+//! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
+//! exactly the samples asked for.
+
+use super::blocks::Blocks;
+use super::kind::ConfiguredIntegrator;
+use super::offset::RayOffset;
+use super::passes::{ImageSteps, Passes};
+use super::slice::{Slice, job_uniform, lens};
+use super::tables::SceneBuffers;
+use super::visibility::Visibility;
+use raystone_accel::Traced;
+use raystone_core::geometry::Camera;
+use raystone_core::structure::RAY_COUNT_CLASSES;
+use raystone_core::text::cell_hash;
+use raystone_gpu::{Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues};
+use raystone_image::Image;
+use raystone_sampling::Sampler;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Samples of the first slice: few, each may be a path through brute force over thousands of triangles.
+const FIRST_SLICE: u64 = 512;
+/// Bytes of the error word and of what is counted behind it, see `kernels/common/ray_counts.wesl`.
+const STATUS_BYTES: u64 = 256;
+/// Bytes that a buffer between passes may take at most, below the adapter's limit.
+const SCRATCH_BYTES: u64 = 1 << 28;
+
+/// Samples of a pixel that are summed in f32 on the device before the host adds the sum in f64. Blocks
+/// begin at multiples of it, so that an image does not depend on slices.
+pub const BLOCK_SAMPLES: u32 = 256;
+
+/// How far rounding alone may move a pixel of an image of `spp` samples, relative to the mean of the
+/// samples' magnitudes: one rounding per addition within a block, and one of the mean to f32 (N. Higham,
+/// "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2). What f64 adds to that
+/// stays below a millionth of it.
+pub fn rounding_bound(spp: u32) -> f64 {
+    let roundings = f64::from(spp.min(BLOCK_SAMPLES));
+    roundings * 0.5 * f64::from(f32::EPSILON) * (1.0 + 1e-6)
+}
+
+/// One image to render.
+#[derive(Clone, Copy)]
+pub struct RenderJob<'a> {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Where it is taken from.
+    pub camera: Camera,
+    /// What draws the samples.
+    pub sampler: &'a Sampler,
+    /// What is computed per sample.
+    pub integrator: &'a ConfiguredIntegrator,
+    /// Where rays that leave a surface start.
+    pub offset: RayOffset,
+    /// Whether the driver's checks are on.
+    pub runtime_checks: bool,
+}
+
+/// The image after so many samples.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Mean radiance.
+    pub image: Image,
+}
+
+/// Rows whose sums fit into one buffer.
+struct Band {
+    rows: Range<u32>,
+    /// Sum of radiance and number of samples, per pixel.
+    sums: wgpu::Buffer,
+}
+
+/// A compiled job on one scene and structure.
+pub struct Renderer<'a> {
+    gpu: &'a Gpu,
+    player: Player,
+    size: [u32; 2],
+    integrator: ConfiguredIntegrator,
+    uniform: UniformValues,
+    passes: Passes,
+    bands: Vec<Band>,
+    /// Where only some blocks take samples: which.
+    chosen: Option<Blocks>,
+    status: wgpu::Buffer,
+    /// Samples per pixel since the last reset.
+    done: Cell<u32>,
+    /// Of these, how many the sums on the device hold.
+    pending: Cell<u32>,
+    /// The sums of the blocks before; empty if there were none.
+    blocks: RefCell<Vec<[f64; 3]>>,
+    slices: Slices,
+    /// Samples for which the buffers between passes have room.
+    most: u64,
+    /// GPU milliseconds of each stage since the last reset.
+    stages: RefCell<BTreeMap<String, f64>>,
+    /// GPU milliseconds and wall milliseconds of all slices since the last reset.
+    spent: Cell<Elapsed>,
+}
+
+/// Buffers for the sums of an image, as many rows in each as the adapter can bind.
+fn bands(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Vec<Band>, GpuError> {
+    let row_bytes = u64::from(width) * 16;
+    // Slices are multiples of eight rows, the height of a workgroup.
+    let fitting = gpu.limits.max_storage_buffer_binding_size / row_bytes.max(1) / 8 * 8;
+    let rows = fitting.clamp(8, 1 << 31) as usize;
+    (0..height)
+        .step_by(rows)
+        .map(|start| {
+            let rows = start..height.min(start + rows as u32);
+            let bytes = u64::from(rows.end - rows.start) * row_bytes;
+            let sums = gpu.zeroed("accumulation", bytes)?;
+            Ok(Band { rows, sums })
+        })
+        .collect()
+}
+
+/// Puts a sampler into a kernel that draws; its words are bound as `sampler_table`.
+#[must_use]
+pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composition {
+    for (name, value) in sampler.constants() {
+        composition = composition.constant(name, value);
+    }
+    let [sequence, decorrelation] = sampler.kernels();
+    composition
+        .with("sequence", &sequence)
+        .with("decorrelation", &decorrelation)
+}
+
+/// Samples for which an integrator's buffers between passes have room.
+fn most_samples(gpu: &Gpu, integrator: &ConfiguredIntegrator) -> u64 {
+    let scratch = integrator.kind.scratch().iter();
+    let limit = gpu
+        .limits
+        .max_storage_buffer_binding_size
+        .min(SCRATCH_BYTES);
+    let fitting = scratch.map(|(_, bytes)| limit / (*bytes).max(1));
+    let organised = integrator.organisation.samples_at_once(limit);
+    fitting.chain([organised]).min().unwrap_or(u64::MAX)
+}
+
+impl<'a> Renderer<'a> {
+    /// Compiles the job's kernels and makes its buffers.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, the integrator needs another kind of structure, or the scene or
+    /// one row of the image is too large for a buffer.
+    pub fn new(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+        ray_counts: bool,
+    ) -> Result<Self, GpuError> {
+        Self::compiled(gpu, scene, traced, job, [ray_counts, false])
+    }
+
+    /// The same with a kernel that takes samples in some blocks of the image alone, see [`Renderer::only`]; in all at
+    /// first.
+    ///
+    /// # Errors
+    /// As for [`Renderer::new`], or the integrator has passes of its own, or the sums do not fit into one buffer.
+    pub fn by_blocks(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+    ) -> Result<Self, GpuError> {
+        Self::compiled(gpu, scene, traced, job, [false, true])
+    }
+
+    fn compiled(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+        [ray_counts, by_blocks]: [bool; 2],
+    ) -> Result<Self, GpuError> {
+        if let Some(reason) = job.integrator.refusal(traced) {
+            return Err(GpuError::Kernel(reason));
+        }
+        let status = gpu.zeroed("status", STATUS_BYTES)?;
+        let renderer = Self {
+            gpu,
+            player: Player::new(gpu),
+            size: job.size,
+            integrator: job.integrator.clone(),
+            uniform: job_uniform(job, scene),
+            passes: Passes::new(gpu, scene, traced, job, &status, [ray_counts, by_blocks])?,
+            bands: bands(gpu, job.size)?,
+            chosen: match by_blocks {
+                true => Some(Blocks::all(gpu, job.size)?),
+                false => None,
+            },
+            status,
+            done: Cell::new(0),
+            pending: Cell::new(0),
+            blocks: RefCell::default(),
+            slices: Slices::starting_with(FIRST_SLICE),
+            most: most_samples(gpu, job.integrator),
+            stages: RefCell::default(),
+            spent: Cell::default(),
+        };
+        let own_passes =
+            job.integrator.kind.kernel().is_empty() || !job.integrator.organisation.takes_any();
+        if by_blocks && (own_passes || renderer.bands.len() > 1) {
+            return Err(GpuError::Kernel(format!(
+                "`{}` at {:?} pixels cannot take samples by blocks: that needs an integrator of one kernel and sums in one buffer",
+                job.integrator.kind.name(),
+                job.size
+            )));
+        }
+        if let Some(band) = renderer.bands.first() {
+            renderer.record(&mut Recording::new(), band, &Slice::default())?;
+        }
+        Ok(renderer)
+    }
+
+    /// Looks from elsewhere: what is added from now on is seen by this camera.
+    ///
+    /// # Errors
+    /// As [`Renderer::reset`], which forgets what was seen so far.
+    pub fn look(&mut self, camera: Camera) -> Result<(), GpuError> {
+        self.uniform = lens(self.uniform.clone(), camera, self.size);
+        if let Some(visibility) = self.visibility() {
+            visibility.draw(camera)?;
+        }
+        self.reset()
+    }
+
+    /// What was rasterised, if paths begin there.
+    pub fn visibility(&self) -> Option<&Visibility> {
+        self.passes.visibility.as_ref()
+    }
+
+    /// Feature flags of the kernels.
+    pub fn features(&self) -> Vec<String> {
+        self.passes.features()
+    }
+
+    /// Features that other scenes need and these kernels are without; none of integrators that trace nothing.
+    pub fn left_out(&self) -> Vec<String> {
+        self.passes.left_out()
+    }
+
+    /// Texts of the composed kernels.
+    pub fn kernel_text(&self) -> String {
+        let texts = self.passes.texts();
+        let texts: Vec<String> = texts.into_iter().map(|(_, text)| text).collect();
+        texts.join("\n")
+    }
+
+    /// BLAKE3 of the text of the one kernel, or of the names and texts of all passes.
+    pub fn kernel_hash(&self) -> String {
+        let texts = self.passes.texts();
+        match &texts[..] {
+            [(_, only)] => blake3::hash(only.as_bytes()).to_hex().to_string(),
+            all => {
+                let parts: Vec<_> = all.iter().map(|(p, t)| (p.as_str(), t.as_str())).collect();
+                cell_hash(&parts)
+            }
+        }
+    }
+
+    /// Clears the sum, the error word, the ray counts and the clock.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn reset(&self) -> Result<(), GpuError> {
+        let mut recording = Recording::new();
+        recording.clear(&self.status);
+        self.clear_sums(&mut recording);
+        self.player.play(&recording)?;
+        self.pending.set(0);
+        self.done.set(0);
+        self.blocks.borrow_mut().clear();
+        self.stages.borrow_mut().clear();
+        self.spent.set(Elapsed::nothing(self.gpu.has_clock()));
+        Ok(())
+    }
+
+    fn clear_sums(&self, recording: &mut Recording) {
+        for band in &self.bands {
+            recording.clear(&band.sums);
+        }
+    }
+
+    /// Adds samples `first … first + count - 1` to every pixel, in slices.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains; a block of samples that ended is not whole.
+    pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
+        let mut sample = first;
+        let end = first + count;
+        while sample < end {
+            if sample.is_multiple_of(BLOCK_SAMPLES) && self.pending.get() > 0 {
+                self.close_block()?;
+            }
+            let left_in_block = BLOCK_SAMPLES - sample % BLOCK_SAMPLES;
+            let samples = self.samples_at_once().min(left_in_block).min(end - sample);
+            for band in &self.bands {
+                match &self.chosen {
+                    Some(blocks) => self.add_to_blocks(band, blocks, (sample, samples), seed)?,
+                    None => self.add_to_band(band, sample, samples, seed)?,
+                }
+            }
+            sample += samples;
+            self.done.set(self.done.get() + samples);
+            self.pending.set(self.pending.get() + samples);
+        }
+        Ok(())
+    }
+
+    /// Samples, pixels times samples per pixel, of a slice.
+    fn fitting(&self) -> u64 {
+        self.slices.fitting().min(self.most)
+    }
+
+    /// Samples of all pixels that a slice has time for. Where a driver ends loops, one alone, so that only
+    /// a sample that needs more turns than the driver allows is refused.
+    fn samples_at_once(&self) -> u32 {
+        if self.gpu.loop_limit.is_some() {
+            return 1;
+        }
+        let [width, height] = self.size.map(u64::from);
+        let blocks = self.chosen.as_ref().map(Blocks::pixels);
+        let pixels = blocks.unwrap_or(width * height);
+        (self.fitting() / pixels.max(1)).clamp(1, u64::from(BLOCK_SAMPLES)) as u32
+    }
+
+    /// Takes samples, from the next reset on, in these blocks of [`BLOCK_EDGE`](super::BLOCK_EDGE) pixels squared alone,
+    /// each by its column and row; all other pixels of images are black. Of a renderer that was not made
+    /// [by blocks](Renderer::by_blocks) nothing changes.
+    pub fn only(&self, blocks: &[[u32; 2]]) {
+        if let Some(known) = &self.chosen {
+            known.set(self.gpu, blocks);
+        }
+    }
+
+    fn add_to_blocks(
+        &self,
+        band: &Band,
+        blocks: &Blocks,
+        (first_sample, samples): (u32, u32),
+        seed: u32,
+    ) -> Result<(), GpuError> {
+        let fitting = self.fitting() / (u64::from(samples) * Blocks::PIXELS).max(1);
+        let mut first = 0;
+        while first < blocks.len() {
+            let count = (fitting.clamp(1, Blocks::MOST) as u32).min(blocks.len() - first);
+            let slice = Slice {
+                band_row: 0,
+                first_row: first,
+                rows: count,
+                first_sample,
+                samples,
+                seed,
+            };
+            let items = u64::from(count) * u64::from(samples) * Blocks::PIXELS;
+            self.run_slice(band, &slice, items)?;
+            first += count;
+        }
+        Ok(())
+    }
+
+    fn add_to_band(
+        &self,
+        band: &Band,
+        first_sample: u32,
+        samples: u32,
+        seed: u32,
+    ) -> Result<(), GpuError> {
+        let mut row = band.rows.start;
+        while row < band.rows.end {
+            let row_samples = u64::from(self.size[0]) * u64::from(samples);
+            let fitting = self.fitting() / row_samples.max(1) / 8 * 8;
+            let rows = fitting.clamp(8, 1 << 31) as u32;
+            let slice = Slice {
+                band_row: band.rows.start,
+                first_row: row,
+                rows: rows.min(band.rows.end - row),
+                first_sample,
+                samples,
+                seed,
+            };
+            self.run_slice(band, &slice, row_samples * u64::from(slice.rows))?;
+            row += slice.rows;
+        }
+        Ok(())
+    }
+
+    fn record(
+        &self,
+        recording: &mut Recording,
+        band: &Band,
+        slice: &Slice,
+    ) -> Result<(), GpuError> {
+        let of_job = (self.size[0], &self.uniform);
+        let (sums, scratch) = (&band.sums, self.integrator.kind.scratch());
+        self.integrator.record(&mut ImageSteps::new(
+            &self.passes,
+            recording,
+            of_job,
+            slice,
+            sums,
+            scratch,
+            self.chosen.as_ref().map(Blocks::list),
+        ))
+    }
+
+    fn run_slice(&self, band: &Band, slice: &Slice, items: u64) -> Result<(), GpuError> {
+        let mut recording = Recording::new();
+        self.record(&mut recording, band, slice)?;
+        let played = self.player.play(&recording)?;
+        let elapsed = played.elapsed();
+        let mut stages = self.stages.borrow_mut();
+        for (stage, ms) in played.runs {
+            let Some(ms) = ms else { continue };
+            *stages.entry(stage).or_default() += ms;
+        }
+        self.slices.learn(items, elapsed);
+        let mut spent = self.spent.get();
+        spent += elapsed;
+        self.spent.set(spent);
+        Ok(())
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        self.gpu
+    }
+
+    /// Time of all slices since the last reset.
+    pub fn spent(&self) -> Elapsed {
+        self.spent.get()
+    }
+
+    /// Milliseconds of the longest slice of its life: no dispatch took longer.
+    pub fn longest_slice_ms(&self) -> f64 {
+        self.slices.longest_ms()
+    }
+
+    /// GPU milliseconds of each stage since the last reset, summed over its runs: [`RAY_QUERIES`](super::RAY_QUERIES) and those of the
+    /// organisation. None without timestamps.
+    pub fn stages(&self) -> BTreeMap<String, f64> {
+        self.stages.borrow().clone()
+    }
+
+    /// Renders from nothing and returns the images after each of `spps` (ascending) samples.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`], or the driver complains.
+    pub fn render(&self, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, GpuError> {
+        self.reset()?;
+        let mut done = 0;
+        let mut out = Vec::with_capacity(spps.len());
+        for &spp in spps {
+            self.add_samples(done, spp - done, seed)?;
+            done = spp;
+            out.push(Snapshot {
+                spp,
+                image: self.image()?,
+            });
+        }
+        Ok(out)
+    }
+
+    /// The mean so far.
+    ///
+    /// # Errors
+    /// A kernel raised its error word, a pixel did not take every sample, or the device is lost or
+    /// hangs.
+    pub fn image(&self) -> Result<Image, GpuError> {
+        let mut totals = self.blocks.borrow().clone();
+        self.add_pending(&mut totals)?;
+        let count = f64::from(self.done.get());
+        let mean = |total: &[f64; 3]| total.map(|sum| (sum / count) as f32);
+        Ok(Image {
+            width: self.size[0],
+            height: self.size[1],
+            pixels: totals.iter().map(mean).collect(),
+        })
+    }
+
+    /// Takes the sums of a whole block over to the host.
+    fn close_block(&self) -> Result<(), GpuError> {
+        self.add_pending(&mut self.blocks.borrow_mut())?;
+        let mut recording = Recording::new();
+        self.clear_sums(&mut recording);
+        self.player.play(&recording)?;
+        self.pending.set(0);
+        Ok(())
+    }
+
+    /// Whether everything since the last reset is sound.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn check(&self) -> Result<(), GpuError> {
+        self.add_pending(&mut Vec::new())
+    }
+
+    /// Adds the sums on the device to those of the blocks before, if they are sound.
+    fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
+        let mut recording = Recording::new();
+        recording.download("status", &self.status);
+        for (index, band) in self.bands.iter().enumerate() {
+            recording.download(&index.to_string(), &band.sums);
+        }
+        let played = self.player.play(&recording)?;
+        let status: Vec<u32> = played.download("status")?;
+        self.gpu.check_error_word(status[0])?;
+        let [width, height] = self.size.map(|edge| edge as usize);
+        totals.resize(width * height, [0.0; 3]);
+        let wanted = self.pending.get();
+        let (mut wrong, mut first) = (0, None);
+        for (index, band) in self.bands.iter().enumerate() {
+            let sums: Vec<[f32; 4]> = played.download(&index.to_string())?;
+            let [start, end] = [band.rows.start, band.rows.end].map(|row| row as usize * width);
+            let pixels = totals[start..end].iter_mut().zip(&sums);
+            for (pixel, (total, [r, g, b, taken])) in (start..).zip(pixels) {
+                let blocks = self.chosen.as_ref();
+                let is_off = blocks.is_some_and(|blocks| !blocks.has(pixel, width));
+                let wanted = if is_off { 0 } else { wanted };
+                // Exact: a block has far fewer samples than 2²⁴.
+                if *taken != wanted as f32 {
+                    wrong += 1;
+                    first.get_or_insert((pixel, *taken));
+                }
+                for (total, sum) in total.iter_mut().zip([r, g, b]) {
+                    *total += f64::from(*sum);
+                }
+            }
+        }
+        match first {
+            None => Ok(()),
+            Some((pixel, taken)) => Err(GpuError::Samples {
+                wrong,
+                wanted,
+                x: (pixel % width) as u32,
+                y: (pixel / width) as u32,
+                taken,
+            }),
+        }
+    }
+
+    /// The error word of the kernels since the last reset.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn error_word(&self) -> Result<u32, GpuError> {
+        Ok(self.gpu.read::<u32>(&self.status)?[0])
+    }
+
+    /// Rays per class since the last reset, in the order of [`CountedRays`](super::CountedRays); zeros unless the
+    /// kernel was compiled to count.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn ray_counts(&self) -> Result<[u64; RAY_COUNT_CLASSES.len()], GpuError> {
+        let totals = self.totals()?;
+        Ok(std::array::from_fn(|class| totals[class]))
+    }
+
+    /// Paths that sent a ray from the camera, after one bounce, after two, …, since the last reset; nothing unless the kernel
+    /// was compiled to count.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn live_paths(&self) -> Result<Vec<u64>, GpuError> {
+        let mut live = self.totals()?.split_off(RAY_COUNT_CLASSES.len());
+        let last = live.iter().rposition(|paths| *paths > 0);
+        live.truncate(last.map_or(0, |last| last + 1));
+        Ok(live)
+    }
+
+    /// What kernels have counted behind the error word.
+    fn totals(&self) -> Result<Vec<u64>, GpuError> {
+        self.check()?;
+        let words: Vec<u32> = self.gpu.read(&self.status)?;
+        let pairs = words[1..].as_chunks::<2>().0.iter();
+        let total = |[low, high]: &[u32; 2]| u64::from(*low) | u64::from(*high) << 32;
+        Ok(pairs.map(total).collect())
+    }
+}

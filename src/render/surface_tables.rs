@@ -1,0 +1,173 @@
+//! What `shading_tables` holds of surfaces besides the numbers of materials: places of textures, texture coordinates, normals,
+//! colours of vertices, texels.
+
+use raystone_scene::{Material, SceneData, TextureUse, Wrap};
+
+/// Words of a material without its parameters; the last four are the places of its textures.
+pub(super) const MATERIAL_WORDS: usize = 12;
+/// Words of the place of a texture.
+const USE_WORDS: usize = 12;
+
+/// What the surfaces of a scene make kernels carry; absent features are not in the kernel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SurfaceFeatures {
+    /// Some material has a texture.
+    pub textures: bool,
+    /// Some texture is of metalness and roughness.
+    pub metallic_roughness_textures: bool,
+    /// Some texture bends normals.
+    pub normal_maps: bool,
+    /// Some texture is of emission.
+    pub emission_textures: bool,
+    /// Some texture is moved, or does not repeat.
+    pub texture_transforms: bool,
+    /// Some vertex has a normal that is not its triangle's.
+    pub normals: bool,
+    /// Some vertex has a colour.
+    pub vertex_colors: bool,
+}
+
+impl SurfaceFeatures {
+    /// Of these materials among those of the scene.
+    pub(super) fn of(scene: &SceneData, is_among: impl Fn(&Material) -> bool) -> Self {
+        // Without coordinates, materials show their constants.
+        let is_mapped = scene.uvs.len() == scene.triangles.len();
+        let materials = scene.materials.iter();
+        let materials = materials.filter(|material| is_mapped && is_among(material));
+        let uses: Vec<[Option<TextureUse>; 4]> = materials.map(Material::texture_uses).collect();
+        let some = |slot: usize| uses.iter().any(|of_one| of_one[slot].is_some());
+        let mut all = uses.iter().flatten().flatten();
+        Self {
+            textures: (0..4).any(some),
+            metallic_roughness_textures: some(1),
+            normal_maps: some(2),
+            emission_textures: some(3),
+            texture_transforms: all.any(|used| !used.is_plain()),
+            normals: scene.normals.len() == scene.triangles.len(),
+            vertex_colors: scene.colors.len() == scene.triangles.len(),
+        }
+    }
+
+    /// Feature names as kernels write them, with whether they are on.
+    pub(super) fn flags(&self) -> [(&'static str, bool); 7] {
+        [
+            ("textures", self.textures),
+            (
+                "metallic_roughness_textures",
+                self.metallic_roughness_textures,
+            ),
+            ("normal_maps", self.normal_maps),
+            ("emission_textures", self.emission_textures),
+            ("texture_transforms", self.texture_transforms),
+            ("normals", self.normals),
+            ("vertex_colors", self.vertex_colors),
+        ]
+    }
+
+    /// Features that a kernel for surfaces with these does without, whatever else there is in the scene. Emission and its textures
+    /// are those of lights, too.
+    pub(super) fn unneeded(&self) -> impl Iterator<Item = &'static str> {
+        let of_one_surface = [
+            "textures",
+            "metallic_roughness_textures",
+            "normal_maps",
+            "normals",
+            "vertex_colors",
+        ];
+        let unneeded = move |(name, on): &(&str, bool)| !on && of_one_surface.contains(name);
+        let flags = self.flags().into_iter();
+        flags.filter(unneeded).map(|(name, _)| name)
+    }
+}
+
+/// Where things begin, in words; 0 for what the scene does not have.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Places {
+    pub first_uv: u32,
+    pub first_normal: u32,
+    pub first_color: u32,
+    pub first_mirrored: u32,
+}
+
+/// Appends, in this order: places of textures, three `vec4` each; six words of texture coordinates a triangle; three of normals;
+/// six of colours; a bit whether it is mirrored; texels. Tells the materials where the places of their textures are, in `vec4`.
+///
+/// A place: first texel, in words, width, height, and how it wraps (in v times 4, in u); the matrix by columns; what is added, and the scale of
+/// normals.
+pub(super) fn append(
+    scene: &SceneData,
+    features: &SurfaceFeatures,
+    words: &mut Vec<u32>,
+) -> Places {
+    let mut rows = Vec::new();
+    if features.textures {
+        words.resize(words.len().next_multiple_of(4), 0);
+        for (index, material) in scene.materials.iter().enumerate() {
+            for (slot, used) in material.texture_uses().iter().enumerate() {
+                let Some(used) = used else { continue };
+                words[MATERIAL_WORDS * index + 8 + slot] = words.len() as u32 / 4;
+                rows.push((words.len(), used.texture));
+                words.extend(place(scene, used));
+            }
+        }
+    }
+    // Materials come first: 0 is where neither can begin.
+    let place_of = |there: bool, words: &[u32]| if there { words.len() as u32 } else { 0 };
+    let first_uv = place_of(features.textures, words);
+    let texels = match features.textures {
+        true => scene.textures.iter().map(|t| t.texels.len()).sum(),
+        false => 0,
+    };
+    let corners = 6 * scene.uvs.len() + 3 * scene.normals.len() + 6 * scene.colors.len();
+    let mirrored = scene.mirrored.len().div_ceil(32);
+    words.reserve_exact(corners + mirrored + texels + 3);
+    if features.textures {
+        let uvs = scene.uvs.iter().flatten();
+        words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
+    }
+    let first_normal = place_of(features.normals, words);
+    if features.normals {
+        words.extend_from_slice(scene.normals.as_flattened());
+    }
+    let first_color = place_of(features.vertex_colors, words);
+    if features.vertex_colors {
+        words.extend_from_slice(scene.colors.as_flattened().as_flattened());
+    }
+    let first_mirrored = place_of(!scene.mirrored.is_empty(), words);
+    words.extend(scene.mirrored.chunks(32).map(|bits| {
+        let set = (0..).zip(bits).map(|(place, bit)| u32::from(*bit) << place);
+        set.sum::<u32>()
+    }));
+    if features.textures {
+        // Those of masks alone are with the triangles.
+        let shown = (0_u32..).zip(&scene.textures);
+        for (id, texture) in shown.filter(|(id, _)| rows.iter().any(|(_, used)| used == id)) {
+            let first = words.len() as u32;
+            words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
+            for (row, _) in rows.iter().filter(|(_, used)| *used == id) {
+                words[*row] = first;
+            }
+        }
+    }
+    Places {
+        first_uv,
+        first_normal,
+        first_color,
+        first_mirrored,
+    }
+}
+
+fn place(scene: &SceneData, used: &TextureUse) -> [u32; USE_WORDS] {
+    let texture = &scene.textures[used.texture as usize];
+    let number = |wrap| match wrap {
+        Wrap::Repeat => 0,
+        Wrap::Mirrored => 1,
+        Wrap::Clamp => 2,
+    };
+    let [u, v] = used.wrap.map(number);
+    let [a, b, c, d] = used.linear.to_cols_array().map(f32::to_bits);
+    let [x, y] = used.offset.to_array().map(f32::to_bits);
+    let (width, height) = (texture.width, texture.height);
+    let scale = used.scale.to_bits();
+    [0, width, height, 4 * v + u, a, b, c, d, x, y, scale, 0]
+}

@@ -1,0 +1,248 @@
+//! Scene buffers for shading: canonical triangles, materials, lights, textures.
+
+use super::light_tables::LightTables;
+use super::offset::TransformError;
+use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
+use glam::Vec3;
+use raystone_accel::{TriangleBuffers, TriangleSoup};
+use raystone_gpu::{Bindings, Gpu, GpuError};
+use raystone_scene::{
+    DIFFUSE, Daylight, LIGHT_KINDS, LightList, MATERIAL_KINDS, Material, MaterialKind, SceneData,
+};
+
+/// What a scene makes kernels carry; absent features are not in the kernel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SceneFeatures {
+    /// Textures, normals and colours of vertices.
+    pub surfaces: SurfaceFeatures,
+    /// There are lights that can be sampled.
+    pub lights: bool,
+    /// Which of [`LIGHT_KINDS`] they are of.
+    pub light_kinds: [bool; LIGHT_KINDS.len()],
+    /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
+    pub many_lights: bool,
+    /// Some surface emits from its front alone.
+    pub one_sided_lights: bool,
+    /// Rays that leave the scene find light.
+    pub background: bool,
+    /// The environment is the sky over a scene without a light.
+    pub daylight: bool,
+    /// Which of [`MATERIAL_KINDS`] some material is of.
+    pub materials: [bool; MATERIAL_KINDS.len()],
+    /// Textures of the materials of each kind, normals and colours of vertices.
+    pub kinds: [SurfaceFeatures; MATERIAL_KINDS.len()],
+    /// Instances add to the error of points.
+    pub transforms: bool,
+    /// Some triangle is mirrored, so that its corners turn the other way round.
+    pub mirrored: bool,
+}
+
+/// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need.
+pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
+    (
+        "materials",
+        &[
+            "phong",
+            "cook_torrance",
+            "principled",
+            "mirror",
+            "dielectric",
+            "several_materials",
+        ],
+    ),
+    (
+        "textures",
+        &[
+            "textures",
+            "metallic_roughness_textures",
+            "emission_textures",
+            "texture_transforms",
+            "vertex_colors",
+        ],
+    ),
+    ("normals", &["normals", "normal_maps"]),
+    (
+        "lights",
+        &[
+            "lights",
+            "triangle_lights",
+            "rectangle_lights",
+            "sphere_lights",
+            "point_lights",
+            "spot_lights",
+            "ies_lights",
+            "directional_lights",
+            "one_sided_lights",
+            "several_light_kinds",
+        ],
+    ),
+    ("choice", &["many_lights"]),
+    ("background", &["background", "daylight", "environment_map"]),
+    ("transforms", &["transforms", "mirrored_triangles"]),
+];
+
+impl SceneFeatures {
+    /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
+    pub fn flags(&self) -> Vec<(&'static str, bool)> {
+        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.feature);
+        let mut flags: Vec<_> = kinds.zip(self.materials).collect();
+        flags.retain(|(name, _)| *name != DIFFUSE.feature);
+        flags.extend([
+            ("several_materials", several(&self.materials)),
+            ("lights", self.lights),
+            ("many_lights", self.many_lights),
+            ("several_light_kinds", several(&self.light_kinds)),
+            ("one_sided_lights", self.one_sided_lights),
+            ("background", self.background),
+            ("daylight", self.daylight),
+            ("transforms", self.transforms),
+            ("mirrored_triangles", self.mirrored),
+        ]);
+        flags.extend(LightTables::flags(&self.light_kinds));
+        flags.extend(self.surfaces.flags());
+        flags
+    }
+
+    /// Numbers of the kinds of materials that there are, as in `kernels/shading/bsdf.wesl`.
+    pub(crate) fn material_kinds(&self) -> impl Iterator<Item = usize> {
+        (0..MATERIAL_KINDS.len()).filter(|kind| self.materials[*kind])
+    }
+
+    /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
+    pub(crate) fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
+        let feature = kind.map(|kind| MATERIAL_KINDS[kind].feature);
+        let (_, of_materials) = FEATURE_GROUPS[0];
+        let others = of_materials.iter().copied();
+        let own = kind.map_or(SurfaceFeatures::default(), |kind| self.kinds[kind]);
+        let others = others.filter(|name| Some(*name) != feature);
+        others.chain(own.unneeded()).collect()
+    }
+}
+
+/// A scene on the GPU.
+pub struct SceneBuffers {
+    /// `triangles`, `shading_tables`.
+    pub bindings: Bindings,
+    /// The triangles alone, and how rays meet them.
+    pub triangles: TriangleBuffers,
+    /// How many there are.
+    pub triangle_count: u32,
+    /// What instances add to the error of points.
+    pub transform_error: TransformError,
+    /// What kernels must carry.
+    pub features: SceneFeatures,
+    /// Radiance of the environment.
+    pub environment: [f32; 3],
+    /// The sky; kernels without its feature do not read it.
+    pub daylight: Daylight,
+    /// What is sampled.
+    pub lights: LightTables,
+    /// Where texture coordinates begin in `shading_tables`, in words.
+    pub first_uv: u32,
+    /// Where normals begin in `shading_tables`, in words.
+    pub first_normal: u32,
+    /// Where colours of vertices begin in `shading_tables`, in words.
+    pub first_color: u32,
+    /// Where the bits of mirrored triangles begin in `shading_tables`, in words.
+    pub first_mirrored: u32,
+    /// Length of the diagonal of the scene's box, scene units.
+    pub diagonal: f64,
+    /// Corners of that box.
+    pub bounds: [[f32; 3]; 2],
+}
+
+impl SceneBuffers {
+    /// Uploads what shading needs.
+    ///
+    /// # Errors
+    /// A buffer exceeds the adapter's limit.
+    pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
+        let surfaces = SurfaceFeatures::of(scene, |_| true);
+        let mut lights = LightTables::of(scene, &LightList::of(scene));
+        let tables = Tables::of(scene, &mut lights, &surfaces);
+        let triangles = TriangleBuffers::upload(gpu, soup)?;
+        let mut bindings = triangles.bindings.clone();
+        bindings.buffer(
+            "shading_tables",
+            &gpu.storage("shading_tables", &tables.words)?,
+        );
+        let transform_error = TransformError::of(soup);
+        let has_map = lights.has_map();
+        Ok(Self {
+            bindings,
+            triangles,
+            triangle_count: soup.records.len() as u32,
+            transform_error,
+            features: SceneFeatures {
+                surfaces,
+                lights: lights.lights > 0,
+                light_kinds: lights.kinds,
+                many_lights: lights.are_chosen(scene),
+                one_sided_lights: lights.one_sided,
+                background: has_map || scene.daylight.is_some() || scene.environment != Vec3::ZERO,
+                daylight: scene.daylight.is_some(),
+                materials: MATERIAL_KINDS
+                    .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
+                kinds: MATERIAL_KINDS.map(|kind| SurfaceFeatures::of(scene, |m| m.kind == kind)),
+                transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
+                mirrored: scene.mirrored.contains(&true),
+            },
+            environment: scene.environment.to_array(),
+            daylight: scene.daylight.unwrap_or_default(),
+            lights,
+            first_uv: tables.places.first_uv,
+            first_normal: tables.places.first_normal,
+            first_color: tables.places.first_color,
+            first_mirrored: tables.places.first_mirrored,
+            diagonal: f64::from(2.0 * scene.bounds().radius()),
+            bounds: [scene.bounds().min, scene.bounds().max].map(|corner| corner.to_array()),
+        })
+    }
+}
+
+/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights, and what
+/// [`surface_tables`](super::surface_tables) appends.
+///
+/// A material: base colour and number of its kind, with the highest bit set where it emits from its front alone; emission
+/// and place of its parameters, in `vec4`; places of its textures, 0 where it has none.
+struct Tables {
+    words: Vec<u32>,
+    places: Places,
+}
+
+impl Tables {
+    fn of(scene: &SceneData, lights: &mut LightTables, surfaces: &SurfaceFeatures) -> Self {
+        let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
+        for (index, material) in scene.materials.iter().enumerate() {
+            let parameters = words.len() as u32 / 4;
+            words.extend(material.parameters.iter().map(|x| x.to_bits()));
+            words.resize(words.len().next_multiple_of(4), 0);
+            let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
+            let [er, eg, eb] = material.emission.to_array().map(f32::to_bits);
+            let one_sided = u32::from(emits_in_front(material)) << 31;
+            let kind = number(material.kind) | one_sided;
+            let row = [r, g, b, kind, er, eg, eb, parameters];
+            let first = MATERIAL_WORDS * index;
+            words[first..first + row.len()].copy_from_slice(&row);
+        }
+        lights.append(&mut words);
+        let places = append(scene, surfaces, &mut words);
+        words.resize(words.len().next_multiple_of(4), 0);
+        Self { words, places }
+    }
+}
+
+fn several(kinds: &[bool]) -> bool {
+    kinds.iter().filter(|there| **there).count() > 1
+}
+
+/// Whether the material emits, and from its front alone.
+pub(super) fn emits_in_front(material: &Material) -> bool {
+    !material.emits_both_sides && material.emission != Vec3::ZERO
+}
+
+/// Of a kind of material, in kernels.
+fn number(kind: &MaterialKind) -> u32 {
+    let place = MATERIAL_KINDS.iter().position(|known| *known == kind);
+    place.unwrap_or_default() as u32
+}

@@ -1,0 +1,127 @@
+//! What the machine makes of what did not change: the movement of control cells, whose kernels, scene, parameters and
+//! counted work are equal on both sides.
+//!
+//! The model: the logarithm of a cell's ratio is what the change did, plus a deviation of the cell in this pair of runs,
+//! plus the noise of its rounds. Controls show the last two alone. The variance of both together is the mean of the squares
+//! of their logarithms *about zero*: a whole run that went slower counts as much as cells that moved apart, so that drift
+//! widens intervals and shifts none. A cell whose own rounds are noisier than those of controls has that much more.
+
+use crate::format::plural;
+use raystone_stats::statistics::Spread;
+
+/// Fewer controls show no drift.
+pub(crate) const LEAST_CONTROLS: usize = 3;
+
+/// So many degrees of freedom at most: deviations have heavier tails than the normal distribution.
+const MOST_FREEDOM: f64 = 8.0;
+
+/// The same where both sides were measured in the same rounds, which share what is heaviest.
+const MOST_FREEDOM_IN_ROUNDS: f64 = 20.0;
+
+/// Where a time belongs to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// Times of one figure are taken by the same clock of the same kind of work.
+    pub figure: String,
+    /// Times of one scene are taken in the same rounds.
+    pub scene: String,
+    /// By which clock: what one clock makes of noise, another does not.
+    pub clock: &'static str,
+}
+
+/// A cell with equal kernels and equal work on both sides.
+#[derive(Debug, Clone, PartialEq)]
+struct Control {
+    place: Place,
+    /// Logarithm of the ratio of its times.
+    log: f64,
+    /// What the noise of its rounds makes of the square of that.
+    rounds: f64,
+}
+
+/// How far controls moved.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Drift {
+    controls: Vec<Control>,
+    /// Whether both sides were measured in the same rounds of one process.
+    in_rounds: bool,
+}
+
+impl Drift {
+    /// Of two sides that were measured in the same rounds of one process, or apart.
+    pub fn new(in_rounds: bool) -> Self {
+        Self {
+            controls: Vec::new(),
+            in_rounds,
+        }
+    }
+
+    /// One more control: the logarithm of its ratio, and the variance that its rounds say it has.
+    pub fn add(&mut self, place: Place, log: f64, rounds: f64) {
+        self.controls.push(Control { place, log, rounds });
+    }
+
+    /// All noise of a cell whose own rounds have this variance: from the controls of its figure in its rounds, or in all
+    /// rounds, whichever moved more. `None` where there are too few. A control leaves itself out.
+    pub fn of(&self, place: &Place, rounds: f64, itself: Option<f64>) -> Option<Spread> {
+        let alike = self.controls.iter();
+        let of_it = |c: &&Control| (&c.place.figure, c.place.clock) == (&place.figure, place.clock);
+        let alike = alike.filter(of_it);
+        let mut alike: Vec<&Control> = alike.collect();
+        let is_itself = |c: &&Control| c.place == *place && Some(c.log) == itself;
+        if let Some(at) = alike.iter().position(is_itself) {
+            alike.swap_remove(at);
+        }
+        let near = alike.iter().copied();
+        let near: Vec<&Control> = near.filter(|c| c.place.scene == place.scene).collect();
+        let most = match self.in_rounds {
+            true => MOST_FREEDOM_IN_ROUNDS,
+            false => MOST_FREEDOM,
+        };
+        let (near, all) = (spread(&near, rounds, most), spread(&alike, rounds, most));
+        let variance = |s: &Option<Spread>| s.map_or(-1.0, |s| s.variance);
+        match variance(&near) >= variance(&all) {
+            true => near,
+            false => all,
+        }
+    }
+
+    /// In words, figure by figure: how far they moved.
+    pub fn words(&self) -> Vec<String> {
+        let places = self.controls.iter().map(|c| &c.place);
+        let places: std::collections::BTreeSet<(&str, &str)> =
+            places.map(|place| (&*place.figure, place.clock)).collect();
+        let words = places
+            .iter()
+            .map(|(figure, clock)| self.words_of(figure, clock));
+        words.collect()
+    }
+
+    fn words_of(&self, figure: &str, clock: &str) -> String {
+        let of_it = self.controls.iter();
+        let of_it = of_it.filter(|c| (&*c.place.figure, c.place.clock) == (figure, clock));
+        let logs: Vec<f64> = of_it.map(|c| c.log).collect();
+        let least = logs.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let square = logs.iter().map(|x| x * x).sum::<f64>() / logs.len() as f64;
+        format!(
+            "{figure}: times of {} with equal kernels and work moved by {:+.1} to {:+.1} % (root mean square {:.1} %)",
+            plural(logs.len(), "cell"),
+            100.0 * least.exp_m1(),
+            100.0 * most.exp_m1(),
+            100.0 * square.sqrt()
+        )
+        .replace('-', "−")
+    }
+}
+
+/// The mean square of the logarithms, and what these rounds have beyond those of controls.
+fn spread(controls: &[&Control], own_rounds: f64, most_freedom: f64) -> Option<Spread> {
+    let count = controls.len() as f64;
+    let square = controls.iter().map(|c| c.log * c.log).sum::<f64>() / count;
+    let rounds = controls.iter().map(|c| c.rounds).sum::<f64>() / count;
+    (controls.len() >= LEAST_CONTROLS).then(|| Spread {
+        variance: square + (own_rounds - rounds).max(0.0),
+        freedom: count.min(most_freedom),
+    })
+}

@@ -1,0 +1,428 @@
+//! From two pieces of evidence to what can be said of their difference.
+
+use super::signed_rank::SignedRank;
+use super::taken::Evidence;
+use raystone_record::Interval;
+use raystone_record::figure::{Better, Figure, Shown};
+use raystone_stats::comparison::LogFigure;
+use raystone_stats::hypothesis::{capped_t_test, student_t_quantile, student_t_two_sided};
+use raystone_stats::statistics::{Spread, mean, median, variance};
+
+/// What a comparison says of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Worse by more than the effect that counts, or a new failure.
+    Worse,
+    /// The noise leaves it open, or there is no comparable figure on the other side.
+    Undecided,
+    /// Another value of something that is neither good nor bad.
+    Changed,
+    /// Better by more than the effect that counts.
+    Better,
+    /// Only the candidate has it.
+    New,
+    /// Measured once: told and not judged.
+    Told,
+    /// Equal, or known to lie within the effect that counts.
+    Same,
+}
+
+impl Verdict {
+    /// How it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Worse => "worse",
+            Self::Undecided => "undecided",
+            Self::Changed => "changed",
+            Self::Better => "better",
+            Self::New => "new",
+            Self::Told => "told",
+            Self::Same => "same",
+        }
+    }
+}
+
+/// Which differences count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effects {
+    /// Part of a time.
+    pub time: f64,
+    /// Part of an error or a discrepancy.
+    pub error: f64,
+    /// Of exponents, absolute.
+    pub exponent: f64,
+    /// Part of an exact figure; 0: any difference counts.
+    pub exact: f64,
+    /// Whether images may be other ones.
+    pub images: bool,
+}
+
+impl Default for Effects {
+    /// 2 % of times, 0.5 % of errors, 0.02 of exponents, nothing of exact figures and images.
+    fn default() -> Self {
+        Self {
+            time: 0.02,
+            error: 0.005,
+            exponent: 0.02,
+            exact: 0.0,
+            images: false,
+        }
+    }
+}
+
+/// A difference that is known with some noise. It is positive where the figure's value grew: relative for all
+/// but exponents.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The difference with its 95 % interval.
+    pub change: Interval,
+    /// Two-sided p-value of the hypothesis that there is none.
+    pub p: f64,
+    /// The effect that counts.
+    pub margin: f64,
+    /// What the interval follows from.
+    pub how: &'static str,
+}
+
+/// What two pieces of evidence say.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// A verdict that needs no statistics, with the reason.
+    Known(Verdict, String),
+    /// A verdict that needs the p-values of all others first.
+    Tested(Measured),
+}
+
+fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
+    Outcome::Known(verdict, why.into())
+}
+
+/// Probability with which an interval misses.
+pub(crate) const ALPHA: f64 = 0.05;
+
+/// Compares everything but times: what they need beside the samples is in [`TimeRatio`].
+pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -> Outcome {
+    match (a, b) {
+        (Evidence::Exact(a), Evidence::Exact(b)) => exact(figure, *a, *b, effects),
+        (Evidence::Once(a), Evidence::Once(b)) if a == b => known(Verdict::Same, ""),
+        (Evidence::Once(_), Evidence::Once(_)) => known(Verdict::Told, "measured once"),
+        (
+            Evidence::Fact {
+                text: a,
+                fails: was,
+            },
+            Evidence::Fact { text: b, fails: is },
+        ) => facts(a, b, [*was, *is]),
+        (Evidence::Summary(a, m), Evidence::Summary(b, n)) => {
+            summaries(figure, (*a, *m), (*b, *n), effects)
+        }
+        (
+            Evidence::Seeds {
+                values: a,
+                reference: r,
+            },
+            Evidence::Seeds {
+                values: b,
+                reference: s,
+            },
+        ) => seeds(figure, a, b, r == s, effects),
+        _ => known(
+            Verdict::Undecided,
+            "recorded in two ways, which cannot be compared",
+        ),
+    }
+}
+
+/// Whether more of a figure is worse (1), better (−1), or neither (0).
+fn badness(figure: &Figure) -> f64 {
+    match figure.better {
+        Better::Lower => 1.0,
+        Better::Higher => -1.0,
+        Better::Neither => 0.0,
+    }
+}
+
+/// Worse, better or changed, for a difference of this sign.
+pub(crate) fn direction(figure: &Figure, change: f64) -> Verdict {
+    match badness(figure) * change {
+        x if x > 0.0 => Verdict::Worse,
+        x if x < 0.0 => Verdict::Better,
+        _ => Verdict::Changed,
+    }
+}
+
+/// Shares of rays that hit: the one figure that ranks nothing and may not change.
+const HITS: &str = "hit-share/v1";
+
+fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
+    if a == b {
+        return known(Verdict::Same, "");
+    }
+    if !a.is_finite() || !b.is_finite() {
+        return known(Verdict::Undecided, "a value is no finite number");
+    }
+    let part = (b - a) / a.abs();
+    if part.abs() <= effects.exact {
+        return known(Verdict::Same, "within what --exact allows");
+    }
+    match figure.id == HITS {
+        true => known(Verdict::Worse, "other rays hit"),
+        false => known(direction(figure, b - a), "exact"),
+    }
+}
+
+fn facts(a: &str, b: &str, fails: [bool; 2]) -> Outcome {
+    match fails {
+        [false, true] => known(Verdict::Worse, b),
+        [true, false] => known(Verdict::Better, format!("before: {a}")),
+        _ if a == b => known(Verdict::Same, ""),
+        _ => known(Verdict::Changed, ""),
+    }
+}
+
+/// The effect that counts, and whether differences of the figure are relative.
+fn margin_of(figure: &Figure, effects: &Effects) -> (f64, bool) {
+    match figure.shown {
+        Shown::Exponent => (effects.exponent, false),
+        _ => (effects.error, true),
+    }
+}
+
+/// Values by seed. With the same seeds and the same reference pairs are tested, else two samples.
+fn seeds(
+    figure: &Figure,
+    a: &[(u32, f64)],
+    b: &[(u32, f64)],
+    same_reference: bool,
+    effects: &Effects,
+) -> Outcome {
+    if a == b {
+        return known(Verdict::Same, "equal for every seed");
+    }
+    let (margin, relative) = margin_of(figure, effects);
+    let values = |of: &[(u32, f64)]| of.iter().map(|(_, x)| *x).collect::<Vec<f64>>();
+    let (old, new) = (values(a), values(b));
+    let unit = match (relative, mean(&old)) {
+        (false, _) => 1.0,
+        (true, Some(mean)) if mean != 0.0 => mean.abs(),
+        _ => return known(Verdict::Undecided, "the base is 0 or no number"),
+    };
+    let paired = a.iter().map(|(s, _)| s).eq(b.iter().map(|(s, _)| s));
+    match (old.len().min(new.len()), paired && same_reference) {
+        (0 | 1, _) => known(
+            Verdict::Undecided,
+            "one image, of whose spread nothing is known",
+        ),
+        (_, true) => {
+            let gaps: Vec<f64> = old.iter().zip(&new).map(|(x, y)| (y - x) / unit).collect();
+            pairs(&gaps, margin)
+        }
+        (_, false) => two_samples(&old, &new, unit, margin, same_reference),
+    }
+}
+
+fn pairs(gaps: &[f64], margin: f64) -> Outcome {
+    let Some(test) = SignedRank::new(gaps) else {
+        return known(Verdict::Undecided, "a value is no finite number");
+    };
+    let [low, high] = test.interval(ALPHA);
+    Outcome::Tested(Measured {
+        change: Interval {
+            value: test.estimate(),
+            low,
+            high,
+        },
+        p: test.p(),
+        margin,
+        how: "pairs of equal seeds",
+    })
+}
+
+fn two_samples(old: &[f64], new: &[f64], unit: f64, margin: f64, same_reference: bool) -> Outcome {
+    if !same_reference {
+        return known(
+            Verdict::Undecided,
+            "the references differ, and what is measured against them shares their noise",
+        );
+    }
+    let Some(test) = capped_t_test(new, old, 0.0) else {
+        return known(Verdict::Undecided, "a value is no finite number");
+    };
+    let gap = (mean(new).unwrap_or(f64::NAN) - mean(old).unwrap_or(f64::NAN)) / unit;
+    let half = student_t_quantile(ALPHA, test.degrees_of_freedom) * test.standard_error / unit;
+    Outcome::Tested(Measured {
+        change: Interval {
+            value: gap,
+            low: gap - half,
+            high: gap + half,
+        },
+        p: test.p,
+        margin,
+        how: "two samples of different seeds",
+    })
+}
+
+/// Intervals whose samples are not kept, of about Student's distribution.
+fn summaries(
+    figure: &Figure,
+    a: (Interval, f64),
+    b: (Interval, f64),
+    effects: &Effects,
+) -> Outcome {
+    if a.0 == b.0 {
+        return known(Verdict::Same, "");
+    }
+    let (margin, relative) = margin_of(figure, effects);
+    let unit = if relative { a.0.value.abs() } else { 1.0 };
+    let spread = |(i, freedom): (Interval, f64)| Spread {
+        variance: (0.5 * (i.high - i.low) / unit / student_t_quantile(ALPHA, freedom)).powi(2),
+        freedom,
+    };
+    let together = Spread::together(&[spread(a), spread(b)]);
+    if unit == 0.0 || !together.variance.is_finite() || together.variance == 0.0 {
+        return known(Verdict::Undecided, "nothing is known of its spread");
+    }
+    let gap = (b.0.value - a.0.value) / unit;
+    Outcome::Tested(student(gap, together, margin, "two intervals"))
+}
+
+/// Student's test and interval.
+fn student(gap: f64, spread: Spread, margin: f64, how: &'static str) -> Measured {
+    let half = student_t_quantile(ALPHA, spread.freedom) * spread.variance.sqrt();
+    Measured {
+        change: Interval {
+            value: gap,
+            low: gap - half,
+            high: gap + half,
+        },
+        p: match gap == 0.0 {
+            true => 1.0,
+            false => student_t_two_sided(gap / spread.variance.sqrt(), spread.freedom),
+        },
+        margin,
+        how,
+    }
+}
+
+/// What stands for a clock where two programs were run in turns.
+pub const IN_TURNS: &str = "processes in turns";
+
+/// Logarithm of the ratio of two times, with the noise of their rounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeRatio {
+    /// Natural logarithm of candidate over base.
+    pub log: f64,
+    /// What the rounds say of its noise.
+    pub rounds: Spread,
+    /// Logarithm for each round, where both were measured in the same ones.
+    pub by_round: Vec<f64>,
+    /// By which clock, in words.
+    pub clock: &'static str,
+}
+
+impl TimeRatio {
+    /// Of the times of two cells. Rounds are paired if both were measured in the same ones, in which so many compilations of each
+    /// side took turns.
+    pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool, compilations: usize) -> Option<Self> {
+        let (
+            Evidence::Times {
+                adapter: a,
+                processors: c,
+            },
+            Evidence::Times {
+                adapter: b,
+                processors: d,
+            },
+        ) = (a, b)
+        else {
+            return None;
+        };
+        let (a, b, clock) = match c.is_empty() || d.is_empty() {
+            true => (a, b, "adapter time"),
+            false => (
+                c,
+                d,
+                "processor time (the values are by the adapter's clock)",
+            ),
+        };
+        match in_rounds && a.len() == b.len() {
+            true => {
+                let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
+                let ratio = Self::of_rounds(&ratios, clock)?;
+                Some(ratio.of_compilations(compilations))
+            }
+            false => Self::of_samples(LogFigure::of_times(a)?, LogFigure::of_times(b)?, clock),
+        }
+    }
+
+    /// Of the ratios of both in the same rounds.
+    pub fn of_rounds(ratios: &[f64], clock: &'static str) -> Option<Self> {
+        let figure = LogFigure::of_times(ratios)?;
+        Some(Self {
+            by_round: ratios.iter().map(|x| x.ln()).collect(),
+            log: figure.log,
+            rounds: Spread::together(&figure.own),
+            clock,
+        })
+    }
+
+    /// Where each side was compiled so often, and round r is of compilation r modulo that: rounds of one compilation share what its
+    /// code has by chance, so that as many compilations, not rounds, may be all that is known of the noise.
+    fn of_compilations(mut self, count: usize) -> Self {
+        let of = |k: usize| {
+            let rounds = self.by_round.iter().skip(k).step_by(count.max(1));
+            median(&rounds.copied().collect::<Vec<_>>())
+        };
+        let medians: Option<Vec<f64>> = (0..count).map(of).collect();
+        if let Some(variance) = medians.and_then(|medians| variance(&medians)) {
+            let variance = variance / count as f64;
+            if variance > self.rounds.variance {
+                self.rounds = Spread {
+                    variance,
+                    freedom: count as f64 - 1.0,
+                };
+            }
+        }
+        self
+    }
+
+    fn of_samples(a: LogFigure, b: LogFigure, clock: &'static str) -> Option<Self> {
+        let log = b.log - a.log;
+        log.is_finite().then(|| Self {
+            log,
+            rounds: Spread::together(&[a.own, b.own].concat()),
+            by_round: Vec::new(),
+            clock,
+        })
+    }
+
+    /// The difference of a figure, given the noise of what did not change; without it that of the rounds. Rounds of both
+    /// together also have to pass the permutation test.
+    pub fn measured(&self, figure: &Figure, noise: Option<Spread>, margin: f64) -> Measured {
+        let spread = noise.unwrap_or(self.rounds);
+        let how = match (self.by_round.is_empty(), noise.is_some()) {
+            (true, _) => "two runs, widened by what did not change",
+            (false, true) => "the same rounds, widened by what did not change",
+            (false, false) => "the same rounds",
+        };
+        let mut measured = student(self.log, spread, margin, how);
+        if !self.by_round.is_empty() {
+            let test = SignedRank::new(&self.by_round);
+            let p = test.map_or(1.0, |test| test.p());
+            measured.p = measured.p.max(p);
+        }
+        // Of a rate it is the inverse.
+        let Interval { value, low, high } = measured.change;
+        let [value, low, high] = match figure.better {
+            Better::Higher => [-value, -high, -low],
+            _ => [value, low, high],
+        };
+        measured.change = Interval {
+            value: value.exp_m1(),
+            low: low.exp_m1(),
+            high: high.exp_m1(),
+        };
+        measured
+    }
+}

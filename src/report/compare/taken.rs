@@ -1,0 +1,482 @@
+//! What a side says, figure by figure, with the evidence behind it: raw samples where the records keep them.
+
+use super::Identity;
+use super::facts::{BIAS, fact, facts};
+use super::side::Side;
+use crate::data::{RunData, SceneGroup, View};
+use crate::samplers::{FURTHER_METRICS, MeasuredSampler, Metric};
+use crate::values::{Reading, Value, values};
+use crate::{failed_checks, format};
+use raystone_record::figure::{Figure, Spread};
+use raystone_record::*;
+use raystone_stats::statistics::{log_log_fit, mean};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a figure rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Evidence {
+    /// It is counted or computed: any difference is one.
+    Exact(f64),
+    /// Milliseconds of the same work in the order measured, round by round.
+    Times {
+        /// By the adapter's clock, or the wall clock where it has none.
+        adapter: Vec<f64>,
+        /// Of all threads of the process together, in which others on the machine do not count; empty where that is not
+        /// what the adapter computes with.
+        processors: Vec<f64>,
+    },
+    /// A value for each seed, whose mean is the figure.
+    Seeds {
+        /// Seed and value; of a figure that is no mean, the jackknife's pseudo-values (Tukey 1958).
+        values: Vec<(u32, f64)>,
+        /// What they were held against.
+        reference: String,
+    },
+    /// No more than an interval that is about Student's with so many degrees of freedom.
+    Summary(Interval, f64),
+    /// A number that was measured once.
+    Once(f64),
+    /// A verdict or a hash.
+    Fact {
+        /// What it says.
+        text: String,
+        /// Whether that is a failure.
+        fails: bool,
+    },
+}
+
+/// A figure of a cell with its evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// What it is of.
+    pub key: Key,
+    /// Its row in the table of figures.
+    pub figure: Figure,
+    /// The value as it is shown.
+    pub shown: String,
+    /// What it rests on.
+    pub evidence: Evidence,
+    /// What must be the same for two values to be of the same work.
+    pub work: String,
+    /// `run.seed`, where it is of rays, pictures or tests of that seed alone: with another it is another sample of the same.
+    pub seed: Option<i64>,
+    /// Hash of the kernels that ran; empty where none is recorded.
+    pub kernel: String,
+}
+
+impl Taken {
+    /// What tells it from all others: labels, since programs of different versions may know different parameters.
+    pub fn identity(&self) -> Identity {
+        let labels: Vec<String> = self.key.labels().map(|(a, l)| format!("{a}={l}")).collect();
+        (labels.join("\u{1}"), self.figure.id.to_string())
+    }
+}
+
+/// Figures that follow from others, or hold times beside what they are of: they are told by reports and decide nothing.
+const DERIVED: [&str; 24] = [
+    "build-rate/v1",
+    "bytes-per-triangle/v1",
+    "references-per-triangle/v1",
+    "cell-mrays-per-s/v1",
+    "against-single-kernel/v1",
+    "order-ratio/v1",
+    "time-to-image/v1",
+    "error-seconds/v1",
+    "error-at-time/v1",
+    "spp-to-error/v1",
+    "seconds-to-error/v1",
+    "break-even/v1",
+    "specialisation/v1",
+    "ray-query-share/v1",
+    "compaction-melements-per-s/v1",
+    "compaction-gb-per-s/v1",
+    "compaction-ratio/v1",
+    "cpu-ns-per-ray/v1",
+    "cpu-over-peer/v1",
+    "peer-mrays-per-s/v1",
+    "frame-time-ratio/v1",
+    "frame-break-even/v1",
+    "loop-ns/v1",
+    "rays/v1",
+];
+
+/// Figures of cells that the seed of the run changes, beside those of its rays: what is counted in one picture of that seed, or
+/// timed of it.
+const OF_ONE_SEED: [&str; 12] = [
+    "ms-per-spp/v1",
+    "ray-query-share/v1",
+    "primary-other-triangle/v1",
+    "primary-other-value/v1",
+    "primary-mean-difference/v1",
+    "primary-rms-difference/v1",
+    "compaction-ns/v1",
+    "frame-judged/v1",
+    "frame-nodes-ratio/v1",
+    "neighbour-angle/v1",
+    "coverage/v1",
+    "image/v1",
+];
+
+/// Fewer degrees of freedom say too little of the spread of means over seeds to compare those of other seeds.
+const FEWEST_FREE: f64 = 7.0;
+
+/// Whether a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by seed, and
+/// structures know none.
+fn is_of_one_seed(taken: &Taken) -> bool {
+    if let Evidence::Summary(_, freedom) = taken.evidence
+        && freedom < FEWEST_FREE
+    {
+        return true;
+    }
+    let of_seeds = matches!(
+        taken.evidence,
+        Evidence::Seeds { .. } | Evidence::Summary(..)
+    );
+    let of_rays = !taken.key.label(axis::RAYS).is_empty();
+    !of_seeds && (of_rays || OF_ONE_SEED.contains(&&*taken.figure.id))
+}
+
+/// A check of the run that failed.
+const CHECK: &str = "check/v1";
+
+/// Whether a figure follows from others; those of the check for bias do, which has a verdict.
+fn is_derived(id: &str) -> bool {
+    DERIVED.contains(&id) || id.starts_with("bias-") || id.starts_with("growth-")
+}
+
+/// Everything that a side says.
+pub fn taken(side: &Side) -> Vec<Taken> {
+    of_lines(&side.lines)
+}
+
+/// Names of what a side says in two ways that contradict each other: of two lines on one thing a report takes the later
+/// one, a comparison neither.
+pub(crate) fn contradictions(side: &Side) -> Vec<Identity> {
+    if !repeats(&side.lines) {
+        return Vec::new();
+    }
+    let turned: Vec<Line> = side.lines.iter().rev().cloned().collect();
+    let by_identity = |all: Vec<Taken>| -> BTreeMap<Identity, Evidence> {
+        let pairs = all.into_iter().map(|t| (t.identity(), t.evidence));
+        pairs.collect()
+    };
+    let earlier = by_identity(of_lines(&turned));
+    let of_record = |e: &Evidence| !matches!(e, Evidence::Times { .. } | Evidence::Once(_));
+    let later = by_identity(of_lines(&side.lines)).into_iter();
+    // A check tells what others say, in their order.
+    let differing = later.filter(|((_, figure), _)| figure != CHECK);
+    let differing = differing.filter(|(id, evidence)| {
+        let other = earlier.get(id);
+        of_record(evidence) && other.is_some_and(|other| !is_like(other, evidence))
+    });
+    differing.map(|(id, _)| id).collect()
+}
+
+/// Whether two lines are on the same thing, as far as keys tell.
+fn repeats(lines: &[Line]) -> bool {
+    let mut seen = BTreeSet::new();
+    // What has no key is of the run, and of cells and modules, of which there are many.
+    let is_new = |line: &Line| {
+        if line.key.is_empty() {
+            return true;
+        }
+        let number = match &line.body {
+            Body::Error(record) => record.replicate,
+            Body::Stream(record) => record.dimensions[0] << 16 | record.dimensions[1],
+            Body::Skipped(_) | Body::Failed(_) | Body::Warning(_) => return true,
+            _ => 0,
+        };
+        let kind = std::mem::discriminant(&line.body);
+        seen.insert((line.key.to_string(), format!("{kind:?}"), number))
+    };
+    !lines.iter().all(is_new)
+}
+
+/// Whether two evidences are equal but for the order of seeds and the rounding of their sums.
+fn is_like(a: &Evidence, b: &Evidence) -> bool {
+    let near = |x: f64, y: f64| x == y || (x - y).abs() <= 1e-9 * x.abs().max(y.abs());
+    match (a, b) {
+        (Evidence::Seeds { values: a, .. }, Evidence::Seeds { values: b, .. }) => {
+            let of = |seed: u32| a.iter().find(|(s, _)| *s == seed).map(|(_, x)| *x);
+            a.len() == b.len() && b.iter().all(|(s, y)| of(*s).is_some_and(|x| near(x, *y)))
+        }
+        (Evidence::Summary(a, _), Evidence::Summary(b, _)) => near(a.value, b.value),
+        (Evidence::Exact(a), Evidence::Exact(b)) => near(*a, *b),
+        (Evidence::Fact { text: a, .. }, Evidence::Fact { text: b, .. }) => a == b,
+        _ => true,
+    }
+}
+
+/// Whether it is a test's verdict, which other seeds may turn.
+fn is_a_chance(taken: &Taken) -> bool {
+    [CHECK, BIAS].contains(&&*taken.figure.id)
+}
+
+fn of_lines(lines: &[Line]) -> Vec<Taken> {
+    let data = RunData::new(lines);
+    let raw = raw(&data);
+    let mut all: Vec<Taken> = values(&data)
+        .into_iter()
+        .filter(|value| !is_derived(&value.figure.id))
+        .filter_map(|value| of_value(&data, &raw, &value))
+        .collect();
+    all.extend(facts(&data));
+    let failed = failed_checks(lines).into_iter();
+    all.extend(failed.map(|text| {
+        let (title, detail) = text.split_once(": ").unwrap_or((&text, ""));
+        let key = Key::default().with(axis::SUBJECT, title);
+        fact(&key, CHECK, "check of the run", detail, true)
+    }));
+    let seed = data.run.and_then(RunRecord::seed);
+    for taken in all
+        .iter_mut()
+        .filter(|t| is_of_one_seed(t) || is_a_chance(t))
+    {
+        taken.seed = seed;
+    }
+    all
+}
+
+type Raw = BTreeMap<Identity, Taken>;
+
+fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
+    let number = match value.reading {
+        Reading::Known(interval) | Reading::HeavyTailed(interval) => interval,
+        Reading::Below(bound) => Interval {
+            value: bound,
+            low: 0.0,
+            high: bound,
+        },
+        Reading::Word(_) => return None,
+    };
+    let mut own = Taken {
+        key: value.key.clone(),
+        figure: value.figure.clone().into_owned(),
+        shown: value.cell().text,
+        evidence: match value.figure.spread {
+            Spread::Exact => Evidence::Exact(number.value),
+            Spread::Single => Evidence::Once(number.value),
+            // Times whose rounds are not kept.
+            Spread::Median => Evidence::Once(number.value),
+            Spread::Mean | Spread::Jackknife => of_means(data, value, number),
+        },
+        work: scene_hash(data, &value.key),
+        seed: None,
+        kernel: String::new(),
+    };
+    let (cell, id) = own.identity();
+    // Counters are of the rays that were timed.
+    let of_rays = raw.get(&(cell.clone(), "mrays-per-s/v1".into()));
+    let sampled = raw.get(&(cell, id));
+    // Seeds that have missed the pixel that decides agree with each other by that: with one degree of freedom, what differs is undecided.
+    if value.is_heavy_tailed() {
+        own.evidence = Evidence::Summary(number, 1.0);
+    } else if let Some(sampled) = sampled {
+        own.evidence = sampled.evidence.clone();
+    }
+    if let Some(sampled) = sampled.or(of_rays) {
+        own.work += &sampled.work;
+        own.kernel.clone_from(&sampled.kernel);
+    }
+    Some(own)
+}
+
+/// Means over seeds whose values are not kept. What no seed changes is exact.
+fn of_means(data: &RunData, value: &Value, number: Interval) -> Evidence {
+    let key = &value.key;
+    let is_it = |stream: &&Recorded<StreamRecord>| {
+        let own = [axis::SEQUENCE, axis::DECORRELATION];
+        stream.key.agrees(key, &own) && !key.label(axis::DIMENSIONS).is_empty()
+    };
+    match data.streams.iter().find(is_it) {
+        Some(stream) if !stream.randomised => Evidence::Exact(number.value),
+        Some(stream) => Evidence::Summary(number, stream.seeds.saturating_sub(1).max(1) as f64),
+        // A spectrum: the replicates of its sampler.
+        None => {
+            let replicates = data.views().flat_map(|(_, view)| &view.samplers);
+            let fewest = replicates
+                .map(|s| s.replicates.len())
+                .filter(|n| *n > 1)
+                .min();
+            Evidence::Summary(number, fewest.unwrap_or(2) as f64 - 1.0)
+        }
+    }
+}
+
+fn scene_hash(data: &RunData, key: &Key) -> String {
+    let scene = data
+        .scenes
+        .iter()
+        .find(|s| s.name == key.label(axis::SCENE));
+    let record = scene.and_then(|scene| scene.record);
+    record.map_or(String::new(), |r| format!("scene {}; ", r.scene_hash))
+}
+
+/// Raw samples by identity.
+fn raw(data: &RunData) -> Raw {
+    let mut all = Vec::new();
+    for scene in &data.scenes {
+        all.extend(of_structures(scene));
+        for view in &scene.views {
+            all.extend(of_times(view));
+            all.extend(view.samplers.iter().flat_map(|s| of_sampler(view, s)));
+        }
+    }
+    let compactions = data.compactions.iter();
+    all.extend(compactions.filter(|c| !c.ms.is_empty()).map(|c| {
+        let work = format!("{} elements of {} bytes", c.elements, c.bytes);
+        let times = times(&c.ms, &[]);
+        sample(c.key, "compaction-ns/v1", times, work, &c.ran.kernel_hash)
+    }));
+    all.into_iter().map(|t| (t.identity(), t)).collect()
+}
+
+fn sample(key: &Key, id: &str, evidence: Evidence, work: String, kernel: &str) -> Taken {
+    Taken {
+        key: key.clone(),
+        figure: raystone_record::figure::figure(id).clone(),
+        shown: String::new(),
+        evidence,
+        work,
+        seed: None,
+        kernel: kernel.to_owned(),
+    }
+}
+
+fn times(ms: &[f64], cpu_ms: &[f64]) -> Evidence {
+    Evidence::Times {
+        adapter: ms.to_vec(),
+        processors: cpu_ms.to_vec(),
+    }
+}
+
+fn of_structures(scene: &SceneGroup) -> Vec<Taken> {
+    let of = |s: &crate::data::Measured<StructureRecord>| -> Vec<Taken> {
+        let of_class = |t: &ClassTiming| {
+            let key = s.key.clone().with(axis::RAYS, format::ray_class(t.class));
+            let times = times(&t.ms, &t.cpu_ms);
+            let work = format!("{} rays", t.rays);
+            sample(&key, "mrays-per-s/v1", times, work, &s.ran.kernel_hash)
+        };
+        s.timings.iter().map(of_class).collect()
+    };
+    scene.structures.iter().flat_map(of).collect()
+}
+
+fn of_times(view: &View) -> Vec<Taken> {
+    let of = |time: &crate::data::Measured<TimeRecord>| {
+        let [width, height] = time.resolution;
+        let work = format!("{width} × {height} pixels, {} spp", time.spp);
+        let times = times(&time.ms, &time.cpu_ms);
+        sample(
+            &time.key,
+            "ms-per-spp/v1",
+            times,
+            work,
+            &time.ran.kernel_hash,
+        )
+    };
+    view.valid_times().map(of).collect()
+}
+
+fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Vec<Taken> {
+    let reference = match view.reference {
+        None => "none".into(),
+        Some(r) => format!(
+            "{} spp, mean {:e}, MSE {:?}, {:?}",
+            r.spp, r.mean, r.mse, r.file
+        ),
+    };
+    let work = sampler.replicates.first().map_or(String::new(), |r| {
+        format!("{} × {} pixels", r.resolution[0], r.resolution[1])
+    });
+    let seeds = |values: Vec<f64>| -> Option<Evidence> {
+        let whole =
+            values.len() == sampler.replicates.len() && values.iter().all(|x| x.is_finite());
+        let seeds = sampler.replicates.iter().map(|r| r.seed);
+        let mut values: Vec<(u32, f64)> = seeds.zip(values).collect();
+        values.sort_by_key(|(seed, _)| *seed);
+        whole.then(|| Evidence::Seeds {
+            values,
+            reference: reference.clone(),
+        })
+    };
+    let mut all = Vec::new();
+    let mut put = |key: &Key, id: &str, values: Vec<f64>| {
+        let evidence = seeds(values);
+        all.extend(evidence.map(|e| sample(key, id, e, work.clone(), "")));
+    };
+    let at = |spp: u32, id: &str| -> Vec<f64> {
+        let errors = sampler.replicates.iter();
+        let errors = errors.filter_map(|r| r.errors.iter().find(|e| e.spp == spp));
+        errors.filter_map(|e| e.metrics.get(id).copied()).collect()
+    };
+    for metric in [Metric::RelMse, Metric::Rmse] {
+        let Some(id) = sampler.metric_id(metric) else {
+            continue;
+        };
+        let errors = sampler.mean_errors(metric);
+        for error in &errors {
+            let key = sampler.key.clone().with(axis::SPP, error.spp);
+            let values = at(error.spp, id);
+            let root = |values: &[f64]| mean(values).map_or(f64::NAN, f64::sqrt);
+            put(
+                &key,
+                metric.figure(),
+                match metric {
+                    Metric::RelMse => values,
+                    Metric::Rmse => pseudo_values(&values, root),
+                },
+            );
+        }
+        let fitted: Vec<u32> = errors
+            .iter()
+            .filter(|e| e.resolved)
+            .map(|e| e.spp)
+            .collect();
+        let curves: Vec<Vec<f64>> = fitted.iter().map(|spp| at(*spp, id)).collect();
+        put(
+            &sampler.key,
+            metric.slope_figure(),
+            slopes(metric, &fitted, &curves),
+        );
+    }
+    if let Some(spp) = sampler.highest_spp() {
+        let key = sampler.key.clone().with(axis::SPP, spp);
+        FURTHER_METRICS
+            .iter()
+            .for_each(|(figure, id)| put(&key, figure, at(spp, id)));
+    }
+    all
+}
+
+/// What each value brings to an estimate: n times it less n − 1 times that without the value.
+fn pseudo_values(values: &[f64], estimate: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    let n = values.len() as f64;
+    let all = estimate(values);
+    let without = raystone_stats::statistics::leave_one_out(values);
+    match values.len() {
+        0 | 1 => vec![all; values.len()],
+        _ => without
+            .map(|rest| n * all - (n - 1.0) * estimate(&rest))
+            .collect(),
+    }
+}
+
+/// Pseudo-values of the slope of the mean error over samples per pixel; empty where some replicates lack some.
+fn slopes(metric: Metric, spps: &[u32], curves: &[Vec<f64>]) -> Vec<f64> {
+    let n = curves.first().map_or(0, Vec::len);
+    if curves.iter().any(|values| values.len() != n) {
+        return Vec::new();
+    }
+    let power = if metric == Metric::Rmse { 0.5 } else { 1.0 };
+    let replicates: Vec<f64> = (0..n).map(|i| i as f64).collect();
+    pseudo_values(&replicates, |kept| {
+        let at = |(spp, values): (&u32, &Vec<f64>)| {
+            let kept: Vec<f64> = kept.iter().map(|i| values[*i as usize]).collect();
+            (f64::from(*spp), mean(&kept).unwrap_or(f64::NAN))
+        };
+        let points: Vec<(f64, f64)> = spps.iter().zip(curves).map(at).collect();
+        log_log_fit(&points).map_or(f64::NAN, |slope| power * slope)
+    })
+}

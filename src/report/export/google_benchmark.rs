@@ -1,0 +1,72 @@
+//! JSON as Google Benchmark's `--benchmark_format=json` writes it
+//! (<https://github.com/google/benchmark/blob/main/docs/user_guide.md>): every round is a repetition, which
+//! `compare.py` tests with Mann and Whitney's U.
+
+use super::samples::Samples;
+use super::{Exported, Source, name, pretty};
+use crate::format;
+use serde_json::{Value as Json, json};
+
+/// Nanoseconds of a millisecond: `compare.py` prints whole numbers.
+const NS: f64 = 1e6;
+
+pub(super) fn write(source: &Source) -> Exported {
+    let rows = source.samples.iter().enumerate();
+    let benchmarks: Vec<Json> = rows
+        .flat_map(|(family, s)| repetitions(family, s))
+        .collect();
+    Exported {
+        text: pretty(&json!({ "context": context(source), "benchmarks": benchmarks })),
+        left_out: Vec::new(),
+    }
+}
+
+fn context(source: &Source) -> Json {
+    let mut context = json!({ "json_schema_version": 1, "executable": "raystone" });
+    if let Some(run) = source.run() {
+        let machine = &run.environment;
+        context["date"] = json!(format::utc(run.started_unix_s));
+        context["num_cpus"] = json!(machine.cpu_threads);
+        context["library_version"] = json!(machine.version);
+        context["run"] = json!(run.name);
+        context["adapter"] = json!(machine.adapter);
+        context["driver"] = json!(format!("{} {}", machine.driver, machine.driver_info));
+        context["cpu"] = json!(machine.cpu);
+        context["commit"] = json!(machine.commit);
+    }
+    context
+}
+
+/// A repetition for each round. The format wants a time of the processors: where none was measured, it is
+/// that of the wall clock, or of the only clock, and the label says so.
+fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
+    let name = name(samples.figure, &samples.key);
+    let (cpu_ms, label) = match (&samples.cpu_ms, &samples.wall_ms) {
+        (cpu, _) if cpu.len() == samples.ms.len() => (cpu, "cpu_time: processors, all threads"),
+        (_, wall) if wall.len() == samples.ms.len() => (wall, "cpu_time: the wall clock"),
+        _ => (&samples.ms, "cpu_time: the same as real_time"),
+    };
+    let rounds = samples.ms.iter().zip(cpu_ms).enumerate();
+    let repetition = |(index, (ms, cpu_ms)): (usize, (&f64, &f64))| {
+        let mut entry = json!({
+            "name": name,
+            "family_index": family,
+            "per_family_instance_index": 0,
+            "run_name": name,
+            "run_type": "iteration",
+            "repetitions": samples.ms.len(),
+            "repetition_index": index,
+            "threads": 1,
+            "iterations": 1,
+            "real_time": ms * NS,
+            "cpu_time": cpu_ms * NS,
+            "time_unit": "ns",
+            "label": label,
+        });
+        if let Some(rays) = samples.rays.filter(|_| *ms > 0.0) {
+            entry["items_per_second"] = json!(rays as f64 / (ms * 1e-3));
+        }
+        entry
+    };
+    rounds.map(repetition).collect()
+}

@@ -1,0 +1,218 @@
+//! Figures, times, checks and images of a run for other tools: a file and a line of [`FORMATS`] for each format.
+//! All numbers are those of the one table of figures ([`crate::values`]) or raw times ([`samples`]).
+
+mod bencher;
+mod github;
+mod google_benchmark;
+mod hyperfine;
+mod json;
+mod junit;
+mod latex;
+mod npy;
+pub mod samples;
+mod schema;
+pub mod select;
+mod tables;
+
+pub use json::{OUTPUT_SCHEMA, checks_json, values_json};
+pub use schema::record_schema;
+
+use crate::data::RunData;
+use crate::values::{self, Reading, Value};
+use raystone_image::ImageError;
+use raystone_record::figure::Better;
+use raystone_record::{Line, RunRecord};
+use select::Selection;
+use std::path::{Path, PathBuf};
+
+/// What is exported: the records of one run, and the figures and times that were asked for.
+pub struct Source<'a> {
+    /// The run's folder.
+    pub dir: &'a Path,
+    /// The records, sorted.
+    pub data: RunData<'a>,
+    /// The chosen figures.
+    pub values: Vec<Value<'a>>,
+    /// The chosen raw times.
+    pub samples: Vec<samples::Samples>,
+}
+
+impl<'a> Source<'a> {
+    /// The records of the run in `dir`, and what is chosen of them.
+    ///
+    /// # Errors
+    /// A choice that nothing fits.
+    pub fn new(dir: &'a Path, lines: &'a [Line], choice: &Selection) -> Result<Self, ExportError> {
+        let data = RunData::new(lines);
+        let values = choice.of(values::values(&data))?;
+        let mut samples = samples::samples(&data);
+        samples.retain(|s| choice.keeps(&s.key, s.figure));
+        Ok(Self {
+            dir,
+            data,
+            values,
+            samples,
+        })
+    }
+
+    /// First line of the run, if it was written.
+    fn run(&self) -> Option<&'a RunRecord> {
+        self.data.run
+    }
+}
+
+/// What a format of text made of a run.
+#[derive(Debug, Default, PartialEq)]
+pub struct Exported {
+    /// The file.
+    pub text: String,
+    /// What the format has no place for, in words.
+    pub left_out: Vec<String>,
+}
+
+/// How a format is written.
+pub enum Writer {
+    /// As one text.
+    Text(fn(&Source) -> Exported),
+    /// As files in a folder: how many.
+    Folder(fn(&Source, &Path) -> Result<usize, ExportError>),
+}
+
+/// A format.
+pub struct Format {
+    /// What it is called on the command line.
+    pub name: &'static str,
+    /// One line: what it holds, and who reads it.
+    pub description: &'static str,
+    /// Ending of its files, without the dot.
+    pub ending: &'static str,
+    /// Whether it holds what `--figure` and `--only` choose among.
+    pub selective: bool,
+    /// What writes it.
+    pub write: Writer,
+}
+
+impl Format {
+    const fn text(
+        name: &'static str,
+        ending: &'static str,
+        description: &'static str,
+        write: fn(&Source) -> Exported,
+    ) -> Self {
+        Self {
+            name,
+            description,
+            ending,
+            selective: true,
+            write: Writer::Text(write),
+        }
+    }
+
+    const fn of_all(mut self) -> Self {
+        self.selective = false;
+        self
+    }
+}
+
+/// All formats.
+#[rustfmt::skip]
+pub static FORMATS: [Format; 11] = [
+    Format::text("csv", "csv", "every figure, a line each, with a column for each axis", tidy_csv),
+    Format::text("json", "json", "every figure as JSON, in the shape of `--json`", json::write),
+    Format::text("bencher", "json", "Bencher Metric Format, for `bencher run --adapter json`", bencher::write),
+    Format::text("github-bigger-is-better", "json", "figures that rank upwards, for github-action-benchmark's customBiggerIsBetter", github::bigger),
+    Format::text("github-smaller-is-better", "json", "figures that rank downwards, for github-action-benchmark's customSmallerIsBetter", github::smaller),
+    Format::text("google-benchmark", "json", "raw times as repetitions, as Google Benchmark writes them, for its compare.py", google_benchmark::write),
+    Format::text("hyperfine", "json", "raw times in seconds, as `hyperfine --export-json` writes them", hyperfine::write),
+    Format::text("junit", "xml", "gates, judged paths and checks as test cases", junit::write).of_all(),
+    Format::text("markdown", "md", "a table for each figure", tables::markdown),
+    Format::text("latex", "tex", "a table for each figure, with booktabs", latex::write),
+    Format { name: "npy", description: "linear images of a run made with --images, as NumPy arrays [height, width, 3] of f32", ending: "npy", selective: false, write: Writer::Folder(npy::write) },
+];
+
+/// Why a run cannot be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// A choice fits nothing.
+    #[error("{0}")]
+    Choice(String),
+    /// The run kept no linear images.
+    #[error("{} holds no linear images; `raystone run --images npy` keeps them", .0.display())]
+    NoImages(PathBuf),
+    /// A folder cannot be read or made.
+    #[error("cannot use the folder {}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// An image cannot be read or written.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+}
+
+fn tidy_csv(source: &Source) -> Exported {
+    Exported {
+        text: values::csv(&source.values),
+        left_out: Vec::new(),
+    }
+}
+
+/// A name that tells a figure or time from all others, in the way of Google Benchmark's named arguments:
+/// `mrays-per-s/v1/scene:cornell-box/accel:bvh/rays:primary`.
+fn name(figure: &str, key: &raystone_record::Key) -> String {
+    let part = |(axis, label): (&str, &str)| format!("/{axis}:{label}");
+    figure.to_owned() + &key.labels().map(part).collect::<String>()
+}
+
+/// A value that is a number.
+struct Number<'v, 'a> {
+    value: &'v Value<'a>,
+    at: f64,
+    /// Ends of the interval, if it has a width.
+    bounds: Option<[f64; 2]>,
+}
+
+/// The values that are numbers and rank in one of these directions, and what they leave out, in words.
+fn numbers<'v, 'a>(
+    values: &'v [Value<'a>],
+    directions: &[Better],
+) -> (Vec<Number<'v, 'a>>, Vec<String>) {
+    let (mut numbers, mut below, mut words, mut other_way) = (Vec::new(), 0, 0, 0);
+    for value in values {
+        match value.reading {
+            _ if !directions.contains(&value.figure.better) => other_way += 1,
+            Reading::Known(i) if i.value.is_finite() => {
+                let bounds = [i.low, i.high];
+                let has_width = i.low < i.high && bounds.iter().all(|end| end.is_finite());
+                numbers.push(Number {
+                    value,
+                    at: i.value,
+                    bounds: has_width.then_some(bounds),
+                });
+            }
+            // A point without the bounds that are not to be trusted.
+            Reading::HeavyTailed(i) if i.value.is_finite() => numbers.push(Number {
+                value,
+                at: i.value,
+                bounds: None,
+            }),
+            Reading::Below(_) => below += 1,
+            Reading::Known(_) | Reading::HeavyTailed(_) | Reading::Word(_) => words += 1,
+        }
+    }
+    let told = [
+        (below, "known only to lie below a bound"),
+        (words, "without a number"),
+        (other_way, "of figures that do not rank in this direction"),
+    ];
+    let told = told.into_iter().filter(|(count, _)| *count > 0);
+    let left_out = told.map(|(count, why)| format!("{count} of {} values, {why}", values.len()));
+    (numbers, left_out.collect())
+}
+
+/// JSON as it stands in a file.
+fn pretty(value: &serde_json::Value) -> String {
+    format!("{value:#}\n")
+}

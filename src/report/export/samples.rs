@@ -1,0 +1,61 @@
+//! Raw times: every kept round, by the clock that the figure is made of and by others.
+
+use crate::data::RunData;
+use crate::format;
+use raystone_record::{Key, axis};
+
+/// The rounds of one measurement, milliseconds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Samples {
+    /// What was measured.
+    pub key: Key,
+    /// Id of the figure that is made of them.
+    pub figure: &'static str,
+    /// By the clock of the adapter where it has one: what the figure is made of.
+    pub ms: Vec<f64>,
+    /// By the wall clock; empty where `ms` is that.
+    pub wall_ms: Vec<f64>,
+    /// In time of the processors; empty on adapters that work elsewhere.
+    pub cpu_ms: Vec<f64>,
+    /// Rays in a round, if they are what is timed.
+    pub rays: Option<u64>,
+}
+
+impl Samples {}
+
+/// All raw times of a run: builds, classes of rays, and full cells. Of what failed its gate there is none.
+pub fn samples(data: &RunData) -> Vec<Samples> {
+    let mut all = Vec::new();
+    for scene in &data.scenes {
+        let sound = || scene.structures.iter().filter(|s| s.fault().is_none());
+        all.extend(sound().map(|s| Samples {
+            key: s.key.clone(),
+            figure: "build-ms/v1",
+            ms: vec![s.build_ms],
+            wall_ms: Vec::new(),
+            cpu_ms: Vec::new(),
+            rays: None,
+        }));
+        all.extend(sound().flat_map(|s| {
+            s.timings.iter().map(|timing| Samples {
+                key: (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class)),
+                figure: "mrays-per-s/v1",
+                ms: timing.ms.clone(),
+                wall_ms: timing.wall_ms.clone(),
+                cpu_ms: timing.cpu_ms.clone(),
+                rays: Some(timing.rays as u64),
+            })
+        }));
+        let times = scene.views.iter().flat_map(|view| view.valid_times());
+        all.extend(times.map(|time| Samples {
+            key: time.key.clone(),
+            figure: "ms-per-spp/v1",
+            ms: time.ms.clone(),
+            wall_ms: time.wall_ms.clone(),
+            cpu_ms: Vec::new(),
+            rays: Some(time.rays.values().sum()),
+        }));
+    }
+    all.retain(|samples| !samples.ms.is_empty());
+    all
+}

@@ -1,0 +1,197 @@
+//! Figures over runs of several commits: one series for each figure, key and device, with the runs at which its level
+//! changes. Counts and other exact figures change where they differ; of the others the levels are parted by
+//! `e_divisive`.
+
+pub mod change;
+pub mod page;
+
+use crate::data::RunData;
+use crate::export::ExportError;
+use crate::export::select::Selection;
+use crate::values::{Reading, Value, values};
+use change::e_divisive;
+use raystone_record::figure::{Better, Figure, Spread};
+use raystone_record::{Interval, Key, Line};
+use raystone_stats::statistics::median;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Chance that a series without a change is said to have one.
+pub(crate) const LEVEL: f64 = 0.05;
+
+/// A run, in the order of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// The commit of the program, with `+` if the sources had changes; `unknown` where it was not recorded.
+    pub commit: String,
+    /// Seconds since 1970-01-01 UTC.
+    pub started_unix_s: u64,
+    /// Adapter, driver and processor: figures of different ones are never in one series.
+    pub device: String,
+}
+
+/// A level that differs from the one before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The first run of the new level.
+    pub run: usize,
+    /// Median of the level before.
+    pub before: f64,
+    /// Median of the new level.
+    pub after: f64,
+    /// p-value of the permutation test; absent for exact figures, which need none.
+    pub p: Option<f64>,
+}
+
+/// A figure of one key on one device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series<'a> {
+    /// What it is of.
+    pub key: Key,
+    /// Its row in the table of figures.
+    pub figure: Cow<'a, Figure>,
+    /// The device.
+    pub device: String,
+    /// Run and value, in the order of time.
+    pub points: Vec<(usize, Interval)>,
+    /// Where its level changes.
+    pub changes: Vec<Change>,
+    /// Whether it has enough values for a change to be found; exact ones need two.
+    pub tested: bool,
+}
+
+/// All series of some runs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct History<'a> {
+    /// The runs by time.
+    pub runs: Vec<Run>,
+    /// The series, in the order in which runs hold them.
+    pub series: Vec<Series<'a>>,
+    /// Values that are no numbers.
+    pub left_out: usize,
+}
+
+impl<'a> History<'a> {
+    /// The chosen figures of runs; of all figures, if none is chosen, those that rank.
+    ///
+    /// # Errors
+    /// A run without its first line, or a choice that nothing fits.
+    pub fn new(all: &'a [(PathBuf, Vec<Line>)], choice: &Selection) -> Result<Self, ExportError> {
+        let mut data: Vec<(Run, RunData<'a>)> = Vec::new();
+        for (folder, lines) in all {
+            let of_run = RunData::new(lines);
+            data.push((run(folder, &of_run)?, of_run));
+        }
+        data.sort_by_key(|(run, _)| run.started_unix_s);
+        let found = data.iter().map(|(_, data)| values(data));
+        let found: Vec<Vec<Value>> = found.collect();
+        // A figure that one of the runs lacks is no fault: the choice is held against all together.
+        choice.of(found.concat())?;
+        let mut history = Self::default();
+        for (number, (run, values)) in data.iter().map(|(run, _)| run).zip(found).enumerate() {
+            history.runs.push(run.clone());
+            let ranks =
+                |figure: &Figure| !choice.is_of_all_figures() || figure.better != Better::Neither;
+            for value in values {
+                if choice.keeps(&value.key, &value.figure.id) && ranks(&value.figure) {
+                    history.add(number, &run.device, value);
+                }
+            }
+        }
+        for series in &mut history.series {
+            series.find_changes();
+        }
+        Ok(history)
+    }
+
+    fn add(&mut self, run: usize, device: &str, value: Value<'a>) {
+        let point = match value.reading {
+            Reading::Known(interval) if interval.value.is_finite() => (run, interval),
+            _ => {
+                self.left_out += 1;
+                return;
+            }
+        };
+        let is_it = |series: &&mut Series| {
+            series.device == device
+                && series.figure.id == value.figure.id
+                && series.key == value.key
+        };
+        match self.series.iter_mut().find(is_it) {
+            Some(series) => series.points.push(point),
+            None => self.series.push(Series {
+                key: value.key,
+                figure: value.figure,
+                device: device.to_owned(),
+                points: vec![point],
+                changes: Vec::new(),
+                tested: false,
+            }),
+        }
+    }
+
+    /// How many series without a change would be said to have one, by chance.
+    pub(crate) fn false_alarms(&self) -> f64 {
+        let tested = |s: &&Series| s.tested && s.figure.spread != Spread::Exact;
+        LEVEL * self.series.iter().filter(tested).count() as f64
+    }
+}
+
+impl Series<'_> {
+    fn find_changes(&mut self) {
+        let values: Vec<f64> = self.points.iter().map(|(_, value)| value.value).collect();
+        let splits: Vec<(usize, Option<f64>)> = match self.figure.spread {
+            Spread::Exact => {
+                let differs = |at: &usize| values[*at] != values[at - 1];
+                (1..values.len())
+                    .filter(differs)
+                    .map(|at| (at, None))
+                    .collect()
+            }
+            _ => {
+                let found = e_divisive(&values, LEVEL);
+                found.into_iter().map(|(at, p)| (at, Some(p))).collect()
+            }
+        };
+        self.tested = match self.figure.spread {
+            Spread::Exact => values.len() > 1,
+            _ => values.len() >= change::LEAST_RUNS,
+        };
+        let mut bounds: Vec<usize> = vec![0];
+        bounds.extend(splits.iter().map(|(at, _)| *at));
+        bounds.push(values.len());
+        let level =
+            |part: usize| median(&values[bounds[part]..bounds[part + 1]]).unwrap_or(f64::NAN);
+        let change = |(part, (at, p)): (usize, &(usize, Option<f64>))| Change {
+            run: self.points[*at].0,
+            before: level(part),
+            after: level(part + 1),
+            p: *p,
+        };
+        self.changes = splits.iter().enumerate().map(change).collect();
+    }
+}
+
+fn run(folder: &Path, data: &RunData) -> Result<Run, ExportError> {
+    let no_run = || {
+        ExportError::Choice(format!(
+            "{}: the records lack the first line, which says when and where they were made",
+            folder.display()
+        ))
+    };
+    let run = data.run.ok_or_else(no_run)?;
+    let machine = &run.environment;
+    let commit = machine.commit.as_deref().unwrap_or("unknown");
+    let dirty = if machine.dirty == Some(true) { "+" } else { "" };
+    Ok(Run {
+        folder: folder.to_owned(),
+        commit: format!("{commit}{dirty}"),
+        started_unix_s: run.started_unix_s,
+        device: format!(
+            "{} ({}, {} {}), {}",
+            machine.adapter, machine.backend, machine.driver, machine.driver_info, machine.cpu
+        ),
+    })
+}

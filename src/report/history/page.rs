@@ -1,0 +1,268 @@
+//! A history as tables and as a page with plots.
+
+use super::{Change, History, LEVEL, Series};
+use crate::document::{Block, Document, Section, Table, TableCell};
+use crate::format;
+use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use raystone_record::figure::Spread;
+use raystone_record::{Interval, Key};
+use serde_json::{Value as Json, json};
+
+/// Series of a plot: more cannot be told apart.
+const IN_PLOT: usize = 6;
+/// Of more series than this, those that change are drawn alone.
+const MOST_DRAWN: usize = 200;
+
+impl History<'_> {
+    /// The runs by number.
+    pub fn runs_table(&self) -> Table {
+        let mut table = Table::new(
+            "Runs",
+            &["run", ":commit", ":started", ":device", ":folder"],
+        );
+        for (number, run) in self.runs.iter().enumerate() {
+            table.rows.push(vec![
+                number.to_string().into(),
+                short(&run.commit).into(),
+                format::utc(run.started_unix_s).into(),
+                run.device.as_str().into(),
+                run.folder.display().to_string().into(),
+            ]);
+        }
+        table
+    }
+
+    /// Every change of a level, a row each.
+    pub fn changes_table(&self) -> Table {
+        let heads = [
+            "figure", ":of", ":commit", "run", "before", "after", "ratio", "p",
+        ];
+        let mut table = Table::new("Changes", &heads);
+        for (series, change) in self
+            .series
+            .iter()
+            .flat_map(|s| s.changes.iter().map(move |c| (s, c)))
+        {
+            table.rows.push(self.change_row(series, change));
+        }
+        table
+    }
+
+    fn change_row(&self, series: &Series, change: &Change) -> Vec<TableCell> {
+        let text = |value| TableCell::from(format::figure(&series.figure, value));
+        vec![
+            series.figure.heading().into(),
+            series.key.to_string().into(),
+            self.runs
+                .get(change.run)
+                .map_or("", |run| short(&run.commit))
+                .into(),
+            change.run.to_string().into(),
+            text(change.before),
+            text(change.after),
+            format::number(change.after / change.before).into(),
+            change
+                .p
+                .map_or_else(|| "exact".to_owned(), format::number)
+                .into(),
+        ]
+    }
+
+    /// What was looked at, what was not, and how far to believe it.
+    pub fn summary(&self) -> String {
+        let count = |what: &dyn Fn(&&Series) -> bool| self.series.iter().filter(what).count();
+        let changed = count(&|s| !s.changes.is_empty());
+        let tested = count(&|s| s.tested && s.figure.spread != Spread::Exact);
+        let short = count(&|s| !s.tested);
+        let mut text = format!(
+            "{} of {} changed. Exact figures change where they differ; of {tested} with a spread, levels are parted by \
+             E-divisive (Matteson and James 2014) with a permutation test at {LEVEL}: about {} would be said to change by \
+             chance.",
+            changed,
+            format::plural(self.series.len(), "series").replace("seriess", "series"),
+            format::number(self.false_alarms()),
+        );
+        if short > 0 {
+            text += &format!(
+                " {short} have too few runs to tell: exact ones need 2, others {}.",
+                super::change::LEAST_RUNS
+            );
+        }
+        if !self.draws_all() {
+            text += " Only what changes is drawn: --figure and --only choose fewer series.";
+        }
+        if self.left_out > 0 {
+            text += &format!(
+                " {} values are no numbers and were left out.",
+                self.left_out
+            );
+        }
+        text
+    }
+
+    fn draws_all(&self) -> bool {
+        self.series.len() <= MOST_DRAWN
+    }
+
+    /// The page: runs, changes, and plots of each figure over the runs.
+    pub fn document(&self) -> Document {
+        let mut runs = Section::new("runs", "Runs");
+        runs.blocks.extend(self.runs_table().into_block());
+        let mut changes = Section::new("changes", "Changes");
+        changes.blocks.push(Block::Paragraph(self.summary()));
+        changes.blocks.extend(self.changes_table().into_block());
+        let mut document = Document {
+            title: "Raystone: figures over runs".into(),
+            subtitle: format::plural(self.runs.len(), "run"),
+            sections: vec![changes, runs],
+            ..Document::default()
+        };
+        document.sections.extend(self.figure_sections());
+        document
+    }
+
+    fn figure_sections(&self) -> Vec<Section> {
+        let mut ids: Vec<&str> = Vec::new();
+        for series in &self.series {
+            if !ids.contains(&series.figure.id.as_ref()) {
+                ids.push(&series.figure.id);
+            }
+        }
+        let is_drawn = |s: &&Series| !s.changes.is_empty() || self.draws_all();
+        let section = |id: &&str| {
+            let of_figure = self.series.iter().filter(|s| s.figure.id == **id);
+            let heading = of_figure.clone().next().map(|s| s.figure.heading());
+            let of_figure: Vec<&Series> = of_figure.filter(is_drawn).collect();
+            let name: String = id
+                .chars()
+                .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+                .collect();
+            let mut section = Section::new(name.clone(), heading.unwrap_or_default());
+            let plots = of_figure.chunks(IN_PLOT).enumerate();
+            let plots = plots.map(|(i, some)| {
+                let shared = shared(some).to_string();
+                let caption = "Value by run, with intervals; dashed: levels between changes";
+                plot(some).figure(format!("{name}-{i}"), format!("{caption}. {shared}"))
+            });
+            section.blocks.extend(Block::figures(plots));
+            section
+        };
+        let sections = ids.iter().map(section);
+        sections
+            .filter(|section| !section.blocks.is_empty())
+            .collect()
+    }
+
+    /// Runs and series as JSON.
+    pub fn json(&self) -> Json {
+        let runs = self.runs.iter().map(|run| {
+            json!({
+                "commit": run.commit,
+                "started_unix_s": run.started_unix_s,
+                "device": run.device,
+                "folder": run.folder,
+            })
+        });
+        let series = self.series.iter().map(|series| {
+            let points = series.points.iter().map(
+                |(run, i)| json!({ "run": run, "value": i.value, "low": i.low, "high": i.high }),
+            );
+            let changes = series
+                .changes
+                .iter()
+                .map(|c| json!({ "run": c.run, "before": c.before, "after": c.after, "p": c.p }));
+            json!({
+                "figure": series.figure.id,
+                "unit": series.figure.unit,
+                "better": series.figure.better,
+                "key": series.key,
+                "device": series.device,
+                "tested": series.tested,
+                "points": points.collect::<Vec<Json>>(),
+                "changes": changes.collect::<Vec<Json>>(),
+            })
+        });
+        json!({
+            "runs": runs.collect::<Vec<Json>>(),
+            "series": series.collect::<Vec<Json>>(),
+            "level": LEVEL,
+            "left_out": self.left_out,
+        })
+    }
+}
+
+fn plot(series: &[&Series]) -> CurvePlot {
+    let several = series.iter().any(|s| s.device != series[0].device);
+    let shared = shared(series);
+    let mut curves = Vec::new();
+    for (look, series) in series.iter().enumerate() {
+        let own = series
+            .key
+            .labels()
+            .filter(|(axis, _)| shared.get(axis).is_none());
+        let mut own: Vec<&str> = own.map(|(_, label)| label).collect();
+        own.extend(several.then_some(series.device.as_str()));
+        let label = match own.is_empty() {
+            true => series.key.to_string(),
+            false => own.join(", "),
+        };
+        let points = series.points.iter();
+        let points = points.map(|(run, value)| CurvePoint::new(*run as f64, value));
+        if !series.changes.is_empty() {
+            curves.push(Curve {
+                label: format!("levels of {label}"),
+                look,
+                exact: true,
+                points: levels(series),
+            });
+        }
+        curves.push(Curve {
+            label,
+            look,
+            exact: false,
+            points: points.collect(),
+        });
+    }
+    CurvePlot {
+        x_title: "run, by time".into(),
+        x_ticks: Ticks::Whole,
+        y_title: series[0].figure.heading(),
+        curves,
+        guides: Vec::new(),
+    }
+}
+
+/// What the keys of all series have in common.
+fn shared(series: &[&Series]) -> Key {
+    let first = &series[0].key;
+    let same = |axis: &&str| series.iter().all(|s| s.key.agrees(first, &[*axis]));
+    let axes: Vec<&str> = first.labels().map(|(axis, _)| axis).filter(same).collect();
+    first.only(&axes)
+}
+
+/// Steps from level to level, each half a run before the first of a new level.
+fn levels(series: &Series) -> Vec<CurvePoint> {
+    let point = |x: f64, y: f64| CurvePoint::new(x, &Interval::exact(y));
+    let ends = [series.points.first(), series.points.last()];
+    let (Some((first, _)), Some((last, _))) = (ends[0], ends[1]) else {
+        return Vec::new();
+    };
+    let mut points = Vec::new();
+    let mut from = *first as f64;
+    let mut level = f64::NAN;
+    for change in &series.changes {
+        let at = change.run as f64 - 0.5;
+        points.extend([point(from, change.before), point(at, change.before)]);
+        (from, level) = (at, change.after);
+    }
+    points.extend([point(from, level), point(*last as f64, level)]);
+    points
+}
+
+/// The first characters of a commit, with its mark.
+fn short(commit: &str) -> &str {
+    match commit.char_indices().nth(12) {
+        Some((end, _)) if !commit.ends_with('+') => &commit[..end],
+        _ => commit,
+    }
+}

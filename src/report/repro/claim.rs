@@ -1,0 +1,455 @@
+//! An expectation against what a run found: a row for each place where it speaks.
+
+use super::judge::{Bounds, Verdict, factor, ratio, slope, spread};
+use super::rounds::Rounds;
+use super::select::{fits, merged, partner, select, words};
+use crate::format;
+use crate::samplers::HEAVY_TAILED;
+use crate::values::{Reading, Value};
+use raystone_config::expect::{At, Compare, Expect, Pick, Speaks};
+use raystone_record::{Interval, Key};
+
+/// What is known of a run beside its values.
+#[derive(Debug, Clone, Default)]
+pub struct Context {
+    /// Whether it ran on a software adapter.
+    pub software: bool,
+    /// Whether it is a short run.
+    pub quick: bool,
+    /// Original scene → pattern of ours, or why there is none.
+    pub scenes: Vec<(String, Result<String, String>)>,
+    /// What was left out or failed: the cell in words, and why.
+    pub absent: Vec<(Key, String)>,
+    /// What is known round by round.
+    pub rounds: Rounds,
+}
+
+/// One place of a claim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Where, in the thesis's words or by key.
+    pub row: String,
+    /// Column of the original's table.
+    pub column: String,
+    /// What the thesis prints.
+    pub thesis: Option<f64>,
+    /// What we found.
+    pub ours: Option<Interval>,
+    /// The number on the axis of a curve, where the place has one (samples, points).
+    pub x: Option<f64>,
+    /// What is found of the claim.
+    pub verdict: Verdict,
+    /// Why, or what agrees.
+    pub reason: String,
+    /// Counted figures: title and value.
+    pub counted: Vec<(String, f64)>,
+}
+
+/// Judges an expectation wherever it speaks.
+pub fn judge(expect: &Expect, values: &[Value], context: &Context) -> Vec<Row> {
+    let everywhere = [At::default()];
+    let places = match expect.at.is_empty() {
+        true => &everywhere[..],
+        false => &expect.at[..],
+    };
+    let at = |at: &At| Place::new(expect, at, context).rows(values);
+    places.iter().flat_map(at).collect()
+}
+
+struct Place<'e> {
+    expect: &'e Expect,
+    at: &'e At,
+    context: &'e Context,
+    /// Pattern of the scene, or why there is none.
+    scene: Option<Result<String, String>>,
+}
+
+impl<'e> Place<'e> {
+    fn new(expect: &'e Expect, at: &'e At, context: &'e Context) -> Self {
+        let find = |on: &String| {
+            let found = context.scenes.iter().find(|(name, _)| name == on);
+            found.map_or_else(|| Err(format!("no scene stands for {on}")), |f| f.1.clone())
+        };
+        let scene = at.on.as_ref().map(find);
+        Self {
+            expect,
+            at,
+            context,
+            scene,
+        }
+    }
+
+    /// A pick of the expectation with what this place adds.
+    fn pick(&self, base: &Pick, more: &Pick) -> Pick {
+        let mut pick = merged(base, more);
+        if let Some(Ok(pattern)) = &self.scene {
+            pick.insert("scene".to_owned(), pattern.clone());
+        }
+        pick
+    }
+
+    fn rows(&self, values: &[Value]) -> Vec<Row> {
+        if self.at.full_only && self.context.quick {
+            let reason = "a short run leaves this size out".to_owned();
+            return vec![self.row(None, Verdict::NotTestable, reason)];
+        }
+        if let Some(Err(reason)) = &self.scene {
+            return vec![self.row(None, Verdict::NotTestable, reason.clone())];
+        }
+        let found = match self.expect.compare {
+            Compare::Shown | Compare::Bound => self.single(values),
+            Compare::Ratio => self.ratios(values, &self.expect.figure),
+            Compare::Order => self.orders(values),
+            Compare::Slope => self.slopes(values),
+        };
+        match found {
+            Ok(rows) => rows,
+            Err((pick, problem)) => vec![self.absent(&pick, problem)],
+        }
+    }
+
+    /// Nothing was found: what was left out for a reason cannot be tested, else the expectation is at fault.
+    fn absent(&self, pick: &Pick, problem: String) -> Row {
+        let of_cells: Pick = (pick.iter())
+            .filter(|(axis, _)| {
+                self.context
+                    .absent
+                    .iter()
+                    .any(|(k, _)| k.get(axis).is_some())
+            })
+            .map(|(axis, pattern)| (axis.clone(), pattern.clone()))
+            .collect();
+        let mut left_out = self.context.absent.iter();
+        let left_out = left_out.find(|(key, _)| fits(key, &of_cells));
+        match left_out {
+            Some((_, reason)) => self.row(None, Verdict::NotTestable, reason.clone()),
+            None => self.row(None, Verdict::Faulty, problem),
+        }
+    }
+
+    fn row(&self, ours: Option<Interval>, verdict: Verdict, reason: String) -> Row {
+        let column = match self.at.column.is_empty() {
+            true => &self.expect.column,
+            false => &self.at.column,
+        };
+        let place = self.at.on.as_ref().filter(|_| self.at.row.is_empty());
+        Row {
+            row: place.unwrap_or(&self.at.row).clone(),
+            column: column.clone(),
+            thesis: self.at.thesis,
+            ours,
+            x: None,
+            verdict,
+            reason,
+            counted: Vec::new(),
+        }
+    }
+
+    /// The values of a selection; the pick and what is wrong if there are none.
+    fn chosen<'v, 'a>(
+        &self,
+        values: &'v [Value<'a>],
+        figure: &str,
+        pick: &Pick,
+    ) -> Result<Vec<&'v Value<'a>>, (Pick, String)> {
+        let chosen = select(values, figure, pick);
+        match chosen.is_empty() {
+            false => Ok(chosen),
+            true => Err((
+                pick.clone(),
+                format!("no {figure} was found where {}", words(pick)),
+            )),
+        }
+    }
+
+    /// What agrees, in the unit of ours; `unit` is that of the compared number.
+    fn bounds(&self, unit: &str) -> Result<Bounds, String> {
+        let (expect, at) = (self.expect, self.at);
+        let mut bounds = Bounds::new(at.least.or(expect.least), at.most.or(expect.most));
+        if let Some(thesis) = self.thesis_in(unit)? {
+            if let Some(factor) = expect.within {
+                bounds = bounds.and(Bounds::new(Some(thesis / factor), Some(thesis * factor)));
+            }
+            if let Some(d) = expect.off_by {
+                bounds = bounds.and(Bounds::new(Some(thesis - d), Some(thesis + d)));
+            }
+        }
+        Ok(bounds)
+    }
+
+    /// The thesis's value in the unit of ours.
+    fn thesis_in(&self, unit: &str) -> Result<Option<f64>, String> {
+        let Some(thesis) = self.at.thesis else {
+            return Ok(None);
+        };
+        let from = match self.expect.unit.is_empty() {
+            true => unit,
+            false => self.expect.unit.as_str(),
+        };
+        let problem = || format!("the thesis's {from} cannot be told in the figure's \"{unit}\"");
+        Ok(Some(thesis * factor(from, unit).ok_or_else(problem)?))
+    }
+
+    /// A row with its verdict, for a number in this unit.
+    fn judged(&self, ours: Interval, unit: &str, key: &Key) -> Row {
+        let speaks = self.expect.device == Speaks::Any || !self.context.software;
+        let judged = match self.bounds(unit) {
+            Err(problem) => (Verdict::Faulty, problem),
+            Ok(_) if self.expect.compare == Compare::Shown => (Verdict::Shown, String::new()),
+            Ok(_) if !speaks => (
+                Verdict::NotTestable,
+                "times of a software adapter say nothing of a GPU".to_owned(),
+            ),
+            Ok(bounds) => (bounds.judge(ours), format!("agrees: {}", bounds.words())),
+        };
+        let mut row = self.row(Some(ours), judged.0, judged.1);
+        row.thesis = self.thesis_in(unit).ok().flatten().or(row.thesis);
+        if row.row.is_empty() {
+            row.row = key.to_string();
+        }
+        let number = |axis| key.label(axis).parse::<f64>().ok();
+        row.x = ["spp", "points"].into_iter().find_map(number);
+        row
+    }
+
+    /// A row whose reading is no number.
+    fn unread(&self, value: &Value) -> Option<Row> {
+        let row = match value.reading {
+            Reading::Known(_) => return None,
+            Reading::HeavyTailed(i) => {
+                let reason = format!("its interval is not to be trusted: {HEAVY_TAILED}");
+                self.row(Some(i), Verdict::Undecided, reason)
+            }
+            Reading::Below(bound) => {
+                let reason = format!("below {bound:.3e}, which the reference resolves");
+                self.row(None, Verdict::Undecided, reason)
+            }
+            Reading::Word(word) => self.row(None, Verdict::NotTestable, word.to_owned()),
+        };
+        Some(row)
+    }
+
+    fn single(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
+        let pick = self.pick(&self.expect.of, &self.at.of);
+        let chosen = self.chosen(values, &self.expect.figure, &pick)?;
+        let row = |value: &&Value| match known(value) {
+            None => self.unread(value),
+            Some(ours) => {
+                let mut row = self.judged(ours, &value.figure.unit, &value.key);
+                row.counted = self.counted(values, |figure| {
+                    let same = select(values, figure, &pick);
+                    let same = same.into_iter().find(|v| agrees(&v.key, &value.key))?;
+                    known(same).map(|i| i.value)
+                });
+                Some(row)
+            }
+        };
+        Ok(chosen.iter().filter_map(row).collect())
+    }
+
+    fn counted(&self, values: &[Value], of: impl Fn(&str) -> Option<f64>) -> Vec<(String, f64)> {
+        let title = |id: &str| {
+            let value = values.iter().find(|value| value.figure.id == id);
+            value.map_or_else(|| id.to_owned(), |value| value.figure.title.to_string())
+        };
+        let figure = |id: &String| Some((title(id), of(id)?));
+        self.expect.explain.iter().filter_map(figure).collect()
+    }
+
+    /// Pairs of the two selections of a ratio, each pair alike on all other axes.
+    fn pairs<'v, 'a>(
+        &self,
+        values: &'v [Value<'a>],
+        figure: &str,
+    ) -> Result<Vec<[&'v Value<'a>; 2]>, (Pick, String)> {
+        let of = self.pick(&self.expect.of, &self.at.of);
+        let over = self.pick(&self.expect.over, &self.at.over);
+        let upper = self.chosen(values, figure, &of)?;
+        let lower = self.chosen(values, figure, &over)?;
+        let pair = |a: &'v Value<'a>| {
+            let b = partner(a, &lower, &[&of, &over]).map_err(|problem| (over.clone(), problem))?;
+            Ok([a, b])
+        };
+        upper.into_iter().map(pair).collect()
+    }
+
+    /// A ratio with its interval: of what is known part by part (times of the same rounds) by these, else as of
+    /// independent figures.
+    fn ratio(&self, a: &Value, b: &Value) -> Option<Interval> {
+        let paired = self.context.rounds.product(&[(a, 1.0), (b, -1.0)]);
+        paired.or_else(|| Some(ratio(known(a)?, known(b)?)))
+    }
+
+    /// The ratio of two gains.
+    fn growth(&self, after: &Gain, before: &Gain) -> Option<Interval> {
+        let (Some(over), Some(under)) = (after.over, before.over) else {
+            return self.ratio(after.value, before.value);
+        };
+        let terms = [
+            (after.value, 1.0),
+            (over, -1.0),
+            (before.value, -1.0),
+            (under, 1.0),
+        ];
+        let paired = self.context.rounds.product(&terms);
+        paired.or_else(|| Some(ratio(self.gained(after)?, self.gained(before)?)))
+    }
+
+    fn ratios(&self, values: &[Value], figure: &str) -> Result<Vec<Row>, (Pick, String)> {
+        let row = |[a, b]: &[&Value; 2]| match (known(a), known(b)) {
+            (Some(_), Some(_)) => {
+                let mut row = self.judged(self.ratio(a, b)?, "", &a.key);
+                row.counted = self.counted(values, |figure| {
+                    let pairs = self.pairs(values, figure).ok()?;
+                    let same = pairs.iter().find(|[c, _]| agrees(&c.key, &a.key))?;
+                    Some(known(same[0])?.value / known(same[1])?.value)
+                });
+                Some(row)
+            }
+            (None, _) => self.unread(a),
+            _ => self.unread(b),
+        };
+        Ok(self.pairs(values, figure)?.iter().filter_map(row).collect())
+    }
+
+    /// The picks of an order, with what all of them share.
+    fn steps(&self, shared: &Pick, more: &Pick) -> Vec<Pick> {
+        let shared = merged(shared, more);
+        let order = self.expect.order.iter();
+        order.map(|pick| self.pick(&shared, pick)).collect()
+    }
+
+    /// The least ratio of a selection to the one before it: at least 1 where they ascend. With `over` it is what each
+    /// gains over another one that should ascend.
+    fn orders(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
+        let picks = self.steps(&self.expect.of, &self.at.of);
+        let lower = match self.expect.over.is_empty() && self.at.over.is_empty() {
+            true => Vec::new(),
+            false => self.steps(&self.expect.over, &self.at.over),
+        };
+        let all: Vec<&Pick> = picks.iter().chain(&lower).collect();
+        let figure = &self.expect.figure;
+        let chosen = |picks: &[Pick]| {
+            let chosen = picks.iter().map(|pick| self.chosen(values, figure, pick));
+            chosen.collect::<Result<Vec<_>, _>>()
+        };
+        let (upper, under) = (chosen(&picks)?, chosen(&lower)?);
+        let alike = |to: &Value, others: &[_], pick: &Pick| {
+            partner(to, others, &all).map_err(|problem| (pick.clone(), problem))
+        };
+        let mut rows = Vec::new();
+        for first in &upper[0] {
+            let mut chain = vec![Gain::of(first)];
+            for (others, pick) in upper.iter().zip(&picks).skip(1) {
+                chain.push(Gain::of(alike(first, others, pick)?));
+            }
+            for ((gain, others), pick) in chain.iter_mut().zip(&under).zip(&lower) {
+                gain.over = Some(alike(first, others, pick)?);
+            }
+            rows.push(self.ordered(&chain, &picks));
+        }
+        Ok(rows)
+    }
+
+    /// The number of a part of an order.
+    fn gained(&self, gain: &Gain) -> Option<Interval> {
+        match gain.over {
+            None => known(gain.value),
+            Some(over) => self.ratio(gain.value, over),
+        }
+    }
+
+    fn ordered(&self, chain: &[Gain], picks: &[Pick]) -> Row {
+        let mut values = chain.iter().flat_map(|gain| [Some(gain.value), gain.over]);
+        if let Some(row) = values.find_map(|value| self.unread(value?)) {
+            return row;
+        }
+        let numbers: Vec<Interval> = chain.iter().filter_map(|gain| self.gained(gain)).collect();
+        let steps = chain.windows(2);
+        let steps = steps.filter_map(|pair| self.growth(&pair[1], &pair[0]));
+        let steps: Vec<Interval> = steps.collect();
+        let ascends = Bounds::new(Some(1.0), None);
+        let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
+        let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
+        let Some(least) = least else {
+            return self.row(None, Verdict::Faulty, "an order of one".to_owned());
+        };
+        let mut row = self.judged(least, "", &chain[0].value.key);
+        if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
+            row.verdict = verdict;
+        }
+        let named = picks
+            .iter()
+            .zip(chain)
+            .zip(&numbers)
+            .map(|((pick, Gain { value, .. }), i)| {
+                let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
+                let labels = pick.keys().filter(own).map(|axis| value.key.label(axis));
+                let labels: Vec<&str> = labels.collect();
+                format!("{} {}", labels.join(" "), format::number(i.value))
+            });
+        let named = named.collect::<Vec<_>>().join(" → ");
+        row.reason = match row.verdict {
+            Verdict::NotTestable | Verdict::Faulty => format!("{}; {named}", row.reason),
+            _ => format!("{named} (least step shown)"),
+        };
+        row
+    }
+
+    fn slopes(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
+        let pick = self.pick(&self.expect.of, &self.at.of);
+        let chosen = self.chosen(values, &self.expect.figure, &pick)?;
+        let along = self.expect.along.as_deref().unwrap_or_default();
+        let without = |key: &Key| key.clone().with(along, "");
+        let mut groups: Vec<(Key, Vec<(f64, Interval)>)> = Vec::new();
+        for value in chosen {
+            let (Ok(x), Some(y)) = (value.key.label(along).parse::<f64>(), known(value)) else {
+                continue;
+            };
+            let key = without(&value.key);
+            match groups.iter_mut().find(|(known, _)| *known == key) {
+                Some((_, points)) => points.push((x, y)),
+                None => groups.push((key, vec![(x, y)])),
+            }
+        }
+        if groups.is_empty() {
+            return Err((pick, format!("no number on the axis {along}")));
+        }
+        let row = |(key, points): &(Key, Vec<(f64, Interval)>)| match slope(points) {
+            Some(exponent) => self.judged(exponent, "", key),
+            None => self.row(
+                None,
+                Verdict::Faulty,
+                format!("one point only along {along} at {key}"),
+            ),
+        };
+        Ok(groups.iter().map(row).collect())
+    }
+}
+
+/// A value, and what it is divided by where that is what is compared.
+#[derive(Clone, Copy)]
+struct Gain<'v, 'a> {
+    value: &'v Value<'a>,
+    over: Option<&'v Value<'a>>,
+}
+
+impl<'v, 'a> Gain<'v, 'a> {
+    fn of(value: &'v Value<'a>) -> Self {
+        Self { value, over: None }
+    }
+}
+
+/// The number of a value, with the spread that is assumed of what was measured once.
+fn known(value: &Value) -> Option<Interval> {
+    match value.reading {
+        Reading::Known(i) if i.value.is_finite() => Some(spread(&value.figure, i)),
+        _ => None,
+    }
+}
+
+/// Whether two keys agree on all axes that both have.
+fn agrees(a: &Key, b: &Key) -> bool {
+    let both = a.labels().filter(|(axis, _)| b.get(axis).is_some());
+    both.into_iter().all(|(axis, label)| b.label(axis) == label)
+}

@@ -1,0 +1,284 @@
+//! What runs for a table, and what its records say of each expectation.
+
+use super::Source;
+use super::claim::{Context, Row, judge};
+use super::judge::Verdict;
+use super::rounds::Rounds;
+use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
+use crate::data::RunData;
+use crate::values::values;
+use raystone_config::expect::{Compare, Substitute, Thesis, same_experiment};
+use raystone_config::{Catalogue, ConfigError, Experiment, Pattern};
+use raystone_record::Environment;
+use raystone_record::{Body, Key, Line, RecordError, RunRecord, read_records, records_file};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// How tables are run.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// Short runs on built-in scenes.
+    pub quick: bool,
+    /// Whether the adapter is a software rasteriser, which runs some tables smaller.
+    pub software: bool,
+    /// The scene directory.
+    pub scenes: PathBuf,
+    /// Folder of all tables.
+    pub out: PathBuf,
+    /// Run again what is there.
+    pub force: bool,
+}
+
+/// Why a table has no verdicts.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// Its file or an override is wrong.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Its records cannot be read.
+    #[error(transparent)]
+    Records(#[from] RecordError),
+}
+
+/// A scene that ran, and its triangles if it was loaded.
+pub type Placed = (String, Option<usize>);
+
+/// A table with what was found.
+#[derive(Debug, Clone)]
+pub struct Reproduced {
+    /// Its name.
+    pub name: &'static str,
+    /// What the thesis says.
+    pub thesis: Thesis,
+    /// Where it ran; `None` if nothing did.
+    pub environment: Option<Environment>,
+    /// When, seconds since 1970-01-01 UTC.
+    pub started: u64,
+    /// Whether it was a short run.
+    pub quick: bool,
+    /// What the run changed of the experiment.
+    pub changes: Vec<String>,
+    /// Original scene → ours with its triangles, or why there is none.
+    pub scenes: Vec<(Substitute, Result<Placed, String>)>,
+    /// Rows of each expectation, in the order of the file.
+    pub claims: Vec<Vec<Row>>,
+}
+
+impl Reproduced {
+    /// The verdict on an expectation as a whole.
+    pub fn verdict(&self, index: usize) -> Verdict {
+        let found = Verdict::of_all(self.claims[index].iter().map(|row| row.verdict));
+        // What is only shown is no claim, whether there is something to show or not.
+        let only_shown = self.thesis.expects[index].compare == Compare::Shown;
+        match found != Verdict::Faulty && only_shown {
+            true => Verdict::Shown,
+            false => found,
+        }
+    }
+}
+
+/// What runs for a table: the experiment, and which scenes stand for which.
+pub struct Prepared {
+    /// The experiment.
+    pub experiment: Experiment,
+    /// What the thesis says.
+    pub thesis: Thesis,
+    /// Scene of each substitute, or why it has none.
+    pub scenes: Vec<(Substitute, Result<String, String>)>,
+    /// What a short run, or one on a software adapter, changes.
+    pub changes: Vec<String>,
+}
+
+/// Reads a table's file, with the scenes that are there and, if asked for, what makes it short.
+///
+/// # Errors
+/// A fault of the file.
+pub fn prepare(
+    source: &Source,
+    settings: &Settings,
+    catalogue: &Catalogue,
+) -> Result<Prepared, ConfigError> {
+    let thesis = source.thesis()?;
+    let stand_in = |s: &Substitute| (s.clone(), scene_of(s, settings));
+    let scenes: Vec<_> = thesis.substitutes.iter().map(stand_in).collect();
+    let changes = match (settings.quick, settings.software) {
+        (true, _) => thesis.quick.clone(),
+        (false, true) => thesis.software.clone(),
+        (false, false) => Vec::new(),
+    };
+    let mut overrides = changes.clone();
+    let mut there: Vec<String> = Vec::new();
+    for scene in scenes.iter().filter_map(|(_, scene)| scene.as_ref().ok()) {
+        let scene = name_of(scene).to_owned();
+        if !there.contains(&scene) {
+            there.push(scene);
+        }
+    }
+    if !there.is_empty() {
+        overrides.insert(0, format!("axes.scene={}", toml::Value::from(there)));
+    }
+    let folder = settings.scenes.display().to_string();
+    let text = source.text.replace(IN_FILES, &folder);
+    let file = format!("{}.toml", source.name);
+    let experiment = Experiment::parse(&text, &file, &overrides, catalogue)?;
+    Ok(Prepared {
+        experiment,
+        thesis,
+        scenes,
+        changes,
+    })
+}
+
+/// The scene in the place of the thesis's.
+fn scene_of(substitute: &Substitute, settings: &Settings) -> Result<String, String> {
+    let original = &substitute.original;
+    if settings.quick {
+        let none = || format!("no built-in scene stands for {original}; run it without --quick");
+        return substitute.quick.clone().ok_or_else(none);
+    }
+    let none = || format!("no scene stands for {original}: {}", substitute.why);
+    let scene = substitute.scene.clone().ok_or_else(none)?;
+    if !is_model(&scene) {
+        return Ok(scene);
+    }
+    let path = settings.scenes.join(&scene);
+    match path.is_file() {
+        true => Ok(path.display().to_string()),
+        false => Err(what_to_get(&scene, &settings.scenes)),
+    }
+}
+
+/// A table's verdicts from its records alone; `None` if it has none that are whole.
+///
+/// # Errors
+/// A fault of its file, or records that cannot be read.
+pub fn recorded(
+    source: &Source,
+    settings: &Settings,
+    catalogue: &Catalogue,
+) -> Result<Option<Reproduced>, TableError> {
+    let out = settings.out.join(source.name);
+    // Which adapter it ran on is not known.
+    for software in [settings.software, !settings.software] {
+        let settings = Settings {
+            software,
+            ..settings.clone()
+        };
+        let prepared = prepare(source, &settings, catalogue)?;
+        if is_done(&out, &prepared.experiment.text) {
+            return judged(source.name, settings.quick, prepared, &out).map(Some);
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a folder holds records of this experiment, be they whole or what is left of a killed run.
+pub fn is_of(folder: &Path, text: &str) -> bool {
+    let same = |line: &Line| matches!(&line.body, Body::Run(r) if same_experiment(&r.experiment_text, text));
+    let records = read_records(folder);
+    records.is_ok_and(|records| records.lines.iter().any(same))
+}
+
+/// Whether a folder holds the whole records of this experiment.
+pub fn is_done(out: &Path, text: &str) -> bool {
+    if !records_file(out).is_file() || !is_of(out, text) {
+        return false;
+    }
+    let finished = |line: &Line| matches!(line.body, Body::Finished(_));
+    read_records(out).is_ok_and(|records| records.lines.iter().any(finished))
+}
+
+/// The verdicts on a table that ran, from the records in `out`.
+///
+/// # Errors
+/// Records that cannot be read.
+pub fn judged(
+    name: &'static str,
+    quick: bool,
+    prepared: Prepared,
+    out: &Path,
+) -> Result<Reproduced, TableError> {
+    let lines = read_records(out)?.lines;
+    let data = RunData::new(&lines);
+    let run = data.run;
+    let context = Context {
+        quick,
+        software: run.is_none_or(|run| run.environment.software),
+        scenes: (prepared.scenes.iter())
+            .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
+            .collect(),
+        absent: lines.iter().filter_map(absent).collect(),
+        rounds: Rounds::new(&lines),
+    };
+    let values = values(&data);
+    let claims = prepared.thesis.expects.iter();
+    let claims = claims.map(|expect| judge(expect, &values, &context));
+    let claims = claims.collect();
+    let placed = |ours: String| {
+        let wanted = Pattern::new(pattern(&ours));
+        let mut scenes = data.scenes.iter();
+        let scene = scenes.find(|scene| wanted.fits_text(scene.name));
+        let count = scene.and_then(|scene| Some(scene.record?.triangles));
+        // A pattern is shown as what it chose, a path as the name of its file.
+        (scene.map_or(ours, |scene| scene.name.to_owned()), count)
+    };
+    let scenes = prepared.scenes.into_iter();
+    let scenes = scenes.map(|(substitute, ours)| (substitute, ours.map(placed)));
+    Ok(Reproduced {
+        name,
+        scenes: scenes.collect(),
+        thesis: prepared.thesis,
+        environment: run.map(|run: &RunRecord| run.environment.clone()),
+        started: run.map_or(0, |run| run.started_unix_s),
+        quick,
+        changes: prepared.changes,
+        claims,
+    })
+}
+
+/// The pattern of a scene's label: a path by its file's name, a built-in scene whatever its parameters, unless it is a pattern itself.
+fn pattern(scene: &str) -> String {
+    if name_of(scene) != scene {
+        return scene.to_owned();
+    }
+    let file = Path::new(scene).file_name();
+    let file = file.map_or(scene.into(), |file| file.to_string_lossy());
+    match is_model(scene) {
+        true => format!("*{file}*"),
+        false => format!("{file}*"),
+    }
+}
+
+/// What a line says was left out, or failed, and why.
+fn absent(line: &Line) -> Option<(Key, String)> {
+    let reason = match &line.body {
+        Body::Skipped(record) | Body::Failed(record) => record.reason.clone(),
+        Body::Structure(record) => record.failure.clone()?,
+        Body::Time(record) => record.failure.clone()?,
+        _ => return None,
+    };
+    (!line.key.is_empty()).then(|| (line.key.clone(), reason))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_found_by_its_file_by_its_name_or_by_the_pattern_that_it_is() {
+        assert_eq!(pattern("../a.b/model.obj"), "*model.obj*");
+        assert_eq!(pattern("city"), "city*");
+        assert_eq!(
+            pattern("instances(*overlap=0.5*"),
+            "instances(*overlap=0.5*"
+        );
+    }
+
+    #[test]
+    fn records_of_another_experiment_are_none_of_this_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = "[run]\nname = \"a\"\n";
+        assert!(!is_of(folder.path(), text));
+        assert!(!is_done(folder.path(), text));
+    }
+}

@@ -1,0 +1,347 @@
+//! Scenes: what is traced. Loaders for OBJ, glTF, PLY and Nori's XML, built-in procedural scenes, cameras,
+//! materials and emitters.
+//!
+//! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
+//! see only [`Triangle`]s, two-level ones also the [`Assembly`]; shading sees the rest.
+#![warn(missing_docs)]
+
+mod builder;
+pub mod builtin;
+mod camera;
+mod colors;
+mod content;
+mod copies;
+mod daylight;
+mod environment;
+mod error;
+mod framing;
+mod gltf;
+mod gltf_accessor;
+mod gltf_container;
+mod gltf_files;
+mod gltf_instancing;
+mod gltf_lights;
+mod gltf_material;
+mod gltf_texture;
+mod gltf_unread;
+mod hung_lamps;
+mod ies;
+mod instances;
+mod light;
+mod mask;
+mod material;
+mod mtl;
+mod mtl_texture;
+mod nori;
+mod normals;
+mod obj;
+mod obj_statements;
+mod ply;
+mod polygon;
+mod reduce;
+mod text;
+mod texture;
+mod texture_use;
+
+pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
+pub use builtin::builtin_scenes;
+pub use camera::{Bounds, check_camera};
+pub use colors::{WHITE, decode_color, encode_color};
+pub use daylight::Daylight;
+pub use environment::EnvironmentMap;
+pub use error::SceneError;
+pub use framing::Framing;
+pub use ies::{IesError, IesProfile, Photometry};
+pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
+pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
+pub use mask::{AlphaChannel, AlphaMask};
+pub use material::{
+    COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
+    Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
+};
+pub use normals::{GEOMETRIC, decode_normal, encode_normal};
+pub use raystone_core::load::LoadReport;
+pub use texture_use::{TextureUse, Wrap};
+
+use glam::{Vec2, Vec3};
+use raystone_core::geometry::{Camera, Triangle};
+use raystone_core::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params, Variant};
+use std::io::Read as _;
+use std::path::Path;
+
+/// An 8-bit texture, row by row from the top. What it is used for says how it is encoded: [`TextureUse`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// File or embedded name, for messages.
+    pub name: String,
+    /// Texels in x.
+    pub width: u32,
+    /// Texels in y.
+    pub height: u32,
+    /// `width * height` texels, RGBA8.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// A loaded scene: flat world-space triangles and what shading needs.
+///
+/// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+#[derive(Debug, Clone)]
+pub struct SceneData {
+    /// Name as the user typed it.
+    pub name: String,
+    /// The triangle soup.
+    pub triangles: Vec<Triangle>,
+    /// Texture coordinates per corner, `v` pointing down (glTF convention); empty if unused.
+    pub uvs: Vec<[Vec2; 3]>,
+    /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
+    pub normals: Vec<[u32; 3]>,
+    /// Colours of the corners, as [`encode_color`] has them, by which the base colour is multiplied; empty where all are white.
+    pub colors: Vec<[[u32; 2]; 3]>,
+    /// Of which triangles the front is the side from which the corners turn clockwise, because a transform has mirrored them:
+    /// copies of an object keep the order of its corners, on which u and v of hits depend. Empty if none is.
+    pub mirrored: Vec<bool>,
+    /// Index into `materials` for each triangle.
+    pub material_ids: Vec<u32>,
+    /// Materials; never empty.
+    pub materials: Vec<Material>,
+    /// Textures.
+    pub textures: Vec<Texture>,
+    /// What the triangles are copies of, if the scene consists of instances.
+    pub assembly: Option<Assembly>,
+    /// The camera of the file or of the built-in scene; `None` means "frame automatically".
+    pub camera: Option<Camera>,
+    /// Constant radiance of the environment, linear RGB; zero is a black sky.
+    pub environment: Vec3,
+    /// Lights without triangles.
+    pub lights: Vec<Light>,
+    /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
+    pub daylight: Option<Daylight>,
+    /// Where to look from, if the scene brings no camera.
+    pub framing: Option<Framing>,
+    /// BLAKE3 of the scene's content (hex), part of every cell's hash.
+    pub hash: String,
+    /// What was dropped or approximated.
+    pub report: LoadReport,
+}
+
+/// How a scene is loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Whether textures are decoded. Without them textured surfaces show their constant colour, and no texture coordinates are kept.
+    /// Masks are there in any case: they say what rays hit.
+    pub textures: bool,
+    /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
+    pub max_texture_size: u32,
+    /// Bytes that the tables of the scene may have: what the adapter binds as one buffer. Textures and maps are reduced until they
+    /// fit, with a warning.
+    pub table_bytes: u64,
+    /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
+    /// from elsewhere could read any file of this machine.
+    pub allow_outside: bool,
+}
+
+/// What every adapter binds as one storage buffer, bytes (WebGPU's `maxStorageBufferBindingSize`).
+pub const LEAST_BINDING: u64 = 128 << 20;
+
+impl LoadOptions {
+    /// The greatest size of a texture beside so many triangles, and words for all of them.
+    fn texture_limits(&self, triangles: usize) -> [u64; 2] {
+        let room = texture::texel_room(self.table_bytes, triangles);
+        [self.max_texture_size.into(), room]
+    }
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            textures: true,
+            max_texture_size: 1024,
+            table_bytes: LEAST_BINDING,
+            allow_outside: false,
+        }
+    }
+}
+
+/// A built-in scene with its default parameters, or a model file.
+///
+/// # Errors
+/// As [`load`].
+pub fn named(name: &str) -> Result<SceneData, SceneError> {
+    let builtin = builtin_scenes().into_iter().find(|e| e.name == name);
+    let file = || Variant {
+        name: name.to_owned(),
+        params: Params::default(),
+        label: name.to_owned(),
+    };
+    let variant = builtin.map_or_else(file, |entry| entry.default_variant());
+    load(&variant, &LoadOptions::default())
+}
+
+/// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB, PLY
+/// or Nori XML file (relative to the working directory, extension in any case).
+///
+/// # Errors
+/// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
+pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
+    let mut variant = variant.clone();
+    let mut common = Params::default();
+    for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS] {
+        common.0.extend(variant.params.0.remove_entry(name));
+    }
+    let common = common.completed(&common_parameters())?;
+    let mut scene = load_alone(&variant, options)?;
+    let number = |name| match common.0.get(name) {
+        Some(ParamValue::Integer(number @ 1..)) => Some(*number as usize),
+        _ => None,
+    };
+    if let Some(most) = number(MOST_TRIANGLES) {
+        scene = copies::with_at_most(scene, most)?;
+    }
+    if let Some(copies) = number(COPIES) {
+        scene = copies::on_a_plane(scene, copies)?;
+    }
+    if let Some(lamps) = number(HUNG_LAMPS) {
+        scene = hung_lamps::hang(scene, lamps as u32);
+    }
+    match common.0.get(ENVIRONMENT) {
+        Some(ParamValue::Name(file)) if !file.is_empty() => {
+            scene.under(Path::new(file), options.table_bytes)
+        }
+        _ => Ok(scene),
+    }
+}
+
+/// The parameter of every scene that names an environment map.
+const ENVIRONMENT: &str = "environment";
+
+/// The parameter of every scene that says how many lamps are hung into it.
+const HUNG_LAMPS: &str = "hung_lamps";
+
+/// The parameter of every scene that says how many triangles may be left of it.
+const MOST_TRIANGLES: &str = "most_triangles";
+
+/// The parameter of every scene that says how many copies of it stand on a plane.
+const COPIES: &str = "copies";
+
+/// What every scene has as parameters, built in or not.
+pub(crate) fn common_parameters() -> ParameterSchema {
+    vec![
+        Parameter {
+            name: ENVIRONMENT,
+            description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
+            default: ParamValue::Name(String::new()),
+            range: ParamRange::Text,
+        },
+        Parameter {
+            name: MOST_TRIANGLES,
+            description: "vertices are merged until the scene has no more triangles; 0 leaves it as it is",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer {
+                min: 0,
+                max: u32::MAX.into(),
+            },
+        },
+        Parameter {
+            name: COPIES,
+            description: "copies of the scene that stand on a plane, turned about the vertical; 0 leaves it as it is",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer {
+                min: 0,
+                max: 65_536,
+            },
+        },
+        Parameter {
+            name: HUNG_LAMPS,
+            description: "small square lamps that are hung into the scene, at places of their own, and shine down",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer { min: 0, max: 4096 },
+        },
+    ]
+}
+
+/// The scene of a variant without its environment map.
+fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
+    if let Some(scene) = builtin::build(variant) {
+        return scene;
+    }
+    let name = variant.name.as_str();
+    let path = Path::new(name);
+    match extension(path).as_str() {
+        "obj" => obj::load(path, name, options),
+        "gltf" | "glb" => gltf::load(path, name, options),
+        "ply" => ply::load(path, name),
+        "xml" => nori::load(path, name, options),
+        _ if path.exists() => Err(SceneError::UnknownFormat {
+            path: path.to_owned(),
+        }),
+        _ => Err(SceneError::Unknown {
+            name: name.to_owned(),
+            hint: builtin::hint(name),
+        }),
+    }
+}
+
+/// Looks at the file of a model without loading it: whether its format is known, whether it is a file with
+/// something in it, and whether that begins as the format does.
+///
+/// # Errors
+/// [`SceneError`]: an unknown format, or a file that cannot be read or cannot be a model.
+pub fn check_model(path: &Path) -> Result<(), SceneError> {
+    let mut start = Vec::new();
+    let read = error::open(path)?
+        .0
+        .take(MODEL_START)
+        .read_to_end(&mut start);
+    read.map_err(SceneError::unreadable(path))?;
+    let text = raystone_core::text::plain_text_or_latin1(start.clone());
+    let json = || text.trim_ascii_start().starts_with('{');
+    let xml = || text.trim_ascii_start().starts_with('<');
+    let (begins_well, expected) = match extension(path).as_str() {
+        "obj" => (!text.contains('\0'), "it is not text"),
+        "gltf" | "glb" => (
+            start.starts_with(b"glTF") || json(),
+            "it begins neither with `glTF` nor with `{`",
+        ),
+        "ply" => (text.starts_with("ply"), "it does not begin with `ply`"),
+        "xml" => (xml(), "it does not begin with `<`"),
+        _ => {
+            let path = path.to_owned();
+            return Err(SceneError::UnknownFormat { path });
+        }
+    };
+    match begins_well {
+        true => Ok(()),
+        false => Err(SceneError::malformed(path, "", expected)),
+    }
+}
+
+/// The ending of a file's name in lower case.
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension
+        .to_ascii_lowercase()
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// Bytes of a model that [`check_model`] looks at.
+const MODEL_START: u64 = 512;
+
+/// How many materials a warning names.
+const NAMES_IN_WARNING: usize = 4;
+
+/// One line for all materials that are `what` but drawn as `drawn`; nothing if there are none.
+fn approximation_warning(what: &str, drawn: &str, names: Vec<&str>) -> Option<String> {
+    if names.is_empty() {
+        return None;
+    }
+    let count = names.len();
+    let mut shown = names[..count.min(NAMES_IN_WARNING)].join(", ");
+    if count > NAMES_IN_WARNING {
+        shown += ", …";
+    }
+    let are = ["materials are", "material is"][usize::from(count == 1)];
+    Some(format!(
+        "{count} {are} {what}, which is not rendered yet; drawn as {drawn}: {shown}"
+    ))
+}

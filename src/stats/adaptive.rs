@@ -1,0 +1,193 @@
+//! How many samples each tile of an image needs for an error that was asked for: in two stages (C. Stein, "A two-sample
+//! test for a linear hypothesis whose power is independent of the variance", 1945).
+//!
+//! Whoever stops where an estimate looks good stops where it is too dark by chance, since an image that has missed its
+//! fireflies has little variance, too: adaptive images are biased by that. Here the replicates are two groups. The first samples of
+//! each group say how many the *other* group takes, tile by tile, and nothing is looked at again. What a group
+//! draws is independent of how many samples it takes, so that the mean of its images is the integral, exactly, and the mean of both
+//! groups, too.
+
+use crate::comparison::LogFigure;
+use crate::metrics::RELATIVE_EPSILON;
+use raystone_image::Image;
+
+/// Fewest replicates of a group that say anything of their spread.
+pub const LEAST_GROUP: usize = 4;
+
+/// The tiles of an image: squares, cut off at the right and lower edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tiles {
+    /// Width and height of the image, pixels.
+    pub size: [u32; 2],
+    /// Edge of a tile, pixels.
+    pub edge: u32,
+}
+
+impl Tiles {
+    /// Columns and rows of tiles.
+    pub fn counts(self) -> [u32; 2] {
+        self.size.map(|pixels| pixels.div_ceil(self.edge))
+    }
+
+    /// How many there are.
+    pub fn len(self) -> usize {
+        let [columns, rows] = self.counts();
+        columns as usize * rows as usize
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+
+    /// The number of the tile that holds a pixel, by the number of the pixel.
+    pub fn of_pixel(self, pixel: usize) -> usize {
+        let (width, edge) = (self.size[0] as usize, self.edge as usize);
+        let [x, y] = [pixel % width, pixel / width].map(|at| at / edge);
+        y * self.counts()[0] as usize + x
+    }
+
+    /// Its pixels.
+    pub fn pixels(self, tile: usize) -> Vec<usize> {
+        let [width, height] = self.size.map(|edge| edge as usize);
+        let (columns, edge) = (self.counts()[0] as usize, self.edge as usize);
+        let [left, top] = [tile % columns, tile / columns].map(|at| at * edge);
+        let rows = top..height.min(top + edge);
+        let row = |y: usize| (left..width.min(left + edge)).map(move |x| y * width + x);
+        rows.flat_map(row).collect()
+    }
+}
+
+/// The relMSE of a tile of one replicate, from what the replicates differ by, without a reference: the mean over its pixels and
+/// channels of variance / (mean² + 0.01). A jackknife over the replicates says how well it is known. The noise of the mean below
+/// the fraction makes it too high, by 4 · variance / (n · mean²) to first order: on the safe side. `None` below [`LEAST_GROUP`]
+/// images, and where something is not finite.
+pub fn tile_error(images: &[&Image], pixels: &[usize]) -> Option<LogFigure> {
+    if images.len() < LEAST_GROUP {
+        return None;
+    }
+    let without = |left_out: usize| {
+        let kept = (images.iter().enumerate()).filter(|(i, _)| *i != left_out);
+        let kept: Vec<&Image> = kept.map(|(_, image)| *image).collect();
+        relative_variance(&kept, pixels).ln()
+    };
+    let by_replicate = (0..images.len()).map(without).collect();
+    LogFigure::new(without(usize::MAX), &[by_replicate], Vec::new())
+}
+
+fn relative_variance(images: &[&Image], pixels: &[usize]) -> f64 {
+    let n = images.len() as f64;
+    let of = |pixel: usize, channel: usize| {
+        let values = || {
+            images
+                .iter()
+                .map(|image| f64::from(image.pixels[pixel][channel]))
+        };
+        let mean = values().sum::<f64>() / n;
+        let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        // The square of a noisy mean is too large by the noise.
+        let square = (mean * mean - variance / n).max(0.0);
+        variance / (square + RELATIVE_EPSILON)
+    };
+    let all = pixels.iter().flat_map(|p| (0..3).map(move |c| of(*p, c)));
+    all.sum::<f64>() / (3 * pixels.len()).max(1) as f64
+}
+
+/// The samples that a tile needs: the fewest of `counts` (ascending) with which its relMSE is below `target` with this
+/// confidence, if it falls as one over the samples, from `error` at the first of them; the most where none is enough or nothing is
+/// known. Errors of good samplers fall faster, so that they then need fewer.
+pub fn samples_needed(
+    error: Option<&LogFigure>,
+    counts: &[u32],
+    target: f64,
+    confidence: f64,
+) -> u32 {
+    let (first, most) = (counts.first(), counts.last());
+    let Some(((error, first), most)) = error.zip(first).zip(most) else {
+        return most.copied().unwrap_or(0);
+    };
+    // One side of the interval: twice its chance to miss is that of both.
+    let worst = error.upper(2.0 * (1.0 - confidence));
+    let is_enough = |count: &&u32| worst * f64::from(*first) / f64::from(**count) <= target;
+    counts.iter().find(is_enough).copied().unwrap_or(*most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_core::random::Pcg32;
+
+    fn image(size: [u32; 2], pixel: impl FnMut(usize) -> [f32; 3]) -> Image {
+        let pixels = (0..(size[0] * size[1]) as usize).map(pixel).collect();
+        Image {
+            width: size[0],
+            height: size[1],
+            pixels,
+        }
+    }
+
+    #[test]
+    fn every_pixel_is_in_one_tile() {
+        let tiles = Tiles {
+            size: [37, 20],
+            edge: 16,
+        };
+        assert_eq!((tiles.counts(), tiles.len()), ([3, 2], 6));
+        let mut seen = vec![0; 37 * 20];
+        for tile in 0..tiles.len() {
+            for pixel in tiles.pixels(tile) {
+                assert_eq!(tiles.of_pixel(pixel), tile);
+                seen[pixel] += 1;
+            }
+        }
+        assert!(seen.iter().all(|count| *count == 1));
+    }
+
+    /// Images of mean 1 with uniform noise of this relative variance.
+    fn noisy(rng: &mut Pcg32, variance: f64, count: usize) -> Vec<Image> {
+        let half = (3.0 * variance).sqrt();
+        let mut value = || (1.0 + half * (2.0 * rng.uniform() - 1.0)) as f32;
+        (0..count)
+            .map(|_| image([8, 8], |_| [value(), value(), value()]))
+            .collect()
+    }
+
+    #[test]
+    fn the_error_of_a_tile_is_its_variance_and_the_confidence_holds() {
+        let mut rng = Pcg32::new(3);
+        let pixels: Vec<usize> = (0..64).collect();
+        let (mut sum, mut too_low) = (0.0, 0);
+        // So little noise that the mean of the quotient is no more than 0.1 % too high.
+        let variance = 0.0025;
+        let truth = variance / (1.0 + RELATIVE_EPSILON);
+        for _ in 0..400 {
+            let images = noisy(&mut rng, variance, 8);
+            let images: Vec<&Image> = images.iter().collect();
+            let error = tile_error(&images, &pixels).expect("eight images");
+            sum += error.log.exp();
+            too_low += usize::from(error.upper(0.1) < truth);
+        }
+        assert!((sum / 400.0 / truth - 1.0).abs() < 0.01, "{}", sum / 400.0);
+        // 5 % may lie below: 20 of 400, within four standard deviations.
+        assert!((3..=38).contains(&too_low), "{too_low}");
+    }
+
+    #[test]
+    fn a_tile_takes_the_fewest_samples_that_are_enough() {
+        let exact = |error: f64| LogFigure {
+            log: error.ln(),
+            own: Vec::new(),
+            shared: Vec::new(),
+        };
+        let counts = [4, 8, 16, 32];
+        let needed = |error| samples_needed(Some(&exact(error)), &counts, 0.01, 0.95);
+        assert_eq!(
+            [0.009, 0.019, 0.039, 0.041, 5.0].map(needed),
+            [4, 8, 16, 32, 32]
+        );
+        assert_eq!(needed(0.0), 4);
+        assert_eq!(samples_needed(None, &counts, 0.01, 0.95), 32);
+        let few = noisy(&mut Pcg32::new(1), 0.1, LEAST_GROUP - 1);
+        assert!(tile_error(&few.iter().collect::<Vec<_>>(), &[0, 1]).is_none());
+    }
+}

@@ -1,0 +1,328 @@
+//! The bias check: do the replicates of a sampler have the mean that the reference has?
+//!
+//! A t-test ([`capped_t_test`]) compares luminance means of the replicates with those of the independent parts
+//! of the reference (the idea of Jung, Hanika and Dachsbacher, JCGT 9(2), 2020, with the replicate image as the
+//! unit of inference: the samples within one image may depend on each other). There are three of them, each at
+//! a third of the level:
+//!
+//! * of the mean of the whole image, which sees any bias that adds up;
+//! * of a mean in which noisy places count less (`weights`), which sees a small bias that all pixels share: on
+//!   the Cornell box, where most of the noise comes from the edges of the lamp, its standard error is a fifth of
+//!   the plain mean's;
+//! * per tile, for a bias that stays in its place: over all tiles the Benjamini–Hochberg procedure bounds the
+//!   share of false alarms.
+//!
+//! So a sampler without bias is called biased with at most the whole probability.
+//!
+//! What is hit seldom shows no noise where no replicate hit it, and differs from the reference all the same.
+//! Where replicates show less than `LEAST_NOISE` of the noise that the reference foretells, what it foretells counts
+//! (`careful_test`). Below `replicates_needed` nothing is said at all.
+//!
+//! The t-test supposes that means are about normal. Many samples per pixel make them so; at very
+//! few, fireflies skew them and very small p-values come up too often.
+
+mod weights;
+
+use crate::hypothesis::{
+    WelchTest, benjamini_hochberg, capped_t_test, least_rate, student_t_two_sided, t_test_effect,
+    t_test_power,
+};
+use crate::statistics::{mean, median, variance};
+use raystone_image::{Image, ImageError, luminance};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A sampler may be said to have no bias found only if one of so many standard errors of the mean
+/// luminance of the whole image …
+pub(crate) const EFFECT: f64 = 10.0;
+/// … would have been found with this probability.
+pub(crate) const POWER: f64 = 0.9;
+/// Of the whole level, the part that each of the three tests gets.
+const SHARE: f64 = 1.0 / 3.0;
+/// Of the noise that the reference foretells for a mean, the part of the variance below which replicates are not
+/// believed: of eight even replicates one tile in twenty has as little by chance.
+pub(crate) const LEAST_NOISE: f64 = 0.25;
+/// Most replicates that an experiment may have.
+const MOST_REPLICATES: u32 = 1024;
+
+/// How to test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasOptions {
+    /// Edge of a tile in pixels, at least 1.
+    pub tile: u32,
+    /// Greatest probability of a false alarm, in (0, 1): a third for each of the three tests.
+    pub alpha: f64,
+    /// Differences below this part of the reference are not bias but rounding, see
+    /// `rounding_bound`.
+    pub rounding: f64,
+}
+
+impl Default for BiasOptions {
+    /// 8 × 8 pixels, 1 %, and 2⁻¹⁵: 256 additions in f32 on both sides.
+    fn default() -> Self {
+        Self {
+            tile: 8,
+            alpha: 0.01,
+            rounding: 1.0 / 32768.0,
+        }
+    }
+}
+
+/// What the test says.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BiasVerdict {
+    /// Neither the whole image nor a tile was rejected. This is not a proof: a bias far below the noise
+    /// stays unseen.
+    NoBiasFound,
+    /// The whole image or at least one tile was rejected.
+    Biased,
+    /// There is nothing to test, or too little to find a bias in, for this reason.
+    NotTestable(String),
+}
+
+impl fmt::Display for BiasVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoBiasFound => f.write_str("no bias found"),
+            Self::Biased => f.write_str("biased"),
+            Self::NotTestable(reason) => write!(f, "not testable: {reason}"),
+        }
+    }
+}
+
+/// Outcome of the check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BiasCheck {
+    /// Tiles tested; 0 if not testable.
+    pub tiles: usize,
+    /// Top left pixels `[x, y]` of the rejected tiles.
+    pub rejected: Vec<[u32; 2]>,
+    /// Probability of a false alarm asked for.
+    pub alpha: f64,
+    /// Smallest p-value of a tile; 1 if not testable.
+    pub min_p: f64,
+    /// p-value of the three tests together: the least level `alpha` at which one of them rejects. 1 if not
+    /// testable.
+    pub p: f64,
+    /// p-values of tiles in ten equal bins of `[0, 1]`, without those whose difference rounding explains (p = 1 by
+    /// definition): flat if there is no bias.
+    pub p_histogram: [usize; 10],
+    /// Test of the mean luminance of the whole image, the difference shortened by the rounding; absent
+    /// if not testable.
+    pub whole: Option<WelchTest>,
+    /// The same of the mean in which noisy places count less, relative to that mean; absent if not testable,
+    /// below four parts of the reference, and without noise.
+    pub weighted: Option<WelchTest>,
+    /// The least bias, as a part of the radiance that all pixels share, that one of these two tests would have
+    /// found with probability `POWER`; absent if not testable or black.
+    pub detectable: Option<f64>,
+    /// The verdict.
+    pub verdict: BiasVerdict,
+}
+
+/// Tests `replicates` (independent seeds of one sampler, one spp) against the independent
+/// `reference_parts` (other seeds, better another sampler family).
+///
+/// Fewer than two images on a side, or NaN or infinite pixels, are [`BiasVerdict::NotTestable`], and so
+/// are fewer than `replicates_needed`, unless no pixel has any noise on either side. Then, and only then, a
+/// tile counts as p = 1 if the means agree to the rounding, else as p = 0.
+///
+/// # Errors
+/// [`ImageError::SizeMismatch`] if the images are not all of one size.
+pub fn check_bias(
+    replicates: &[Image],
+    reference_parts: &[Image],
+    options: BiasOptions,
+) -> Result<BiasCheck, ImageError> {
+    for image in replicates.iter().chain(reference_parts) {
+        reference_parts
+            .first()
+            .unwrap_or(image)
+            .check_size(image, "an image of the bias check")?;
+    }
+    let mut check = BiasCheck {
+        tiles: 0,
+        rejected: Vec::new(),
+        alpha: options.alpha,
+        min_p: 1.0,
+        p: 1.0,
+        p_histogram: [0; 10],
+        whole: None,
+        weighted: None,
+        detectable: None,
+        verdict: BiasVerdict::NoBiasFound,
+    };
+    if let Some(reason) = why_not_testable(replicates, reference_parts) {
+        check.verdict = BiasVerdict::NotTestable(reason);
+        return Ok(check);
+    }
+    let noisy = has_noise(replicates) || has_noise(reference_parts);
+    let tiles = [replicates, reference_parts].map(|images| tile_means(images, options.tile));
+    let noisier = noisy.then(|| noise_ratio(&tiles));
+    let test = |a: &[f64], b: &[f64]| careful_test(a, b, options.rounding, noisier);
+    let (width, height) = (replicates[0].width, replicates[0].height);
+    let level = SHARE * options.alpha;
+    let whole = |images| tile_means(images, width.max(height)).concat();
+    check.whole = test(&whole(replicates), &whole(reference_parts));
+    let [ours, theirs] = weights::weighted_means(replicates, reference_parts).unwrap_or_default();
+    check.weighted = test(&ours, &theirs);
+    let brightness = mean_size(&whole(reference_parts));
+    let relative = [
+        (check.whole, brightness),
+        (check.weighted, mean_size(&theirs)),
+    ];
+    let least = relative
+        .into_iter()
+        .filter_map(|(test, size)| detectable(test?, size, level));
+    check.detectable = least.reduce(f64::min).map(|least| least + options.rounding);
+    // Both sides have two finite samples or more, so the tests exist.
+    let p_value = |test: Option<WelchTest>| test.map_or(1.0, |test| test.p);
+    let [ours, theirs] = &tiles;
+    let pairs = ours.iter().zip(theirs);
+    let p_values: Vec<f64> = pairs.map(|(a, b)| p_value(test(a, b))).collect();
+    count_tiles(&mut check, &p_values, width, options);
+    let of_image = [check.whole, check.weighted].map(p_value);
+    let biased = of_image.iter().any(|p| *p <= level) || !check.rejected.is_empty();
+    let least = of_image.into_iter().fold(least_rate(&p_values), f64::min);
+    check.p = (least / SHARE).min(1.0);
+    let needed = replicates_needed(options.alpha);
+    if !noisy || replicates.len() as u64 >= u64::from(needed) {
+        if biased {
+            check.verdict = BiasVerdict::Biased;
+        }
+    } else {
+        (check.rejected, check.p) = (Vec::new(), 1.0);
+        check.verdict = BiasVerdict::NotTestable(format!(
+            "{} replicates, {needed} are needed to find a bias of {EFFECT} standard errors in {:.0} % \
+             of all cases at this level ({:.1e})",
+            replicates.len(),
+            100.0 * POWER,
+            options.alpha
+        ));
+    }
+    Ok(check)
+}
+
+/// The part of `size` that a bias must be for this test to find it with probability [`POWER`].
+fn detectable(test: WelchTest, size: f64, level: f64) -> Option<f64> {
+    let effect = t_test_effect(POWER, level, test.degrees_of_freedom);
+    let part = effect * test.standard_error / size;
+    part.is_finite().then_some(part)
+}
+
+/// From how many replicates on a bias of [`EFFECT`] standard errors in the whole image is found with
+/// probability [`POWER`] at level `alpha`, if the noise of the reference is far smaller than theirs.
+pub(crate) fn replicates_needed(alpha: f64) -> u32 {
+    let finds = |&n: &u32| t_test_power(EFFECT, SHARE * alpha, f64::from(n - 1)) >= POWER;
+    (2..MOST_REPLICATES).find(finds).unwrap_or(MOST_REPLICATES)
+}
+
+fn why_not_testable(replicates: &[Image], parts: &[Image]) -> Option<String> {
+    for (images, name) in [
+        (replicates, "replicates"),
+        (parts, "parts of the reference"),
+    ] {
+        if images.len() < 2 {
+            return Some(format!("{} {name}, two are needed", images.len()));
+        }
+        let bad: usize = images.iter().map(Image::non_finite_pixels).sum();
+        if bad > 0 {
+            return Some(format!("{bad} pixels of the {name} are NaN or infinite"));
+        }
+    }
+    None
+}
+
+/// Luminance means, by tile (row by row) and then by image.
+fn tile_means(images: &[Image], tile: u32) -> Vec<Vec<f64>> {
+    let (width, height) = (images[0].width, images[0].height);
+    let tile = tile.max(1);
+    let mut means = Vec::new();
+    for y in (0..height).step_by(tile as usize) {
+        for x in (0..width).step_by(tile as usize) {
+            let (right, bottom) = ((x + tile).min(width), (y + tile).min(height));
+            let mean = |image: &Image| {
+                let row =
+                    |v: u32| &image.pixels[(v * width + x) as usize..][..(right - x) as usize];
+                let sum: f64 = (y..bottom).flat_map(row).map(luminance).sum();
+                sum / f64::from((right - x) * (bottom - y))
+            };
+            means.push(images.iter().map(mean).collect());
+        }
+    }
+    means
+}
+
+/// Whether any pixel differs from one image to another.
+fn has_noise(images: &[Image]) -> bool {
+    images.iter().any(|image| image.pixels != images[0].pixels)
+}
+
+/// How much noisier a replicate is than a part of the reference, in variance: the median over tiles in which both have
+/// noise.
+fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
+    let ratio = |(a, b): (&Vec<f64>, &Vec<f64>)| Some(variance(a)? / variance(b)?);
+    let ratios = ours.iter().zip(theirs).filter_map(ratio);
+    let ratios: Vec<f64> = ratios.filter(|r| r.is_finite() && *r > 0.0).collect();
+    median(&ratios).unwrap_or(0.0)
+}
+
+/// The test of one mean. `noisier` is [`noise_ratio`], absent where no pixel has any noise: then the means are compared
+/// as they are.
+///
+/// Where replicates have less than [`LEAST_NOISE`] of the variance that the reference's times `noisier` foretells, they
+/// have not seen what makes the noise there, and the foretold one counts. And n replicates that are all alike (to the
+/// rounding) speak no louder than they would with the reference's mean as one more of them, which makes |t| = n.
+fn careful_test(
+    ours: &[f64],
+    theirs: &[f64],
+    rounding: f64,
+    noisier: Option<f64>,
+) -> Option<WelchTest> {
+    let margin = rounding * mean_size(theirs);
+    let found = capped_t_test(ours, theirs, margin)?;
+    let Some(noisier) = noisier.filter(|_| found.t != 0.0) else {
+        return Some(found);
+    };
+    let n = ours.len() as f64;
+    let (own, foretold) = (variance(ours)?, noisier * variance(theirs)?);
+    let missing = match own < LEAST_NOISE * foretold {
+        true => foretold - own,
+        false => 0.0,
+    };
+    let gap = (mean(ours)? - mean(theirs)?).abs() - margin;
+    let standard_error = (found.standard_error.powi(2) + missing / n).sqrt();
+    let alike = own.sqrt() <= margin;
+    let most = if alike { n } else { f64::INFINITY };
+    let size = (gap / standard_error).min(most);
+    Some(WelchTest {
+        t: size.copysign(found.t),
+        p: student_t_two_sided(size, found.degrees_of_freedom),
+        standard_error,
+        ..found
+    })
+}
+
+fn mean_size(values: &[f64]) -> f64 {
+    values.iter().map(|v| v.abs()).sum::<f64>() / values.len() as f64
+}
+
+fn count_tiles(check: &mut BiasCheck, p_values: &[f64], width: u32, options: BiasOptions) {
+    // A tile that rounding explains has p = 1, whatever chance did.
+    for p in p_values.iter().filter(|p| **p < 1.0) {
+        check.p_histogram[((p * 10.0) as usize).min(9)] += 1;
+    }
+    let tile = options.tile.max(1);
+    let columns = width.div_ceil(tile);
+    check.rejected = (0u32..)
+        .zip(benjamini_hochberg(p_values, SHARE * options.alpha))
+        .filter(|&(_, rejected)| rejected)
+        .map(|(i, _)| [i % columns * tile, i / columns * tile])
+        .collect();
+    check.tiles = p_values.len();
+    check.min_p = p_values.iter().copied().fold(1.0, f64::min);
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,14 @@
+//! Estimates with their intervals, tests of hypotheses, and metrics of images.
+#![warn(missing_docs)]
+
+pub mod adaptive;
+pub mod bias;
+pub mod comparison;
+pub mod flip;
+pub mod growth;
+pub mod heavy_tails;
+pub mod hypothesis;
+pub mod interval;
+pub mod metrics;
+mod shown;
+pub mod statistics;

@@ -1,0 +1,420 @@
+//! The gate: no figure is printed for a structure whose hits differ from the judge's.
+//!
+//! The judge is the scalar CPU twin of the plain BVH. It is itself compared with brute force and with
+//! the f64 oracle on as many rays as a budget allows. On an adapter that computes like the host,
+//! hits must be equal to the bit. On one that fuses or divides otherwise, a differing hit is a *tie*
+//! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
+//!
+//! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
+//! see `instance_judge`.
+
+use crate::holes::SceneHoles;
+use crate::instance_judge;
+use crate::kept_checks::{self, KeptChecks};
+use crate::rays::{RaySet, record_rays};
+use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
+use raystone_accel::triangle::TriangleRecord;
+use raystone_accel::{
+    AccelError, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, NO_HIT, Query, Ray,
+    RayBatch, Space, Traced, Tracer, TriangleBuffers, TriangleSoup, brute_force_hits,
+};
+use raystone_config::Gate;
+use raystone_core::geometry::Camera;
+use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
+use raystone_record::{ClassVerdict, GateVerdict, JudgeCheck};
+use raystone_scene::SceneData;
+
+/// The judge is compared with brute force on at least this many rays.
+const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
+/// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
+const TIE_ULPS: f64 = 4.0;
+
+/// The judge of a scene: recorded rays with its answers. The scalar BVH that gave them is not kept.
+pub struct Judge {
+    /// Rays and true hits, per class.
+    pub sets: Vec<RaySet>,
+    /// The judge against brute force.
+    pub brute_force: JudgeCheck,
+    /// The judge against the f64 oracle.
+    pub oracle: JudgeCheck,
+    /// The first ray on which the judge itself is wrong.
+    pub first_wrong: Option<String>,
+    /// The judge of structures that trace instances; `None` if no ray of the scene is transformed.
+    pub instances: Option<Box<Judge>>,
+}
+
+/// What becomes of checks of a judge that were carried out before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checks {
+    /// They are repeated.
+    Repeated,
+    /// Those of a judge that is the same to the bit are found again on disk.
+    Kept,
+}
+
+impl Judge {
+    /// Builds the judge, records the rays and checks the judge itself.
+    ///
+    /// # Errors
+    /// The scene has too many triangles for a BVH.
+    pub fn new(
+        scene: &SceneData,
+        soup: &TriangleSoup,
+        camera: Camera,
+        settings: &Gate,
+        seed: u64,
+        past: Checks,
+    ) -> Result<Self, AccelError> {
+        let params = BvhParameters::default();
+        let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
+        tree.validate(soup)?;
+        let twin = tree.twin(soup);
+        let sets = record_rays(scene, soup, camera, &twin, settings, seed);
+        drop(tree);
+        let mut judge = Self::of_sets(sets);
+        judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
+        let kept = match past {
+            Checks::Repeated => None,
+            Checks::Kept => kept_checks::folder().and_then(|folder| {
+                KeptChecks::of(folder, &judge, &scene.hash, soup.intersection, settings)
+            }),
+        };
+        if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
+            judge.check(scene, soup, settings);
+            kept.iter().for_each(|kept| kept.keep(&judge));
+        }
+        Ok(judge)
+    }
+
+    /// A judge of these answers, as yet unchecked.
+    pub(super) fn of_sets(sets: Vec<RaySet>) -> Self {
+        Self {
+            sets,
+            brute_force: JudgeCheck::default(),
+            oracle: JudgeCheck::default(),
+            first_wrong: None,
+            instances: None,
+        }
+    }
+
+    fn check(&mut self, scene: &SceneData, soup: &TriangleSoup, settings: &Gate) {
+        self.check_brute_force(settings.brute_force_tests, soup.records.len(), |rays| {
+            brute_force_hits(soup, rays)
+        });
+        self.check_oracle(scene, soup, settings.oracle_rays as usize);
+        if let (Some(judge), Some(placed)) = (&mut self.instances, &soup.placed) {
+            instance_judge::check(judge, (scene, placed), settings);
+        }
+    }
+
+    /// The same judge with every so many of its rays.
+    pub fn thinned(&self, every: usize) -> Self {
+        let thin = |set: &RaySet| RaySet {
+            class: set.class,
+            rays: set.rays.iter().step_by(every).copied().collect(),
+            truth: set.truth.iter().step_by(every).copied().collect(),
+            shadow: Vec::new(),
+        };
+        Self {
+            sets: self.sets.iter().map(thin).collect(),
+            brute_force: self.brute_force.clone(),
+            oracle: self.oracle.clone(),
+            first_wrong: self.first_wrong.clone(),
+            instances: self
+                .instances
+                .as_ref()
+                .map(|judge| Box::new(judge.thinned(every))),
+        }
+    }
+
+    /// The judge of structures that meet triangles in this space.
+    pub fn of(&self, space: Space) -> &Self {
+        match (space, &self.instances) {
+            (Space::Instances, Some(judge)) => judge,
+            _ => self,
+        }
+    }
+
+    fn pairs(&self, timed: bool) -> impl Iterator<Item = (Ray, Hit)> {
+        let sets = self.sets.iter().filter(move |s| s.is_timed() == timed);
+        sets.flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()))
+    }
+
+    /// All hard rays.
+    pub(super) fn hard(&self) -> impl Iterator<Item = (Ray, Hit)> {
+        self.pairs(false)
+    }
+
+    /// `count` rays (or all, if there are fewer) spread evenly over all classes but the hard one.
+    pub(super) fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
+        let all: Vec<(Ray, Hit)> = self.pairs(true).collect();
+        let count = count.min(all.len());
+        (0..count).map(|i| all[i * all.len() / count]).collect()
+    }
+
+    /// Compares with `brute_force`, which costs a ray `triangles` tests, as far as `tests` reach, and on
+    /// all hard rays.
+    pub(super) fn check_brute_force(
+        &mut self,
+        tests: u64,
+        triangles: usize,
+        brute_force: impl FnOnce(&[Ray]) -> Vec<Hit>,
+    ) {
+        let affordable = (tests / triangles.max(1) as u64) as usize;
+        let mut pairs = self.subset(affordable.max(LEAST_BRUTE_FORCE_RAYS));
+        pairs.extend(self.hard());
+        let rays: Vec<Ray> = pairs.iter().map(|(ray, _)| *ray).collect();
+        let truth = brute_force(&rays);
+        self.brute_force.rays = rays.len();
+        for ((ray, judged), brute) in pairs.iter().zip(&truth) {
+            if !judged.same_bits(brute) {
+                self.brute_force.wrong += 1;
+                self.first_wrong
+                    .get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
+            }
+        }
+    }
+
+    fn check_oracle(&mut self, scene: &SceneData, soup: &TriangleSoup, rays: usize) {
+        let mut pairs = self.subset(rays);
+        pairs.extend(self.hard());
+        let questions: Vec<_> = pairs
+            .iter()
+            .map(|(ray, hit)| {
+                // As it is traced: what is raised next to 0 decides at edges.
+                let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
+                (soup.intersection.raised(ray), answer)
+            })
+            .collect();
+        let holes = SceneHoles::of(scene);
+        let surfaces = Surfaces {
+            triangles: &scene.triangles,
+            holes: holes.as_ref().map(|holes| holes as &dyn Holes),
+        };
+        let verdicts = oracle::judge_closest_hits(surfaces, &questions);
+        self.note_oracle(&pairs, verdicts);
+    }
+
+    /// Counts what the oracle thinks of these answers, of which those of hard rays come last.
+    pub(super) fn note_oracle(&mut self, pairs: &[(Ray, Hit)], verdicts: Vec<Verdict>) {
+        let hard = self.hard().count().min(pairs.len());
+        self.oracle.rays = pairs.len();
+        for (place, ((ray, hit), verdict)) in pairs.iter().zip(verdicts).enumerate() {
+            match verdict {
+                Verdict::Agrees => {}
+                Verdict::Ambiguous => {
+                    self.oracle.ambiguous += 1;
+                    self.oracle.hard_ambiguous += usize::from(place >= pairs.len() - hard);
+                }
+                Verdict::Wrong(fault) => {
+                    self.oracle.wrong += 1;
+                    self.first_wrong
+                        .get_or_insert_with(|| format!("ray {ray} | judge {hit} | f64: {fault}"));
+                }
+            }
+        }
+    }
+
+    /// Whether the judge agrees with brute force and with the oracle.
+    pub fn is_sound(&self) -> bool {
+        self.brute_force.wrong == 0 && self.oracle.wrong == 0
+    }
+}
+
+/// Traces all recorded rays, closest and any hit, and compares with the judge of the space in which
+/// the structure meets triangles.
+///
+/// # Errors
+/// A kernel does not compile, the device is lost or hangs, or its driver cuts the loops short.
+pub fn gate(
+    gpu: &Gpu,
+    triangles: &TriangleBuffers,
+    soup: &TriangleSoup,
+    traced: &Traced,
+    judge: &Judge,
+    probe: &ArithmeticProbe,
+    runtime_checks: bool,
+) -> Result<GateVerdict, GpuError> {
+    let judge = judge.of(traced.space);
+    let mut errors = 0;
+    let mut classes = Vec::new();
+    for set in &judge.sets {
+        let batch = |query: Query| {
+            let ask = Ask {
+                coherent: set.is_coherent(),
+                runtime_checks,
+                ..query.into()
+            };
+            Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)
+        };
+        let (closest, any) = (batch(Query::Closest)?, batch(Query::Any)?);
+        closest.trace()?;
+        any.trace()?;
+        if !set.is_timed() {
+            // What is timed is looked at again; here a second turn shows what a first one left behind.
+            closest.trace_in_rows()?;
+            any.trace_in_rows()?;
+        }
+        errors |= closest.error_word()? | any.error_word()?;
+        classes.push(compare(
+            set,
+            &closest.hits()?,
+            &any.found()?,
+            soup,
+            traced.space,
+            probe.is_exact(),
+        ));
+    }
+    if let Err(refused @ GpuError::LoopsCut { .. }) = gpu.check_error_word(errors) {
+        return Err(refused);
+    }
+    let right = classes.iter().all(|c| c.wrong == 0);
+    Ok(GateVerdict {
+        passed: right && errors == 0 && judge.is_sound(),
+        classes,
+        brute_force: judge.brute_force.clone(),
+        oracle: judge.oracle.clone(),
+        kernel_errors: kernel_errors(errors),
+        structural: None,
+        elsewhere: None,
+    })
+}
+
+/// What is wrong with the answers that a timed batch left behind, all of them looked at, and with the
+/// error word of all its dispatches; nothing if nothing is.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub fn timed_fault(
+    batch: &RayBatch,
+    set: &RaySet,
+    soup: &TriangleSoup,
+    space: Space,
+    exact: bool,
+) -> Result<Option<String>, GpuError> {
+    let mut hits = set.truth.clone();
+    let mut found: Vec<_> = hits.iter().map(|h| Some(h.triangle != NO_HIT)).collect();
+    match set.query() {
+        Query::Closest => hits = batch.hits()?,
+        Query::Any => found = batch.found()?,
+    }
+    let mut faults = kernel_errors(batch.error_word()?);
+    let verdict = compare(set, &hits, &found, soup, space, exact);
+    if let Some(first) = verdict.first_wrong {
+        faults.push(format!(
+            "{} of {} rays of the last timed turn differ from the judge; first: {first}",
+            verdict.wrong, verdict.rays
+        ));
+    }
+    Ok((!faults.is_empty()).then(|| faults.join("; ")))
+}
+
+/// Compares the answers of a structure with the judge's.
+pub fn compare(
+    set: &RaySet,
+    hits: &[Hit],
+    found: &[Option<bool>],
+    soup: &TriangleSoup,
+    space: Space,
+    exact: bool,
+) -> ClassVerdict {
+    let mut verdict = ClassVerdict {
+        class: set.class,
+        rays: set.rays.len(),
+        wrong: 0,
+        ties: 0,
+        first_wrong: None,
+    };
+    for (index, (ray, truth)) in set.rays.iter().zip(&set.truth).enumerate() {
+        let none = Hit {
+            t: f32::NAN,
+            ..Hit::miss(ray)
+        };
+        let hit = hits.get(index).copied().unwrap_or(none);
+        let any_right = found.get(index) == Some(&Some(truth.triangle != NO_HIT));
+        if hit.same_bits(truth) && any_right {
+            continue;
+        }
+        if !exact && any_right && is_tie(ray, &hit, truth, soup, space) {
+            verdict.ties += 1;
+            continue;
+        }
+        verdict.wrong += 1;
+        verdict.first_wrong.get_or_insert_with(|| {
+            let any = if any_right {
+                ""
+            } else {
+                " | any-hit answer differs"
+            };
+            describe(ray, "structure", &hit, "judge", truth) + any
+        });
+    }
+    verdict
+}
+
+/// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer, and the
+/// ray may hit the other one there: a plane goes on beyond its triangle. Where rays are transformed,
+/// what rounding the transform can move the distance by comes on top.
+fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup, space: Space) -> bool {
+    let (Some(found), Some(expected)) = (
+        Meeting::new(ray, hit, soup, space),
+        Meeting::new(ray, truth, soup, space),
+    ) else {
+        return false;
+    };
+    let ulp = |t: f64| t.abs() * f64::from(f32::EPSILON);
+    let slack = found.transform_error + expected.transform_error;
+    let near = |a: f64, b: f64| (a - b).abs() <= TIE_ULPS * ulp(a.abs().max(b.abs())) + slack;
+    near(found.plane_distance(), expected.plane_distance())
+        && near(f64::from(hit.t), f64::from(truth.t))
+        && (hit.triangle == truth.triangle || found.may_hit(hit.t))
+}
+
+/// A ray and a triangle in the space where they meet.
+pub(super) struct Meeting {
+    pub ray: Ray,
+    pub record: TriangleRecord,
+    /// How far rounding of the transformed ray may move the distance to the plane.
+    pub transform_error: f64,
+}
+
+impl Meeting {
+    /// `None` for a miss, or for a triangle that the scene has not.
+    fn new(ray: &Ray, hit: &Hit, soup: &TriangleSoup, space: Space) -> Option<Self> {
+        if hit.triangle == NO_HIT {
+            return None;
+        }
+        match (space, &soup.placed) {
+            (Space::Instances, Some(placed)) => {
+                instance_judge::meeting(placed, ray, hit.triangle, hit.t)
+            }
+            _ => Some(Self {
+                ray: soup.intersection.raised(ray),
+                record: *soup.records.get(hit.triangle as usize)?,
+                transform_error: 0.0,
+            }),
+        }
+    }
+
+    /// Distance to the triangle's plane, f64.
+    fn plane_distance(&self) -> f64 {
+        let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
+        let [v0, v1, v2] = self.record.vertices().map(v);
+        let normal = (v1 - v0).cross(v2 - v0);
+        normal.dot(v0 - v(self.ray.origin)) / normal.dot(v(self.ray.direction))
+    }
+
+    /// Whether rounding alone can explain that the triangle was found at `t`.
+    fn may_hit(&self, t: f32) -> bool {
+        let triangle = self.record.triangle();
+        !matches!(
+            oracle::judge(&[triangle], self.ray, Some((0, t))),
+            Verdict::Wrong(_)
+        )
+    }
+}
+
+/// A ray as `raystone trace --ray` takes it, with two answers.
+fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
+    format!("ray {ray} | {left} {a} | {right} {b}")
+}

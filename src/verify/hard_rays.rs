@@ -1,0 +1,240 @@
+//! Hard rays: what cameras, lamps and surfaces hardly ever send out, and what a fault hides behind.
+//!
+//! Half of them are whole rays: through corners, edges and insides of triangles, along edges and in planes
+//! of triangles, along axes with zeros of both signs and with components next to zero, along the diagonals
+//! of the scene; from corners, from planes of triangles, from the planes of boxes and of cells, from far
+//! outside; with directions from 1e-10 to 1e10 long. The other half are parts of these: they end or begin
+//! exactly at, just before or just behind the hit, are a point, or are empty.
+//!
+//! They are made from the scene and a seed alone, and never timed.
+
+use glam::Vec3;
+use raystone_accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
+use raystone_core::random::Pcg32;
+
+/// How many there are: no multiple of a workgroup.
+pub const HARD_RAYS: usize = 4100;
+
+/// Origins outside the scene lie up to this many diagonals away: the margins of grids are made for these.
+const OUTSIDE: f32 = 15.0;
+
+/// Lengths of directions.
+const LENGTHS: [f32; 8] = [1.0, 1e-4, 1e-7, 1e-10, 1e4, 1e7, 1e10, 0.3];
+
+/// What takes the place of components of directions.
+const NEXT_TO_ZERO: [f32; 8] = [0.0, -0.0, 1e-12, -1e-12, 1e-25, -1e-25, 1e-37, -1e-37];
+
+/// The hard rays of a scene, with intervals that end at the hits that `judge` finds.
+pub fn hard_rays(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Vec<Ray> {
+    if soup.records.is_empty() {
+        return Vec::new();
+    }
+    let mut maker = Maker::new(soup, seed);
+    let mut rays: Vec<Ray> = (0..HARD_RAYS / 2).map(|kind| maker.whole(kind)).collect();
+    let parts: Vec<Ray> = rays
+        .iter()
+        .enumerate()
+        .map(|(turn, ray)| {
+            let hit = judge.closest_hit(ray, &mut Counters::default());
+            let t = (hit.triangle != NO_HIT).then_some(hit.t);
+            part(ray, t.unwrap_or(maker.diagonal), turn)
+        })
+        .collect();
+    rays.extend(parts);
+    rays
+}
+
+/// A part of a whole ray, around the distance `t` of its hit.
+fn part(ray: &Ray, t: f32, turn: usize) -> Ray {
+    let [t_min, t_max] = match turn % 16 {
+        0..=2 => [0.0, t],
+        3 | 4 => [0.0, t.next_down()],
+        5 => [0.0, t.next_up()],
+        6 | 7 => [t, Ray::FAR],
+        8 | 9 => [t.next_up(), Ray::FAR],
+        10 => [t.next_down(), Ray::FAR],
+        11 => [t, t],
+        12 => [t, t.next_down()],
+        13 => [0.0, 0.0],
+        14 => [0.5 * t, 1e37],
+        _ => [-0.0, 2.0 * t],
+    };
+    ray.between(t_min, t_max)
+}
+
+/// Makes rays of one scene.
+struct Maker<'a> {
+    soup: &'a TriangleSoup,
+    random: Pcg32,
+    low: Vec3,
+    high: Vec3,
+    diagonal: f32,
+}
+
+impl<'a> Maker<'a> {
+    fn new(soup: &'a TriangleSoup, seed: u64) -> Self {
+        let bounds = soup.bounds();
+        let [low, high] = [bounds.min, bounds.max].map(Vec3::from);
+        Self {
+            soup,
+            random: Pcg32::with_stream(seed, 0x4841_5244),
+            low,
+            high,
+            diagonal: (high - low).length().max(f32::MIN_POSITIVE),
+        }
+    }
+
+    /// From nothing to far away; the kinds take turns.
+    fn whole(&mut self, kind: usize) -> Ray {
+        let (origin, direction) = match kind % 8 {
+            0 => self.along_an_axis(),
+            1 => self.in_a_plane(),
+            2 => self.along_a_diagonal(),
+            3 => {
+                let (origin, direction) = self.towards_a_triangle();
+                (origin, self.with_components_next_to_zero(direction))
+            }
+            4 => {
+                let (origin, direction) = self.towards_a_triangle();
+                let length = self.random.one_of(&LENGTHS);
+                (origin, direction.normalize_or(Vec3::X) * length)
+            }
+            5 => {
+                let origin = self.origin();
+                (origin, self.any_direction())
+            }
+            _ => self.towards_a_triangle(),
+        };
+        let usable = direction.is_finite() && direction.abs().max_element() > 1e-16;
+        Ray::new(origin, if usable { direction } else { Vec3::Y })
+    }
+
+    fn unit(&mut self) -> f32 {
+        self.random.uniform() as f32
+    }
+
+    fn triangle(&mut self) -> [Vec3; 3] {
+        let at = self.random.below(self.soup.records.len());
+        let mut corners = self.soup.records[at].triangle().vertices;
+        corners.rotate_left(self.random.below(3));
+        corners
+    }
+
+    /// A corner, a point of an edge, the middle, or a point of the inside of some triangle.
+    fn point_of_a_triangle(&mut self) -> Vec3 {
+        let [a, b, c] = self.triangle();
+        match self.random.below(5) {
+            0 | 1 => a,
+            2 => 0.5 * (a + b),
+            3 => a + self.unit() * (b - a),
+            _ => (a + b + c) / 3.0,
+        }
+    }
+
+    fn inside(&mut self) -> Vec3 {
+        let at = Vec3::new(self.unit(), self.unit(), self.unit());
+        self.low + at * (self.high - self.low)
+    }
+
+    fn any_direction(&mut self) -> Vec3 {
+        let coordinate = |x: f32| 2.0 * x - 1.0;
+        let direction = Vec3::new(self.unit(), self.unit(), self.unit()).map(coordinate);
+        direction.normalize_or(Vec3::X)
+    }
+
+    /// Inside, outside, on triangles, and on planes: of the scene's box, of halves, quarters, … of it, and
+    /// of the boxes of triangles.
+    fn origin(&mut self) -> Vec3 {
+        let mut origin = match self.random.below(6) {
+            0 | 1 => self.inside(),
+            2 => {
+                let away = self.unit() * OUTSIDE * self.diagonal;
+                0.5 * (self.low + self.high) + away * self.any_direction()
+            }
+            3 => self.point_of_a_triangle(),
+            4 => {
+                let cells = f32::from(1u8 << self.random.below(7));
+                let steps = self.inside() - self.low;
+                let size = (self.high - self.low) / cells;
+                let step = |x: f32, size: f32| if size > 0.0 { (x / size).round() } else { 0.0 };
+                let [x, y, z] = [0, 1, 2].map(|a| step(steps[a], size[a]));
+                self.low + Vec3::new(x, y, z) * size
+            }
+            _ => {
+                let at = Vec3::new(self.unit(), self.unit(), self.unit());
+                Vec3::select(at.cmplt(Vec3::splat(0.5)), self.low, self.high)
+            }
+        };
+        if self.random.below(3) == 0 {
+            let axis = self.random.below(3);
+            origin[axis] = self.triangle()[0][axis];
+        }
+        origin
+    }
+
+    fn towards_a_triangle(&mut self) -> (Vec3, Vec3) {
+        let (origin, target) = (self.origin(), self.point_of_a_triangle());
+        (origin, target - origin)
+    }
+
+    /// Along an axis through a point of a triangle or from anywhere; the other components are zeros of
+    /// either sign or next to it.
+    fn along_an_axis(&mut self) -> (Vec3, Vec3) {
+        let axis = self.random.below(3);
+        let mut origin = match self.random.below(3) {
+            0 => self.origin(),
+            _ => self.point_of_a_triangle(),
+        };
+        let mut direction = Vec3::ZERO;
+        for other in 0..3 {
+            direction[other] =
+                NEXT_TO_ZERO[self.random.below(4) * self.random.below(2) + self.random.below(2)];
+        }
+        let sign = if self.random.below(2) == 0 { 1.0 } else { -1.0 };
+        direction[axis] = sign * self.random.one_of(&LENGTHS);
+        origin[axis] -= sign * self.unit() * 2.0 * (self.high - self.low)[axis];
+        (origin, direction)
+    }
+
+    /// In the plane of a triangle, as far as f32 goes: along an edge, through a corner, or beside it.
+    fn in_a_plane(&mut self) -> (Vec3, Vec3) {
+        let [a, b, c] = self.triangle();
+        let (e, f) = (b - a, c - a);
+        let [s, t] = [self.unit(), self.unit()].map(|x| 6.0 * x - 3.0);
+        match self.random.below(4) {
+            0 => (a, e),
+            1 => (a - s.abs() * e, e),
+            2 => (a + s * e + t * f, -(s * e + t * f)),
+            _ => (a + s * e + t * f, self.unit() * e - self.unit() * f),
+        }
+    }
+
+    /// Along one of the diagonals of the scene or of a face of it, either way: past as many boxes as can be.
+    fn along_a_diagonal(&mut self) -> (Vec3, Vec3) {
+        let pick = [(); 3].map(|()| self.random.below(2) == 0);
+        let [mut from, mut to] = [self.low, self.high];
+        for (axis, swap) in pick.into_iter().enumerate() {
+            if swap {
+                (from[axis], to[axis]) = (to[axis], from[axis]);
+            }
+        }
+        let jitter = 1e-3 * self.random.below(4) as f32 * self.diagonal;
+        let beside = jitter * self.any_direction();
+        let mut direction = to - from;
+        if self.random.below(4) == 0 {
+            let axis = self.random.below(3);
+            direction[axis] = 0.0;
+        }
+        (from + beside - self.unit() * direction, direction)
+    }
+
+    fn with_components_next_to_zero(&mut self, mut direction: Vec3) -> Vec3 {
+        let longest = direction.abs().max_element();
+        for axis in 0..3 {
+            if direction[axis].abs() < longest && self.random.below(2) == 0 {
+                direction[axis] = self.random.one_of(&NEXT_TO_ZERO);
+            }
+        }
+        direction
+    }
+}

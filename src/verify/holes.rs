@@ -1,0 +1,180 @@
+//! What masks cut out of the triangles of a scene, in f64 from the images and texture coordinates as they were loaded: nothing here
+//! reads the words that kernels read. Formula: `docs/shading.md`.
+
+use glam::DVec2;
+use raystone_accel::oracle::{Cut, Holes, Weight};
+use raystone_scene::{AlphaMask, SceneData, Texture, TextureUse, Wrap};
+
+/// How far kernels may place a point in an image off where it is, texels: coordinates of corners and of points are multiples of
+/// 1/256 texel, and are rounded three times.
+pub(crate) const PLACED: f64 = 2.0 / 256.0;
+/// Weights are multiples of it.
+const WEIGHT: f64 = 1.0 / (1_u32 << 24) as f64;
+/// Texels over which the error of a point may reach for anything to be said of it.
+const MOST_TEXELS: f64 = 16.0;
+
+/// The masks of a scene.
+#[derive(Clone, Copy)]
+pub(crate) struct SceneHoles<'a> {
+    scene: &'a SceneData,
+    /// Added to the index of each triangle.
+    first: u32,
+}
+
+impl<'a> SceneHoles<'a> {
+    /// `None` where nothing is cut out.
+    pub(crate) fn of(scene: &'a SceneData) -> Option<Self> {
+        let mut materials = scene.materials.iter();
+        let first = 0;
+        materials
+            .any(|material| material.mask.is_some())
+            .then_some(Self { scene, first })
+    }
+
+    /// Those of a copy of an object, whose first triangle this is in the scene.
+    pub(crate) fn of_copy(self, first: u32) -> Self {
+        Self { first, ..self }
+    }
+
+    /// Whether there is no surface at the point of a triangle with these weights of its second and third corner, moved by `shift`
+    /// texels.
+    pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
+        let Some(mask) = self.mask(triangle) else {
+            return false;
+        };
+        let alpha = match mask.texture {
+            Some(used) => {
+                let [place, x, y] = self.placed(triangle, &used);
+                let at = place + weights[0] * x + weights[1] * y + shift;
+                Image::of(self.scene, &mask, &used).between(at)
+            }
+            None => 1.0,
+        };
+        is_below(&mask, alpha)
+    }
+
+    fn mask(&self, triangle: u32) -> Option<AlphaMask> {
+        let id = self.scene.material_ids[(triangle + self.first) as usize];
+        self.scene.materials[id as usize].mask
+    }
+
+    /// The first corner in texels from the centre of the first one, and what a weight of the others adds.
+    fn placed(&self, triangle: u32, used: &TextureUse) -> [DVec2; 3] {
+        let uvs = self.scene.uvs.get((triangle + self.first) as usize);
+        let texture = &self.scene.textures[used.texture as usize];
+        let size = DVec2::new(texture.width.into(), texture.height.into());
+        let [a, b, c] = uvs.copied().unwrap_or_default().map(|uv| {
+            (used.linear.as_dmat2() * uv.as_dvec2() + used.offset.as_dvec2()) * size - 0.5
+        });
+        [a, b - a, c - a]
+    }
+}
+
+impl Holes for SceneHoles<'_> {
+    fn cut(&self, triangle: u32, weights: Option<[Weight; 2]>) -> Cut {
+        let Some(mask) = self.mask(triangle) else {
+            return Cut::Surface;
+        };
+        let Some(used) = mask.texture else {
+            return said(&mask, [1.0, 1.0]);
+        };
+        let Some([u, v]) = weights else {
+            return Cut::Open;
+        };
+        let [place, x, y] = self.placed(triangle, &used);
+        let at = place + u.value * x + v.value * y;
+        let error = (u.error + WEIGHT) * x.abs() + (v.error + WEIGHT) * y.abs() + PLACED;
+        if error.max_element() > MOST_TEXELS || !at.is_finite() {
+            return Cut::Open;
+        }
+        let range = Image::of(self.scene, &mask, &used).range(at - error, at + error);
+        said(&mask, range)
+    }
+}
+
+fn is_below(mask: &AlphaMask, alpha: f64) -> bool {
+    let alpha = alpha * f64::from(mask.factor);
+    // A factor that is no number cuts out all.
+    (alpha < f64::from(mask.cutoff) || alpha.is_nan()) && mask.cutoff > 0.0
+}
+
+/// What is known where the image has values between these.
+fn said(mask: &AlphaMask, range: [f64; 2]) -> Cut {
+    match range.map(|alpha| is_below(mask, alpha)) {
+        [false, false] => Cut::Surface,
+        [true, true] => Cut::Hole,
+        _ => Cut::Open,
+    }
+}
+
+/// The alphas of an image.
+struct Image<'a> {
+    texture: &'a Texture,
+    mask: &'a AlphaMask,
+    wrap: [Wrap; 2],
+}
+
+impl<'a> Image<'a> {
+    fn of(scene: &'a SceneData, mask: &'a AlphaMask, used: &TextureUse) -> Self {
+        Self {
+            texture: &scene.textures[used.texture as usize],
+            mask,
+            wrap: used.wrap,
+        }
+    }
+
+    fn texel(&self, x: f64, y: f64) -> f64 {
+        let [width, height] = [self.texture.width, self.texture.height];
+        let column = wrapped(x, width.into(), self.wrap[0]);
+        let row = wrapped(y, height.into(), self.wrap[1]);
+        let value = self
+            .mask
+            .channel
+            .value(self.texture.texels[row * width as usize + column]);
+        f64::from(value) / 255.0
+    }
+
+    /// Bilinear between the centres of texels.
+    fn between(&self, at: DVec2) -> f64 {
+        let (cell, part) = (at.floor(), at - at.floor());
+        let row = |y: f64| {
+            let [left, right] = [0.0, 1.0].map(|x| self.texel(cell.x + x, cell.y + y));
+            left * (1.0 - part.x) + right * part.x
+        };
+        row(0.0) * (1.0 - part.y) + row(1.0) * part.y
+    }
+
+    /// Least and greatest value in a rectangle: both lie at corners of its parts in cells.
+    fn range(&self, low: DVec2, high: DVec2) -> [f64; 2] {
+        let stops = |low: f64, high: f64| {
+            let mut stops = vec![low, high];
+            let mut at = low.ceil();
+            while at < high {
+                stops.push(at);
+                at += 1.0;
+            }
+            stops
+        };
+        let (xs, ys) = (stops(low.x, high.x), stops(low.y, high.y));
+        let all = ys
+            .iter()
+            .flat_map(|y| xs.iter().map(move |x| DVec2::new(*x, *y)));
+        all.map(|at| self.between(at))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| {
+                [least.min(x), most.max(x)]
+            })
+    }
+}
+
+/// The texel that a place on an axis of `size` texels stands for.
+pub(super) fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
+    let inside = match wrap {
+        Wrap::Repeat => at.rem_euclid(size),
+        Wrap::Clamp => at.clamp(0.0, size - 1.0),
+        Wrap::Mirrored => {
+            let there = at.rem_euclid(2.0 * size);
+            there.min(2.0 * size - 1.0 - there)
+        }
+    };
+    inside as usize
+}

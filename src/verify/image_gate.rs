@@ -1,0 +1,356 @@
+//! The gate of integrators: single samples of single pixels, as the image kernel computes them, against the
+//! oracle for images ([`PathOracle`]). No error figure is printed for an integrator that fails.
+//!
+//! Each path is put into one of four classes:
+//!
+//! * it *agrees*: every channel within `TOLERANCE`, relative, or below a floor of `FLOOR` of the mean radiance;
+//! * it is *ill-conditioned*: it differs by more, but by no more than `SPREAD` times what the same path does when a few
+//!   roundings of f32 are played in f64 ([`Rounding`]), all its decisions being the same: texture coordinates on long triangles,
+//!   grazing light;
+//! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere and then gives the kernel's answer. That decision
+//!   had a margin below `MOST_ROUNDINGS` roundings. By what is decided otherwise first, it is of one of three kinds: *another surface*
+//!   that lies within rounding of the first (walls of two layers), *an edge* of what is met or in the way, or anything else, such as a
+//!   random number against a probability;
+//! * else it is *wrong*: a fault of the kernels, or of the oracle.
+//!
+//! Means of some samples that are summed in one dispatch are compared with those of single samples ([`sums`]).
+//!
+//! One wrong path fails. So do more flips than `FLIPS` of the paths beyond chance, not counting other surfaces, of which there may be as
+//! many as paths meet surfaces with another one within rounding, or more ill-conditioned ones than
+//! `ILL_CONDITIONED` and a median difference above `MEDIAN`, which no single path shows. Texture coordinates that repeat often have
+//! few digits left within a texel, so that the last two have bounds of their own where textures are.
+
+use crate::path_oracle::{MOST_ROUNDINGS, Parting, Path, PathId, PathOracle, Rounding, View};
+use glam::DVec3;
+use rayon::prelude::*;
+use raystone_gpu::GpuError;
+use raystone_record::PathsRecord;
+use raystone_render::Renderer;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Relative difference of a channel that is agreement.
+pub(crate) const TOLERANCE: f64 = 1e-4;
+/// Radiance below which differences do not count, as a part of the mean radiance of the judged paths.
+pub(crate) const FLOOR: f64 = 1e-3;
+/// Roundings of f32 that are played, in this order.
+pub(crate) const SCALES: [f64; 3] = [4.0, 16.0, MOST_ROUNDINGS];
+/// Part of the paths that may be flips.
+pub(crate) const FLIPS: f64 = 1e-3;
+/// Part of the paths that may be ill-conditioned: where nothing is textured, where a map shines, and where surfaces have textures. Measured
+/// on Mesa's software driver: at most 0.07 % of 1,482 paths of a trial scene (0.03 % of 3,952 of the Cornell box), 1.0 % with maps,
+/// and in the last case 0.2 % of a trial scene but a third of those of a large building, whose textures repeat often.
+pub(crate) const ILL_CONDITIONED: [f64; 3] = [0.02, 0.05, 0.6];
+/// Greatest median of the relative differences in the same cases; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
+pub(crate) const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
+/// Times that each scale is played; twice as often for each surface of a path that has another one within rounding, and on as long as
+/// plays take branches that none took before (light that is passed on by many small facets), but never more often than [`MOST_TRIALS`].
+const TRIALS: u64 = 24;
+const MOST_TRIALS: u64 = TRIALS << 5;
+/// By this factor a kernel may differ more than the worst of the played paths of its branch.
+const SPREAD: f64 = 3.0;
+/// A difference that the second of [`SCALES`] may excuse, too: several offsets add up on long paths in corners.
+const SLIGHT: f64 = 1e-3;
+/// Samples that are summed in one dispatch to be compared with single ones, and by how much their mean may differ, relative.
+const SUMMED: u32 = 4;
+const SUM_TOLERANCE: f64 = 1e-6;
+/// After so many wrong paths no more are looked at.
+const ENOUGH: usize = 16;
+
+/// A path as the kernel has it.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer {
+    /// Which one.
+    pub id: PathId,
+    /// Its radiance.
+    pub radiance: DVec3,
+}
+
+/// What a path of a kernel is that does not agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Class {
+    IllConditioned,
+    Flip(Parting),
+    Wrong,
+}
+
+/// Which paths are judged.
+#[derive(Debug, Clone)]
+pub struct Pixels {
+    /// Width and height of the image, pixels.
+    pub size: [u32; 2],
+    /// Of so many pixels one, others with each sample.
+    pub every: u32,
+    /// Indices of samples.
+    pub samples: Vec<u32>,
+    /// Seed of the replicate.
+    pub seed: u32,
+}
+
+/// Renders single samples, each by itself.
+///
+/// # Errors
+/// A kernel raised its error word, or the device is lost or hangs.
+pub fn answers(renderer: &Renderer, pixels: &Pixels) -> Result<Vec<Answer>, GpuError> {
+    let [width, every] = [pixels.size[0], pixels.every.max(1)];
+    let mut out = Vec::new();
+    for (turn, &sample) in (0u32..).zip(&pixels.samples) {
+        renderer.reset()?;
+        renderer.add_samples(sample, 1, pixels.seed)?;
+        let image = renderer.image()?;
+        let numbered = (0u32..).zip(&image.pixels);
+        let chosen = numbered.filter(|(i, _)| (i + turn) % every == 0);
+        out.extend(chosen.map(|(i, pixel)| Answer {
+            id: PathId {
+                pixel: [i % width, i / width],
+                sample,
+                seed: pixels.seed,
+            },
+            radiance: DVec3::from_array(pixel.map(f64::from)),
+        }));
+    }
+    Ok(out)
+}
+
+/// What is wrong with the sum of some samples in one dispatch: it must be that of the same samples each by itself.
+///
+/// # Errors
+/// A kernel raised its error word, or the device is lost or hangs.
+pub fn sums(renderer: &Renderer, pixels: &Pixels) -> Result<Option<String>, GpuError> {
+    let last = pixels.samples.iter().copied().max().unwrap_or_default();
+    let count = SUMMED.min(last + 1);
+    let render = |first, count| {
+        renderer.reset()?;
+        renderer.add_samples(first, count, pixels.seed)?;
+        renderer.image()
+    };
+    let singles: Vec<_> = (0..count)
+        .map(|sample| render(sample, 1))
+        .collect::<Result<_, _>>()?;
+    let together = render(0, count)?;
+    for (place, mean) in (0u32..).zip(&together.pixels) {
+        for (channel, mean) in mean.iter().map(|x| f64::from(*x)).enumerate() {
+            let own =
+                |image: &raystone_image::Image| f64::from(image.pixels[place as usize][channel]);
+            let expected = singles.iter().map(own).sum::<f64>() / f64::from(count);
+            if (mean - expected).abs() > SUM_TOLERANCE * expected.abs() {
+                let [x, y] = [place % pixels.size[0], place / pixels.size[0]];
+                return Ok(Some(format!(
+                    "pixel ({x}, {y}), seed {}: the mean of samples 0 to {} is {mean:.7e} in one dispatch, {expected:.7e} by single samples",
+                    pixels.seed,
+                    count - 1
+                )));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Judges the answers of a kernel.
+pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecord {
+    let truth: Vec<Path> = (answers.par_iter())
+        .map(|answer| oracle.trace(view, answer.id, Rounding::none()))
+        .collect();
+    let mean = |c: DVec3| c.element_sum() / 3.0;
+    let sum: f64 = truth.iter().map(|path| mean(path.radiance)).sum();
+    let floor = FLOOR * sum / truth.len().max(1) as f64;
+    let differences: Vec<f64> = (answers.iter().zip(&truth))
+        .map(|(answer, path)| difference(answer.radiance, path.radiance, floor))
+        .collect();
+    // NaN differs.
+    let mut differing: Vec<usize> = (0..answers.len()).collect();
+    differing.retain(|&i| differences[i].is_nan() || differences[i] > TOLERANCE);
+    let wrong = AtomicUsize::new(0);
+    let class = |&i: &usize| {
+        if wrong.load(Ordering::Relaxed) >= ENOUGH {
+            return Class::Wrong;
+        }
+        let class = classify(oracle, view, &answers[i], &truth[i], floor);
+        wrong.fetch_add(usize::from(class == Class::Wrong), Ordering::Relaxed);
+        class
+    };
+    let classes: Vec<Class> = differing.par_iter().map(class).collect();
+    let of = |class: Class| classes.iter().filter(|c| **c == class).count();
+    let first_wrong = (differing.iter().zip(&classes)).find(|(_, c)| **c == Class::Wrong);
+    let agreeing = differences.iter().filter(|d| **d <= TOLERANCE);
+    let mut record = PathsRecord {
+        paths: answers.len(),
+        ill_conditioned: of(Class::IllConditioned),
+        flips: [Parting::Surfaces, Parting::Edge, Parting::Decision]
+            .map(|parting| of(Class::Flip(parting)))
+            .iter()
+            .sum(),
+        surfaces: of(Class::Flip(Parting::Surfaces)),
+        edges: of(Class::Flip(Parting::Edge)),
+        layered: truth.iter().filter(|path| path.layers > 0).count(),
+        wrong: of(Class::Wrong),
+        median: median(&truth, &differences, floor),
+        worst: agreeing.copied().fold(0.0, f64::max),
+        ..PathsRecord::default()
+    };
+    record.fault = match first_wrong {
+        Some((&i, _)) => {
+            let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
+            Some(describe(&answers[i], &truth[i]) + &played)
+        }
+        None => out_of_bounds(&record, oracle.texturing()),
+    };
+    record
+}
+
+/// The greatest difference of a channel, relative to the oracle's, or to the floor.
+fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
+    let off = (kernel - oracle).abs();
+    let relative = off / oracle.abs().max(DVec3::splat(floor));
+    // Where nothing shines the floor is 0, too, and equal is equal. Unlike `max_element`, what follows keeps NaN.
+    let [r, g, b] = DVec3::select(off.cmpeq(DVec3::ZERO), DVec3::ZERO, relative).to_array();
+    match r.is_nan() || g.is_nan() || b.is_nan() {
+        true => f64::NAN,
+        false => r.max(g).max(b),
+    }
+}
+
+/// Median difference of the paths that found light.
+fn median(truth: &[Path], differences: &[f64], floor: f64) -> f64 {
+    let lit = truth.iter().zip(differences);
+    let lit = lit.filter(|(path, _)| path.radiance.max_element() > floor);
+    let mut lit: Vec<f64> = lit.map(|(_, d)| *d).collect();
+    lit.sort_by(f64::total_cmp);
+    lit.get(lit.len() / 2).copied().unwrap_or_default()
+}
+
+/// Plays roundings until a path of the oracle explains the kernel's.
+fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, floor: f64) -> Class {
+    let mut spread = 0.0_f64;
+    let mut near = TOLERANCE;
+    let mut others: Vec<Path> = Vec::new();
+    let off = difference(answer.radiance, truth.radiance, floor);
+    let least = (TRIALS << truth.layers.min(8)).min(MOST_TRIALS);
+    for (index, scale) in (0..).zip(SCALES) {
+        // Many roundings would excuse anything of a path that keeps its branch.
+        let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
+        let (mut trial, mut since_new) = (0, 0);
+        while since_new < least && trial < MOST_TRIALS {
+            let rounding = Rounding::played(scale, MOST_TRIALS * index + trial);
+            let played = oracle.trace(view, answer.id, rounding);
+            trial += 1;
+            since_new += 1;
+            if played.parting(truth).is_none() {
+                spread = spread.max(difference(played.radiance, truth.radiance, floor));
+            } else {
+                if others.iter().all(|other| other.parting(&played).is_some()) {
+                    since_new = 0;
+                }
+                others.push(played);
+            }
+            if off <= SPREAD * spread && is_excused {
+                return Class::IllConditioned;
+            }
+        }
+        if is_excused {
+            // A path on a boundary may have no play of its own branch: then those of the others say how far they lie apart.
+            near = TOLERANCE + SPREAD * spread.max(spread_of_branches(&others, floor));
+        }
+        let explains = |other: &Path| difference(answer.radiance, other.radiance, floor) <= near;
+        let parting = others.iter().filter(|other| explains(other));
+        if let Some(parting) = parting.filter_map(|other| other.parting(truth)).min() {
+            return Class::Flip(parting);
+        }
+    }
+    Class::Wrong
+}
+
+/// What the fewest roundings that are played make of a path, for people.
+fn spread_of(
+    oracle: &PathOracle,
+    view: &View,
+    answer: &Answer,
+    truth: &Path,
+    floor: f64,
+) -> String {
+    let plays =
+        (0..TRIALS).map(|trial| oracle.trace(view, answer.id, Rounding::played(SCALES[0], trial)));
+    let (same, others): (Vec<Path>, Vec<Path>) = plays.partition(|p| p.parting(truth).is_none());
+    let off = |path: &Path| difference(path.radiance, truth.radiance, floor);
+    let spread = same.iter().map(off).fold(0.0, f64::max);
+    let from_kernel = |path: &Path| difference(answer.radiance, path.radiance, floor);
+    let nearest = others
+        .iter()
+        .min_by(|a, b| from_kernel(a).total_cmp(&from_kernel(b)));
+    let nearest = nearest.map_or(String::new(), |path| {
+        let apart = spread_of_branches(&others, floor);
+        format!(
+            ", the nearest of which is {} and off by {:.1e} (up to {apart:.1e} within a branch)",
+            show(path.radiance),
+            from_kernel(path)
+        )
+    });
+    let others = others.len();
+    format!(
+        "; rounding moves it by {spread:.1e}, {others} of {TRIALS} plays take other branches{nearest}"
+    )
+}
+
+/// The greatest difference of a path from the first one of its branch.
+fn spread_of_branches(paths: &[Path], floor: f64) -> f64 {
+    let from_first = |path: &Path| {
+        let first = paths.iter().find(|first| first.parting(path).is_none());
+        first.map_or(0.0, |first| {
+            difference(path.radiance, first.radiance, floor)
+        })
+    };
+    paths.iter().map(from_first).fold(0.0, f64::max)
+}
+
+/// The most of `paths` that may be of a class with this share: six standard deviations above the mean.
+fn most(paths: usize, share: f64) -> usize {
+    let mean = share * paths as f64;
+    (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
+}
+
+/// What the numbers of a record say against it, when no single path does; `texturing` is that of the oracle.
+pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
+    let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
+    let PathsRecord {
+        paths,
+        flips,
+        surfaces,
+        layered,
+        ill_conditioned,
+        ..
+    } = *record;
+    let over = |what: &str, found: usize, share: f64| {
+        let most = most(paths, share);
+        (found > most).then(|| {
+            format!("{found} of {paths} paths {what}, at most {most} are explained by rounding")
+        })
+    };
+    let off = record.median > median;
+    let strange = surfaces > layered + most(paths, FLIPS);
+    let strange = strange.then(|| {
+        format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
+    });
+    over("take another branch", flips - surfaces, FLIPS)
+        .or(strange)
+        .or_else(|| over("are ill-conditioned", ill_conditioned, share))
+        .or_else(|| {
+            off.then(|| format!("half of the paths differ by {:.1e} or more", record.median))
+        })
+}
+
+/// Both answers, and the path, a line for each vertex.
+fn describe(answer: &Answer, truth: &Path) -> String {
+    let mut text = format!(
+        "{}: kernel {}, oracle {}",
+        answer.id,
+        show(answer.radiance),
+        show(truth.radiance)
+    );
+    for (number, vertex) in truth.vertices.iter().enumerate() {
+        text += &format!("; vertex {number}: {vertex}");
+    }
+    text
+}
+
+fn show(c: DVec3) -> String {
+    format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z)
+}

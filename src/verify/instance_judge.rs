@@ -1,0 +1,136 @@
+//! The judge of structures that take rays to the spaces of objects. Its answers are those of brute
+//! force over the same instances with the same transforms and the same records, so that hits must be
+//! equal to the bit here too; flat triangles in world space round otherwise and judge flat
+//! structures only.
+
+use crate::gate::{Judge, Meeting};
+use crate::holes::SceneHoles;
+use crate::rays::RaySet;
+use glam::DVec3;
+use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
+use raystone_accel::{
+    AccelError, Hit, InstanceJudge, Placed, Ray, TriangleSoup, brute_force_instances,
+};
+use raystone_config::Gate;
+use raystone_core::geometry::Triangle;
+use raystone_record::RayClass;
+use raystone_scene::{Instance, SceneData};
+
+/// Answers of the oracle that are held at a time, one for each ray and instance.
+const ORACLE_QUESTIONS: usize = 1_000_000;
+
+/// The judge of the same rays in the spaces of the objects, as yet unchecked; `None` if no ray is
+/// transformed.
+///
+/// # Errors
+/// An object has too many triangles for a BVH.
+pub(super) fn new(
+    soup: &TriangleSoup,
+    sets: &[RaySet],
+    seed: u64,
+) -> Result<Option<Judge>, AccelError> {
+    let placed = soup.placed.as_ref();
+    let Some(placed) = placed.filter(|p| !p.instances.iter().all(Instance::is_identity)) else {
+        return Ok(None);
+    };
+    let twin = InstanceJudge::new(placed)?;
+    // The intervals of hard rays end where this judge finds hits.
+    let of_class = |set: &RaySet| match set.class {
+        RayClass::Hard => RaySet::hard(soup, &twin, seed),
+        _ => set.judged_by(&twin),
+    };
+    Ok(Some(Judge::of_sets(sets.iter().map(of_class).collect())))
+}
+
+/// Compares this judge with brute force and the oracle.
+pub(super) fn check(judge: &mut Judge, (scene, placed): (&SceneData, &Placed), settings: &Gate) {
+    let triangles = scene.triangles.len();
+    judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
+        brute_force_instances(placed, rays)
+    });
+    let at_once = (ORACLE_QUESTIONS / placed.instances.len()).max(64);
+    let mut pairs = judge.subset((settings.oracle_rays as usize).min(at_once));
+    pairs.extend(judge.hard().take(at_once));
+    let verdicts = oracle_verdicts((scene, placed), &pairs);
+    judge.note_oracle(&pairs, verdicts);
+}
+
+/// What the oracle thinks of each answer. Every instance is asked with the ray as it is in its
+/// object's space: the one that was hit whether the hit is right, the others whether they leave the
+/// way to it free.
+fn oracle_verdicts((scene, placed): (&SceneData, &Placed), pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
+    let mut verdicts = vec![Verdict::Agrees; pairs.len()];
+    for (index, object) in placed.objects.iter().enumerate() {
+        let of_object = |i: &&Instance| i.object as usize == index;
+        let mut questions = Vec::new();
+        let mut asked = Vec::new();
+        for instance in placed.instances.iter().filter(of_object) {
+            let ids = instance.first..instance.first + object.records.len() as u32;
+            for (pair, (ray, hit)) in pairs.iter().enumerate() {
+                let tests = object.intersection;
+                let local = placed.object_ray(instance, &tests.raised(ray));
+                let local = tests.raised(&local);
+                questions.push(if ids.contains(&hit.triangle) {
+                    (local, Some((hit.triangle - instance.first, hit.t)))
+                } else {
+                    (local.between(local.t_min, hit.t), None)
+                });
+                asked.push(pair);
+            }
+        }
+        let records = object.records.iter();
+        let triangles: Vec<Triangle> = records.map(|record| record.triangle()).collect();
+        // All copies of an object are cut alike.
+        let first = placed.instances.iter().find(of_object).map(|i| i.first);
+        let holes = SceneHoles::of(scene).map(|holes| holes.of_copy(first.unwrap_or(0)));
+        let surfaces = Surfaces {
+            triangles: &triangles,
+            holes: holes.as_ref().map(|holes| holes as &dyn Holes),
+        };
+        let answers = oracle::judge_closest_hits(surfaces, &questions);
+        for (pair, answer) in asked.into_iter().zip(answers) {
+            match (&verdicts[pair], &answer) {
+                (Verdict::Wrong(_), _) | (_, Verdict::Agrees) => {}
+                _ => verdicts[pair] = answer,
+            }
+        }
+    }
+    verdicts
+}
+
+/// Where a ray meets the triangle `id` of the scene: in the space of its object.
+pub(super) fn meeting(placed: &Placed, ray: &Ray, id: u32, t: f32) -> Option<Meeting> {
+    let (instance, record) = placed.locate(id)?;
+    Some(Meeting {
+        ray: placed.object_ray(instance, ray),
+        record: *record,
+        transform_error: transform_error(instance, record, ray, f64::from(t)),
+    })
+}
+
+/// How far, to first order, rounding of the transformed ray moves the distance to the plane of a
+/// triangle: t = n·(v0 − o′) / n·d′, and o′ and d′ are sums of four and three products.
+fn transform_error(
+    instance: &Instance,
+    record: &raystone_accel::triangle::TriangleRecord,
+    ray: &Ray,
+    t: f64,
+) -> f64 {
+    if instance.is_identity() {
+        return 0.0;
+    }
+    let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+    let (linear, offset) = instance.to_object.parts();
+    let sizes = glam::DMat3::from_cols(
+        linear.x_axis.abs(),
+        linear.y_axis.abs(),
+        linear.z_axis.abs(),
+    );
+    let unit = 0.5 * f64::from(f32::EPSILON);
+    let origin_error = 4.0 * unit * (sizes * wide(ray.origin).abs() + offset.abs());
+    let direction_error = 3.0 * unit * (sizes * wide(ray.direction).abs());
+    let [e, f] = record.edges().map(DVec3::from_array);
+    let normal = e.cross(f);
+    let moved = normal.abs().dot(origin_error + t.abs() * direction_error);
+    moved / normal.dot(linear * wide(ray.direction)).abs()
+}

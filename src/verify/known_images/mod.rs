@@ -1,0 +1,300 @@
+//! Images whose radiance is known in closed form, or by quadrature in f64: each shows what one kind of fault of an integrator,
+//! a material or a light would change. `raystone verify --images` renders them through the kernels.
+//!
+//! A view looks at one point: every pixel of it is an independent estimate of the same radiance, and their spread gives the standard
+//! error. Samples are doubled until four standard errors are at most [`NOISE`] of the radiance; it is then judged against the known one with
+//! [`SYSTEMATIC`] beside them, so that no fault above 0.2 % passes but by chance, and one of 0.3 % in no case.
+
+pub mod closed;
+mod lamps;
+mod lights;
+mod occlusion;
+mod surfaces;
+mod textures;
+
+use crate::trial_scenes::Trial;
+use glam::{DVec3, Quat, Vec3, vec3};
+use raystone_core::geometry::Camera;
+use raystone_gpu::GpuError;
+use raystone_render::Renderer;
+use raystone_scene::{Light, SceneData, SceneError, decode_normal, encode_normal};
+
+/// Width and height of a view, pixels.
+pub const SIZE: [u32; 2] = [8, 8];
+/// What four standard errors may be of a radiance that is judged.
+pub const NOISE: f64 = 1.5e-3;
+/// By what a radiance may differ beyond four standard errors: f32, and the width of a pixel.
+pub const SYSTEMATIC: f64 = 5e-4;
+/// Samples per pixel: the least, and the most, after which the noise is a fault.
+const SAMPLES: [u32; 2] = [256, 1 << 14];
+/// Part of the brightest channel that a channel without light may show.
+const DARK: f64 = 1e-5;
+const SEED: u32 = 4_242;
+const FIELD_OF_VIEW: f32 = 0.01;
+
+/// A point seen from somewhere, and its radiance.
+pub struct View {
+    /// Which.
+    pub name: String,
+    /// Sees nothing else.
+    pub camera: Camera,
+    /// Linear RGB.
+    pub expected: DVec3,
+}
+
+impl View {
+    /// The point `at` from the place `at + from`.
+    fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
+        let camera = Camera {
+            eye: at + from,
+            target: at,
+            up: from.any_orthonormal_vector(),
+            vertical_fov_degrees: FIELD_OF_VIEW,
+        };
+        Self {
+            name: name.to_owned(),
+            camera,
+            expected,
+        }
+    }
+}
+
+/// A scene with points of known radiance.
+pub struct KnownImage {
+    /// Which.
+    pub name: &'static str,
+    /// The scene.
+    pub scene: SceneData,
+    /// Integrator, and its parameters that are not at their defaults.
+    pub trial: Trial,
+    /// Points.
+    pub views: Vec<View>,
+}
+
+impl KnownImage {
+    /// The image turned and moved as a whole, so that no plane of it is exact in f32.
+    fn turned(mut self) -> Self {
+        let turn = Quat::from_axis_angle(vec3(0.36, 0.48, 0.8), 0.7);
+        let place = |p: Vec3| turn * p + vec3(0.3, -0.2, 0.5);
+        for triangle in &mut self.scene.triangles {
+            *triangle = triangle.map(place);
+        }
+        for word in self.scene.normals.as_flattened_mut() {
+            if let Some(normal) = decode_normal(*word) {
+                *word = encode_normal(turn * normal.as_vec3());
+            }
+        }
+        for light in &mut self.scene.lights {
+            match light {
+                Light::Sphere { center, .. } => *center = place(*center),
+                Light::Point { position, .. } => *position = place(*position),
+                Light::Spot {
+                    position,
+                    direction,
+                    ..
+                } => (*position, *direction) = (place(*position), turn * *direction),
+                Light::Ies {
+                    position, rotation, ..
+                } => {
+                    (*position, *rotation) = (place(*position), (turn * *rotation).normalize());
+                }
+                Light::Directional { direction, .. } => *direction = turn * *direction,
+                // It turns about one axis alone: no image with a map is turned.
+                Light::Environment { .. } => {}
+            }
+        }
+        for View { camera, .. } in &mut self.views {
+            (camera.eye, camera.target) = (place(camera.eye), place(camera.target));
+            camera.up = turn * camera.up;
+        }
+        self
+    }
+}
+
+/// All of them.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
+    let parts = [
+        lamps::images,
+        lights::images,
+        occlusion::images,
+        surfaces::images,
+        textures::images,
+    ];
+    let mut all = Vec::new();
+    for part in parts {
+        all.extend(part()?);
+    }
+    Ok(all)
+}
+
+/// What a view of a known image showed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Image and view.
+    pub name: String,
+    /// Known radiance, linear RGB.
+    pub expected: DVec3,
+    /// Mean over pixels and samples.
+    pub measured: DVec3,
+    /// Its standard error.
+    pub sigma: DVec3,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// What is wrong, if something is.
+    pub fault: Option<String>,
+}
+
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+impl Seen {
+    /// What would be shown by kernels that cannot be run.
+    pub fn not_rendered(image: &KnownImage, reason: &str) -> Self {
+        Self {
+            name: image.name.to_owned(),
+            expected: DVec3::NAN,
+            measured: DVec3::NAN,
+            sigma: DVec3::NAN,
+            spp: 0,
+            fault: Some(format!("not rendered: {reason}")),
+        }
+    }
+
+    /// Radiances against which differences of a channel count.
+    fn scale(&self, channel: usize) -> f64 {
+        match self.expected[channel] > 0.0 {
+            true => self.expected[channel],
+            false => self.expected.max_element().max(1.0) * DARK / SYSTEMATIC,
+        }
+    }
+
+    /// The channel that differs most, and by how much in parts of the known radiance.
+    pub fn worst(&self) -> (usize, f64) {
+        let off = |c: usize| (self.measured[c] - self.expected[c]) / self.scale(c);
+        let all = [0, 1, 2].map(|c| (c, off(c)));
+        let greater = |a: (usize, f64), b: (usize, f64)| if b.1.abs() > a.1.abs() { b } else { a };
+        all.into_iter().reduce(greater).unwrap_or_default()
+    }
+
+    /// The greatest standard error in parts of the known radiance.
+    pub fn noise(&self) -> f64 {
+        let parts = [0, 1, 2].map(|c| self.sigma[c] / self.scale(c));
+        parts.into_iter().fold(0.0, f64::max)
+    }
+
+    fn judged(mut self) -> Self {
+        self.fault = (0..3).find_map(|c| {
+            let scale = self.scale(c);
+            let (off, noise) = (
+                (self.measured[c] - self.expected[c]).abs() / scale,
+                4.0 * self.sigma[c] / scale,
+            );
+            let (measured, expected, name) = (self.measured[c], self.expected[c], CHANNELS[c]);
+            if off.is_nan() || off > SYSTEMATIC + noise.min(NOISE) {
+                let percent = 100.0 * off;
+                return Some(format!(
+                    "{name} is {measured:.6}, not {expected:.6}: {percent:.3} % off"
+                ));
+            }
+            (noise > NOISE).then(|| {
+                format!(
+                    "{name} is too noisy to say: four standard errors are {:.2} %",
+                    100.0 * noise
+                )
+            })
+        });
+        self
+    }
+}
+
+/// Mean over the pixels, and its standard error.
+fn moments(pixels: &[[f32; 3]]) -> [DVec3; 2] {
+    let count = pixels.len() as f64;
+    let all = || pixels.iter().map(|p| Vec3::from(*p).as_dvec3());
+    let mean = all().sum::<DVec3>() / count;
+    let squares: DVec3 = all().map(|p| (p - mean) * (p - mean)).sum();
+    let sigma = squares / (count * (count - 1.0));
+    [mean, sigma.map(f64::sqrt)]
+}
+
+/// Looks at a view with more and more samples until its noise is small, and judges it.
+///
+/// # Errors
+/// A kernel raised its error word, or the device is lost or hangs.
+pub fn look(renderer: &mut Renderer, image: &KnownImage, view: &View) -> Result<Seen, GpuError> {
+    renderer.look(view.camera)?;
+    let [mut spp, most] = SAMPLES;
+    let mut done = 0;
+    loop {
+        renderer.add_samples(done, spp - done, SEED)?;
+        done = spp;
+        let [measured, sigma] = moments(&renderer.image()?.pixels);
+        let seen = Seen {
+            name: format!("{}, {}", image.name, view.name),
+            expected: view.expected,
+            measured,
+            sigma,
+            spp,
+            fault: None,
+        };
+        if 4.0 * seen.noise() <= NOISE || spp >= most {
+            return Ok(seen.judged());
+        }
+        spp *= 2;
+    }
+}
+
+/// The most samples per pixel that a view takes.
+pub fn most_samples() -> u32 {
+    SAMPLES[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(measured: f64, sigma: f64) -> Seen {
+        Seen {
+            name: "test".to_owned(),
+            expected: DVec3::new(2.0, 0.0, 1.0),
+            measured: DVec3::new(measured, 0.0, 1.0),
+            sigma: DVec3::new(sigma, 0.0, 0.0),
+            spp: 1,
+            fault: None,
+        }
+        .judged()
+    }
+
+    #[test]
+    fn no_more_than_noise_and_rounding_pass_and_noise_is_no_excuse() {
+        assert_eq!(seen(2.0009, 0.0).fault, None);
+        assert!(seen(2.002, 0.0).fault.is_some());
+        assert_eq!(seen(2.002, 0.0005).fault, None);
+        // 0.3 % is found however large the noise is.
+        assert!(seen(2.006, 0.5).fault.is_some());
+        assert!(seen(2.0, 0.5).fault.is_some_and(|f| f.contains("noisy")));
+        assert!(seen(f64::NAN, 0.0).fault.is_some());
+        let mut dark = seen(2.0, 0.0);
+        dark.measured.y = 1e-3;
+        assert!(dark.judged().fault.is_some_and(|f| f.contains("green")));
+    }
+
+    #[test]
+    fn all_images_have_views_whose_answers_are_numbers() {
+        let all = known_images().expect("scenes");
+        assert!(all.len() >= 20, "{}", all.len());
+        for image in &all {
+            assert!(!image.views.is_empty(), "{}", image.name);
+            for view in &image.views {
+                let known = view.expected;
+                assert!(
+                    known.is_finite() && known.min_element() >= 0.0,
+                    "{}",
+                    image.name
+                );
+            }
+        }
+    }
+}

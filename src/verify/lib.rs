@@ -1,0 +1,20 @@
+//! Checks of hits and images against references of their own: the gate, the path oracle, images in closed form, Mitsuba.
+#![warn(missing_docs)]
+
+pub mod gate;
+pub mod hard_rays;
+mod holes;
+pub mod image_gate;
+mod instance_judge;
+mod kept_checks;
+pub mod known_images;
+mod mesh;
+pub mod mitsuba;
+pub mod path_oracle;
+pub mod peer_judge;
+pub mod rays;
+pub mod shadow_rays;
+mod trial_lights;
+pub mod trial_scenes;
+mod trial_slivers;
+mod trial_surfaces;

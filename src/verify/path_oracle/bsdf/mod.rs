@@ -1,0 +1,209 @@
+//! Materials, one file each, from `docs/shading.md`.
+
+mod cook_torrance;
+mod dielectric;
+mod diffuse;
+mod mirror;
+mod phong;
+mod principled;
+
+use super::luminance;
+use super::rounding::Rounding;
+use super::surface::Surface;
+use glam::DVec3;
+use raystone_scene::SceneData;
+use std::f64::consts::{PI, TAU};
+
+/// A direction in which a path goes on.
+pub(super) struct Bounce {
+    pub direction: DVec3,
+    /// f · cos / density.
+    pub weight: DVec3,
+    /// Density over solid angle; `None` for a delta lobe.
+    pub density: Option<f64>,
+    /// The reciprocal of what refraction did to radiance.
+    pub medium: f64,
+}
+
+/// What a material does with light from one direction, delta lobes aside.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reflected {
+    /// f · cos.
+    pub value: DVec3,
+    /// Density with which the material samples the direction.
+    pub density: f64,
+}
+
+/// A material at a point.
+pub(super) trait Bsdf {
+    /// Where the path goes on; `None` ends it.
+    fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce>;
+    /// Value and density of a direction by the shading normal.
+    fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected>;
+    /// The surface, if what it would reflect behind itself is mirrored at it.
+    fn folded(&self) -> Option<&Surface<'_>> {
+        None
+    }
+    /// Value and density of a direction.
+    fn reflect(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
+        let Some(surface) = self.folded() else {
+            return self.evaluate(direction, rounding);
+        };
+        if direction.dot(surface.geometric) <= 0.0 {
+            return None;
+        }
+        let parts = [direction, across(surface, direction)];
+        let parts = parts.map(|part| self.evaluate(part, rounding));
+        let sum = |a: Reflected, b: Reflected| Reflected {
+            value: a.value + b.value,
+            density: a.density + b.density,
+        };
+        parts.into_iter().flatten().reduce(sum)
+    }
+    /// Whether all lobes are delta: light samples are not taken then.
+    fn is_delta(&self) -> bool {
+        false
+    }
+}
+
+type Make = for<'a> fn(&'a Surface<'a>) -> Box<dyn Bsdf + 'a>;
+
+/// Kinds of materials by name.
+const KINDS: [(&str, Make); 6] = [
+    ("diffuse", |s| Box::new(diffuse::Diffuse(s))),
+    ("phong", |s| Box::new(phong::Phong::new(s))),
+    ("cook-torrance", |s| {
+        Box::new(cook_torrance::CookTorrance::new(s))
+    }),
+    ("principled", |s| Box::new(principled::Principled::new(s))),
+    ("mirror", |s| Box::new(mirror::Mirror(s))),
+    ("dielectric", |s| Box::new(dielectric::Dielectric(s))),
+];
+
+fn make(kind: &str) -> Option<Make> {
+    let found = KINDS.iter().find(|(name, _)| *name == kind);
+    found.map(|(_, make)| *make)
+}
+
+/// The material at a point, whose kind is known.
+pub(super) fn of<'a>(surface: &'a Surface<'a>) -> Box<dyn Bsdf + 'a> {
+    let diffuse: Make = KINDS[0].1;
+    make(surface.material.kind.name).unwrap_or(diffuse)(surface)
+}
+
+/// Whether there is a formula for every material.
+pub(super) fn all_known(scene: &SceneData) -> Result<(), String> {
+    let mut kinds = scene.materials.iter().map(|m| m.kind.name);
+    match kinds.find(|kind| make(kind).is_none()) {
+        Some(kind) => Err(format!("material `{kind}`")),
+        None => Ok(()),
+    }
+}
+
+/// Unit vectors across `n`: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
+pub(super) fn basis(n: DVec3) -> [DVec3; 2] {
+    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [
+        DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        DVec3::new(b, sign + n.y * n.y * a, -n.y),
+    ]
+}
+
+/// The direction of local coordinates around `n`.
+pub(super) fn around(n: DVec3, local: DVec3) -> DVec3 {
+    let [x, y] = basis(n);
+    (x * local.x + y * local.y + n * local.z).normalize()
+}
+
+/// A direction whose density is cos / π.
+pub(super) fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
+    let (sin, cos) = (TAU * v).sin_cos();
+    around(
+        n,
+        DVec3::new(u.sqrt() * cos, u.sqrt() * sin, (1.0 - u).sqrt()),
+    )
+}
+
+/// Density of [`cosine_direction`].
+pub(super) fn cosine_density(n: DVec3, direction: DVec3) -> f64 {
+    n.dot(direction).max(0.0) / PI
+}
+
+/// The mirror direction of `o` about `n`.
+pub(super) fn mirrored(o: DVec3, n: DVec3) -> DVec3 {
+    (2.0 * n.dot(o) * n - o).normalize()
+}
+
+/// Parameter number `place` of the material.
+pub(super) fn parameter(surface: &Surface, place: usize) -> f64 {
+    let parameters = &surface.material.parameters;
+    parameters.get(place).copied().unwrap_or_default().into()
+}
+
+/// The colour whose components are the first three parameters.
+pub(super) fn colour(surface: &Surface) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|place| parameter(surface, place)))
+}
+
+/// Whether the first of two lobes is chosen, of probability `p`, and the number that is left of `u`.
+pub(super) fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
+    let u = rounding.share(u).clamp(0.0, 1.0);
+    match u < p {
+        true => (true, u / p),
+        false => (false, (u - p) / (1.0 - p)),
+    }
+}
+
+/// Probability of the diffuse lobe beside a specular one of this colour.
+pub(super) fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
+    let (base, specular) = (luminance(base), luminance(specular));
+    match base + specular > 0.0 {
+        true => base / (base + specular),
+        false => 1.0,
+    }
+}
+
+/// The least n·o that is told apart from 0.
+pub(super) const LEAST_COSINE: f64 = 1e-7;
+
+/// Whether light that arrives from there is reflected at all by a surface that is not [`Bsdf::folded`].
+pub(super) fn is_above(surface: &Surface, direction: DVec3) -> bool {
+    direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
+}
+
+/// The direction on the other side of the surface.
+fn across(surface: &Surface, direction: DVec3) -> DVec3 {
+    direction - surface.geometric * (2.0 * direction.dot(surface.geometric))
+}
+
+/// A direction of a delta lobe, mirrored at the surface where that and the shading normal have it on different sides.
+pub(super) fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
+    let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
+    match meant == found {
+        true => direction,
+        false => across(surface, direction),
+    }
+}
+
+/// The direction of a lobe with the weight of the whole material.
+pub(super) fn bounce(
+    bsdf: &(impl Bsdf + ?Sized),
+    direction: DVec3,
+    rounding: &mut Rounding,
+) -> Option<Bounce> {
+    let direction = match bsdf.folded() {
+        Some(surface) if surface.normal.dot(direction) <= 0.0 => return None,
+        Some(surface) => kept(surface, direction),
+        None => direction,
+    };
+    let direction = rounding.direction(direction);
+    let Reflected { value, density } = bsdf.reflect(direction, rounding)?;
+    (density > 0.0).then(|| Bounce {
+        direction,
+        weight: value / density,
+        density: Some(density),
+        medium: 1.0,
+    })
+}

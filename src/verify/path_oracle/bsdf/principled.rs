@@ -1,0 +1,120 @@
+//! Metallic-roughness: Burley's diffuse part, renormalised, under GGX facets.
+
+use super::dielectric::schlick;
+use super::*;
+
+/// The least width of the facets' distribution.
+const LEAST_ALPHA: f64 = 0.001;
+
+pub(super) struct Principled<'a> {
+    surface: &'a Surface<'a>,
+    metallic: f64,
+    roughness: f64,
+    alpha: f64,
+    /// Reflectance of the dielectric part at normal incidence.
+    f0: f64,
+    /// n·o.
+    n_o: f64,
+    /// Probability of the diffuse lobe.
+    diffuse: f64,
+}
+
+impl<'a> Principled<'a> {
+    pub(super) fn new(surface: &'a Surface<'a>) -> Self {
+        let [metallic, roughness, f0] = [0, 1, 2].map(|place| parameter(surface, place));
+        let [metallic, roughness] = [metallic * surface.varied[0], roughness * surface.varied[1]];
+        let n_o = surface.normal.dot(surface.out).max(LEAST_COSINE);
+        let mut made = Self {
+            surface,
+            metallic,
+            roughness,
+            alpha: (roughness * roughness).max(LEAST_ALPHA),
+            f0,
+            n_o,
+            diffuse: 0.0,
+        };
+        if metallic < 1.0 && surface.base.max_element() > 0.0 {
+            let specular = luminance(made.reflectance(n_o));
+            let base = (1.0 - metallic) * (1.0 - schlick(f0, n_o)) * luminance(surface.base);
+            made.diffuse = (base / (specular + base)).clamp(0.1, 0.9);
+        }
+        made
+    }
+
+    /// Of the facets, of both parts together.
+    fn reflectance(&self, cos: f64) -> DVec3 {
+        let base = self.surface.base.to_array();
+        let metal = DVec3::from_array(base.map(|f0| schlick(f0, cos)));
+        (1.0 - self.metallic) * DVec3::splat(schlick(self.f0, cos)) + self.metallic * metal
+    }
+
+    fn facets(&self, n_h: f64) -> f64 {
+        let alpha_2 = self.alpha * self.alpha;
+        alpha_2 / (PI * (n_h * n_h * (alpha_2 - 1.0) + 1.0).powi(2))
+    }
+
+    fn lambda(&self, cos: f64) -> f64 {
+        let tan_2 = (1.0 - cos * cos).max(0.0) / (cos * cos);
+        ((1.0 + self.alpha * self.alpha * tan_2).sqrt() - 1.0) / 2.0
+    }
+
+    fn diffuse_part(&self, n_i: f64, i_h: f64) -> DVec3 {
+        let r = self.roughness;
+        let energy = 1.0 - r * (1.0 - 1.0 / 1.51);
+        let grazing = r / 2.0 + 2.0 * r * i_h * i_h;
+        let side = |cos: f64| 1.0 + (grazing - 1.0) * (1.0 - cos).max(0.0).powi(5);
+        self.surface.base / PI * (energy * side(n_i) * side(self.n_o))
+    }
+
+    /// A facet's normal among those that the viewer sees.
+    fn visible_normal(&self, [u, v]: [f64; 2]) -> DVec3 {
+        let n = self.surface.normal;
+        let [x, y] = basis(n);
+        let o = self.surface.out;
+        let alpha = self.alpha;
+        let seen = DVec3::new(alpha * o.dot(x), alpha * o.dot(y), self.n_o).normalize();
+        let z = (1.0 - v) * (1.0 + seen.z) - seen.z;
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        let (sin, cos) = (TAU * u).sin_cos();
+        let sum = DVec3::new(radius * cos, radius * sin, z) + seen;
+        around(
+            n,
+            DVec3::new(alpha * sum.x, alpha * sum.y, sum.z).normalize(),
+        )
+    }
+}
+
+impl Bsdf for Principled<'_> {
+    fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
+        let (is_diffuse, u) = choose(u, self.diffuse, rounding);
+        let direction = match is_diffuse {
+            true => cosine_direction(self.surface.normal, [u, v]),
+            false => mirrored(self.surface.out, self.visible_normal([u, v])),
+        };
+        bounce(self, direction, rounding)
+    }
+
+    fn folded(&self) -> Option<&Surface<'_>> {
+        Some(self.surface)
+    }
+
+    fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
+        let (o, n) = (self.surface.out, self.surface.normal);
+        if n.dot(direction) <= 0.0 {
+            return None;
+        }
+        let h = (o + direction).normalize();
+        let (n_i, o_h) = (n.dot(direction), o.dot(h).min(1.0));
+        let facets = self.facets(rounding.number(n.dot(h)).min(1.0));
+        let (seen, lit) = (self.lambda(self.n_o), self.lambda(n_i));
+        // Of the facets alone, over n·i.
+        let specular = facets / (1.0 + seen + lit) / (4.0 * self.n_o);
+        let passed = (1.0 - schlick(self.f0, self.n_o)) * (1.0 - schlick(self.f0, n_i));
+        let diffuse = (1.0 - self.metallic) * passed * self.diffuse_part(n_i, o_h) * n_i;
+        let density = facets / (1.0 + seen) / (4.0 * self.n_o);
+        Some(Reflected {
+            value: diffuse + self.reflectance(o_h) * specular,
+            density: self.diffuse * cosine_density(n, direction) + (1.0 - self.diffuse) * density,
+        })
+    }
+}

@@ -1,0 +1,466 @@
+//! What a sample is: primary visibility, ambient occlusion, path tracing.
+
+use super::bsdf::{self, Bounce, Bsdf, Reflected};
+use super::hits::{Blocked, SHORT, Segment};
+use super::light::{Choice, Chosen, moved};
+use super::surface::Surface;
+use super::{PathOracle, Vertex, Walk};
+use glam::DVec3;
+use raystone_core::params::{ParamValue, Params};
+use raystone_render::{ConfiguredIntegrator, CountedRays};
+use raystone_sampling::dimensions::{
+    DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
+};
+
+/// What a sample of an image is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Estimator {
+    /// Base colour of the first hit times the cosine to the viewer, and its emission.
+    Primary,
+    /// Whether a cosine-distributed ray of limited length is free.
+    Occlusion {
+        /// Its length, as a fraction of the diagonal of the scene's box.
+        radius: f64,
+    },
+    /// The radiance of a path.
+    Path(PathRules),
+}
+
+/// The rules of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathRules {
+    /// Most bounces.
+    max_depth: u32,
+    /// What light samples and found emission count.
+    strategy: Strategy,
+    roulette: Roulette,
+    /// First bounce with roulette.
+    roulette_depth: u32,
+    pub(super) choice: Choice,
+    /// Greatest component of a contribution of bounce 1 and later; 0 is none.
+    clamp: f64,
+    /// Whether it begins with a ray through the centre of the pixel.
+    centred: bool,
+}
+
+/// How light is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Strategy {
+    /// Both ways, weighted by densities to this power.
+    Both(i32),
+    /// By the directions of materials alone.
+    Material,
+    /// By points of lights alone.
+    Light,
+}
+
+/// With what probability paths survive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Roulette {
+    None,
+    Albedo,
+    Throughput,
+}
+
+/// The greatest probability of survival.
+const SURVIVAL: f64 = 0.95;
+
+/// Reads parameters and notes which were asked for.
+struct Reader<'a> {
+    name: &'a str,
+    params: &'a Params,
+    known: Vec<&'static str>,
+}
+
+impl Reader<'_> {
+    fn get(&mut self, key: &'static str) -> Option<&ParamValue> {
+        self.known.push(key);
+        self.params.0.get(key)
+    }
+
+    fn number(&mut self, key: &'static str, missing: f64) -> f64 {
+        match self.get(key) {
+            Some(ParamValue::Number(x)) => *x,
+            Some(ParamValue::Integer(x)) => *x as f64,
+            _ => missing,
+        }
+    }
+
+    fn choice<T: Copy>(&mut self, key: &'static str, of: &[(&str, T)]) -> Result<T, String> {
+        let name = self.name.to_owned();
+        match self.get(key) {
+            None => Ok(of[0].1),
+            Some(value) => {
+                let value = value.to_string();
+                let found = of.iter().find(|(word, _)| *word == value);
+                let found = found.map(|(_, meaning)| *meaning);
+                found.ok_or_else(|| format!("`{key} = {value}` of `{name}`"))
+            }
+        }
+    }
+
+    fn light_choice(&mut self) -> Result<Choice, String> {
+        let by = [
+            ("power", Choice::Power),
+            ("uniform", Choice::Uniform),
+            ("tree", Choice::Tree),
+        ];
+        let by = self.choice("light_choice", &by)?;
+        self.choice("lights", &[("one", by), ("all", Choice::All)])
+    }
+
+    /// Whether all parameters were asked for.
+    fn finish(&self) -> Result<(), String> {
+        let unknown = |key: &&String| !self.known.contains(&key.as_str());
+        match self.params.0.keys().find(unknown) {
+            Some(key) => Err(format!("parameter `{key}` of integrator `{}`", self.name)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Estimator {
+    /// The estimator of an integrator.
+    ///
+    /// # Errors
+    /// What of the integrator the oracle does not know.
+    pub fn of(integrator: &ConfiguredIntegrator) -> Result<Self, String> {
+        let name = integrator.kind.name();
+        let mut read = Reader {
+            name,
+            params: &integrator.params,
+            known: Vec::new(),
+        };
+        // What a kernel carries besides changes no image.
+        if name == "path" {
+            read.get("carry");
+        }
+        let estimator = match name {
+            "primary" => Self::Primary,
+            "ao" => Self::Occlusion {
+                radius: read.number("radius", 0.1),
+            },
+            "path" => Self::Path(PathRules {
+                max_depth: read.number("max_depth", 6.0) as u32,
+                strategy: read.choice(
+                    "strategy",
+                    &[
+                        ("mis-balance", Strategy::Both(1)),
+                        ("mis-power", Strategy::Both(2)),
+                        ("bsdf", Strategy::Material),
+                        ("light", Strategy::Light),
+                    ],
+                )?,
+                roulette: read.choice(
+                    "roulette",
+                    &[
+                        ("throughput", Roulette::Throughput),
+                        ("albedo", Roulette::Albedo),
+                        ("none", Roulette::None),
+                    ],
+                )?,
+                roulette_depth: read.number("roulette_depth", 3.0) as u32,
+                choice: read.light_choice()?,
+                clamp: read.number("clamp", 0.0),
+                centred: read.choice("primary", &[("traced", false), ("centre", true)])?,
+            }),
+            _ => return Err(format!("integrator `{name}`")),
+        };
+        read.finish()?;
+        Ok(estimator)
+    }
+}
+
+impl Strategy {
+    /// What a sample of density `own` counts that the other way finds with density `other`.
+    fn weight(self, own: f64, other: f64) -> f64 {
+        match self {
+            Self::Both(power) => 1.0 / (1.0 + (other / own).powi(power)),
+            Self::Material | Self::Light => 1.0,
+        }
+    }
+}
+
+impl Strategy {
+    /// What emission counts that a direction of this density has found; `other` is that of light samples.
+    fn found(self, density: Option<f64>, other: impl FnOnce() -> f64) -> f64 {
+        match (density, self) {
+            (None, _) => 1.0,
+            (Some(_), Self::Light) => 0.0,
+            (Some(density), _) => self.weight(density, other()),
+        }
+    }
+}
+
+impl PathRules {
+    fn clamped(&self, depth: u32, light: DVec3) -> DVec3 {
+        let greatest = light.max_element();
+        match self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
+            true => light * (self.clamp / greatest),
+            false => light,
+        }
+    }
+}
+
+/// Where a path is.
+struct State {
+    ray: Segment,
+    throughput: DVec3,
+    radiance: DVec3,
+    /// Density of the last direction, if light samples could have found it.
+    density: Option<f64>,
+    medium: f64,
+}
+
+impl PathOracle<'_> {
+    /// The radiance of a sample.
+    pub(super) fn estimate(&self, walk: &mut Walk) -> DVec3 {
+        let lens = walk.lens();
+        let point = match walk.view.estimator {
+            Estimator::Path(PathRules { centred: true, .. }) => [0.5; 2],
+            _ => walk.draw_2d(PIXEL),
+        };
+        let direction = lens.direction(walk.id.pixel, point);
+        let direction = walk.rounding.direction(direction);
+        let ray = Segment::endless(lens.eye, direction, None);
+        match walk.view.estimator {
+            Estimator::Primary => self.primary(walk, &ray),
+            Estimator::Occlusion { radius } => self.occlusion(walk, &ray, radius),
+            Estimator::Path(rules) => self.path(walk, ray, &rules),
+        }
+    }
+
+    /// The first thing on a ray, noted.
+    fn meet(&self, walk: &mut Walk, ray: &Segment) -> Option<(Surface<'_>, f64)> {
+        let moved = walk.rounding.point(ray.origin, ray.origin.abs()) - ray.origin;
+        let seen = Segment {
+            start: ray.start + moved,
+            origin: ray.origin + moved,
+            shift: walk.rounding.texel(),
+            ..*ray
+        };
+        let class = match walk.vertices.is_empty() {
+            true => CountedRays::Primary,
+            false => CountedRays::Bounce,
+        };
+        walk.note_ray(class, 0, &seen);
+        let met = self.hits.nearest(&seen, &mut walk.rounding);
+        walk.decide_met(met.as_ref());
+        let hit = self.hits.unmoved(met?.hit, &seen);
+        let surface = self.surface(ray, &hit, &mut walk.rounding);
+        walk.vertices.push(Vertex {
+            position: surface.position,
+            triangle: hit.triangle,
+            material: surface.material.name.clone(),
+            throughput: DVec3::ONE,
+            direct: DVec3::ZERO,
+        });
+        Some((surface, hit.distance))
+    }
+
+    fn primary(&self, walk: &mut Walk, ray: &Segment) -> DVec3 {
+        match self.meet(walk, ray) {
+            None => self.escaped(ray.direction),
+            Some((surface, _)) => {
+                surface.base * surface.geometric.dot(surface.out).abs() + surface.emission
+            }
+        }
+    }
+
+    fn occlusion(&self, walk: &mut Walk, ray: &Segment, radius: f64) -> DVec3 {
+        let Some((surface, _)) = self.meet(walk, ray) else {
+            return DVec3::ONE;
+        };
+        let uv = walk.draw_2d(at_bounce(0, DIRECTION));
+        let direction = bsdf::cosine_direction(surface.normal, uv);
+        let direction = walk.rounding.direction(direction);
+        let free = Segment {
+            length: walk.rounding.number(radius * self.diagonal),
+            ..surface.leave(direction, &mut walk.rounding)
+        };
+        walk.note_ray(CountedRays::Ao, 0, &free);
+        let blocked = self.hits.blocked(&free, &mut walk.rounding);
+        walk.decide_blocked(blocked);
+        DVec3::splat(if blocked == Blocked::No { 1.0 } else { 0.0 })
+    }
+
+    fn path(&self, walk: &mut Walk, ray: Segment, rules: &PathRules) -> DVec3 {
+        let mut state = State {
+            ray,
+            throughput: DVec3::ONE,
+            radiance: DVec3::ZERO,
+            density: None,
+            medium: 1.0,
+        };
+        for depth in 0..=rules.max_depth {
+            let met = self.meet(walk, &state.ray);
+            let end = met
+                .as_ref()
+                .map_or(f64::INFINITY, |(_, distance)| *distance);
+            let ball = self.sphere_met(&state.ray, end, rules.choice, &mut walk.rounding);
+            if let Some((radiance, density)) = ball {
+                walk.decide(4);
+                let found = radiance * rules.strategy.found(state.density, || density);
+                state.radiance += rules.clamped(depth, state.throughput * found);
+                break;
+            }
+            let leaves = |distance: f64| depth > 0 && self.escapes(distance);
+            let met = met.filter(|(_, d)| !leaves(walk.rounding.number(*d)));
+            let Some((surface, _)) = met else {
+                walk.decide(2);
+                let found = self.escaped_found(walk, &state, rules);
+                state.radiance += rules.clamped(depth, state.throughput * found);
+                break;
+            };
+            let rounding = &mut walk.rounding;
+            let other = || self.light_density(&surface, &state.ray, rules.choice, rounding);
+            let found = surface.emission * rules.strategy.found(state.density, other);
+            state.radiance += rules.clamped(depth, state.throughput * found);
+            if depth == rules.max_depth {
+                break;
+            }
+            let bsdf = bsdf::of(&surface);
+            if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material)
+            {
+                let direct = self.direct(walk, &surface, &*bsdf, depth, rules);
+                state.radiance += rules.clamped(depth, state.throughput * direct);
+                if let Some(vertex) = walk.vertices.last_mut() {
+                    vertex.direct = state.throughput * direct;
+                }
+            }
+            if !self.go_on(walk, &surface, &*bsdf, depth, &mut state, rules) {
+                break;
+            }
+        }
+        walk.rounding.colour(state.radiance)
+    }
+
+    /// Light from one point of a light, or of all lights, reflected and weighted.
+    fn direct(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        depth: u32,
+        rules: &PathRules,
+    ) -> DVec3 {
+        let point = walk.draw_2d(at_bounce(depth, LIGHT_POINT));
+        let number = walk.draw(at_bounce(depth, LIGHT_CHOICE));
+        let at = (surface.position, surface.geometric);
+        let chosen = self.chosen(rules.choice, number, at, &mut walk.rounding);
+        let mut sum = DVec3::ZERO;
+        for chosen in chosen {
+            let point = match rules.choice {
+                Choice::All => moved(point, chosen.light),
+                _ => point,
+            };
+            sum += self.of_light(walk, surface, bsdf, (chosen, point), rules.strategy);
+        }
+        sum
+    }
+
+    /// What a ray brings that leaves the scene, weighted.
+    fn escaped_found(&self, walk: &mut Walk, state: &State, rules: &PathRules) -> DVec3 {
+        let light = self.escaped(state.ray.direction);
+        let rounding = &mut walk.rounding;
+        match self.escaped_density(&state.ray, rules.choice, rounding) {
+            Some((texel, other)) => {
+                walk.decide(texel as u64);
+                light * rules.strategy.found(state.density, || other)
+            }
+            None => light,
+        }
+    }
+
+    /// Light from a point of a light that was chosen.
+    fn of_light(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        (chosen, point): (Chosen, [f64; 2]),
+        strategy: Strategy,
+    ) -> DVec3 {
+        walk.decide(chosen.light as u64);
+        let (part, light) = self.light_sample(surface, &chosen, point, &mut walk.rounding);
+        walk.decide(part as u64);
+        let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
+            return DVec3::ZERO;
+        };
+        let reflected = bsdf.reflect(light.direction, &mut walk.rounding);
+        let Some(Reflected { value, density }) = reflected else {
+            return DVec3::ZERO;
+        };
+        // To the point of the light, from wherever it starts.
+        let left = surface.leave(light.direction, &mut walk.rounding);
+        let towards = left.start + light.direction * light.distance - left.origin;
+        let distance = towards.length();
+        let shadow = Segment {
+            to: light.triangles,
+            length: distance * (1.0 - SHORT),
+            direction: towards / distance,
+            ..left
+        };
+        let blocked = self.shadowed(walk, &shadow, chosen.light);
+        walk.decide_blocked(blocked);
+        if blocked != Blocked::No {
+            return DVec3::ZERO;
+        }
+        let weight = match light.density {
+            Some(own) => strategy.weight(chosen.share * own, density) / own,
+            None => 1.0,
+        };
+        value * light.radiance * (weight / chosen.share)
+    }
+
+    /// Takes a path to its next ray; false if it ends.
+    fn go_on(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        depth: u32,
+        state: &mut State,
+        rules: &PathRules,
+    ) -> bool {
+        let uv = walk.draw_2d(at_bounce(depth, DIRECTION));
+        let Some(bounce) = bsdf.sample(uv, &mut walk.rounding) else {
+            walk.decide(3);
+            return false;
+        };
+        let Bounce {
+            direction,
+            weight,
+            density,
+            medium,
+        } = bounce;
+        walk.decide(u64::from(direction.dot(surface.geometric) > 0.0));
+        state.throughput *= walk.rounding.colour(weight);
+        state.medium *= medium;
+        if let Some(vertex) = walk.vertices.last_mut() {
+            vertex.throughput = state.throughput;
+        }
+        let brightest = state.throughput.max_element() * state.medium;
+        if brightest <= 0.0 {
+            return false;
+        }
+        let survival = match rules.roulette {
+            Roulette::None => None,
+            Roulette::Throughput => Some(brightest),
+            Roulette::Albedo => Some(weight.max_element() * medium),
+        };
+        if let Some(survival) = survival.filter(|_| depth >= rules.roulette_depth) {
+            let survival = survival.min(SURVIVAL);
+            let ends = walk.draw(at_bounce(depth, ROULETTE)) >= walk.rounding.share(survival);
+            walk.decide(ends.into());
+            if ends {
+                return false;
+            }
+            state.throughput /= survival;
+        }
+        // Light samples find no direction of a delta lobe, and none at all where nothing can be sampled.
+        state.density = density;
+        state.ray = surface.leave(direction, &mut walk.rounding);
+        true
+    }
+}

@@ -1,0 +1,300 @@
+//! Nearest hits in f64, over all triangles whose group is near the ray.
+
+use super::rounding::{EPSILON, MOST_ROUNDINGS, Rounding};
+use crate::holes::SceneHoles;
+use glam::{DVec2, DVec3};
+use raystone_accel::oracle::{Groups, Line};
+use raystone_core::geometry::Triangle;
+use raystone_scene::SceneData;
+
+/// Where a shadow ray ends, as a part of the distance to its light that is left out.
+pub(crate) const SHORT: f64 = 1e-7;
+
+/// Hits nearer than this, in the greatest coordinate of the scene, are the surface that the ray leaves.
+const START: f64 = 1e-9;
+
+/// By so much a barycentric may be negative, so that no ray slips through between two triangles.
+const EDGE: f64 = 1e-12;
+
+/// Distances that differ by less, relative, are equal: the lowest triangle counts.
+const EQUAL: f64 = 1e-12;
+
+/// Surfaces whose distances differ by less than this many roundings of f32 are layers: a kernel may meet either first.
+const LAYERED: f64 = 16.0;
+
+/// Beyond this f32 distances are open-ended.
+const FAR: f64 = 1e30;
+
+/// The triangles of a scene.
+pub(super) struct Hits<'a> {
+    triangles: &'a [Triangle],
+    holes: Option<SceneHoles<'a>>,
+    groups: Groups,
+    start: f64,
+}
+
+/// Where a ray meets a triangle: distance, and the weights of the second and third corner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    pub triangle: u32,
+    pub distance: f64,
+    pub weights: [f64; 2],
+}
+
+impl Hit {
+    /// The least of the weights of the corners: how far the hit is from an edge.
+    fn margin(&self) -> f64 {
+        let [u, v] = self.weights;
+        u.min(v).min(1.0 - u - v)
+    }
+}
+
+/// What lies on a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Blocked {
+    No,
+    /// A layer of the surface that it leaves, which a kernel may have passed.
+    ByLayer,
+    Yes,
+}
+
+/// The nearest hit, as rounding has it.
+pub(super) struct Nearest {
+    pub hit: Hit,
+    /// Whether rounding alone made it the nearest.
+    pub is_swapped: bool,
+    /// Whether another surface is as near but for [`LAYERED`] roundings.
+    pub is_layered: bool,
+}
+
+/// A ray with a unit direction; what it does not see again.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
+    /// The point of the surface or lens that it leaves: where light is measured.
+    pub start: DVec3,
+    /// Of the triangle there, on the viewer's side.
+    pub normal: DVec3,
+    /// Where it is traced from: `start`, unless an offset is played.
+    pub origin: DVec3,
+    pub direction: DVec3,
+    /// The triangle that it leaves.
+    pub from: Option<u32>,
+    /// The triangles that it goes to.
+    pub to: Option<[u32; 2]>,
+    pub length: f64,
+    /// How far masks are off their places on it, texels: see [`Rounding::texel`](super::Rounding::texel).
+    pub shift: DVec2,
+}
+
+impl Segment {
+    pub(super) fn endless(origin: DVec3, direction: DVec3, from: Option<u32>) -> Self {
+        Self {
+            start: origin,
+            normal: DVec3::ZERO,
+            origin,
+            direction,
+            from,
+            to: None,
+            length: FAR,
+            shift: DVec2::ZERO,
+        }
+    }
+
+    /// Point and normal where it begins.
+    pub(super) fn place(&self) -> (DVec3, DVec3) {
+        (self.start, self.normal)
+    }
+}
+
+impl<'a> Hits<'a> {
+    pub(super) fn new(scene: &'a SceneData) -> Self {
+        let triangles = &scene.triangles;
+        let corners = |id: usize| triangles[id].vertices.map(|v| v.to_array());
+        let coordinates = triangles.iter().flat_map(|t| t.vertices);
+        let greatest = coordinates.fold(0.0_f32, |most, v| most.max(v.abs().max_element()));
+        Self {
+            triangles,
+            holes: SceneHoles::of(scene),
+            groups: Groups::new(triangles.len(), true, corners),
+            start: START * f64::from(greatest),
+        }
+    }
+
+    /// The nearest hit of a segment.
+    pub(super) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
+        let mut found: Vec<(Hit, Blur)> = Vec::new();
+        let mut end = f64::INFINITY;
+        self.visit(segment, |hit| {
+            let blur = self.blur(&hit, segment);
+            // What is behind a triangle counts where a kernel may miss it.
+            if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
+                end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
+            }
+            found.push((hit, blur));
+            // The end as f32, rounded away by more than rounding.
+            (end * (1.0 + 1e-6)) as f32
+        });
+        // In an order that groups do not decide.
+        found.sort_by_key(|(hit, _)| hit.triangle);
+        found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
+        let before = |a: &Hit, b: &Hit| match (a.distance - b.distance).abs() <= EQUAL * b.distance
+        {
+            true => a.triangle < b.triangle,
+            false => a.distance < b.distance,
+        };
+        let first = found
+            .iter()
+            .copied()
+            .reduce(|a, b| if before(&b.0, &a.0) { b } else { a })?;
+        let room = |blur: &Blur| blur.within(LAYERED) + first.1.within(LAYERED);
+        let is_layer = |(hit, blur): &(Hit, Blur)| {
+            hit.triangle != first.0.triangle && hit.distance - first.0.distance <= room(blur)
+        };
+        let is_layered = found.iter().any(is_layer);
+        let is_played = rounding.is_played();
+        let played = found.iter().map(|(hit, blur)| {
+            (
+                *hit,
+                rounding.distance(hit.distance, blur.of_rounding, blur.most),
+            )
+        });
+        let met = match is_played {
+            true => played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0,
+            false => first.0,
+        };
+        Some(Nearest {
+            hit: met,
+            is_swapped: met.triangle != first.0.triangle || self.is_at_start(&met, segment),
+            is_layered: is_layered || self.is_at_start(&first.0, segment),
+        })
+    }
+
+    /// How far the distance of a hit may be off.
+    fn blur(&self, hit: &Hit, segment: &Segment) -> Blur {
+        let [a, b, c] = self.triangles[hit.triangle as usize]
+            .vertices
+            .map(|v| v.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let area = e1.cross(e2);
+        let normal = area.normalize_or_zero();
+        let terms = segment.origin.abs() + a.abs() + e1.abs() + e2.abs();
+        let longest = e1.length().max(e2.length());
+        let cosine = normal.dot(segment.direction).abs();
+        Blur {
+            of_rounding: normal.abs().dot(terms) / cosine.max(1e-12),
+            most: longest,
+            of_weights: Rounding::of_weights(terms.max_element() * longest, area.length()),
+        }
+    }
+
+    /// A hit as it is from the point that the ray leaves; as it is found, where the line from there passes the triangle.
+    pub(super) fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
+        let from_there = Segment {
+            origin: segment.start,
+            ..*segment
+        };
+        let triangle = &self.triangles[hit.triangle as usize];
+        meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
+    }
+
+    /// Whether anything lies on a segment, and whether that is a layer of the surface that it leaves and nothing else.
+    pub(super) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
+        let (mut by_layer, mut by_other) = (false, false);
+        self.visit(segment, |hit| {
+            if !rounding.holds(hit.margin(), self.blur(&hit, segment).of_weights) {
+                return f32::INFINITY;
+            }
+            if self.is_at_start(&hit, segment) {
+                by_layer = true;
+                return f32::INFINITY;
+            }
+            by_other = true;
+            f32::NEG_INFINITY
+        });
+        match (by_layer, by_other) {
+            (_, true) => Blocked::Yes,
+            (true, false) => Blocked::ByLayer,
+            (false, false) => Blocked::No,
+        }
+    }
+
+    /// Whether a hit is on a layer of the surface that a segment leaves.
+    fn is_at_start(&self, hit: &Hit, segment: &Segment) -> bool {
+        segment.from.is_some() && hit.distance <= self.blur(hit, segment).within(LAYERED)
+    }
+
+    /// Whether there is no surface at a point of a triangle.
+    pub(super) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
+        let holes = self.holes.as_ref();
+        holes.is_some_and(|holes| holes.is_cut_out(triangle, weights, shift))
+    }
+
+    /// Calls `found` with every hit; it returns the end of what is still of interest.
+    fn visit(&self, segment: &Segment, mut found: impl FnMut(Hit) -> f32) {
+        let inverse = |d: f64| {
+            let d = d as f32;
+            1.0 / d.abs().max(1e-37).copysign(d)
+        };
+        let mut end = segment.length as f32;
+        let origin = segment.origin.as_vec3().to_array();
+        let direction = segment.direction.to_array();
+        let line = Line::new(origin, direction.map(inverse), [0.0, end]);
+        self.groups.visit(&line, |group| {
+            for &id in self.groups.members(group) {
+                if Some(id) == segment.from || segment.to.is_some_and(|to| to.contains(&id)) {
+                    continue;
+                }
+                let hit = meet(&self.triangles[id as usize], id, segment);
+                let within = |h: &Hit| h.distance > self.start && h.distance < segment.length;
+                let hit = hit.filter(within);
+                if let Some(hit) = hit.filter(|h| !self.is_cut_out(id, h.weights, segment.shift)) {
+                    end = end.min(found(hit));
+                }
+            }
+            end
+        });
+    }
+}
+
+/// The error of a distance, scene units.
+#[derive(Debug, Clone, Copy)]
+struct Blur {
+    /// Over the relative error of the coordinates that it is made of.
+    of_rounding: f64,
+    /// A hit stays on its triangle.
+    most: f64,
+    /// Of the weights of its corners, over the same relative error.
+    of_weights: f64,
+}
+
+impl Blur {
+    fn within(&self, roundings: f64) -> f64 {
+        (self.of_rounding * roundings * EPSILON).min(self.most)
+    }
+}
+
+/// The point at which the line of a segment meets a triangle, by Cramer's rule.
+fn meet(triangle: &Triangle, id: u32, segment: &Segment) -> Option<Hit> {
+    let [a, b, c] = triangle.vertices.map(|v| v.as_dvec3());
+    let (e1, e2) = (b - a, c - a);
+    let across = segment.direction.cross(e2);
+    let det = e1.dot(across);
+    if det == 0.0 {
+        return None;
+    }
+    let to_origin = segment.origin - a;
+    let u = to_origin.dot(across) / det;
+    if !(-EDGE..=1.0 + EDGE).contains(&u) {
+        return None;
+    }
+    let turned = to_origin.cross(e1);
+    let v = segment.direction.dot(turned) / det;
+    if v < -EDGE || u + v > 1.0 + EDGE {
+        return None;
+    }
+    Some(Hit {
+        triangle: id,
+        distance: e2.dot(turned) / det,
+        weights: [u, v],
+    })
+}

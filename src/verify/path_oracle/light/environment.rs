@@ -1,0 +1,159 @@
+//! Radiance from all around by an equirectangular map.
+//!
+//! Which texel a number chooses depends on the order in which an alias table was made: the table is read as data, whole numbers as
+//! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
+//! kernels divide by shows, as does a density that is none of the table.
+
+use super::{LightSample, UNITS};
+use crate::path_oracle::rounding::Rounding;
+use glam::DVec3;
+use raystone_render::environment_aliases;
+use raystone_scene::EnvironmentMap;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Distance of what has none.
+const FAR: f64 = 1e30;
+
+/// A choice by one number: threshold and alias of each part, and with what probability each entry is chosen.
+struct Aliases {
+    parts: Vec<(u32, usize)>,
+    /// Values of a number in each part.
+    size: u32,
+    shares: Vec<f64>,
+}
+
+impl Aliases {
+    fn new(parts: Vec<(u32, usize)>) -> Self {
+        let size = (UNITS / parts.len() as f64) as u32;
+        let mut shares = vec![0.0; parts.len()];
+        for (part, (own, alias)) in parts.iter().enumerate() {
+            shares[part] += f64::from(*own) / UNITS;
+            shares[*alias] += f64::from(size - own) / UNITS;
+        }
+        Self {
+            parts,
+            size,
+            shares,
+        }
+    }
+
+    /// The entry of a number in [0, 1), and how far along what chose it the number lies.
+    fn choose(&self, u: f64) -> (usize, f64) {
+        let value = (u * UNITS).clamp(0.0, UNITS - 1.0) as u32;
+        let part = (value / self.size) as usize;
+        let place = value % self.size;
+        let (own, alias) = self.parts[part];
+        let along = |place: u32, of: u32| (f64::from(place) + 0.5) / f64::from(of);
+        match place < own {
+            true => (part, along(place, own)),
+            false => (alias, along(place - own, self.size - own)),
+        }
+    }
+}
+
+/// A map with the tables that choose its texels.
+pub(super) struct Map {
+    map: Arc<EnvironmentMap>,
+    scale: f64,
+    turn: f64,
+    rows: Aliases,
+    /// One for each row.
+    columns: Vec<Aliases>,
+}
+
+impl Map {
+    pub(super) fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
+        let parts: Vec<(u32, usize)> = (environment_aliases(map).into_iter())
+            .map(|(threshold, alias)| (threshold, alias as usize))
+            .collect();
+        let [width, height] = [map.width, map.height].map(|n| n.next_power_of_two() as usize);
+        let (rows, columns) = parts.split_at(height);
+        let of_row = |row: &[(u32, usize)]| Aliases::new(row.to_vec());
+        Self {
+            map: Arc::clone(map),
+            scale: scale.into(),
+            turn: turn.into(),
+            rows: of_row(rows),
+            columns: columns.chunks(width).map(of_row).collect(),
+        }
+    }
+
+    fn size(&self) -> [f64; 2] {
+        [self.map.width.into(), self.map.height.into()]
+    }
+
+    /// Solid angle of a texel of a row.
+    fn solid_angle(&self, row: usize) -> f64 {
+        let [width, height] = self.size();
+        let cosine = |row: usize| (PI * row as f64 / height).cos();
+        TAU / width * (cosine(row) - cosine(row + 1))
+    }
+
+    /// Column and row of a direction, as they run over the map.
+    fn place(&self, d: DVec3) -> [f64; 2] {
+        let [width, height] = self.size();
+        // The poles of the map have no azimuth: there its first column begins, however it is turned.
+        let around = match d.x == 0.0 && d.z == 0.0 {
+            true => 0.0,
+            false => (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU),
+        };
+        let down = d.x.hypot(d.z).atan2(d.y);
+        [around / TAU * width, down / PI * height]
+    }
+
+    /// Bilinear between the centres of texels.
+    pub(super) fn radiance(&self, direction: DVec3) -> DVec3 {
+        let [x, y] = self.place(direction);
+        let (width, height) = (self.map.width as usize, self.map.height as usize);
+        let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, height as f64 - 1.0));
+        let left = x.floor().rem_euclid(width as f64) as usize;
+        let above = y as usize;
+        let (s, t) = (x - x.floor(), y - above as f64);
+        let texel = |column: usize, row: usize| {
+            let at = row.min(height - 1) * width + column % width;
+            self.map.texels[at].as_dvec3()
+        };
+        let along = |row: usize| texel(left, row) * (1.0 - s) + texel(left + 1, row) * s;
+        self.scale * (along(above) * (1.0 - t) + along(above + 1) * t)
+    }
+
+    /// The texel of a direction, and the density with which light samples find it.
+    pub(super) fn density(&self, direction: DVec3) -> (usize, f64) {
+        let [x, y] = self.place(direction);
+        let (width, height) = (self.map.width as usize, self.map.height as usize);
+        let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
+        (row * width + column, self.density_of(column, row))
+    }
+
+    fn density_of(&self, column: usize, row: usize) -> f64 {
+        self.rows.shares[row] * self.columns[row].shares[column] / self.solid_angle(row)
+    }
+
+    /// A direction: the second number chooses the row and the place along it, the first one the column.
+    pub(super) fn sample(
+        &self,
+        [u, v]: [f64; 2],
+        rounding: &mut Rounding,
+    ) -> (usize, Option<LightSample>) {
+        let [width, height] = self.size();
+        let (row, down) = self.rows.choose(rounding.share(v));
+        let (column, along) = self.columns[row].choose(rounding.share(u));
+        let edge = |row: usize| (PI * row as f64 / height).cos();
+        let cos = edge(row) + down * (edge(row + 1) - edge(row));
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let around = TAU * (column as f64 + along) / width - self.turn;
+        let direction = DVec3::new(around.sin() * sin, cos, -around.cos() * sin);
+        let direction = rounding.direction(direction);
+        let density = self.density_of(column, row);
+        let sample = LightSample {
+            direction,
+            distance: FAR,
+            radiance: self.radiance(direction),
+            density: Some(density),
+            triangles: None,
+        };
+        let texel = row * self.map.width as usize + column;
+        (texel, (density > 0.0).then_some(sample))
+    }
+}

@@ -1,0 +1,63 @@
+//! Luminaires by their measured intensities.
+
+use crate::path_oracle::rounding::Rounding;
+use glam::{DQuat, DVec3, Quat};
+use raystone_scene::{IesProfile, Photometry};
+use std::f64::consts::TAU;
+
+/// Beyond the last angle by this much is not outside yet, degrees.
+const SLACK: f64 = 1e-3;
+
+/// Candela in the direction in which light travels.
+pub(super) fn candela(
+    profile: &IesProfile,
+    rotation: Quat,
+    travels: DVec3,
+    rounding: &mut Rounding,
+) -> f64 {
+    let turn = DQuat::from_array(rotation.to_array().map(f64::from)).normalize();
+    let DVec3 { x, y, z } = rounding.direction(turn.inverse() * travels);
+    // Type C: (sin v cos h, sin v sin h, cos v); B: (sin h, cos h sin v, cos h cos v); A: (cos v sin h, sin v, cos v cos h).
+    let (vertical, horizontal) = match profile.photometry {
+        Photometry::C => (z.clamp(-1.0, 1.0).acos(), angle(y, x).rem_euclid(TAU)),
+        Photometry::B => (angle(y, z), x.clamp(-1.0, 1.0).asin()),
+        Photometry::A => (y.clamp(-1.0, 1.0).asin(), angle(x, z)),
+    };
+    let row = weights(&profile.vertical, vertical.to_degrees());
+    let column = match profile.horizontal.len() {
+        1 => Some([(0, 1.0); 2].map(|(at, _)| (at, 0.5))),
+        _ => weights(&profile.horizontal, horizontal.to_degrees()),
+    };
+    let Some((row, column)) = row.zip(column) else {
+        return 0.0;
+    };
+    let count = profile.vertical.len();
+    let measured = |h: usize, v: usize| f64::from(profile.candela[h * count + v]);
+    let of_column = |h: usize| row.iter().map(|(v, w)| w * measured(h, *v)).sum::<f64>();
+    column.iter().map(|(h, w)| w * of_column(*h)).sum()
+}
+
+/// The angle of (x, y); 0 at their origin, whatever the signs of the zeros.
+fn angle(y: f64, x: f64) -> f64 {
+    match x == 0.0 && y == 0.0 {
+        true => 0.0,
+        false => y.atan2(x),
+    }
+}
+
+/// The two values between which `x` lies, with their weights; nothing outside of all.
+fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
+    let value = |at: usize| f64::from(values[at]);
+    let last = values.len().checked_sub(1)?;
+    if x < value(0) - SLACK || x > value(last) + SLACK {
+        return None;
+    }
+    let x = x.clamp(value(0), value(last));
+    let low = (0..last).rev().find(|at| value(*at) <= x).unwrap_or(0);
+    let high = (low + 1).min(last);
+    let part = match high > low {
+        true => (x - value(low)) / (value(high) - value(low)),
+        false => 0.0,
+    };
+    Some([(low, 1.0 - part), (high, part)])
+}

@@ -1,0 +1,331 @@
+//! Lights, one file for each way of shining, from `docs/shading.md`.
+
+mod delta;
+mod environment;
+mod flat;
+mod ies;
+mod sky;
+mod sphere;
+mod tree;
+
+use super::hits::{Blocked, Segment};
+use super::rounding::Rounding;
+use super::surface::Surface;
+use super::{PathOracle, Walk};
+use glam::DVec3;
+use raystone_render::CountedRays;
+use raystone_scene::{Light, LightList, SceneData, Source};
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+/// What lights are chosen by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Choice {
+    /// Their power.
+    Power,
+    /// Nothing.
+    Uniform,
+    /// What they contribute at the point, about.
+    Tree,
+    /// All are sampled.
+    All,
+}
+
+/// What shines on a scene.
+pub(super) struct Lights {
+    list: LightList,
+    /// Values below the end of each light where lights are chosen by power.
+    ends: Vec<f64>,
+    /// The light of an emissive triangle.
+    owners: BTreeMap<u32, usize>,
+    /// The lights that rays meet though they have no triangles.
+    spheres: Vec<(usize, sphere::Ball)>,
+    /// The map around the scene, which is the last light.
+    map: Option<environment::Map>,
+    tree: OnceLock<tree::Tree>,
+}
+
+/// Where a light is chosen: a point of a surface, and the normal of the triangle there on the viewer's side.
+pub(super) type Place = (DVec3, DVec3);
+
+/// Values that a number can have: those of a draw are multiples of the reciprocal.
+const UNITS: f64 = (1u32 << 24) as f64;
+
+/// A light that was chosen.
+pub(super) struct Chosen {
+    pub light: usize,
+    /// With what probability.
+    pub share: f64,
+}
+
+/// A point of a light, as a surface sees it.
+pub(super) struct LightSample {
+    pub direction: DVec3,
+    pub distance: f64,
+    /// Radiance; irradiance of a surface that faces a delta light.
+    pub radiance: DVec3,
+    /// Over solid angle, without the choice of the light in it; `None` for delta lights.
+    pub density: Option<f64>,
+    /// The triangles that the point may lie on.
+    pub triangles: Option<[u32; 2]>,
+}
+
+impl Lights {
+    /// The lights of a scene.
+    pub(super) fn new(scene: &SceneData) -> Self {
+        let list = LightList::of(scene);
+        let mut map = None;
+        let mut owners = BTreeMap::new();
+        let mut spheres = Vec::new();
+        for (place, light) in list.lights.iter().enumerate() {
+            match light.source {
+                Source::Triangle(id) => _ = owners.insert(id, place),
+                Source::Parallelogram(of) => owners.extend(of.triangles.map(|id| (id, place))),
+                Source::Light(id) => match &scene.lights[id as usize] {
+                    light @ Light::Sphere { .. } => {
+                        spheres.extend(sphere::Ball::of(light).map(|ball| (place, ball)));
+                    }
+                    Light::Environment {
+                        map: texels,
+                        scale,
+                        turn,
+                    } => map = Some(environment::Map::new(texels, *scale, *turn)),
+                    _ => {}
+                },
+            }
+        }
+        Self {
+            ends: ends(&list),
+            list,
+            owners,
+            spheres,
+            map,
+            tree: OnceLock::new(),
+        }
+    }
+
+    /// Whether there is nothing to sample.
+    pub(super) fn are_none(&self) -> bool {
+        self.list.lights.is_empty()
+    }
+
+    /// Whether a map shines.
+    pub(super) fn have_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    fn tree(&self, scene: &SceneData) -> &tree::Tree {
+        self.tree.get_or_init(|| tree::Tree::new(scene, &self.list))
+    }
+
+    /// Values of each light without a place, and of the tree over all others.
+    fn groups(&self, tree: &tree::Tree) -> [f64; 2] {
+        let placeless = (self.list.lights.len() - tree.len()) as f64;
+        let each = ((UNITS - tree.len() as f64) / (placeless + 1.0)).floor();
+        [each, UNITS - placeless * each]
+    }
+
+    /// The first value of a light where all are chosen evenly.
+    fn evenly(&self, light: usize) -> f64 {
+        let count = self.list.lights.len() as f64;
+        let (each, longer) = ((UNITS / count).floor(), UNITS % count);
+        light as f64 * each + longer.min(light as f64)
+    }
+}
+
+/// One value for each light, and the others by rounded sums of their powers.
+fn ends(list: &LightList) -> Vec<f64> {
+    let powers = || list.lights.iter().map(|light| light.power);
+    let all: f64 = powers().sum();
+    let spare = UNITS - list.lights.len() as f64;
+    let mut below = 0.0;
+    let end = |(place, power)| {
+        below += power;
+        place as f64 + 1.0 + (spare * (below / all)).round()
+    };
+    powers().enumerate().map(end).collect()
+}
+
+/// The point of the k-th light where all are sampled.
+pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
+    let k = k as f64;
+    [
+        (u + k * 0.754_877_666_246_692_7).fract(),
+        (v + k * 0.569_840_290_998_053_2).fract(),
+    ]
+}
+
+impl PathOracle<'_> {
+    /// Probability with which a light is chosen.
+    fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
+        let lights = &self.lights;
+        match choice {
+            Choice::Power => {
+                let before = light.checked_sub(1).map_or(0.0, |other| lights.ends[other]);
+                (lights.ends[light] - before) / UNITS
+            }
+            Choice::All => 1.0,
+            Choice::Tree if !lights.tree(self.scene).is_empty() => {
+                let tree = lights.tree(self.scene);
+                let [each, all] = lights.groups(tree);
+                match light < tree.len() {
+                    true => tree.values(light, all, at, rounding) / UNITS,
+                    false => each / UNITS,
+                }
+            }
+            Choice::Uniform | Choice::Tree => {
+                (lights.evenly(light + 1) - lights.evenly(light)) / UNITS
+            }
+        }
+    }
+
+    /// The lights that are sampled.
+    pub(super) fn chosen(
+        &self,
+        choice: Choice,
+        number: f64,
+        at: Place,
+        rounding: &mut Rounding,
+    ) -> Vec<Chosen> {
+        let lights = self.lights.list.lights.len();
+        let chosen = |light| Chosen {
+            light,
+            share: self.share(light, choice, at, &mut Rounding::none()),
+        };
+        if choice == Choice::All {
+            return (0..lights).map(chosen).collect();
+        }
+        // Where a number is held against whole values, nothing is rounded.
+        let value = (number * UNITS).floor();
+        let last = lights - 1;
+        if choice == Choice::Power {
+            let light = self.lights.ends.partition_point(|end| *end <= value);
+            return vec![chosen(light.min(last))];
+        }
+        let tree = (choice == Choice::Tree).then(|| self.lights.tree(self.scene));
+        if let Some(tree) = tree.filter(|tree| !tree.is_empty()) {
+            let [each, all] = self.lights.groups(tree);
+            let placeless = (lights - tree.len()) as f64;
+            if value < placeless * each {
+                return vec![chosen(tree.len() + (value / each) as usize)];
+            }
+            let found = tree.choose(value - placeless * each, all, at, rounding);
+            let found = found.map(|(light, values)| Chosen {
+                light,
+                share: values / UNITS,
+            });
+            return found.into_iter().collect();
+        }
+        let light = (0..last).find(|light| value < self.lights.evenly(light + 1));
+        vec![chosen(light.unwrap_or(last))]
+    }
+
+    /// A point of a light, and which part of it that is, where lights have parts that are chosen.
+    pub(super) fn light_sample(
+        &self,
+        surface: &Surface,
+        chosen: &Chosen,
+        point: [f64; 2],
+        rounding: &mut Rounding,
+    ) -> (usize, Option<LightSample>) {
+        let from = surface.position;
+        let light = match self.lights.list.lights[chosen.light].source {
+            Source::Light(id) => match &self.scene.lights[id as usize] {
+                light @ Light::Sphere { .. } => {
+                    sphere::Ball::of(light).and_then(|ball| ball.sample(from, point))
+                }
+                Light::Environment { .. } => {
+                    let map = self.lights.map.as_ref();
+                    let found = map.map(|map| map.sample(point, rounding));
+                    return found.unwrap_or((0, None));
+                }
+                light => delta::sample(light, from, rounding),
+            },
+            flat => flat::sample(
+                (self.scene, &self.textures, &self.hits),
+                flat,
+                from,
+                point,
+                rounding,
+            ),
+        };
+        (0, light)
+    }
+
+    /// With what density light samples find the point of an emitter that a ray has met.
+    pub(super) fn light_density(
+        &self,
+        emitter: &Surface,
+        ray: &Segment,
+        choice: Choice,
+        rounding: &mut Rounding,
+    ) -> f64 {
+        let lights = &self.lights;
+        lights.owners.get(&emitter.triangle).map_or(0.0, |light| {
+            let cos = emitter.geometric.dot(emitter.out);
+            let distance = emitter.geometric.dot(ray.start - emitter.position) / cos;
+            let area = lights.list.lights[*light].area;
+            self.share(*light, choice, ray.place(), rounding) * distance * distance / (area * cos)
+        })
+    }
+
+    /// The nearest sphere before `end` on a ray: its radiance, and the density with which light samples find the direction.
+    pub(super) fn sphere_met(
+        &self,
+        ray: &Segment,
+        end: f64,
+        choice: Choice,
+        rounding: &mut Rounding,
+    ) -> Option<(DVec3, f64)> {
+        let met = self.lights.spheres.iter().filter_map(|(light, ball)| {
+            let distance = ball.meet(ray)?;
+            (distance < end).then_some((light, ball, distance))
+        });
+        let (light, ball, _) = met.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let density = ball.density(ray.start, ray.direction);
+        let share = self.share(*light, choice, ray.place(), rounding);
+        Some((ball.radiance, share * density))
+    }
+
+    /// Whether anything lies on the way to a light.
+    pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> Blocked {
+        let balls = self.lights.spheres.iter();
+        let mut others = balls.filter(|(place, _)| *place != light);
+        if others.any(|(_, ball)| ball.meet(shadow).is_some_and(|d| d < shadow.length)) {
+            return Blocked::Yes;
+        }
+        walk.note_ray(CountedRays::Shadow, light, shadow);
+        self.hits.blocked(shadow, &mut walk.rounding)
+    }
+
+    /// What comes along a ray that leaves the scene. A map takes the place of the sky.
+    pub(super) fn escaped(&self, direction: DVec3) -> DVec3 {
+        let map = self.lights.map.as_ref();
+        map.map_or_else(
+            || sky::radiance(self.scene, direction),
+            |map| map.radiance(direction),
+        )
+    }
+
+    /// The part of the map that a ray meets which leaves the scene, and the density with which light samples find its direction;
+    /// nothing where there is no map.
+    pub(super) fn escaped_density(
+        &self,
+        ray: &Segment,
+        choice: Choice,
+        rounding: &mut Rounding,
+    ) -> Option<(usize, f64)> {
+        let (texel, density) = self.lights.map.as_ref()?.density(ray.direction);
+        let last = self.lights.list.lights.len() - 1;
+        Some((
+            texel,
+            density * self.share(last, choice, ray.place(), rounding),
+        ))
+    }
+
+    /// Whether a bounced ray counts as one that leaves, though it hits something so far away.
+    pub(super) fn escapes(&self, distance: f64) -> bool {
+        let sky = &self.scene.daylight;
+        (sky.as_ref()).is_some_and(|sky| distance > f64::from(sky.reach))
+    }
+}

@@ -1,0 +1,95 @@
+//! Spheres: uniform over the solid angle of the cap that is seen, or over the area from inside.
+
+use super::LightSample;
+use crate::path_oracle::bsdf::around;
+use crate::path_oracle::hits::Segment;
+use glam::DVec3;
+use raystone_scene::Light;
+use std::f64::consts::{PI, TAU};
+
+/// A sphere that shines.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ball {
+    centre: DVec3,
+    radius: f64,
+    pub radiance: DVec3,
+}
+
+impl Ball {
+    pub(super) fn of(light: &Light) -> Option<Self> {
+        let Light::Sphere {
+            center,
+            radius,
+            radiance,
+        } = light
+        else {
+            return None;
+        };
+        Some(Self {
+            centre: center.as_dvec3(),
+            radius: f64::from(*radius),
+            radiance: radiance.as_dvec3(),
+        })
+    }
+
+    /// 1 - cos of the half angle under which it is seen; `None` from inside.
+    fn cap(&self, from: DVec3) -> Option<f64> {
+        let sin_2 = self.radius * self.radius / from.distance_squared(self.centre);
+        (sin_2 < 1.0).then(|| sin_2 / (1.0 + (1.0 - sin_2).sqrt()))
+    }
+
+    /// Where a ray meets it first.
+    pub(super) fn meet(&self, ray: &Segment) -> Option<f64> {
+        let to_centre = self.centre - ray.origin;
+        let along = to_centre.dot(ray.direction);
+        let across = to_centre - along * ray.direction;
+        let half_2 = self.radius * self.radius - across.length_squared();
+        if half_2 < 0.0 {
+            return None;
+        }
+        let half = half_2.sqrt();
+        [along - half, along + half].into_iter().find(|d| *d > 0.0)
+    }
+
+    pub(super) fn sample(&self, from: DVec3, [u, v]: [f64; 2]) -> Option<LightSample> {
+        let direction = match self.cap(from) {
+            Some(cap) => {
+                let below = u * cap;
+                let ring = (below * (2.0 - below)).max(0.0).sqrt();
+                let (sin, cos) = (TAU * v).sin_cos();
+                let axis = (self.centre - from).normalize();
+                around(axis, DVec3::new(ring * cos, ring * sin, 1.0 - below))
+            }
+            None => {
+                let z = 1.0 - 2.0 * u;
+                let ring = (1.0 - z * z).max(0.0).sqrt();
+                let (sin, cos) = (TAU * v).sin_cos();
+                let point = self.centre + self.radius * DVec3::new(ring * cos, ring * sin, z);
+                (point - from).normalize()
+            }
+        };
+        // A direction that just misses is one along the edge.
+        let edge = (self.centre - from).dot(direction).max(0.0);
+        let distance = self
+            .meet(&Segment::endless(from, direction, None))
+            .unwrap_or(edge);
+        Some(LightSample {
+            direction,
+            distance,
+            radiance: self.radiance,
+            density: Some(self.density(from, direction)),
+            triangles: None,
+        })
+    }
+
+    /// With which [`Ball::sample`] finds this direction.
+    pub(super) fn density(&self, from: DVec3, direction: DVec3) -> f64 {
+        if let Some(cap) = self.cap(from) {
+            return 1.0 / (TAU * cap);
+        }
+        let ray = Segment::endless(from, direction, None);
+        let distance = self.meet(&ray).unwrap_or_default();
+        let normal = (from + distance * direction - self.centre) / self.radius;
+        distance * distance / (4.0 * PI * self.radius * self.radius * normal.dot(direction))
+    }
+}

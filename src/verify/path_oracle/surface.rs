@@ -1,0 +1,168 @@
+//! From a hit to what materials need.
+
+use super::PathOracle;
+use super::hits::{Hit, Segment};
+use super::rounding::Rounding;
+use glam::DVec3;
+use raystone_scene::{Material, decode_color, decode_normal};
+
+/// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
+/// two times as many of the triangle's extent, and the ray starts by that off the surface: see
+/// [`raystone_render::offset::position_error`].
+const OFFSET: f64 = 8.0;
+
+/// Square of the length below which normals of corners cancel each other.
+const LEAST_SQUARE: f64 = 1e-12;
+
+/// A point that was hit.
+pub(super) struct Surface<'a> {
+    pub triangle: u32,
+    pub position: DVec3,
+    /// To where the path came from.
+    pub out: DVec3,
+    /// Unit geometric normal on the side of `out`.
+    pub geometric: DVec3,
+    /// Unit shading normal on that side.
+    pub normal: DVec3,
+    /// 1 where that is the front of the triangle, -1 where not.
+    pub side: f64,
+    pub material: &'a Material,
+    /// Base colour, with the texture and the colours of vertices.
+    pub base: DVec3,
+    /// What metalness and roughness are multiplied by.
+    pub varied: [f64; 2],
+    pub emission: DVec3,
+    /// How far rays start off the surface by one rounding.
+    offset: f64,
+}
+
+impl<'a> Surface<'a> {
+    /// A point of the plane z = 0 seen from its front, without textures.
+    pub(super) fn flat(material: &'a Material, out: DVec3) -> Self {
+        Self {
+            triangle: 0,
+            position: DVec3::ZERO,
+            out,
+            geometric: DVec3::Z,
+            normal: DVec3::Z,
+            side: 1.0,
+            material,
+            base: material.base_color.as_dvec3(),
+            varied: [1.0; 2],
+            emission: DVec3::ZERO,
+            offset: 0.0,
+        }
+    }
+}
+
+impl Surface<'_> {
+    /// The ray that leaves in this direction.
+    pub(super) fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
+        let side = direction.dot(self.geometric).signum();
+        let off = self.geometric * (side * rounding.offset(self.offset));
+        Segment {
+            origin: self.position + off,
+            normal: self.geometric,
+            shift: rounding.texel(),
+            ..Segment::endless(self.position, direction, Some(self.triangle))
+        }
+    }
+}
+
+impl PathOracle<'_> {
+    pub(super) fn surface(
+        &self,
+        segment: &Segment,
+        hit: &Hit,
+        rounding: &mut Rounding,
+    ) -> Surface<'_> {
+        let corners = self.scene.triangles[hit.triangle as usize].vertices;
+        let [a, b, c] = corners.map(|v| v.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let terms = a.abs() + e1.abs() + e2.abs();
+        let exact = a + e1 * hit.weights[0] + e2 * hit.weights[1];
+        let position = rounding.point(exact, terms);
+        let area = e1.cross(e2);
+        // The rounding of a thin triangle's normal is that of its edges against its height.
+        let thinness = e1.length() * e2.length() / area.length();
+        let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
+        let front = match self.scene.is_mirrored(hit.triangle as usize) {
+            true => -1.0,
+            false => 1.0,
+        };
+        let outward = front * outward.normalize();
+        let out = -segment.direction;
+        let side = match outward.dot(out) > 0.0 {
+            true => 1.0,
+            false => -1.0,
+        };
+        let id = self.scene.material_ids[hit.triangle as usize];
+        let material = &self.scene.materials[id as usize];
+        // The weights of a triangle that is thin, or small where coordinates are large, err by that of the point against its height.
+        let farthest = (terms + segment.origin.abs()).max_element();
+        let [u, v] = hit.weights;
+        let weights = [(u, e2), (v, e1)].map(|(w, across)| {
+            let error = Rounding::of_weights(farthest * across.length(), area.length());
+            rounding.weight(w, error)
+        });
+        let uv = self.textures.coordinates(hit.triangle, weights);
+        let [colours, varied, bent, shining] = material.texture_uses();
+        let base = material.base_color.as_dvec3() * self.textures.colour(colours, uv);
+        let base = base * self.vertex_color(hit.triangle, weights);
+        let varied = self.textures.numbers(varied, uv);
+        let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
+        let geometric = side * outward;
+        let mut normal = self.vertex_normal(hit.triangle, weights, outward);
+        let turn = if normal.dot(geometric) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        if let Some(used) = bent.filter(|_| self.textures.are_mapped()) {
+            normal = self.textures.bent(used, hit.triangle, uv, normal);
+        }
+        normal *= turn;
+        if normal.dot(out) <= 0.0 {
+            normal = geometric;
+        }
+        let reach = geometric.abs().dot(terms) + 2.0 * (e1.abs() + e2.abs()).max_element();
+        Surface {
+            triangle: hit.triangle,
+            position,
+            out,
+            geometric,
+            normal,
+            side,
+            material,
+            base,
+            varied: [varied.z, varied.y],
+            emission: match material.emits_both_sides || side > 0.0 {
+                true => emission,
+                false => DVec3::ZERO,
+            },
+            offset: OFFSET * reach,
+        }
+    }
+
+    /// Between the colours of the corners; white where they have none.
+    fn vertex_color(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec3 {
+        let Some(words) = self.scene.colors.get(triangle as usize) else {
+            return DVec3::ONE;
+        };
+        let [a, b, c] = words.map(decode_color);
+        a * (1.0 - u - v) + b * u + c * v
+    }
+
+    /// Between the normals of the corners; that of the triangle, `outward`, where they have none.
+    fn vertex_normal(&self, triangle: u32, [u, v]: [f64; 2], outward: DVec3) -> DVec3 {
+        let Some(words) = self.scene.normals.get(triangle as usize) else {
+            return outward;
+        };
+        let [a, b, c] = words.map(|word| decode_normal(word).unwrap_or(outward));
+        let sum = a * (1.0 - u - v) + b * u + c * v;
+        match sum.length_squared() > LEAST_SQUARE {
+            true => sum.normalize(),
+            false => outward,
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! Trial scenes of what shines in ways of its own: maps all around, measured luminaires, many lights in a tree.
+
+use crate::mesh::Mesh;
+use crate::trial_scenes::{Trial, TrialScene, camera, depth, word};
+use glam::{Quat, Vec3, vec3};
+use raystone_render::ConfiguredIntegrator;
+use raystone_scene::{
+    EnvironmentMap, GEOMETRIC, IesProfile, Light, Material, Photometry, SceneData, SceneError,
+    encode_normal,
+};
+use std::sync::Arc;
+
+/// All of them.
+pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
+    let path = |changes: &[_]| -> Trial { ("path", changes.to_vec()) };
+    let tree = || word("light_choice", "tree");
+    Ok(vec![
+        TrialScene {
+            scene: sky()?,
+            trials: vec![
+                path(&[depth(4)]),
+                path(&[
+                    depth(3),
+                    word("lights", "all"),
+                    word("strategy", "mis-power"),
+                ]),
+                path(&[depth(2), word("strategy", "light"), tree()]),
+                path(&[depth(2), word("light_choice", "uniform")]),
+            ],
+        },
+        TrialScene {
+            scene: luminaires()?,
+            trials: vec![path(&[depth(3)])],
+        },
+        TrialScene {
+            scene: many_lamps()?,
+            trials: vec![
+                path(&[depth(4), tree()]),
+                path(&[depth(3), word("strategy", "mis-power")]),
+                path(&[depth(2), word("lights", "all")]),
+            ],
+        },
+    ])
+}
+
+/// The trial scenes that a scene's own paths may show too little of: of its maps, its luminaires, and the tree that an integrator chooses
+/// its lights by. The integrator is judged as it is.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub fn trials_of(
+    scene: &SceneData,
+    integrator: &ConfiguredIntegrator,
+) -> Result<Vec<TrialScene>, SceneError> {
+    let mut scenes: Vec<SceneData> = Vec::new();
+    if integrator.kind.name() != "path" {
+        return Ok(Vec::new());
+    }
+    let has = |is: fn(&Light) -> bool| scene.lights.iter().any(is);
+    if has(|light| matches!(light, Light::Environment { .. })) {
+        scenes.push(sky()?);
+    }
+    if has(|light| matches!(light, Light::Ies { .. })) {
+        scenes.push(luminaires()?);
+    }
+    let choice = integrator.params.0.get("light_choice");
+    if choice.is_some_and(|by| by.to_string() == "tree") {
+        scenes.push(many_lamps()?);
+    }
+    let trial = |scene| TrialScene {
+        scene,
+        trials: Vec::new(),
+    };
+    Ok(scenes.into_iter().map(trial).collect())
+}
+
+/// Numbers in [0, 1) that look like chance.
+fn mixed(seed: u32) -> f32 {
+    let word = (seed + 1)
+        .wrapping_mul(0x9e37_79b9)
+        .rotate_left(13)
+        .wrapping_mul(0x85eb_ca6b);
+    (word >> 8) as f32 / (1 << 24) as f32
+}
+
+/// A map of dark and bright texels, one of them a small sun, turned and scaled.
+fn map() -> Light {
+    const SIZE: [u32; 2] = [13, 7];
+    let texel = |at: u32| {
+        let colour = vec3(mixed(3 * at), mixed(3 * at + 1), mixed(3 * at + 2));
+        match (at / SIZE[0], at % SIZE[0]) {
+            (1, 4) => vec3(90.0, 80.0, 60.0),
+            (4, _) => Vec3::ZERO,
+            (_, column) if column % 5 == 2 => Vec3::ZERO,
+            _ => colour,
+        }
+    };
+    Light::Environment {
+        map: Arc::new(EnvironmentMap {
+            name: "map".to_owned(),
+            width: SIZE[0],
+            height: SIZE[1],
+            texels: (0..SIZE[0] * SIZE[1]).map(texel).collect(),
+        }),
+        scale: 1.3,
+        turn: 0.7,
+    }
+}
+
+/// Blocks, a ball and a mirror under the map, and a small lamp.
+fn sky() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.9, 1.7, 3.0), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("sky", camera, Vec3::splat(7.0))?;
+    let [floor, block, shiny, mirror, lamp] = [
+        Material::diffuse("floor", vec3(0.6, 0.7, 0.5)),
+        Material::diffuse("block", vec3(0.8, 0.4, 0.3)),
+        Material::phong("shiny", vec3(0.2, 0.3, 0.4), Vec3::splat(0.5), 40.0),
+        Material::mirror("mirror", vec3(0.9, 0.8, 0.7)),
+        Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(4.0, 6.0, 9.0)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X], floor);
+    mesh.block(vec3(-0.9, 0.0, -0.8), vec3(0.6, 1.3, 0.5), block);
+    mesh.ball(vec3(0.6, 0.5, 0.3), 0.45, shiny);
+    mesh.plain(
+        [vec3(-1.8, 0.1, 0.4), vec3(0.5, 0.0, 1.1), 1.1 * Vec3::Y],
+        mirror,
+    );
+    mesh.plain([vec3(1.2, 0.9, -1.2), 0.4 * Vec3::X, 0.3 * Vec3::Y], lamp);
+    let mut scene = mesh.done(Vec::new());
+    scene.lights = vec![map()];
+    Ok(scene)
+}
+
+/// A luminaire of this type, no two of whose intensities are alike but where angles meet.
+fn profile(photometry: Photometry, axial: bool) -> IesProfile {
+    let (vertical, horizontal) = match (photometry, axial) {
+        (_, true) => (vec![0.0, 35.0, 80.0, 110.0], vec![0.0]),
+        (Photometry::C, _) => (
+            vec![0.0, 25.0, 60.0, 90.0, 130.0, 180.0],
+            vec![0.0, 70.0, 180.0, 250.0, 360.0],
+        ),
+        _ => (
+            vec![-90.0, -35.0, 10.0, 40.0, 90.0],
+            vec![-90.0, -20.0, 45.0, 90.0],
+        ),
+    };
+    let (rows, columns) = (vertical.len(), horizontal.len());
+    let value = |at: usize| {
+        let (mut column, mut row) = (at / rows, at % rows);
+        // Where all angles of the other kind are one direction, and where the circle closes.
+        match photometry {
+            Photometry::C if row == 0 || row == rows - 1 => column = 0,
+            Photometry::C if column == columns - 1 => column = 0,
+            Photometry::A if row == 0 || row == rows - 1 => column = 0,
+            Photometry::B if column == 0 || column == columns - 1 => row = 0,
+            _ => {}
+        }
+        0.2 + 2.0 * mixed((40 + 10 * column + row) as u32)
+    };
+    IesProfile {
+        name: "luminaire".to_owned(),
+        photometry,
+        candela: (0..rows * columns).map(value).collect(),
+        vertical,
+        horizontal,
+        rated_lumens: None,
+        input_watts: 0.0,
+        warnings: Vec::new(),
+    }
+}
+
+fn luminaire(photometry: Photometry, axial: bool, position: Vec3, turn: Quat) -> Light {
+    Light::Ies {
+        position,
+        rotation: turn.normalize(),
+        color: vec3(1.0, 0.8, 1.4),
+        profile: Arc::new(profile(photometry, axial)),
+    }
+}
+
+fn luminaire_lights() -> [Light; 4] {
+    let turn = |x: f32, y: f32, z: f32, w: f32| Quat::from_xyzw(x, y, z, w);
+    [
+        luminaire(
+            Photometry::C,
+            false,
+            vec3(-0.9, 1.4, 0.6),
+            turn(0.3, 0.6, -0.2, 0.7),
+        ),
+        luminaire(
+            Photometry::B,
+            false,
+            vec3(0.8, 1.1, 0.9),
+            turn(-0.5, 0.4, 0.6, 0.2),
+        ),
+        luminaire(
+            Photometry::A,
+            false,
+            vec3(0.1, 1.6, -0.9),
+            turn(0.8, -0.1, 0.3, 0.5),
+        ),
+        luminaire(
+            Photometry::C,
+            true,
+            vec3(1.3, 0.7, -0.4),
+            turn(0.7, 0.1, 0.1, 0.7),
+        ),
+    ]
+}
+
+/// A corner with a block between luminaires of all types.
+fn luminaires() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.4, 2.1, 3.3), vec3(-0.1, 0.5, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("luminaires", camera, Vec3::ZERO)?;
+    room(&mut mesh);
+    let mut scene = mesh.done(Vec::new());
+    scene.lights = luminaire_lights().into();
+    Ok(scene)
+}
+
+/// A floor, two walls, a block.
+fn room(mesh: &mut Mesh) {
+    let wall = |name, r, g, b| Material::diffuse(name, vec3(r, g, b));
+    let [floor, left, back, block] = [
+        wall("floor", 0.7, 0.6, 0.5),
+        wall("left", 0.3, 0.7, 0.5),
+        wall("back", 0.6, 0.6, 0.8),
+        wall("block", 0.8, 0.5, 0.6),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X], floor);
+    mesh.plain([vec3(-2.0, 0.0, -2.0), 3.0 * Vec3::Y, 4.0 * Vec3::Z], left);
+    mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::X, 3.0 * Vec3::Y], back);
+    mesh.block(vec3(-0.4, 0.0, -0.3), vec3(0.6, 0.8, 0.5), block);
+}
+
+/// Lamps of all kinds, sizes and directions: flat ones of one side and of two, balls, points, cones, luminaires, and from far away. The floor
+/// has vertex normals, so that it matters which normal a light is chosen by.
+fn many_lamps() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.2, 1.8, 3.4), vec3(-0.1, 0.6, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("many-lamps", camera, Vec3::ZERO)?;
+    room(&mut mesh);
+    let shade = |k: u32| vec3(mixed(k), mixed(k + 1), mixed(k + 2)) + 0.1;
+    let within = |k: u32| vec3(-1.8, 0.3, -1.8) + vec3(3.4, 2.2, 3.4) * (shade(k) - 0.1);
+    let aside = |k: u32| 0.5 * (shade(k) - 0.6);
+    for lamp in 0..12 {
+        let k = 300 + 20 * lamp;
+        let material = Material::diffuse("lamp", shade(k));
+        let power = shade(k + 3) * 9.0;
+        let material = mesh.material(match lamp % 3 {
+            0 => material.emitting(power),
+            _ => material.emitting_from_front(power),
+        });
+        let quad = [within(k + 6), aside(k + 9), aside(k + 12)];
+        match lamp % 4 {
+            3 => {
+                let [a, b, c] = quad;
+                mesh.triangle([a, a + b, a + c], [glam::Vec2::ZERO; 3], material);
+            }
+            _ => mesh.plain(quad, material),
+        }
+    }
+    let mut scene = mesh.done(Vec::new());
+    scene.normals = vec![[GEOMETRIC; 3]; scene.triangles.len()];
+    let bent = |x: f32, z: f32| encode_normal(vec3(x, 1.0, z).normalize());
+    scene.normals[0] = [bent(-0.4, -0.1), bent(0.5, -0.2), bent(0.4, 0.3)];
+    scene.normals[1] = [bent(-0.4, -0.1), bent(0.4, 0.3), bent(-0.3, 0.4)];
+    for k in (600..700).step_by(20) {
+        scene.lights.extend([
+            Light::Sphere {
+                center: within(k),
+                radius: 0.02 + 0.1 * mixed(k + 3),
+                radiance: 8.0 * shade(k + 4),
+            },
+            Light::Point {
+                position: within(k + 7),
+                intensity: 0.3 * shade(k + 10),
+            },
+            Light::Spot {
+                position: within(k + 13),
+                direction: shade(k + 16) - 0.6,
+                intensity: shade(k + 5),
+                inner: 0.4,
+                outer: 0.9,
+                decay: k % 40 == 0,
+            },
+        ]);
+    }
+    scene.lights.extend(luminaire_lights());
+    let sun = |x: f32| Light::Directional {
+        direction: vec3(x, -1.0, -0.4),
+        irradiance: vec3(0.3, 0.2, 0.4),
+    };
+    scene.lights.extend([sun(0.3), sun(-0.8), map()]);
+    Ok(scene)
+}

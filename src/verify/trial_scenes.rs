@@ -1,0 +1,389 @@
+//! Small scenes with what single paths can go wrong with: unequal, small, grazing and hidden lamps, glass in glass, panes,
+//! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
+//! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
+
+use crate::mesh::Mesh;
+use glam::{Vec2, Vec3, vec2, vec3};
+use raystone_core::geometry::Camera;
+use raystone_core::params::ParamValue;
+use raystone_scene::{
+    self as scene, CookTorrance, Fresnel, Light, Masking, Material, SceneData, SceneError, Texture,
+    TextureUse,
+};
+
+/// What is judged on a scene: integrator and the parameters that are not at their defaults.
+pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
+
+/// A scene and what is judged on it.
+pub struct TrialScene {
+    /// The scene, with a camera.
+    pub scene: SceneData,
+    /// Integrators.
+    pub trials: Vec<Trial>,
+}
+
+pub use crate::trial_lights::trials_of;
+pub use crate::trial_slivers::sheets;
+pub use crate::trial_surfaces::layers;
+
+/// All of them.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
+    let mut lamps_trials = vec![("path", vec![depth(8)])];
+    for (strategy, roulette) in [
+        ("mis-power", "albedo"),
+        ("bsdf", "none"),
+        ("light", "albedo"),
+    ] {
+        lamps_trials.push((
+            "path",
+            vec![
+                word("strategy", strategy),
+                word("roulette", roulette),
+                depth(5),
+            ],
+        ));
+    }
+    lamps_trials.push((
+        "path",
+        vec![
+            ("clamp", ParamValue::Number(0.25)),
+            depth(4),
+            ("roulette_depth", ParamValue::Integer(1)),
+        ],
+    ));
+    let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
+    let primary = || ("primary", vec![]);
+    let mut scenes = vec![
+        TrialScene {
+            scene: lamps()?,
+            trials: lamps_trials,
+        },
+        TrialScene {
+            scene: points()?,
+            trials: vec![
+                ("path", vec![depth(4)]),
+                (
+                    "path",
+                    vec![
+                        depth(3),
+                        word("lights", "all"),
+                        word("strategy", "mis-power"),
+                    ],
+                ),
+                ("path", vec![depth(3), word("light_choice", "uniform")]),
+            ],
+        },
+        TrialScene {
+            scene: glass()?,
+            trials: vec![("path", vec![depth(12)])],
+        },
+        TrialScene {
+            scene: glossy()?,
+            trials: vec![
+                ("path", vec![depth(6)]),
+                ("path", vec![depth(3), word("strategy", "bsdf")]),
+            ],
+        },
+        TrialScene {
+            scene: textured()?,
+            trials: vec![("path", vec![depth(4)]), primary()],
+        },
+        TrialScene {
+            scene: scene::named("instances")?,
+            trials: vec![
+                ("path", vec![depth(6)]),
+                occlusion(0.02),
+                occlusion(0.3),
+                primary(),
+            ],
+        },
+    ];
+    scenes.extend(crate::trial_lights::scenes()?);
+    scenes.extend(crate::trial_surfaces::scenes()?);
+    scenes.extend(crate::trial_slivers::scenes()?);
+    Ok(scenes)
+}
+
+pub(super) fn depth(depth: i64) -> (&'static str, ParamValue) {
+    ("max_depth", ParamValue::Integer(depth))
+}
+
+pub(super) fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
+    (key, ParamValue::Name(value.to_owned()))
+}
+
+pub(super) fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
+    Camera {
+        eye,
+        target,
+        up,
+        vertical_fov_degrees: 47.0,
+    }
+}
+
+/// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and bright, one in the
+/// plane of a wall, one on edge, one hidden behind a block, one that faces away.
+fn lamps() -> Result<SceneData, SceneError> {
+    let camera = camera(
+        vec3(2.3, 2.2, 3.7),
+        vec3(-0.4, 0.7, -0.3),
+        vec3(0.1, 1.0, -0.05),
+    );
+    let mut mesh = Mesh::new("lamps", camera, vec3(0.02, 0.03, 0.05))?;
+    let wall = |name, r, g, b| Material::diffuse(name, vec3(r, g, b));
+    let [floor, red, blue, block] = [
+        wall("floor", 0.7, 0.65, 0.5),
+        wall("red", 0.8, 0.2, 0.15),
+        wall("blue", 0.1, 0.25, 0.75),
+        wall("block", 0.85, 0.9, 0.8),
+    ]
+    .map(|m| mesh.material(m));
+    let mut lamp = |name, reflectance, emission| {
+        mesh.material(Material::diffuse(name, Vec3::splat(reflectance)).emitting(emission))
+    };
+    let dim = lamp("dim", 0.5, vec3(0.6, 0.5, 0.4));
+    let bright = lamp("bright", 0.0, vec3(160.0, 200.0, 90.0));
+    let green = lamp("green", 0.3, vec3(0.0, 3.0, 0.0));
+    let violet = lamp("violet", 0.2, vec3(4.0, 0.1, 6.0));
+    mesh.plain([vec3(-3.0, 0.0, -3.0), 6.0 * Vec3::Z, 6.0 * Vec3::X], floor);
+    mesh.plain([vec3(-2.0, 0.0, -3.0), 4.0 * Vec3::Y, 6.0 * Vec3::Z], red);
+    mesh.plain([vec3(-3.0, 0.0, -2.0), 6.0 * Vec3::X, 4.0 * Vec3::Y], blue);
+    mesh.block(vec3(-0.6, 0.0, -0.5), vec3(0.9, 1.1, 0.7), block);
+    mesh.ball(vec3(1.0, 0.4, 0.9), 0.4, block);
+    mesh.plain([vec3(-1.0, 3.2, -1.5), 2.0 * Vec3::X, 1.5 * Vec3::Z], dim);
+    mesh.plain(
+        [vec3(0.9, 1.9, -0.9), 0.04 * Vec3::X, 0.05 * Vec3::Z],
+        bright,
+    );
+    // Standing on the floor, along the wall: light grazes both.
+    mesh.plain([vec3(-1.9, 0.0, -1.9), 0.6 * Vec3::Y, 1.4 * Vec3::Z], green);
+    mesh.triangle(
+        [
+            vec3(1.4, 0.05, -1.2),
+            vec3(1.5, 0.9, -1.3),
+            vec3(1.6, 0.05, -0.6),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
+    // In the shadow of the block, and facing away from all else.
+    mesh.triangle(
+        [
+            vec3(-0.5, 0.2, -0.9),
+            vec3(0.2, 0.3, -0.9),
+            vec3(-0.1, 0.8, -0.8),
+        ],
+        [Vec2::ZERO; 3],
+        green,
+    );
+    mesh.triangle(
+        [
+            vec3(2.6, 0.3, 0.2),
+            vec3(2.6, 1.2, 0.6),
+            vec3(2.7, 0.4, 0.9),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
+    Ok(mesh.done(Vec::new()))
+}
+
+/// Lights without triangles, of every kind but measured ones and maps, over a floor with a block and a lamp.
+fn points() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
+    let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));
+    let block = Material::phong("block", vec3(0.4, 0.5, 0.3), Vec3::splat(0.3), 20.0);
+    let block = mesh.material(block);
+    let lamp = Material::diffuse("lamp", Vec3::splat(0.2)).emitting_from_front(vec3(3.0, 2.0, 4.0));
+    let lamp = mesh.material(lamp);
+    mesh.plain([vec3(-3.0, 0.0, -3.0), 6.0 * Vec3::Z, 6.0 * Vec3::X], floor);
+    mesh.plain([vec3(-3.0, 0.0, -2.0), 6.0 * Vec3::X, 4.0 * Vec3::Y], floor);
+    mesh.block(vec3(-0.4, 0.0, -0.5), vec3(0.7, 0.9, 0.6), block);
+    mesh.plain([vec3(1.5, 0.2, -1.0), vec3(0.0, 0.3, 1.2), Vec3::Y], lamp);
+    let mut scene = mesh.done(Vec::new());
+    let spot = |x: f32, decay| Light::Spot {
+        position: vec3(x, 2.5, 1.0),
+        direction: vec3(-0.5 * x, -1.6, -0.6),
+        intensity: vec3(2.0, 3.0, 2.5),
+        inner: 0.25,
+        outer: 0.6,
+        decay,
+    };
+    let ball = |center, radius, power: f32| Light::Sphere {
+        center,
+        radius,
+        radiance: power * vec3(1.0, 0.8, 0.5),
+    };
+    scene.lights = vec![
+        Light::Point {
+            position: vec3(-1.5, 1.2, 0.8),
+            intensity: vec3(1.0, 0.3, 0.2),
+        },
+        spot(0.8, true),
+        spot(-0.9, false),
+        ball(vec3(0.9, 1.6, 0.3), 0.25, 6.0),
+        ball(vec3(-0.9, 0.05, 0.9), 0.04, 300.0),
+        Light::Directional {
+            direction: vec3(0.4, -1.0, -0.7),
+            irradiance: vec3(0.2, 0.3, 0.6),
+        },
+    ];
+    Ok(scene)
+}
+
+/// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
+fn glass() -> Result<SceneData, SceneError> {
+    let camera = camera(
+        vec3(0.3, 1.3, 4.1),
+        vec3(0.1, 0.8, 0.0),
+        vec3(-0.08, 1.0, 0.0),
+    );
+    let mut mesh = Mesh::new("glass", camera, vec3(0.5, 0.6, 0.9))?;
+    let [floor, mirror, clear, green, dense, pane, lamp] = [
+        Material::diffuse("floor", vec3(0.6, 0.55, 0.5)),
+        Material::mirror("mirror", vec3(0.9, 0.85, 0.8)),
+        Material::dielectric("clear", Vec3::ONE, 1.5),
+        Material::dielectric("green", vec3(0.7, 0.95, 0.8), 1.33),
+        Material::dielectric("bubble", Vec3::ONE, 0.7),
+        Material::thin_dielectric("pane", vec3(0.9, 0.8, 0.95), 1.6),
+        Material::diffuse("lamp", Vec3::splat(0.4)).emitting(vec3(9.0, 8.0, 6.0)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
+    mesh.plain(
+        [vec3(-2.0, 0.1, -2.0), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        mirror,
+    );
+    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.7, clear);
+    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.35, dense);
+    mesh.block(vec3(0.5, 0.1, -0.4), vec3(0.8, 1.2, 0.8), green);
+    mesh.plain(
+        [vec3(-1.8, 0.2, 1.1), vec3(1.9, 0.0, 0.4), 1.4 * Vec3::Y],
+        pane,
+    );
+    mesh.plain([vec3(-0.8, 2.9, -0.6), 1.4 * Vec3::X, 1.2 * Vec3::Z], lamp);
+    Ok(mesh.done(Vec::new()))
+}
+
+/// A row of balls of every glossy kind over a glossy floor, between two lamps of one side and a sheet.
+fn glossy() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
+    let cook = |masking, fresnel, roughness| {
+        let of = CookTorrance {
+            diffuse: vec3(0.3, 0.2, 0.1),
+            specular: vec3(0.5, 0.6, 0.4),
+            roughness,
+            ior: 1.7,
+            masking,
+            fresnel,
+        };
+        Material::cook_torrance("cook-torrance", &of)
+    };
+    let principled = |metallic, roughness, f0| {
+        Material::principled("principled", vec3(0.9, 0.6, 0.4), metallic, roughness, f0)
+    };
+    let phong =
+        |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
+    let balls = [
+        phong(3.0),
+        phong(150.0),
+        cook(Masking::VCavities, Fresnel::Schlick, 0.4),
+        cook(Masking::Smith, Fresnel::Exact, 0.15),
+        principled(0.0, 0.3, 0.04),
+        principled(1.0, 0.5, 0.04),
+        principled(0.5, 0.9, 0.08),
+        Material::dielectric("glass", vec3(0.9, 1.0, 0.9), 1.5).with_schlick(),
+        // Rough enough for half of the angles to be masked.
+        cook(Masking::Smith, Fresnel::Schlick, 0.6),
+        cook(Masking::VCavities, Fresnel::Exact, 0.7),
+        // A hemisphere about the mirror direction, which ends at a step.
+        phong(0.0),
+    ];
+    for (place, material) in balls.into_iter().enumerate() {
+        let material = mesh.material(material);
+        let (column, row) = ((place % 4) as f32, (place / 4) as f32);
+        mesh.ball(
+            vec3(1.1 * column - 1.7, 0.5, 1.2 * row - 0.6),
+            0.48,
+            material,
+        );
+    }
+    let floor = mesh.material(principled(0.2, 0.6, 0.05));
+    let one_sided =
+        Material::diffuse("lamp", Vec3::splat(0.3)).emitting_from_front(vec3(6.0, 7.0, 8.0));
+    let both = Material::diffuse("sheet", Vec3::splat(0.5)).emitting(vec3(2.0, 1.5, 1.0));
+    let [one_sided, both] = [one_sided, both].map(|m| mesh.material(m));
+    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
+    mesh.plain(
+        [vec3(-1.0, 2.6, -1.0), 2.0 * Vec3::X, 1.5 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain(
+        [vec3(-2.6, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain([vec3(2.7, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z], both);
+    Ok(mesh.done(Vec::new()))
+}
+
+/// Textures that are not square, repeat, begin below 0 and are tinted, on a floor, a wall, a mirror and a lamp.
+fn textured() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.7, 1.6, 2.4), vec3(0.0, 0.5, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("textured", camera, vec3(0.4, 0.5, 0.6))?;
+    let painted = |material: Material, texture| Material {
+        base_color_texture: Some(TextureUse::plain(texture)),
+        ..material
+    };
+    let [floor, wall, mirror, lamp, plain] = [
+        painted(Material::diffuse("floor", vec3(0.9, 0.7, 0.8)), 0),
+        painted(Material::diffuse("wall", Vec3::ONE), 1),
+        painted(Material::mirror("mirror", vec3(0.8, 0.9, 1.0)), 1),
+        painted(Material::diffuse("lamp", Vec3::splat(0.6)), 0).emitting(vec3(5.0, 4.0, 3.0)),
+        Material::diffuse("plain", vec3(0.4, 0.6, 0.5)),
+    ]
+    .map(|m| mesh.material(m));
+    let to = |x: f32, y: f32| vec2(x, y);
+    mesh.quad(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        [to(-1.3, 0.2), to(2.4, 3.1)],
+        floor,
+    );
+    mesh.quad(
+        [vec3(-2.0, 0.0, -1.5), 4.0 * Vec3::X, 2.0 * Vec3::Y],
+        [to(0.1, 0.9), to(0.8, 0.05)],
+        wall,
+    );
+    mesh.quad(
+        [vec3(-1.6, 0.0, -1.0), vec3(0.3, 0.0, 1.8), 1.2 * Vec3::Y],
+        [to(0.0, 0.0), to(-1.0, 2.0)],
+        mirror,
+    );
+    mesh.quad(
+        [vec3(-0.5, 2.3, -0.5), 1.0 * Vec3::X, 0.8 * Vec3::Z],
+        [to(0.0, 0.0), to(1.0, 1.0)],
+        lamp,
+    );
+    mesh.block(vec3(0.2, 0.0, -0.6), vec3(0.5, 0.7, 0.4), plain);
+    let texture = |name: &str, width: u32, height: u32, seed: u32| Texture {
+        name: name.to_owned(),
+        width,
+        height,
+        texels: (0..width * height)
+            .map(|i| {
+                [
+                    (i * 73 + seed) % 256,
+                    (i * i * 31 + 90) % 256,
+                    (i * 17 + seed) % 64,
+                    255,
+                ]
+            })
+            .map(|texel| texel.map(|c| c as u8))
+            .collect(),
+    };
+    Ok(mesh.done(vec![texture("wide", 7, 3, 12), texture("tall", 2, 5, 200)]))
+}
