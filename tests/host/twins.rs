@@ -385,6 +385,7 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
 
 /// Free functions of a twin that no kernel needs, with the reason.
 const RUST_ONLY: &[(&str, &str, &str)] = &[
+    ("accel/bvh/pairs", "validate", "looks at what was built"),
     (
         "sampling/seeding",
         "paired",
@@ -509,6 +510,11 @@ fn twin_text(kernel: &str) -> String {
 /// Text of a twin with what all twins of its folder share, where a structure is a folder.
 fn twin_and_shared_text(kernel: &str) -> String {
     let shared = twin_path(kernel).with_file_name("mod.rs");
+    // A crate of its own begins with its root.
+    let shared = match shared.exists() {
+        true => shared,
+        false => shared.with_file_name("lib.rs"),
+    };
     let in_folder = kernel.matches('/').count() > 1;
     let shared = if in_folder {
         without_tests(&shared)
