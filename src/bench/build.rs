@@ -51,8 +51,14 @@ fn main() {
         collect(folder, &mut files);
         println!("cargo::rerun-if-changed={}", folder.display());
     }
-    // A published package lacks the lock file of the workspace.
-    files.push(root.join("../../Cargo.lock"));
+    // What of the workspace reaches every crate: profiles and versions. A published package lacks them.
+    for name in ["Cargo.toml", "Cargo.lock"] {
+        let file = root.join("../..").join(name);
+        if file.exists() {
+            println!("cargo::rerun-if-changed={}", file.display());
+            files.push(file);
+        }
+    }
     files.sort();
     // It changes with the toolchain, too, as the hasher of the standard library is not fixed.
     let mut hasher = DefaultHasher::new();
