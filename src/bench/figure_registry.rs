@@ -24,7 +24,11 @@ impl FigureRegistry {
                 "the id of the figure {id:?} needs a version, as in \"{id}/v1\""
             ));
         }
-        if self.rows().chain(&FIGURES).any(|known| known.id == *id) {
+        if self
+            .rows()
+            .chain(FIGURES.iter().copied())
+            .any(|known| known.id == *id)
+        {
             return Err(format!(
                 "there is a figure {id:?} already: choose another id or version"
             ));

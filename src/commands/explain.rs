@@ -84,7 +84,7 @@ impl Explain {
 
 fn in_words(inventory: &Inventory, state: &State, stale: Option<String>) -> Result<String> {
     let mut text = format!("{}\n\n", state.unit.name);
-    writeln!(text, "kind          {}", state.unit.kind.plural())?;
+    writeln!(text, "kind          {}", state.unit.measurement.plural())?;
     for (axis, variant) in variants(&state.unit.cell) {
         writeln!(text, "{:<13} {variant}", axis.name())?;
     }
@@ -119,7 +119,7 @@ fn as_json(inventory: &Inventory, state: &State, stale: Option<String>) -> Value
     let modules = state.record.as_ref().map(|r| inventory.modules(&r.inputs));
     json!({
         "cell": state.unit.name,
-        "kind": state.unit.kind,
+        "kind": state.unit.kind(),
         "key": variants(&state.unit.cell).map(|(a, v)| (a.name(), v)).collect::<BTreeMap<_, _>>(),
         "record": state.record,
         "modules": modules,

@@ -234,7 +234,7 @@ fn figures() -> String {
     let width = FIGURES.iter().map(|figure| figure.id.len()).max();
     let width = width.unwrap_or(0);
     let mut text = "figure: what is measured\n".to_owned();
-    for figure in &FIGURES {
+    for figure in FIGURES {
         let better = match figure.better {
             Better::Higher => ", higher is better",
             Better::Lower => ", lower is better",

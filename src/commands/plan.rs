@@ -4,8 +4,8 @@ use super::arguments::{ExperimentArguments, plan};
 use super::output::{OutputArguments, print, print_json};
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Axis, Experiment, Plan as Cells, Skipped, Unit, UnitKind, shards};
-use raystone::run::{Estimate, Registries};
+use raystone::config::{Axis, Experiment, Plan as Cells, Skipped};
+use raystone::run::{Cost, Registries, Unit, shards};
 use raystone::text::shell_word;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -36,13 +36,12 @@ impl Plan {
         let overrides = &self.experiment.values.set;
         let experiment = Experiment::load(&self.file, overrides, &registries.catalogue())?;
         let cells = plan(&experiment, &self.experiment.only, &registries)?;
-        let units = cells.units(&experiment);
-        let estimate = Estimate::new(&experiment, &cells, &units, &registries);
-        let cost = |unit: &Unit| estimate.seconds_of(unit);
+        let units = registries.measurements.units(&experiment, &cells);
+        let cost = Cost::new(&experiment, &cells, &registries);
         let of = usize::from(self.shards);
-        let numbers = shards(&units, of, cost);
+        let numbers = shards(&units, of, |unit| cost.seconds_of(unit));
         if self.output.json {
-            let mut fields = as_json(&cells, &units, &estimate);
+            let mut fields = as_json(&cells, &units, &cost);
             for (entry, number) in fields["cells"]
                 .as_array_mut()
                 .into_iter()
@@ -58,12 +57,12 @@ impl Plan {
         let mut text = String::new();
         if self.cells {
             for (unit, number) in units.iter().zip(&numbers) {
-                writeln!(text, "{number}/{of}\t{:?}\t{}", unit.kind, unit.name)?;
+                writeln!(text, "{number}/{of}\t{}\t{}", unit.kind(), unit.name)?;
             }
             print(&text)?;
             return Ok(ExitCode::SUCCESS);
         }
-        self.describe(&mut text, (&cells, &units, &numbers), &estimate)?;
+        self.describe(&mut text, (&cells, &units, &numbers), &cost)?;
         print(&text)?;
         Ok(ExitCode::SUCCESS)
     }
@@ -72,13 +71,13 @@ impl Plan {
         &self,
         text: &mut String,
         (plan, units, numbers): (&Cells, &[Unit], &[usize]),
-        estimate: &Estimate,
+        cost: &Cost,
     ) -> Result<()> {
         let of = usize::from(self.shards);
         let [cells, skipped] = [units.len(), plan.skipped.iter().map(|s| s.cells).sum()];
         writeln!(text, "{cells} cells, {skipped} left out; {of} shards:\n")?;
         let mut empty = 0;
-        let seconds: Vec<f64> = units.iter().map(|unit| estimate.seconds_of(unit)).collect();
+        let seconds: Vec<f64> = units.iter().map(|unit| cost.seconds_of(unit)).collect();
         for number in 1..=of {
             let own = |place: &usize| numbers[*place] == number;
             let own: Vec<usize> = (0..units.len()).filter(own).collect();
@@ -86,11 +85,17 @@ impl Plan {
                 empty += 1;
                 continue;
             }
-            let kinds = UnitKind::ALL.into_iter().filter_map(|kind| {
-                let count = own.iter().filter(|place| units[**place].kind == kind);
-                let count = count.count();
-                (count > 0).then(|| format!("{count} {}", kind.plural()))
-            });
+            let mut counts: Vec<(&str, usize)> = Vec::new();
+            for unit in own.iter().map(|place| &units[*place]) {
+                let plural = unit.measurement.plural();
+                match counts.iter_mut().find(|(known, _)| *known == plural) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((plural, 1)),
+                }
+            }
+            let kinds = counts
+                .iter()
+                .map(|(plural, count)| format!("{count} {plural}"));
             let kinds = kinds.collect::<Vec<_>>().join(", ");
             let sum: f64 = own.iter().map(|place| seconds[*place]).sum();
             writeln!(text, "  {number}/{of}  about {:>7}  {kinds}", duration(sum))?;
@@ -121,17 +126,17 @@ impl Plan {
 }
 
 /// Every cell of a plan with its kind and the seconds that it is expected to take, and what is left out.
-pub fn as_json(plan: &Cells, units: &[Unit], estimate: &Estimate) -> Value {
+pub fn as_json(plan: &Cells, units: &[Unit], cost: &Cost) -> Value {
     let cell = |unit: &Unit| {
         let axes = Axis::ALL.into_iter();
         let axes = axes.filter_map(|axis| Some((axis.name(), unit.cell.get(axis)?.label.as_str())));
         let key: BTreeMap<_, _> = axes.collect();
-        json!({ "cell": unit.name, "kind": unit.kind, "key": key, "seconds": estimate.seconds_of(unit) })
+        json!({ "cell": unit.name, "kind": unit.kind(), "key": key, "seconds": cost.seconds_of(unit) })
     };
     let left_out = |s: &Skipped| json!({ "cell": s.cell, "reason": s.reason, "cells": s.cells });
     json!({
         "cells": units.iter().map(cell).collect::<Vec<_>>(),
-        "seconds": estimate.seconds(),
+        "seconds": cost.whole(units).seconds(),
         "left_out": plan.skipped.iter().map(left_out).collect::<Vec<_>>(),
     })
 }

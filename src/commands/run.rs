@@ -12,7 +12,7 @@ use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, write_report};
 use raystone::run::{
-    Estimate, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
+    Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
     user_cache,
 };
 use std::path::{Path, PathBuf};
@@ -91,13 +91,17 @@ impl Run {
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
-            let units = plan.units(&experiment);
-            let estimate = Estimate::new(&experiment, &plan, &units, &registries);
+            let units = registries.measurements.units(&experiment, &plan);
+            let cost = Cost::new(&experiment, &plan, &registries);
             if self.output.json {
-                print_json("run", super::plan::as_json(&plan, &units, &estimate))?;
+                print_json("run", super::plan::as_json(&plan, &units, &cost))?;
                 return Ok(ExitCode::SUCCESS);
             }
-            print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
+            print(&format!(
+                "{}\n{}\n",
+                plan.describe().trim_end(),
+                cost.describe(&units)
+            ))?;
             return Ok(ExitCode::SUCCESS);
         }
         let existing = match (self.force, self.number || self.out.is_none()) {

@@ -32,7 +32,7 @@ pub use experiment::{
 pub use keys::Axis;
 pub use pattern::Pattern;
 pub use plan::{Plan, Skipped};
-pub use units::{Shard, Unit, UnitKind, shards, unit_name};
+pub use units::Shard;
 
 use raystone_core::params::Entry;
 

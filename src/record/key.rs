@@ -197,6 +197,13 @@ impl Key {
         )
     }
 
+    /// The same key with what stands on the axes of another one.
+    #[must_use]
+    pub fn beside(mut self, other: &Self) -> Self {
+        self.0.extend(other.0.clone());
+        self
+    }
+
     /// Whether two keys have the same labels on these axes.
     pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
         axes.iter()

@@ -6,7 +6,6 @@
 mod animation;
 mod cell;
 mod coherence;
-mod compaction;
 mod environment;
 mod error;
 pub mod figure;
@@ -15,6 +14,7 @@ mod old;
 mod paths;
 mod peer;
 mod read;
+mod reading;
 pub mod replicates;
 mod run;
 mod sound;
@@ -24,7 +24,6 @@ mod structure;
 pub use animation::*;
 pub use cell::*;
 pub use coherence::*;
-pub use compaction::CompactionRecord;
 pub use environment::{Environment, MachineLoad};
 pub use error::*;
 pub use key::{Key, axis};
@@ -34,6 +33,7 @@ pub use read::{
     PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
     records_file, text_of,
 };
+pub use reading::{MeasuredRecord, Reading, Samples};
 pub use run::*;
 pub use sound::Sound;
 pub use stream::*;
@@ -44,7 +44,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Deref;
 
 /// Version tag of every line; bumped together with any change of a field's meaning.
-pub const SCHEMA: &str = "raystone/2";
+pub const SCHEMA: &str = "raystone/3";
 
 /// One line: of a run, or of another file of records with bodies of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -60,6 +60,9 @@ pub struct Line<B = Body> {
     /// What it ran with.
     #[serde(default, skip_serializing_if = "Ran::is_empty")]
     pub ran: Ran,
+    /// The figures that were measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<Reading>,
     /// What was found.
     pub body: B,
 }
@@ -72,6 +75,7 @@ impl<B> Line<B> {
             key,
             hash: String::new(),
             ran,
+            readings: Vec::new(),
             body,
         }
     }
@@ -88,6 +92,13 @@ impl<B> Line<B> {
         self
     }
 
+    /// The same line with the figures that were measured.
+    #[must_use]
+    pub fn with_readings(mut self, readings: Vec<Reading>) -> Self {
+        self.readings = readings;
+        self
+    }
+
     /// The same line about another body.
     pub fn with_body<C>(self, body: impl FnOnce(B) -> C) -> Line<C> {
         Line {
@@ -95,6 +106,7 @@ impl<B> Line<B> {
             key: self.key,
             hash: self.hash,
             ran: self.ran,
+            readings: self.readings,
             body: body(self.body),
         }
     }
@@ -104,6 +116,7 @@ impl<B> Line<B> {
         Recorded {
             key: &self.key,
             ran: &self.ran,
+            readings: &self.readings,
             body,
         }
     }
@@ -116,8 +129,18 @@ pub struct Recorded<'a, T> {
     pub key: &'a Key,
     /// What it ran with.
     pub ran: &'a Ran,
+    /// The figures that were measured.
+    pub readings: &'a [Reading],
     /// What was found.
     pub body: &'a T,
+}
+
+impl<T> Recorded<'_, T> {
+    /// The reading of a figure, of all that the line is of.
+    pub fn reading(&self, id: &str) -> Option<&Reading> {
+        let mut readings = self.readings.iter();
+        readings.find(|reading| reading.figure == id && reading.at.is_empty())
+    }
 }
 
 impl<T> Copy for Recorded<'_, T> {}
@@ -169,8 +192,8 @@ pub enum Body {
     Stream(StreamRecord),
     /// What drawing from a sampler costs.
     SamplerCost(SamplerCostRecord),
-    /// A compaction of a stream was judged and timed.
-    Compaction(CompactionRecord),
+    /// A cell of a measurement whose figures are readings alone.
+    Measured(MeasuredRecord),
     /// A cell that was not run, with the reason.
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
@@ -222,7 +245,7 @@ kinds! {
     Animation: AnimationRecord,
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
-    Compaction: CompactionRecord,
+    Measured: MeasuredRecord,
     Kernels: KernelSetRecord,
     Cell: CellRecord,
     Finished: FinishedRecord,

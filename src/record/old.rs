@@ -1,10 +1,20 @@
-//! Lines of `raystone/1`, whose bodies each held their own names of axes.
+//! Lines of versions before this one, as lines of this one.
+//!
+//! Bodies of `raystone/1` each held their own names of axes. In `raystone/2` compactions had a body of their own, whose figures
+//! are readings now.
 
-use super::{SCHEMA, axis};
+use super::{Interval, Reading, SCHEMA, Samples, axis};
+use crate::figure::{self, Figure};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-/// The version before this one.
-pub(crate) const OLD_SCHEMA: &str = "raystone/1";
+/// The versions before this one.
+const OLD_SCHEMAS: [&str; 2] = ["raystone/1", "raystone/2"];
+
+/// Whether a file of records of the schema `wanted` may have lines of this one, which can be [`renewed`].
+pub(crate) fn is_old(schema: &str, wanted: &str) -> bool {
+    wanted == SCHEMA && OLD_SCHEMAS.contains(&schema)
+}
 
 /// Axes that stood in bodies, and in what they ran with.
 const IN_BODY: [&str; 5] = [
@@ -20,7 +30,81 @@ const IN_RAN: [&str; 4] = [axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST, axis::
 const KERNELS_MARK: &str = " @";
 
 /// The same line in the present schema.
-pub(crate) fn renewed(mut line: Value) -> Value {
+///
+/// # Errors
+/// A body that lacks a field.
+pub(crate) fn renewed(line: Value) -> serde_json::Result<Value> {
+    let mut line = match line.get("schema").and_then(Value::as_str) == Some(OLD_SCHEMAS[0]) {
+        true => with_key(line),
+        false => line,
+    };
+    line["schema"] = SCHEMA.into();
+    if line["body"]["kind"] == "compaction" {
+        let body = Compaction::deserialize(&line["body"])?;
+        let measured =
+            json!({ "kind": "measured", "measurement": "compaction", "failure": body.failure });
+        line["readings"] = serde_json::to_value(body.readings())?;
+        line["body"] = measured;
+    }
+    Ok(line)
+}
+
+/// A compaction of a stream, as `raystone/2` wrote it.
+#[derive(Deserialize)]
+struct Compaction {
+    elements: u32,
+    bytes: u32,
+    passes: u32,
+    kept: u32,
+    scratch_bytes: u64,
+    least_bytes: u64,
+    ms: Vec<f64>,
+    wall_ms: Vec<f64>,
+    ns_per_element: Option<Interval>,
+    melements_s: Option<Interval>,
+    gb_s: Option<Interval>,
+    failure: Option<String>,
+}
+
+impl Compaction {
+    fn readings(&self) -> Vec<Reading> {
+        let Some(ns) = self.ns_per_element.filter(|_| self.failure.is_none()) else {
+            return Vec::new();
+        };
+        let per_element = |ms: &[f64]| {
+            ms.iter()
+                .map(|ms| ms * 1e6 / f64::from(self.elements))
+                .collect()
+        };
+        let samples = Samples::Rounds {
+            adapter: per_element(&self.ms),
+            wall: per_element(&self.wall_ms),
+            processors: Vec::new(),
+        };
+        let work = format!("{} elements of {} bytes", self.elements, self.bytes);
+        let of = |figure: &Figure, value: Option<Interval>| {
+            value.map(|value| Reading::new(figure, value))
+        };
+        let mut readings = vec![
+            Reading::new(&figure::COMPACTION_NS, ns)
+                .with_samples(samples)
+                .of_work(work),
+        ];
+        readings.extend(of(&figure::COMPACTION_MELEMENTS_PER_S, self.melements_s));
+        readings.extend(of(&figure::COMPACTION_GB_PER_S, self.gb_s));
+        let counted = [
+            (&figure::COMPACTION_PASSES, f64::from(self.passes)),
+            (&figure::COMPACTION_KEPT, f64::from(self.kept)),
+            (&figure::COMPACTION_LEAST_BYTES, self.least_bytes as f64),
+            (&figure::COMPACTION_SCRATCH, self.scratch_bytes as f64),
+        ];
+        readings.extend(counted.map(|(figure, value)| Reading::exact(figure, value)));
+        readings
+    }
+}
+
+/// A line of `raystone/1` with a key and a body.
+fn with_key(mut line: Value) -> Value {
     let mut take = |name: &str| line.as_object_mut().and_then(|line| line.remove(name));
     let hash = take("hash").unwrap_or_default();
     let Some(Value::Object(mut body)) = take("record") else {

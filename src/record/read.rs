@@ -1,6 +1,7 @@
 //! Reading and writing files of records.
 
-use super::old::{OLD_SCHEMA, renewed};
+use super::old::{is_old, renewed};
+use super::sound::fault_of;
 use super::{Line, SCHEMA, Sound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -30,7 +31,7 @@ pub struct Records<B = super::Body> {
     pub lines: Vec<Line<B>>,
     /// What was left out while reading, in words.
     pub warnings: Vec<String>,
-    /// How many lines are of the version before.
+    /// How many lines are of versions before this one.
     pub old: usize,
 }
 
@@ -124,7 +125,7 @@ fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// Reads a file of records of this schema, packed by gzip or not, those of a run also if they are of the version before. A
+/// Reads a file of records of this schema, packed by gzip or not, those of a run also if they are of a version before. A
 /// last line without its newline that does not parse is what a crash leaves: it is left out with a warning.
 ///
 /// # Errors
@@ -151,9 +152,11 @@ pub fn read_lines<B: DeserializeOwned + Sound>(
         let truncated = !whole && rows.peek().is_none();
         let line = index + 1;
         let parsed = match serde_json::from_slice::<Tag>(row) {
-            Ok(tag) if tag.schema == OLD_SCHEMA => {
+            Ok(tag) if is_old(&tag.schema, wanted) => {
                 records.old += 1;
-                serde_json::from_slice(row).and_then(|old| serde_json::from_value(renewed(old)))
+                serde_json::from_slice(row)
+                    .and_then(renewed)
+                    .and_then(serde_json::from_value)
             }
             Ok(Tag { schema: found }) if found != wanted => {
                 return Err(RecordError::Schema {
@@ -176,7 +179,7 @@ pub fn read_lines<B: DeserializeOwned + Sound>(
             line,
             source,
         })?;
-        if let Some(what) = parsed.body.fault() {
+        if let Some(what) = parsed.body.fault().or_else(|| fault_of(&parsed.readings)) {
             return Err(RecordError::Damaged {
                 path: path.into(),
                 line,
@@ -211,7 +214,7 @@ mod tests {
     use super::*;
 
     const GOOD: &str =
-        r#"{"schema":"raystone/2","body":{"kind":"skipped","cell":"a","reason":"b"}}"#;
+        r#"{"schema":"raystone/3","body":{"kind":"skipped","cell":"a","reason":"b"}}"#;
 
     fn read(text: &str) -> Result<Records, RecordError> {
         let dir = tempfile::tempdir().unwrap();

@@ -23,7 +23,6 @@ impl Sound for Body {
                     rounds(&timing.wall_ms, [&[], &timing.cpu_ms], &mut faults);
                 }
             }
-            Self::Compaction(record) => rounds(&record.ms, [&record.wall_ms, &[]], &mut faults),
             Self::Error(record) => record
                 .errors
                 .iter()
@@ -37,6 +36,27 @@ impl Sound for Body {
         }
         faults.into_iter().next()
     }
+}
+
+/// What in readings cannot be, in words: values that are no numbers, times and rates below zero, rounds that lack one of their
+/// clocks.
+pub(crate) fn fault_of(readings: &[Reading]) -> Option<String> {
+    let mut faults = Vec::new();
+    for reading in readings {
+        let Interval { value, low, high } = reading.value;
+        if ![value, low, high].iter().all(|x| x.is_finite()) || low > value || value > high {
+            faults.push(format!("{} is {value} in [{low}, {high}]", reading.figure));
+        }
+        if let Samples::Rounds {
+            adapter,
+            wall,
+            processors,
+        } = &reading.samples
+        {
+            rounds(adapter, [wall, processors], &mut faults);
+        }
+    }
+    faults.into_iter().next()
 }
 
 /// Metrics that are sums of squares or of magnitudes.

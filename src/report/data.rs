@@ -3,7 +3,7 @@
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
-use raystone_record::figure::{FIGURES, Figure, figure};
+use raystone_record::figure::{EPO, FIGURES, Figure};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
 use std::borrow::Cow;
@@ -29,8 +29,8 @@ pub struct RunData<'a> {
     pub paths: Vec<Recorded<'a, PathsRecord>>,
     /// What drawing costs.
     pub costs: Vec<Recorded<'a, SamplerCostRecord>>,
-    /// Compactions of streams.
-    pub compactions: Vec<Recorded<'a, CompactionRecord>>,
+    /// Cells of measurements whose figures are readings alone.
+    pub measured: Vec<Recorded<'a, MeasuredRecord>>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
     /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
@@ -172,8 +172,8 @@ impl<'a> RunData<'a> {
                 Body::SamplerCost(record) => {
                     put(&mut data.costs, line.of(record), |a, b| a.key == b.key)
                 }
-                Body::Compaction(record) => put(&mut data.compactions, line.of(record), |a, b| {
-                    a.key == b.key
+                Body::Measured(record) => put(&mut data.measured, line.of(record), |a, b| {
+                    a.key == b.key && a.measurement == b.measurement
                 }),
                 Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
                 Body::Bias(record) => data.sampler(&line.key).bias = Some(record.clone()),
@@ -324,11 +324,11 @@ impl<'a> RunData<'a> {
     /// A row of the table of figures; of one that nobody describes only the id is known.
     pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
         let from_outside = self.run.iter().flat_map(|run| &run.figures);
-        let mut known = FIGURES.iter().chain(from_outside);
+        let mut known = FIGURES.iter().copied().chain(from_outside);
         let unknown = || Figure {
             id: id.to_owned().into(),
             title: id.to_owned().into(),
-            ..figure("epo/v1").clone()
+            ..EPO.clone()
         };
         let known = known.find(|figure| figure.id == id);
         known.map_or_else(|| Cow::Owned(unknown()), Cow::Borrowed)
@@ -384,6 +384,12 @@ impl<'a> RunData<'a> {
         };
         let samplers = &mut self.view(key).samplers;
         find_or_push(samplers, |s| s.key.agrees(key, &SAMPLER_AXES), new)
+    }
+
+    /// Cells of one of the measurements whose figures are readings alone.
+    pub(crate) fn measured_by(&self, name: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
+        let cells = self.measured.iter().filter(|cell| cell.measurement == name);
+        cells.copied().collect()
     }
 
     /// Every view with its scene.

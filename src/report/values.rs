@@ -8,7 +8,11 @@ use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
 use raystone_record::figure::{Figure, figure};
-use raystone_record::*;
+use raystone_record::{
+    BiasRecord, ClassCoherence, ClassTiming, CoherenceRecord, FigureAtCount, Interval, Key,
+    MeasuredRecord, OrderTime, PrimaryRecord, RayClass, Recorded, SamplerCostRecord,
+    SpectrumRecord, StreamRecord, StructureRecord, Tally, TimeRecord, axis,
+};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
@@ -138,10 +142,29 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     }
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
     values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
-    values.extend(compactions::values(data));
+    values.extend(
+        data.measured
+            .iter()
+            .flat_map(|cell| of_readings(data, cell)),
+    );
+    values.extend(compactions::derived(data));
     // What a damaged record makes of a division is no figure.
     values.retain(Value::is_a_number);
     values
+}
+
+/// The readings of a cell that did not fail.
+pub(crate) fn of_readings<'a>(
+    data: &RunData<'a>,
+    cell: &Recorded<'a, MeasuredRecord>,
+) -> Vec<Value<'a>> {
+    let sound = cell.readings.iter().filter(|_| cell.failure.is_none());
+    let value = |reading: &raystone_record::Reading| Value {
+        key: cell.key.clone().beside(&reading.at),
+        figure: data.figure(&reading.figure),
+        reading: Reading::Known(reading.value),
+    };
+    sound.map(value).collect()
 }
 
 /// Coherence of recorded rays, class by class.

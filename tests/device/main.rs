@@ -4,6 +4,7 @@
 mod support;
 
 mod adding_a_figure;
+mod adding_a_measurement;
 mod adding_a_structure;
 mod adding_a_triangle_test;
 mod adding_an_integrator;

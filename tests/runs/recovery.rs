@@ -76,7 +76,7 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Coherence(_) => (format!("coherence of {cell}"), false),
         Body::Animation(r) => (format!("animation of {cell}"), failed(&r.failure)),
         Body::Peer(_) => (format!("peer {cell}"), false),
-        Body::Compaction(r) => (cell.to_string(), failed(&r.failure)),
+        Body::Measured(r) => (format!("{} {cell}", r.measurement), failed(&r.failure)),
         Body::Stream(r) => (format!("stream {sampler}, {:?}", r.dimensions), false),
         Body::Skipped(r) => (format!("skipped {}", r.cell), false),
         Body::Failed(r) => (r.cell.clone(), true),

@@ -1,7 +1,7 @@
 //! Runs that are resumed, divided into shards and joined: nothing is measured twice, nothing is lost, nothing false is kept.
 
 use crate::support::{plan, records, small_with};
-use raystone::config::{Shard, UnitKind};
+use raystone::config::Shard;
 use raystone::gpu::AdapterChoice;
 use raystone::measure::record::{Body, CellRecord, Line, Outcome, text_of};
 use raystone::run::{Existing, Inventory, Registries, RunError, RunOptions, RunSummary, merge};
@@ -73,14 +73,17 @@ fn evidence(lines: &[Line]) -> BTreeMap<String, String> {
     found.collect()
 }
 
-fn units(text: &str, kind: Option<UnitKind>) -> BTreeSet<String> {
-    let (experiment, plan) = plan(text, &Registries::default());
-    let units = plan.units(&experiment).into_iter();
-    let units = units.filter(|unit| kind.is_none_or(|kind| unit.kind == kind));
+fn units(text: &str, kind: Option<&str>) -> BTreeSet<String> {
+    let registries = Registries::default();
+    let (experiment, plan) = plan(text, &registries);
+    let units = registries.measurements.units(&experiment, &plan);
+    let units = units
+        .into_iter()
+        .filter(|unit| kind.is_none_or(|kind| unit.kind() == kind));
     units.map(|unit| unit.name).collect()
 }
 
-fn names(kinds: &[UnitKind], text: &str) -> BTreeSet<String> {
+fn names(kinds: &[&str], text: &str) -> BTreeSet<String> {
     kinds
         .iter()
         .flat_map(|kind| units(text, Some(*kind)))
@@ -113,16 +116,15 @@ fn a_finished_run_is_resumed_without_an_adapter_and_stays_to_the_byte() {
 
 #[test]
 fn a_changed_setting_runs_the_cells_that_depend_on_it_and_no_others() {
-    use UnitKind::*;
     let folder = tempfile::tempdir().expect("a folder");
     let (_, lines) = resume(&experiment(&[]), folder.path());
     let first = evidence(&lines);
     for (change, kinds) in [
-        ("discrepancy.points = 32", &[Stream][..]),
-        ("reference.spp = 16", &[Sampler]),
-        ("gate.rays = 2048", &[Structure]),
-        ("timing.rounds = 4", &[Structure, Time]),
-        ("run.replicates = 3", &[Sampler]),
+        ("discrepancy.points = 32", &["stream"][..]),
+        ("reference.spp = 16", &["sampler"]),
+        ("gate.rays = 2048", &["structure"]),
+        ("timing.rounds = 4", &["structure", "time"]),
+        ("run.replicates = 3", &["sampler"]),
     ] {
         let copy = tempfile::tempdir().expect("a folder");
         copy_folder(folder.path(), copy.path());
@@ -134,7 +136,7 @@ fn a_changed_setting_runs_the_cells_that_depend_on_it_and_no_others() {
         for (what, value) in evidence(&lines) {
             let before = first.get(&what);
             let is_other = before.is_some_and(|before| *before != value);
-            let of_kind = kinds.contains(&Sampler) || kinds.contains(&Stream);
+            let of_kind = kinds.contains(&"sampler") || kinds.contains(&"stream");
             assert!(!is_other || of_kind, "{change}: {what}");
         }
         // A second time there is nothing left to do.
@@ -176,14 +178,14 @@ fn a_changed_kernel_runs_the_cells_that_were_made_of_it() {
     write("accel/uniform_grid", "\n// Another word.\n");
     let (_, lines) = resume(&text, &out);
     let again = measured_again(&lines);
-    let grid: BTreeSet<String> = names(&[UnitKind::Structure, UnitKind::Time], &text)
+    let grid: BTreeSet<String> = names(&["structure", "time"], &text)
         .into_iter()
         .filter(|name| name.contains("uniform-grid"))
         .collect();
     assert!(grid.is_subset(&again), "{again:?}");
     // Samplers were rendered through one of the structures, by luck this one.
     let others: BTreeSet<&String> = again.difference(&grid).collect();
-    let samplers = units(&text, Some(UnitKind::Sampler));
+    let samplers = units(&text, Some("sampler"));
     assert!(
         others.iter().all(|name| samplers.contains(*name)),
         "{others:?}"
@@ -538,7 +540,6 @@ fn an_include_brings_back_what_an_exclude_takes_and_a_condition_ties_a_variant_t
 
 #[test]
 fn times_of_another_device_and_cells_of_another_program_are_measured_again() {
-    use UnitKind::{Sampler, Stream, Structure, Time};
     let folder = tempfile::tempdir().expect("a folder");
     let text = experiment(&[]);
     resume(&text, folder.path());
@@ -553,7 +554,7 @@ fn times_of_another_device_and_cells_of_another_program_are_measured_again() {
     };
     rewrite(folder.path(), take_out);
     let (_, lines) = resume(&text, folder.path());
-    let all = names(&[Sampler, Stream, Structure, Time], &text);
+    let all = names(&["sampler", "stream", "structure", "time"], &text);
     assert_eq!(measured_again(&lines), all);
     assert!(!text_of(&lines).expect("lines").contains("another machine"));
 }

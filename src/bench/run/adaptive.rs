@@ -1,6 +1,8 @@
 //! Adaptive sampling by tile: each takes as many samples as the first ones say that it needs.
 
-use super::errors::{Pass, Replicates, add_error, blank_record, check_finite, draw, replicates};
+use super::errors::{
+    Pass, Replicates, add_error, blank_record, check_finite, draw, replicate_s, replicates,
+};
 use super::session::Session;
 use super::{Fault, reference::Yardstick};
 use raystone_config::{Cell, StopRule};
@@ -76,7 +78,7 @@ pub(super) fn by_tile(
         };
         draw(session, cell, yardstick, &mut record, &snapshot)?;
         session.write(&line(Body::Error(record)))?;
-        session.progress.add(session.weights.replicate);
+        session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates { spp, images })
 }

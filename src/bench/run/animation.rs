@@ -1,15 +1,59 @@
 //! Structures from frame to frame of a moving scene, where the experiment asks for it.
 
-use super::RunError;
+use super::measurement::Measurement;
 use super::session::{Session, content_hash};
-use super::structures::Gated;
+use super::structures::{Gated, Structures, image_settings};
 use super::world::World;
+use super::{Cost, RunError, Work};
 use crate::animation::{Actor, Frame, moved, take_over};
-use raystone_config::{Animation, Axis, UnitKind, unit_name};
+use raystone_config::{Animation, Axis, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
 use raystone_record::{AnimationRecord, Body, Key, Line, Outcome, Ran};
 use raystone_render::Stage;
 use raystone_verify::gate::{Checks, Judge};
+
+/// Structures from frame to frame of a moving scene.
+pub(super) struct Animations;
+
+impl Measurement for Animations {
+    fn name(&self) -> &'static str {
+        "animation"
+    }
+
+    fn plural(&self) -> &'static str {
+        "animations"
+    }
+
+    fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell> {
+        if experiment.animation.is_none() {
+            return Vec::new();
+        }
+        plan.structures.clone()
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        Structures.rounds_of(cell)
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        let e = experiment;
+        format!(
+            "{:?}",
+            (image_settings(e), &e.gate, &e.timing, &e.animation)
+        )
+    }
+
+    fn cost(&self, _: &Cell, cost: &Cost) -> Work {
+        Work::other(seconds_of(cost.experiment))
+    }
+}
+
+/// Seconds that a structure takes for all frames.
+fn seconds_of(experiment: &Experiment) -> f64 {
+    experiment
+        .animation
+        .map_or(0.0, |animation| f64::from(animation.frames))
+}
 
 /// A structure whose frames are recorded.
 struct Part<'a> {
@@ -69,14 +113,14 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Some(reason) => (Outcome::Failed, reason.as_str()),
             None => (Outcome::Done, ""),
         };
-        session.progress.add(session.weights.animation);
+        session.progress.add(seconds_of(session.experiment));
         session.close(&name, ended, vec![hash], &["animation"])?;
     }
     Ok(())
 }
 
 fn name(structure: &Gated) -> String {
-    unit_name(UnitKind::Animation, &structure.cell)
+    Animations.unit_name(&structure.cell)
 }
 
 fn part<'a>(

@@ -1,21 +1,65 @@
 //! Coherence of full cells: the rays of some pixels, through the twins of the structures, on the model's machine.
 
-use super::RunError;
 use super::images::Estimator;
+use super::measurement::Measurement;
 use super::session::{Session, content_hash};
 use super::structures::Gated;
+use super::times::Times;
 use super::world::World;
+use super::{Cost, RunError, Work};
 use crate::coherence::{
     Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run_groups, together,
 };
 use raystone_accel::{BuildLog, CpuTwin};
-use raystone_config::{Axis, Cell, Coherence, UnitKind, unit_name};
+use raystone_config::{Axis, Cell, Coherence, Experiment, Plan};
 use raystone_record::{
     Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, by_group,
 };
 use raystone_verify::path_oracle::{self, PathOracle};
 use raystone_verify::rays::RaySet;
 use std::collections::BTreeMap;
+
+/// Seconds to model a cell.
+const MODEL_SECONDS: f64 = 1.0;
+
+/// Coherence of full cells, by a model.
+pub(super) struct Models;
+
+impl Measurement for Models {
+    fn name(&self) -> &'static str {
+        "coherence"
+    }
+
+    fn plural(&self) -> &'static str {
+        "models of coherence"
+    }
+
+    fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell> {
+        if experiment.coherence.is_none() {
+            return Vec::new();
+        }
+        plan.modelled(experiment)
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        Times.rounds_of(cell)
+    }
+
+    fn is_timed(&self) -> bool {
+        false
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!(
+            "{:?}",
+            (experiment.seed, &experiment.camera, &experiment.coherence)
+        )
+    }
+
+    fn cost(&self, _: &Cell, _: &Cost) -> Work {
+        Work::other(MODEL_SECONDS)
+    }
+}
 
 /// What does not depend on the structure.
 struct Known<'a> {
@@ -56,7 +100,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
 }
 
 fn name(cell: &Cell) -> String {
-    unit_name(UnitKind::Coherence, cell)
+    Models.unit_name(cell)
 }
 
 fn write(
@@ -69,7 +113,7 @@ fn write(
     let settings = format!("{:?}", line.body.settings);
     let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
     session.write(&line.hashed(&hash).with_body(Body::Coherence))?;
-    session.progress.add(session.weights.model);
+    session.progress.add(MODEL_SECONDS);
     session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
 }
 

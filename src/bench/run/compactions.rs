@@ -1,186 +1,167 @@
-//! Compactions of streams: each judged word by word, then all timed in the same rounds.
+//! Compactions of streams: each is checked word by word, then all are timed in the same rounds.
 
-use super::RunError;
-use super::kernels::Device;
-use super::session::{Session, content_hash};
+use super::measurement::{Absent, At, Measurement, Preparation, Prepared};
+use super::{Cost, Work};
 use crate::compaction::{Bench, Inputs, Load, benched, stream};
-use crate::timing::{Measured, Samples, interleave, millions_per_second};
-use raystone_config::{Axis, Cell};
-use raystone_gpu::compaction::Order;
-use raystone_gpu::{Elapsed, Gpu, GpuError, Player};
-use raystone_record::{Body, CompactionRecord, Key, Line, Outcome, Ran};
+use crate::timing::{Measured, Samples, millions_per_second};
+use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_gpu::{Elapsed, GpuError, Player};
+use raystone_record::figure::{
+    COMPACTION_GB_PER_S, COMPACTION_KEPT, COMPACTION_LEAST_BYTES, COMPACTION_MELEMENTS_PER_S,
+    COMPACTION_NS, COMPACTION_PASSES, COMPACTION_SCRATCH, Figure,
+};
+use raystone_record::{Reading, Samples as Rounds};
 use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 
-/// A cell that passed its judge.
-struct Timed {
-    cell: Cell,
-    bench: Bench,
-    record: CompactionRecord,
+/// The measurement.
+pub(super) struct Compactions;
+
+impl Measurement for Compactions {
+    fn name(&self) -> &'static str {
+        "compaction"
+    }
+
+    fn plural(&self) -> &'static str {
+        "compactions"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.compactions.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!("{:?}", (experiment.seed, experiment.timing))
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let turn = Work {
+            elements: f64::from(Load::of(&cell[Axis::Integrator]).elements),
+            ..Work::default()
+        };
+        Work::kernels(1) + cost.timed(turn)
+    }
+
+    fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
+        let mut streams = Streams {
+            at,
+            cells,
+            player: Arc::new(Player::new(&at.device.gpu)),
+            uploaded: Vec::new(),
+        };
+        Box::new(cells.iter().map(move |cell| {
+            let ready = streams.prepare(cell)?;
+            Ok(Box::new(ready) as Box<dyn Prepared>)
+        }))
+    }
 }
 
-impl Measured for Timed {
+/// A compaction that passed its check.
+struct Ready {
+    load: Load,
+    bench: Bench,
+}
+
+impl Measured for Ready {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.bench.measure()
     }
 }
 
-/// Streams that were uploaded, and what they are of.
-type Uploaded = Vec<((u64, u32, u32), Arc<Inputs>)>;
-
-/// All compactions of the plan.
-pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError> {
-    let cells = session.plan.compactions.iter();
-    let cells: Vec<Cell> = cells
-        .filter(|c| !session.is_done(&c.to_string()))
-        .cloned()
-        .collect();
-    let player = Arc::new(Player::new(&device.gpu));
-    let mut uploaded = Uploaded::new();
-    let mut timed = Vec::new();
-    for cell in &cells {
-        session.go_on()?;
-        let gpu = device.of(&cell[Axis::Kernels])?;
-        session.say(format!("{cell}: judging"));
-        session.lose_device_on_request(gpu, &cell.to_string());
-        let prepared = prepare(session, gpu, &player, &mut uploaded, cell, &cells);
-        session.note_kernels(&cell.to_string());
-        match prepared {
-            Ok(item) => timed.push(item),
-            Err(Absent::Refused(reason)) => session.write_refused(cell.to_string(), reason)?,
-            Err(Absent::Failed(reason)) => fail(session, cell, reason)?,
-        }
-        session.progress.add(session.weights.compaction);
-        if gpu.lost().is_some() {
-            return Ok(());
-        }
+impl Prepared for Ready {
+    fn timed(&self) -> Vec<&dyn Measured> {
+        vec![self]
     }
-    let timing = session.experiment.timing;
-    let seed = u64::from(session.experiment.seed);
-    let (progress, weight) = (session.progress.clone(), session.weights.compaction);
-    session.say("timing compactions");
-    let measured = (session.clock).time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.add(weight))
-    });
-    let measured = match measured {
-        Ok(measured) => measured,
-        Err((index, error)) => return fail(session, &timed[index].cell, error.to_string()),
-    };
-    for (item, samples) in timed.into_iter().zip(measured) {
-        match samples {
-            Ok(samples) => write(session, &item.cell, finished(item.record, samples))?,
-            Err(error) => fail(session, &item.cell, error.to_string())?,
-        }
-    }
-    Ok(())
-}
 
-/// Why a cell is not timed.
-enum Absent {
-    /// The adapter cannot run it.
-    Refused(String),
-    /// It is wrong.
-    Failed(String),
-}
-
-impl From<GpuError> for Absent {
-    fn from(error: GpuError) -> Self {
-        match error {
-            GpuError::TooLarge { .. } => Self::Refused(error.to_string()),
-            error => Self::Failed(error.to_string()),
-        }
+    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
+        let samples = samples.into_iter().next().unwrap_or_default();
+        let elements = f64::from(self.load.elements);
+        let per_element = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / elements).collect();
+        let rounds: Vec<f64> = per_element(&samples.ms);
+        let ns = median_interval(&rounds).ok_or("nothing was timed")?;
+        let rates = [
+            (&COMPACTION_MELEMENTS_PER_S, elements),
+            (&COMPACTION_GB_PER_S, self.bench.least_bytes() as f64 * 1e-3),
+        ];
+        let counted: [(&Figure, f64); 4] = [
+            (&COMPACTION_PASSES, f64::from(self.bench.runs)),
+            (&COMPACTION_KEPT, f64::from(self.bench.kept_elements)),
+            (&COMPACTION_LEAST_BYTES, self.bench.least_bytes() as f64),
+            (&COMPACTION_SCRATCH, self.bench.scratch_bytes as f64),
+        ];
+        let time = Reading::new(&COMPACTION_NS, ns)
+            .of_work(format!(
+                "{} elements of {} bytes",
+                self.load.elements, self.load.bytes
+            ))
+            .with_samples(Rounds::Rounds {
+                adapter: rounds,
+                wall: per_element(&samples.wall_ms),
+                processors: Vec::new(),
+            });
+        let rates = rates.into_iter().filter_map(|(figure, items)| {
+            Some(Reading::new(
+                figure,
+                millions_per_second(&samples.ms, items)?,
+            ))
+        });
+        let counted = counted.map(|(figure, value)| Reading::exact(figure, value));
+        Ok([time].into_iter().chain(rates).chain(counted).collect())
     }
 }
 
-fn prepare(
-    session: &mut Session,
-    gpu: &Gpu,
-    player: &Arc<Player>,
-    uploaded: &mut Uploaded,
-    cell: &Cell,
-    cells: &[Cell],
-) -> Result<Timed, Absent> {
-    let registry = &session.registries.compactions;
-    let configured = |cell: &Cell| benched(registry, &cell[Axis::Integrator]);
-    let method = configured(cell).map_err(Absent::Failed)?;
-    let load = Load::of(&cell[Axis::Integrator]);
-    if let Some(reason) = method.refusal(gpu) {
-        return Err(Absent::Refused(reason));
-    }
-    let kind = (load.valid.to_bits(), method.buckets(), load.bytes);
-    // The longest stream of its kind is uploaded once, and each cell takes its beginning.
-    let length = |other: &Cell| {
-        let load = Load::of(&other[Axis::Integrator]);
-        let buckets = configured(other).ok()?.buckets();
-        ((load.valid.to_bits(), buckets, load.bytes) == kind).then_some(load.elements)
-    };
-    let longest = cells.iter().filter_map(length).max();
-    let longest = longest.unwrap_or(load.elements);
-    let inputs = match uploaded.iter().find(|(known, _)| *known == kind) {
-        Some((_, inputs)) => Arc::clone(inputs),
-        None => {
-            let seed = u64::from(session.experiment.seed);
-            let flags = stream::flags(longest, load.valid, method.buckets(), seed);
-            let inputs = Arc::new(Inputs::upload(gpu, flags, load.bytes)?);
-            uploaded.push((kind, Arc::clone(&inputs)));
-            inputs
+/// What makes two streams parts of one: the share that stays, buckets, bytes of an element.
+type Kind = (u64, u32, u32);
+
+/// Streams on the device.
+struct Streams<'a> {
+    at: &'a At<'a>,
+    cells: &'a [Cell],
+    player: Arc<Player>,
+    uploaded: Vec<(Kind, Arc<Inputs>)>,
+}
+
+impl Streams<'_> {
+    fn prepare(&mut self, cell: &Cell) -> Result<Ready, Absent> {
+        let gpu = self.at.gpu(cell)?;
+        let registry = &self.at.registries.compactions;
+        let method = benched(registry, &cell[Axis::Integrator]).map_err(Absent::Failed)?;
+        let load = Load::of(&cell[Axis::Integrator]);
+        if let Some(reason) = method.refusal(gpu) {
+            return Err(Absent::Refused(reason));
         }
-    };
-    let stable = method.order() != Order::Any;
-    let bench = Bench::new(player, gpu, method, &inputs, [load.elements; 2])?;
-    if let Some(fault) = session.clock.time("gate", || bench.judge())? {
-        return Err(Absent::Failed(fault));
+        let kind = (load.valid.to_bits(), method.buckets(), load.bytes);
+        let known = self.uploaded.iter().find(|(known, _)| *known == kind);
+        let inputs = match known {
+            Some((_, inputs)) => Arc::clone(inputs),
+            None => {
+                let seed = u64::from(self.at.experiment.seed);
+                let longest = self.longest(kind).unwrap_or(load.elements);
+                let flags = stream::flags(longest, load.valid, method.buckets(), seed);
+                let inputs = Arc::new(Inputs::upload(gpu, flags, load.bytes)?);
+                self.uploaded.push((kind, Arc::clone(&inputs)));
+                inputs
+            }
+        };
+        let bench = Bench::new(&self.player, gpu, method, &inputs, [load.elements; 2])?;
+        match bench.judge()? {
+            Some(fault) => Err(Absent::Failed(fault)),
+            None => Ok(Ready { load, bench }),
+        }
     }
-    let record = CompactionRecord {
-        elements: load.elements,
-        valid: load.valid,
-        bytes: load.bytes,
-        kept: bench.kept_elements,
-        stable,
-        passes: bench.runs,
-        scratch_bytes: bench.scratch_bytes,
-        least_bytes: bench.least_bytes(),
-        ..CompactionRecord::default()
-    };
-    Ok(Timed {
-        cell: cell.clone(),
-        bench,
-        record,
-    })
-}
 
-fn finished(mut record: CompactionRecord, samples: Samples) -> CompactionRecord {
-    let elements = f64::from(record.elements);
-    let over = |ms: &[f64], of: f64| ms.iter().map(|ms| ms * 1e6 / of).collect::<Vec<_>>();
-    record.ns_per_element = median_interval(&over(&samples.ms, elements));
-    record.melements_s = millions_per_second(&samples.ms, elements);
-    record.gb_s = millions_per_second(&samples.ms, record.least_bytes as f64 * 1e-3);
-    record.ms = samples.ms;
-    record.wall_ms = samples.wall_ms;
-    record
-}
-
-fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunError> {
-    session.failed += 1;
-    let load = Load::of(&cell[Axis::Integrator]);
-    let record = CompactionRecord {
-        elements: load.elements,
-        valid: load.valid,
-        bytes: load.bytes,
-        failure: Some(reason),
-        ..CompactionRecord::default()
-    };
-    write(session, cell, record)
-}
-
-fn write(session: &mut Session, cell: &Cell, record: CompactionRecord) -> Result<(), RunError> {
-    let failure = record.failure.clone();
-    let line = Line::new(Key::from(cell), Ran::default(), Body::Compaction(record));
-    let hash = content_hash(&line, "", &[("what", "compaction")]);
-    session.write(&line.hashed(&hash))?;
-    let ended = match &failure {
-        Some(reason) => (Outcome::Failed, reason.as_str()),
-        None => (Outcome::Done, ""),
-    };
-    session.close(&cell.to_string(), ended, vec![hash], &[])
+    /// Elements of the longest stream of a kind: that one is uploaded, and each cell takes its beginning.
+    fn longest(&self, kind: Kind) -> Option<u32> {
+        let length = |other: &Cell| {
+            let load = Load::of(&other[Axis::Integrator]);
+            let method = benched(&self.at.registries.compactions, &other[Axis::Integrator]).ok()?;
+            let own = (load.valid.to_bits(), method.buckets(), load.bytes);
+            (own == kind).then_some(load.elements)
+        };
+        self.cells.iter().filter_map(length).max()
+    }
 }

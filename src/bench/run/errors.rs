@@ -2,15 +2,16 @@
 
 use super::adaptive;
 use super::images::{self, Estimator, IMAGE_AXES, attributes, sampler_label, write_spread};
+use super::measurement::Measurement;
 use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash};
-use super::structures::Gated;
+use super::structures::{Gated, image_settings};
 use super::world::World;
-use super::{Fault, RunError};
+use super::{Cost, Fault, RunError, Work};
 use crate::spectrum::{ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power};
 use crate::stopping::is_met_by;
-use raystone_config::{Axis, Cell, StopRule};
+use raystone_config::{Axis, Cell, Experiment, Plan, StopRule};
 use raystone_gpu::GpuError;
 use raystone_image::{Image, Picture, tone_map, viridis};
 use raystone_record::{
@@ -22,6 +23,52 @@ use raystone_stats::heavy_tails::PixelErrors;
 use raystone_stats::metrics::{error_map, measure};
 use raystone_stats::statistics::mean_interval;
 use std::collections::BTreeMap;
+
+/// Name of the measurement in records.
+pub(super) const NAME: &str = "sampler";
+
+/// Errors of samplers against a reference.
+pub(super) struct Errors;
+
+impl Measurement for Errors {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn plural(&self) -> &'static str {
+        "errors of samplers"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.samplers.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        (NAME, cell.clone())
+    }
+
+    fn is_timed(&self) -> bool {
+        false
+    }
+
+    fn settings(&self, experiment: &Experiment, reference_file: &str) -> String {
+        let e = experiment;
+        let reference = (&e.reference, reference_file);
+        format!(
+            "{:?}",
+            (image_settings(e), e.replicates, &e.spp, &e.stop, reference)
+        )
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let image = cost.image(&cell[Axis::Integrator], cost.experiment.spp.max());
+        image * f64::from(cost.plan.renders(cell))
+    }
+}
 
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
@@ -288,7 +335,7 @@ fn all_samples(
         check_finite(&record)?;
         session.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
-        session.progress.add(session.weights.replicate);
+        session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates {
         spp: session.experiment.spp.max(),
@@ -344,7 +391,7 @@ fn until_met(
         record.stop = Some(rule);
         draw(session, cell, yardstick, &mut record, snapshot)?;
         session.write(&line(Body::Error(record)))?;
-        session.progress.add(session.weights.replicate);
+        session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates {
         spp: last.first().map_or(0, |snapshot| snapshot.spp),
@@ -544,4 +591,10 @@ pub(super) fn image_hash(image: &Image) -> String {
     blake3::hash(bytemuck::cast_slice(&image.pixels))
         .to_hex()
         .to_string()
+}
+
+/// Seconds that a replicate of a sampler is expected to take.
+pub(super) fn replicate_s(session: &Session, cell: &Cell) -> f64 {
+    let image = (session.cost).image(&cell[Axis::Integrator], session.experiment.spp.max());
+    image.seconds()
 }

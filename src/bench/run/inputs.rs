@@ -1,7 +1,8 @@
 //! What the figures of a cell depend on, and whether those of an earlier run still hold.
 
 use super::kernels::Kernels;
-use raystone_config::{Axis, Experiment, Unit, UnitKind, is_compaction};
+use super::{Registries, Unit};
+use raystone_config::{Axis, Experiment};
 use raystone_core::text::cell_hash;
 use raystone_record::Environment;
 use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
@@ -41,56 +42,10 @@ pub fn place(environment: &Environment) -> String {
     )
 }
 
-/// The settings of an experiment that matter to a kind of cells. A field that is added to experiments has to be placed here.
-fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> String {
-    let Experiment {
-        name: _,
-        source: _,
-        text: _,
-        overrides: _,
-        excludes: _,
-        includes: _,
-        conditions: _,
-        replicates,
-        seed,
-        resolution,
-        spp,
-        stop,
-        runtime_checks,
-        camera,
-        axes,
-        reference,
-        timing,
-        gate,
-        discrepancy,
-        coherence,
-        animation,
-    } = experiment;
-    let image = (seed, camera, resolution, runtime_checks);
-    match kind {
-        UnitKind::Structure | UnitKind::Peer => format!("{:?}", (image, gate, timing, coherence)),
-        UnitKind::Animation => format!("{:?}", (image, gate, timing, animation)),
-        UnitKind::Sampler => {
-            format!(
-                "{:?}",
-                (image, replicates, spp, stop, reference, reference_file)
-            )
-        }
-        UnitKind::Time => format!("{:?}", (image, timing, spp)),
-        UnitKind::Coherence => format!("{:?}", (seed, camera, coherence)),
-        UnitKind::Compaction => format!("{:?}", (seed, timing)),
-        UnitKind::Stream => {
-            // The worst pair of dimensions is looked for among those of all integrators.
-            let drawn = axes[Axis::Integrator].iter().filter(|i| !is_compaction(i));
-            let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
-            format!("{:?}", (seed, resolution, discrepancy, drawn))
-        }
-    }
-}
-
 /// What the cells of a run depend on now.
 pub(super) struct Current<'a> {
-    settings: BTreeMap<UnitKind, String>,
+    /// By name of the measurement.
+    settings: BTreeMap<&'static str, String>,
     kernels: &'a Kernels,
     /// Label of a scene → hash of its content, or why it has none.
     pub scenes: HashMap<String, Result<String, String>>,
@@ -100,10 +55,16 @@ pub(super) struct Current<'a> {
 
 impl<'a> Current<'a> {
     /// Of an experiment with these kernels; the hash of the image that is compared with, if it is a file's.
-    pub(super) fn new(experiment: &Experiment, reference_file: &str, kernels: &'a Kernels) -> Self {
-        let of = |kind| (kind, settings(experiment, reference_file, kind));
+    pub(super) fn new(
+        experiment: &Experiment,
+        reference_file: &str,
+        registries: &Registries,
+        kernels: &'a Kernels,
+    ) -> Self {
+        let measurements = registries.measurements.iter();
+        let settings = measurements.map(|m| (m.name(), m.settings(experiment, reference_file)));
         Self {
-            settings: UnitKind::ALL.into_iter().map(of).collect(),
+            settings: settings.collect(),
             kernels,
             scenes: HashMap::new(),
             device: None,
@@ -113,9 +74,8 @@ impl<'a> Current<'a> {
     /// Hash of the parameters of a unit and of the settings that matter to it.
     pub(super) fn settings_of(&self, unit: &Unit) -> String {
         let key = serde_json::to_string(&Key::from(&unit.cell)).unwrap_or_default();
-        let settings = self.settings.get(&unit.kind).map_or("", String::as_str);
-        let kind = format!("{:?}", unit.kind);
-        short(&[("kind", &kind), ("key", &key), ("settings", settings)])
+        let settings = self.settings.get(unit.kind()).map_or("", String::as_str);
+        short(&[("kind", unit.kind()), ("key", &key), ("settings", settings)])
     }
 
     /// What a unit depends on that is known before it is measured.
@@ -127,9 +87,10 @@ impl<'a> Current<'a> {
             settings: self.settings_of(unit),
             scene: scene.unwrap_or_default(),
             kernels: String::new(),
-            device: match unit.kind.is_timed() {
-                true => self.device.clone().unwrap_or_default(),
-                false => String::new(),
+            device: if unit.measurement.is_timed() {
+                self.device.clone().unwrap_or_default()
+            } else {
+                String::new()
             },
         }
     }
@@ -166,7 +127,7 @@ impl<'a> Current<'a> {
             Some(Err(reason)) => return Some(format!("its scene cannot be loaded: {reason}")),
             _ => {}
         }
-        let device = self.device.as_ref().filter(|_| unit.kind.is_timed());
+        let device = self.device.as_ref().filter(|_| unit.measurement.is_timed());
         if let Some(device) = device.filter(|device| **device != was.device) {
             let before = &was.device;
             return Some(format!("it was timed on {before}, and this is {device}"));

@@ -4,8 +4,8 @@ use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
 use super::resume::Earlier;
 use super::world::load_options;
-use super::{Estimate, Registries, RunError, RunOptions};
-use raystone_config::{ConfigError, Experiment, Plan, Shard, Unit, shards};
+use super::{Cost, Registries, RunError, RunOptions, Unit, shards};
+use raystone_config::{ConfigError, Experiment, Plan, Shard};
 use raystone_record::{
     CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RecordError,
     RunRecord, read_records, records_file,
@@ -112,7 +112,7 @@ impl Inventory {
                 .push(cell.clone());
         }
         let units = wanted_units(&records.lines, &experiment, &plan, registries);
-        let all = plan.units(&experiment);
+        let all = registries.measurements.units(&experiment, &plan);
         let known: BTreeSet<&str> = all.iter().map(|unit| unit.name.as_str()).collect();
         let foreign = of_unit.keys().filter(|name| !known.contains(name.as_str()));
         let foreign = foreign.cloned().collect();
@@ -176,7 +176,7 @@ impl Inventory {
         let kernels = Kernels::load(&self.plan.kernels, registries)?;
         let file = super::reference_file::ReferenceFile::load(&self.experiment)?;
         let file = file.as_ref().map_or("", |file| &*file.hash);
-        let mut current = Current::new(&self.experiment, file, &kernels);
+        let mut current = Current::new(&self.experiment, file, registries, &kernels);
         current.scenes = HashMap::new();
         if let Some(scene) = state.unit.cell.get(raystone_config::Axis::Scene) {
             let load = load_options(options, self.earlier.table_bytes());
@@ -207,17 +207,17 @@ fn wanted_units(
     plan: &Plan,
     registries: &Registries,
 ) -> Vec<Unit> {
-    let mut units = plan.units(experiment);
+    let mut units = registries.measurements.units(experiment, plan);
     let runs = lines.iter().filter_map(|line| RunRecord::of(&line.body));
     let parts: Option<Vec<Shard>> = runs.map(|run| run.shard.as_ref()?.parse().ok()).collect();
     let Some(parts) = parts.filter(|parts| !parts.is_empty()) else {
         return units;
     };
-    let estimate = Estimate::new(experiment, plan, &units, registries);
-    let cost = |unit: &Unit| estimate.seconds_of(unit);
+    let cost = Cost::new(experiment, plan, registries);
+    let seconds = |unit: &Unit| cost.seconds_of(unit);
     let mut wanted = vec![false; units.len()];
     for part in parts {
-        let numbers = shards(&units, part.of, cost);
+        let numbers = shards(&units, part.of, seconds);
         for (wanted, number) in wanted.iter_mut().zip(numbers) {
             *wanted |= number == part.number;
         }

@@ -6,8 +6,7 @@
 use super::folder::lock_folder;
 use super::inputs::{MadeOf, differing};
 use super::resume::Earlier;
-use super::{Registries, RunError};
-use raystone_config::Unit;
+use super::{Registries, RunError, Unit};
 use raystone_core::atomic::write_atomic;
 use raystone_record::{
     Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
@@ -101,7 +100,7 @@ pub fn merge(
     }
     let (experiment, plan) = super::inventory::planned(&first.run, registries)
         .map_err(|e| input(format!("{}: {e}", first.dir.display())))?;
-    let units = plan.units(&experiment);
+    let units = registries.measurements.units(&experiment, &plan);
     let chosen = choose(&parts, &units, device, &mut merged)?;
     check_devices(&parts, &units, &chosen)?;
     let mut lines = Vec::new();
@@ -163,7 +162,7 @@ fn choose(
         let holders = all.iter().enumerate();
         let holders = holders.filter_map(|(i, of)| Some((i, *of.cells.get(unit.name.as_str())?)));
         let mut holders: Vec<(usize, &CellRecord)> = holders.collect();
-        if let Some(device) = device.filter(|_| unit.kind.is_timed()) {
+        if let Some(device) = device.filter(|_| unit.measurement.is_timed()) {
             let before = holders.len();
             holders.retain(|(_, cell)| {
                 cell.outcome != Outcome::Done || cell.inputs.device.contains(device)
@@ -311,7 +310,7 @@ fn check_devices(
 ) -> Result<(), RunError> {
     let timed: BTreeSet<&str> = units
         .iter()
-        .filter(|unit| unit.kind.is_timed())
+        .filter(|unit| unit.measurement.is_timed())
         .map(|unit| unit.name.as_str())
         .collect();
     let mut devices: BTreeMap<&str, &Path> = BTreeMap::new();

@@ -7,14 +7,16 @@ mod adaptive;
 mod animation;
 mod coherence;
 mod compactions;
+mod cost;
+mod driver;
 mod errors;
-mod estimate;
 mod folder;
 mod images;
 mod inputs;
 mod inventory;
 mod kernels;
 mod known_images;
+mod measurement;
 mod merge;
 mod orders;
 mod paths;
@@ -28,6 +30,7 @@ mod registries;
 mod render;
 mod resume;
 mod session;
+mod shard;
 mod streams;
 mod structure_times;
 mod structures;
@@ -36,21 +39,24 @@ mod trial;
 mod words;
 mod world;
 
-pub use estimate::Estimate;
+pub use cost::{Cost, Work};
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
 pub use inputs::place;
 pub use inventory::{Inventory, State};
 pub use kernels::{Kernels, kernel_library};
 pub use known_images::verify_images;
+pub use measurement::{Absent, At, Measurement, MeasurementRegistry, Preparation, Prepared, Unit};
 pub use merge::{Merged, merge};
 pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
+pub use shard::shards;
 
 pub use crate::words::dump_stream;
 use inputs::Current;
 use kernels::Device;
-use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Shard, Unit};
+use measurement::Run;
+use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Shard};
 use raystone_core::params::Variant;
 use raystone_core::program::Program;
 use raystone_gpu::{AdapterChoice, ArithmeticProbe, GpuError};
@@ -61,7 +67,7 @@ use session::Session;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use thiserror::Error;
-use world::{Absent, Loaded, World, load_options};
+use world::{Loaded, NoWorld, World, load_options};
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -235,7 +241,7 @@ pub fn run(
     session.keep_shard();
     let earlier = session.take_earlier();
     let file = session.reference_file.as_ref().map(|file| &*file.hash);
-    let mut current = Current::new(experiment, file.unwrap_or_default(), &kernels);
+    let mut current = Current::new(experiment, file.unwrap_or_default(), registries, &kernels);
     if !earlier.is_empty() {
         current.scenes = scene_hashes(plan, options, earlier.table_bytes());
         let kept = earlier.kept(&session.units, &current);
@@ -313,10 +319,7 @@ fn measure(
         }
     }
     loop {
-        streams::run(session, &device)?;
-        if device.gpu.lost().is_none() {
-            compactions::run(session, &device)?;
-        }
+        run_alone(session, &device)?;
         if device.gpu.lost().is_none() {
             break;
         }
@@ -324,6 +327,28 @@ fn measure(
         session.use_device(&device.gpu);
     }
     session.write_end()
+}
+
+/// What is measured without a scene.
+fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
+    let at = At {
+        experiment: session.experiment,
+        registries: session.registries,
+        stage: None,
+        device,
+        gated: &[],
+    };
+    for entry in session.registries.measurements.entries() {
+        match entry.run {
+            Run::Alone(run) => run(session, device)?,
+            Run::CellByCell => driver::run(session, entry.measurement, &at, None)?,
+            Run::First | Run::OfWorld(_) => {}
+        }
+        if device.gpu.lost().is_some() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
@@ -367,29 +392,34 @@ fn run_world(
     }
     let world = match World::new(session, device, loaded, cell) {
         Ok(world) => world,
-        Err(Absent::BadInput(reason)) => {
+        Err(NoWorld::BadInput(reason)) => {
             session.bad_input = true;
             return session.fail_all(&failed, |unit| unit.cell.is_on(cell), reason);
         }
-        Err(Absent::NotKept(reason)) => {
+        Err(NoWorld::NotKept(reason)) => {
             session.finish(failed);
             return session.leave_out(cell, reason);
         }
     };
-    session.progress.add(session.weights.world);
-    let gpu = &device.gpu;
+    session.progress.add(session.cost.world(cell).seconds());
     let gated = structures::run(session, &world)?;
-    session.go_on()?;
-    if gpu.lost().is_none() {
-        errors::run(session, &world, &gated)?;
-    }
-    if gpu.lost().is_none() {
-        times::run(session, &world, &gated)?;
-    }
-    session.go_on()?;
-    coherence::run(session, &world, &gated)?;
-    if gpu.lost().is_none() {
-        animation::run(session, &world, &gated)?;
+    let at = At {
+        experiment: session.experiment,
+        registries: session.registries,
+        stage: Some(&world.stage),
+        device,
+        gated: &gated,
+    };
+    for entry in session.registries.measurements.entries() {
+        session.go_on()?;
+        if device.gpu.lost().is_some() {
+            break;
+        }
+        match entry.run {
+            Run::OfWorld(run) => run(session, &world, &gated)?,
+            Run::CellByCell => driver::run(session, entry.measurement, &at, Some(cell))?,
+            Run::First | Run::Alone(_) => {}
+        }
     }
     Ok(())
 }
@@ -490,7 +520,7 @@ pub fn verify(
         for part in plan.worlds(scene) {
             let world = match &loaded {
                 Ok(loaded) => World::new(&mut session, &device, loaded, &part),
-                Err(reason) => Err(Absent::BadInput(reason.clone())),
+                Err(reason) => Err(NoWorld::BadInput(reason.clone())),
             };
             for cell in plan.structures.iter().filter(|c| c.is_on(&part)) {
                 verified.push(verify_cell(&mut session, &world, cell)?);
@@ -503,18 +533,18 @@ pub fn verify(
 
 fn verify_cell(
     session: &mut Session,
-    world: &Result<World, Absent>,
+    world: &Result<World, NoWorld>,
     cell: &Cell,
 ) -> Result<Verified, RunError> {
     let mut verified = Verified {
         cell: cell.clone(),
         verdict: Err("no verdict".to_owned()),
-        bad_input: matches!(world, Err(Absent::BadInput(_))),
+        bad_input: matches!(world, Err(NoWorld::BadInput(_))),
         refused: false,
         paths: Vec::new(),
     };
     match world {
-        Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => {
+        Err(NoWorld::BadInput(reason) | NoWorld::NotKept(reason)) => {
             verified.verdict = Err(reason.clone());
         }
         Ok(world) => {

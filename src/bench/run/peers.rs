@@ -1,15 +1,53 @@
 //! Ray casters of others, traced in the rounds of the structures.
 
-use super::RunError;
+use super::measurement::Measurement;
 use super::session::{Session, content_hash};
+use super::structures::Structures;
 use super::world::World;
+use super::{Cost, RunError, Work};
 use crate::peers::{BuiltPeer, PeerBatch};
 use crate::timing::{Measured, Samples, Watch, millions_per_second};
-use raystone_config::{Axis, Cell};
+use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError};
 use raystone_record::{Body, Key, Line, Outcome, PeerRecord, PeerTiming, Ran};
 use raystone_verify::peer_judge::differences;
 use raystone_verify::rays::RaySet;
+
+/// Name of the measurement in records.
+pub(super) const NAME: &str = "peer";
+
+/// Speed of external tracers.
+pub(super) struct Peers;
+
+impl Measurement for Peers {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn plural(&self) -> &'static str {
+        "external tracers"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.peers.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        Structures.rounds_of(cell)
+    }
+
+    fn settings(&self, experiment: &Experiment, reference_file: &str) -> String {
+        Structures.settings(experiment, reference_file)
+    }
+
+    fn cost(&self, _: &Cell, cost: &Cost) -> Work {
+        cost.timed(Work::rays(cost.experiment.timing.rays)) * cost.ray_classes()
+    }
+}
 
 /// A peer of a world, or why there is none.
 pub(super) struct Built<'a> {

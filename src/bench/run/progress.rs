@@ -1,16 +1,12 @@
 //! How far a run is: a bar on a terminal, lines elsewhere.
 //!
-//! Every step has an expected time, loading, judging and compiling included, from which the share that is done follows. What is left is
-//! the time so far over that share: a step that takes longer than expected makes the rest longer, and nothing is called nearly done that is
-//! not.
+//! Every step has an expected time by [`super::Cost`], loading, checks and compiling included, from which the share that is done
+//! follows. The rest is expected at the pace so far: a step that takes longer than expected makes the rest longer, and nothing is
+//! called nearly done that is not. The first steps say little of the pace: a share of the whole counts as done at the pace that was
+//! expected.
 
-use super::estimate::Estimate;
-use super::{RunOptions, session::Session};
+use super::RunOptions;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
-use raystone_config::{
-    Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Unit, UnitKind, is_compaction,
-};
-use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -19,111 +15,8 @@ use std::time::{Duration, Instant};
 const STEPS: u64 = 1000;
 /// Between two lines where there is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
-/// The first part of a run is too short to go by.
-const FIRST_SECONDS: f64 = 2.0;
-
-/// Expected seconds of the steps of a run, on a software adapter with two cores.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Weights {
-    /// A scene is loaded and its judge is checked.
-    pub world: f64,
-    /// A structure is built and judged.
-    pub gate: f64,
-    /// A class of rays is traced once.
-    pub rays: f64,
-    /// A full cell is compiled.
-    pub compile: f64,
-    /// A full cell is timed once.
-    pub image: f64,
-    /// A replicate is rendered.
-    pub replicate: f64,
-    /// A part of a reference is rendered.
-    pub reference_part: f64,
-    /// A stream is measured.
-    pub stream: f64,
-    /// A compaction is judged, or timed once.
-    pub compaction: f64,
-    /// A cell is modelled.
-    pub model: f64,
-    /// A structure is taken through all frames.
-    pub animation: f64,
-}
-
-impl Weights {
-    pub(super) fn new(
-        experiment: &Experiment,
-        plan: &Plan,
-        units: &[Unit],
-        estimate: &Estimate,
-    ) -> Self {
-        let megabytes =
-            |scene: &str| std::fs::metadata(scene).map_or(0.0, |m| m.len() as f64 / 1e6);
-        let sizes = plan.scenes.iter().map(|scene| megabytes(&scene.name));
-        let megabytes = sizes.sum::<f64>() / plan.scenes.len().max(1) as f64;
-        let integrators = &experiment.axes[Axis::Integrator];
-        let rendering: Vec<_> = integrators.iter().filter(|i| !is_compaction(i)).collect();
-        let image = |spp| {
-            let seconds = rendering.iter().map(|i| estimate.image_seconds(i, spp));
-            seconds.sum::<f64>() / rendering.len().max(1) as f64
-        };
-        let timing = &experiment.timing;
-        let rounds = f64::from(timing.rounds) + 1.0;
-        let warmup = f64::from(timing.min_warmup_ms) / 1e3 / rounds;
-        let rays = |count: u32| estimate.rays_seconds(u64::from(count));
-        let compactions = plan.compactions.len().max(1) as f64;
-        let of_compactions = units
-            .iter()
-            .filter(|unit| unit.kind == UnitKind::Compaction);
-        let of_compactions: f64 = of_compactions.map(|unit| estimate.seconds_of(unit)).sum();
-        Self {
-            world: 1.0 + 0.3 * megabytes,
-            gate: 0.6 + 5.0 * rays(experiment.gate.rays) + 0.15 * megabytes,
-            rays: rays(timing.rays) + warmup,
-            compile: 0.3,
-            image: image(timing.spp) + warmup,
-            replicate: image(experiment.spp.max()),
-            reference_part: image(experiment.reference.spp / REFERENCE_PARTS),
-            stream: 0.6,
-            compaction: of_compactions / compactions / (rounds + 1.0),
-            model: 1.0,
-            animation: experiment.animation.map_or(0.0, |a| f64::from(a.frames)),
-        }
-    }
-
-    /// Expected seconds of these units, with the worlds and references that they need.
-    pub(super) fn of<'u>(
-        &self,
-        units: impl Iterator<Item = &'u Unit>,
-        experiment: &Experiment,
-        plan: &Plan,
-    ) -> f64 {
-        let rounds = f64::from(experiment.timing.rounds) + 1.0;
-        let (mut worlds, mut references) = (BTreeSet::new(), BTreeSet::new());
-        let mut seconds = 0.0;
-        for unit in units {
-            let cell = &unit.cell;
-            if cell.get(Axis::Scene).is_some() {
-                worlds.insert(cell.on(&Cell::WORLD).identity());
-            }
-            seconds += match unit.kind {
-                UnitKind::Structure => self.gate + 5.0 * rounds * self.rays,
-                UnitKind::Peer => 5.0 * rounds * self.rays,
-                UnitKind::Sampler => {
-                    let part = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
-                    references.insert(cell.on(&part).identity());
-                    f64::from(plan.renders(cell)) * self.replicate
-                }
-                UnitKind::Time => self.compile + rounds * self.image,
-                UnitKind::Coherence => self.model,
-                UnitKind::Animation => self.animation,
-                UnitKind::Stream => self.stream,
-                UnitKind::Compaction => (rounds + 1.0) * self.compaction,
-            };
-        }
-        let parts = references.len() as f64 * f64::from(REFERENCE_PARTS);
-        seconds + worlds.len() as f64 * self.world + parts * self.reference_part
-    }
-}
+/// The share of a run that counts as done at the expected pace.
+const PRIOR: f64 = 0.1;
 
 #[derive(Debug)]
 struct Shared {
@@ -141,16 +34,13 @@ impl Shared {
         (self.done_s / self.expected_s.max(1e-9)).clamp(0.0, 0.995)
     }
 
-    /// Seconds that are left: by the time so far, and in the beginning by what was expected.
+    /// Seconds that are left: what was expected of them, times the pace so far.
     fn left_s(&self) -> f64 {
+        let prior = (PRIOR * self.expected_s).max(1e-9);
         let so_far = self.start.elapsed().as_secs_f64();
-        let by_time = so_far * (1.0 - self.share()) / self.share().max(1e-9);
-        let expected = (self.expected_s - self.done_s).max(1.0);
-        match self.done_s {
-            // A first step that takes long says that all of them will.
-            done if done < FIRST_SECONDS.min(0.05 * self.expected_s) => expected.max(so_far),
-            _ => by_time.max(1.0),
-        }
+        let pace = (so_far + prior) / (self.done_s + prior);
+        let left = (self.expected_s - self.done_s).max(0.005 * self.expected_s);
+        (pace * left).max(1.0)
     }
 }
 
@@ -244,15 +134,6 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// Sets what the open units of a run are expected to take.
-pub(super) fn expect(session: &mut Session) {
-    let (experiment, plan) = (session.experiment, session.plan);
-    let estimate = Estimate::new(experiment, plan, &session.units, session.registries);
-    session.weights = Weights::new(experiment, plan, &session.units, &estimate);
-    let seconds = session.weights.of(session.open_units(), experiment, plan);
-    session.progress.expect(seconds);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -269,11 +150,15 @@ mod tests {
 
     #[test]
     fn what_is_left_follows_the_time_so_far_and_is_never_nothing() {
-        // Half of it took 50 s: about as long again.
-        assert!((shared(10.0, 5.0, 50).left_s() - 50.0).abs() < 0.5);
+        // Half of it took 50 s: nearly as long again.
+        let left = shared(10.0, 5.0, 50).left_s();
+        assert!((40.0..50.0).contains(&left), "{left}");
         // Before anything is known, what was expected; a first step that hangs makes it longer.
         assert!((shared(60.0, 0.0, 0).left_s() - 60.0).abs() < 0.5);
         assert!(shared(60.0, 0.0, 300).left_s() >= 299.0);
+        // The first steps took three times as long as expected: that says little of the whole.
+        let left = shared(300.0, 6.0, 18).left_s();
+        assert!((300.0..420.0).contains(&left), "{left}");
         // Everything is done as expected, and yet the run goes on.
         for so_far in [1, 60, 600] {
             let left = shared(10.0, 10.0, so_far).left_s();

@@ -169,8 +169,10 @@ fn rendered(
     // Whatever structure the rays go through, the image is the same to the bit; the kernels are the program's, whose bytes are part of the
     // place.
     let hash = reference_hash(session, world, &Line::new(key, Ran::default(), ()), &points);
+    let expected_s = session.cost.reference_part(&cell).seconds();
+    let each = (spp, &seeds[..], &*hash, expected_s);
     Ok(Rendered {
-        parts: parts(session, world, &renderer, (spp, &seeds, &hash), wanted)?,
+        parts: parts(session, world, &renderer, each, wanted)?,
         spp,
         sampler,
         kernel: renderer.kernel_hash(),
@@ -190,7 +192,7 @@ fn parts(
     session: &mut Session,
     world: &World,
     renderer: &Renderer,
-    (spp, seeds, hash): (u32, &[u32], &str),
+    (spp, seeds, hash, expected_s): (u32, &[u32], &str, f64),
     wanted: impl Iterator<Item = usize>,
 ) -> Result<Vec<Part>, Fault> {
     let size = session.experiment.resolution;
@@ -215,7 +217,7 @@ fn parts(
             session.warn("reference", format!("is not kept for later runs: {error}"))?;
         }
         parts.push(Part { image, cached });
-        session.progress.add(session.weights.reference_part);
+        session.progress.add(expected_s);
     }
     Ok(parts)
 }
@@ -243,9 +245,10 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
 fn file_reference(session: &mut Session, world: &World, cell: &Cell) -> Result<Yardstick, Fault> {
     let file = session.reference_file.as_ref();
     let file = file.ok_or_else(|| "no reference was read".to_owned())?;
+    let part = session.cost.reference_part(cell);
     session
         .progress
-        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
+        .add(f64::from(REFERENCE_PARTS) * part.seconds());
     let reference = file.reference.clone();
     let record = ReferenceRecord {
         file: Some(file.name.clone()),
@@ -271,9 +274,10 @@ fn exact_reference(
     let reference = Image::new(width, height, pixels)
         .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
         .map_err(|e| e.to_string())?;
+    let part = session.cost.reference_part(cell);
     session
         .progress
-        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
+        .add(f64::from(REFERENCE_PARTS) * part.seconds());
     let record = ReferenceRecord {
         exact: Some(value),
         ..reference_record(&reference)

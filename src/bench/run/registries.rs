@@ -1,5 +1,6 @@
 //! All registries together.
 
+use super::measurement::MeasurementRegistry;
 use crate::compaction::benches;
 use crate::figure_registry::FigureRegistry;
 use crate::peers::PeerRegistry;
@@ -38,7 +39,9 @@ pub struct Registries {
     pub workgroups: WorkgroupRegistry,
     /// Compactions of streams.
     pub compactions: CompactionRegistry,
-    /// Figures beside those of the crate.
+    /// What is measured.
+    pub measurements: MeasurementRegistry,
+    /// Figures of structures beside those of the crate.
     pub figures: FigureRegistry,
 }
 

@@ -1,7 +1,7 @@
 //! What an earlier run left in the folder of a run that is resumed: which cells still hold, and their lines.
 
+use super::Unit;
 use super::inputs::Current;
-use raystone_config::Unit;
 use raystone_record::{Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome};
 use raystone_scene::LEAST_BINDING;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -140,9 +140,9 @@ fn once<'a>(lines: impl Iterator<Item = &'a Line>) -> Vec<Line> {
 mod tests {
     use super::super::inputs::kernel_set;
     use super::super::kernels::Kernels;
-    use super::super::{Estimate, Registries};
+    use super::super::{Cost, Registries, shards};
     use super::*;
-    use raystone_config::{Experiment, Plan, shards};
+    use raystone_config::{Experiment, Plan};
     use raystone_record::{RECORDS_FILE, SkippedRecord, read_records, text_of};
     use std::time::Instant;
 
@@ -175,10 +175,10 @@ mod tests {
     fn a_plan_of_many_cells_is_made_and_divided_quickly() {
         let start = Instant::now();
         let (experiment, plan) = large(100_000);
-        let units = plan.units(&experiment);
         let registries = Registries::default();
-        let estimate = Estimate::new(&experiment, &plan, &units, &registries);
-        let numbers = shards(&units, 64, |unit| estimate.seconds_of(unit));
+        let units = registries.measurements.units(&experiment, &plan);
+        let cost = Cost::new(&experiment, &plan, &registries);
+        let numbers = shards(&units, 64, |unit| cost.seconds_of(unit));
         let seconds = start.elapsed().as_secs_f64();
         assert!(units.len() >= 100_000 && numbers.len() == units.len());
         // Two seconds are the bound for a program as released on a machine of its own.
@@ -192,10 +192,10 @@ mod tests {
     #[test]
     fn a_finished_run_of_many_cells_is_looked_through_quickly() {
         let (experiment, plan) = large(10_000);
-        let units = plan.units(&experiment);
         let registries = Registries::default();
+        let units = registries.measurements.units(&experiment, &plan);
         let kernels = Kernels::load(&plan.kernels, &registries).expect("kernels");
-        let mut current = Current::new(&experiment, "", &kernels);
+        let mut current = Current::new(&experiment, "", &registries, &kernels);
         let scene = ("cornell-box".to_owned(), Ok("0123".to_owned()));
         current.scenes.insert(scene.0, scene.1);
         let library = raystone_gpu::KernelLibrary::default();

@@ -1,15 +1,14 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
-use super::estimate::Estimate;
 use super::folder::Folder;
 use super::inputs::{Current, kernel_set, place};
 use super::kernels::{Device, Kernels};
-use super::progress::{Progress, Weights, expect};
+use super::progress::Progress;
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
-use super::{RunError, RunOptions};
+use super::{Cost, Measurement, RunError, RunOptions, Unit, shards};
 use crate::environment::{capture, machine_load};
-use raystone_config::{Axis, Cell, Experiment, Plan, Skipped, Unit, UnitKind, shards, unit_name};
+use raystone_config::{Axis, Cell, Experiment, Plan, Skipped};
 use raystone_core::params::Variant;
 use raystone_core::text::cell_hash;
 use raystone_gpu::Gpu;
@@ -63,7 +62,7 @@ pub(super) struct Session<'a> {
     pub clock: Clock,
     pub progress: Progress,
     /// Expected times of its steps.
-    pub weights: Weights,
+    pub cost: Cost<'a>,
     pub failed: usize,
     pub skipped: usize,
     /// Whether a scene could not be loaded.
@@ -165,7 +164,8 @@ impl<'a> Session<'a> {
         }
         self.current = Some(current);
         self.take_over(kept)?;
-        expect(self);
+        let open = self.cost.whole(self.open_units());
+        self.progress.expect(open.seconds());
         self.write_start(environment, kernels.folders())?;
         Ok(count)
     }
@@ -233,8 +233,7 @@ impl<'a> Session<'a> {
             return;
         };
         let units = Arc::clone(&self.units);
-        let estimate = Estimate::new(self.experiment, self.plan, &units, self.registries);
-        let numbers = shards(&units, shard.of, |unit| estimate.seconds_of(unit));
+        let numbers = shards(&units, shard.of, |unit| self.cost.seconds_of(unit));
         for (unit, number) in units.iter().zip(numbers) {
             if number != shard.number {
                 self.done.insert(unit.name.clone());
@@ -248,8 +247,8 @@ impl<'a> Session<'a> {
     }
 
     /// Whether a unit of the plan is not measured yet.
-    pub(super) fn is_open(&self, kind: UnitKind, cell: &Cell) -> bool {
-        !self.is_done(&unit_name(kind, cell))
+    pub(super) fn is_open(&self, measurement: &dyn Measurement, cell: &Cell) -> bool {
+        !self.is_done(&measurement.unit_name(cell))
     }
 
     /// Whether a unit failed, or cannot be measured here.
@@ -335,7 +334,7 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Self {
-        let units = plan.units(experiment);
+        let units = registries.measurements.units(experiment, plan);
         let places = units.iter().enumerate();
         let places = places.map(|(place, unit)| (unit.name.clone(), place));
         Self {
@@ -353,7 +352,7 @@ impl<'a> Session<'a> {
             options,
             clock: Clock::new(),
             progress: Progress::new(options),
-            weights: Weights::default(),
+            cost: Cost::new(experiment, plan, registries),
             failed: 0,
             skipped: 0,
             bad_input: false,
@@ -428,7 +427,14 @@ impl<'a> Session<'a> {
             overrides: self.experiment.overrides.clone(),
             only: self.plan.only.clone(),
             shard: self.options.shard.map(|shard| shard.to_string()),
-            figures: self.registries.figures.rows().cloned().collect(),
+            figures: {
+                let of_measurements = self.registries.measurements.figures();
+                let of_structures = self.registries.figures.rows();
+                of_structures
+                    .cloned()
+                    .chain(of_measurements.cloned())
+                    .collect()
+            },
             lenient: self.options.lenient,
             compilations: self.options.compilations.max(1),
         };

@@ -1,14 +1,15 @@
 //! Figures of the words that samplers draw, dumped from a kernel that imports the renderer's modules
 //! ([`crate::words`]) and equal to the twin's, and what drawing costs.
 
-use super::RunError;
 use super::kernels::Device;
+use super::measurement::Measurement;
 use super::session::{Session, content_hash};
+use super::{Cost, RunError, Work};
 use crate::sampler_cost::sampler_cost;
 use crate::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
 use crate::words::{compare, dump_stream, kernel_hash};
 use rayon::prelude::*;
-use raystone_config::{Axis, Cell, is_compaction};
+use raystone_config::{Axis, Cell, Experiment, Plan, is_compaction};
 use raystone_discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use raystone_gpu::Gpu;
 use raystone_record::{
@@ -38,6 +39,48 @@ const RECORDED_PIXELS: u32 = 8;
 const SPECTRUM_POINTS: u32 = 1024;
 const FREQUENCIES: usize = 64;
 const SPECTRUM_SECONDS: f64 = 10.0;
+
+/// Seconds to measure a stream.
+const STREAM_SECONDS: f64 = 0.6;
+
+/// Words of samplers, and what drawing them costs.
+pub(super) struct Streams;
+
+impl Measurement for Streams {
+    fn name(&self) -> &'static str {
+        "stream"
+    }
+
+    fn plural(&self) -> &'static str {
+        "streams of samplers"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.streams.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        (self.name(), cell.clone())
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        let e = experiment;
+        // The worst pair of dimensions is looked for among those of all integrators.
+        let drawn = e.axes[Axis::Integrator]
+            .iter()
+            .filter(|i| !is_compaction(i));
+        let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
+        format!("{:?}", (e.seed, e.resolution, &e.discrepancy, drawn))
+    }
+
+    fn cost(&self, _: &Cell, _: &Cost) -> Work {
+        Work::other(STREAM_SECONDS)
+    }
+}
 
 /// A pair of dimensions to be measured.
 #[derive(Clone, Copy)]
@@ -86,7 +129,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
             None => (Outcome::Done, ""),
         };
         session.close(&cell.to_string(), ended, written.hashes, &[])?;
-        session.progress.add(session.weights.stream);
+        session.progress.add(STREAM_SECONDS);
         if gpu.lost().is_some() {
             return Ok(());
         }

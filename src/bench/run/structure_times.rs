@@ -3,7 +3,7 @@
 use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
-use super::{Fault, RunError, peers};
+use super::{Fault, RunError, Work, peers};
 use crate::timing::{
     Measured, Samples, Watch, empty_ms, interleave, millions_per_second, without_overhead,
 };
@@ -94,11 +94,12 @@ pub(super) fn time_all(
     session.note_kernels("peers");
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let (progress, weight) = (session.progress.clone(), session.weights.rays);
+    let turns = session.cost.timed(Work::rays(timing.rays));
+    let (progress, step_s) = (session.progress.clone(), session.cost.step_s(turns));
     let ours = timed.iter().map(|item| item as &dyn Measured);
     let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
     let mut samples = match session.clock.time("gpu", || {
-        interleave(&all, &timing, seed, || progress.add(weight))
+        interleave(&all, &timing, seed, || progress.add(step_s))
     }) {
         Ok(samples) => samples,
         Err((index, error)) => {

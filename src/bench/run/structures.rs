@@ -1,18 +1,58 @@
 //! Structures: build, validate, gate; what passes is timed, counted and drawn.
 
-use super::RunError;
+use super::measurement::Measurement;
 use super::session::{Session, content_hash};
 use super::structure_times::{draw_heat_maps, time_all};
 use super::world::World;
+use super::{Cost, RunError, Unit, Work, errors, peers};
 use crate::memory::peak_bytes;
 use raystone_accel::tracer::kernel_hash;
 use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
-use raystone_config::{Axis, Cell, Unit, UnitKind};
+use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Outcome, Ran, StructureRecord};
 use raystone_verify::gate::gate;
 use std::time::Instant;
+
+/// Build, gate and speed of structures.
+pub(super) struct Structures;
+
+impl Measurement for Structures {
+    fn name(&self) -> &'static str {
+        "structure"
+    }
+
+    fn plural(&self) -> &'static str {
+        "structures"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.structures.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        let e = experiment;
+        format!(
+            "{:?}",
+            (image_settings(e), &e.gate, &e.timing, &e.coherence)
+        )
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        cost.gate(cell) + cost.timed(Work::rays(cost.experiment.timing.rays)) * cost.ray_classes()
+    }
+}
+
+/// The settings that an image depends on, in all measurements that render or record rays.
+pub(super) fn image_settings(experiment: &Experiment) -> impl std::fmt::Debug + use<> {
+    let e = experiment;
+    (e.seed, e.camera, e.resolution, e.runtime_checks)
+}
 
 /// A structure that passed its gate.
 pub(super) struct Gated {
@@ -259,14 +299,16 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
             None if session.is_done(&name) => {}
             None => write_failed(session, world, &cell, outcome.record)?,
         }
-        session.progress.add(session.weights.gate);
+        session
+            .progress
+            .add(session.cost.gate(&world.cell).seconds());
         if world.gpu.lost().is_some() {
             return Ok(Vec::new());
         }
     }
     drop(last);
     // Those whose record is there serve others, and are not timed again.
-    let is_open = |g: &Gated| session.is_open(UnitKind::Structure, &g.cell);
+    let is_open = |g: &Gated| session.is_open(&Structures, &g.cell);
     let (open, mut usable): (Vec<_>, Vec<_>) = gated.into_iter().partition(is_open);
     let timed = time_all(session, world, open)?;
     let mut timed = draw_heat_maps(session, world, timed)?;
@@ -291,11 +333,9 @@ fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
     let mut open = session
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    open.any(|unit| match unit.kind {
-        UnitKind::Structure | UnitKind::Animation => unit.cell == *cell,
-        UnitKind::Time | UnitKind::Coherence => unit.cell.is_on(cell),
-        _ => false,
-    })
+    // Samplers are rendered through any structure, peers through none.
+    let apart = [errors::NAME, peers::NAME];
+    open.any(|unit| !apart.contains(&unit.kind()) && unit.cell.is_on(cell))
 }
 
 /// Whether a sampler that is not measured yet has nothing else to be rendered through. Hits are equal to the bit in
@@ -306,8 +346,7 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
     let mut open = session
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    let needs =
-        |unit: &Unit| unit.kind == UnitKind::Sampler && unit.cell[Axis::Kernels] == *kernels;
+    let needs = |unit: &Unit| unit.kind() == errors::NAME && unit.cell[Axis::Kernels] == *kernels;
     !gated.iter().any(serves) && open.any(needs)
 }
 

@@ -3,14 +3,15 @@
 
 use super::errors::image_hash;
 use super::images::{self, Estimator};
+use super::measurement::Measurement;
 use super::paths;
 use super::session::{Session, content_hash};
-use super::structures::Gated;
+use super::structures::{Gated, image_settings};
 use super::world::World;
-use super::{Fault, RunError};
+use super::{Cost, Fault, RunError, Work};
 use crate::timing::{Measured, Samples, Watch, interleave};
 use raystone_accel::Space;
-use raystone_config::{Axis, Cell};
+use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_core::text::cell_hash;
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use raystone_record::{Body, Key, Line, Outcome, Ran, TimeRecord};
@@ -18,6 +19,49 @@ use raystone_render::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use raystone_stats::statistics::{median, median_interval};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+
+/// Times of full cells.
+pub(super) struct Times;
+
+impl Measurement for Times {
+    fn name(&self) -> &'static str {
+        "time"
+    }
+
+    fn plural(&self) -> &'static str {
+        "times of full cells"
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        plan.times.clone()
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
+        let mut axes = Cell::SAMPLER.to_vec();
+        axes.retain(|axis| *axis != Axis::Kernels);
+        (self.name(), cell.on(&axes))
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!(
+            "{:?}",
+            (
+                image_settings(experiment),
+                &experiment.timing,
+                &experiment.spp
+            )
+        )
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let image = cost.image(&cell[Axis::Integrator], cost.experiment.timing.spp);
+        Work::kernels(1) + cost.timed(image)
+    }
+}
 
 /// A full cell, compiled.
 struct Timed<'a> {
@@ -82,9 +126,16 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let (progress, weight) = (session.progress.clone(), session.weights.image);
+    let cost = &session.cost;
+    let image = |item: &Timed| cost.image(&item.cell[Axis::Integrator], timing.spp);
+    let steps: f64 = timed
+        .iter()
+        .map(|item| cost.step_s(cost.timed(image(item))))
+        .sum();
+    let step_s = steps / timed.len().max(1) as f64;
+    let progress = session.progress.clone();
     let samples = session.clock.time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.add(weight))
+        interleave(&timed, &timing, seed, || progress.add(step_s))
     });
     let samples = match samples {
         Ok(samples) => samples,
@@ -146,7 +197,7 @@ fn prepare<'a>(
         }
     }
     let compiled = compile(session, world, structure, cell.clone());
-    session.progress.add(session.weights.compile);
+    session.progress.add(Work::kernels(1).seconds());
     match compiled {
         Ok(item) => Ok(Some(item)),
         Err(reason) => fail(session, &cell, reason).map(|()| None),

@@ -42,21 +42,21 @@ impl std::ops::Deref for World<'_> {
 }
 
 /// Why there is no world.
-pub(super) enum Absent {
+pub(super) enum NoWorld {
     /// The scene is at fault.
     BadInput(String),
     /// The adapter does not keep what the experiment asks for: its cells are left out.
     NotKept(String),
 }
 
-impl From<Absent> for RunError {
-    fn from(absent: Absent) -> Self {
-        let (Absent::BadInput(reason) | Absent::NotKept(reason)) = absent;
+impl From<NoWorld> for RunError {
+    fn from(absent: NoWorld) -> Self {
+        let (NoWorld::BadInput(reason) | NoWorld::NotKept(reason)) = absent;
         Self::Input(reason)
     }
 }
 
-impl From<String> for Absent {
+impl From<String> for NoWorld {
     fn from(reason: String) -> Self {
         Self::BadInput(reason)
     }
@@ -116,7 +116,7 @@ impl<'a> World<'a> {
         device: &'a Device,
         loaded: &Loaded,
         cell: &Cell,
-    ) -> Result<Self, Absent> {
+    ) -> Result<Self, NoWorld> {
         let gpu = &device.gpu;
         session.say(format!("{cell}: checking the judge"));
         let tests = session.registries.intersection(cell)?;
@@ -126,7 +126,7 @@ impl<'a> World<'a> {
                 .time("gate", || raystone_gpu::probe_arithmetic(gpu))
                 .map_err(|e| e.to_string())?,
         };
-        tests.kept_by(&probe).map_err(Absent::NotKept)?;
+        tests.kept_by(&probe).map_err(NoWorld::NotKept)?;
         let stage = session
             .clock
             .time("load", || Stage::new(gpu, Arc::clone(&loaded.scene), tests))

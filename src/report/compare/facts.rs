@@ -25,9 +25,9 @@ pub(super) fn facts(data: &RunData) -> Vec<Taken> {
         all.extend(peers.chain(moving).map(of_failure));
     }
     all.extend(
-        data.compactions
+        data.measured
             .iter()
-            .map(|c| of_failure((c.key, &c.failure))),
+            .map(|cell| of_failure((cell.key, &cell.failure))),
     );
     all.extend(data.paths.iter().map(|p| {
         let text = p.fault.as_deref().unwrap_or(p.verdict().word());

@@ -7,7 +7,7 @@ use crate::data::{RunData, SceneGroup, View};
 use crate::samplers::{FURTHER_METRICS, MeasuredSampler, Metric};
 use crate::values::{Reading, Value, values};
 use crate::{failed_checks, format};
-use raystone_record::figure::{Figure, Spread};
+use raystone_record::figure::{Better, Figure, Spread};
 use raystone_record::*;
 use raystone_stats::statistics::{log_log_fit, mean};
 use std::collections::{BTreeMap, BTreeSet};
@@ -183,6 +183,9 @@ fn repeats(lines: &[Line]) -> bool {
         let number = match &line.body {
             Body::Error(record) => record.replicate,
             Body::Stream(record) => record.dimensions[0] << 16 | record.dimensions[1],
+            Body::Measured(record) => {
+                return seen.insert((line.key.to_string(), record.measurement.clone(), 0));
+            }
             Body::Skipped(_) | Body::Failed(_) | Body::Warning(_) => return true,
             _ => 0,
         };
@@ -322,12 +325,11 @@ fn raw(data: &RunData) -> Raw {
             all.extend(view.samplers.iter().flat_map(|s| of_sampler(view, s)));
         }
     }
-    let compactions = data.compactions.iter();
-    all.extend(compactions.filter(|c| !c.ms.is_empty()).map(|c| {
-        let work = format!("{} elements of {} bytes", c.elements, c.bytes);
-        let times = times(&c.ms, &[]);
-        sample(c.key, "compaction-ns/v1", times, work, &c.ran.kernel_hash)
-    }));
+    all.extend(
+        data.measured
+            .iter()
+            .flat_map(|cell| of_readings(data, cell)),
+    );
     all.into_iter().map(|t| (t.identity(), t)).collect()
 }
 
@@ -341,6 +343,39 @@ fn sample(key: &Key, id: &str, evidence: Evidence, work: String, kernel: &str) -
         seed: None,
         kernel: kernel.to_owned(),
     }
+}
+
+/// Readings that were timed in rounds.
+fn of_readings(data: &RunData, cell: &Recorded<MeasuredRecord>) -> Vec<Taken> {
+    let of_one = |reading: &raystone_record::Reading| {
+        let Samples::Rounds {
+            adapter,
+            processors,
+            ..
+        } = &reading.samples
+        else {
+            return None;
+        };
+        let figure = data.figure(&reading.figure).into_owned();
+        // A rate is compared by the time that each round took.
+        let times = |values: &[f64]| match figure.better {
+            Better::Higher => values.iter().map(|rate| rate.recip()).collect(),
+            _ => values.to_vec(),
+        };
+        Some(Taken {
+            key: cell.key.clone().beside(&reading.at),
+            evidence: Evidence::Times {
+                adapter: times(adapter),
+                processors: times(processors),
+            },
+            figure,
+            shown: String::new(),
+            work: reading.work.clone(),
+            seed: None,
+            kernel: cell.ran.kernel_hash.clone(),
+        })
+    };
+    cell.readings.iter().filter_map(of_one).collect()
 }
 
 fn times(ms: &[f64], cpu_ms: &[f64]) -> Evidence {

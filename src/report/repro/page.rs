@@ -8,7 +8,7 @@ use crate::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::format;
 use raystone_config::expect::Expect;
 use raystone_record::Interval;
-use raystone_record::figure::{FIGURES, Figure};
+use raystone_record::figure::FIGURES;
 
 /// Tables that could not be run: name and reason.
 pub type Failures = [(String, String)];
@@ -329,7 +329,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
 fn how(expect: &Expect) -> String {
     use raystone_config::expect::Compare;
     let figure = FIGURES.iter().find(|figure| figure.id == expect.figure);
-    let with_unit = figure.map_or_else(|| expect.figure.clone(), Figure::heading);
+    let with_unit = figure.map_or_else(|| expect.figure.clone(), |figure| figure.heading());
     let title = figure.map_or(expect.figure.as_str(), |figure| &figure.title);
     match expect.compare {
         Compare::Shown => format!("{with_unit}: shown"),

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 /// test and box test, all structures in turns or all full cells or all compactions.
 #[derive(Debug, Clone, PartialEq)]
 struct Sitting {
-    kind: &'static str,
+    kind: String,
     world: [String; 3],
     began_unix_s: u64,
     device: String,
@@ -77,9 +77,9 @@ impl Rounds {
 
     fn add_times(&mut self, line: &Line, cell: &CellRecord) {
         let key = competitor(line);
-        let mut put = |key: &Key, figure: &str, kind, values: Vec<f64>| {
+        let mut put = |key: &Key, figure: &str, kind: &str, values: Vec<f64>| {
             let sitting = Sitting {
-                kind,
+                kind: kind.to_owned(),
                 world: world(key),
                 began_unix_s: cell.run_began_unix_s,
                 device: cell.inputs.device.clone(),
@@ -103,9 +103,17 @@ impl Rounds {
                 let rate = each(&record.ms, &|ms| rays as f64 / ms * 1e-3);
                 put(&key, "cell-mrays-per-s/v1", "full cells", rate);
             }
-            Body::Compaction(record) => {
-                let ns = each(&record.ms, &|ms| 1e6 * ms / f64::from(record.elements));
-                put(&key, "compaction-ns/v1", "compactions", ns);
+            Body::Measured(record) => {
+                let timed = line.readings.iter().filter(|r| !r.rounds().is_empty());
+                for reading in timed {
+                    let key = key.clone().beside(&reading.at);
+                    put(
+                        &key,
+                        &reading.figure,
+                        &record.measurement,
+                        reading.rounds().to_vec(),
+                    );
+                }
             }
             _ => {}
         }
@@ -114,7 +122,7 @@ impl Rounds {
     /// Predicted cycles. They are counted, and so the same in every run.
     fn put_groups(&mut self, key: &Key, figure: &str, parts: Vec<[f64; 2]>) {
         let sitting = Sitting {
-            kind: "groups of warps",
+            kind: "groups of warps".to_owned(),
             world: world(key),
             began_unix_s: 0,
             device: String::new(),

@@ -2,23 +2,28 @@
 
 use crate::data::RunData;
 use crate::document::*;
+use crate::format::ABSENT;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::values::Value;
+use crate::values::{Reading, Value, of_readings};
 use raystone_core::params::ParamValue;
-use raystone_record::{CompactionRecord, Interval, Key, Recorded, axis};
+use raystone_record::figure::COMPACTION_NS;
+use raystone_record::{Interval, Key, MeasuredRecord, Recorded, axis};
 use raystone_stats::growth::{Growth, growth};
 use raystone_stats::statistics::median_interval;
 use std::collections::BTreeSet;
 
-type Measured<'a> = Recorded<'a, CompactionRecord>;
+type Measured<'a> = Recorded<'a, MeasuredRecord>;
+
+/// Name of the measurement in records.
+pub(crate) const NAME: &str = "compaction";
 
 /// What tells compactions of a run apart.
 const ROW: [&str; 2] = [axis::INTEGRATOR, axis::KERNELS];
 /// Parameters of the stream.
 const STREAM: [&str; 3] = ["elements", "valid", "bytes"];
-/// What others are measured against: the method that the thesis proposes, with its own parameters.
-const YARDSTICK: &str = "compaction:roger";
+/// The baseline: the method that the thesis proposes, with its own parameters.
+const BASELINE: &str = "compaction:roger";
 /// A curve has so many points at least.
 const LEAST_POINTS: usize = 3;
 
@@ -30,7 +35,7 @@ const JUDGED: &str = "Each method first compacted its stream once and was judged
 
 /// The section; `None` when no compaction was measured.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
-    if data.compactions.is_empty() {
+    if data.measured_by(NAME).is_empty() {
         return None;
     }
     let mut section = Section::new("compaction", "Compaction of streams");
@@ -63,6 +68,21 @@ fn label_without(key: &Key, left_out: &[&str]) -> String {
     text
 }
 
+/// Nanoseconds per element, round by round; `None` for a cell that failed.
+fn time<'a>(cell: &Measured<'a>) -> Option<&'a raystone_record::Reading> {
+    let mut readings = cell.readings.iter();
+    readings.find(|reading| reading.figure == COMPACTION_NS.id)
+}
+
+/// A parameter of the stream or the method.
+fn parameter(key: &Key, name: &str) -> Option<f64> {
+    match key.get(axis::INTEGRATOR)?.params.0.get(name)? {
+        ParamValue::Integer(x) => Some(*x as f64),
+        ParamValue::Number(x) => Some(*x),
+        _ => None,
+    }
+}
+
 /// What is the same in all cells of a curve over a parameter.
 fn others(key: &Key, parameter: &str) -> (String, String) {
     let Some(variant) = key.get(axis::INTEGRATOR) else {
@@ -75,16 +95,17 @@ fn others(key: &Key, parameter: &str) -> (String, String) {
 }
 
 /// Cells that differ in one parameter alone, by growing values of it.
-fn over<'a, 'd>(data: &'d RunData<'a>, parameter: &str) -> Vec<Vec<(f64, &'d Measured<'a>)>> {
-    let mut groups: Vec<(_, Vec<(f64, &Measured)>)> = Vec::new();
-    for cell in data.compactions.iter().filter(|c| c.failure.is_none()) {
-        let variant = cell.key.get(axis::INTEGRATOR);
-        let x = match variant.and_then(|v| v.params.0.get(parameter)) {
-            Some(ParamValue::Integer(x)) => *x as f64,
-            Some(ParamValue::Number(x)) => *x,
-            _ => continue,
+fn over<'a>(data: &RunData<'a>, name: &str) -> Vec<Vec<(f64, Measured<'a>)>> {
+    let mut groups: Vec<(_, Vec<(f64, Measured)>)> = Vec::new();
+    for cell in data
+        .measured_by(NAME)
+        .into_iter()
+        .filter(|c| time(c).is_some())
+    {
+        let Some(x) = parameter(cell.key, name) else {
+            continue;
         };
-        let same = others(cell.key, parameter);
+        let same = others(cell.key, name);
         match groups.iter_mut().find(|(known, _)| *known == same) {
             Some((_, cells)) => cells.push((x, cell)),
             None => groups.push((same, vec![(x, cell)])),
@@ -100,7 +121,7 @@ fn over<'a, 'd>(data: &'d RunData<'a>, parameter: &str) -> Vec<Vec<(f64, &'d Mea
 
 /// A plot for each parameter that was varied.
 fn plots(data: &RunData) -> Vec<Option<Illustration>> {
-    let variants = data.compactions.iter();
+    let variants = data.measured_by(NAME).into_iter();
     let variants = variants.filter_map(|c| c.key.get(axis::INTEGRATOR));
     let own = variants.flat_map(|v| v.params.0.keys().map(String::as_str));
     let own: BTreeSet<&str> = own.filter(|name| !STREAM.contains(name)).collect();
@@ -110,12 +131,15 @@ fn plots(data: &RunData) -> Vec<Option<Illustration>> {
 
 fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
     let whole = parameter == "elements";
-    let curve = |cells: Vec<(f64, &Measured)>| {
+    let curve = |cells: Vec<(f64, Measured)>| {
         let (_, first) = cells.first()?;
-        let point = |(x, cell): &(f64, &Measured)| {
-            let y = match whole {
-                true => median_interval(&cell.ms)?,
-                false => cell.ns_per_element?,
+        let point = |(x, cell): &(f64, Measured)| {
+            let time = time(cell)?;
+            // The whole stream, in milliseconds.
+            let y = if whole {
+                time.value.scaled(x * 1e-6)
+            } else {
+                time.value
             };
             Some(CurvePoint::new(*x, &y))
         };
@@ -159,7 +183,7 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
 /// The same look for all variants of a method.
 fn look(data: &RunData, key: &Key) -> usize {
     let mut names: Vec<&str> = Vec::new();
-    for cell in &data.compactions {
+    for cell in data.measured_by(NAME) {
         let name = cell.key.name(axis::INTEGRATOR);
         if !names.contains(&name) {
             names.push(name);
@@ -170,55 +194,60 @@ fn look(data: &RunData, key: &Key) -> usize {
 }
 
 /// Every figure of compactions.
-pub(crate) fn values(data: &RunData) -> Vec<Value<'static>> {
-    let sound = data.compactions.iter().filter(|c| c.failure.is_none());
-    let mut values: Vec<Value> = sound.flat_map(|cell| of_cell(data, cell)).collect();
+pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
+    let cells = data.measured_by(NAME);
+    let mut values: Vec<Value> = cells
+        .iter()
+        .flat_map(|cell| of_readings(data, cell))
+        .collect();
+    values.extend(derived(data));
+    values
+}
+
+/// Figures that follow from several cells.
+pub(crate) fn derived(data: &RunData) -> Vec<Value<'static>> {
+    let mut values = Vec::new();
+    for cell in data.measured_by(NAME) {
+        let ratio = [("compaction-ratio/v1", over_baseline(data, &cell))];
+        values.extend(Value::known(cell.key, ratio));
+    }
     for (key, growth) in growths(data) {
-        values.push(Value::new(&key, "growth-linear/v1", growth.linear));
-        values.push(Value::new(
-            &key,
-            "growth-linearithmic/v1",
-            growth.linearithmic,
-        ));
-        values.push(Value::new(&key, "growth-difference/v1", growth.difference));
+        let figures = [
+            ("growth-linear/v1", Reading::from(growth.linear)),
+            ("growth-linearithmic/v1", growth.linearithmic.into()),
+            ("growth-difference/v1", growth.difference.into()),
+        ];
+        values.extend(figures.map(|(id, value)| Value::new(&key, id, value)));
     }
     values
 }
 
-fn of_cell(data: &RunData, cell: &Measured) -> Vec<Value<'static>> {
-    let known = [
-        ("compaction-ns/v1", cell.ns_per_element),
-        ("compaction-melements-per-s/v1", cell.melements_s),
-        ("compaction-gb-per-s/v1", cell.gb_s),
-        ("compaction-ratio/v1", yardstick(data, cell)),
-    ];
-    let counted = [
-        ("compaction-passes/v1", Some(f64::from(cell.passes))),
-        ("compaction-scratch/v1", Some(cell.scratch_bytes as f64)),
-    ];
-    let mut values = Value::known(cell.key, known);
-    values.extend(Value::known(cell.key, counted));
-    values
-}
-
-/// Time over that of the yardstick on the same stream, round by round.
-fn yardstick(data: &RunData, cell: &Measured) -> Option<Interval> {
-    let same_stream = |other: &&Measured| {
-        label_without(other.key, &STREAM) == YARDSTICK
-            && (other.elements, other.bytes) == (cell.elements, cell.bytes)
-            && other.valid == cell.valid
-            && other.failure.is_none()
+/// Time over that of the baseline on the same stream, round by round.
+fn over_baseline(data: &RunData, cell: &Measured) -> Option<Interval> {
+    let stream = |key: &Key| STREAM.map(|name| parameter(key, name));
+    let is_baseline = |other: &Measured| {
+        label_without(other.key, &STREAM) == BASELINE && stream(other.key) == stream(cell.key)
     };
-    let other = data.compactions.iter().find(same_stream)?;
-    let ratios = cell.ms.iter().zip(&other.ms).map(|(a, b)| a / b);
+    let baseline = data.measured_by(NAME).into_iter().find(is_baseline)?;
+    let (own, other) = (time(cell)?.rounds(), time(&baseline)?.rounds());
+    let ratios = own.iter().zip(other).map(|(a, b)| a / b);
     median_interval(&ratios.collect::<Vec<_>>())
 }
 
 /// How each method grows, where there are sizes enough.
 fn growths(data: &RunData) -> Vec<(Key, Growth)> {
-    let of = |cells: Vec<(f64, &Measured)>| {
-        let rounds = cells.iter().map(|(_, cell)| cell.ms.len()).min()?;
-        let round = |r: usize| cells.iter().map(|(n, cell)| (*n, cell.ms[r])).collect();
+    let of = |cells: Vec<(f64, Measured)>| {
+        let timed = cells
+            .iter()
+            .filter_map(|(n, cell)| Some((*n, time(cell)?.rounds())));
+        let timed: Vec<(f64, &[f64])> = timed.collect();
+        let rounds = timed.iter().map(|(_, rounds)| rounds.len()).min()?;
+        let round = |r: usize| {
+            timed
+                .iter()
+                .map(|(n, rounds)| (*n, n * rounds[r]))
+                .collect()
+        };
         let rounds: Vec<Vec<(f64, f64)>> = (0..rounds).map(round).collect();
         let key = cells.first()?.1.key;
         let label = label_without(key, &["elements"]);
@@ -256,17 +285,21 @@ pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
             None => TableCell::from("passed").toned(Tone::Good),
             Some(fault) => TableCell::with_detail("FAILED", fault.clone()).toned(Tone::Bad),
         };
+        let stream = |place: usize| {
+            let value = parameter(cell.key, STREAM[place]);
+            value.map_or_else(|| ABSENT.into(), |x| TableCell::from(x.to_string()))
+        };
         let cells = vec![
             label_without(cell.key, &STREAM).into(),
-            cell.elements.to_string().into(),
-            cell.valid.to_string().into(),
-            cell.bytes.to_string().into(),
+            stream(0),
+            stream(1),
+            stream(2),
             judged,
         ];
         (cell.key.clone(), cells)
     };
     let heads = ["method", "elements", "valid", "bytes", ":judge"];
-    Rows::new(&ROW, &heads, data.compactions.iter().map(row)).table(
+    Rows::new(&ROW, &heads, data.measured_by(NAME).iter().map(row)).table(
         values,
         "All compactions: median [95 % interval]. Least traffic: flags once, what stays once from and once to memory",
         &[

@@ -7,6 +7,7 @@ pub mod coherence;
 pub(crate) mod compactions;
 mod comparer;
 pub mod kernels;
+pub(crate) mod measured;
 mod orders;
 pub(crate) mod organisations;
 pub mod peers;
@@ -47,6 +48,7 @@ pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
     sections.extend(compactions::section(data));
+    sections.extend(measured::section(data));
     sections.extend(cells.section(data));
     sections.extend(run::sections(data));
     let mut document = Document {

@@ -1,6 +1,6 @@
 //! What was asked, who wins, what failed, whether to believe it.
 
-use super::{belief, rendering, run};
+use super::{belief, compactions, rendering, run};
 use crate::data::{Measured, RunData, SceneGroup, View, without_repeats};
 use crate::document::*;
 use crate::ruling::{Contender, Ruling, judge};
@@ -50,7 +50,7 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
         "Verdict on further pairs of dimensions",
         further,
     ));
-    let text = match (data.scenes.is_empty(), data.compactions.is_empty()) {
+    let text = match (data.scenes.is_empty(), data.measured.is_empty()) {
         (true, true) => "Nothing was measured.",
         (true, false) => {
             "No structure and no sampler was measured. How the methods of compaction compare stands in their own \
@@ -106,7 +106,7 @@ fn question(data: &RunData) -> String {
     parts.extend(of(&data.structures, "structure", "how fast is", fast));
     let exact = "errs least per sample and per second";
     parts.extend(of(&data.samplers, "sampler", "how exact is", exact));
-    let mut methods: Vec<String> = { data.compactions.iter() }
+    let mut methods: Vec<String> = { data.measured_by(compactions::NAME).into_iter() }
         .map(|c| c.key.name(axis::INTEGRATOR).to_owned())
         .collect();
     methods = without_repeats(methods);

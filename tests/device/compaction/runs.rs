@@ -1,7 +1,10 @@
 //! Compactions in a run like any other: records, figures, report.
 
 use crate::support::{plan, run};
-use raystone::measure::record::{Body, CompactionRecord, Line, axis};
+use raystone::measure::figure::{
+    COMPACTION_KEPT, COMPACTION_LEAST_BYTES, COMPACTION_NS, COMPACTION_PASSES, Figure,
+};
+use raystone::measure::record::{Interval, Line, MeasuredRecord, Recorded, all_of, axis};
 use raystone::run::Registries;
 use std::path::Path;
 
@@ -30,14 +33,20 @@ max_warmup_ms = 1
 "#;
 
 /// The compactions among some lines.
-fn compactions(lines: &[Line]) -> Vec<(&Line, &CompactionRecord)> {
-    let mut out = Vec::new();
-    for line in lines {
-        if let Body::Compaction(record) = &line.body {
-            out.push((line, record));
-        }
+fn compactions(lines: &[Line]) -> Vec<Recorded<'_, MeasuredRecord>> {
+    let measured = all_of::<MeasuredRecord>(lines);
+    measured
+        .filter(|cell| cell.measurement == "compaction")
+        .collect()
+}
+
+/// Elements and bytes of an element, as the label of a cell says.
+fn parameter(cell: &Recorded<MeasuredRecord>, name: &str) -> f64 {
+    let variant = cell.key.get(axis::INTEGRATOR).expect("a compaction");
+    match &variant.params.0[name] {
+        raystone::params::ParamValue::Integer(value) => *value as f64,
+        other => panic!("{name} is {other:?}"),
     }
-    out
 }
 
 #[test]
@@ -52,20 +61,29 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     assert_eq!(summary.failed, 0);
     let found = compactions(&lines);
     assert_eq!(found.len() + summary.skipped, plan.compactions.len());
-    for (line, record) in &found {
-        assert_eq!(record.failure, None, "{}", line.key);
-        assert_eq!(record.ms.len(), 6);
-        assert!(record.kept > 0 && record.kept < record.elements);
-        assert!(record.ns_per_element.is_some_and(|ns| ns.value > 0.0));
-        assert!(record.least_bytes == u64::from(4 * record.elements + 16 * record.kept));
+    let exact = |cell: &Recorded<MeasuredRecord>, figure: &Figure| {
+        let reading = cell.reading(&figure.id).expect("a reading");
+        assert_eq!(reading.value, Interval::exact(reading.value.value));
+        reading.value.value
+    };
+    for cell in &found {
+        assert_eq!(cell.failure, None, "{}", cell.key);
+        let elements = parameter(cell, "elements");
+        let time = cell.reading(&COMPACTION_NS.id).expect("a time");
+        assert!(time.value.value > 0.0 && time.rounds().len() == 6);
+        assert_eq!(time.work, format!("{elements} elements of 8 bytes"));
+        let kept = exact(cell, &COMPACTION_KEPT);
+        assert!(0.0 < kept && kept < elements);
+        assert_eq!(
+            exact(cell, &COMPACTION_LEAST_BYTES),
+            4.0 * elements + 16.0 * kept
+        );
     }
-    let horn = found.iter().find(|(line, _)| {
-        line.key
-            .label(axis::INTEGRATOR)
-            .contains("horn(elements=4096")
-    });
+    let horn = found
+        .iter()
+        .find(|cell| (cell.key.label(axis::INTEGRATOR)).contains("horn(elements=4096"));
     // Marks, 12 steps, the search.
-    assert_eq!(horn.expect("a cell").1.passes, 14);
+    assert_eq!(exact(horn.expect("a cell"), &COMPACTION_PASSES), 14.0);
     let page = std::fs::read_to_string(folder.path().join("summary.md")).expect("a summary");
     for text in [
         "Compaction of streams",
@@ -118,14 +136,11 @@ fn a_method_that_is_wrong_has_no_figure() {
     assert_eq!(summary.failed, 1);
     let found = compactions(&lines);
     assert_eq!(found.len(), 4);
-    for (line, record) in found {
-        let is_short = line.key.label(axis::KERNELS) == "short"
-            && line.key.name(axis::INTEGRATOR).ends_with("scatter");
-        assert_eq!(record.failure.is_some(), is_short, "{}", line.key);
-        assert_eq!(
-            record.ns_per_element.is_none() && record.ms.is_empty(),
-            is_short
-        );
+    for cell in found {
+        let is_short = cell.key.label(axis::KERNELS) == "short"
+            && cell.key.name(axis::INTEGRATOR).ends_with("scatter");
+        assert_eq!(cell.failure.is_some(), is_short, "{}", cell.key);
+        assert_eq!(cell.readings.is_empty(), is_short);
     }
 }
 
@@ -140,8 +155,8 @@ fn a_lost_device_costs_one_cell() {
     assert_eq!(summary.failed, 1);
     let found = compactions(&lines);
     assert_eq!(found.len(), 3);
-    for (line, record) in found {
-        let is_lost = line.key.label(axis::INTEGRATOR) == lost;
-        assert_eq!(record.failure.is_some(), is_lost, "{}", line.key);
+    for cell in found {
+        let is_lost = cell.key.label(axis::INTEGRATOR) == lost;
+        assert_eq!(cell.failure.is_some(), is_lost, "{}", cell.key);
     }
 }

@@ -1,0 +1,147 @@
+//! Measurements that are carried out cell by cell: what is done already is passed over, the rest is made ready and checked one by
+//! one, timed in the same rounds, and written.
+
+use super::RunError;
+use super::measurement::{Absent, At, Measurement, Prepared};
+use super::session::{Session, content_hash};
+use crate::timing::{Measured, Samples, interleave};
+use raystone_config::{Axis, Cell};
+use raystone_gpu::GpuError;
+use raystone_record::{Body, Key, Line, MeasuredRecord, Outcome, Ran, Reading};
+
+/// A cell that is ready.
+struct Ready<'a> {
+    cell: &'a Cell,
+    item: Box<dyn Prepared + 'a>,
+}
+
+/// The open cells of a measurement that lie on `world`, the scene and tests of [`At::stage`]; those without a scene where there
+/// is none. Ends early when the device is lost: what is left is measured on another one.
+pub(super) fn run(
+    session: &mut Session,
+    measurement: &'static dyn Measurement,
+    at: &At,
+    world: Option<&Cell>,
+) -> Result<(), RunError> {
+    let is_here = |cell: &Cell| match world {
+        Some(world) => cell.is_on(world),
+        None => cell.get(Axis::Scene).is_none(),
+    };
+    let mut cells = measurement.cells(session.experiment, session.plan);
+    cells.retain(|cell| is_here(cell) && !session.is_done(&measurement.unit_name(cell)));
+    let mut ready = Vec::new();
+    let mut preparation = measurement.prepare(at, &cells);
+    for cell in &cells {
+        session.go_on()?;
+        let name = measurement.unit_name(cell);
+        session.say(format!("{name}: preparing"));
+        session.lose_device_on_request(&at.device.gpu, &name);
+        let prepared = session.clock.time("gate", || preparation.next());
+        session.note_kernels(&name);
+        match prepared {
+            Some(Ok(item)) => ready.push(Ready { cell, item }),
+            Some(Err(Absent::Refused(reason))) => session.write_refused(name, reason)?,
+            Some(Err(Absent::Failed(reason))) => {
+                write(session, measurement, at, (cell, Err(reason)))?
+            }
+            None => {
+                let reason = "nothing was prepared of it".to_owned();
+                write(session, measurement, at, (cell, Err(reason)))?;
+            }
+        }
+        session.progress.add(step_s(session, measurement, cell));
+        if at.device.gpu.lost().is_some() {
+            return Ok(());
+        }
+    }
+    let samples = match time(session, measurement, &ready) {
+        Ok(samples) => samples,
+        Err((place, error)) => {
+            return write(
+                session,
+                measurement,
+                at,
+                (ready[place].cell, Err(error.to_string())),
+            );
+        }
+    };
+    for (Ready { cell, item }, samples) in ready.iter().zip(samples) {
+        let readings = samples.and_then(|samples| item.readings(samples));
+        write(session, measurement, at, (cell, readings))?;
+    }
+    Ok(())
+}
+
+/// Seconds of one of the steps of a cell: it is made ready, warmed up, and timed in each round.
+fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 {
+    let seconds = measurement.cost(cell, &session.cost).seconds();
+    if measurement.is_timed() {
+        seconds / f64::from(session.experiment.timing.rounds + 2)
+    } else {
+        seconds
+    }
+}
+
+/// Samples of each cell, or what went wrong; if the device is gone, the place of the cell that was being timed.
+fn time(
+    session: &mut Session,
+    measurement: &dyn Measurement,
+    ready: &[Ready],
+) -> Result<Vec<Result<Vec<Samples>, String>>, (usize, GpuError)> {
+    let of_cells: Vec<Vec<&dyn Measured>> = ready.iter().map(|one| one.item.timed()).collect();
+    let places = of_cells.iter().enumerate();
+    let places: Vec<usize> = places
+        .flat_map(|(place, own)| vec![place; own.len()])
+        .collect();
+    let all: Vec<&dyn Measured> = of_cells.iter().flatten().copied().collect();
+    let steps: f64 = ready
+        .iter()
+        .map(|one| step_s(session, measurement, one.cell))
+        .sum();
+    let step_s = steps / all.len().max(1) as f64;
+    session.say(format!("timing {}", measurement.plural()));
+    let timing = session.experiment.timing;
+    let seed = u64::from(session.experiment.seed);
+    let progress = session.progress.clone();
+    let samples = (session.clock).time("gpu", || {
+        interleave(&all, &timing, seed, || progress.add(step_s))
+    });
+    let samples = samples.map_err(|(index, error)| (places[index], error))?;
+    let mut samples = samples.into_iter();
+    let own = |own: Vec<&dyn Measured>| {
+        let own = samples.by_ref().take(own.len());
+        own.map(|one| one.map_err(|error| error.to_string()))
+            .collect()
+    };
+    Ok(of_cells.into_iter().map(own).collect())
+}
+
+fn write(
+    session: &mut Session,
+    measurement: &dyn Measurement,
+    at: &At,
+    (cell, readings): (&Cell, Result<Vec<Reading>, String>),
+) -> Result<(), RunError> {
+    let (readings, failure) = match readings {
+        Ok(readings) => (readings, None),
+        Err(reason) => (Vec::new(), Some(reason)),
+    };
+    session.failed += usize::from(failure.is_some());
+    let ran = Ran {
+        unchecked: at.stage.is_some() && !session.experiment.runtime_checks,
+        ..Ran::default()
+    };
+    let body = MeasuredRecord {
+        measurement: measurement.name().to_owned(),
+        failure: failure.clone(),
+    };
+    let line = Line::new(Key::from(cell), ran, Body::Measured(body)).with_readings(readings);
+    let scene = at.stage.map_or("", |stage| &stage.scene.hash);
+    let hash = content_hash(&line, scene, &[("what", measurement.name())]);
+    session.write(&line.hashed(&hash))?;
+    let ended = match &failure {
+        Some(reason) => (Outcome::Failed, reason.as_str()),
+        None => (Outcome::Done, ""),
+    };
+    session.close(&measurement.unit_name(cell), ended, vec![hash], &[])
+}

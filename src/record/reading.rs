@@ -1,0 +1,106 @@
+//! Readings: figures as the code that measures them writes them.
+
+use super::{Interval, Key};
+use crate::figure::Figure;
+use serde::{Deserialize, Serialize};
+
+/// A figure of something, with the samples that it was made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Reading {
+    /// [`Figure::id`].
+    pub figure: String,
+    /// What it is of beyond the key of its line, for instance a class of rays; empty if nothing.
+    #[serde(default, skip_serializing_if = "Key::is_empty")]
+    pub at: Key,
+    /// The value with its 95 % interval, which has no width where the figure is exact or was measured once.
+    pub value: Interval,
+    /// What it was made of.
+    #[serde(default, skip_serializing_if = "Samples::is_once")]
+    pub samples: Samples,
+    /// What must be equal for two readings to be of the same work, in words.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub work: String,
+}
+
+/// Samples of a reading, all in the unit of its figure.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Samples {
+    /// It was computed, counted, or measured once.
+    #[default]
+    Once,
+    /// One for each round, in the order of the rounds; all that was timed in the same rounds has as many.
+    Rounds {
+        /// By the clock of the adapter, or the wall clock where it has none.
+        adapter: Vec<f64>,
+        /// By the wall clock.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        wall: Vec<f64>,
+        /// In time of the processors, all threads of the process together; empty on adapters that work elsewhere.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        processors: Vec<f64>,
+    },
+}
+
+impl Samples {
+    fn is_once(&self) -> bool {
+        *self == Self::Once
+    }
+}
+
+impl Reading {
+    /// A value of which no more is known than its interval.
+    pub fn new(figure: &Figure, value: Interval) -> Self {
+        Self {
+            figure: figure.id.to_string(),
+            at: Key::default(),
+            value,
+            samples: Samples::Once,
+            work: String::new(),
+        }
+    }
+
+    /// A value that is exact or was measured once.
+    pub fn exact(figure: &Figure, value: f64) -> Self {
+        Self::new(figure, Interval::exact(value))
+    }
+
+    /// The same reading of a part of what its line is of.
+    #[must_use]
+    pub fn at(mut self, at: Key) -> Self {
+        self.at = at;
+        self
+    }
+
+    /// The same reading of this work.
+    #[must_use]
+    pub fn of_work(mut self, work: impl Into<String>) -> Self {
+        self.work = work.into();
+        self
+    }
+
+    /// The same reading with its samples.
+    #[must_use]
+    pub fn with_samples(mut self, samples: Samples) -> Self {
+        self.samples = samples;
+        self
+    }
+
+    /// The value in each round by the clock of the adapter; empty for what was not timed in rounds.
+    pub fn rounds(&self) -> &[f64] {
+        match &self.samples {
+            Samples::Rounds { adapter, .. } => adapter,
+            Samples::Once => &[],
+        }
+    }
+}
+
+/// What a measurement says of a cell beside its [readings](Reading).
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct MeasuredRecord {
+    /// Name of the measurement, for instance `compaction`.
+    pub measurement: String,
+    /// Why there are no readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
