@@ -6,7 +6,8 @@
 //! not a latency.
 
 use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
-use raystone_record::SamplerCostRecord;
+use raystone_record::Reading;
+use raystone_record::figure::{LOOP_NS, NS_PER_SAMPLE};
 use raystone_render::with_sampler;
 use raystone_sampling::Sampler;
 use raystone_stats::statistics::median_interval;
@@ -47,13 +48,14 @@ impl Loop<'_> {
     }
 }
 
-/// Measures what a sampler costs on this adapter; also returns the BLAKE3 of the kernel that draws. Samples are those that it was made for, from the
+/// Measures what a sampler costs on this adapter: nanoseconds of adapter time per two-dimensional sample, the empty loop taken off (near zero
+/// it may be negative), and those of the empty loop, medians of the rounds. Also returns the BLAKE3 of the kernel that draws. Samples are those that it was made for, from the
 /// first on; dimensions the first eight of them.
 ///
 /// # Errors
 /// The sampler was made for less than two dimensions, its kernel does not run, or its table is too
 /// large.
-pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<(SamplerCostRecord, String), GpuError> {
+pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], String), GpuError> {
     let pairs = (sampler.demand.dimensions / 2).min(MOST_PAIRS);
     if pairs == 0 {
         return Err(GpuError::Kernel(format!(
@@ -100,9 +102,9 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<(SamplerCostRecord, 
         median_interval(values)
             .ok_or_else(|| GpuError::Driver("a clock returned what is no time".to_owned()))
     };
-    let record = SamplerCostRecord {
-        ns_per_sample: interval(&drawn)?,
-        loop_ns_per_sample: interval(&looped)?,
-    };
-    Ok((record, gpu.pipeline(&drawing, true)?.kernel.hash()))
+    let readings = [
+        Reading::new(&NS_PER_SAMPLE, interval(&drawn)?),
+        Reading::new(&LOOP_NS, interval(&looped)?),
+    ];
+    Ok((readings, gpu.pipeline(&drawing, true)?.kernel.hash()))
 }

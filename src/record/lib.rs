@@ -190,8 +190,6 @@ pub enum Body {
     /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
     /// renderer's modules.
     Stream(StreamRecord),
-    /// What drawing from a sampler costs.
-    SamplerCost(SamplerCostRecord),
     /// A cell of a measurement whose figures are readings alone.
     Measured(MeasuredRecord),
     /// A cell that was not run, with the reason.
@@ -244,7 +242,6 @@ kinds! {
     Coherence: CoherenceRecord,
     Animation: AnimationRecord,
     Stream: StreamRecord,
-    SamplerCost: SamplerCostRecord,
     Measured: MeasuredRecord,
     Kernels: KernelSetRecord,
     Cell: CellRecord,

@@ -1,9 +1,9 @@
 //! Lines of versions before this one, as lines of this one.
 //!
-//! Bodies of `raystone/1` each held their own names of axes. In `raystone/2` compactions had a body of their own, whose figures
-//! are readings now.
+//! Bodies of `raystone/1` each held their own names of axes. In `raystone/2` compactions and the cost of
+//! samplers had bodies of their own, whose figures are readings now.
 
-use super::{Interval, Reading, SCHEMA, Samples, axis};
+use super::{Body, Interval, MeasuredRecord, Reading, SCHEMA, Samples, axis};
 use crate::figure::{self, Figure};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -39,13 +39,15 @@ pub(crate) fn renewed(line: Value) -> serde_json::Result<Value> {
         false => line,
     };
     line["schema"] = SCHEMA.into();
-    if line["body"]["kind"] == "compaction" {
-        let body = Compaction::deserialize(&line["body"])?;
-        let measured =
-            json!({ "kind": "measured", "measurement": "compaction", "failure": body.failure });
-        line["readings"] = serde_json::to_value(body.readings())?;
-        line["body"] = measured;
-    }
+    let body = &line["body"];
+    let found = match body["kind"].as_str() {
+        Some("compaction") => Compaction::deserialize(body)?.measured(),
+        Some("sampler-cost") => SamplerCost::deserialize(body)?.measured(),
+        _ => return Ok(line),
+    };
+    let (measured, readings) = found;
+    line["readings"] = serde_json::to_value(readings)?;
+    line["body"] = serde_json::to_value(Body::Measured(measured))?;
     Ok(line)
 }
 
@@ -67,6 +69,15 @@ struct Compaction {
 }
 
 impl Compaction {
+    fn measured(self) -> (MeasuredRecord, Vec<Reading>) {
+        let readings = self.readings();
+        let measured = MeasuredRecord {
+            measurement: "compaction".to_owned(),
+            failure: self.failure,
+        };
+        (measured, readings)
+    }
+
     fn readings(&self) -> Vec<Reading> {
         let Some(ns) = self.ns_per_element.filter(|_| self.failure.is_none()) else {
             return Vec::new();
@@ -100,6 +111,27 @@ impl Compaction {
         ];
         readings.extend(counted.map(|(figure, value)| Reading::exact(figure, value)));
         readings
+    }
+}
+
+/// What drawing from a sampler costs, as `raystone/2` wrote it.
+#[derive(Deserialize)]
+struct SamplerCost {
+    ns_per_sample: Interval,
+    loop_ns_per_sample: Interval,
+}
+
+impl SamplerCost {
+    fn measured(self) -> (MeasuredRecord, Vec<Reading>) {
+        let measured = MeasuredRecord {
+            measurement: "sampler-cost".to_owned(),
+            failure: None,
+        };
+        let readings = [
+            Reading::new(&figure::NS_PER_SAMPLE, self.ns_per_sample),
+            Reading::new(&figure::LOOP_NS, self.loop_ns_per_sample),
+        ];
+        (measured, readings.into())
     }
 }
 

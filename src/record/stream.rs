@@ -133,13 +133,3 @@ pub struct PixelsAtCount {
     /// Share of the cells of a grid of 4√N × 4√N that the points of 150 pixels fall into.
     pub coverage: f64,
 }
-
-/// What drawing from a sampler costs, see `sampler_cost`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct SamplerCostRecord {
-    /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
-    /// its 95 % interval. Near zero it may be negative.
-    pub ns_per_sample: Interval,
-    /// Nanoseconds of the empty loop that was taken off.
-    pub loop_ns_per_sample: Interval,
-}

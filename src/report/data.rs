@@ -27,8 +27,6 @@ pub struct RunData<'a> {
     pub streams: Vec<Recorded<'a, StreamRecord>>,
     /// Verdicts on integrators.
     pub paths: Vec<Recorded<'a, PathsRecord>>,
-    /// What drawing costs.
-    pub costs: Vec<Recorded<'a, SamplerCostRecord>>,
     /// Cells of measurements whose figures are readings alone.
     pub measured: Vec<Recorded<'a, MeasuredRecord>>,
     /// Cells left out.
@@ -169,9 +167,6 @@ impl<'a> RunData<'a> {
                 Body::Stream(record) => put(&mut data.streams, line.of(record), |a, b| {
                     a.key == b.key && a.dimensions == b.dimensions
                 }),
-                Body::SamplerCost(record) => {
-                    put(&mut data.costs, line.of(record), |a, b| a.key == b.key)
-                }
                 Body::Measured(record) => put(&mut data.measured, line.of(record), |a, b| {
                     a.key == b.key && a.measurement == b.measurement
                 }),

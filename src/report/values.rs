@@ -10,8 +10,8 @@ use super::sections::{
 use raystone_record::figure::{Figure, figure};
 use raystone_record::{
     BiasRecord, ClassCoherence, ClassTiming, CoherenceRecord, FigureAtCount, Interval, Key,
-    MeasuredRecord, OrderTime, PrimaryRecord, RayClass, Recorded, SamplerCostRecord,
-    SpectrumRecord, StreamRecord, StructureRecord, Tally, TimeRecord, axis,
+    MeasuredRecord, OrderTime, PrimaryRecord, RayClass, Recorded, SpectrumRecord, StreamRecord,
+    StructureRecord, Tally, TimeRecord, axis,
 };
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -141,7 +141,6 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
         values.extend(of_references(scene));
     }
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
-    values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
     values.extend(
         data.measured
             .iter()
@@ -471,14 +470,6 @@ pub(crate) fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> 
         values.push(Value::new(&key, "coverage/v1", pixels.coverage));
     }
     values
-}
-
-/// What drawing costs.
-pub(crate) fn of_cost(cost: &Recorded<SamplerCostRecord>) -> [Value<'static>; 2] {
-    [
-        Value::new(cost.key, "ns-per-sample/v1", cost.ns_per_sample),
-        Value::new(cost.key, "loop-ns/v1", cost.loop_ns_per_sample.value),
-    ]
 }
 
 /// The values as comma-separated text: one line for each key and figure, a column for each axis.

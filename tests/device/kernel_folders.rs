@@ -90,7 +90,7 @@ fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
         }
         assert_eq!(line.ran.kernel_hash.len() % 65, 64, "{line:?}");
         assert_eq!(line.hash.len(), 64, "{line:?}");
-        let is_traced = !matches!(line.body, Body::Stream(_) | Body::SamplerCost(_));
+        let is_traced = !matches!(line.body, Body::Stream(_) | Body::Measured(_));
         for (name, test) in [
             (axis::TRIANGLE, "watertight"),
             (axis::BOX_TEST, "padded-16"),

@@ -6,8 +6,8 @@ use raystone::config::{Axis, Experiment};
 use raystone::discrepancy::{Budget, Measure, PointSet, Value, measure};
 use raystone::integrator::integrand::Function;
 use raystone::measure::record::{
-    BiasRecord, ErrorRecord, Kind, Line, Recorded, ReferenceRecord, SamplerCostRecord,
-    SpectrumRecord, StreamRecord, all_of, axis,
+    BiasRecord, ErrorRecord, Kind, Line, MeasuredRecord, Recorded, ReferenceRecord, SpectrumRecord,
+    StreamRecord, all_of, axis,
 };
 use raystone::measure::spectrum::error_spectrum;
 use raystone::run::Registries;
@@ -185,8 +185,12 @@ fn streams_have_every_figure_and_jitter_lies_between_its_ends() {
             assert!(pixels.coverage > 0.9, "{angles:?}");
         }
     }
-    let costs = find::<SamplerCostRecord>();
+    let costs = find::<MeasuredRecord>();
     assert_eq!(costs.len(), 4);
+    for cost in costs {
+        assert_eq!(cost.measurement, "sampler-cost");
+        assert!(cost.reading("ns-per-sample/v1").is_some());
+    }
 }
 
 #[test]

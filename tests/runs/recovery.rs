@@ -71,7 +71,6 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Error(r) => (format!("replicate {} of {cell}", r.replicate), false),
         Body::Bias(_) => (format!("bias of {cell}"), false),
         Body::Spectrum(_) => (format!("spectrum of {cell}"), false),
-        Body::SamplerCost(_) => (format!("cost of {sampler}"), false),
         Body::Time(r) => (cell.to_string(), failed(&r.failure)),
         Body::Coherence(_) => (format!("coherence of {cell}"), false),
         Body::Animation(r) => (format!("animation of {cell}"), failed(&r.failure)),

@@ -77,7 +77,7 @@ pub(super) fn by_tile(
             image: image.clone(),
         };
         draw(session, cell, yardstick, &mut record, &snapshot)?;
-        session.write(&line(Body::Error(record)))?;
+        session.recorder.write(&line(Body::Error(record)))?;
         session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates { spp, images })

@@ -76,7 +76,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     }
     let mut parts = Vec::new();
     for structure in gated {
-        if session.is_done(&name(structure)) {
+        if session.ledger.is_done(&name(structure)) {
             continue;
         }
         match part(session, world, structure, animation) {
@@ -96,9 +96,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             }
         }
     }
-    session.note_kernels("animation");
+    session.recorder.note_kernels("animation");
     for part in parts {
-        session.failed += usize::from(part.record.failure.is_some());
+        session.ledger.failed += usize::from(part.record.failure.is_some());
         let failure = part.record.failure.clone();
         let name = name(part.gated);
         let ran = Ran {
@@ -108,7 +108,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         let line = Line::new(Key::from(&part.gated.cell), ran, part.record);
         let settings = format!("{animation:?}");
         let hash = content_hash(&line, &world.scene.hash, &[("animation", &settings)]);
-        session.write(&line.hashed(&hash).with_body(Body::Animation))?;
+        session
+            .recorder
+            .write(&line.hashed(&hash).with_body(Body::Animation))?;
         let ended = match &failure {
             Some(reason) => (Outcome::Failed, reason.as_str()),
             None => (Outcome::Done, ""),

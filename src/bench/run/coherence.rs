@@ -84,7 +84,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     };
     for structure in gated {
         let own = cells.iter().filter(|cell| cell.is_on(&structure.cell));
-        let own: Vec<&Cell> = own.filter(|cell| !session.is_done(&name(cell))).collect();
+        let own: Vec<&Cell> = own
+            .filter(|cell| !session.ledger.is_done(&name(cell)))
+            .collect();
         if own.is_empty() {
             continue;
         }
@@ -112,7 +114,9 @@ fn write(
     let line = Line::new(Key::from(cell), Ran::default(), record);
     let settings = format!("{:?}", line.body.settings);
     let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
-    session.write(&line.hashed(&hash).with_body(Body::Coherence))?;
+    session
+        .recorder
+        .write(&line.hashed(&hash).with_body(Body::Coherence))?;
     session.progress.add(MODEL_SECONDS);
     session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
 }

@@ -28,7 +28,7 @@ pub(super) fn run(
         None => cell.get(Axis::Scene).is_none(),
     };
     let mut cells = measurement.cells(session.experiment, session.plan);
-    cells.retain(|cell| is_here(cell) && !session.is_done(&measurement.unit_name(cell)));
+    cells.retain(|cell| is_here(cell) && !session.ledger.is_done(&measurement.unit_name(cell)));
     let mut ready = Vec::new();
     let mut preparation = measurement.prepare(at, &cells);
     for cell in &cells {
@@ -37,7 +37,7 @@ pub(super) fn run(
         session.say(format!("{name}: preparing"));
         session.lose_device_on_request(&at.device.gpu, &name);
         let prepared = session.clock.time("gate", || preparation.next());
-        session.note_kernels(&name);
+        session.recorder.note_kernels(&name);
         match prepared {
             Some(Ok(item)) => ready.push(Ready { cell, item }),
             Some(Err(Absent::Refused(reason))) => session.write_refused(name, reason)?,
@@ -126,7 +126,7 @@ fn write(
         Ok(readings) => (readings, None),
         Err(reason) => (Vec::new(), Some(reason)),
     };
-    session.failed += usize::from(failure.is_some());
+    session.ledger.failed += usize::from(failure.is_some());
     let ran = Ran {
         unchecked: at.stage.is_some() && !session.experiment.runtime_checks,
         ..Ran::default()
@@ -138,7 +138,7 @@ fn write(
     let line = Line::new(Key::from(cell), ran, Body::Measured(body)).with_readings(readings);
     let scene = at.stage.map_or("", |stage| &stage.scene.hash);
     let hash = content_hash(&line, scene, &[("what", measurement.name())]);
-    session.write(&line.hashed(&hash))?;
+    session.recorder.write(&line.hashed(&hash))?;
     let ended = match &failure {
         Some(reason) => (Outcome::Failed, reason.as_str()),
         None => (Outcome::Done, ""),

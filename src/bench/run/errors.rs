@@ -98,7 +98,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     for integrator in &session.experiment.axes[Axis::Integrator] {
         let wanted = world.cell.clone().with(Axis::Integrator, integrator);
         let cells = session.plan.samplers.iter();
-        let cells = cells.filter(|c| c.is_on(&wanted) && !session.is_done(&c.to_string()));
+        let cells = cells.filter(|c| c.is_on(&wanted) && !session.ledger.is_done(&c.to_string()));
         let cells: Vec<Cell> = cells.cloned().collect();
         if cells.is_empty() {
             continue;
@@ -265,10 +265,14 @@ fn sampler_error(
     let finals = replicates.images;
     write_spread(session, cell, spp, &finals)?;
     let bias = bias_record(session, cell, &finals, yardstick)?;
-    session.write(&line(Body::Bias(bias)))?;
+    session.recorder.write(&line(Body::Bias(bias)))?;
     let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
-    session.write(&line(Body::Spectrum(spectrum)))?;
-    let judged = session.judged_lines.get(&paths::key(world, cell)).cloned();
+    session.recorder.write(&line(Body::Spectrum(spectrum)))?;
+    let judged = session
+        .checked
+        .integrator_lines
+        .get(&paths::key(world, cell))
+        .cloned();
     let mut lines = vec![hash.clone(), yardstick.line.clone()];
     lines.extend(judged);
     let name = cell.to_string();
@@ -333,7 +337,7 @@ fn all_samples(
         let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
         draw(session, cell, yardstick, &mut record, last)?;
         check_finite(&record)?;
-        session.write(&line(Body::Error(record)))?;
+        session.recorder.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.add(replicate_s(session, cell));
     }
@@ -390,7 +394,7 @@ fn until_met(
     for (mut record, snapshot) in records.into_iter().zip(&last) {
         record.stop = Some(rule);
         draw(session, cell, yardstick, &mut record, snapshot)?;
-        session.write(&line(Body::Error(record)))?;
+        session.recorder.write(&line(Body::Error(record)))?;
         session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates {

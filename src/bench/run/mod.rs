@@ -16,6 +16,7 @@ mod inputs;
 mod inventory;
 mod kernels;
 mod known_images;
+mod ledger;
 mod measurement;
 mod merge;
 mod orders;
@@ -23,6 +24,7 @@ mod paths;
 mod peers;
 mod primary;
 mod progress;
+mod recorder;
 mod reference;
 mod reference_cache;
 mod reference_file;
@@ -239,14 +241,14 @@ pub fn run(
     let device = device.transpose()?;
     let mut session = Session::new(experiment, plan, registries, options)?;
     session.keep_shard();
-    let earlier = session.take_earlier();
+    let earlier = session.recorder.take_earlier();
     let file = session.reference_file.as_ref().map(|file| &*file.hash);
     let mut current = Current::new(experiment, file.unwrap_or_default(), registries, &kernels);
     if !earlier.is_empty() {
         current.scenes = scene_hashes(plan, options, earlier.table_bytes());
-        let kept = earlier.kept(&session.units, &current);
+        let kept = earlier.kept(&session.ledger.units, &current);
         if session.open_beside(&kept) == 0 {
-            session.abandon();
+            session.recorder.abandon();
             return Ok(RunSummary {
                 kept: kept.cells.len(),
                 out: options.out.clone(),
@@ -256,7 +258,7 @@ pub fn run(
     }
     let device = match device {
         Some(device) => device,
-        None => Device::open(options, &kernels).inspect_err(|_| session.abandon())?,
+        None => Device::open(options, &kernels).inspect_err(|_| session.recorder.abandon())?,
     };
     let kept = session.begin(&device, &kernels, (&earlier, current));
     let out = kept.and_then(|kept| Ok((kept, measure(&mut session, device, &kernels)?)));
@@ -268,9 +270,9 @@ pub fn run(
         _ => error,
     })?;
     Ok(RunSummary {
-        failed: session.failed,
-        skipped: session.skipped,
-        bad_input: session.bad_input,
+        failed: session.ledger.failed,
+        skipped: session.ledger.skipped,
+        bad_input: session.ledger.bad_input,
         kept,
         out,
     })
@@ -315,7 +317,7 @@ fn measure(
                 break;
             }
             device = Device::open(options, kernels)?;
-            session.use_device(&device.gpu);
+            session.recorder.use_device(&device.gpu);
         }
     }
     loop {
@@ -324,7 +326,7 @@ fn measure(
             break;
         }
         device = Device::open(options, kernels)?;
-        session.use_device(&device.gpu);
+        session.recorder.use_device(&device.gpu);
     }
     session.write_end()
 }
@@ -354,20 +356,25 @@ fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
     let failed = format!("scene {variant}: failed");
     let is_on = |unit: &Unit| unit.cell.get(Axis::Scene) == Some(variant);
-    if session.is_done(&failed) || !session.open_units().any(is_on) {
+    if session.ledger.is_done(&failed) || !session.ledger.open_units().any(is_on) {
         return Ok(());
     }
     let loaded = match Loaded::new(session, &device.gpu, variant) {
         Ok(loaded) => loaded,
         Err(fault) => {
-            session.bad_input = true;
+            session.ledger.bad_input = true;
             return session.fail_all(&failed, is_on, fault.of_cell()?);
         }
     };
     for cell in session.plan.worlds(variant) {
         // After a lost device worlds that are complete are not built again.
         let done = format!("world {cell}: done");
-        if session.is_done(&done) || !session.open_units().any(|unit| unit.cell.is_on(&cell)) {
+        if session.ledger.is_done(&done)
+            || !session
+                .ledger
+                .open_units()
+                .any(|unit| unit.cell.is_on(&cell))
+        {
             continue;
         }
         session.go_on()?;
@@ -375,7 +382,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
         if device.gpu.lost().is_some() {
             break;
         }
-        session.finish(done);
+        session.ledger.finish(done);
     }
     Ok(())
 }
@@ -387,17 +394,17 @@ fn run_world(
     cell: &Cell,
 ) -> Result<(), RunError> {
     let failed = format!("scene {cell}: failed");
-    if session.is_done(&failed) {
+    if session.ledger.is_done(&failed) {
         return Ok(());
     }
     let world = match World::new(session, device, loaded, cell) {
         Ok(world) => world,
         Err(NoWorld::BadInput(reason)) => {
-            session.bad_input = true;
+            session.ledger.bad_input = true;
             return session.fail_all(&failed, |unit| unit.cell.is_on(cell), reason);
         }
         Err(NoWorld::NotKept(reason)) => {
-            session.finish(failed);
+            session.ledger.finish(failed);
             return session.leave_out(cell, reason);
         }
     };
@@ -510,7 +517,7 @@ pub fn verify(
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
-    session.judges_trials = trials;
+    session.checked.on_all_trials = trials;
     let mut verified = Vec::new();
     for scene in &plan.scenes {
         let loaded = match Loaded::new(&mut session, &device.gpu, scene) {

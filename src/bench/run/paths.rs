@@ -63,7 +63,7 @@ pub(super) fn check(
     traced: &Traced,
     cell: &Cell,
 ) -> Result<(), Fault> {
-    let fault = match session.judged.get(&key(world, cell)) {
+    let fault = match session.checked.integrators.get(&key(world, cell)) {
         Some(known) => known.clone(),
         None => judge_and_record(session, world, traced, cell, RUN)?.fault,
     };
@@ -85,7 +85,7 @@ pub(super) fn verify(
     let reorganised = reorganised.filter(|cell| cell.is_unusual(Axis::Organisation));
     for cell in session.plan.samplers.iter().chain(reorganised) {
         let is_its = cell.is_on(&world.cell) && cell[Axis::Kernels] == structure[Axis::Kernels];
-        if is_its && !session.judged.contains_key(&key(world, cell)) {
+        if is_its && !session.checked.integrators.contains_key(&key(world, cell)) {
             let record = judge_and_record(session, world, traced, cell, VERIFY)?;
             judged.push((cell.clone(), record));
         }
@@ -114,7 +114,8 @@ fn judge_and_record(
         return Ok(record);
     }
     session
-        .judged
+        .checked
+        .integrators
         .insert(key(world, cell), record.fault.clone());
     if let Some(reason) = &record.not_judged {
         session.tell_warning(&format!("{cell}: paths are not judged: {reason}"));
@@ -122,8 +123,13 @@ fn judge_and_record(
     let blank = Line::new(Key::from(cell), ran, ());
     let hash = content_hash(&blank, &world.scene.hash, &[]);
     let paths = record.clone();
-    session.judged_lines.insert(key(world, cell), hash.clone());
-    session.write(&blank.hashed(&hash).with_body(|()| Body::Paths(paths)))?;
+    session
+        .checked
+        .integrator_lines
+        .insert(key(world, cell), hash.clone());
+    session
+        .recorder
+        .write(&blank.hashed(&hash).with_body(|()| Body::Paths(paths)))?;
     Ok(record)
 }
 
@@ -168,8 +174,8 @@ fn made(
     let (mut record, ran) = judged(session, &subject, &integrator, extent)?;
     let of = [Axis::Offset, Axis::Organisation, Axis::Kernels];
     let all = format!("trial scenes, {}, {}", cell.on(&of), integrator.kind.name());
-    let trials = match session.judges_trials {
-        true if session.judged.insert(all, None).is_none() => trial_scenes(),
+    let trials = match session.checked.on_all_trials {
+        true if session.checked.integrators.insert(all, None).is_none() => trial_scenes(),
         true => Ok(Vec::new()),
         false => trials_of(&world.scene, &integrator),
     };
@@ -221,7 +227,11 @@ fn of_trial(
         ..*subject
     };
     for integrator in integrators {
-        let extent = if session.judges_trials { TRIAL } else { RUN };
+        let extent = if session.checked.on_all_trials {
+            TRIAL
+        } else {
+            RUN
+        };
         let (mut record, _) = judged(session, &on_trial, integrator, extent)?;
         let told = |fault: String| format!("on the trial scene `{}`: {fault}", trial.scene.name);
         record.fault = record.fault.map(told);

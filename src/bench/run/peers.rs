@@ -79,7 +79,7 @@ impl Measured for Timed<'_> {
 pub(super) fn build<'a>(session: &mut Session, world: &'a World) -> Vec<Built<'a>> {
     let cells = session.plan.peers.iter().filter(|c| c.is_on(&world.cell));
     let mut cells: Vec<Cell> = cells.cloned().collect();
-    cells.retain(|cell| !session.is_done(&cell.to_string()));
+    cells.retain(|cell| !session.ledger.is_done(&cell.to_string()));
     let mut built = Vec::new();
     for cell in cells {
         session.say(format!("{cell}: build"));
@@ -189,7 +189,9 @@ pub(super) fn write(
         let line = Line::new(Key::from(&one.cell), Ran::default(), record);
         let hash = content_hash(&line, &world.scene.hash, &[]);
         let failure = line.body.failure.clone();
-        session.write(&line.hashed(&hash).with_body(Body::Peer))?;
+        session
+            .recorder
+            .write(&line.hashed(&hash).with_body(Body::Peer))?;
         let ended = match &failure {
             Some(reason) => (Outcome::Failed, reason.as_str()),
             None => (Outcome::Done, ""),

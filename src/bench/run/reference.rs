@@ -328,12 +328,14 @@ fn finish_reference(
     line.body.image = image.unwrap_or_default();
     let part_spp = line.body.spp / REFERENCE_PARTS;
     let done = format!("reference {}: done", labels.join(", "));
-    session.note_kernels(&done);
+    session.recorder.note_kernels(&done);
     let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
     let hash = reference_hash(session, world, &line, &sampler);
-    if !session.is_done(&done) {
-        session.write(&line.hashed(&hash).with_body(Body::Reference))?;
-        session.finish(done.clone());
+    if !session.ledger.is_done(&done) {
+        session
+            .recorder
+            .write(&line.hashed(&hash).with_body(Body::Reference))?;
+        session.ledger.finish(done.clone());
     }
     Ok(Yardstick {
         line: hash,

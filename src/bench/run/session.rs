@@ -1,24 +1,24 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
-use super::folder::Folder;
-use super::inputs::{Current, kernel_set, place};
+use super::inputs::{Current, place};
 use super::kernels::{Device, Kernels};
+use super::ledger::Ledger;
 use super::progress::Progress;
+use super::recorder::Recorder;
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
-use super::{Cost, Measurement, RunError, RunOptions, Unit, shards};
+use super::{Cost, RunError, RunOptions, Unit, shards};
 use crate::environment::{capture, machine_load};
-use raystone_config::{Axis, Cell, Experiment, Plan, Skipped};
-use raystone_core::params::Variant;
+use raystone_config::{Cell, Experiment, Plan, Skipped};
 use raystone_core::text::cell_hash;
 use raystone_gpu::Gpu;
 use raystone_image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
 use raystone_record::Environment;
 use raystone_record::{
-    Body, CellRecord, FinishedRecord, KernelFolder, Line, Outcome, RunRecord, SkippedRecord, axis,
-    text_of,
+    Body, CellRecord, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord,
+    SkippedRecord, axis,
 };
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
@@ -63,42 +63,29 @@ pub(super) struct Session<'a> {
     pub progress: Progress,
     /// Expected times of its steps.
     pub cost: Cost<'a>,
-    pub failed: usize,
-    pub skipped: usize,
-    /// Whether a scene could not be loaded.
-    pub bad_input: bool,
-    /// The gate's second scene.
-    pub trial: super::trial::Trial,
-    /// Cells that need longer loops than the driver runs, with the reason.
-    pub refused: BTreeMap<String, String>,
-    /// Cells that are not measured: they have their record (and are not run again after a lost device), or another shard has them.
-    done: HashSet<String>,
-    /// Units that failed in this run: nothing else is measured through them.
-    unusable: HashSet<String>,
-    /// The units of the plan, in its order.
-    pub units: Arc<Vec<Unit>>,
-    /// Place of each unit by its name.
-    places: HashMap<String, usize>,
-    /// What cells depend on.
-    pub current: Option<Current<'a>>,
-    /// Modules of kernels that were used for a unit, or for something that several share.
-    used: BTreeMap<String, BTreeMap<String, String>>,
-    /// Kernel sets that are recorded.
-    sets: HashSet<String>,
-    /// The device that kernels run on.
-    gpu: Option<Gpu>,
-    /// Hashes of the lines that judge an integrator.
-    pub judged_lines: BTreeMap<String, String>,
-    /// Samplers whose words were compared with the twin's.
-    pub compared: HashSet<String>,
+    /// What is left to be measured.
+    pub ledger: Ledger,
+    /// What is written.
+    pub recorder: Recorder<'a>,
+    /// What was checked once for several cells.
+    pub checked: Checked,
     /// What images are compared with, if it is not rendered.
     pub reference_file: Option<ReferenceFile>,
-    /// What is wrong with the integrators that were judged.
-    pub judged: BTreeMap<String, Option<String>>,
-    /// Whether they are judged on all trial scenes, and not on those alone that are of a scene.
-    pub judges_trials: bool,
-    /// `None`: nothing is written (gate alone, single images).
-    folder: Option<Arc<Folder>>,
+}
+
+/// What was checked once for several cells.
+#[derive(Default)]
+pub(super) struct Checked {
+    /// The gate's second scene.
+    pub trial: super::trial::Trial,
+    /// Hashes of the lines about integrators.
+    pub integrator_lines: BTreeMap<String, String>,
+    /// What is wrong with the integrators that were checked.
+    pub integrators: BTreeMap<String, Option<String>>,
+    /// Whether they are checked on all trial scenes, and not on those alone that are of a scene.
+    pub on_all_trials: bool,
+    /// Samplers whose words were compared with the twin's.
+    pub words: HashSet<String>,
 }
 
 impl<'a> Session<'a> {
@@ -110,39 +97,17 @@ impl<'a> Session<'a> {
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
         let reference_file = ReferenceFile::load(experiment)?;
-        let folder = Arc::new(Folder::open(&options.out, options.existing, options.wait)?);
-        options.interrupt.begin(&folder);
+        let recorder = Recorder::open(options)?;
         let mut session = Self::unrecorded(experiment, plan, registries, options);
-        session.folder = Some(folder);
+        session.recorder = recorder;
         session.reference_file = reference_file;
         Ok(session)
-    }
-
-    /// The lines of the run that is resumed.
-    pub(super) fn take_earlier(&self) -> Earlier {
-        let lines = self.folder.as_ref().map(|folder| folder.take_earlier());
-        Earlier::new(lines.unwrap_or_default())
-    }
-
-    /// Leaves the folder as it was.
-    pub(super) fn abandon(&self) {
-        if let Some(folder) = &self.folder {
-            folder.abandon();
-        }
-    }
-
-    /// The content of a scene that was loaded.
-    pub(super) fn note_scene(&mut self, scene: &Variant, hash: &str) {
-        if let Some(current) = &mut self.current {
-            let hash = Ok(hash.to_owned());
-            current.scenes.insert(scene.label.clone(), hash);
-        }
     }
 
     /// How many units are left to be measured beside those that are kept.
     pub(super) fn open_beside(&self, kept: &Kept) -> usize {
         let names: HashSet<&str> = kept.cells.iter().map(|cell| cell.unit.as_str()).collect();
-        let open = self.open_units();
+        let open = self.ledger.open_units();
         open.filter(|unit| !names.contains(unit.name.as_str()))
             .count()
     }
@@ -154,17 +119,17 @@ impl<'a> Session<'a> {
         kernels: &Kernels,
         (earlier, mut current): (&Earlier, Current<'a>),
     ) -> Result<usize, RunError> {
-        self.use_device(&device.gpu);
+        self.recorder.use_device(&device.gpu);
         let environment = capture(&device.gpu, &self.options.program);
         current.device = Some(place(&environment));
-        let kept = earlier.kept(&self.units, &current);
+        let kept = earlier.kept(&self.ledger.units, &current);
         let count = kept.cells.len();
         for (unit, why) in &kept.stale {
             self.tell_progress(&format!("{unit}: again, {why}"));
         }
-        self.current = Some(current);
+        self.recorder.current = Some(current);
         self.take_over(kept)?;
-        let open = self.cost.whole(self.open_units());
+        let open = self.cost.whole(self.ledger.open_units());
         self.progress.expect(open.seconds());
         self.write_start(environment, kernels.folders())?;
         Ok(count)
@@ -178,9 +143,7 @@ impl<'a> Session<'a> {
         reason: String,
     ) -> Result<(), RunError> {
         self.write_failure(about, reason.clone())?;
-        let open = self.open_units().filter(|unit| is_one(unit));
-        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
-        for name in names {
+        for name in self.ledger.open_names(is_one) {
             self.close(&name, (Outcome::Failed, &reason), Vec::new(), &[])?;
         }
         Ok(())
@@ -189,16 +152,15 @@ impl<'a> Session<'a> {
     /// Leaves out all units of a world that are not measured yet, for one reason, which is told once.
     pub(super) fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
         let skipped = self.plan.all_on(world, reason.clone());
-        self.skipped += skipped.cells;
+        self.ledger.skipped += skipped.cells;
         let hash = cell_hash(&[("left out", &skipped.cell), ("reason", &reason)]);
         let record = SkippedRecord {
             cell: skipped.cell,
             reason: skipped.reason,
         };
-        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
-        let open = self.open_units().filter(|unit| unit.cell.is_on(world));
-        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
-        for name in names {
+        self.recorder
+            .write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        for name in self.ledger.open_names(|unit| unit.cell.is_on(world)) {
             let lines = vec![hash.clone()];
             self.close(&name, (Outcome::LeftOut, &reason), lines, &[])?;
         }
@@ -207,22 +169,14 @@ impl<'a> Session<'a> {
 
     /// Takes over what still holds of an earlier run.
     fn take_over(&mut self, kept: Kept) -> Result<(), RunError> {
-        for line in &kept.lines {
-            if let Body::Kernels(set) = &line.body {
-                self.sets.insert(set.id.clone());
-            }
-        }
-        let text = text_of(&kept.lines).map_err(unwritable)?;
-        if let (Some(folder), false) = (&self.folder, text.is_empty()) {
-            folder.append(&text)?;
-        }
+        self.recorder.take_over(&kept.lines)?;
         for cell in kept.cells {
             if cell.outcome == Outcome::LeftOut {
-                self.skipped += 1;
-                self.refused.insert(cell.unit.clone(), cell.reason);
-                self.unusable.insert(cell.unit.clone());
+                self.ledger.skipped += 1;
+                self.ledger.refused.insert(cell.unit.clone(), cell.reason);
+                self.ledger.set_unusable(&cell.unit);
             }
-            self.done.insert(cell.unit);
+            self.ledger.finish(cell.unit);
         }
         Ok(())
     }
@@ -232,41 +186,12 @@ impl<'a> Session<'a> {
         let Some(shard) = self.options.shard else {
             return;
         };
-        let units = Arc::clone(&self.units);
+        let units = Arc::clone(&self.ledger.units);
         let numbers = shards(&units, shard.of, |unit| self.cost.seconds_of(unit));
         for (unit, number) in units.iter().zip(numbers) {
             if number != shard.number {
-                self.done.insert(unit.name.clone());
+                self.ledger.finish(unit.name.clone());
             }
-        }
-    }
-
-    /// The units that are not measured yet.
-    pub(super) fn open_units(&self) -> impl Iterator<Item = &Unit> {
-        self.units.iter().filter(|unit| !self.is_done(&unit.name))
-    }
-
-    /// Whether a unit of the plan is not measured yet.
-    pub(super) fn is_open(&self, measurement: &dyn Measurement, cell: &Cell) -> bool {
-        !self.is_done(&measurement.unit_name(cell))
-    }
-
-    /// Whether a unit failed, or cannot be measured here.
-    pub(super) fn is_unusable(&self, name: &str) -> bool {
-        self.unusable.contains(name)
-    }
-
-    /// Kernels run on this device from now on.
-    pub(super) fn use_device(&mut self, gpu: &Gpu) {
-        self.gpu = Some(gpu.clone());
-    }
-
-    /// Counts the kernels that were asked for since the last call as used for this: a unit, or something that several share.
-    pub(super) fn note_kernels(&mut self, used_for: &str) {
-        let modules = self.gpu.as_ref().map(Gpu::take_modules).unwrap_or_default();
-        if !modules.is_empty() {
-            let used = self.used.entry(used_for.to_owned()).or_default();
-            used.extend(modules);
         }
     }
 
@@ -278,49 +203,31 @@ impl<'a> Session<'a> {
         lines: Vec<String>,
         shared: &[&str],
     ) -> Result<(), RunError> {
-        self.note_kernels(name);
-        self.finish(name.to_owned());
+        self.recorder.note_kernels(name);
+        self.ledger.finish(name.to_owned());
         if outcome != Outcome::Done {
-            self.unusable.insert(name.to_owned());
+            self.ledger.set_unusable(name);
         }
-        let units = Arc::clone(&self.units);
-        let unit = self.places.get(name).and_then(|place| units.get(*place));
-        let (Some(unit), Some(current)) = (unit, &self.current) else {
+        let Some(unit) = self.ledger.unit(name) else {
             return Ok(());
         };
-        let mut inputs = current.inputs(unit);
-        let mut modules = self.used.remove(name).unwrap_or_default();
-        for other in shared.iter().filter_map(|name| self.used.get(*name)) {
-            modules.extend(other.clone());
-        }
-        if !modules.is_empty() {
-            let kernels = &unit.cell[Axis::Kernels];
-            let label = match kernels.name.is_empty() {
-                true => "",
-                false => &kernels.label,
-            };
-            let set = kernel_set(label, modules);
-            inputs.kernels.clone_from(&set.id);
-            if self.sets.insert(set.id.clone()) {
-                self.write(&Line::about_all(Body::Kernels(set)))?;
-            }
-        }
         let record = CellRecord {
             unit: name.to_owned(),
             outcome,
             reason: reason.to_owned(),
             run_began_unix_s: self.clock.began_unix_s,
-            inputs,
+            inputs: Inputs::default(),
             lines,
         };
-        self.write(&Line::about_all(Body::Cell(record)))?;
+        self.recorder.write_cell(unit, record, shared)?;
         let word = match outcome {
             Outcome::Done => "done",
             Outcome::Failed => "failed",
             Outcome::LeftOut => "left out",
         };
         let between = if reason.is_empty() { "" } else { ": " };
-        self.log(&format!("{name}: {word}{between}{reason}"));
+        self.recorder
+            .log(&format!("{name}: {word}{between}{reason}"));
         if outcome == Outcome::Failed && self.options.fail_fast {
             return Err(RunError::Wrong(format!("{name} failed: {reason}")));
         }
@@ -335,17 +242,7 @@ impl<'a> Session<'a> {
         options: &'a RunOptions,
     ) -> Self {
         let units = registries.measurements.units(experiment, plan);
-        let places = units.iter().enumerate();
-        let places = places.map(|(place, unit)| (unit.name.clone(), place));
         Self {
-            places: places.collect(),
-            units: Arc::new(units),
-            unusable: HashSet::new(),
-            current: None,
-            used: BTreeMap::new(),
-            sets: HashSet::new(),
-            gpu: None,
-            judged_lines: BTreeMap::new(),
             experiment,
             plan,
             registries,
@@ -353,17 +250,10 @@ impl<'a> Session<'a> {
             clock: Clock::new(),
             progress: Progress::new(options),
             cost: Cost::new(experiment, plan, registries),
-            failed: 0,
-            skipped: 0,
-            bad_input: false,
-            trial: Default::default(),
-            refused: BTreeMap::new(),
-            done: HashSet::new(),
-            compared: HashSet::new(),
+            ledger: Ledger::new(units),
+            recorder: Recorder::default(),
+            checked: Checked::default(),
             reference_file: None,
-            judged: BTreeMap::new(),
-            judges_trials: false,
-            folder: None,
         }
     }
 
@@ -374,36 +264,20 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Appends one record as one whole line and flushes it to the disk.
-    pub(super) fn write(&self, line: &Line) -> Result<(), RunError> {
-        let Some(folder) = &self.folder else {
-            return Ok(());
-        };
-        let mut text = serde_json::to_string(line).map_err(unwritable)?;
-        text.push('\n');
-        folder.append(&text)
-    }
-
     /// Tells what went wrong beside the measuring: now, and in the report.
     pub(super) fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
         self.tell_warning(&format!("{about}: {reason}"));
         let cell = about.to_owned();
-        self.write(&Line::about_all(Body::Warning(SkippedRecord {
-            cell,
-            reason,
-        })))
-    }
-
-    /// Writes a line to the log of the run. A log that cannot be written is no reason to end.
-    pub(super) fn log(&self, text: &str) {
-        if let Some(folder) = &self.folder {
-            folder.log(text);
-        }
+        self.recorder
+            .write(&Line::about_all(Body::Warning(SkippedRecord {
+                cell,
+                reason,
+            })))
     }
 
     /// Hands a warning on, above the progress bar.
     pub(super) fn tell_warning(&self, text: &str) {
-        self.log(&format!("warning: {text}"));
+        self.recorder.log(&format!("warning: {text}"));
         if let Some(tell) = self.options.warn {
             self.progress.bar.suspend(|| tell(text));
         }
@@ -438,7 +312,7 @@ impl<'a> Session<'a> {
             lenient: self.options.lenient,
             compilations: self.options.compilations.max(1),
         };
-        self.write(&Line::about_all(Body::Run(record)))?;
+        self.recorder.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {
             self.write_skipped(skipped)?;
         }
@@ -447,24 +321,25 @@ impl<'a> Session<'a> {
 
     /// Records cells that are left out.
     pub(super) fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
-        self.skipped += skipped.cells;
+        self.ledger.skipped += skipped.cells;
         let record = SkippedRecord {
             cell: skipped.cell.clone(),
             reason: skipped.reason.clone(),
         };
-        self.write(&Line::about_all(Body::Skipped(record)))
+        self.recorder.write(&Line::about_all(Body::Skipped(record)))
     }
 
     /// Records a cell that needs longer loops than the driver runs.
     pub(super) fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
-        self.refused.insert(cell.clone(), reason.clone());
-        self.skipped += 1;
+        self.ledger.refused.insert(cell.clone(), reason.clone());
+        self.ledger.skipped += 1;
         let hash = cell_hash(&[("left out", &cell), ("reason", &reason)]);
         let record = SkippedRecord {
             cell: cell.clone(),
             reason: reason.clone(),
         };
-        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        self.recorder
+            .write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
         self.close(&cell, (Outcome::LeftOut, &reason), vec![hash], &[])
     }
 
@@ -477,17 +352,15 @@ impl<'a> Session<'a> {
             wall_s,
             parts_s,
             overhead_s,
-            failed: self.failed,
-            skipped: self.skipped,
+            failed: self.ledger.failed,
+            skipped: self.ledger.skipped,
             load: machine_load(),
         };
         self.progress.bar.finish_and_clear();
-        self.write(&Line::about_all(Body::Finished(record)))?;
-        let Some(folder) = &self.folder else {
-            return Ok(self.options.out.clone());
-        };
-        folder.finish()?;
-        Ok(folder.out().to_owned())
+        self.recorder
+            .write(&Line::about_all(Body::Finished(record)))?;
+        let out = self.recorder.finish()?;
+        Ok(out.unwrap_or_else(|| self.options.out.clone()))
     }
 
     /// Ends the run here if somebody asked for it.
@@ -498,31 +371,22 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether a cell has its record.
-    pub(super) fn is_done(&self, cell: &str) -> bool {
-        self.done.contains(cell)
-    }
-
-    /// Notes that a cell has its record.
-    pub(super) fn finish(&mut self, cell: String) {
-        self.done.insert(cell);
-    }
-
     /// Records a cell that failed without a record of its own kind.
     pub(super) fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
-        self.failed += 1;
+        self.ledger.failed += 1;
         let hash = cell_hash(&[("failed", cell), ("reason", &reason)]);
         let record = SkippedRecord {
             cell: cell.to_owned(),
             reason: reason.clone(),
         };
-        self.write(&Line::about_all(Body::Failed(record)).hashed(&hash))?;
+        self.recorder
+            .write(&Line::about_all(Body::Failed(record)).hashed(&hash))?;
         self.close(cell, (Outcome::Failed, &reason), vec![hash], &[])
     }
 
     /// Tells how the run goes on: above the progress bar, or as a line.
     pub(super) fn tell_progress(&self, text: &str) {
-        self.log(text);
+        self.recorder.log(text);
         if let Some(tell) = self.options.tell {
             self.progress.bar.suspend(|| tell(text));
         }
@@ -531,7 +395,7 @@ impl<'a> Session<'a> {
     /// Shows what is being done.
     pub(super) fn say(&self, message: impl Into<String>) {
         let message = message.into();
-        self.log(&message);
+        self.recorder.log(&message);
         self.progress.say(message);
     }
 
@@ -594,22 +458,12 @@ impl<'a> Session<'a> {
     ) -> Result<Option<String>, RunError> {
         let labels = labels.iter().map(String::as_str);
         let parts: Vec<&str> = std::iter::once(kind).chain(labels).collect();
-        let Some(folder) = &self.folder else {
-            return Ok(None);
-        };
-        let (relative, path) = folder.image(&parts, ending);
-        match write(&path) {
-            Ok(()) => Ok(Some(relative)),
-            Err(error) => {
-                self.warn(&parts.join(", "), error.to_string())?;
-                Ok(None)
-            }
-        }
+        let written = self.recorder.image(&parts, ending, write);
+        written.or_else(|error| {
+            self.warn(&parts.join(", "), error.to_string())?;
+            Ok(None)
+        })
     }
-}
-
-fn unwritable(error: serde_json::Error) -> RunError {
-    RunError::Input(format!("a record cannot be written: {error}"))
 }
 
 /// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else

@@ -13,7 +13,8 @@ use raystone_config::{Axis, Cell, Experiment, Plan, is_compaction};
 use raystone_discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use raystone_gpu::Gpu;
 use raystone_record::{
-    Body, Key, Line, Outcome, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord,
+    Body, Key, Line, MeasuredRecord, Outcome, PixelsAtCount, Ran, Reading, RecordedPoints,
+    StreamRecord,
 };
 use raystone_sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
 use raystone_sampling::hash::pcg_hash;
@@ -95,7 +96,7 @@ struct Pair {
 /// All streams of the plan.
 pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError> {
     for cell in session.plan.streams.clone() {
-        if session.is_done(&cell.to_string()) {
+        if session.ledger.is_done(&cell.to_string()) {
             continue;
         }
         session.go_on()?;
@@ -117,9 +118,13 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok((record, kernel)) => {
-                    let line = line(&cell, kernel, "cost", Body::SamplerCost(record));
-                    written.line(session, &line)?;
+                Ok((readings, kernel)) => {
+                    let cost = MeasuredRecord {
+                        measurement: "sampler-cost".to_owned(),
+                        failure: None,
+                    };
+                    let line = line(&cell, kernel, "cost", Body::Measured(cost));
+                    written.line(session, &line.with_readings(readings.into()))?;
                 }
                 Err(reason) => written.failure(session, format!("cost of {cell}"), reason)?,
             }
@@ -147,7 +152,7 @@ struct Written {
 impl Written {
     fn line(&mut self, session: &Session, line: &Line) -> Result<(), RunError> {
         self.hashes.push(line.hash.clone());
-        session.write(line)
+        session.recorder.write(line)
     }
 
     fn failure(
@@ -436,7 +441,7 @@ fn cost_record(
     session: &mut Session,
     gpu: &Gpu,
     cell: &Cell,
-) -> Result<(SamplerCostRecord, String), String> {
+) -> Result<([Reading; 2], String), String> {
     let pairs = session.experiment.discrepancy.pairs.iter().flatten();
     let highest = pairs.max().copied().unwrap_or(1).max(1);
     let sampler = sampler_of(

@@ -87,11 +87,11 @@ pub(super) fn time_all(
                 Err(error) => failures[structure] = Some(error.to_string()),
             }
         }
-        session.note_kernels(&one.cell.to_string());
+        session.recorder.note_kernels(&one.cell.to_string());
     }
     let rivals = peers::build(session, world);
     let (cast, refused) = peers::batches(&rivals, world);
-    session.note_kernels("peers");
+    session.recorder.note_kernels("peers");
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
     let turns = session.cost.timed(Work::rays(timing.rays));
@@ -119,7 +119,7 @@ pub(super) fn time_all(
             Err(fault) => failures[item.structure] = Some(fault.of_cell()?),
         }
         one.record.ran.features = item.batch.tracer().features();
-        session.note_kernels(&one.cell.to_string());
+        session.recorder.note_kernels(&one.cell.to_string());
     }
     let mut kept = Vec::new();
     for (mut one, failure) in gated.into_iter().zip(failures) {
@@ -215,7 +215,7 @@ pub(super) fn draw_heat_maps(
                 &rays,
             )
         });
-        session.note_kernels(&structure.cell.to_string());
+        session.recorder.note_kernels(&structure.cell.to_string());
         let Ok(Some(work)) = work else { continue };
         structure.costs = vec![0.0; rays.len()];
         for (pixel, counters) in pixels.iter().zip(&work) {

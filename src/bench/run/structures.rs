@@ -272,7 +272,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     for cell in cells {
         let name = cell.to_string();
         let is_wanted = is_needed(session, world, &cell) || carries(session, world, &cell, &gated);
-        if session.is_unusable(&name) || !is_wanted {
+        if session.ledger.is_unusable(&name) || !is_wanted {
             continue;
         }
         // What was judged so far is still timed.
@@ -285,7 +285,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         let same = (last.take()).filter(|other| other.cell[Axis::Accel] == cell[Axis::Accel]);
         let built = same.unwrap_or_else(|| build(session, world, &cell));
         let outcome = gate_with(session, world, built.clone(), &cell)?;
-        session.note_kernels(&name);
+        session.recorder.note_kernels(&name);
         last = Some(built);
         match outcome.traced {
             Some(traced) => gated.push(Gated {
@@ -296,7 +296,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
                 cell,
                 costs: Vec::new(),
             }),
-            None if session.is_done(&name) => {}
+            None if session.ledger.is_done(&name) => {}
             None => write_failed(session, world, &cell, outcome.record)?,
         }
         session
@@ -308,7 +308,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     }
     drop(last);
     // Those whose record is there serve others, and are not timed again.
-    let is_open = |g: &Gated| session.is_open(&Structures, &g.cell);
+    let is_open = |g: &Gated| session.ledger.is_open(&Structures, &g.cell);
     let (open, mut usable): (Vec<_>, Vec<_>) = gated.into_iter().partition(is_open);
     let timed = time_all(session, world, open)?;
     let mut timed = draw_heat_maps(session, world, timed)?;
@@ -320,7 +320,9 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         }
     }
     for structure in &timed {
-        session.write(&structure.record.clone().with_body(Body::Structure))?;
+        session
+            .recorder
+            .write(&structure.record.clone().with_body(Body::Structure))?;
         let lines = vec![structure.record.hash.clone()];
         session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
     }
@@ -331,6 +333,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
 /// Whether something that is not measured yet is of this structure.
 fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
     let mut open = session
+        .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
     // Samplers are rendered through any structure, peers through none.
@@ -344,6 +347,7 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
     let kernels = &cell[Axis::Kernels];
     let serves = |g: &Gated| g.cell[Axis::Kernels] == *kernels && g.traced.is_inline();
     let mut open = session
+        .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
     let needs = |unit: &Unit| unit.kind() == errors::NAME && unit.cell[Axis::Kernels] == *kernels;
@@ -364,11 +368,11 @@ pub(super) fn write_failed(
     if record.body.refused {
         return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
     }
-    session.failed += 1;
+    session.ledger.failed += 1;
     let reason = record.body.failure.clone().unwrap_or_default();
     let record = hashed(world, record);
     let lines = vec![record.hash.clone()];
-    session.write(&record.with_body(Body::Structure))?;
+    session.recorder.write(&record.with_body(Body::Structure))?;
     let failed = (Outcome::Failed, &*reason);
     session.close(&cell.to_string(), failed, lines, &[])
 }

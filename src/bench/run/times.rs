@@ -112,13 +112,13 @@ fn key(cell: &Cell, space: Space) -> String {
 /// All full cells of a world.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
     let cells = session.plan.times.iter();
-    let cells = cells.filter(|c| c.is_on(&world.cell) && !session.is_done(&c.to_string()));
+    let cells = cells.filter(|c| c.is_on(&world.cell) && !session.ledger.is_done(&c.to_string()));
     let mut timed = Vec::new();
     for cell in cells.cloned().collect::<Vec<_>>() {
         session.go_on()?;
         let name = cell.to_string();
         timed.extend(prepare(session, world, gated, cell)?);
-        session.note_kernels(&name);
+        session.recorder.note_kernels(&name);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
@@ -213,8 +213,10 @@ fn write(
     let device = format!("{:?}", world.gpu.info);
     let hash = content_hash(&record, &world.scene.hash, &[("device", &device)]);
     let failure = record.body.failure.clone();
-    session.failed += usize::from(failure.is_some());
-    session.write(&record.hashed(&hash).with_body(Body::Time))?;
+    session.ledger.failed += usize::from(failure.is_some());
+    session
+        .recorder
+        .write(&record.hashed(&hash).with_body(Body::Time))?;
     let ended = match &failure {
         Some(reason) => (Outcome::Failed, reason.as_str()),
         None => (Outcome::Done, ""),
@@ -222,7 +224,8 @@ fn write(
     let mut lines = vec![hash];
     lines.extend(
         session
-            .judged_lines
+            .checked
+            .integrator_lines
             .get(&paths::key(world, &item.cell))
             .cloned(),
     );
@@ -233,7 +236,7 @@ fn write(
 fn refusal(session: &Session, cell: &Cell) -> Option<String> {
     let mut structures = session.plan.structures.iter();
     let structure = structures.find(|s| cell.is_on(s))?;
-    session.refused.get(&structure.to_string()).cloned()
+    session.ledger.refused.get(&structure.to_string()).cloned()
 }
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
@@ -431,10 +434,12 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
 }
 
 fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunError> {
-    session.failed += 1;
+    session.ledger.failed += 1;
     let record = empty_record(session, cell, reason.clone());
     let name = cell.to_string();
     let hash = cell_hash(&[("failed", &name), ("reason", &reason)]);
-    session.write(&record.hashed(&hash).with_body(Body::Time))?;
+    session
+        .recorder
+        .write(&record.hashed(&hash).with_body(Body::Time))?;
     session.close(&name, (Outcome::Failed, &reason), vec![hash], &[])
 }

@@ -79,11 +79,11 @@ pub(super) fn fault(
         Axis::Kernels,
     ];
     let key = format!("{:?}", cell.on(&parts));
-    if let Some(known) = session.trial.outcomes.get(&key) {
+    if let Some(known) = session.checked.trial.outcomes.get(&key) {
         return Ok(known.clone());
     }
     let of_tests = format!("{tests:?}");
-    let judged = match session.trial.scenes.get(&of_tests) {
+    let judged = match session.checked.trial.scenes.get(&of_tests) {
         Some(judged) => Arc::clone(judged),
         None => {
             let made = session.clock.time("judge", || JudgedScene::new(tests));
@@ -93,12 +93,12 @@ pub(super) fn fault(
             }
         }
     };
-    (session.trial.scenes).insert(of_tests, Arc::clone(&judged));
+    (session.checked.trial.scenes).insert(of_tests, Arc::clone(&judged));
     let found = session.clock.time("gate", || {
         judged.fault_of(session.registries, world, gpu, cell)
     })?;
     let found = found.map(|fault| format!("{SCENE}: {fault}"));
-    session.trial.outcomes.insert(key, found.clone());
+    session.checked.trial.outcomes.insert(key, found.clone());
     Ok(found)
 }
 

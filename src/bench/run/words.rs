@@ -25,12 +25,12 @@ pub(super) fn check(
     let kernel = kernel_hash(gpu, sampler)?;
     let table = blake3::hash(bytemuck::cast_slice(sampler.table.words()));
     let key = format!("{} {used:?} {kernel} {table}", sampler.label());
-    if session.compared.contains(&key) {
+    if session.checked.words.contains(&key) {
         return Ok(());
     }
     session
         .clock
         .time("gate", || check_words(gpu, sampler, &used))?;
-    session.compared.insert(key);
+    session.checked.words.insert(key);
     Ok(())
 }

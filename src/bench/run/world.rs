@@ -91,16 +91,18 @@ impl Loaded {
         let own = || scene.view(session.experiment.aspect());
         let camera = session.experiment.camera.unwrap_or_else(own);
         raystone_scene::check_camera(&camera).map_err(|e| e.to_string())?;
-        session.note_scene(variant, &scene.hash);
+        session.recorder.note_scene(variant, &scene.hash);
         let cell = format!("scene {variant}");
-        if !session.is_done(&cell) {
+        if !session.ledger.is_done(&cell) {
             for line in scene.report.lines() {
                 session.tell_warning(&format!("{variant}: {line}"));
             }
             let key = Key::from(&Cell::default().with(Axis::Scene, variant));
             let record = Body::Scene(scene_record(&scene, camera, load_ms));
-            session.write(&Line::new(key, Ran::default(), record).hashed(&scene.hash))?;
-            session.finish(cell);
+            session
+                .recorder
+                .write(&Line::new(key, Ran::default(), record).hashed(&scene.hash))?;
+            session.ledger.finish(cell);
         }
         Ok(Self {
             scene: Arc::new(scene),

@@ -24,11 +24,10 @@ pub(super) fn facts(data: &RunData) -> Vec<Taken> {
         let moving = scene.animations.iter().map(|a| (&a.key, &a.failure));
         all.extend(peers.chain(moving).map(of_failure));
     }
-    all.extend(
-        data.measured
-            .iter()
-            .map(|cell| of_failure((cell.key, &cell.failure))),
-    );
+    all.extend(data.measured.iter().map(|cell| {
+        let key = cell.key.clone().with(axis::SUBJECT, &cell.measurement);
+        of_failure((&key, &cell.failure))
+    }));
     all.extend(data.paths.iter().map(|p| {
         let text = p.fault.as_deref().unwrap_or(p.verdict().word());
         fact(

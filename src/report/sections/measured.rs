@@ -1,6 +1,6 @@
 //! Measurements that have no section of their own: a table of all their figures.
 
-use super::compactions;
+use super::{compactions, streams};
 use crate::data::{RunData, without_repeats};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Rows};
@@ -11,7 +11,7 @@ use raystone_record::axis;
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
     let names = data.measured.iter().map(|cell| cell.measurement.clone());
     let names = without_repeats(names.collect()).into_iter();
-    let others = names.filter(|name| name != compactions::NAME);
+    let others = names.filter(|name| ![compactions::NAME, streams::COST].contains(&name.as_str()));
     others.map(|name| table(data, &name)).collect()
 }
 

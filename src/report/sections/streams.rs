@@ -6,7 +6,7 @@ use crate::data::{RunData, SAMPLER_ROW};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::values::{Value, number, of_cost, of_stream, pair_of_dimensions};
+use crate::values::{Value, number, of_readings, of_stream, pair_of_dimensions};
 use raystone_record::figure::figure;
 use raystone_record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
 
@@ -21,9 +21,12 @@ const TAPPED: &str = "Tapped are a sampler's 32-bit words for (pixel, sample, di
 /// Functions that are plotted; all are in the table: a smooth one, and one with an edge.
 const PLOTTED: [&str; 2] = ["exponential", "disk"];
 
+/// Name in records of what drawing from a sampler costs.
+pub(super) const COST: &str = "sampler-cost";
+
 /// The section; `None` when no stream was measured.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
-    if data.streams.is_empty() && data.costs.is_empty() {
+    if data.streams.is_empty() && data.measured_by(COST).is_empty() {
         return None;
     }
     let mut section = Section::new("discrepancy", "Point streams");
@@ -257,9 +260,13 @@ fn worst_table(data: &RunData) -> Table {
 
 /// What drawing costs.
 fn cost_table(data: &RunData) -> Table {
-    let values: Vec<Value> = data.costs.iter().flat_map(of_cost).collect();
+    let costs = data.measured_by(COST);
+    let values: Vec<Value> = costs
+        .iter()
+        .flat_map(|cost| of_readings(data, cost))
+        .collect();
     let row = |key: &Key| (key.clone(), vec![data.names.sampler(key).into()]);
-    let rows = data.costs.iter().map(|cost| row(cost.key));
+    let rows = costs.iter().map(|cost| row(cost.key));
     Rows::new(&SAMPLER_ROW, &["sampler"], rows).table(
         &values,
         "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], empty loop \

@@ -284,9 +284,12 @@ fn stream(sampler: &Sampler) -> Line {
 
 fn cost(sampler: &Sampler) -> Line {
     let (own, empty) = (around(12.5, 0.1), around(1.5, 0.1));
-    let record =
-        json!({ "kind": "sampler-cost", "ns_per_sample": own, "loop_ns_per_sample": empty });
-    sampled([""; 2], sampler, record)
+    let record = json!({ "kind": "measured", "measurement": "sampler-cost" });
+    let readings = [(&figure::NS_PER_SAMPLE, own), (&figure::LOOP_NS, empty)];
+    let readings = readings.map(|(figure, value)| {
+        Reading::new(figure, serde_json::from_value(value).expect("an interval"))
+    });
+    sampled([""; 2], sampler, record).with_readings(readings.into())
 }
 
 fn finished() -> Line {

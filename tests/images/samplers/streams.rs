@@ -214,7 +214,7 @@ fn the_cost_of_a_sampler_is_measured_without_its_loop() {
         let sampler = sampler(sequence, decorrelation, &demand(256, 8));
         let (cost, _) = sampler_cost(support::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
         println!("{}: {cost:?}", sampler.label());
-        cost.ns_per_sample
+        cost[0].value
     };
     let registry = SamplerRegistry::default();
     let mut costs: Vec<_> = registry
