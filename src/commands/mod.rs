@@ -5,17 +5,16 @@ mod arguments;
 mod completions;
 mod discrepancy;
 mod doctor;
-mod explain;
 mod export;
 mod exporting;
 mod failure;
 mod faults;
 mod history;
+mod inspect;
 mod list;
 mod list_json;
 mod merge;
 mod output;
-mod plan;
 mod points;
 mod points_plot;
 mod render;
@@ -30,7 +29,6 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
-mod verify_run;
 
 mod compare;
 
@@ -97,14 +95,11 @@ enum Command {
     Doctor(doctor::Doctor),
     #[command(after_help = EXIT_CODES)]
     Discrepancy(discrepancy::Discrepancy),
-    #[command(after_help = EXIT_CODES)]
-    Plan(plan::Plan),
+    // The names that its parts once had.
+    #[command(after_help = EXIT_CODES, aliases = ["plan", "verify-run", "explain"])]
+    Inspect(inspect::Inspect),
     #[command(after_help = EXIT_CODES)]
     Merge(merge::Merge),
-    #[command(after_help = EXIT_CODES)]
-    VerifyRun(verify_run::VerifyRun),
-    #[command(after_help = EXIT_CODES)]
-    Explain(explain::Explain),
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
@@ -136,10 +131,8 @@ pub fn main() -> ExitCode {
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
-        Command::Plan(command) => command.execute(),
+        Command::Inspect(command) => command.execute(),
         Command::Merge(command) => command.execute(),
-        Command::VerifyRun(command) => command.execute(),
-        Command::Explain(command) => command.execute(),
         Command::Report(command) => command.execute(),
         Command::Repro(command) => command.execute(),
         Command::Scenes(command) => command.execute(),

@@ -94,7 +94,7 @@ impl Run {
             let units = registries.measurements.units(&experiment, &plan);
             let cost = Cost::new(&experiment, &plan, &registries);
             if self.output.json {
-                print_json("run", super::plan::as_json(&plan, &units, &cost))?;
+                print_json("run", super::inspect::plan::as_json(&plan, &units, &cost))?;
                 return Ok(ExitCode::SUCCESS);
             }
             print(&format!(

@@ -418,7 +418,7 @@ fn json_has_one_head_for_every_command() {
     std::fs::write(&points, "0.5 0.25\n0.75 0.5\n").expect("a file");
     let merged = RUN.path().join("merged");
     let tiny = "tests/data/tiny.toml";
-    let commands: [&[&str]; 15] = [
+    let commands: [&[&str]; 18] = [
         &[
             "compare",
             text(&folder),
@@ -426,9 +426,13 @@ fn json_has_one_head_for_every_command() {
             "--no-confirm",
             "--json",
         ],
-        &["plan", tiny, "--json"],
+        &["inspect", tiny, "--json"],
         &["run", tiny, "--dry-run", "--json"],
         &["merge", text(&folder), "--out", text(&merged), "--json"],
+        &["inspect", text(&folder), "--json"],
+        &["inspect", text(&folder), "cornell-box, bvh", "--json"],
+        // Names that these had before.
+        &["plan", tiny, "--json"],
         &["verify-run", text(&folder), "--json"],
         &["explain", text(&folder), "cornell-box, bvh", "--json"],
         &["repro", "--list", "--json"],
@@ -444,7 +448,8 @@ fn json_has_one_head_for_every_command() {
     for command in commands {
         let found: Value = serde_json::from_str(&done(command)).expect("JSON");
         assert_eq!(found["schema"], "raystone-output/1", "{command:?}");
-        assert_eq!(found["command"], command[0]);
+        let old = ["plan", "verify-run", "explain"].contains(&command[0]);
+        assert_eq!(found["command"], if old { "inspect" } else { command[0] });
     }
 }
 

@@ -1,8 +1,8 @@
-//! `raystone explain`.
+//! One cell of the folder of a run: what it is, why it is up to date or not, and how to measure it alone.
 
-use super::output::{OutputArguments, print, print_json};
+use super::Inspect;
+use crate::commands::output::{print, print_json};
 use anyhow::{Result, bail};
-use clap::Args;
 use raystone::config::{Axis, Cell};
 use raystone::measure::record::{CellRecord, Outcome};
 use raystone::run::{Inventory, Registries, RunOptions, State};
@@ -10,74 +10,58 @@ use raystone::text::{nearest, shell_word};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
 
-/// Tell of a cell what it is, why it is up to date or not, and how to measure it alone
-#[derive(Args)]
-pub struct Explain {
-    /// Folder that a run wrote
-    dir: PathBuf,
-    /// The cell: its name as reports and `raystone verify-run` have it, or a part of it that no other has
-    cell: String,
-    /// Let glTF models name files outside their folder, and OBJ models absolute paths
-    #[arg(long)]
-    allow_outside: bool,
-    #[command(flatten)]
-    output: OutputArguments,
+pub(super) fn inspect(command: &Inspect, name: &str) -> Result<ExitCode> {
+    let registries = Registries::default();
+    let inventory = Inventory::read(&command.path, &registries)?;
+    let state = find(&inventory, &command.path, name)?;
+    let options = RunOptions {
+        program: raystone::PROGRAM,
+        allow_outside: command.experiment.values.allow_outside,
+        ..RunOptions::default()
+    };
+    let stale = inventory.stale(state, &registries, &options)?;
+    if command.output.json {
+        print_json("inspect", as_json(&inventory, state, stale))?;
+    } else {
+        print(&in_words(&inventory, state, stale)?)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
-impl Explain {
-    pub fn execute(self) -> Result<ExitCode> {
-        let registries = Registries::default();
-        let inventory = Inventory::read(&self.dir, &registries)?;
-        let state = self.find(&inventory)?;
-        let options = RunOptions {
-            program: raystone::PROGRAM,
-            allow_outside: self.allow_outside,
-            ..RunOptions::default()
-        };
-        let stale = inventory.stale(state, &registries, &options)?;
-        match self.output.json {
-            true => print_json("explain", as_json(&inventory, state, stale))?,
-            false => print(&in_words(&inventory, state, stale)?)?,
-        }
-        Ok(ExitCode::SUCCESS)
+/// The cell of this name, or whose name alone holds it.
+fn find<'i>(inventory: &'i Inventory, dir: &Path, name: &str) -> Result<&'i State> {
+    let states = &inventory.states;
+    if let Some(state) = states.iter().find(|state| state.unit.name == name) {
+        return Ok(state);
     }
-
-    fn find<'i>(&self, inventory: &'i Inventory) -> Result<&'i State> {
-        let states = &inventory.states;
-        if let Some(state) = states.iter().find(|state| state.unit.name == self.cell) {
-            return Ok(state);
+    let holds = |state: &&State| state.unit.name.contains(name);
+    let found: Vec<&State> = states.iter().filter(holds).collect();
+    match found.as_slice() {
+        [one] => Ok(one),
+        [] => {
+            let names = states.iter().map(|state| state.unit.name.as_str());
+            let near = nearest(name, names).unwrap_or_default();
+            bail!(
+                "{} has no cell `{name}`; did you mean `{near}`?",
+                dir.display()
+            )
         }
-        let holds = |state: &&State| state.unit.name.contains(&self.cell);
-        let found: Vec<&State> = states.iter().filter(holds).collect();
-        match found.as_slice() {
-            [one] => Ok(one),
-            [] => {
-                let names = states.iter().map(|state| state.unit.name.as_str());
-                let near = nearest(&self.cell, names).unwrap_or_default();
-                bail!(
-                    "{} has no cell `{}`; did you mean `{near}`?",
-                    self.dir.display(),
-                    self.cell
-                )
-            }
-            several => {
-                let names = several.iter().map(|state| state.unit.name.as_str());
-                let names: Vec<&str> = names.take(8).collect();
-                bail!(
-                    "`{}` is a part of {} names: {}{}",
-                    self.cell,
-                    several.len(),
-                    names.join("; "),
-                    if several.len() > names.len() {
-                        "; …"
-                    } else {
-                        ""
-                    }
-                )
-            }
+        several => {
+            let names = several.iter().map(|state| state.unit.name.as_str());
+            let names: Vec<&str> = names.take(8).collect();
+            let more = if several.len() > names.len() {
+                "; …"
+            } else {
+                ""
+            };
+            bail!(
+                "`{name}` is a part of {} names: {}{more}",
+                several.len(),
+                names.join("; ")
+            )
         }
     }
 }

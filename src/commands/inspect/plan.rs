@@ -1,0 +1,128 @@
+//! An experiment before it runs: its cells, their shards, and the time that they may take.
+
+use super::Inspect;
+use crate::commands::arguments::plan;
+use crate::commands::output::{print, print_json};
+use anyhow::Result;
+use raystone::config::{Axis, Experiment, Plan as Cells, Skipped};
+use raystone::run::{Cost, Registries, Unit, shards};
+use raystone::text::shell_word;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
+    let registries = Registries::default();
+    let overrides = &command.experiment.values.set;
+    let experiment = Experiment::load(&command.path, overrides, &registries.catalogue())?;
+    let cells = plan(&experiment, &command.experiment.only, &registries)?;
+    let units = registries.measurements.units(&experiment, &cells);
+    let cost = Cost::new(&experiment, &cells, &registries);
+    let of = usize::from(command.shards.unwrap_or(1));
+    let numbers = shards(&units, of, |unit| cost.seconds_of(unit));
+    if command.output.json {
+        let mut fields = as_json(&cells, &units, &cost);
+        let entries = fields["cells"].as_array_mut().into_iter().flatten();
+        for (entry, number) in entries.zip(&numbers) {
+            entry["shard"] = json!(number);
+        }
+        fields["shards"] = json!(of);
+        print_json("inspect", fields)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut text = String::new();
+    if command.cells {
+        for (unit, number) in units.iter().zip(&numbers) {
+            writeln!(text, "{number}/{of}\t{}\t{}", unit.kind(), unit.name)?;
+        }
+    } else {
+        let left_out: usize = cells.skipped.iter().map(|s| s.cells).sum();
+        let count = units.len();
+        writeln!(text, "{count} cells, {left_out} left out; {of} shards:\n")?;
+        describe(&mut text, (&units, &numbers), of, &cost)?;
+        writeln!(text, "\n{}", how_to_run(command, of))?;
+    }
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What each shard measures, and how long that may take.
+fn describe(
+    text: &mut String,
+    (units, numbers): (&[Unit], &[usize]),
+    of: usize,
+    cost: &Cost,
+) -> Result<()> {
+    let mut empty = 0;
+    let seconds: Vec<f64> = units.iter().map(|unit| cost.seconds_of(unit)).collect();
+    for number in 1..=of {
+        let own = |place: &usize| numbers[*place] == number;
+        let own: Vec<usize> = (0..units.len()).filter(own).collect();
+        if own.is_empty() {
+            empty += 1;
+            continue;
+        }
+        let mut counts: Vec<(&str, usize)> = Vec::new();
+        for unit in own.iter().map(|place| &units[*place]) {
+            let plural = unit.measurement.plural();
+            match counts.iter_mut().find(|(known, _)| *known == plural) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((plural, 1)),
+            }
+        }
+        let kinds = counts
+            .iter()
+            .map(|(plural, count)| format!("{count} {plural}"));
+        let kinds = kinds.collect::<Vec<_>>().join(", ");
+        let sum: f64 = own.iter().map(|place| seconds[*place]).sum();
+        writeln!(text, "  {number}/{of}  about {:>7}  {kinds}", duration(sum))?;
+    }
+    if empty > 0 {
+        writeln!(
+            text,
+            "\n{empty} shards have nothing to do: what is timed in the same rounds stays together."
+        )?;
+    }
+    Ok(())
+}
+
+fn how_to_run(command: &Inspect, of: usize) -> String {
+    let file = shell_word(&command.path.to_string_lossy());
+    let values = command.experiment.values.set.iter();
+    let filters = command.experiment.only.iter();
+    let also: String = (values.map(|value| format!(" --set {}", shell_word(value))))
+        .chain(filters.map(|filter| format!(" --only {}", shell_word(filter))))
+        .collect();
+    format!(
+        "Times are estimates for a software adapter with two cores; references and checks, which every shard \
+         needs on its own, come on top.\n\n\
+         Run each, wherever:  raystone run {file}{also} --shard K/{of} --resume --out DIR/K\n\
+         and join them:       raystone merge DIR/* --out ALL"
+    )
+}
+
+/// Every cell of a plan with its kind and the seconds that it is expected to take, and what is left out.
+pub fn as_json(plan: &Cells, units: &[Unit], cost: &Cost) -> Value {
+    let cell = |unit: &Unit| {
+        let axes = Axis::ALL.into_iter();
+        let axes = axes.filter_map(|axis| Some((axis.name(), unit.cell.get(axis)?.label.as_str())));
+        let key: BTreeMap<_, _> = axes.collect();
+        json!({ "cell": unit.name, "kind": unit.kind(), "key": key, "seconds": cost.seconds_of(unit) })
+    };
+    let left_out = |s: &Skipped| json!({ "cell": s.cell, "reason": s.reason, "cells": s.cells });
+    json!({
+        "cells": units.iter().map(cell).collect::<Vec<_>>(),
+        "seconds": cost.whole(units).seconds(),
+        "left_out": plan.skipped.iter().map(left_out).collect::<Vec<_>>(),
+    })
+}
+
+/// A time with the precision of an estimate.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        ..100.0 => format!("{:.0} s", seconds.ceil()),
+        ..6000.0 => format!("{:.0} min", (seconds / 60.0).ceil()),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
