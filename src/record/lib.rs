@@ -14,6 +14,7 @@ mod key;
 mod old;
 mod paths;
 mod peer;
+mod pictures;
 mod read;
 pub mod replicates;
 mod run;
@@ -30,6 +31,7 @@ pub use error::*;
 pub use key::{Key, axis};
 pub use paths::PathsRecord;
 pub use peer::{PeerRecord, PeerTiming};
+pub use pictures::{IMAGE_AXES, Pictures, SPREAD};
 pub use read::{
     PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
     records_file, text_of,

@@ -160,7 +160,10 @@ impl<'a> RunData<'a> {
         };
         for line in lines {
             match &line.body {
-                Body::Run(record) => data.run = Some(record),
+                Body::Run(record) => {
+                    // The ends of runs before are none of this one, which went on with them.
+                    (data.run, data.finished, data.interrupted) = (Some(record), None, None);
+                }
                 Body::Finished(record) => data.finished = Some(record),
                 Body::Interrupted(record) => data.interrupted = Some(record),
                 Body::Warning(record) => data.warnings.push(record),

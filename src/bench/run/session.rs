@@ -178,10 +178,12 @@ impl<'a> Session<'a> {
         reason: String,
     ) -> Result<(), RunError> {
         self.write_failure(about, reason.clone())?;
+        let hash = failure_hash(about, &reason);
         let open = self.open_units().filter(|unit| is_one(unit));
         let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
         for name in names {
-            self.close(&name, (Outcome::Failed, &reason), Vec::new(), &[])?;
+            let lines = vec![hash.clone()];
+            self.close(&name, (Outcome::Failed, &reason), lines, &[])?;
         }
         Ok(())
     }
@@ -505,7 +507,7 @@ impl<'a> Session<'a> {
     /// Records a cell that failed without a record of its own kind.
     pub(super) fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.failed += 1;
-        let hash = cell_hash(&[("failed", cell), ("reason", &reason)]);
+        let hash = failure_hash(cell, &reason);
         let record = SkippedRecord {
             cell: cell.to_owned(),
             reason: reason.clone(),
@@ -600,6 +602,11 @@ impl<'a> Session<'a> {
             }
         }
     }
+}
+
+/// Hash of the lines that say why a cell failed.
+pub(super) fn failure_hash(cell: &str, reason: &str) -> String {
+    cell_hash(&[("failed", cell), ("reason", reason)])
 }
 
 fn unwritable(error: serde_json::Error) -> RunError {
