@@ -19,7 +19,7 @@ const MOST_ALIKE: usize = 4;
 const MOST_OF_COMMENT: usize = 65_536;
 /// What of it the verdict and each note may take.
 const MOST_OF_LINE: usize = 2_000;
-/// What is kept for lines that say how much was cut, and around tables.
+/// What is kept for lines that say how much was cut, and for the mark by which continuous integration finds its comment.
 const RESERVE: usize = 1_000;
 /// Texts of facts are cut to so many characters; the records have them whole.
 const MOST_CHARACTERS: usize = 40;

@@ -106,9 +106,9 @@ fn paths(paths: &Recorded<PathsRecord>) -> Case {
 /// Cells without figures, and whether the run came to its end.
 fn cells(source: &Source) -> Suite {
     let data = &source.data;
-    let failed = data.failed.iter().map(|cell| Case {
-        name: cell.cell.clone(),
-        outcome: Outcome::Failed(cell.reason.clone()),
+    let failed = data.failures().into_iter().map(|(name, why)| Case {
+        name: name.to_owned(),
+        outcome: Outcome::Failed(why.to_owned()),
     });
     let skipped = data.skipped.iter().map(|cell| Case {
         name: cell.cell.clone(),

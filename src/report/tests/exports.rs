@@ -56,6 +56,20 @@ fn a_label_with_parameters_is_chosen_as_it_is_written() {
     assert!(of_one > 0 && of_bvh > 0);
     assert_eq!(rows(&[&format!("{one},bvh")]), Ok(of_one + of_bvh));
     assert_eq!(rows(&[&format!("{one},accel=bvh")]), Ok(of_one + of_bvh));
+    // Without the driver's checks it is another competitor, of the same name.
+    let unchecked = lines.iter().cloned().map(|mut line| {
+        line.ran.unchecked = line.key.label(axis::ACCEL) == "bvh";
+        line
+    });
+    let unchecked: Vec<Line> = unchecked.collect();
+    let csv = text(&unchecked, "csv", &["accel=bvh"]).unwrap();
+    assert_eq!(csv.lines().count() - 1, of_bvh);
+    assert!(
+        csv.lines()
+            .skip(1)
+            .all(|line| line.contains("bvh (unchecked)")),
+        "{csv}"
+    );
     let of_rays = rows(&[&format!("{one},rays=primary")]).unwrap();
     assert!(0 < of_rays && of_rays < of_one);
     for (wrong, told) in [
@@ -167,4 +181,26 @@ fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
         files.left_out[0].starts_with("42 of 48 linear images"),
         "{files:?}"
     );
+}
+
+#[test]
+fn every_cell_that_failed_is_a_test_case_whatever_its_kind() {
+    let mut lines = full_run();
+    let cell = |unit: &str, outcome: &str, reason: &str| {
+        let record = serde_json::json!({ "kind": "cell", "unit": unit, "outcome": outcome, "reason": reason });
+        Line::about_all(serde_json::from_value(record).unwrap())
+    };
+    // A peer that failed has a record of its own kind; the last word on a cell counts.
+    lines.push(cell("cornell-box, peer embree", "failed", "no library"));
+    lines.push(cell("cornell-box, peer obvhs", "failed", "before"));
+    lines.push(cell("cornell-box, peer obvhs", "done", ""));
+    let failed = RunData::new(&lines).failures();
+    assert_eq!(failed["cornell-box, peer embree"], "no library");
+    assert!(
+        !failed.contains_key("cornell-box, peer obvhs"),
+        "{failed:?}"
+    );
+    let xml = text(&lines, "junit", &[]).unwrap();
+    assert!(xml.contains("<failure message=\"no library\">"), "{xml}");
+    assert!(!xml.contains("before"), "{xml}");
 }
