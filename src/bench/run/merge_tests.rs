@@ -202,9 +202,9 @@ fn linear_images_go_along_with_the_pictures_beside_them() {
         .chain(labels.iter().map(String::as_str))
         .collect();
     let mean = format!("images-2/{}.npy", slug(&parts));
-    let names = ["images-2/image-x.png", "images-2/image-x.exr", &mean];
+    let names = ["images-2/image-x.png", "images-2/image-x.pfm", &mean];
     fs::create_dir(a.join("images-2")).expect("a folder");
-    for name in names.into_iter().chain(["images-2/foreign.exr"]) {
+    for name in names.into_iter().chain(["images-2/foreign.pfm"]) {
         fs::write(a.join(name), name).expect("an image");
     }
     let out = dir.path().join("out");

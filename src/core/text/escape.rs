@@ -64,76 +64,48 @@ pub fn xml(text: &str) -> String {
     out
 }
 
-/// Raised characters, as exponents have them, and what each stands for.
-const RAISED: [(char, char); 13] = [
-    ('⁰', '0'),
-    ('¹', '1'),
-    ('²', '2'),
-    ('³', '3'),
-    ('⁴', '4'),
-    ('⁵', '5'),
-    ('⁶', '6'),
-    ('⁷', '7'),
-    ('⁸', '8'),
-    ('⁹', '9'),
-    ('⁻', '-'),
-    ('⁺', '+'),
-    ('ⁿ', 'n'),
-];
+/// Characters as they stand raised, and what each stands for.
+const RAISED: [&str; 2] = ["⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺ⁿ", "0123456789-+n"];
+/// The same of lowered ones.
+const LOWERED: [&str; 2] = ["₀₁₂₃₄₅₆₇₈₉ᵢ", "0123456789i"];
 
-/// Lowered characters, and what each stands for.
-const LOWERED: [(char, char); 11] = [
-    ('₀', '0'),
-    ('₁', '1'),
-    ('₂', '2'),
-    ('₃', '3'),
-    ('₄', '4'),
-    ('₅', '5'),
-    ('₆', '6'),
-    ('₇', '7'),
-    ('₈', '8'),
-    ('₉', '9'),
-    ('ᵢ', 'i'),
-];
+/// What stands for a character in the second of two lists.
+fn counterpart(c: char, [from, to]: [&str; 2]) -> Option<char> {
+    let mut pairs = from.chars().zip(to.chars());
+    pairs.find(|(known, _)| *known == c).map(|(_, other)| other)
+}
 
 /// Digits and signs as they stand raised in a line of text; other characters stay.
 pub fn raised(exponent: &str) -> String {
-    let up = |c: char| RAISED.iter().find(|(_, plain)| *plain == c);
-    let exponent = exponent.chars();
-    exponent.map(|c| up(c).map_or(c, |(up, _)| *up)).collect()
+    let up = |c| counterpart(c, [RAISED[1], RAISED[0]]).unwrap_or(c);
+    exponent.chars().map(up).collect()
 }
 
 /// Text in a paragraph or table of LaTeX, for pdfTeX, XeTeX and LuaTeX alike. Brackets and stars are kept from `\\`, which takes them for
 /// its arguments, and hyphens from each other; a character outside of ASCII that has no command is shown by its number.
 pub fn latex(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        let script = [('^', &RAISED[..]), ('_', &LOWERED)]
-            .into_iter()
-            .find_map(|(mark, table)| {
-                let plain = |c| table.iter().find(|(other, _)| *other == c).map(|(_, p)| *p);
-                let inside: String = rest.chars().map_while(plain).collect();
-                (!inside.is_empty()).then_some((mark, inside))
-            });
-        let taken = match script {
-            // All that stands raised is one exponent: two in a row are an error.
-            Some((mark, inside)) => {
+    let mut rest = text.chars();
+    while let Some(c) = rest.clone().next() {
+        // All that stands raised is one exponent: two in a row are an error.
+        for (mark, table) in [('^', RAISED), ('_', LOWERED)] {
+            let inside: String = rest.clone().map_while(|c| counterpart(c, table)).collect();
+            if let Some(last) = inside.chars().count().checked_sub(1) {
                 let _ = write!(out, "${mark}{{{inside}}}$");
-                inside.chars().count()
+                rest.nth(last);
             }
-            None => {
-                match latex_command(c) {
-                    Some(command) => out += command,
-                    None if matches!(c, '[' | ']' | '*' | '-') => out.extend(['{', c, '}']),
-                    None if "#$%&_{}".contains(c) => out.extend(['\\', c]),
-                    None if matches!(c, ' '..='~') => out.push(c),
-                    None => number(&mut out, c, ["{[}", "{]}"]),
-                }
-                1
-            }
-        };
-        rest = &rest[rest.chars().take(taken).map(char::len_utf8).sum()..];
+        }
+        if counterpart(c, RAISED).or(counterpart(c, LOWERED)).is_some() {
+            continue;
+        }
+        rest.next();
+        match latex_command(c) {
+            Some(command) => out += command,
+            None if "[]*-".contains(c) => out.extend(['{', c, '}']),
+            None if "#$%&_{}".contains(c) => out.extend(['\\', c]),
+            None if matches!(c, ' '..='~') => out.push(c),
+            None => number(&mut out, c, ["{[}", "{]}"]),
+        }
     }
     out
 }
@@ -202,7 +174,7 @@ mod tests {
     fn markdown_and_xml_show_what_would_be_markup() {
         assert_eq!(
             markdown("a|b <i> @x #1 http://y\n\u{202e}"),
-            "a\\|b &lt;i&gt; &#64;x &#35;1 http:\u{2060}//y [U+202E]"
+            "a\\|b &lt;i&gt; &#64;x &#35;1 http:\u{2060}//y \\[U+202E\\]"
         );
         assert_eq!(
             xml("<a b=\"&\">\n\u{1}λ"),

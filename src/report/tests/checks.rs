@@ -124,9 +124,10 @@ fn an_image_that_failed_its_cell_fails_the_check_and_is_named() {
     assert_eq!(check.verdict, Verdict::Fail);
     let name = "; sobol × cranley-patterson on cornell-box, path";
     assert!(check.detail.contains(name), "{}", check.detail);
-    // The page of such records can be written.
-    let (html, _) = report("not-finite", &lines);
-    assert!(html.contains("NaN or infinite pixels"));
+    // The page of such records can be made, and says so beside the sampler.
+    let nowhere = Path::new("no such folder");
+    let page = markdown::summary(&sections::document(nowhere, &RunData::new(&lines), &[]));
+    assert!(page.contains("NaN or infinite pixels"));
 }
 
 #[test]

@@ -152,13 +152,13 @@ fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
     let references = ["cornell-box", "displaced-sphere"];
     let references = references.map(|scene| ["path", "ao"].map(|i| format!("{scene}-{i}")));
     for name in references.as_flattened() {
-        keep(dir, &format!("images/reference-{name}.exr"), 1.0);
+        keep(dir, &format!("images/reference-{name}.pfm"), 1.0);
     }
     let image = "render-cornell-box-path-sobol-none";
     keep(dir, &format!("images-2/{image}.pfm"), 2.0);
     // What no record names any more.
     keep(dir, &format!("images/{image}.pfm"), 3.0);
-    keep(dir, "images/foreign.exr", 3.0);
+    keep(dir, "images/foreign.pfm", 3.0);
     let files = write(&source, &out).unwrap();
     assert_eq!((files.count, files.left_out.len()), (5, 1));
     assert!(
@@ -174,7 +174,7 @@ fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
     assert_eq!(found.pixels, [[2.0; 3]]);
     // Where one mean was kept, the others are missing.
     let mean = raystone_core::text::slug(&["mean", "cornell-box", "path", "pixel-hash", "none"]);
-    keep(dir, &format!("images-2/{mean}.exr"), 4.0);
+    keep(dir, &format!("images-2/{mean}.pfm"), 4.0);
     let files = write(&source, &out).unwrap();
     // Means and variances of three randomised samplers in four views.
     assert!(
