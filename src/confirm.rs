@@ -14,7 +14,7 @@ use raystone_report::compare::{Confirmed, Finding, Identity};
 use raystone_stats::statistics::median;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 /// So many rounds at least, fifteen of each compilation: by them a slowdown of 2 % is found on a busy machine (docs/compare.md).
 /// With fewer than 21 no permutation test passes a correction for some dozens of cells.
@@ -23,6 +23,9 @@ pub const LEAST_ROUNDS: u32 = 105;
 /// So often every timed kernel of either side is compiled, in turns over the rounds. Of some hundred compilations of equal text one
 /// or two took a third longer in all their rounds (Mesa 25, LLVM 15), by where their code came to lie: one of seven moves no median.
 pub const COMPILATIONS: usize = 7;
+
+/// Lines of a program that failed which are passed on.
+const LAST_LINES: usize = 5;
 
 /// Why nothing was measured again.
 #[derive(Debug, thiserror::Error)]
@@ -197,10 +200,11 @@ fn ratios([a, b]: &[Side; 2]) -> Confirmed {
     pairs.collect()
 }
 
-/// Runs the programs of base and candidate in turns over the cells, each as the experiment of its own run says.
+/// Runs the programs of base and candidate in turns over the cells, each as the experiment of its own run says. Cells that fail have no
+/// times, and end no run.
 ///
 /// # Errors
-/// A program cannot be started, or leaves no records.
+/// A program cannot be started, does not end well, or leaves no records.
 pub fn in_turns(
     programs: [&Path; 2],
     sides: [&Side; 2],
@@ -226,14 +230,17 @@ pub fn in_turns(
             let (program, file, sets) = &turns[which];
             let mut command = Command::new(program);
             command.arg("run").arg(file).arg("--out").arg(&out);
-            command.args(["--force", "--quiet"]);
+            command.args(["--force", "--quiet", "--lenient"]);
             command.args(sets.iter().flat_map(|set| ["--set", set]));
             // Errors are not what is asked for.
             command.args(["--set", "run.replicates=2"]);
             command.args(only(cells).iter().flat_map(|only| ["--only", only]));
             command.args(adapter.iter().flat_map(|adapter| ["--adapter", adapter]));
-            command.stdout(Stdio::null()).stderr(Stdio::null());
-            command.status().map_err(|e| failed(program, &e))?;
+            command.stdin(Stdio::null()).stdout(Stdio::null());
+            let ended = command.output().map_err(|e| failed(program, &e))?;
+            if !ended.status.success() {
+                return Err(impossible(ended_badly(program, &ended)));
+            }
             for (identity, ms) in times(&out)? {
                 medians[which].entry(identity).or_default().push(ms);
             }
@@ -251,6 +258,18 @@ pub fn in_turns(
             Some((identity, TimeRatio::of_rounds(&ratios, IN_TURNS)?))
         });
     Ok(pairs.collect())
+}
+
+/// How a program ended, and its last words.
+fn ended_badly(program: &Path, ended: &Output) -> String {
+    let words = String::from_utf8_lossy(&ended.stderr);
+    let lines: Vec<&str> = words.lines().filter(|l| !l.trim().is_empty()).collect();
+    let last = &lines[lines.len().saturating_sub(LAST_LINES)..];
+    let said = match last.is_empty() {
+        true => "it said nothing".to_owned(),
+        false => last.join("; "),
+    };
+    format!("{} ended with {}: {said}", program.display(), ended.status)
 }
 
 /// The median of each time of a run.

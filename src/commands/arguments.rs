@@ -76,7 +76,7 @@ pub struct ValueArguments {
 pub struct ExperimentArguments {
     #[command(flatten)]
     pub values: ValueArguments,
-    /// Keep the cells that fit: `--only 'accel=*bvh,sequence=sobol'`; patterns of one axis are
+    /// Keep the cells that fit: `--only 'accel=*bvh,uniform-grid,sequence=sobol'`; patterns of one axis are
     /// alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     pub only: Vec<String>,

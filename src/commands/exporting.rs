@@ -7,6 +7,7 @@ use raystone::atomic::write_atomic;
 use raystone::export::select::Selection;
 use raystone::export::{FORMATS, Format, Source, Writer};
 use raystone::measure::record::{STRESS_FILE, read_records, records_file};
+use raystone::run::records_in;
 use raystone::text::nearest;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,7 +26,7 @@ pub struct Export {
     /// Figure, by its id with or without the version, or a pattern of ids; may be given many times
     #[arg(long, value_name = "ID")]
     figure: Vec<String>,
-    /// Keep what fits: `--only 'accel=*bvh,scene=cornell-box'`; patterns of one axis are alternatives
+    /// Keep what fits: `--only 'accel=*bvh,uniform-grid(lambda=3),scene=cornell-box'`; patterns of one axis are alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     only: Vec<String>,
 }
@@ -54,12 +55,13 @@ impl Export {
         if chooses && !self.format.selective {
             bail!("--format {name} holds no figures to choose from: leave out --figure and --only");
         }
-        let records = read_records(&self.dir)?;
+        let dir = records_in(&self.dir);
+        let records = read_records(&dir)?;
         for warning in &records.warnings {
             warn(warning);
         }
         let choice = Selection::new(&self.figure, &self.only)?;
-        let source = Source::new(&self.dir, &records.lines, &choice)?;
+        let source = Source::new(&dir, &records.lines, &choice)?;
         match &self.format.write {
             Writer::Text(write) => {
                 let exported = write(&source);
@@ -77,8 +79,11 @@ impl Export {
                 let folder = folder.ok_or_else(|| {
                     anyhow!("--format {name} writes files: give their folder with -o")
                 })?;
-                let count = write(&source, folder)?;
-                tell(&format!("{count} files in {}", folder.display()));
+                let files = write(&source, folder)?;
+                for line in &files.left_out {
+                    warn(line);
+                }
+                tell(&format!("{} files in {}", files.count, folder.display()));
             }
         }
         Ok(ExitCode::SUCCESS)

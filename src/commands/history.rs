@@ -7,6 +7,7 @@ use raystone::export::select::Selection;
 use raystone::history::History;
 use raystone::measure::record::read_records;
 use raystone::report::write_page;
+use raystone::run::records_in;
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,7 +22,7 @@ pub struct HistoryOf {
     /// rank]
     #[arg(long, value_name = "ID")]
     figure: Vec<String>,
-    /// Keep what fits: `--only 'accel=*bvh,scene=cornell-box'`; patterns of one axis are alternatives
+    /// Keep what fits: `--only 'accel=*bvh,uniform-grid(lambda=3),scene=cornell-box'`; patterns of one axis are alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     only: Vec<String>,
     /// Folder for the page and its plots [default: none is written]
@@ -34,7 +35,7 @@ pub struct HistoryOf {
 impl HistoryOf {
     pub fn execute(self) -> Result<ExitCode> {
         let mut all = Vec::new();
-        for dir in self.dirs {
+        for dir in self.dirs.iter().map(|dir| records_in(dir)) {
             let records = read_records(&dir)?;
             for warning in &records.warnings {
                 warn(&format!("{}: {warning}", dir.display()));

@@ -1,10 +1,11 @@
 //! `raystone merge`.
 
 use super::failure::FAILED;
-use super::output::{OutputArguments, print, print_json, warn};
+use super::output::{OutputArguments, print, print_json, tell, warn};
 use anyhow::Result;
 use clap::Args;
-use raystone::report::write_report;
+use raystone::measure::record::{RunRecord, all_of, read_records};
+use raystone::report::{failed_checks, write_report};
 use raystone::run::{Registries, merge};
 use serde_json::json;
 use std::path::PathBuf;
@@ -34,6 +35,11 @@ impl Merge {
             warn(note);
         }
         let page = write_report(&self.out)?.html;
+        let lines = read_records(&self.out)?.lines;
+        let failed = failed_checks(&lines);
+        for check in &failed {
+            tell(&format!("failed: {check}"));
+        }
         let cells = merged.cells;
         if self.output.json {
             let fields = json!({
@@ -50,9 +56,15 @@ impl Merge {
                 page.display()
             ))?;
         }
-        Ok(match merged.incomplete {
-            true => ExitCode::from(FAILED),
-            false => ExitCode::SUCCESS,
-        })
+        // As of the run that was divided.
+        let is_lenient = all_of::<RunRecord>(&lines)
+            .last()
+            .is_some_and(|run| run.body.lenient);
+        Ok(
+            match merged.incomplete || !(failed.is_empty() || is_lenient) {
+                true => ExitCode::from(FAILED),
+                false => ExitCode::SUCCESS,
+            },
+        )
     }
 }

@@ -3,7 +3,8 @@
 use anyhow::{Context as _, Result};
 use clap::Args;
 use raystone::export::OUTPUT_SCHEMA;
-use raystone::report::terminal::{Screen, shown};
+use raystone::report::terminal::Screen;
+use raystone::text::escape::visible;
 use serde_json::{Value, json};
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 
@@ -66,7 +67,7 @@ fn shows_colours() -> bool {
 /// Writes a line to standard error. A terminal that went away is no reason to end: what is measured
 /// counts.
 pub fn tell(text: &str) {
-    let lines: Vec<String> = text.split('\n').map(shown).collect();
+    let lines: Vec<String> = text.split('\n').map(visible).collect();
     let _ = writeln!(std::io::stderr().lock(), "{}", lines.join("\n"));
 }
 

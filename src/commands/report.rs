@@ -4,11 +4,12 @@ use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::export::{checks_json, values_json};
-use raystone::measure::record::{PARTIAL, STRESS_FILE, read_records, records_file};
+use raystone::measure::record::{STRESS_FILE, read_records, records_file};
 use raystone::report::data::RunData;
 use raystone::report::sections::belief::checks;
 use raystone::report::values::values;
 use raystone::report::write_report;
+use raystone::run::records_in;
 use raystone::stress::record::read;
 use raystone::stress::report::write_stress_page;
 use serde_json::{Value, json};
@@ -36,9 +37,7 @@ impl Report {
             }
             return Ok(ExitCode::SUCCESS);
         }
-        let partial = self.dir.join(PARTIAL);
-        let is_partial = !records_file(&self.dir).exists() && partial.is_dir();
-        let dir = if is_partial { &partial } else { &self.dir };
+        let dir = &records_in(&self.dir);
         let paths = write_report(dir)?;
         for warning in &paths.warnings {
             warn(warning);

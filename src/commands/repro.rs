@@ -5,6 +5,7 @@ use super::output::{OutputArguments, print, print_json, tell};
 use super::signals;
 use anyhow::{Result, anyhow};
 use clap::Args;
+use raystone::config::Shard;
 use raystone::gpu::{AdapterChoice, GpuError, is_software};
 use raystone::report::{html, markdown, write_file, write_page};
 use raystone::repro::claim::Row;
@@ -36,9 +37,9 @@ pub struct Repro {
     /// Run again what the folder holds whole; otherwise a run goes on where an earlier one ended
     #[arg(long)]
     force: bool,
-    /// Run the I-th of N shares of the tables (I from 0) and write no page; a run without it then reads them all
-    #[arg(long, value_name = "I/N", value_parser = share)]
-    shard: Option<[usize; 2]>,
+    /// Run one of N shares of the tables, as 3/8, and write no page; a run without it then reads them all
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
     /// Run nothing: write the pages from the records that are there
     #[arg(long, conflicts_with = "force")]
     pages: bool,
@@ -47,14 +48,6 @@ pub struct Repro {
     adapter: Option<AdapterChoice>,
     #[command(flatten)]
     output: OutputArguments,
-}
-
-fn share(text: &str) -> Result<[usize; 2], String> {
-    let numbers = text.split_once('/').map(|(i, n)| (i.parse(), n.parse()));
-    match numbers {
-        Some((Ok(i), Ok(n))) if i < n => Ok([i, n]),
-        _ => Err("write I/N with I below N, for instance 0/4".to_owned()),
-    }
 }
 
 impl Repro {
@@ -93,7 +86,8 @@ impl Repro {
         signals::watch(options.interrupt.clone())?;
         let (mut tables, mut failed) = (Vec::new(), Vec::new());
         for (index, source) in sources.iter().enumerate() {
-            let mine = self.shard.is_none_or(|[i, n]| index % n == i);
+            let is_its = |shard: Shard| index % shard.of == shard.number - 1;
+            let mine = self.shard.is_none_or(is_its);
             let found = match self.pages || !mine {
                 true => recorded(source, &settings, &catalogue).map_err(ReproError::from),
                 false => {

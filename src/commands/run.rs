@@ -7,9 +7,10 @@ use super::report::findings;
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Cell, Experiment, Plan, Shard};
+use raystone::config::{Experiment, Plan, Shard};
 use raystone::image::FileFormat;
-use raystone::measure::record::{Body, Line, read_records};
+use raystone::measure::record::read_records;
+use raystone::report::data::RunData;
 use raystone::report::{failed_checks, write_report};
 use raystone::run::{
     Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
@@ -217,11 +218,12 @@ fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
 fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
     let lines = read_records(&summary.out)?.lines;
     let failed_checks = failed_checks(&lines);
+    let data = RunData::new(&lines);
     if summary.failed == 0 && !summary.bad_input && failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    for failure in lines.iter().filter_map(failure) {
-        output::tell(&format!("failed: {failure}"));
+    for (cell, reason) in data.failures() {
+        output::tell(&format!("failed: {cell}: {reason}"));
     }
     for check in &failed_checks {
         output::tell(&format!("failed: {check}"));
@@ -240,17 +242,6 @@ fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
 
 fn plural(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
-}
-
-/// The cell of a record and why it failed, if it did.
-fn failure(line: &Line) -> Option<String> {
-    let failure = match &line.body {
-        Body::Failed(failed) => return Some(format!("{}: {}", failed.cell, failed.reason)),
-        Body::Structure(record) => record.failure.as_ref()?,
-        Body::Time(record) => record.failure.as_ref()?,
-        _ => return None,
-    };
-    Some(format!("{}: {failure}", Cell::from(&line.key)))
 }
 
 /// `results/NAME`, with a folder for a shard below it, where a name such as `../a b` cannot lead out of `results`.

@@ -30,7 +30,7 @@ pub use experiment::{
     REFERENCE_PARTS, Reference, Rule, Seeds, SppCounts, StopRule, Timing,
 };
 pub use keys::Axis;
-pub use pattern::Pattern;
+pub use pattern::{Pattern, Selector};
 pub use plan::{Plan, Skipped};
 pub use units::Shard;
 

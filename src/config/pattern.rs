@@ -1,6 +1,8 @@
-//! Patterns that choose variants: names with `*`, optionally negated.
+//! Patterns that choose variants (names with `*`, optionally negated), and what `--only` chooses by them.
 
+use super::ConfigError;
 use raystone_core::params::Variant;
+use raystone_core::text::nearest;
 use std::fmt;
 
 /// Chooses variants of one axis: a name, a label, or either with `*` for any text; a leading `!`
@@ -42,6 +44,114 @@ impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
+}
+
+/// What `--only` of any command chooses: patterns by axis. Those of one axis are alternatives, different axes must all fit.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Selector(Vec<(&'static str, Vec<Pattern>)>);
+
+impl Selector {
+    /// Reads texts `axis=pattern`, several of them in one text behind commas: `accel=*bvh,grid(a=1,b=2),scene=cornell-box` has two
+    /// patterns of `accel` and one of `scene`. Commas separate nothing in round brackets, nor before a blank, as labels have them
+    /// (`rays=shadow, reversed`), unless an axis follows.
+    ///
+    /// # Errors
+    /// [`ConfigError::Only`]: a text that begins without an axis, or with none of `axes`.
+    pub fn parse(only: &[String], axes: &[&'static str]) -> Result<Self, ConfigError> {
+        let mut selector = Self::default();
+        for text in only {
+            let mut axis = None;
+            for whole in split_outside_brackets(text, ',') {
+                let part = whole.trim();
+                let fault = |problem| ConfigError::Only {
+                    text: part.to_owned(),
+                    problem,
+                };
+                let named = split_outside_brackets(part, '=').next().unwrap_or_default();
+                let (pattern, continues) = match part.get(named.len() + 1..) {
+                    Some(pattern) => {
+                        axis = Some(known(named.trim(), axes).map_err(fault)?);
+                        (pattern.trim(), false)
+                    }
+                    None if part.is_empty() => continue,
+                    None => (part, whole.starts_with(' ')),
+                };
+                let axis = axis.ok_or_else(|| fault("no `=` in it".to_owned()))?;
+                let patterns = selector.of(axis);
+                match patterns.last_mut() {
+                    Some(last) if continues => last.0 += &format!(", {pattern}"),
+                    _ => patterns.push(Pattern::new(pattern)),
+                }
+            }
+        }
+        Ok(selector)
+    }
+
+    /// The patterns of an axis.
+    fn of(&mut self, axis: &'static str) -> &mut Vec<Pattern> {
+        let place = self.0.iter().position(|(other, _)| *other == axis);
+        let place = place.unwrap_or_else(|| {
+            self.0.push((axis, Vec::new()));
+            self.0.len() - 1
+        });
+        &mut self.0[place].1
+    }
+
+    /// That every pattern fits, or leaves out, one of the variants that there are on its axis.
+    ///
+    /// # Errors
+    /// [`ConfigError::NoMatch`].
+    pub fn check<'v>(
+        &self,
+        variants: impl Fn(&str) -> Vec<&'v Variant>,
+    ) -> Result<(), ConfigError> {
+        for (axis, patterns) in &self.0 {
+            let known = variants(axis);
+            for pattern in patterns {
+                let named = pattern.without_negation();
+                if !known.iter().any(|variant| named.matches(variant)) {
+                    return Err(ConfigError::NoMatch {
+                        at: format!("--only {axis}={pattern}"),
+                        axis,
+                        pattern: pattern.to_string(),
+                        known: known.iter().map(|variant| variant.label.clone()).collect(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether every axis fits: `on` is asked for each whether what it has there fits.
+    pub fn fits(&self, on: impl Fn(&str, &dyn Fn(&Variant) -> bool) -> bool) -> bool {
+        let mut axes = self.0.iter();
+        axes.all(|(axis, patterns)| {
+            on(axis, &|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+/// The axis of this name.
+fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
+    let found = axes.iter().find(|axis| **axis == name).copied();
+    found.ok_or_else(|| {
+        let near = nearest(name, axes.iter().copied()).unwrap_or_default();
+        let all = axes.join(", ");
+        format!("unknown axis `{name}`; did you mean `{near}`? Known: {all}")
+    })
+}
+
+/// Parts between separators, except those in round brackets: labels such as `grid(a=1,b=2)` have them.
+fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
+    let mut depth = 0usize;
+    text.split(move |c| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        c == separator && depth == 0
+    })
 }
 
 /// Whether `text` fits `glob`, in which `*` stands for any text, the empty one included.
@@ -102,5 +212,48 @@ mod tests {
         ] {
             assert_eq!(Pattern::new(text).matches(&variant), fits, "{text}");
         }
+    }
+
+    #[test]
+    fn a_selector_reads_labels_as_they_are_written() {
+        let parsed = |texts: &[&str]| {
+            let texts: Vec<String> = texts.iter().map(|text| (*text).to_owned()).collect();
+            Selector::parse(&texts, &["accel", "scene"])
+        };
+        let same = |texts: &[&str], axes: &[(&'static str, &[&str])]| {
+            let of = |(axis, patterns): &(&'static str, &[&str])| {
+                (*axis, patterns.iter().map(|p| Pattern::new(*p)).collect())
+            };
+            let expected = Selector(axes.iter().map(of).collect());
+            assert_eq!(parsed(texts).expect("a selector"), expected, "{texts:?}");
+        };
+        same(
+            &["accel=g(a=1,b=2), scene=x,,"],
+            &[("accel", &["g(a=1,b=2)"]), ("scene", &["x"])],
+        );
+        same(
+            &["accel=*bvh,g(a=1,b=2),!h"],
+            &[("accel", &["*bvh", "g(a=1,b=2)", "!h"])],
+        );
+        same(
+            &["accel=a,scene=x", "accel=b"],
+            &[("accel", &["a", "b"]), ("scene", &["x"])],
+        );
+        same(&["scene=a b=c"], &[("scene", &["a b=c"])]);
+        same(
+            &["scene=a, b, accel=g"],
+            &[("scene", &["a, b"]), ("accel", &["g"])],
+        );
+        same(&[""], &[]);
+        for (wrong, told) in [
+            ("g(a=1)", "no `=`"),
+            ("acel=bvh", "did you mean `accel`"),
+            ("accel=a,scne=b", "unknown axis `scne`"),
+        ] {
+            let error = parsed(&[wrong]).expect_err(wrong).to_string();
+            assert!(error.contains(told), "{error}");
+        }
+        // What a second text is of is said in it.
+        assert!(parsed(&["accel=a", "b"]).is_err());
     }
 }

@@ -8,8 +8,9 @@ use super::ConfigError;
 use super::cells::{Cell, NO_PEER, is_compaction};
 use super::experiment::Experiment;
 use super::keys::Axis;
+use super::pattern::Selector;
 use super::product::{
-    Filter, Point, asked_once, check_size, excluded, included, product, refused, shared, unmet,
+    Point, asked_once, check_size, excluded, filter, included, product, refused, shared, unmet,
 };
 use raystone_core::params::Variant;
 use std::collections::HashSet;
@@ -56,8 +57,7 @@ pub struct Plan {
 impl Plan {
     /// Expands the axes of `experiment` into cells, without its excludes.
     ///
-    /// `only` holds filters `axis=pattern`, several of them in one text behind commas; patterns of
-    /// one axis are alternatives, different axes must all fit. `is_randomised` says of a sequence
+    /// `only` holds filters as [`Selector`] reads them. `is_randomised` says of a sequence
     /// and a decorrelation whether each seed gives another image (only then are replicates needed),
     /// or why the two make no sense together: such pairs are left out with the reason.
     ///
@@ -78,7 +78,7 @@ impl Plan {
         }
         let axes = &experiment.axes;
         check_size(experiment)?;
-        let filter = Filter::parse(only, axes)?;
+        let filter = filter(only, axes)?;
         let variants = shared(axes);
         let is_randomised = asked_once(is_randomised);
         let full = product(&variants, &Cell::FULL);
@@ -271,8 +271,8 @@ impl Plan {
 }
 
 /// Whether a point passes the filters and no exclude takes it out.
-fn is_wanted(experiment: &Experiment, filter: &Filter, point: &Point) -> bool {
-    filter.fits(point) && experiment.keeps(point)
+fn is_wanted(experiment: &Experiment, filter: &Selector, point: &Point) -> bool {
+    point.fits(filter) && experiment.keeps(point)
 }
 
 /// The variants of an axis that some of these cells need.

@@ -6,10 +6,9 @@ use super::cells::Cell;
 use super::error::Place;
 use super::experiment::{Axes, CellSet, Condition, Experiment};
 use super::keys::Axis;
-use super::pattern::Pattern;
+use super::pattern::Selector;
 use super::plan::Skipped;
 use raystone_core::params::Variant;
-use raystone_core::text::nearest;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -119,7 +118,7 @@ pub(super) fn excluded(
     exclude: &CellSet,
     experiment: &Experiment,
     full: &[Point],
-    filter: &Filter,
+    filter: &Selector,
 ) -> Result<Option<Skipped>, ConfigError> {
     let covered = full.iter().filter(|point| exclude.covers(point));
     let covered: Vec<_> = covered.collect();
@@ -131,7 +130,7 @@ pub(super) fn excluded(
         });
     }
     let includes = &experiment.includes;
-    let is_out = |point: &&&Point| filter.fits(point) && !includes.iter().any(|i| i.touches(point));
+    let is_out = |point: &&&Point| point.fits(filter) && !includes.iter().any(|i| i.touches(point));
     let cells = covered.iter().filter(is_out).count();
     Ok((cells > 0).then(|| Skipped {
         cell: exclude.to_string(),
@@ -153,9 +152,9 @@ pub(super) fn included(include: &CellSet, full: &[Point]) -> Result<(), ConfigEr
 }
 
 /// What conditions of variants take out of the filtered product.
-pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Filter) -> Vec<Skipped> {
+pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Selector) -> Vec<Skipped> {
     let skipped = experiment.conditions.iter().filter_map(|condition| {
-        let is_out = |point: &&Point| filter.fits(point) && !condition.allows(point);
+        let is_out = |point: &&Point| point.fits(filter) && !condition.allows(point);
         let cells = full.iter().filter(is_out).count();
         let sets: Vec<String> = condition.cells.iter().map(CellSet::to_string).collect();
         (cells > 0).then(|| Skipped {
@@ -220,77 +219,21 @@ impl Experiment {
     }
 }
 
-/// What `--only` asks for.
-pub(super) struct Filter(Vec<(Axis, Vec<Pattern>)>);
+/// What `--only` asks for: each pattern fits a variant of the experiment.
+pub(super) fn filter(only: &[String], axes: &Axes) -> Result<Selector, ConfigError> {
+    let filter = Selector::parse(only, &Axis::ALL.map(Axis::name))?;
+    filter.check(|axis| {
+        Axis::from_name(axis).map_or_else(Vec::new, |axis| axes[axis].iter().collect())
+    })?;
+    Ok(filter)
+}
 
-impl Filter {
-    pub(crate) fn parse(only: &[String], axes: &Axes) -> Result<Self, ConfigError> {
-        let mut filter: Vec<(Axis, Vec<Pattern>)> = Vec::new();
-        for text in only.iter().flat_map(|text| split_outside_brackets(text)) {
-            let fault = |problem: String| ConfigError::Only {
-                text: text.to_owned(),
-                problem,
-            };
-            let (name, pattern) = text
-                .split_once('=')
-                .ok_or_else(|| fault("no `=` in it".to_owned()))?;
-            let name = name.trim();
-            let axis = Axis::from_name(name).ok_or_else(|| {
-                let known = Axis::ALL.map(Axis::name);
-                let near = nearest(name, known).unwrap_or_default();
-                fault(format!(
-                    "unknown axis `{name}`; did you mean `{near}`? Known: {}",
-                    known.join(", ")
-                ))
-            })?;
-            let pattern = Pattern::new(pattern.trim());
-            let variants = &axes[axis];
-            if !variants.iter().any(|variant| pattern.matches(variant)) {
-                return Err(ConfigError::NoMatch {
-                    at: format!("--only {text}"),
-                    axis: axis.name(),
-                    pattern: pattern.to_string(),
-                    known: variants.iter().map(|v| v.label.clone()).collect(),
-                });
-            }
-            match filter.iter_mut().find(|(other, _)| *other == axis) {
-                Some((_, patterns)) => patterns.push(pattern),
-                None => filter.push((axis, vec![pattern])),
-            }
-        }
-        Ok(Self(filter))
-    }
-
+impl Point<'_> {
     /// Whether the point fits on every filtered axis that it has.
-    pub(crate) fn fits(&self, point: &Point) -> bool {
-        self.0.iter().all(|(axis, patterns)| {
-            let variant = point.get(*axis);
-            variant.is_none_or(|variant| patterns.iter().any(|p| p.matches(variant)))
+    pub(super) fn fits(&self, filter: &Selector) -> bool {
+        filter.fits(|axis, fits| {
+            let variant = Axis::from_name(axis).and_then(|axis| self.get(axis));
+            variant.is_none_or(fits)
         })
-    }
-}
-
-/// Parts between commas, except commas in round brackets: labels such as `grid(a=1,b=2)` have them.
-fn split_outside_brackets(text: &str) -> impl Iterator<Item = &str> {
-    let mut depth = 0;
-    let parts = text.split(move |c| {
-        match c {
-            '(' => depth += 1,
-            ')' => depth -= 1,
-            _ => {}
-        }
-        c == ',' && depth == 0
-    });
-    parts.map(str::trim).filter(|part| !part.is_empty())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::split_outside_brackets;
-
-    #[test]
-    fn commas_in_brackets_do_not_separate() {
-        let parts: Vec<_> = split_outside_brackets("accel=g(a=1,b=2), scene=x,,").collect();
-        assert_eq!(parts, ["accel=g(a=1,b=2)", "scene=x"]);
     }
 }

@@ -35,17 +35,20 @@ impl FromStr for Shard {
 
     /// `3/8`: the third of eight.
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text
-            .split_once('/')
-            .and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
-        match numbers {
-            Some((number, of)) if (1..=of).contains(&number) && of <= MOST_SHARDS => {
-                Ok(Self { number, of })
-            }
-            _ => Err(format!(
-                "`{text}` is no shard: write K/N with 1 ≤ K ≤ N ≤ {MOST_SHARDS}, as in 3/8"
-            )),
-        }
+        let numbers = text.split_once('/');
+        let numbers = numbers.and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+        let shard = numbers.map(|(number, of)| Self { number, of });
+        // No sign, no blank and no leading zero.
+        let is_sound = |shard: &Self| {
+            (1..=shard.of).contains(&shard.number)
+                && shard.of <= MOST_SHARDS
+                && shard.to_string() == text
+        };
+        shard.filter(is_sound).ok_or_else(|| {
+            format!(
+                "`{text}` is no shard: write K/N with 1 ≤ K ≤ N ≤ {MOST_SHARDS}, as in 3/8 for the third of eight"
+            )
+        })
     }
 }
 
@@ -64,7 +67,21 @@ mod tests {
         let shard = |text: &str| text.parse::<Shard>();
         assert_eq!(shard("3/8"), Ok(Shard { number: 3, of: 8 }));
         assert_eq!(shard("1/1").unwrap().to_string(), "1/1");
-        for wrong in ["0/8", "9/8", "3", "/", "3/0", "-1/2", "1/99999999", "a/b"] {
+        for wrong in [
+            "0/8",
+            "9/8",
+            "3",
+            "/",
+            "3/0",
+            "-1/2",
+            "1/99999999",
+            "a/b",
+            "+1/2",
+            " 1/2",
+            "1 /2",
+            "01/2",
+            "1/2/3",
+        ] {
             assert!(shard(wrong).is_err(), "{wrong}");
         }
     }

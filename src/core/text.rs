@@ -1,4 +1,7 @@
-//! Texts that all parts deal in: what files of text hold, content hashes, and the known name nearest to a misspelt one.
+//! Texts that all parts deal in: what files of text hold, how texts stand in other languages, names of files, content hashes, and the known
+//! name nearest to a misspelt one.
+
+pub mod escape;
 
 /// Bytes that are no text in UTF-8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,6 +96,23 @@ pub fn shell_word(text: &str) -> String {
         true => text.to_owned(),
         false => format!("'{}'", text.replace('\'', "'\\''")),
     }
+}
+
+/// Longest readable part of a file's name, characters.
+const SLUG_CHARACTERS: usize = 80;
+
+/// A file name for what `parts` name: readable, and told apart from others by a hash, also where case
+/// is ignored or the readable part is cut.
+pub fn slug(parts: &[&str]) -> String {
+    let plain = |c: char| match c {
+        '.' => '.',
+        c if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
+        _ => '-',
+    };
+    let text = parts.join("-");
+    let readable: String = text.chars().take(SLUG_CHARACTERS).map(plain).collect();
+    let hash = blake3::hash(parts.join("\0").as_bytes()).to_hex();
+    format!("{readable}-{}", &hash[..10])
 }
 
 /// Characters of names that are compared: the time and the memory that it takes are their product.

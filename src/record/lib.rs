@@ -13,6 +13,7 @@ mod key;
 mod old;
 mod paths;
 mod peer;
+mod pictures;
 mod read;
 mod reading;
 pub mod replicates;
@@ -29,6 +30,7 @@ pub use error::*;
 pub use key::{Key, axis};
 pub use paths::PathsRecord;
 pub use peer::{PeerRecord, PeerTiming};
+pub use pictures::{IMAGE_AXES, Pictures, SPREAD};
 pub use read::{
     PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
     records_file, text_of,

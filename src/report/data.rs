@@ -3,11 +3,12 @@
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
+use raystone_core::params::Variant;
 use raystone_record::figure::{EPO, FIGURES, Figure};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 
 /// Everything a run recorded.
@@ -33,8 +34,10 @@ pub struct RunData<'a> {
     pub skipped: Vec<&'a SkippedRecord>,
     /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
     pub sittings: BTreeSet<u64>,
-    /// Cells that failed without a record of their own kind.
+    /// What failed without a record of its own kind.
     pub failed: Vec<&'a SkippedRecord>,
+    /// The last word on each cell; empty in old records.
+    pub cells: BTreeMap<&'a str, &'a CellRecord>,
     /// What competitors are called.
     pub names: Names,
     /// Every structure of the run; the index is its look in all plots.
@@ -140,13 +143,16 @@ pub(crate) const SAMPLER_AXES: [&str; 8] = [
     axis::OFFSET,
 ];
 
-/// The key of a line; a structure that ran without the driver's checks has another label.
+/// The key of a line; a structure that ran without the driver's checks has another label, and is chosen by the same name.
 pub(crate) fn competitor(line: &Line) -> Key {
-    let accel = line.key.label(axis::ACCEL);
-    match line.ran.unchecked && !accel.is_empty() {
-        true => (line.key.clone()).with(axis::ACCEL, format!("{accel} (unchecked)")),
-        false => line.key.clone(),
-    }
+    let Some(accel) = line.key.get(axis::ACCEL).filter(|_| line.ran.unchecked) else {
+        return line.key.clone();
+    };
+    let unchecked = Variant {
+        label: format!("{accel} (unchecked)"),
+        ..accel.clone()
+    };
+    line.key.clone().with_variant(axis::ACCEL, &unchecked)
 }
 
 impl<'a> RunData<'a> {
@@ -158,7 +164,10 @@ impl<'a> RunData<'a> {
         };
         for line in lines {
             match &line.body {
-                Body::Run(record) => data.run = Some(record),
+                Body::Run(record) => {
+                    // The ends of runs before are none of this one, which went on with them.
+                    (data.run, data.finished, data.interrupted) = (Some(record), None, None);
+                }
                 Body::Finished(record) => data.finished = Some(record),
                 Body::Interrupted(record) => data.interrupted = Some(record),
                 Body::Warning(record) => data.warnings.push(record),
@@ -191,6 +200,7 @@ impl<'a> RunData<'a> {
                 }
                 Body::Reference(_) | Body::Kernels(_) => {}
                 Body::Cell(record) => {
+                    data.cells.insert(&record.unit, record);
                     if !record.inputs.device.is_empty() {
                         data.sittings.insert(record.run_began_unix_s);
                     }
@@ -385,6 +395,18 @@ impl<'a> RunData<'a> {
     pub(crate) fn measured_by(&self, name: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
         let cells = self.measured.iter().filter(|cell| cell.measurement == name);
         cells.copied().collect()
+    }
+
+    /// What failed, of any kind, each with the reason: what is told once of many cells, and cells by their last word.
+    pub fn failures(&self) -> BTreeMap<&'a str, &'a str> {
+        let cells = self
+            .cells
+            .values()
+            .filter(|cell| cell.outcome == Outcome::Failed);
+        let cells = cells.map(|cell| (cell.unit.as_str(), cell.reason.as_str()));
+        let told = self.failed.iter();
+        let told = told.map(|failed| (failed.cell.as_str(), failed.reason.as_str()));
+        cells.chain(told).collect()
     }
 
     /// Every view with its scene.

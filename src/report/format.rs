@@ -1,5 +1,6 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
+use raystone_core::text::escape::raised;
 use raystone_record::Environment;
 use raystone_record::figure::{Figure, Shown};
 use raystone_record::{Interval, RayClass};
@@ -18,13 +19,6 @@ pub fn significant(value: f64, digits: usize) -> String {
             format!("{}·10{}", mantissa.replace('-', "−"), raised(exponent))
         }
     }
-}
-
-/// An exponent's digits as they stand raised.
-pub fn raised(exponent: &str) -> String {
-    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let digit = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
-    exponent.chars().map(digit).collect()
 }
 
 /// The same in plain characters.

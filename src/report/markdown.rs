@@ -1,6 +1,7 @@
 //! The document as Markdown.
 
 use super::document::*;
+use raystone_core::text::escape::markdown as escape;
 
 /// The summary: everything but the pictures, with plots linked under `plots/`.
 pub fn summary(document: &Document) -> String {
@@ -107,19 +108,6 @@ pub fn table(table: &Table) -> String {
     out + "\n"
 }
 
-/// Text that Markdown shows as it is.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\n' => escaped.push(' '),
-            '\\' | '`' | '*' | '_' | '<' | '>' | '|' | '[' | ']' | '#' => escaped.extend(['\\', c]),
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,7 +118,7 @@ mod tests {
         let failed = TableCell::from("FAILED").toned(Tone::Bad);
         content.rows.push(vec!["x|y<b>".into(), failed]);
         let out = table(&content);
-        assert!(out.ends_with("| x\\|y\\<b\\> | **FAILED** |\n"), "{out}");
+        assert!(out.ends_with("| x\\|y&lt;b&gt; | **FAILED** |\n"), "{out}");
         assert!(block(&Block::Verbatim("a ```` b".into())).starts_with("`````\n"));
     }
 }

@@ -1,6 +1,7 @@
 //! The whole report on synthetic but realistic records.
 
 mod checks;
+mod exports;
 mod fixture;
 mod names;
 mod rendering;
@@ -270,7 +271,7 @@ fn no_winner_and_no_point_where_the_reference_is_too_noisy() {
     let (html, summary) = report("unresolved", &lines);
     assert!(html.contains("Not drawn: 1 point below what the reference can resolve."));
     assert!(
-        summary.contains("\\<0"),
+        summary.contains("&lt;0"),
         "the table says that it is not resolved"
     );
     assert!(!without_pictures(&html).contains("NaN"));

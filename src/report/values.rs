@@ -7,6 +7,7 @@ use super::samplers::{HEAVY_TAILED, Metric};
 use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
+use raystone_core::text::escape::visible;
 use raystone_record::figure::{Figure, figure};
 use raystone_record::{
     BiasRecord, ClassCoherence, ClassTiming, CoherenceRecord, FigureAtCount, Interval, Key,
@@ -517,8 +518,8 @@ pub fn csv(values: &[Value]) -> String {
 /// A name that a spreadsheet would take for a formula has an apostrophe before it.
 fn no_formula(name: &str) -> String {
     match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
-        true => format!("'{}", crate::terminal::shown(name)),
-        false => crate::terminal::shown(name),
+        true => format!("'{}", visible(name)),
+        false => visible(name),
     }
 }
 

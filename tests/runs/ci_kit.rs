@@ -128,6 +128,15 @@ fn a_first_run_becomes_the_baseline() {
 }
 
 #[test]
+fn a_packed_baseline_is_one() {
+    let kit = Kit::new(0, 0, "").with_baseline();
+    let plain = kit.path("base/records.jsonl");
+    fs::rename(&plain, plain.with_added_extension("gz")).expect("renamed");
+    assert_eq!(kit.execute("").status.code(), Some(0));
+    assert_eq!(kit.read("summary"), "verdict\n");
+}
+
+#[test]
 fn one_comment_is_written_and_then_replaced() {
     let kit = Kit::new(0, 1, "").with_baseline();
     assert_eq!(kit.execute("7").status.code(), Some(1));

@@ -558,3 +558,41 @@ fn times_of_another_device_and_cells_of_another_program_are_measured_again() {
     assert_eq!(measured_again(&lines), all);
     assert!(!text_of(&lines).expect("lines").contains("another machine"));
 }
+
+/// The cell ends before its figures are written, and the check of the run is made from records.
+#[test]
+fn an_image_that_is_not_finite_fails_the_check_of_the_run_and_of_joined_ones() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mine = folder.path().join("mine");
+    fs::create_dir_all(mine.join("integrator")).expect("a folder");
+    let library = raystone::gpu::KernelLibrary::default();
+    let good = library.text("integrator/primary").expect("a kernel");
+    let (before, nan) = ("* abs(", "* bitcast<f32>(0x7fc00000u | pixel.x) * abs(");
+    assert_eq!(good.matches(before).count(), 1);
+    let file = mine.join("integrator/primary.wesl");
+    fs::write(file, good.replace(before, nan)).expect("a kernel");
+    let kernels = format!("axes.kernels = [{:?}]", mine.display().to_string());
+    let text = experiment(&[
+        &kernels,
+        "axes.accel = ['bvh']",
+        "axes.sequence = ['sobol']",
+    ]);
+    let out = folder.path().join("out");
+    let (summary, lines) = resume(&text, &out);
+    assert!(summary.failed > 0);
+    let is_told = |lines: &[Line]| {
+        let failed = raystone::report::failed_checks(lines);
+        let mut finite = failed
+            .iter()
+            .filter(|c| c.starts_with("Every pixel finite: "));
+        assert!(finite.any(|check| check.contains("sobol")), "{failed:?}");
+    };
+    is_told(&lines);
+    let page = raystone::report::write_report(&out).expect("a report").html;
+    let page = fs::read_to_string(page).expect("a page");
+    assert!(page.contains("NaN or infinite pixels"));
+    let together = folder.path().join("joined");
+    let merged = joined(&[out], &together).expect("a folder");
+    assert!(merged.incomplete, "{merged:?}");
+    is_told(&records(&together));
+}

@@ -66,7 +66,7 @@ pub(super) fn by_tile(
                 image: image.clone(),
             };
             add_error(session, cell, yardstick, record, &snapshot, None)?;
-            check_finite(record)?;
+            check_finite(session, cell, record, line)?;
         }
     }
     let spp = mean_samples(tiles, &needed, done);

@@ -1,11 +1,11 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::adaptive;
-use super::images::{self, Estimator, IMAGE_AXES, attributes, sampler_label, write_spread};
+use super::images::{self, Estimator, attributes, sampler_label, write_spread};
 use super::measurement::Measurement;
 use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
-use super::session::{Session, content_hash};
+use super::session::{Session, content_hash, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
 use super::{Cost, Fault, RunError, Work};
@@ -15,7 +15,7 @@ use raystone_config::{Axis, Cell, Experiment, Plan, StopRule};
 use raystone_gpu::GpuError;
 use raystone_image::{Image, Picture, tone_map, viridis};
 use raystone_record::{
-    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Outcome, Ran, SpectrumRecord,
+    BiasRecord, Body, ErrorAtSpp, ErrorRecord, IMAGE_AXES, Key, Line, Outcome, Ran, SpectrumRecord,
 };
 use raystone_render::{Renderer, Snapshot, rounding_bound};
 use raystone_stats::bias::{BiasOptions, BiasVerdict, check_bias};
@@ -336,7 +336,7 @@ fn all_samples(
         }
         let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
         draw(session, cell, yardstick, &mut record, last)?;
-        check_finite(&record)?;
+        check_finite(session, cell, &record, line)?;
         session.recorder.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.add(replicate_s(session, cell));
@@ -380,7 +380,7 @@ fn until_met(
                 &snapshot,
                 Some(&mut pixels),
             )?;
-            check_finite(record)?;
+            check_finite(session, cell, record, line)?;
             match last.get_mut(index) {
                 Some(place) => *place = snapshot,
                 None => last.push(snapshot),
@@ -425,16 +425,25 @@ fn further_samples(
     Ok(Snapshot { spp, image })
 }
 
-pub(super) fn check_finite(record: &ErrorRecord) -> Result<(), String> {
-    match record.non_finite_pixels {
-        0 => Ok(()),
-        count => {
-            let replicate = record.replicate;
-            Err(format!(
-                "replicate {replicate} has {count} pixels that are not finite"
-            ))
-        }
+/// Fails a cell with an image that is not finite everywhere. The replicate is recorded with it, without figures: the checks of a run are
+/// made from records.
+pub(super) fn check_finite(
+    session: &Session,
+    cell: &Cell,
+    record: &ErrorRecord,
+    line: &impl Fn(Body) -> Line,
+) -> Result<(), Fault> {
+    let (replicate, count) = (record.replicate, record.non_finite_pixels);
+    if count == 0 {
+        return Ok(());
     }
+    let reason = format!("replicate {replicate} has {count} pixels that are not finite");
+    let found = line(Body::Error(ErrorRecord {
+        errors: Vec::new(),
+        ..record.clone()
+    }));
+    session.recorder.write(&found.hashed(failure_hash(&cell.to_string(), &reason)))?;
+    Err(reason.into())
 }
 
 /// The spectra of all replicates, at the highest number of samples.

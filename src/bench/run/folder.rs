@@ -8,6 +8,7 @@
 
 use super::RunError;
 use raystone_core::atomic::write_atomic;
+use raystone_core::text::slug;
 use raystone_record::{
     Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, STRESS_FILE, read_records,
     records_file, text_of,
@@ -145,7 +146,7 @@ impl Folder {
         if !earlier.is_empty() && is_left_over {
             // Both parts in one place before anything is removed: whenever this run ends, nothing is lost.
             keep(out, &earlier).map_err(failed(out))?;
-        } else if is_left_over && !is_there(&records) {
+        } else if is_left_over && !is_there(&records_file(out)) {
             // What a killed run measured is all there is: it is kept until the new results are whole.
             promote(out).map_err(failed(out))?;
         }
@@ -164,7 +165,7 @@ impl Folder {
         Ok(Self {
             images,
             earlier: Mutex::new(earlier),
-            replaces: existing != Existing::Resume && is_there(&records),
+            replaces: existing != Existing::Resume && is_there(&records_file(out)),
             start: Instant::now(),
             records: Mutex::new(Records {
                 file: file.map_err(failed(&path))?,
@@ -271,10 +272,8 @@ impl Folder {
 
     fn commit(&self, records: &mut Records) -> io::Result<()> {
         let target = self.out.join(RECORDS_FILE);
-        let earlier = match fs::symlink_metadata(&target).is_ok_and(|meta| meta.is_file()) {
-            true => fs::read(&target)?,
-            false => Vec::new(),
-        };
+        let results = records_file(&self.out);
+        let earlier = text_in(&results, &self.out)?;
         fs::create_dir_all(&self.out)?;
         let partial = self.out.join(PARTIAL);
         let moved = fs::rename(partial.join(&self.images), self.out.join(&self.images))
@@ -290,18 +289,22 @@ impl Folder {
         // could not be moved, which keep the folder.
         let _ = remove(&partial.join(RECORDS_FILE));
         let _ = fs::remove_dir(&partial);
-        let _ = self.remove_images(&earlier, &fs::read(&target).unwrap_or_default());
+        // Packed results were read, or are replaced.
+        if results != target {
+            let _ = remove(&results);
+        }
+        let now = text_in(&target, &self.out).unwrap_or_default();
+        let _ = self.remove_images(&earlier, &now);
         Ok(())
     }
 
     /// Removes the images of the earlier results: the folders that their records name, and those of now do not.
-    fn remove_images(&self, earlier: &[u8], now: &[u8]) -> io::Result<()> {
-        let [earlier, now] = [earlier, now].map(String::from_utf8_lossy);
+    fn remove_images(&self, earlier: &str, now: &str) -> io::Result<()> {
         for entry in fs::read_dir(&self.out)? {
             let name = entry?.file_name().to_string_lossy().into_owned();
             let is_ours = name.starts_with(IMAGES) && name != self.images;
             let is_in = |records: &str| records.contains(&format!("\"{name}/"));
-            if is_ours && is_in(&earlier) && !is_in(&now) {
+            if is_ours && is_in(earlier) && !is_in(now) {
                 remove(&self.out.join(name))?;
             }
         }
@@ -394,6 +397,19 @@ fn is_there(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok()
 }
 
+/// The text of the results of `out`, empty where there are none. Packed ones that cannot be read have none.
+fn text_in(results: &Path, out: &Path) -> io::Result<String> {
+    let is_file = fs::symlink_metadata(results).is_ok_and(|meta| meta.is_file());
+    Ok(match results.ends_with(RECORDS_FILE) {
+        _ if !is_file => String::new(),
+        true => String::from_utf8_lossy(&fs::read(results)?).into_owned(),
+        false => {
+            let records = read_records(out).map(|records| text_of(&records.lines));
+            records.ok().and_then(Result::ok).unwrap_or_default()
+        }
+    })
+}
+
 /// Removes a file, a link or a whole folder, if there is one; links in it are not followed.
 fn remove(path: &Path) -> io::Result<()> {
     let removed = match fs::symlink_metadata(path) {
@@ -423,6 +439,15 @@ fn promote_images(out: &Path) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// The folder with the records of a run: those that it left in `partial/` where it goes on or was killed before it had results.
+pub fn records_in(dir: &Path) -> PathBuf {
+    let partial = dir.join(PARTIAL);
+    match !is_there(&records_file(dir)) && partial.is_dir() {
+        true => partial,
+        false => dir.to_owned(),
+    }
 }
 
 /// The lines of the run that a folder holds, and behind them those that a killed run left.
@@ -485,23 +510,6 @@ fn lock(out: &Path) -> Result<Option<File>, Refusal> {
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => Ok(None),
         Err(TryLockError::Error(error)) => Err(failed(error)),
     }
-}
-
-/// Longest readable part of an image's name, characters.
-const SLUG_CHARACTERS: usize = 80;
-
-/// A file name for what `parts` name: readable, and told apart from others by a hash, also where case
-/// is ignored or the readable part is cut.
-fn slug(parts: &[&str]) -> String {
-    let plain = |c: char| match c {
-        '.' => '.',
-        c if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
-        _ => '-',
-    };
-    let text = parts.join("-");
-    let readable: String = text.chars().take(SLUG_CHARACTERS).map(plain).collect();
-    let hash = blake3::hash(parts.join("\0").as_bytes()).to_hex();
-    format!("{readable}-{}", &hash[..10])
 }
 
 #[cfg(test)]

@@ -176,3 +176,35 @@ fn a_full_disk_is_told_with_the_file_and_leaves_whole_lines() {
     folder.finish().unwrap();
     assert_eq!(read(dir.path()), "first\nthird\n");
 }
+
+/// Bytes that begin otherwise than packed ones are read as they are.
+#[test]
+fn packed_results_are_kept_and_replaced_as_others_are() {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, packed) = (dir.path(), dir.path().join("records.jsonl.gz"));
+    let line =
+        r#"{"schema":"raystone/2","body":{"kind":"skipped","cell":"images/heat","reason":"b"}}"#;
+    fs::write(&packed, format!("{line}\n")).unwrap();
+    fs::create_dir(out.join(IMAGES)).unwrap();
+    assert!(Folder::open(out, Existing::Refuse, false).is_err());
+    // A run that is interrupted, and the next one, which is killed.
+    let handle = Interrupt::default();
+    for text in ["first", "second"] {
+        let folder = Arc::new(Folder::open(out, Existing::Replace, false).unwrap());
+        handle.begin(&folder);
+        write(&folder, text);
+        let kept = Interrupted::Kept(out.join(PARTIAL));
+        assert!(text == "second" || handle.now("SIGINT") == kept);
+        assert!(packed.exists() && !out.join(RECORDS_FILE).exists());
+    }
+    let third = Folder::open(out, Existing::Replace, false).unwrap();
+    write(&third, "third");
+    third.finish().unwrap();
+    assert_eq!(read(out), "third\n");
+    assert!(!packed.exists() && !out.join(IMAGES).exists());
+    // What is resumed is not lost.
+    fs::rename(out.join(RECORDS_FILE), &packed).unwrap();
+    fs::write(&packed, format!("{line}\n")).unwrap();
+    let resumed = Folder::open(out, Existing::Resume, false).unwrap();
+    assert_eq!(resumed.take_earlier().len(), 1);
+}

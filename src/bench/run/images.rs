@@ -10,6 +10,7 @@ use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
 use raystone_core::program::Program;
 use raystone_image::{Attribute, Image};
+use raystone_record::{IMAGE_AXES, SPREAD};
 use raystone_render::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
 use raystone_sampling::Sampler;
 
@@ -51,14 +52,6 @@ pub(super) fn attributes(
         .collect()
 }
 
-/// The axes that tell the images of samplers apart.
-pub(super) const IMAGE_AXES: [Axis; 4] = [
-    Axis::Scene,
-    Axis::Integrator,
-    Axis::Sequence,
-    Axis::Decorrelation,
-];
-
 /// Linear images of what all replicates say together, if the run was asked for images: their mean, and the
 /// variance of one of them, by pixel and channel.
 pub(super) fn write_spread(
@@ -81,9 +74,10 @@ pub(super) fn write_spread(
         seeds.join(" "),
     );
     let mean = Image::mean_of(replicates).map_err(|e| e.to_string())?;
-    session.linear("mean", &labels, &mean, &about)?;
     let variance = Image::variance_of(replicates).map_err(|e| e.to_string())?;
-    session.linear("variance", &labels, &variance, &about)?;
+    for (kind, image) in SPREAD.into_iter().zip([mean, variance]) {
+        session.linear(kind, &labels, &image, &about)?;
+    }
     Ok(())
 }
 

@@ -1,5 +1,6 @@
 //! What the records of a folder hold of the plan that they were made by: which cells are done, which are missing, and whether they still hold.
 
+use super::folder::records_in;
 use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
 use super::resume::Earlier;
@@ -82,9 +83,7 @@ impl Inventory {
     /// # Errors
     /// Records that cannot be read, without a first line, or of an experiment that this program does not know.
     pub fn read(dir: &Path, registries: &Registries) -> Result<Self, RunError> {
-        let partial = dir.join(raystone_record::PARTIAL);
-        let is_partial = !records_file(dir).exists() && partial.is_dir();
-        let dir = if is_partial { &partial } else { dir };
+        let dir = &records_in(dir);
         let fault = |error: RecordError| RunError::Input(error.to_string());
         let records = read_records(dir).map_err(fault)?;
         let mut runs = records

@@ -3,14 +3,16 @@
 //! Of a cell that several folders hold one is taken, after it was compared with the others: contradictions are errors. Figures of clocks are
 //! taken from one device alone. What does not depend on the device (errors, discrepancies, models) comes from any.
 
-use super::folder::lock_folder;
+use super::folder::{lock_folder, records_in};
 use super::inputs::{MadeOf, differing};
 use super::resume::Earlier;
 use super::{Registries, RunError, Unit};
+use raystone_config::Skipped;
 use raystone_core::atomic::write_atomic;
+use raystone_image::FileFormat;
 use raystone_record::{
     Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
-    RunRecord, SkippedRecord, read_records, records_file, text_of,
+    Pictures, RunRecord, SkippedRecord, read_records, records_file, text_of,
 };
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -41,12 +43,14 @@ fn input(text: String) -> RunError {
 
 impl Part {
     fn read(dir: &Path, merged: &mut Merged) -> Result<Self, RunError> {
-        let records = read_records(dir).map_err(|e| input(e.to_string()))?;
-        let dir = dir.to_owned();
+        let dir = records_in(dir);
+        let records = read_records(&dir).map_err(|e| input(e.to_string()))?;
         let told = records.warnings.iter();
         let told = told.map(|warning| format!("{}: {warning}", dir.display()));
         merged.notes.extend(told);
-        let run = (records.lines.iter()).find_map(|line| RunRecord::of(&line.body));
+        // A folder that was resumed with other settings holds what of its earlier runs still holds.
+        let mut runs = records.lines.iter().rev();
+        let run = runs.find_map(|line| RunRecord::of(&line.body));
         let run = run.cloned().ok_or_else(|| {
             let dir = dir.display();
             input(format!(
@@ -60,20 +64,14 @@ impl Part {
         })
     }
 
-    /// Why its run ended early; `None` if it did not.
+    /// Why its last run ended early; `None` if it did not.
     fn unfinished(&self) -> Option<String> {
-        let lines = self.earlier.lines();
-        let ended = lines
-            .iter()
-            .any(|line| matches!(line.body, Body::Finished(_)));
-        let reason = lines
-            .iter()
-            .find_map(|line| InterruptedRecord::of(&line.body));
-        match (ended, reason) {
-            (true, _) => None,
-            (false, Some(record)) => Some(record.reason.clone()),
-            (false, None) => Some("it did not end".to_owned()),
-        }
+        let reason = match &self.earlier.lines().last()?.body {
+            Body::Finished(_) => return None,
+            Body::Interrupted(record) => record.reason.as_str(),
+            _ => "it did not end",
+        };
+        Some(format!("{}: {reason}", self.dir.display()))
     }
 }
 
@@ -104,22 +102,21 @@ pub fn merge(
     let chosen = choose(&parts, &units, device, &mut merged)?;
     check_devices(&parts, &units, &chosen)?;
     let mut lines = Vec::new();
-    let mut pictures = BTreeMap::new();
+    let mut pictures = Carried::default();
     for (part, cells) in parts.iter().zip(&chosen) {
         let own = part.earlier.lines_of(cells);
-        for name in own.iter().flat_map(pictures_of) {
-            pictures.entry(name).or_insert_with(|| part.dir.clone());
-        }
+        own.iter().for_each(|line| pictures.add(line, &part.dir));
         lines.extend(own);
         merged.cells += cells.len();
     }
     lines.extend(told_once(&parts));
-    tell_missing(&units, &chosen, &mut merged);
+    let tally = Tally::new(&units, &chosen);
+    tally.tell(&mut merged);
     lines.push(Line::about_all(Body::Run(RunRecord {
         shard: None,
         ..first.run.clone()
     })));
-    lines.push(Line::about_all(end(&parts)));
+    lines.push(Line::about_all(tally.end(&parts, &plan.skipped)));
     let _lock = lock_folder(out)?;
     write(out, &lines, &pictures, &mut merged)?;
     Ok(merged)
@@ -349,124 +346,154 @@ fn told_once(parts: &[Part]) -> Vec<Line> {
     lines.cloned().collect()
 }
 
-/// Notes the cells of the plan that no folder holds, and those that failed.
-fn tell_missing(units: &[Unit], chosen: &[Vec<CellRecord>], merged: &mut Merged) {
-    let cells = chosen.iter().flatten();
-    let held: BTreeMap<&str, Outcome> = cells.map(|c| (c.unit.as_str(), c.outcome)).collect();
-    let missing = units
-        .iter()
-        .filter(|unit| !held.contains_key(unit.name.as_str()));
-    let missing: Vec<&str> = missing.map(|unit| unit.name.as_str()).collect();
-    let failed = held.iter().filter(|(_, o)| **o == Outcome::Failed);
-    let failed: Vec<&str> = failed.map(|(name, _)| *name).collect();
-    for (what, names) in [("missing", &missing), ("failed", &failed)] {
-        if let [first, others @ ..] = names.as_slice() {
-            let more = match others.len() {
-                0 => String::new(),
-                n => format!(" and {n} more"),
-            };
-            let (cells, are) = match names.len() {
-                1 => ("cell", "is"),
-                _ => ("cells", "are"),
-            };
-            let count = names.len();
-            merged
-                .notes
-                .push(format!("{count} {cells} {are} {what}: {first}{more}"));
-            merged.incomplete = true;
+/// How the cells of a plan ended, by the folders that they are taken of.
+struct Tally<'a> {
+    missing: Vec<&'a str>,
+    failed: Vec<&'a str>,
+    left_out: usize,
+}
+
+impl<'a> Tally<'a> {
+    fn new(units: &'a [Unit], chosen: &[Vec<CellRecord>]) -> Self {
+        let cells = chosen.iter().flatten();
+        let held: HashMap<&str, Outcome> = cells.map(|c| (c.unit.as_str(), c.outcome)).collect();
+        let ended = |outcome: Option<Outcome>| {
+            let names = units.iter().map(|unit| unit.name.as_str());
+            names.filter(move |name| held.get(name).copied() == outcome)
+        };
+        Self {
+            left_out: ended.clone()(Some(Outcome::LeftOut)).count(),
+            failed: ended.clone()(Some(Outcome::Failed)).collect(),
+            missing: ended(None).collect(),
         }
+    }
+
+    /// The cells that no folder holds, and those that failed in all of them, in words.
+    fn faults(&self) -> impl Iterator<Item = String> {
+        let faults = [("missing", &self.missing), ("failed", &self.failed)].into_iter();
+        faults.filter_map(|(what, names)| {
+            let (first, others) = names.split_first()?;
+            Some(match others.len() {
+                0 => format!("1 cell is {what}: {first}"),
+                n => format!("{} cells are {what}: {first} and {n} more", n + 1),
+            })
+        })
+    }
+
+    fn tell(&self, merged: &mut Merged) {
+        let before = merged.notes.len();
+        merged.notes.extend(self.faults());
+        merged.incomplete = merged.notes.len() > before;
+    }
+
+    /// The last line: times are sums over all parts, cells are those of the joined records. Where cells are missing, the run has not ended.
+    fn end(&self, parts: &[Part], skipped: &[Skipped]) -> Body {
+        let mut sum = FinishedRecord {
+            wall_s: 0.0,
+            parts_s: BTreeMap::new(),
+            overhead_s: 0.0,
+            failed: self.failed.len(),
+            skipped: self.left_out + skipped.iter().map(|s| s.cells).sum::<usize>(),
+            load: Default::default(),
+        };
+        for line in parts.iter().flat_map(|part| part.earlier.lines()) {
+            match &line.body {
+                Body::Finished(finished) => {
+                    sum.wall_s += finished.wall_s;
+                    sum.overhead_s += finished.overhead_s;
+                    sum.load = finished.load;
+                    for (name, seconds) in &finished.parts_s {
+                        *sum.parts_s.entry(name.clone()).or_default() += seconds;
+                    }
+                }
+                Body::Interrupted(early) => sum.wall_s += early.wall_s,
+                _ => {}
+            }
+        }
+        if self.missing.is_empty() {
+            return Body::Finished(sum);
+        }
+        let reasons = self.faults().take(1);
+        let reasons = reasons.chain(parts.iter().filter_map(Part::unfinished));
+        Body::Interrupted(InterruptedRecord {
+            reason: reasons.collect::<Vec<_>>().join("; "),
+            wall_s: sum.wall_s,
+        })
     }
 }
 
-/// The last line: sums of all parts, or why one of them ended early.
-fn end(parts: &[Part]) -> Body {
-    let mut sum = FinishedRecord {
-        wall_s: 0.0,
-        parts_s: BTreeMap::new(),
-        overhead_s: 0.0,
-        failed: 0,
-        skipped: 0,
-        load: Default::default(),
-    };
-    for part in parts {
-        let lines = part.earlier.lines().iter();
-        for finished in lines.filter_map(|line| FinishedRecord::of(&line.body)) {
-            sum.wall_s += finished.wall_s;
-            sum.overhead_s += finished.overhead_s;
-            sum.failed += finished.failed;
-            sum.skipped += finished.skipped;
-            sum.load = finished.load;
-            for (name, seconds) in &finished.parts_s {
-                *sum.parts_s.entry(name.clone()).or_default() += seconds;
+/// Files of images, each with the folder that it is taken of.
+#[derive(Default)]
+struct Carried {
+    /// PNG files that records name.
+    shown: BTreeMap<String, PathBuf>,
+    /// What linear images are called that may stand beside them, without the ending.
+    linear: BTreeMap<String, PathBuf>,
+}
+
+impl Carried {
+    fn add(&mut self, line: &Line, dir: &Path) {
+        let of_line = Pictures::of(line);
+        let linear = of_line.linear.into_iter().chain(of_line.spread);
+        for (all, names) in [
+            (&mut self.shown, of_line.shown),
+            (&mut self.linear, linear.collect()),
+        ] {
+            for name in names {
+                all.entry(name).or_insert_with(|| dir.to_owned());
             }
         }
     }
-    let early: Vec<String> = parts
-        .iter()
-        .filter_map(|part| Some(format!("{}: {}", part.dir.display(), part.unfinished()?)))
-        .collect();
-    match early.is_empty() {
-        true => Body::Finished(sum),
-        false => Body::Interrupted(InterruptedRecord {
-            reason: early.join("; "),
-            wall_s: sum.wall_s,
-        }),
+
+    /// Copies all of them; how many are named and not there.
+    fn write(&self, out: &Path) -> Result<usize, RunError> {
+        let linear = self.linear.iter().flat_map(|(stem, dir)| {
+            FileFormat::linear().map(move |format| (format!("{stem}.{}", format.ending), dir))
+        });
+        let linear = linear.filter(|(name, dir)| dir.join(name).is_file());
+        let shown = self.shown.iter().map(|(name, dir)| (name.clone(), dir));
+        let mut absent = 0;
+        for (name, dir) in shown.chain(linear) {
+            let target = out.join(&name);
+            let Ok(bytes) = fs::read(dir.join(&name)) else {
+                absent += 1;
+                continue;
+            };
+            let folder = target.parent().unwrap_or(out);
+            fs::create_dir_all(folder).map_err(|e| unwritten(folder, &e))?;
+            write_atomic(&target, &bytes).map_err(|e| unwritten(&target, &e))?;
+        }
+        Ok(absent)
     }
 }
 
-/// Pictures that a line names: files in a folder of images beside the records, and nothing elsewhere.
-fn pictures_of(line: &Line) -> Vec<String> {
-    let named = match &line.body {
-        Body::Error(record) => vec![&record.image, &record.error_map],
-        Body::Structure(record) => vec![&record.heat_map],
-        Body::Reference(record) => return plain_picture(&record.image).into_iter().collect(),
-        _ => Vec::new(),
-    };
-    let names = named.into_iter().flatten();
-    names.filter_map(|name| plain_picture(name)).collect()
-}
-
-fn plain_picture(name: &str) -> Option<String> {
-    let (folder, file) = name.split_once('/')?;
-    let is_plain = folder.starts_with("images")
-        && !file.is_empty()
-        && !file.starts_with('.')
-        && !file.contains(['/', '\\']);
-    is_plain.then(|| name.to_owned())
+fn unwritten(path: &Path, error: &std::io::Error) -> RunError {
+    input(format!("cannot write {}: {error}", path.display()))
 }
 
 fn write(
     out: &Path,
     lines: &[Line],
-    pictures: &BTreeMap<String, PathBuf>,
+    pictures: &Carried,
     merged: &mut Merged,
 ) -> Result<(), RunError> {
     let records = records_file(out);
-    let failed = |path: &Path, error: std::io::Error| {
-        input(format!("cannot write {}: {error}", path.display()))
-    };
     if fs::symlink_metadata(&records).is_ok() {
         return Err(input(format!(
             "{} holds the results of another run; choose another folder with --out",
             records.display()
         )));
     }
-    let mut absent = 0;
-    for (name, dir) in pictures {
-        let target = out.join(name);
-        let Ok(bytes) = fs::read(dir.join(name)) else {
-            absent += 1;
-            continue;
-        };
-        let folder = target.parent().unwrap_or(out);
-        fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
-        write_atomic(&target, &bytes).map_err(|e| failed(&target, e))?;
-    }
+    let absent = pictures.write(out)?;
     if absent > 0 {
         merged.notes.push(format!(
             "{absent} pictures that the records name are not in their folders"
         ));
     }
     let text = text_of(lines).map_err(|e| input(format!("a record cannot be written: {e}")))?;
-    write_atomic(&records, text.as_bytes()).map_err(|e| failed(&records, e))
+    write_atomic(&records, text.as_bytes()).map_err(|e| unwritten(&records, &e))
 }
+
+#[cfg(test)]
+#[path = "merge_tests.rs"]
+mod tests;

@@ -42,7 +42,7 @@ mod words;
 mod world;
 
 pub use cost::{Cost, Work};
-pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
+pub use folder::{Existing, Interrupt, Interrupted, lock_folder, records_in};
 pub use inputs::place;
 pub use inventory::{Inventory, State};
 pub use kernels::{Kernels, kernel_library};

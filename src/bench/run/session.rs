@@ -143,8 +143,10 @@ impl<'a> Session<'a> {
         reason: String,
     ) -> Result<(), RunError> {
         self.write_failure(about, reason.clone())?;
+        let hash = failure_hash(about, &reason);
         for name in self.ledger.open_names(is_one) {
-            self.close(&name, (Outcome::Failed, &reason), Vec::new(), &[])?;
+            let lines = vec![hash.clone()];
+            self.close(&name, (Outcome::Failed, &reason), lines, &[])?;
         }
         Ok(())
     }
@@ -374,7 +376,7 @@ impl<'a> Session<'a> {
     /// Records a cell that failed without a record of its own kind.
     pub(super) fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.ledger.failed += 1;
-        let hash = cell_hash(&[("failed", cell), ("reason", &reason)]);
+        let hash = failure_hash(cell, &reason);
         let record = SkippedRecord {
             cell: cell.to_owned(),
             reason: reason.clone(),
@@ -464,6 +466,11 @@ impl<'a> Session<'a> {
             Ok(None)
         })
     }
+}
+
+/// Hash of the lines that say why a cell failed.
+pub(super) fn failure_hash(cell: &str, reason: &str) -> String {
+    cell_hash(&[("failed", cell), ("reason", reason)])
 }
 
 /// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else

@@ -4,7 +4,8 @@ use super::judge::Verdict;
 use super::{Comparison, Finding};
 use crate::document::{Table, TableCell, Tone};
 use crate::format;
-use crate::terminal::{Screen, shown};
+use crate::terminal::Screen;
+use raystone_core::text::escape::markdown as escaped;
 use raystone_record::figure::Shown;
 use raystone_record::{Interval, axis};
 use serde_json::{Value, json};
@@ -14,8 +15,12 @@ use std::collections::BTreeSet;
 const MOST_ROWS: usize = 20;
 /// Findings that stay open for the same reason are listed up to this many.
 const MOST_ALIKE: usize = 4;
-/// A comment of GitHub has 65,536 characters at most; details beyond this are counted.
-const MOST_DETAILS: usize = 40_000;
+/// A comment of GitHub has 65,536 characters at most.
+const MOST_OF_COMMENT: usize = 65_536;
+/// What of it the verdict and each note may take.
+const MOST_OF_LINE: usize = 2_000;
+/// What is kept for lines that say how much was cut, and for the mark by which continuous integration finds its comment.
+const RESERVE: usize = 1_000;
 /// Texts of facts are cut to so many characters; the records have them whole.
 const MOST_CHARACTERS: usize = 40;
 
@@ -248,107 +253,149 @@ fn shortened(text: &str) -> String {
     }
 }
 
-/// As a comment: a line of verdict, a short table, everything else folded.
+/// As a comment: a line of verdict, a short table, everything else folded. Where that is more than a comment may hold, the rows at the
+/// end go, those that are the same first, and then notes; what went is counted.
 pub fn markdown(comparison: &Comparison) -> String {
-    let varied = varied(comparison);
     let sign = match comparison.verdict() {
         Verdict::Worse => "❌",
         Verdict::Undecided => "❔",
         _ => "✅",
     };
-    let mut out = format!("### {sign} {}\n", escaped(&verdict_line(comparison)));
-    let notes = comparison
-        .notes
-        .iter()
-        .map(|note| format!("\n> {}\n", escaped(note)));
-    out.extend(notes);
+    let mut comment = Comment {
+        varied: varied(comparison),
+        text: format!("### {sign} {}\n", line(&verdict_line(comparison))),
+        left: MOST_OF_COMMENT - RESERVE,
+    };
+    let end = format!("\n{}\n", of_tests(comparison));
+    comment.left -= comment.text.len() + end.len();
     let decisive = |f: &&Finding| {
         matches!(
             f.verdict,
             Verdict::Worse | Verdict::Better | Verdict::Changed
         )
     };
-    let first: Vec<&Finding> = comparison.findings.iter().filter(decisive).collect();
-    out += &rows(&first[..first.len().min(MOST_ROWS)], &varied);
-    if first.len() > MOST_ROWS {
-        out += &format!("\n… and {} more below.\n", first.len() - MOST_ROWS);
+    let mut first: Vec<&Finding> = comparison.findings.iter().filter(decisive).collect();
+    // What is worse comes before what else was decided, in the order of the findings.
+    first.sort_by_key(|f| f.verdict != Verdict::Worse);
+    let table = comment.rows(&first[..first.len().min(MOST_ROWS)]);
+    comment.notes(&comparison.notes);
+    let kept = comment.table(table);
+    if first.len() > kept {
+        comment.text += &format!("\n… and {} more below.\n", first.len() - kept);
     }
     let others = |f: &&Finding| f.verdict != Verdict::Same && !decisive(f);
     let rest: Vec<&Finding> = first
         .into_iter()
-        .skip(MOST_ROWS)
+        .skip(kept)
         .chain(comparison.findings.iter().filter(others))
         .collect();
-    out += &folded("Open, new and told", &rest, &varied);
+    comment.folded("Open, new and told", &rest);
     let same: Vec<&Finding> = comparison
         .findings
         .iter()
         .filter(|f| f.verdict == Verdict::Same && f.measured.is_some())
         .collect();
-    out += &folded(
+    comment.folded(
         "Known to be the same within the effect that counts, and controls",
         &same,
-        &varied,
     );
-    out + &format!("\n{}\n", of_tests(comparison))
+    comment.text + &end
 }
 
-fn folded(title: &str, findings: &[&Finding], varied: &BTreeSet<String>) -> String {
-    if findings.is_empty() {
-        return String::new();
+/// A text in one line, no longer than that may be.
+fn line(text: &str) -> String {
+    let whole = escaped(text);
+    if whole.len() <= MOST_OF_LINE {
+        return whole;
     }
-    let mut kept = findings.len();
-    let mut text = rows(findings, varied);
-    while text.len() > MOST_DETAILS {
-        kept /= 2;
-        text = rows(&findings[..kept], varied);
-    }
-    let more = match findings.len() - kept {
-        0 => String::new(),
-        n => format!("\n… and {n} more: see the terminal's table or --json.\n"),
-    };
-    format!(
-        "\n<details><summary>{title} ({})</summary>\n{text}{more}\n</details>\n",
-        findings.len()
-    )
+    // No character takes more bytes than its number.
+    let longest = escaped("\u{202e}").len();
+    let kept: String = text.chars().take(MOST_OF_LINE / longest).collect();
+    escaped(&kept) + "…"
 }
 
-fn rows(findings: &[&Finding], varied: &BTreeSet<String>) -> String {
-    if findings.is_empty() {
-        return String::new();
-    }
-    let mut out = "\n| verdict | cell | figure | base → candidate | change [95 %] | why |\n|:---|:---|:---|:---|:---|:---|\n".to_owned();
-    for f in findings {
-        let cells = [
-            f.verdict.word().to_owned(),
-            cell(f, varied),
-            f.figure.heading(),
-            values(f),
-            change(f),
-            f.why.clone(),
-        ];
-        let cells = cells.map(|text| escaped(&text));
-        out += &format!("| {} |\n", cells.join(" | "));
-    }
-    out
+/// A comment that is being written.
+struct Comment {
+    varied: BTreeSet<String>,
+    text: String,
+    /// Bytes that it may still take.
+    left: usize,
 }
 
-/// Text that a page of Markdown shows as it is: no markup, no tags, no mention of a person or an issue.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    // Pages make links of addresses.
-    for c in shown(text).replace("://", ":\u{2060}//").chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '@' => out += "&#64;",
-            '#' => out += "&#35;",
-            '\\' | '`' | '*' | '_' | '|' | '[' | ']' | '~' | '!' | '$' => out.extend(['\\', c]),
-            c => out.push(c),
+const HEAD: &str = "\n| verdict | cell | figure | base → candidate | change [95 %] | why |\n|:---|:---|:---|:---|:---|:---|\n";
+
+impl Comment {
+    /// Takes the room of a text, if there is so much.
+    fn takes(&mut self, text: &str) -> bool {
+        let left = self.left.checked_sub(text.len());
+        self.left = left.unwrap_or(self.left);
+        left.is_some()
+    }
+
+    /// The first of these notes for which there is room.
+    fn notes(&mut self, notes: &[String]) {
+        for (index, note) in notes.iter().enumerate() {
+            let text = format!("\n> {}\n", line(note));
+            if !self.takes(&text) {
+                self.text += &format!("\n> … and {} more notes.\n", notes.len() - index);
+                return;
+            }
+            self.text += &text;
         }
     }
-    out
+
+    /// The rows of the first of these findings, as many as there is room for.
+    fn rows(&mut self, findings: &[&Finding]) -> Vec<String> {
+        if findings.is_empty() || !self.takes(HEAD) {
+            return Vec::new();
+        }
+        let row = |f: &&Finding| {
+            let cells = [
+                f.verdict.word().to_owned(),
+                cell(f, &self.varied),
+                f.figure.heading(),
+                values(f),
+                change(f),
+                f.why.clone(),
+            ];
+            format!("| {} |\n", cells.map(|text| line(&text)).join(" | "))
+        };
+        let rows: Vec<String> = findings.iter().map(row).collect();
+        rows.into_iter().take_while(|row| self.takes(row)).collect()
+    }
+
+    /// Writes rows below their head: how many.
+    fn table(&mut self, rows: Vec<String>) -> usize {
+        if !rows.is_empty() {
+            self.text += HEAD;
+            self.text += &rows.concat();
+        }
+        rows.len()
+    }
+
+    fn folded(&mut self, title: &str, findings: &[&Finding]) {
+        let count = findings.len();
+        let open = format!("\n<details><summary>{title} ({count})</summary>\n");
+        let close = "\n</details>\n";
+        if findings.is_empty() {
+            return;
+        }
+        let rows = match self.takes(&open) && self.takes(close) {
+            true => self.rows(findings),
+            false => Vec::new(),
+        };
+        let more = match count - rows.len() {
+            0 => String::new(),
+            n => format!("\n… and {n} more: see the terminal's table or --json.\n"),
+        };
+        if rows.is_empty() {
+            self.text += &format!("\n{title}: {more}");
+            return;
+        }
+        self.text += &open;
+        self.table(rows);
+        self.text += &(more + close);
+    }
 }
 
 /// For other programs.

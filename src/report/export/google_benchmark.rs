@@ -37,14 +37,13 @@ fn context(source: &Source) -> Json {
     context
 }
 
-/// A repetition for each round. The format wants a time of the processors: where none was measured, it is
-/// that of the wall clock, or of the only clock, and the label says so.
+/// A repetition for each round: `real_time` by the clock that the figure is made of (the adapter's, or else the wall clock),
+/// `cpu_time` that of the processors. The format wants one: where none was measured, it is the real time, and the label says so.
 fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
     let name = name(samples.figure, &samples.key);
-    let (cpu_ms, label) = match (&samples.cpu_ms, &samples.wall_ms) {
-        (cpu, _) if cpu.len() == samples.ms.len() => (cpu, "cpu_time: processors, all threads"),
-        (_, wall) if wall.len() == samples.ms.len() => (wall, "cpu_time: the wall clock"),
-        _ => (&samples.ms, "cpu_time: the same as real_time"),
+    let (cpu_ms, label) = match samples.cpu_ms.len() == samples.ms.len() {
+        true => (&samples.cpu_ms, "cpu_time: processors, all threads"),
+        false => (&samples.ms, "cpu_time: not measured, the same as real_time"),
     };
     let rounds = samples.ms.iter().zip(cpu_ms).enumerate();
     let repetition = |(index, (ms, cpu_ms)): (usize, (&f64, &f64))| {

@@ -3,6 +3,7 @@
 use super::{Exported, Source};
 use crate::data::{Measured, SceneGroup};
 use crate::sections::belief::checks;
+use raystone_core::text::escape::xml as escape;
 use raystone_record::{PathsRecord, Recorded, StructureRecord, Verdict, axis};
 use std::fmt::Write as _;
 
@@ -105,9 +106,9 @@ fn paths(paths: &Recorded<PathsRecord>) -> Case {
 /// Cells without figures, and whether the run came to its end.
 fn cells(source: &Source) -> Suite {
     let data = &source.data;
-    let failed = data.failed.iter().map(|cell| Case {
-        name: cell.cell.clone(),
-        outcome: Outcome::Failed(cell.reason.clone()),
+    let failed = data.failures().into_iter().map(|(name, why)| Case {
+        name: name.to_owned(),
+        outcome: Outcome::Failed(why.to_owned()),
     });
     let skipped = data.skipped.iter().map(|cell| Case {
         name: cell.cell.clone(),
@@ -115,7 +116,7 @@ fn cells(source: &Source) -> Suite {
     });
     let end = match (data.finished, data.interrupted) {
         (Some(_), _) => Outcome::Passed,
-        (None, Some(early)) => Outcome::Failed(format!("ended early by {}", early.reason)),
+        (None, Some(early)) => Outcome::Failed(format!("ended early: {}", early.reason)),
         (None, None) => Outcome::Failed("the records have no last line".into()),
     };
     let name = "the run came to its end".to_owned();
@@ -171,24 +172,4 @@ fn counts<'a>(cases: impl Iterator<Item = &'a Case>) -> String {
         }
     }
     format!(" tests=\"{tests}\" failures=\"{failures}\" errors=\"0\" skipped=\"{skipped}\"")
-}
-
-/// Text for XML 1.0; what it has no way to write (control characters) is shown by its number.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\n' => escaped += "&#10;",
-            '\t' => escaped += "&#9;",
-            '\u{0}'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{fffe}' | '\u{ffff}' => {
-                let _ = write!(escaped, "[U+{:04X}]", u32::from(c));
-            }
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }

@@ -3,6 +3,7 @@
 
 use super::{Exported, Source, tables::tables};
 use crate::document::Table;
+use raystone_core::text::escape::latex as escape;
 
 pub(super) fn write(source: &Source) -> Exported {
     let mut text = "% \\usepackage{booktabs}\n".to_owned();
@@ -31,55 +32,35 @@ fn latex(table: &Table) -> String {
     )
 }
 
-/// Text that LaTeX shows as it is. Brackets and stars are kept from `\\`, which takes them for its arguments; a
-/// character outside of ASCII that these tables do not use is shown by its number.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\\' => escaped += "\\textbackslash{}",
-            '~' => escaped += "\\textasciitilde{}",
-            '^' => escaped += "\\textasciicircum{}",
-            '<' => escaped += "\\textless{}",
-            '>' => escaped += "\\textgreater{}",
-            '|' => escaped += "\\textbar{}",
-            '"' => escaped += "{\\char34}",
-            '\'' => escaped += "\\textquotesingle{}",
-            '`' => escaped += "\\textasciigrave{}",
-            '[' | ']' | '*' | '-' => escaped.extend(['{', c, '}']),
-            '#' | '$' | '%' | '&' | '_' | '{' | '}' => escaped.extend(['\\', c]),
-            ' '..='~' => escaped.push(c),
-            '\n' | '\t' | '\r' => escaped.push(' '),
-            '–' => escaped += "--",
-            '−' => escaped += "$-$",
-            '×' => escaped += "$\\times$",
-            '≤' => escaped += "$\\le$",
-            '≥' => escaped += "$\\ge$",
-            '·' => escaped += "$\\cdot$",
-            '⁻' => escaped += "$^{-}$",
-            'λ' => escaped += "$\\lambda$",
-            'σ' => escaped += "$\\sigma$",
-            'π' => escaped += "$\\pi$",
-            'µ' | 'μ' => escaped += "$\\mu$",
-            '°' => escaped += "$^\\circ$",
-            '’' => escaped += "\\textquoteright{}",
-            c => escaped += &format!("{{[}}U+{:04X}{{]}}", u32::from(c)),
-        }
-    }
-    escaped
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format;
+    use raystone_record::figure::FIGURES;
 
     #[test]
-    fn a_hostile_name_is_shown_and_never_run() {
-        assert_eq!(
-            escape("\\input{/etc/passwd}%$x_1^2&#"),
-            "\\textbackslash{}input\\{/etc/passwd\\}\\%\\$x\\_1\\textasciicircum{}2\\&\\#"
-        );
-        assert_eq!(escape("[1] *"), "{[}1{]} {*}");
-        assert_eq!(escape("中\u{1b}"), "{[}U+4E2D{]}{[}U+001B{]}");
+    fn every_text_of_a_figure_has_a_command() {
+        let mut texts: Vec<String> = Vec::new();
+        for figure in FIGURES {
+            texts.extend([figure.heading(), figure.spread.words().to_owned()]);
+            for exponent in -12..13 {
+                let value = 6.333 * 10f64.powi(exponent);
+                texts.extend([value, -value, 0.0, f64::NAN].map(|v| format::figure(figure, v)));
+            }
+        }
+        for text in texts {
+            let shown = escape(&text);
+            assert!(shown.is_ascii() && !shown.contains("U+"), "{text}: {shown}");
+        }
+    }
+
+    #[test]
+    fn exponents_come_back_from_a_table() {
+        for exponent in (-300..300).filter(|e| !(-3..6).contains(e)) {
+            let text = escape(&format::number(-2.5 * 10f64.powi(exponent)));
+            let back = text.strip_prefix("$-$2.50$\\cdot$10$^{");
+            let back = back.and_then(|rest| rest.strip_suffix("}$"));
+            assert_eq!(back.and_then(|e| e.parse().ok()), Some(exponent), "{text}");
+        }
     }
 }

@@ -15,10 +15,12 @@ pub mod select;
 mod tables;
 
 pub use json::{OUTPUT_SCHEMA, checks_json, values_json};
+pub(crate) use npy::linear as linear_file;
 pub use schema::record_schema;
 
 use crate::data::RunData;
 use crate::values::{self, Reading, Value};
+use raystone_config::ConfigError;
 use raystone_image::ImageError;
 use raystone_record::figure::Better;
 use raystone_record::{Line, RunRecord};
@@ -29,7 +31,9 @@ use std::path::{Path, PathBuf};
 pub struct Source<'a> {
     /// The run's folder.
     pub dir: &'a Path,
-    /// The records, sorted.
+    /// The records.
+    pub lines: &'a [Line],
+    /// The same, sorted.
     pub data: RunData<'a>,
     /// The chosen figures.
     pub values: Vec<Value<'a>>,
@@ -49,6 +53,7 @@ impl<'a> Source<'a> {
         samples.retain(|s| choice.keeps(&s.key, s.figure));
         Ok(Self {
             dir,
+            lines,
             data,
             values,
             samples,
@@ -70,12 +75,21 @@ pub struct Exported {
     pub left_out: Vec<String>,
 }
 
+/// What a format of files made of a run.
+#[derive(Debug, Default, PartialEq)]
+pub struct Files {
+    /// How many there are.
+    pub count: usize,
+    /// What is missing, in words.
+    pub left_out: Vec<String>,
+}
+
 /// How a format is written.
 pub enum Writer {
     /// As one text.
     Text(fn(&Source) -> Exported),
-    /// As files in a folder: how many.
-    Folder(fn(&Source, &Path) -> Result<usize, ExportError>),
+    /// As files in a folder.
+    Folder(fn(&Source, &Path) -> Result<Files, ExportError>),
 }
 
 /// A format.
@@ -136,9 +150,17 @@ pub enum ExportError {
     /// A choice fits nothing.
     #[error("{0}")]
     Choice(String),
+    /// `--only` cannot be read, or fits nothing.
+    #[error(transparent)]
+    Only(#[from] ConfigError),
     /// The run kept no linear images.
-    #[error("{} holds no linear images; `raystone run --images npy` keeps them", .0.display())]
-    NoImages(PathBuf),
+    #[error("{} holds none of the {named} linear images that its records name; `raystone run --images npy` keeps them", dir.display())]
+    NoImages {
+        /// The folder of the run.
+        dir: PathBuf,
+        /// How many images the records name.
+        named: usize,
+    },
     /// A folder cannot be read or made.
     #[error("cannot use the folder {}: {source}", path.display())]
     Folder {

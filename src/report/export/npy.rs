@@ -1,50 +1,70 @@
-//! Linear images as NumPy arrays.
+//! Linear images as NumPy arrays: those that the records name, wherever a run that was resumed, replaced or joined put them.
 
-use super::{ExportError, Source};
+use super::{ExportError, Files, Source};
+use crate::pictures::inside;
 use raystone_image::{FileFormat, read_linear};
+use raystone_record::Pictures;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Folder of linear images below that of a run.
-const IMAGES: &str = "images";
 
 /// Writes every linear image of the run into `out` as `.npy`, one at a time.
 ///
 /// # Errors
 /// No images, a folder that cannot be made, an image that cannot be read or written.
-pub(super) fn write(source: &Source, out: &Path) -> Result<usize, ExportError> {
-    let images = linear_images(&source.dir.join(IMAGES))?;
-    if images.is_empty() {
-        return Err(ExportError::NoImages(source.dir.to_owned()));
+pub(super) fn write(source: &Source, out: &Path) -> Result<Files, ExportError> {
+    let (mut named, mut spread) = (BTreeMap::new(), BTreeMap::new());
+    for line in source.lines {
+        let of_line = Pictures::of(line);
+        // Of two lines on the same image the later one holds.
+        for (all, stems) in [(&mut named, of_line.linear), (&mut spread, of_line.spread)] {
+            all.extend(stems.into_iter().map(|stem| {
+                let file = stem.rsplit('/').next().unwrap_or(&stem).to_owned();
+                (file, linear(source.dir, &stem))
+            }));
+        }
+    }
+    // Means and variances are kept by runs that were asked for images: where there is none, none is missing.
+    if spread.values().any(Option::is_some) {
+        named.append(&mut spread);
+    }
+    let found = || {
+        named
+            .iter()
+            .filter_map(|(stem, at)| Some((stem, at.as_ref()?)))
+    };
+    if found().next().is_none() {
+        let (dir, named) = (source.dir.to_owned(), named.len());
+        return Err(ExportError::NoImages { dir, named });
     }
     std::fs::create_dir_all(out).map_err(|source| ExportError::Folder {
         path: out.to_owned(),
         source,
     })?;
-    for path in &images {
-        let stem = path.file_stem().unwrap_or_default();
+    for (stem, path) in found() {
         let target = out.join(stem).with_added_extension("npy");
         FileFormat::of(&target)?.write(&target, &read_linear(path)?, &[])?;
     }
-    Ok(images.len())
+    let absent: Vec<&str> = (named.iter().filter(|(_, at)| at.is_none()))
+        .map(|(stem, _)| stem.as_str())
+        .collect();
+    let told = (!absent.is_empty()).then(|| {
+        format!(
+            "{} of {} linear images that the records name are not there: {}",
+            absent.len(),
+            named.len(),
+            absent.join(", ")
+        )
+    });
+    Ok(Files {
+        count: found().count(),
+        left_out: told.into_iter().collect(),
+    })
 }
 
-/// Images in a folder whose format keeps linear values, by name; none if there is no such folder.
-fn linear_images(folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    let fault = |source| ExportError::Folder {
-        path: folder.to_owned(),
-        source,
-    };
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let mut images = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(fault)? {
-        let path = entry.map_err(fault)?.path();
-        let is_linear = |format: &FileFormat| path.extension().is_some_and(|e| e == format.ending);
-        if FileFormat::linear().any(is_linear) {
-            images.push(path);
-        }
-    }
-    images.sort();
-    Ok(images)
+/// The file of a linear image of this name.
+pub(crate) fn linear(dir: &Path, stem: &str) -> Option<PathBuf> {
+    let place = |format: &FileFormat| inside(dir, &format!("{stem}.{}", format.ending));
+    FileFormat::linear()
+        .filter_map(place)
+        .find(|path| path.is_file())
 }

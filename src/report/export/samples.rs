@@ -2,7 +2,8 @@
 
 use crate::data::RunData;
 use crate::format;
-use raystone_record::{Key, axis};
+use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
+use raystone_record::{Key, TimeRecord, axis};
 
 /// The rounds of one measurement, milliseconds.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,15 +14,11 @@ pub struct Samples {
     pub figure: &'static str,
     /// By the clock of the adapter where it has one: what the figure is made of.
     pub ms: Vec<f64>,
-    /// By the wall clock; empty where `ms` is that.
-    pub wall_ms: Vec<f64>,
     /// In time of the processors; empty on adapters that work elsewhere.
     pub cpu_ms: Vec<f64>,
-    /// Rays in a round, if they are what is timed.
+    /// Rays that a round traces, if that is what is timed.
     pub rays: Option<u64>,
 }
-
-impl Samples {}
 
 /// All raw times of a run: builds, classes of rays, and full cells. Of what failed its gate there is none.
 pub fn samples(data: &RunData) -> Vec<Samples> {
@@ -32,7 +29,6 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
             key: s.key.clone(),
             figure: "build-ms/v1",
             ms: vec![s.build_ms],
-            wall_ms: Vec::new(),
             cpu_ms: Vec::new(),
             rays: None,
         }));
@@ -41,7 +37,6 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
                 key: (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class)),
                 figure: "mrays-per-s/v1",
                 ms: timing.ms.clone(),
-                wall_ms: timing.wall_ms.clone(),
                 cpu_ms: timing.cpu_ms.clone(),
                 rays: Some(timing.rays as u64),
             })
@@ -51,11 +46,16 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
             key: time.key.clone(),
             figure: "ms-per-spp/v1",
             ms: time.ms.clone(),
-            wall_ms: time.wall_ms.clone(),
-            cpu_ms: Vec::new(),
-            rays: Some(time.rays.values().sum()),
+            cpu_ms: time.cpu_ms.clone(),
+            rays: Some(traced_rays(time.body)),
         }));
     }
     all.retain(|samples| !samples.ms.is_empty());
     all
+}
+
+/// Rays of a render of a full cell: records also count those that were left out for they could change nothing.
+pub(crate) fn traced_rays(time: &TimeRecord) -> u64 {
+    let classes = RAY_COUNT_CLASSES[..TRACED_CLASSES].iter();
+    classes.filter_map(|class| time.rays.get(*class)).sum()
 }

@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use crate::values::Value;
-use raystone_config::Pattern;
+use raystone_config::{Pattern, Selector};
 use raystone_core::params::{Params, Variant};
 use raystone_record::{Key, axis};
 use std::collections::BTreeSet;
@@ -11,33 +11,18 @@ use std::collections::BTreeSet;
 #[derive(Debug, Clone, Default)]
 pub struct Selection {
     figures: Vec<Pattern>,
-    only: Vec<(String, Pattern)>,
+    only: Selector,
 }
 
 impl Selection {
-    /// `figures` are ids, with or without their version, or patterns of them; `only` are texts
-    /// `axis=pattern`, several behind commas: patterns of one axis are alternatives.
+    /// `figures` are ids, with or without their version, or patterns of them; `only` are texts as [`Selector`] reads them.
     ///
     /// # Errors
     /// A text that is no `axis=pattern`, or of an axis that there is not.
     pub fn new(figures: &[String], only: &[String]) -> Result<Self, ExportError> {
-        let parse = |text: &str| {
-            let fault = |why: String| ExportError::Choice(format!("--only {text}: {why}"));
-            let (axis, pattern) = text
-                .split_once('=')
-                .ok_or_else(|| fault("give AXIS=PATTERN".into()))?;
-            match axis::ALL.contains(&axis) {
-                true => Ok((axis.to_owned(), Pattern::new(pattern))),
-                false => Err(fault(format!(
-                    "there is no axis {axis} (known: {})",
-                    axis::ALL.join(", ")
-                ))),
-            }
-        };
-        let only = only.iter().flat_map(|text| text.split(','));
         Ok(Self {
             figures: figures.iter().map(Pattern::new).collect(),
-            only: only.map(parse).collect::<Result<_, _>>()?,
+            only: Selector::parse(only, &axis::ALL)?,
         })
     }
 
@@ -46,22 +31,17 @@ impl Selection {
         self.figures.is_empty()
     }
 
-    /// Whether a figure of this key is chosen.
+    /// Whether a figure of this key is chosen: it has all axes that are asked for.
     pub fn keeps(&self, key: &Key, figure: &str) -> bool {
-        let fits_axis = |axis: &String| {
-            let mut patterns = self.only.iter().filter(|(of, _)| of == axis);
-            let variant = key.get(axis);
-            patterns.any(|(_, pattern)| variant.is_some_and(|variant| pattern.matches(variant)))
-        };
         let is_chosen = |pattern: &Pattern| pattern.matches(&id_variant(figure));
         (self.figures.is_empty() || self.figures.iter().any(is_chosen))
-            && self.only.iter().all(|(axis, _)| fits_axis(axis))
+            && self.only.fits(|axis, fits| key.get(axis).is_some_and(fits))
     }
 
     /// The chosen values.
     ///
     /// # Errors
-    /// A pattern of figures that none of them fits, or no value is left.
+    /// A pattern that no figure or no label fits, or no value is left.
     pub fn of<'a>(&self, values: Vec<Value<'a>>) -> Result<Vec<Value<'a>>, ExportError> {
         for pattern in &self.figures {
             let fits = |value: &Value| pattern.matches(&id_variant(&value.figure.id));
@@ -74,6 +54,12 @@ impl Selection {
                 )));
             }
         }
+        self.only.check(|axis| {
+            let mut known: Vec<_> = values.iter().filter_map(|v| v.key.get(axis)).collect();
+            known.sort_unstable_by_key(|variant| &variant.label);
+            known.dedup_by_key(|variant| &variant.label);
+            known
+        })?;
         let had_any = !values.is_empty();
         let mut values = values;
         values.retain(|value| self.keeps(&value.key, &value.figure.id));

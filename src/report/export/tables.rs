@@ -4,7 +4,6 @@ use super::{Exported, Source};
 use crate::document::Table;
 use crate::markdown;
 use crate::pivot::Rows;
-use crate::terminal::shown;
 use crate::values::{Reading, Value};
 use raystone_record::{Key, axis};
 
@@ -16,9 +15,8 @@ const MOST_COLUMNS: usize = 9;
 pub(super) fn markdown(source: &Source) -> Exported {
     let tables = tables(&source.values);
     let texts: Vec<String> = tables.iter().map(markdown::table).collect();
-    let lines: Vec<String> = texts.join("\n").split('\n').map(shown).collect();
     Exported {
-        text: lines.join("\n"),
+        text: texts.join("\n"),
         left_out: Vec::new(),
     }
 }

@@ -3,6 +3,7 @@
 use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point};
 use super::paint::text_width;
 use crate::format;
+use raystone_core::text::escape::raised;
 
 /// A tick: a gridline, with a label unless that is empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -255,7 +256,7 @@ fn decimal_or_power(tenths: u32, exponent: i32) -> String {
         let decimals = (-last).max(0) as usize;
         return format!("{:.decimals$}", mantissa * 10f64.powi(exponent));
     }
-    let power = format::raised(&exponent.to_string());
+    let power = raised(&exponent.to_string());
     match tenths {
         10 => format!("10{power}"),
         _ => format!("{mantissa}·10{power}"),

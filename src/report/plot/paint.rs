@@ -9,6 +9,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontTransform, register_font};
+use raystone_core::text::escape::xml;
 use std::sync::Once;
 
 /// Width of a text in pixels with the embedded font at [`FONT_PX`].
@@ -84,7 +85,7 @@ pub(crate) fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
 fn spots(drawing: &Drawing, scale: f64) -> String {
     let disc = |Spot { at, text }: &Spot| {
         let [x, y, r] = [at.0, at.1, 9.0].map(|v| v * scale);
-        let text = escaped(text);
+        let text = xml(text);
         format!(
             "<circle cx=\"{x:.0}\" cy=\"{y:.0}\" r=\"{r:.0}\" fill-opacity=\"0\"><title>{text}</title></circle>\n"
         )
@@ -94,11 +95,6 @@ fn spots(drawing: &Drawing, scale: f64) -> String {
         true => discs,
         false => format!("<g class=\"spots\">\n{discs}</g>\n"),
     }
-}
-
-fn escaped(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;");
-    text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Above this height, in CSS pixels, a drawing is mostly legend: its PNG file has its own size, not twice that. Dozens

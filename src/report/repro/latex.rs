@@ -2,6 +2,7 @@
 
 use super::page::{Grid, optional, printed};
 use super::table::Reproduced;
+use raystone_core::text::escape::latex as escape;
 
 /// Every table that has columns.
 pub fn tables(tables: &[Reproduced]) -> String {
@@ -41,39 +42,4 @@ fn tabular(table: &Reproduced, grid: &Grid) -> String {
         text += " \\\\\n";
     }
     text + "\\bottomrule\n\\end{tabular}\n\\end{table}\n"
-}
-
-/// Text that LaTeX shows as it is.
-fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\\' => out += "\\textbackslash{}",
-            '&' | '%' | '$' | '#' | '_' | '{' | '}' => out.extend(['\\', c]),
-            '~' => out += "\\textasciitilde{}",
-            '^' => out += "\\textasciicircum{}",
-            '–' => out += "--",
-            '·' => out += "$\\cdot$",
-            '×' => out += "$\\times$",
-            '√' => out += "$\\surd$",
-            'μ' => out += "$\\mu$",
-            '≥' => out += "$\\geq$",
-            '≤' => out += "$\\leq$",
-            c => out.push(c),
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn what_latex_reads_as_commands_is_shown() {
-        assert_eq!(super::escape("5 % of a_b & c"), "5 \\% of a\\_b \\& c");
-        assert_eq!(
-            super::escape("≥ ≤ – √×μ"),
-            "$\\geq$ $\\leq$ -- $\\surd$$\\times$$\\mu$"
-        );
-        assert_eq!(super::escape("\\x·y"), "\\textbackslash{}x$\\cdot$y");
-    }
 }

@@ -2,9 +2,9 @@
 //! in them, and samplers whose rays were followed from the same pixels share these: a ratio is known better than its sides.
 
 use crate::data::competitor;
+use crate::export::samples::traced_rays;
 use crate::format;
 use crate::values::{ALL_RAYS, Value};
-use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use raystone_record::{
     Body, CellRecord, ClassCoherence, CoherenceRecord, Interval, Key, Line, axis,
 };
@@ -98,8 +98,7 @@ impl Rounds {
             Body::Time(record) => {
                 let per_spp = each(&record.ms, &|ms| ms / f64::from(record.spp));
                 put(&key, "ms-per-spp/v1", "full cells", per_spp);
-                let traced = RAY_COUNT_CLASSES[..TRACED_CLASSES].iter();
-                let rays: u64 = traced.filter_map(|class| record.rays.get(*class)).sum();
+                let rays = traced_rays(record);
                 let rate = each(&record.ms, &|ms| rays as f64 / ms * 1e-3);
                 put(&key, "cell-mrays-per-s/v1", "full cells", rate);
             }

@@ -241,14 +241,20 @@ fn bias(data: &RunData) -> Check {
 }
 
 fn finite_pixels(data: &RunData) -> Check {
-    let samplers = || data.views().flat_map(|(_, view)| &view.samplers);
-    let images = samplers().flat_map(|s| &s.replicates).count();
-    let pixels = samplers()
-        .flat_map(|s| &s.replicates)
-        .map(|r| r.non_finite_pixels);
-    let bad: usize = pixels.sum();
+    let (mut images, mut bad, mut names) = (0, 0, String::new());
+    for (scene, view) in data.views() {
+        for sampler in &view.samplers {
+            let pixels = sampler.replicates.iter().map(|r| r.non_finite_pixels);
+            let pixels: usize = pixels.sum();
+            images += sampler.replicates.len();
+            bad += pixels;
+            if pixels > 0 {
+                names += &format!("; {} on {}, {}", sampler.name, scene.name, view.name);
+            }
+        }
+    }
     let detail = format!(
-        "{} in {}.",
+        "{} in {}{names}.",
         plural(bad, "non-finite pixel"),
         plural(images, "image")
     );
@@ -292,7 +298,9 @@ fn reference_noise(data: &RunData) -> Check {
 fn complete(data: &RunData) -> Check {
     let title = "Every planned cell has figures";
     let Some(finished) = data.finished else {
-        return check(title, true, true, "The run did not finish.".into());
+        let why = data.interrupted.map(|early| format!(": {}", early.reason));
+        let detail = format!("The run did not finish{}.", why.unwrap_or_default());
+        return check(title, true, true, detail);
     };
     let skipped = plural(finished.skipped, "cell");
     let detail = format!(

@@ -2,10 +2,11 @@
 
 use crate::data::{RunData, View};
 use crate::document::{Block, Comparer, Layer};
-use crate::{format, pictures};
+use crate::export::linear_file;
+use crate::format;
 use base64::Engine;
 use half::f16;
-use raystone_image::{FileFormat, Image, automatic_exposure, read_linear};
+use raystone_image::{Image, automatic_exposure, read_linear};
 use std::path::Path;
 
 /// Characters of radiance that all comparers of a page may hold together: the page stays below 10 MB.
@@ -81,9 +82,7 @@ fn note(absent: usize, large: usize) -> String {
 
 /// The linear image beside a picture of the run: the same name with another ending.
 fn linear(dir: &Path, picture: &str) -> Option<Image> {
-    let path = pictures::inside(dir, picture)?;
-    let mut candidates = FileFormat::linear().map(|format| path.with_extension(format.ending));
-    read_linear(&candidates.find(|path| path.is_file())?).ok()
+    read_linear(&linear_file(dir, picture.strip_suffix(".png")?)?).ok()
 }
 
 /// 16-bit floats in Base64; what is larger than they reach is their largest.

@@ -99,3 +99,43 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
         }
     });
 }
+
+#[test]
+fn an_image_that_failed_its_cell_fails_the_check_and_is_named() {
+    let mut lines = clean_run();
+    // As a run leaves the cell: replicates before, and the one with the fault, without figures.
+    let is_it = |line: &Line| {
+        matches!(&line.body, Body::Error(e) if e.replicate > 2)
+            && line.key.label(axis::SEQUENCE) == "sobol"
+    };
+    lines.retain(|line| !is_it(line));
+    for line in &mut lines {
+        if let (Body::Error(e), "sobol") = (&mut line.body, line.key.label(axis::SEQUENCE)) {
+            if e.replicate == 2 {
+                (e.errors, e.non_finite_pixels) = (Vec::new(), 7);
+            }
+        }
+    }
+    let checks = sections::belief::checks(&RunData::new(&lines));
+    let check = checks
+        .iter()
+        .find(|check| check.title == "Every pixel finite");
+    let check = check.unwrap();
+    assert_eq!(check.verdict, Verdict::Fail);
+    let name = "; sobol × cranley-patterson on cornell-box, path";
+    assert!(check.detail.contains(name), "{}", check.detail);
+    // The page of such records can be made, and says so beside the sampler.
+    let nowhere = Path::new("no such folder");
+    let page = markdown::summary(&sections::document(nowhere, &RunData::new(&lines), &[]));
+    assert!(page.contains("NaN or infinite pixels"));
+}
+
+#[test]
+fn a_run_that_went_on_has_only_its_own_end() {
+    let mut lines = clean_run();
+    lines.push(run());
+    assert!(RunData::new(&lines).finished.is_none());
+    let open = failing(&lines);
+    let complete = ("Every planned cell has figures".to_owned(), Verdict::Fail);
+    assert!(open.contains(&complete), "{open:?}");
+}

@@ -384,3 +384,54 @@ fn records_that_may_not_be_read_are_named() {
         ),
     }
 }
+
+/// A program in the place of one that measures, which ends so.
+#[cfg(unix)]
+fn stand_in(runs: &Runs, name: &str, script: &str) -> PathBuf {
+    use std::os::unix::fs::PermissionsExt as _;
+    let path = runs.path(name);
+    std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("a script");
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(&path, executable).expect("permissions");
+    path
+}
+
+#[cfg(unix)]
+#[test]
+fn a_program_that_fails_in_its_turn_is_named_with_its_status_and_last_words() {
+    let runs = slower();
+    let records = runs.path("candidate/records.jsonl");
+    let leaves = format!(
+        "out=$4; mkdir -p \"$out\"; cp {} \"$out\"",
+        records.display()
+    );
+    let many = "for i in 1 2 3 4 5 6 7 8; do echo \"line $i\" >&2; done";
+    for (number, (script, told)) in [
+        // Records that an earlier part of the run left do not hide how it ended.
+        (
+            format!("{leaves}; {many}; echo 'error: no space' >&2; exit 3"),
+            "ended with exit status: 3: line 5; line 6; line 7; line 8; error: no space",
+        ),
+        (
+            "kill -9 $$".to_owned(),
+            "ended with signal: 9 (SIGKILL): it said nothing",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let program = stand_in(&runs, &format!("base-{number}"), &script);
+        let program = program.to_str().expect("UTF-8");
+        let output = runs.compare(&[
+            "base",
+            "candidate",
+            "--base-program",
+            program,
+            "--rounds",
+            "2",
+        ]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.contains(told), "{told} in {text}");
+    }
+}

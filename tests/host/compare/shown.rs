@@ -122,3 +122,46 @@ fn a_comment_stays_below_what_a_pull_request_takes() {
         "{text}"
     );
 }
+
+#[test]
+fn a_comment_holds_the_verdict_and_the_worst_however_much_there_is_to_say() {
+    let base = Made {
+        structures: 400,
+        ..Made::default()
+    };
+    let mut other = base.side();
+    for line in &mut other.lines {
+        if let Body::Structure(record) = &mut line.body {
+            record.stats.nodes += 1;
+        }
+    }
+    let mut found = compared(&base.side(), &other);
+    // Both folded sections are full, every reason and note is long, and what is worse stands last.
+    let mut same = found.findings.clone();
+    for (index, finding) in same.iter_mut().enumerate() {
+        finding.verdict = [Verdict::Same, Verdict::Undecided][index % 2];
+        finding.why = format!("@ {index} ").repeat(20);
+    }
+    found.findings.extend(same);
+    let mut worst = found.findings[0].clone();
+    (worst.verdict, worst.why) = (Verdict::Worse, "the worst".to_owned());
+    found.findings.push(worst);
+    for count in [0, 60] {
+        found.notes.resize(count, "&\u{202e}".repeat(3000));
+        for name in ["candidate".to_owned(), "<".repeat(40_000)] {
+            found.names[1] = name;
+            let text = markdown(&found);
+            // A mark of the comment's name comes before it.
+            assert!(text.len() <= 65_536 - 400, "{}", text.len());
+            assert!(text.starts_with("### ❌ WORSE: "), "{}", &text[..40]);
+            assert!(text.contains("| the worst |"), "the worst is cut");
+            assert!(text.trim_end().ends_with("is expected to be false."));
+            assert_eq!(text.contains(" more notes."), count > 0);
+            let [open, closed] = ["<details>", "</details>"].map(|tag| text.matches(tag).count());
+            assert_eq!(open, closed);
+            assert!(
+                text.contains(" more below.") && text.contains(" more: see the terminal's table")
+            );
+        }
+    }
+}

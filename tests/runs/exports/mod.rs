@@ -229,6 +229,25 @@ fn images_are_the_same_to_the_bit() {
         let [a, b] = [&path, &original].map(|path| read_linear(path).expect("an image"));
         assert_eq!(a, b, "{}", path.display());
     }
+    // A run that replaced another has its images in another folder.
+    let forced = folder_of(&records().replace("\"images/", "\"images-2/"));
+    std::fs::create_dir(forced.path().join("images-2")).expect("a folder");
+    let originals = std::fs::read_dir(run_folder().join("images")).expect("images");
+    for original in originals.flatten() {
+        let copy = forced.path().join("images-2").join(original.file_name());
+        std::fs::copy(original.path(), copy).expect("a copy");
+    }
+    let again = RUN.path().join("npy-again");
+    done(&[
+        "export",
+        text(forced.path()),
+        "--format",
+        "npy",
+        "--out",
+        text(&again),
+    ]);
+    let count = |folder: &Path| std::fs::read_dir(folder).expect("a folder").count();
+    assert_eq!(count(&again), count(&out));
     let none = folder_of(&records());
     let output = program(&[
         "export",
