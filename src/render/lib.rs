@@ -9,6 +9,7 @@ pub mod integrand;
 mod kind;
 mod light_tables;
 mod light_tree;
+mod material_kinds;
 pub mod offset;
 pub mod order;
 pub mod organisation;
@@ -30,6 +31,7 @@ pub use kind::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, I
 pub use light_tables::LightTables;
 pub use light_tables::light_branches;
 pub use light_tree::TreeNode;
+pub use material_kinds::{KindInScene, SceneKinds};
 pub use offset::{OffsetRegistry, RayOffset};
 pub use order::Order;
 pub use organisation::{Organisation, OrganisationRegistry};

@@ -1,5 +1,6 @@
 //! The passes in which an integrator adds samples to an image.
 
+use super::material_kinds::SceneKinds;
 use super::render::with_sampler;
 use super::slice::Slice;
 use super::tables::{SceneBuffers, SceneFeatures};
@@ -81,7 +82,7 @@ impl Passes {
         for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
             chosen = chosen.constant(name, value);
         }
-        let chosen = bindings.compose(chosen);
+        let chosen = bindings.compose(scene.features.materials.activate(chosen));
         let in_parts = chosen.features.contains("triangles_1");
         let most = gpu.limits.max_storage_textures_per_shader_stage;
         let chosen = chosen.feature("scene_texels", most >= STORAGE_TEXTURES && !in_parts);
@@ -105,7 +106,7 @@ impl Passes {
             runtime_checks: job.runtime_checks,
             visibility,
             bounds: scene.bounds,
-            scene: scene.features,
+            scene: scene.features.clone(),
             left_out,
             pipelines: RefCell::default(),
             tracers: RefCell::default(),
@@ -347,9 +348,9 @@ impl<'a> ImageSteps<'a> {
         self.passes.bounds
     }
 
-    /// Numbers of the kinds of materials of the scene, as in `kernels/shading/bsdf.wesl`.
-    pub(crate) fn material_kinds(&self) -> Vec<usize> {
-        self.passes.scene.material_kinds().collect()
+    /// Kinds of materials of the scene.
+    pub(crate) fn material_kinds(&self) -> &SceneKinds {
+        &self.passes.scene.materials
     }
 
     /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it

@@ -8,6 +8,7 @@ pub mod image_gate;
 mod instance_judge;
 mod kept_checks;
 pub mod known_images;
+pub mod materials;
 mod mesh;
 pub mod mitsuba;
 pub mod path_oracle;

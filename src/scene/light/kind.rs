@@ -12,15 +12,18 @@ pub struct LightKind {
     pub color: &'static str,
     /// The feature that brings its kernel into those of a scene.
     pub feature: &'static str,
+    /// The group of features that it belongs to: `lights`, or `background` where rays find it that leave the scene.
+    pub group: &'static str,
 }
 
 macro_rules! kind {
-    ($id:ident, $name:literal, $feature:literal, $color:literal, $description:literal) => {
+    ($id:ident, $name:literal, $feature:literal, $group:literal, $color:literal, $description:literal) => {
         pub(super) static $id: LightKind = LightKind {
             name: $name,
             description: $description,
             color: $color,
             feature: $feature,
+            group: $group,
         };
     };
 }
@@ -29,6 +32,7 @@ kind!(
     TRIANGLE,
     "triangle",
     "triangle_lights",
+    "lights",
     "radiance",
     "a triangle of an emissive material (MTL Ke, glTF emissive)"
 );
@@ -36,6 +40,7 @@ kind!(
     RECTANGLE,
     "rectangle",
     "rectangle_lights",
+    "lights",
     "radiance",
     "two triangles of an emissive material that form a parallelogram, as one light"
 );
@@ -43,6 +48,7 @@ kind!(
     SPHERE,
     "sphere",
     "sphere_lights",
+    "lights",
     "radiance",
     "an analytic sphere: visible, casts shadows, reflects nothing"
 );
@@ -50,6 +56,7 @@ kind!(
     POINT,
     "point",
     "point_lights",
+    "lights",
     "intensity",
     "a point of even intensity (glTF KHR_lights_punctual, candela)"
 );
@@ -57,6 +64,7 @@ kind!(
     SPOT,
     "spot",
     "spot_lights",
+    "lights",
     "intensity",
     "a point that shines into a cone, with or without decay (glTF KHR_lights_punctual, candela)"
 );
@@ -64,6 +72,7 @@ kind!(
     IES,
     "ies",
     "ies_lights",
+    "lights",
     "colour",
     "a point with the measured intensities of a luminaire (IES LM-63, candela)"
 );
@@ -71,6 +80,7 @@ kind!(
     DIRECTIONAL,
     "directional",
     "directional_lights",
+    "lights",
     "irradiance",
     "light from infinitely far away (glTF KHR_lights_punctual, lux)"
 );
@@ -79,6 +89,7 @@ kind!(
     ENVIRONMENT,
     "environment",
     "environment_map",
+    "background",
     "radiance",
     "radiance from all around by an equirectangular map (HDR, EXR, PFM, NPY)"
 );

@@ -6,12 +6,13 @@
 //! [`SYSTEMATIC`] beside them, so that no fault above 0.2 % passes but by chance, and one of 0.3 % in no case.
 
 pub mod closed;
-mod lamps;
+pub(crate) mod lamps;
 mod lights;
 mod occlusion;
 mod surfaces;
 mod textures;
 
+use crate::materials::MaterialRegistry;
 use crate::trial_scenes::Trial;
 use glam::{DVec3, Quat, Vec3, vec3};
 use raystone_core::geometry::Camera;
@@ -44,7 +45,7 @@ pub struct View {
 
 impl View {
     /// The point `at` from the place `at + from`.
-    fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
+    pub fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
         let camera = Camera {
             eye: at + from,
             target: at,
@@ -111,22 +112,24 @@ impl KnownImage {
     }
 }
 
-/// All of them.
+/// All of the program's kinds of materials.
 ///
 /// # Errors
 /// A built-in scene is missing.
 pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
-    let parts = [
-        lamps::images,
-        lights::images,
-        occlusion::images,
-        surfaces::images,
-        textures::images,
-    ];
-    let mut all = Vec::new();
-    for part in parts {
-        all.extend(part()?);
-    }
+    known_images_of(&MaterialRegistry::default())
+}
+
+/// All of these kinds of materials.
+///
+/// # Errors
+/// As [`known_images`].
+pub fn known_images_of(kinds: &MaterialRegistry) -> Result<Vec<KnownImage>, SceneError> {
+    let mut all = lamps::images()?;
+    all.extend(lights::images()?);
+    all.extend(occlusion::images()?);
+    all.extend(surfaces::images(kinds)?);
+    all.extend(textures::images()?);
     Ok(all)
 }
 

@@ -9,6 +9,9 @@ mod lights;
 mod look;
 mod mesh;
 
+pub use look::{Color, by_formula};
+
+use crate::materials::MaterialRegistry;
 use glam::Vec3;
 use raystone_core::atomic::write_atomic;
 use raystone_core::geometry::Camera;
@@ -75,8 +78,22 @@ pub fn export_mitsuba(
     settings: &MitsubaSettings,
     folder: &Path,
 ) -> Result<Vec<String>, ExportError> {
+    export_mitsuba_of(&MaterialRegistry::default(), scene, settings, folder)
+}
+
+/// The same of a scene of these kinds of materials.
+///
+/// # Errors
+/// As [`export_mitsuba`].
+pub fn export_mitsuba_of(
+    materials: &MaterialRegistry,
+    scene: &SceneData,
+    settings: &MitsubaSettings,
+    folder: &Path,
+) -> Result<Vec<String>, ExportError> {
     let mut export = Export {
         folder,
+        materials,
         warnings: Vec::new(),
         needs_materials: false,
         xml: String::new(),
@@ -106,6 +123,7 @@ pub fn export_mitsuba(
 /// An export under way.
 struct Export<'a> {
     folder: &'a Path,
+    materials: &'a MaterialRegistry,
     warnings: Vec<String>,
     /// Whether a material is one of those that Mitsuba has to be taught.
     needs_materials: bool,
