@@ -82,7 +82,7 @@ impl Passes {
         for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
             chosen = chosen.constant(name, value);
         }
-        let chosen = bindings.compose(scene.features.materials.activate(chosen));
+        let chosen = bindings.compose(scene.features.activate(chosen));
         let in_parts = chosen.features.contains("triangles_1");
         let most = gpu.limits.max_storage_textures_per_shader_stage;
         let chosen = chosen.feature("scene_texels", most >= STORAGE_TEXTURES && !in_parts);

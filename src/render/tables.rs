@@ -1,12 +1,13 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
+use super::light_kinds::SceneLightKinds;
 use super::light_tables::LightTables;
 use super::material_kinds::SceneKinds;
 use super::offset::TransformError;
 use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
 use glam::Vec3;
 use raystone_accel::{TriangleBuffers, TriangleSoup};
-use raystone_gpu::{Bindings, Gpu, GpuError};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
 use raystone_scene::{Daylight, LIGHT_KINDS, LightList, Material, SceneData};
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
@@ -16,8 +17,8 @@ pub struct SceneFeatures {
     pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled.
     pub lights: bool,
-    /// Which of [`LIGHT_KINDS`] they are of.
-    pub light_kinds: [bool; LIGHT_KINDS.len()],
+    /// Kinds of lights.
+    pub light_kinds: SceneLightKinds,
     /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
     pub many_lights: bool,
     /// Some surface emits from its front alone.
@@ -78,16 +79,21 @@ impl SceneFeatures {
         flags.extend([
             ("lights", self.lights),
             ("many_lights", self.many_lights),
-            ("several_light_kinds", several(&self.light_kinds)),
+            ("several_light_kinds", self.light_kinds.are_several()),
             ("one_sided_lights", self.one_sided_lights),
             ("background", self.background),
             ("daylight", self.daylight),
             ("transforms", self.transforms),
             ("mirrored_triangles", self.mirrored),
         ]);
-        flags.extend(LightTables::flags(&self.light_kinds));
+        flags.extend(self.light_kinds.flags());
         flags.extend(self.surfaces.flags());
         flags
+    }
+
+    /// The kernel with what a scene brings from outside.
+    pub(super) fn activate(&self, kernel: Composition) -> Composition {
+        self.light_kinds.activate(self.materials.activate(kernel))
     }
 
     /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
@@ -158,7 +164,7 @@ impl SceneBuffers {
             features: SceneFeatures {
                 surfaces,
                 lights: lights.lights > 0,
-                light_kinds: lights.kinds,
+                light_kinds: lights.kinds.clone(),
                 many_lights: lights.are_chosen(scene),
                 one_sided_lights: lights.one_sided,
                 background: has_map || scene.daylight.is_some() || scene.environment != Vec3::ZERO,
@@ -215,10 +221,6 @@ impl Tables {
         words.resize(words.len().next_multiple_of(4), 0);
         Self { words, places }
     }
-}
-
-fn several(kinds: &[bool]) -> bool {
-    kinds.iter().filter(|there| **there).count() > 1
 }
 
 /// Whether the material emits, and from its front alone.

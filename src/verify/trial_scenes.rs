@@ -2,12 +2,14 @@
 //! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
 //! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
 
+use crate::kinds::Kinds;
+use crate::lights::LightRegistry;
 use crate::materials::MaterialRegistry;
 use crate::mesh::Mesh;
 use glam::{Vec2, Vec3, vec2, vec3};
 use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
-use raystone_scene::{self as scene, Light, Material, SceneData, SceneError, Texture, TextureUse};
+use raystone_scene::{self as scene, Material, SceneData, SceneError, Texture, TextureUse};
 
 /// What is judged on a scene: integrator and the parameters that are not at their defaults.
 pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
@@ -24,19 +26,19 @@ pub use crate::trial_lights::trials_of;
 pub use crate::trial_slivers::sheets;
 pub use crate::trial_surfaces::layers;
 
-/// All of the program's kinds of materials.
+/// All of the program's kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
 pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
-    trial_scenes_of(&MaterialRegistry::default())
+    trial_scenes_of(&Kinds::default())
 }
 
-/// All of these kinds of materials.
+/// All of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`trial_scenes`].
-pub fn trial_scenes_of(kinds: &MaterialRegistry) -> Result<Vec<TrialScene>, SceneError> {
+pub fn trial_scenes_of(kinds: &Kinds) -> Result<Vec<TrialScene>, SceneError> {
     let mut lamps_trials = vec![("path", vec![depth(8)])];
     for (strategy, roulette) in [
         ("mis-power", "albedo"),
@@ -68,7 +70,7 @@ pub fn trial_scenes_of(kinds: &MaterialRegistry) -> Result<Vec<TrialScene>, Scen
             trials: lamps_trials,
         },
         TrialScene {
-            scene: points()?,
+            scene: points(&kinds.lights)?,
             trials: vec![
                 ("path", vec![depth(4)]),
                 (
@@ -83,12 +85,12 @@ pub fn trial_scenes_of(kinds: &MaterialRegistry) -> Result<Vec<TrialScene>, Scen
             ],
         },
     ];
-    for kind in kinds.iter() {
+    for kind in kinds.materials.iter() {
         scenes.extend((kind.trials)()?);
     }
     scenes.extend([
         TrialScene {
-            scene: glossy(kinds)?,
+            scene: glossy(&kinds.materials)?,
             trials: vec![
                 ("path", vec![depth(6)]),
                 ("path", vec![depth(3), word("strategy", "bsdf")]),
@@ -108,7 +110,10 @@ pub fn trial_scenes_of(kinds: &MaterialRegistry) -> Result<Vec<TrialScene>, Scen
             ],
         },
     ]);
-    scenes.extend(crate::trial_lights::scenes()?);
+    for kind in kinds.lights.iter() {
+        scenes.extend((kind.trials)()?);
+    }
+    scenes.push(crate::trial_lights::many()?);
     scenes.extend(crate::trial_surfaces::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
     Ok(scenes)
@@ -199,7 +204,7 @@ fn lamps() -> Result<SceneData, SceneError> {
 }
 
 /// Lights without triangles, of every kind but measured ones and maps, over a floor with a block and a lamp.
-fn points() -> Result<SceneData, SceneError> {
+fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
     let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));
@@ -212,33 +217,7 @@ fn points() -> Result<SceneData, SceneError> {
     mesh.block(vec3(-0.4, 0.0, -0.5), vec3(0.7, 0.9, 0.6), block);
     mesh.plain([vec3(1.5, 0.2, -1.0), vec3(0.0, 0.3, 1.2), Vec3::Y], lamp);
     let mut scene = mesh.done(Vec::new());
-    let spot = |x: f32, decay| Light::Spot {
-        position: vec3(x, 2.5, 1.0),
-        direction: vec3(-0.5 * x, -1.6, -0.6),
-        intensity: vec3(2.0, 3.0, 2.5),
-        inner: 0.25,
-        outer: 0.6,
-        decay,
-    };
-    let ball = |center, radius, power: f32| Light::Sphere {
-        center,
-        radius,
-        radiance: power * vec3(1.0, 0.8, 0.5),
-    };
-    scene.lights = vec![
-        Light::Point {
-            position: vec3(-1.5, 1.2, 0.8),
-            intensity: vec3(1.0, 0.3, 0.2),
-        },
-        spot(0.8, true),
-        spot(-0.9, false),
-        ball(vec3(0.9, 1.6, 0.3), 0.25, 6.0),
-        ball(vec3(-0.9, 0.05, 0.9), 0.04, 300.0),
-        Light::Directional {
-            direction: vec3(0.4, -1.0, -0.7),
-            irradiance: vec3(0.2, 0.3, 0.6),
-        },
-    ];
+    scene.lights = kinds.iter().flat_map(|kind| (kind.points)()).collect();
     Ok(scene)
 }
 

@@ -1,5 +1,6 @@
 //! The table of kinds of lights.
 
+use raystone_core::params::Sources;
 use std::fmt;
 
 /// A kind of light.
@@ -14,6 +15,9 @@ pub struct LightKind {
     pub feature: &'static str,
     /// The group of features that it belongs to: `lights`, or `background` where rays find it that leave the scene.
     pub group: &'static str,
+    /// Kernel modules that it brings along, because they are not the program's; of `shading/light/<feature>` kernels import
+    /// `<feature>_sample(light, surface, point)`.
+    pub sources: Sources,
 }
 
 macro_rules! kind {
@@ -24,6 +28,7 @@ macro_rules! kind {
             color: $color,
             feature: $feature,
             group: $group,
+            sources: &[],
         };
     };
 }
@@ -108,10 +113,10 @@ pub static LIGHT_KINDS: [&LightKind; 8] = [
 ];
 
 impl LightKind {
-    /// Its place in [`LIGHT_KINDS`].
+    /// Its place in [`LIGHT_KINDS`]; behind them all from outside the program.
     pub fn number(&self) -> u32 {
         let place = LIGHT_KINDS.iter().position(|known| *known == self);
-        place.unwrap_or_default() as u32
+        place.unwrap_or(LIGHT_KINDS.len()) as u32
     }
 }
 
@@ -120,6 +125,8 @@ impl PartialEq for LightKind {
         self.name == other.name
     }
 }
+
+impl Eq for LightKind {}
 
 impl fmt::Debug for LightKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -12,13 +12,13 @@ mod occlusion;
 mod surfaces;
 mod textures;
 
-use crate::materials::MaterialRegistry;
+use crate::kinds::Kinds;
 use crate::trial_scenes::Trial;
 use glam::{DVec3, Quat, Vec3, vec3};
 use raystone_core::geometry::Camera;
 use raystone_gpu::GpuError;
 use raystone_render::Renderer;
-use raystone_scene::{Light, SceneData, SceneError, decode_normal, encode_normal};
+use raystone_scene::{SceneData, SceneError, decode_normal, encode_normal};
 
 /// Width and height of a view, pixels.
 pub const SIZE: [u32; 2] = [8, 8];
@@ -75,8 +75,9 @@ pub struct KnownImage {
 impl KnownImage {
     /// The image turned and moved as a whole, so that no plane of it is exact in f32.
     fn turned(mut self) -> Self {
+        const BY: Vec3 = vec3(0.3, -0.2, 0.5);
         let turn = Quat::from_axis_angle(vec3(0.36, 0.48, 0.8), 0.7);
-        let place = |p: Vec3| turn * p + vec3(0.3, -0.2, 0.5);
+        let place = |p: Vec3| turn * p + BY;
         for triangle in &mut self.scene.triangles {
             *triangle = triangle.map(place);
         }
@@ -85,25 +86,8 @@ impl KnownImage {
                 *word = encode_normal(turn * normal.as_vec3());
             }
         }
-        for light in &mut self.scene.lights {
-            match light {
-                Light::Sphere { center, .. } => *center = place(*center),
-                Light::Point { position, .. } => *position = place(*position),
-                Light::Spot {
-                    position,
-                    direction,
-                    ..
-                } => (*position, *direction) = (place(*position), turn * *direction),
-                Light::Ies {
-                    position, rotation, ..
-                } => {
-                    (*position, *rotation) = (place(*position), (turn * *rotation).normalize());
-                }
-                Light::Directional { direction, .. } => *direction = turn * *direction,
-                // It turns about one axis alone: no image with a map is turned.
-                Light::Environment { .. } => {}
-            }
-        }
+        let lights = std::mem::take(&mut self.scene.lights).into_iter();
+        self.scene.lights = lights.map(|light| light.moved(turn, BY)).collect();
         for View { camera, .. } in &mut self.views {
             (camera.eye, camera.target) = (place(camera.eye), place(camera.target));
             camera.up = turn * camera.up;
@@ -112,23 +96,23 @@ impl KnownImage {
     }
 }
 
-/// All of the program's kinds of materials.
+/// All of the program's kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
 pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
-    known_images_of(&MaterialRegistry::default())
+    known_images_of(&Kinds::default())
 }
 
-/// All of these kinds of materials.
+/// All of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`known_images`].
-pub fn known_images_of(kinds: &MaterialRegistry) -> Result<Vec<KnownImage>, SceneError> {
+pub fn known_images_of(kinds: &Kinds) -> Result<Vec<KnownImage>, SceneError> {
     let mut all = lamps::images()?;
     all.extend(lights::images()?);
     all.extend(occlusion::images()?);
-    all.extend(surfaces::images(kinds)?);
+    all.extend(surfaces::images(&kinds.materials)?);
     all.extend(textures::images()?);
     Ok(all)
 }

@@ -23,7 +23,7 @@ impl Export<'_> {
     pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
         let material = &scene.materials[id];
         let color = self.color(scene, id)?;
-        let known = self.materials.get(material.kind.name);
+        let known = self.kinds.materials.get(material.kind.name);
         let kind = known.unwrap_or(&DIFFUSE_CHECKS);
         if !kind.python.is_empty() {
             self.teach()?;
@@ -63,7 +63,7 @@ impl Export<'_> {
     fn teach(&mut self) -> Result<(), ExportError> {
         if !self.needs_materials {
             self.needs_materials = true;
-            let kinds = self.materials.iter().map(|kind| kind.python);
+            let kinds = self.kinds.materials.iter().map(|kind| kind.python);
             let texts: Vec<&str> = kinds.filter(|text| !text.is_empty()).collect();
             let python = OPAQUE.to_owned() + &texts.join("\n\n");
             self.write(MATERIALS_FILE, python.as_bytes())?;

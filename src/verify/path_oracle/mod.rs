@@ -13,22 +13,24 @@
 pub(crate) mod bsdf;
 mod camera;
 mod estimator;
-mod hits;
-mod light;
+pub(crate) mod hits;
+pub(crate) mod light;
 mod rounding;
 mod surface;
-mod texture;
+pub(crate) mod texture;
 
 pub use bsdf::{
     Bounce, Bsdf, Reflected, around, bounce, choose, colour, cosine_density, cosine_direction,
     diffuse_share, is_above, kept, mirrored, parameter,
 };
 pub use estimator::Estimator;
+pub use light::LightSample;
 pub(crate) use rounding::MOST_ROUNDINGS;
 pub use rounding::Rounding;
 pub use surface::Surface;
 
-use crate::materials::{MaterialChecks, MaterialRegistry};
+use crate::kinds::Kinds;
+use crate::materials::MaterialChecks;
 use camera::Lens;
 use glam::DVec3;
 use hits::{Blocked, Hits, Nearest, Segment};
@@ -209,22 +211,22 @@ pub struct View<'a> {
 }
 
 impl<'a> PathOracle<'a> {
-    /// The oracle of a scene of the program's kinds of materials.
+    /// The oracle of a scene of the program's kinds.
     ///
     /// # Errors
     /// What the scene has that the oracle does not know: nothing can be judged then.
     pub fn new(scene: &'a SceneData) -> Result<Self, String> {
-        Self::knowing(scene, &MaterialRegistry::default())
+        Self::knowing(scene, &Kinds::default())
     }
 
-    /// The oracle of a scene of these kinds.
+    /// The oracle of a scene of these kinds of materials and lights.
     ///
     /// # Errors
     /// As [`PathOracle::new`].
-    pub fn knowing(scene: &'a SceneData, materials: &MaterialRegistry) -> Result<Self, String> {
+    pub fn knowing(scene: &'a SceneData, kinds: &Kinds) -> Result<Self, String> {
         let known = |material: &Material| {
             let kind = material.kind.name;
-            (materials.get(kind)).ok_or_else(|| format!("material `{kind}`"))
+            (kinds.materials.get(kind)).ok_or_else(|| format!("material `{kind}`"))
         };
         Ok(Self {
             materials: scene
@@ -234,7 +236,7 @@ impl<'a> PathOracle<'a> {
                 .collect::<Result<_, _>>()?,
             scene,
             hits: Hits::new(scene),
-            lights: Lights::new(scene),
+            lights: Lights::new(scene, &kinds.lights)?,
             textures: Textures::new(scene),
             diagonal: diagonal(scene),
         })

@@ -1,22 +1,70 @@
 //! Spheres: uniform over the solid angle of the cap that is seen, or over the area from inside.
 
-use super::LightSample;
-use crate::path_oracle::bsdf::around;
+use super::{LightChecks, LightTwin, around, no_trials};
+use crate::mitsuba::{Export, ExportError, vector};
+use crate::path_oracle::LightSample;
 use crate::path_oracle::hits::Segment;
-use glam::DVec3;
-use raystone_scene::Light;
+use glam::{DVec3, Vec3, vec3};
+use raystone_scene::{LIGHT_KINDS, Light};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
+
+/// The row.
+pub(super) static CHECKS: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[2],
+    twin: LightTwin::Alone(|light, from, point, _| Ball::of(light)?.sample(from, point)),
+    mitsuba,
+    points,
+    trials: no_trials,
+};
+
+fn points() -> Vec<Light> {
+    let ball = |center, radius, power: f32| Light::Sphere {
+        center,
+        radius,
+        radiance: power * vec3(1.0, 0.8, 0.5),
+    };
+    vec![
+        ball(vec3(0.9, 1.6, 0.3), 0.25, 6.0),
+        ball(vec3(-0.9, 0.05, 0.9), 0.04, 300.0),
+    ]
+}
+
+fn mitsuba(export: &mut Export<'_>, number: usize, light: &Light) -> Result<(), ExportError> {
+    let Light::Sphere { center, radius, .. } = light else {
+        return Ok(());
+    };
+    let inside = |v: &Vec3| v.distance(*center) < *radius;
+    let mut corners = export.scene.triangles.iter().flat_map(|t| &t.vertices);
+    if corners.any(inside) {
+        let reason = "something is inside, where Mitsuba's spheres do not shine";
+        return Err(ExportError::light(number, light, reason));
+    }
+    let _ = write!(
+        export.xml,
+        r#"    <shape type="sphere">
+        <point name="center" value="{}"/>
+        <float name="radius" value="{radius}"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+        <emitter type="area"><rgb name="radiance" value="{}"/></emitter>
+    </shape>
+"#,
+        vector(*center),
+        vector(light.color())
+    );
+    Ok(())
+}
 
 /// A sphere that shines.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ball {
+pub(crate) struct Ball {
     centre: DVec3,
     radius: f64,
     pub radiance: DVec3,
 }
 
 impl Ball {
-    pub(super) fn of(light: &Light) -> Option<Self> {
+    pub(crate) fn of(light: &Light) -> Option<Self> {
         let Light::Sphere {
             center,
             radius,
@@ -39,7 +87,7 @@ impl Ball {
     }
 
     /// Where a ray meets it first.
-    pub(super) fn meet(&self, ray: &Segment) -> Option<f64> {
+    pub(crate) fn meet(&self, ray: &Segment) -> Option<f64> {
         let to_centre = self.centre - ray.origin;
         let along = to_centre.dot(ray.direction);
         let across = to_centre - along * ray.direction;
@@ -51,7 +99,7 @@ impl Ball {
         [along - half, along + half].into_iter().find(|d| *d > 0.0)
     }
 
-    pub(super) fn sample(&self, from: DVec3, [u, v]: [f64; 2]) -> Option<LightSample> {
+    pub(crate) fn sample(&self, from: DVec3, [u, v]: [f64; 2]) -> Option<LightSample> {
         let direction = match self.cap(from) {
             Some(cap) => {
                 let below = u * cap;
@@ -83,7 +131,7 @@ impl Ball {
     }
 
     /// With which [`Ball::sample`] finds this direction.
-    pub(super) fn density(&self, from: DVec3, direction: DVec3) -> f64 {
+    pub(crate) fn density(&self, from: DVec3, direction: DVec3) -> f64 {
         if let Some(cap) = self.cap(from) {
             return 1.0 / (TAU * cap);
         }

@@ -1,13 +1,31 @@
 //! Triangles and parallelograms: points on them evenly.
 
-use super::LightSample;
+use super::{LightChecks, LightTwin, no_lights, no_trials};
 use crate::path_oracle::hits::Hits;
-use crate::path_oracle::rounding::Rounding;
 use crate::path_oracle::texture::Textures;
+use crate::path_oracle::{LightSample, Rounding};
 use glam::DVec3;
-use raystone_scene::{SceneData, Source};
+use raystone_scene::{LIGHT_KINDS, SceneData, Source};
 
-pub(super) fn sample(
+/// The row of single ones. Mitsuba is told of them with their meshes.
+pub(super) static TRIANGLES: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[0],
+    twin: LightTwin::Surface,
+    mitsuba: |_, _, _| Ok(()),
+    points: no_lights,
+    trials: no_trials,
+};
+
+/// The row of two that form a parallelogram.
+pub(super) static PARALLELOGRAMS: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[1],
+    twin: LightTwin::Surface,
+    mitsuba: |_, _, _| Ok(()),
+    points: no_lights,
+    trials: no_trials,
+};
+
+pub(crate) fn sample(
     (scene, textures, hits): (&SceneData, &Textures, &Hits),
     source: Source,
     from: DVec3,

@@ -4,16 +4,58 @@
 //! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
 //! kernels divide by shows, as does a density that is none of the table.
 
-use super::{LightSample, UNITS};
-use crate::path_oracle::rounding::Rounding;
+use super::{FAR, LightChecks, LightTwin, no_lights};
+use crate::mitsuba::{Export, ExportError};
+use crate::path_oracle::light::UNITS;
+use crate::path_oracle::{LightSample, Rounding};
+use crate::trial_lights;
 use glam::DVec3;
+use raystone_image::Image;
 use raystone_render::environment_aliases;
-use raystone_scene::EnvironmentMap;
+use raystone_scene::{EnvironmentMap, LIGHT_KINDS, Light};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Distance of what has none.
-const FAR: f64 = 1e30;
+/// The row.
+pub(super) static CHECKS: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[7],
+    twin: LightTwin::Map,
+    mitsuba,
+    points: no_lights,
+    trials: trial_lights::skies,
+};
+
+/// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other
+/// row of twice as many and one is one of ours. Columns run the same way.
+fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
+    let Light::Environment { map, scale, turn } = light else {
+        return Ok(());
+    };
+    let (width, height) = (map.width, 2 * map.height + 1);
+    let texel = |x: u32, y: u32| map.texels[(y * width + x) as usize];
+    let between = |at: u32| {
+        let (x, y) = (at % width, at / width);
+        let [above, below] = [y.saturating_sub(1) / 2, (y / 2).min(map.height - 1)];
+        (0.5 * (texel(x, above) + texel(x, below))).to_array()
+    };
+    let texels = (0..width * height).map(between).collect();
+    let name = "textures/environment.exr";
+    export.write_radiance(name, &Image::new(width, height, texels)?)?;
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="envmap">
+        <string name="filename" value="{name}"/>
+        <float name="scale" value="{scale}"/>
+        <transform name="to_world">
+            <rotate y="1" angle="{}"/>
+        </transform>
+    </emitter>
+"#,
+        turn.to_degrees()
+    );
+    Ok(())
+}
 
 /// A choice by one number: threshold and alias of each part, and with what probability each entry is chosen.
 struct Aliases {
@@ -53,7 +95,7 @@ impl Aliases {
 }
 
 /// A map with the tables that choose its texels.
-pub(super) struct Map {
+pub(crate) struct Map {
     map: Arc<EnvironmentMap>,
     scale: f64,
     turn: f64,
@@ -63,7 +105,15 @@ pub(super) struct Map {
 }
 
 impl Map {
-    pub(super) fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
+    /// The map that a light is, if it is one.
+    pub(crate) fn of(light: &Light) -> Option<Self> {
+        let Light::Environment { map, scale, turn } = light else {
+            return None;
+        };
+        Some(Self::new(map, *scale, *turn))
+    }
+
+    fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
         let parts: Vec<(u32, usize)> = (environment_aliases(map).into_iter())
             .map(|(threshold, alias)| (threshold, alias as usize))
             .collect();
@@ -103,7 +153,7 @@ impl Map {
     }
 
     /// Bilinear between the centres of texels.
-    pub(super) fn radiance(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn radiance(&self, direction: DVec3) -> DVec3 {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
         let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, height as f64 - 1.0));
@@ -119,7 +169,7 @@ impl Map {
     }
 
     /// The texel of a direction, and the density with which light samples find it.
-    pub(super) fn density(&self, direction: DVec3) -> (usize, f64) {
+    pub(crate) fn density(&self, direction: DVec3) -> (usize, f64) {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
         let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
@@ -131,7 +181,7 @@ impl Map {
     }
 
     /// A direction: the second number chooses the row and the place along it, the first one the column.
-    pub(super) fn sample(
+    pub(crate) fn sample(
         &self,
         [u, v]: [f64; 2],
         rounding: &mut Rounding,

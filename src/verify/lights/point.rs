@@ -1,0 +1,217 @@
+//! Lights of one direction: points, cones, and light from infinitely far away.
+
+use super::{FAR, LightChecks, LightTwin, delta, no_trials, towards};
+use crate::mitsuba::{Export, ExportError, vector};
+use crate::path_oracle::{LightSample, Rounding};
+use glam::{DVec3, Vec2, vec3};
+use raystone_image::Image;
+use raystone_scene::{LIGHT_KINDS, Light};
+use std::fmt::Write as _;
+
+/// The row of points.
+pub(super) static POINTS: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[3],
+    twin: LightTwin::Alone(point),
+    mitsuba: point_in_mitsuba,
+    points,
+    trials: no_trials,
+};
+
+fn point(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
+    let Light::Point {
+        position,
+        intensity,
+    } = light
+    else {
+        return None;
+    };
+    let (direction, distance) = towards(*position, from);
+    let radiance = intensity.as_dvec3() / (distance * distance);
+    delta(direction, distance, radiance)
+}
+
+fn points() -> Vec<Light> {
+    vec![Light::Point {
+        position: vec3(-1.5, 1.2, 0.8),
+        intensity: vec3(1.0, 0.3, 0.2),
+    }]
+}
+
+fn point_in_mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
+    let Light::Point {
+        position,
+        intensity,
+    } = light
+    else {
+        return Ok(());
+    };
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="point">
+        <point name="position" value="{}"/>
+        <rgb name="intensity" value="{}"/>
+    </emitter>
+"#,
+        vector(*position),
+        vector(*intensity)
+    );
+    Ok(())
+}
+
+/// The row of light from far away.
+pub(super) static DIRECTIONAL: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[6],
+    twin: LightTwin::Alone(directional),
+    mitsuba: directional_in_mitsuba,
+    points: suns,
+    trials: no_trials,
+};
+
+fn directional(light: &Light, _: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
+    let Light::Directional {
+        direction,
+        irradiance,
+    } = light
+    else {
+        return None;
+    };
+    let direction = -direction.as_dvec3().normalize();
+    delta(direction, FAR, irradiance.as_dvec3())
+}
+
+fn suns() -> Vec<Light> {
+    vec![Light::Directional {
+        direction: vec3(0.4, -1.0, -0.7),
+        irradiance: vec3(0.2, 0.3, 0.6),
+    }]
+}
+
+fn directional_in_mitsuba(
+    export: &mut Export<'_>,
+    _: usize,
+    light: &Light,
+) -> Result<(), ExportError> {
+    let Light::Directional {
+        direction,
+        irradiance,
+    } = light
+    else {
+        return Ok(());
+    };
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="directional">
+        <vector name="direction" value="{}"/>
+        <rgb name="irradiance" value="{}"/>
+    </emitter>
+"#,
+        vector(*direction),
+        vector(*irradiance)
+    );
+    Ok(())
+}
+
+/// The row of cones.
+pub(super) static SPOTS: LightChecks = LightChecks {
+    kind: LIGHT_KINDS[4],
+    twin: LightTwin::Alone(spot),
+    mitsuba: spot_in_mitsuba,
+    points: spots,
+    trials: no_trials,
+};
+
+fn spot(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
+    let Light::Spot {
+        position,
+        direction: axis,
+        intensity,
+        inner,
+        outer,
+        decay,
+    } = light
+    else {
+        return None;
+    };
+    let (direction, distance) = towards(*position, from);
+    let [inner, outer] = [inner, outer].map(|angle| f64::from(*angle).cos());
+    let cos = -direction.dot(axis.as_dvec3().normalize());
+    let step = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
+    let falloff = if *decay { distance * distance } else { 1.0 };
+    let radiance = intensity.as_dvec3() * (step * step / falloff);
+    delta(direction, distance, radiance)
+}
+
+fn spots() -> Vec<Light> {
+    let spot = |x: f32, decay| Light::Spot {
+        position: vec3(x, 2.5, 1.0),
+        direction: vec3(-0.5 * x, -1.6, -0.6),
+        intensity: vec3(2.0, 3.0, 2.5),
+        inner: 0.25,
+        outer: 0.6,
+        decay,
+    };
+    vec![spot(0.8, true), spot(-0.9, false)]
+}
+
+/// Width and height of the picture that a spot throws: it fades from the middle to the edge in so many texels.
+const SPOT_EDGE: u32 = 512;
+
+/// Mitsuba's spots fade linearly in the angle; one with a sharp edge throws the picture of how ours do.
+fn spot_in_mitsuba(
+    export: &mut Export<'_>,
+    number: usize,
+    light: &Light,
+) -> Result<(), ExportError> {
+    let &Light::Spot {
+        position,
+        direction,
+        inner,
+        outer,
+        decay,
+        ..
+    } = light
+    else {
+        return Ok(());
+    };
+    let refused = |reason| Err(ExportError::light(number, light, reason));
+    if !decay {
+        return refused("all of Mitsuba's spots fall off with the distance");
+    }
+    if outer >= 1.5 {
+        return refused("a cone of 86 degrees or more throws no picture on a plane");
+    }
+    let colour = vector(light.color());
+    let name = format!("textures/spot-{number}.exr");
+    let [bright, dark] = [inner.cos(), outer.cos()];
+    let shown = |at: u32| {
+        let [x, y] = [at % SPOT_EDGE, at / SPOT_EDGE];
+        let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * (2.0 / SPOT_EDGE as f32) - 1.0;
+        let cosine = 1.0 / (1.0 + (place * outer.tan()).length_squared()).sqrt();
+        let step = ((cosine - dark) / (bright - dark).max(1e-4)).clamp(0.0, 1.0);
+        [step * step; 3]
+    };
+    let texels = (0..SPOT_EDGE * SPOT_EDGE).map(shown).collect();
+    export.write_radiance(&name, &Image::new(SPOT_EDGE, SPOT_EDGE, texels)?)?;
+    let degrees = outer.to_degrees();
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="spot">
+        <transform name="to_world">
+            <lookat origin="{}" target="{}" up="{}"/>
+        </transform>
+        <float name="cutoff_angle" value="{degrees}"/>
+        <float name="beam_width" value="{degrees}"/>
+        <rgb name="intensity" value="{colour}"/>
+        <texture name="texture" type="bitmap">
+            <string name="filename" value="{name}"/>
+            <boolean name="raw" value="true"/>
+            <string name="wrap_mode" value="clamp"/>
+        </texture>
+    </emitter>
+"#,
+        vector(position),
+        vector(position + direction.normalize()),
+        vector(direction.normalize().any_orthonormal_vector())
+    );
+    Ok(())
+}
