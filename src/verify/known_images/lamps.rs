@@ -43,7 +43,7 @@ impl Lamp {
 }
 
 /// Radiance of the floor with this irradiance.
-pub(super) fn reflected(irradiance: DVec3) -> DVec3 {
+pub(crate) fn reflected(irradiance: DVec3) -> DVec3 {
     FLOOR.as_dvec3() / PI * irradiance
 }
 

@@ -7,7 +7,7 @@
 
 pub mod closed;
 pub(crate) mod lamps;
-mod lights;
+pub(crate) mod lights;
 mod occlusion;
 mod surfaces;
 mod textures;
@@ -18,7 +18,7 @@ use glam::{DVec3, Quat, Vec3, vec3};
 use raystone_core::geometry::Camera;
 use raystone_gpu::GpuError;
 use raystone_render::Renderer;
-use raystone_scene::{SceneData, SceneError, decode_normal, encode_normal};
+use raystone_scene::{Light, SceneData, SceneError, decode_normal, encode_normal};
 
 /// Width and height of a view, pixels.
 pub const SIZE: [u32; 2] = [8, 8];
@@ -73,9 +73,14 @@ pub struct KnownImage {
 }
 
 impl KnownImage {
-    /// The image turned and moved as a whole, so that no plane of it is exact in f32.
+    /// The image turned and moved as a whole, so that no plane of it is exact in f32. Maps turn about one axis alone: an image with
+    /// one stays as it is.
     fn turned(mut self) -> Self {
         const BY: Vec3 = vec3(0.3, -0.2, 0.5);
+        let is_map = |light: &Light| matches!(light, Light::Environment { .. });
+        if self.scene.lights.iter().any(is_map) {
+            return self;
+        }
         let turn = Quat::from_axis_angle(vec3(0.36, 0.48, 0.8), 0.7);
         let place = |p: Vec3| turn * p + BY;
         for triangle in &mut self.scene.triangles {
@@ -110,7 +115,7 @@ pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
 /// As [`known_images`].
 pub fn known_images_of(kinds: &Kinds) -> Result<Vec<KnownImage>, SceneError> {
     let mut all = lamps::images()?;
-    all.extend(lights::images()?);
+    all.extend(lights::images(&kinds.lights)?);
     all.extend(occlusion::images()?);
     all.extend(surfaces::images(&kinds.materials)?);
     all.extend(textures::images()?);

@@ -5,14 +5,19 @@
 //! kernels divide by shows, as does a density that is none of the table.
 
 use super::{FAR, LightChecks, LightTwin, no_lights};
+use crate::known_images::closed::{map_irradiance, map_radiance};
+use crate::known_images::lamps::{NEAR, path, reflected};
+use crate::known_images::lights::image;
+use crate::known_images::{KnownImage, View};
 use crate::mitsuba::{Export, ExportError};
 use crate::path_oracle::light::UNITS;
 use crate::path_oracle::{LightSample, Rounding};
 use crate::trial_lights;
-use glam::DVec3;
+use crate::trial_scenes::Trial;
+use glam::{DVec3, Vec3, vec3};
 use raystone_image::Image;
 use raystone_render::environment_aliases;
-use raystone_scene::{EnvironmentMap, LIGHT_KINDS, Light};
+use raystone_scene::{EnvironmentMap, LIGHT_KINDS, Light, SceneError};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -24,6 +29,7 @@ pub(super) static CHECKS: LightChecks = LightChecks {
     mitsuba,
     points: no_lights,
     trials: trial_lights::skies,
+    images,
 };
 
 /// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other
@@ -206,4 +212,40 @@ impl Map {
         let texel = row * self.map.width as usize + column;
         (texel, (density > 0.0).then_some(sample))
     }
+}
+
+fn images() -> Result<Vec<KnownImage>, SceneError> {
+    [("map", "mis-balance"), ("map, by the light", "light")]
+        .map(|(name, strategy)| shown(name, path(1, &[("strategy", strategy)])))
+        .into_iter()
+        .collect()
+}
+
+/// A map that is brighter towards one side and the horizon, turned.
+fn shown(name: &'static str, trial: Trial) -> Result<KnownImage, SceneError> {
+    const TURN: f32 = 0.4;
+    let texel = |k: u32| {
+        let (x, y) = ((k % 12) as f32, (k / 12) as f32);
+        let sun = if (x, y) == (3.0, 1.0) { 4.0 } else { 0.0 };
+        vec3(0.2 + 0.1 * x, 0.3 + 0.3 * y + sun, 1.5 - 0.1 * x)
+    };
+    let texels = (0..72).map(texel).collect();
+    let map = EnvironmentMap::new("map", [12, 6], texels, &mut Vec::new());
+    let map = map.map_err(|e| SceneError::malformed(std::path::Path::new("map"), "", e))?;
+    let turn = f64::from(TURN);
+    let floor = reflected(map_irradiance(&map, turn));
+    let mut views = vec![View::new("floor", Vec3::ZERO, NEAR, floor)];
+    for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4)] {
+        let (sin, cos) = polar.sin_cos();
+        let direction = DVec3::new(azimuth.sin() * sin, cos, -azimuth.cos() * sin).as_vec3();
+        let seen = map_radiance(&map, turn, polar, azimuth);
+        let eye = Vec3::Y;
+        views.push(View::new("sky", eye + direction, -direction, seen));
+    }
+    let lights = vec![Light::Environment {
+        map: Arc::new(map),
+        scale: 1.0,
+        turn: TURN,
+    }];
+    image(name, lights, trial, views)
 }

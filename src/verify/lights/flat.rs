@@ -1,6 +1,6 @@
 //! Triangles and parallelograms: points on them evenly.
 
-use super::{LightChecks, LightTwin, no_lights, no_trials};
+use super::{LightChecks, LightTwin, no_images, no_lights, no_trials};
 use crate::path_oracle::hits::Hits;
 use crate::path_oracle::texture::Textures;
 use crate::path_oracle::{LightSample, Rounding};
@@ -14,6 +14,7 @@ pub(super) static TRIANGLES: LightChecks = LightChecks {
     mitsuba: |_, _, _| Ok(()),
     points: no_lights,
     trials: no_trials,
+    images: no_images,
 };
 
 /// The row of two that form a parallelogram.
@@ -23,6 +24,7 @@ pub(super) static PARALLELOGRAMS: LightChecks = LightChecks {
     mitsuba: |_, _, _| Ok(()),
     points: no_lights,
     trials: no_trials,
+    images: no_images,
 };
 
 pub(crate) fn sample(

@@ -1,12 +1,16 @@
 //! Luminaires by their measured intensities.
 
 use super::{LightChecks, LightTwin, delta, no_lights, towards};
+use crate::known_images::lamps::{NEAR, path, reflected};
+use crate::known_images::lights::image;
+use crate::known_images::{KnownImage, View};
 use crate::mitsuba::ExportError;
 use crate::path_oracle::{LightSample, Rounding};
 use crate::trial_lights;
-use glam::{DQuat, DVec3, Quat};
-use raystone_scene::{IesProfile, LIGHT_KINDS, Light, Photometry};
+use glam::{DQuat, DVec3, Mat3, Quat, Vec3, vec3};
+use raystone_scene::{IesProfile, LIGHT_KINDS, Light, Photometry, SceneError};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
@@ -18,6 +22,7 @@ pub(super) static CHECKS: LightChecks = LightChecks {
     },
     points: no_lights,
     trials: trial_lights::luminaires,
+    images,
 };
 
 fn sample(light: &Light, from: DVec3, _: [f64; 2], rounding: &mut Rounding) -> Option<LightSample> {
@@ -86,4 +91,55 @@ fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
         false => 0.0,
     };
     Some([(low, 1.0 - part), (high, part)])
+}
+
+/// Candela by vertical and horizontal angle of a luminaire without symmetries.
+const LUMINAIRE: &str = "TILT=NONE\n1 -1 2 4 5 1 2 0 0 0\n0.5 1 0\n0 30 50 80\n0 70 180 270 360\n\
+                         90 60 40 10\n90 80 20 30\n90 50 70 5\n90 40 10 60\n90 60 40 10\n";
+
+/// Light from far away in red, a luminaire in green.
+fn images() -> Result<Vec<KnownImage>, SceneError> {
+    const WAY: Vec3 = vec3(0.4, -1.0, -0.7);
+    const HEIGHT: f32 = 1.6;
+    let profile = IesProfile::parse("luminaire", LUMINAIRE)
+        .map_err(|e| SceneError::malformed(std::path::Path::new("luminaire"), "", e.to_string()))?;
+    // Its nadir points down, its horizontal angle begins at +x and grows towards +z.
+    let axes = Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::NEG_Y);
+    let lights = vec![
+        Light::Directional {
+            direction: WAY,
+            irradiance: vec3(4.0, 0.0, 0.5),
+        },
+        Light::Ies {
+            position: HEIGHT * Vec3::Y,
+            rotation: Quat::from_mat3(&axes).normalize(),
+            color: vec3(0.0, 1.0, 0.0),
+            profile: Arc::new(profile),
+        },
+    ];
+    let facing = -WAY.as_dvec3().normalize().y;
+    // Vertical and horizontal angle, and the candela of the file there, before its two multipliers.
+    let places = [
+        ("below the luminaire", 0.0_f64, 0.0_f64, 90.0),
+        ("at a measured angle", 30.0, 70.0, 80.0),
+        ("between vertical angles", 40.0, 270.0, 25.0),
+        ("between horizontal angles", 50.0, 125.0, 45.0),
+    ];
+    let view = |(name, vertical, horizontal, candela): (&str, f64, f64, f64)| {
+        let [v, h] = [vertical, horizontal].map(f64::to_radians);
+        let off = f64::from(HEIGHT) * v.tan();
+        let point = DVec3::new(off * h.cos(), 0.0, off * h.sin()).as_vec3();
+        let distance = f64::from(HEIGHT) / v.cos();
+        let green = 0.5 * 2.0 * candela * v.cos() / (distance * distance);
+        let irradiance = DVec3::new(4.0 * facing, green, 0.5 * facing);
+        View::new(name, point, NEAR, reflected(irradiance))
+    };
+    let views = places.map(view).into();
+    let trial = path(1, &[("lights", "all")]);
+    Ok(vec![image(
+        "far and measured lights",
+        lights,
+        trial,
+        views,
+    )?])
 }

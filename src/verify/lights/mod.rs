@@ -6,6 +6,7 @@ mod ies;
 mod point;
 pub(crate) mod sphere;
 
+use crate::known_images::KnownImage;
 use crate::mitsuba::{Export, ExportError};
 use crate::path_oracle::{LightSample, Rounding, around};
 use crate::trial_scenes::TrialScene;
@@ -39,6 +40,8 @@ pub struct LightChecks {
     pub points: fn() -> Vec<Light>,
     /// Trial scenes of its own, on which paths of every scene with such a light are checked, too.
     pub trials: fn() -> Result<Vec<TrialScene>, SceneError>,
+    /// Known images of its own.
+    pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
 }
 
 /// The rows of all kinds.
@@ -93,6 +96,10 @@ fn towards(place: Vec3, from: DVec3) -> (DVec3, f64) {
 
 fn no_lights() -> Vec<Light> {
     Vec::new()
+}
+
+fn no_images() -> Result<Vec<KnownImage>, SceneError> {
+    Ok(Vec::new())
 }
 
 fn no_trials() -> Result<Vec<TrialScene>, SceneError> {

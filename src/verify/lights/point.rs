@@ -1,11 +1,14 @@
 //! Lights of one direction: points, cones, and light from infinitely far away.
 
-use super::{FAR, LightChecks, LightTwin, delta, no_trials, towards};
+use super::{FAR, LightChecks, LightTwin, delta, no_images, no_trials, towards};
+use crate::known_images::lamps::{NEAR, path, reflected};
+use crate::known_images::lights::image;
+use crate::known_images::{KnownImage, View};
 use crate::mitsuba::{Export, ExportError, vector};
 use crate::path_oracle::{LightSample, Rounding};
-use glam::{DVec3, Vec2, vec3};
+use glam::{DVec3, Vec2, Vec3, vec3};
 use raystone_image::Image;
-use raystone_scene::{LIGHT_KINDS, Light};
+use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::fmt::Write as _;
 
 /// The row of points.
@@ -15,6 +18,7 @@ pub(super) static POINTS: LightChecks = LightChecks {
     mitsuba: point_in_mitsuba,
     points,
     trials: no_trials,
+    images: no_images,
 };
 
 fn point(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
@@ -65,6 +69,7 @@ pub(super) static DIRECTIONAL: LightChecks = LightChecks {
     mitsuba: directional_in_mitsuba,
     points: suns,
     trials: no_trials,
+    images: no_images,
 };
 
 fn directional(light: &Light, _: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
@@ -118,6 +123,7 @@ pub(super) static SPOTS: LightChecks = LightChecks {
     mitsuba: spot_in_mitsuba,
     points: spots,
     trials: no_trials,
+    images,
 };
 
 fn spot(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
@@ -214,4 +220,62 @@ fn spot_in_mitsuba(
         vector(direction.normalize().any_orthonormal_vector())
     );
     Ok(())
+}
+
+/// From a place to a point of the floor: the distance, the cosine there, and that to this axis of a light.
+fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
+    let way = (point - place).as_dvec3();
+    let direction = way.normalize();
+    let axis = axis.as_dvec3().normalize();
+    [way.length(), -direction.y, direction.dot(axis)]
+}
+
+/// A point in red, a spot in green, and one without decay in blue.
+fn images() -> Result<Vec<KnownImage>, SceneError> {
+    const POINT: Vec3 = vec3(0.3, 1.5, -0.2);
+    const SPOTS: [[Vec3; 2]; 2] = [
+        [vec3(-0.5, 2.0, 0.4), vec3(0.2, -1.0, -0.1)],
+        [vec3(0.6, 1.8, 0.5), vec3(-0.3, -1.0, -0.4)],
+    ];
+    const CONE: [f32; 2] = [0.2, 0.5];
+    let spot = |k: usize, intensity, decay| Light::Spot {
+        position: SPOTS[k][0],
+        direction: SPOTS[k][1],
+        intensity,
+        inner: CONE[0],
+        outer: CONE[1],
+        decay,
+    };
+    let lights = vec![
+        Light::Point {
+            position: POINT,
+            intensity: vec3(6.0, 0.0, 0.0),
+        },
+        spot(0, vec3(0.0, 20.0, 0.0), true),
+        spot(1, vec3(0.0, 0.0, 3.0), false),
+    ];
+    let irradiance = |point: Vec3| {
+        let [d, cos, _] = seen_from(POINT, point, Vec3::Y);
+        let red = 6.0 * cos / (d * d);
+        let [green, blue] = [0, 1].map(|k| {
+            let [d, cos, on_axis] = seen_from(SPOTS[k][0], point, SPOTS[k][1]);
+            let [inner, outer] = CONE.map(|angle| f64::from(angle).cos());
+            let step = ((on_axis - outer) / (inner - outer)).clamp(0.0, 1.0);
+            let decay = if k == 0 { 20.0 / (d * d) } else { 3.0 };
+            decay * cos * step * step
+        });
+        DVec3::new(red, green, blue)
+    };
+    let view = |(name, x, z): (&str, f32, f32)| {
+        let point = vec3(x, 0.0, z);
+        View::new(name, point, NEAR, reflected(irradiance(point)))
+    };
+    let places = [
+        ("below", 0.0, 0.2),
+        ("in both half-shadows", -0.5, -0.35),
+        ("far off", 3.0, 2.0),
+    ];
+    let views = places.map(view).into();
+    let trial = path(1, &[("lights", "all")]);
+    Ok(vec![image("points and spots", lights, trial, views)?])
 }

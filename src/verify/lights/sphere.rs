@@ -1,11 +1,15 @@
 //! Spheres: uniform over the solid angle of the cap that is seen, or over the area from inside.
 
 use super::{LightChecks, LightTwin, around, no_trials};
+use crate::known_images::lamps::{NEAR, path, reflected};
+use crate::known_images::lights::image;
+use crate::known_images::{KnownImage, View, closed};
 use crate::mitsuba::{Export, ExportError, vector};
 use crate::path_oracle::LightSample;
 use crate::path_oracle::hits::Segment;
+use crate::trial_scenes::Trial;
 use glam::{DVec3, Vec3, vec3};
-use raystone_scene::{LIGHT_KINDS, Light};
+use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
@@ -16,6 +20,7 @@ pub(super) static CHECKS: LightChecks = LightChecks {
     mitsuba,
     points,
     trials: no_trials,
+    images,
 };
 
 fn points() -> Vec<Light> {
@@ -140,4 +145,45 @@ impl Ball {
         let normal = (from + distance * direction - self.centre) / self.radius;
         distance * distance / (4.0 * PI * self.radius * self.radius * normal.dot(direction))
     }
+}
+
+fn images() -> Result<Vec<KnownImage>, SceneError> {
+    [
+        ("sphere lights", &[("lights", "all")][..]),
+        ("sphere lights, by the light", &[("strategy", "light")]),
+        ("sphere lights, by the material", &[("strategy", "bsdf")]),
+    ]
+    .map(|(name, names)| shown(name, path(1, names)))
+    .into_iter()
+    .collect()
+}
+
+/// Two spheres, one large and near, one small and bright.
+fn shown(name: &'static str, trial: Trial) -> Result<KnownImage, SceneError> {
+    let is_by_material = name.ends_with("material");
+    let mut balls = vec![(vec3(0.2, 1.1, -0.3), 0.9_f32, vec3(1.0, 2.0, 3.0))];
+    if !is_by_material {
+        balls.push((vec3(-1.5, 0.6, 1.2), 0.02, vec3(9e3, 4e3, 1e3)));
+    }
+    let lights = balls
+        .iter()
+        .map(|(center, radius, radiance)| Light::Sphere {
+            center: *center,
+            radius: *radius,
+            radiance: *radiance,
+        });
+    let at = |point: Vec3| {
+        let one = |(center, radius, radiance): &(Vec3, f32, Vec3)| {
+            let offset = (*center - point).as_dvec3();
+            closed::sphere(offset, DVec3::Y, (*radius).into()) * radiance.as_dvec3()
+        };
+        reflected(balls.iter().map(one).sum())
+    };
+    let mut views: Vec<View> = [("below", Vec3::ZERO), ("beside", vec3(-1.4, 0.0, 0.4))]
+        .map(|(name, point)| View::new(name, point, NEAR, at(point)))
+        .into();
+    let (center, radius, radiance) = balls[0];
+    let front = center + radius * Vec3::Z;
+    views.push(View::new("seen", front, 0.4 * Vec3::Z, radiance.as_dvec3()));
+    image(name, lights.collect(), trial, views)
 }
