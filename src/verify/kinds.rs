@@ -5,7 +5,7 @@ use crate::materials::MaterialRegistry;
 
 /// The rows of all kinds: those of the program, until more are registered.
 #[derive(Clone, Default)]
-pub struct Kinds {
+pub struct KindChecks {
     /// Of materials.
     pub materials: MaterialRegistry,
     /// Of lights.

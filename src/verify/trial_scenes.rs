@@ -2,7 +2,7 @@
 //! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
 //! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
 
-use crate::kinds::Kinds;
+use crate::kinds::KindChecks;
 use crate::lights::LightRegistry;
 use crate::materials::MaterialRegistry;
 use crate::mesh::Mesh;
@@ -31,14 +31,14 @@ pub use crate::trial_surfaces::layers;
 /// # Errors
 /// A built-in scene is missing.
 pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
-    trial_scenes_of(&Kinds::default())
+    trial_scenes_of(&KindChecks::default())
 }
 
 /// All of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`trial_scenes`].
-pub fn trial_scenes_of(kinds: &Kinds) -> Result<Vec<TrialScene>, SceneError> {
+pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
     let mut lamps_trials = vec![("path", vec![depth(8)])];
     for (strategy, roulette) in [
         ("mis-power", "albedo"),

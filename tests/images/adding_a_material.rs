@@ -10,8 +10,8 @@ use raystone::integrator::{
     IntegratorRegistry, OrganisationRegistry, RayOffset, RenderJob, Renderer,
 };
 use raystone::measure::image_gate::{Pixels, answers, judge};
+use raystone::measure::kinds::KindChecks;
 use raystone::measure::known_images::{SIZE, known_images_of, look, most_samples};
-use raystone::measure::materials::MaterialRegistry;
 use raystone::measure::mitsuba::{
     MITSUBA_FILE, MitsubaSettings, export_mitsuba, export_mitsuba_of,
 };
@@ -23,13 +23,13 @@ use raystone::sampling::Sampler;
 use raystone::scene::{
     DIFFUSE, LoadOptions, Lobes, MATERIAL_KINDS, MaterialKind, SceneData, encode_normal, load,
 };
-use rows::{GAUZE, MINNAERT, minnaert, registry};
+use rows::{GAUZE, MINNAERT, minnaert, kinds};
 
 const IMAGE: [u32; 2] = [26, 19];
 
 /// The row of balls, among which those of the new kinds stand.
-fn balls(registry: &MaterialRegistry) -> SceneData {
-    let scenes = trial_scenes_of(registry).expect("scenes").into_iter();
+fn balls(kinds: &KindChecks) -> SceneData {
+    let scenes = trial_scenes_of(kinds).expect("scenes").into_iter();
     let mut scenes = scenes.map(|trial| trial.scene);
     let found = scenes.find(|scene| scene.name == "glossy");
     found.expect("the trial scene of gloss")
@@ -60,11 +60,10 @@ fn with<'a>(
     gpu: &'a Gpu,
     stage: &'a Stage,
     sampler: &Sampler,
-    (size, depth): ([u32; 2], i64),
+    (size, what): ([u32; 2], &Variant),
     by: &Variant,
 ) -> Renderer<'a> {
-    let what = path(depth);
-    let integrator = IntegratorRegistry::default().configured(&what);
+    let integrator = IntegratorRegistry::default().configured(what);
     let by = OrganisationRegistry::default().configured(by);
     let by = by.unwrap_or_else(|e| panic!("{e}"));
     let integrator = integrator.expect("an integrator").organised(by);
@@ -91,11 +90,18 @@ fn organisation(name: &str, changes: &[(&str, &str)]) -> Variant {
 }
 
 /// The verdict on single paths.
-fn verdict(gpu: &Gpu, scene: &SceneData) -> PathsRecord {
+pub fn verdict(
+    gpu: &Gpu,
+    scene: &SceneData,
+    kinds: &KindChecks,
+    more: &[(&str, ParamValue)],
+) -> PathsRecord {
     let stage = Stage::new(gpu, scene.clone());
     let sampler = sampler_of("pixel-hash", "none", 100_000);
     let single = organisation("single-kernel", &[]);
-    let renderer = with(gpu, &stage, &sampler, (IMAGE, 5), &single);
+    let depth = ("max_depth", ParamValue::Integer(5));
+    let what = integrator_variant("path", &[&[depth], more].concat());
+    let renderer = with(gpu, &stage, &sampler, (IMAGE, &what), &single);
     let pixels = Pixels {
         size: IMAGE,
         every: 1,
@@ -103,8 +109,8 @@ fn verdict(gpu: &Gpu, scene: &SceneData) -> PathsRecord {
         seed: 70_003,
     };
     let answers = answers(&renderer, &pixels).expect("images");
-    let oracle = PathOracle::knowing(scene, &registry()).expect("known materials");
-    let integrator = IntegratorRegistry::default().configured(&path(5));
+    let oracle = PathOracle::knowing(scene, kinds).expect("known materials");
+    let integrator = IntegratorRegistry::default().configured(&what);
     let view = View {
         estimator: Estimator::of(&integrator.expect("an integrator")).expect("a known one"),
         camera: stage.camera,
@@ -114,9 +120,8 @@ fn verdict(gpu: &Gpu, scene: &SceneData) -> PathsRecord {
     judge(&oracle, &view, &answers)
 }
 
-/// The device with a fault in the kernel that a kind brings along.
-fn faulty(kind: &MaterialKind, from: &str, to: &str) -> Gpu {
-    let (name, text) = kind.sources[0];
+/// The device with a fault in a kernel that a kind brings along.
+pub fn faulty_gpu((name, text): (&str, &str), from: &str, to: &str) -> Gpu {
     assert_eq!(text.matches(from).count(), 1, "{from}");
     let text = text.replace(from, to);
     open(KernelLibrary::default().with_sources(&[(name, &text)]))
@@ -127,10 +132,10 @@ fn single_paths_are_those_of_the_formulas_and_faults_are_seen() {
     if !is_exact(gpu()) {
         return;
     }
-    let (balls, bumpy) = (balls(&registry()), bumpy());
+    let (balls, bumpy) = (balls(&kinds()), bumpy());
     assert!([&MINNAERT, &GAUZE].iter().all(|kind| shows(&balls, kind)));
     for scene in [&balls, &bumpy] {
-        let record = verdict(gpu(), scene);
+        let record = verdict(gpu(), scene, &kinds(), &[]);
         assert_eq!(record.fault, None, "{}", scene.name);
     }
     let unknown = PathOracle::new(&balls).err();
@@ -140,7 +145,12 @@ fn single_paths_are_those_of_the_formulas_and_faults_are_seen() {
         (&MINNAERT, &bumpy, "cosine <= 0.0", "cosine <= 0.2"),
         (&GAUZE, &balls, "u.x < passes", "u.x > passes"),
     ] {
-        let record = verdict(&faulty(kind, from, to), scene);
+        let record = verdict(
+            &faulty_gpu(kind.sources[0], from, to),
+            scene,
+            &kinds(),
+            &[],
+        );
         assert!(record.wrong > 0, "{to}: {record:?}");
     }
 }
@@ -151,10 +161,10 @@ fn shows(scene: &SceneData, kind: &MaterialKind) -> bool {
 
 #[test]
 fn a_kernel_for_each_kind_makes_the_image_of_the_single_kernel() {
-    let stage = Stage::new(gpu(), balls(&registry()));
+    let stage = Stage::new(gpu(), balls(&kinds()));
     let sampler = sampler("owen-sobol", "none");
     let image = |by: &Variant| {
-        let renderer = with(gpu(), &stage, &sampler, (IMAGE, 4), by);
+        let renderer = with(gpu(), &stage, &sampler, (IMAGE, &path(4)), by);
         let shots = renderer.render(&[2], 9).expect("an image");
         let bits = |pixel: &[f32; 3]| pixel.map(f32::to_bits);
         let pixels: Vec<_> = shots[0].image.pixels.iter().map(bits).collect();
@@ -169,34 +179,32 @@ fn a_kernel_for_each_kind_makes_the_image_of_the_single_kernel() {
     }
 }
 
-/// The plane of the known image of materials that has this name: what is wrong with it.
-fn fault_of_plane(gpu: &Gpu, name: &str) -> Option<String> {
-    let images = known_images_of(&registry()).expect("images");
-    let image = images.iter().find(|image| image.name == "materials");
-    let image = image.expect("the image of materials");
-    let view = image.views.iter().find(|view| view.name == name);
-    let view = view.expect("its plane");
+/// What is wrong with a view of a known image.
+pub fn fault_in(gpu: &Gpu, kinds: &KindChecks, image: &str, view: &str) -> Option<String> {
+    let images = known_images_of(kinds).expect("images");
+    let image = images.iter().find(|known| known.name == image);
+    let image = image.expect("a known image");
+    let view = image.views.iter().find(|known| known.name == view);
+    let view = view.expect("one of its views");
     let stage = Stage::new(gpu, image.scene.clone());
     let sampler = sampler_of("owen-sobol", "none", most_samples());
     let single = organisation("single-kernel", &[]);
-    let mut renderer = with(gpu, &stage, &sampler, (SIZE, 1), &single);
+    let mut renderer = with(gpu, &stage, &sampler, (SIZE, &path(1)), &single);
     look(&mut renderer, image, view).expect("a view").fault
 }
 
 #[test]
 fn a_plane_is_as_bright_as_the_quadrature_of_its_formula_and_faults_are_seen() {
-    assert_eq!(fault_of_plane(gpu(), "minnaert"), None);
-    let gpu = faulty(
-        &MINNAERT,
-        "cosine * INVERSE_PI)",
-        "1.01 * cosine * INVERSE_PI)",
-    );
-    assert!(fault_of_plane(&gpu, "minnaert").is_some());
+    let plane = |gpu: &Gpu| fault_in(gpu, &kinds(), "materials", "minnaert");
+    assert_eq!(plane(gpu()), None);
+    let from = "cosine * INVERSE_PI)";
+    let gpu = faulty_gpu(MINNAERT.sources[0], from, &format!("1.01 * {from}"));
+    assert!(plane(&gpu).is_some());
 }
 
 #[test]
 fn mitsuba_is_told_of_it() {
-    let scene = balls(&registry());
+    let scene = balls(&kinds());
     let folder = tempfile::tempdir().expect("a folder");
     let settings = MitsubaSettings {
         camera: scene.view(1.0),
@@ -205,7 +213,7 @@ fn mitsuba_is_told_of_it() {
         bounces: 1,
         fronts_only: true,
     };
-    let said = export_mitsuba_of(&registry(), &scene, &settings, folder.path());
+    let said = export_mitsuba_of(&kinds(), &scene, &settings, folder.path());
     let said = said.expect("a scene").join("\n");
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a file");
     let xml = read(MITSUBA_FILE);
@@ -258,12 +266,15 @@ fn files_are_read_into_it() {
     assert_eq!(plain.materials[0].kind, &DIFFUSE);
 }
 
-/// Kinds without a row, and those that nothing shows.
-fn unchecked(kinds: &[&MaterialKind], registry: &MaterialRegistry) -> Vec<String> {
-    let trials = trial_scenes_of(registry).expect("scenes");
-    let images = known_images_of(registry).expect("images");
+/// KindChecks without a row, and those that nothing shows.
+fn unchecked(all: &[&MaterialKind], kinds: &KindChecks) -> Vec<String> {
+    let trials = trial_scenes_of(kinds).expect("scenes");
+    let images = known_images_of(kinds).expect("images");
     let missing = |kind: &&MaterialKind| {
-        let row = registry.get(kind.name).is_some_and(|row| row.kind == *kind);
+        let row = kinds
+            .materials
+            .get(kind.name)
+            .is_some_and(|row| row.kind == *kind);
         let tried = trials.iter().any(|trial| shows(&trial.scene, kind));
         let known = images.iter().any(|image| shows(&image.scene, kind));
         let all = [(row, "row"), (tried, "trial scene"), (known, "known image")];
@@ -273,23 +284,23 @@ fn unchecked(kinds: &[&MaterialKind], registry: &MaterialRegistry) -> Vec<String
             .map(move |(_, what)| format!("{name}: no {what}"))
             .collect::<Vec<_>>()
     };
-    kinds.iter().flat_map(missing).collect()
+    all.iter().flat_map(missing).collect()
 }
 
 #[test]
 fn every_kind_has_its_row_and_is_shown() {
-    let default = MaterialRegistry::default();
+    let default = KindChecks::default();
     assert_eq!(unchecked(&MATERIAL_KINDS, &default), [""; 0]);
-    assert_eq!(default.iter().count(), MATERIAL_KINDS.len());
+    assert_eq!(default.materials.iter().count(), MATERIAL_KINDS.len());
     let all = |what: &str| format!("minnaert: no {what}");
     assert_eq!(
         unchecked(&[&MINNAERT], &default),
         ["row", "trial scene", "known image"].map(all)
     );
-    assert_eq!(unchecked(&[&MINNAERT], &registry()), [""; 0]);
+    assert_eq!(unchecked(&[&MINNAERT], &kinds()), [""; 0]);
     // What is there of the program's kinds stays where it is.
     let before = trial_scenes().expect("scenes");
-    let after = trial_scenes_of(&registry()).expect("scenes");
+    let after = trial_scenes_of(&kinds()).expect("scenes");
     let names = |trials: &[raystone::measure::trial_scenes::TrialScene]| -> Vec<String> {
         trials
             .iter()

@@ -12,7 +12,7 @@ mod occlusion;
 mod surfaces;
 mod textures;
 
-use crate::kinds::Kinds;
+use crate::kinds::KindChecks;
 use crate::trial_scenes::Trial;
 use glam::{DVec3, Quat, Vec3, vec3};
 use raystone_core::geometry::Camera;
@@ -106,14 +106,14 @@ impl KnownImage {
 /// # Errors
 /// A built-in scene is missing.
 pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
-    known_images_of(&Kinds::default())
+    known_images_of(&KindChecks::default())
 }
 
 /// All of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`known_images`].
-pub fn known_images_of(kinds: &Kinds) -> Result<Vec<KnownImage>, SceneError> {
+pub fn known_images_of(kinds: &KindChecks) -> Result<Vec<KnownImage>, SceneError> {
     let mut all = lamps::images()?;
     all.extend(lights::images(&kinds.lights)?);
     all.extend(occlusion::images()?);

@@ -10,7 +10,7 @@ mod mesh;
 
 pub use look::{Color, by_formula};
 
-use crate::kinds::Kinds;
+use crate::kinds::KindChecks;
 use glam::Vec3;
 use raystone_core::atomic::write_atomic;
 use raystone_core::geometry::Camera;
@@ -89,7 +89,7 @@ pub fn export_mitsuba(
     settings: &MitsubaSettings,
     folder: &Path,
 ) -> Result<Vec<String>, ExportError> {
-    export_mitsuba_of(&Kinds::default(), scene, settings, folder)
+    export_mitsuba_of(&KindChecks::default(), scene, settings, folder)
 }
 
 /// The same of a scene of these kinds of materials and lights.
@@ -97,7 +97,7 @@ pub fn export_mitsuba(
 /// # Errors
 /// As [`export_mitsuba`].
 pub fn export_mitsuba_of(
-    kinds: &Kinds,
+    kinds: &KindChecks,
     scene: &SceneData,
     settings: &MitsubaSettings,
     folder: &Path,
@@ -135,7 +135,7 @@ pub fn export_mitsuba_of(
 /// An export under way.
 pub struct Export<'a> {
     folder: &'a Path,
-    kinds: &'a Kinds,
+    kinds: &'a KindChecks,
     /// What is exported.
     pub scene: &'a SceneData,
     warnings: Vec<String>,

@@ -29,7 +29,7 @@ pub(crate) use rounding::MOST_ROUNDINGS;
 pub use rounding::Rounding;
 pub use surface::Surface;
 
-use crate::kinds::Kinds;
+use crate::kinds::KindChecks;
 use crate::materials::MaterialChecks;
 use camera::Lens;
 use glam::DVec3;
@@ -216,14 +216,14 @@ impl<'a> PathOracle<'a> {
     /// # Errors
     /// What the scene has that the oracle does not know: nothing can be judged then.
     pub fn new(scene: &'a SceneData) -> Result<Self, String> {
-        Self::knowing(scene, &Kinds::default())
+        Self::knowing(scene, &KindChecks::default())
     }
 
     /// The oracle of a scene of these kinds of materials and lights.
     ///
     /// # Errors
     /// As [`PathOracle::new`].
-    pub fn knowing(scene: &'a SceneData, kinds: &Kinds) -> Result<Self, String> {
+    pub fn knowing(scene: &'a SceneData, kinds: &KindChecks) -> Result<Self, String> {
         let known = |material: &Material| {
             let kind = material.kind.name;
             (kinds.materials.get(kind)).ok_or_else(|| format!("material `{kind}`"))

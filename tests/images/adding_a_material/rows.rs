@@ -1,7 +1,8 @@
 //! Two kinds of materials: their rows for rendering, and those of their checks.
 
 use glam::{DVec3, Vec3, vec3};
-use raystone::measure::materials::{MaterialChecks, MaterialRegistry};
+use raystone::measure::kinds::KindChecks;
+use raystone::measure::materials::MaterialChecks;
 use raystone::measure::mitsuba::by_formula;
 use raystone::measure::path_oracle::{
     Bounce, Bsdf, Reflected, Rounding, Surface, bounce, cosine_density, cosine_direction, kept,
@@ -147,9 +148,9 @@ impl Bsdf for Gauze<'_> {
 }
 
 /// The program's kinds and these two.
-pub fn registry() -> MaterialRegistry {
-    let mut registry = MaterialRegistry::default();
-    registry.register(&MINNAERT_CHECKS);
-    registry.register(&GAUZE_CHECKS);
-    registry
+pub fn kinds() -> KindChecks {
+    let mut kinds = KindChecks::default();
+    kinds.materials.register(&MINNAERT_CHECKS);
+    kinds.materials.register(&GAUZE_CHECKS);
+    kinds
 }
