@@ -2,13 +2,15 @@
 //! `kernels/shading/light/table.wesl` takes apart.
 
 use super::environment_tables::environment_rows;
-use super::light_kinds::SceneLightKinds;
 use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
+use super::scene_kinds::SceneKinds;
 use super::tables::emits_in_front;
 use super::units::{shared_out, unit_share};
 use glam::Vec3;
 use raystone_gpu::UniformValues;
-use raystone_scene::{IesProfile, Light, LightList, ListedLight, Photometry, SceneData, Source};
+use raystone_scene::{
+    IesProfile, Light, LightKind, LightList, ListedLight, Photometry, SceneData, Source,
+};
 use std::f64::consts::FRAC_PI_2;
 
 /// `vec4` a light: its head and three of its kind.
@@ -25,7 +27,7 @@ pub struct LightTables {
     /// First of the spheres among the lights, and how many they are.
     spheres: [u32; 2],
     /// Kinds.
-    pub kinds: SceneLightKinds,
+    pub kinds: SceneKinds<LightKind>,
     /// Whether some surface emits from its front alone.
     pub one_sided: bool,
     /// Where the tree over lights with a place begins among the rows, and the leaves of the lights in it.
@@ -48,7 +50,7 @@ impl LightTables {
         let shares = shared_out(&powers);
         let mut tables = Self {
             lights: list.lights.len() as u32,
-            kinds: SceneLightKinds::of(scene, list),
+            kinds: SceneKinds::of(list.lights.iter().map(|light| light.kind(scene))),
             one_sided: scene.materials.iter().any(emits_in_front),
             ..Self::default()
         };
@@ -104,7 +106,8 @@ impl LightTables {
 
     /// Whether one of them is a map of the environment.
     pub(super) fn has_map(&self) -> bool {
-        self.kinds.has("environment")
+        let mut there = self.kinds.present();
+        there.any(|number| self.kinds.kind(number).name == "environment")
     }
 
     /// Whether there is more than one light, or some triangle emits that is not of the one.

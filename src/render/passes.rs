@@ -1,7 +1,7 @@
 //! The passes in which an integrator adds samples to an image.
 
-use super::material_kinds::SceneKinds;
 use super::render::with_sampler;
+use super::scene_kinds::SceneKinds;
 use super::slice::Slice;
 use super::tables::{SceneBuffers, SceneFeatures};
 use super::visibility::Visibility;
@@ -12,6 +12,7 @@ use raystone_core::structure::RAY_QUERIES;
 use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
+use raystone_scene::MaterialKind;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -349,7 +350,7 @@ impl<'a> ImageSteps<'a> {
     }
 
     /// Kinds of materials of the scene.
-    pub(crate) fn material_kinds(&self) -> &SceneKinds {
+    pub(crate) fn material_kinds(&self) -> &SceneKinds<MaterialKind> {
         &self.passes.scene.materials
     }
 

@@ -1,14 +1,15 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
-use super::light_kinds::SceneLightKinds;
 use super::light_tables::LightTables;
-use super::material_kinds::SceneKinds;
 use super::offset::TransformError;
+use super::scene_kinds::{SceneKind as _, SceneKinds};
 use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
 use glam::Vec3;
 use raystone_accel::{TriangleBuffers, TriangleSoup};
 use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
-use raystone_scene::{Daylight, LIGHT_KINDS, LightList, Material, SceneData};
+use raystone_scene::{
+    Daylight, LIGHT_KINDS, LightKind, LightList, Material, MaterialKind, SceneData,
+};
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -18,7 +19,7 @@ pub struct SceneFeatures {
     /// There are lights that can be sampled.
     pub lights: bool,
     /// Kinds of lights.
-    pub light_kinds: SceneLightKinds,
+    pub light_kinds: SceneKinds<LightKind>,
     /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
     pub many_lights: bool,
     /// Some surface emits from its front alone.
@@ -28,7 +29,9 @@ pub struct SceneFeatures {
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
     /// Kinds of materials.
-    pub materials: SceneKinds,
+    pub materials: SceneKinds<MaterialKind>,
+    /// Of each of them by number: textures of its materials, normals and colours of vertices.
+    pub kinds: Vec<SurfaceFeatures>,
     /// Instances add to the error of points.
     pub transforms: bool,
     /// Some triangle is mirrored, so that its corners turn the other way round.
@@ -38,7 +41,7 @@ pub struct SceneFeatures {
 /// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need. Kinds of materials and
 /// lights join theirs.
 const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
-    ("materials", &[]),
+    ("materials", &["several_materials"]),
     (
         "textures",
         &[
@@ -63,11 +66,9 @@ const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
 pub(super) fn grouped_features() -> impl Iterator<Item = (&'static str, &'static str)> {
     let others = FEATURE_GROUPS.iter();
     let others = others.flat_map(|(group, names)| names.iter().map(move |name| (*group, *name)));
-    let materials = SceneKinds::default();
-    let materials: Vec<_> = materials
-        .flags()
-        .map(|(name, _)| ("materials", name))
-        .collect();
+    let materials = SceneKinds::<MaterialKind>::default();
+    let materials: Vec<_> = materials.flags().collect();
+    let materials = materials.into_iter().map(|(name, _)| ("materials", name));
     let lights = LIGHT_KINDS.iter().map(|kind| (kind.group, kind.feature));
     others.chain(materials).chain(lights)
 }
@@ -77,6 +78,7 @@ impl SceneFeatures {
     pub fn flags(&self) -> Vec<(&'static str, bool)> {
         let mut flags: Vec<_> = self.materials.flags().collect();
         flags.extend([
+            ("several_materials", self.materials.are_several()),
             ("lights", self.lights),
             ("many_lights", self.many_lights),
             ("several_light_kinds", self.light_kinds.are_several()),
@@ -98,10 +100,11 @@ impl SceneFeatures {
 
     /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
     pub(crate) fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
-        let own = kind.map(|number| self.materials.numbered()[number]);
+        let own = kind.and_then(|number| self.materials.kind(number).feature());
         let others = self.materials.flags().map(|(name, _)| name);
-        let others = others.filter(|name| own.is_none_or(|own| own.kind.feature != *name));
-        let surfaces = own.map(|own| own.surfaces).unwrap_or_default();
+        let others = others.filter(|name| own != Some(*name));
+        let surfaces = kind.map_or(SurfaceFeatures::default(), |kind| self.kinds[kind]);
+        let others = others.chain(["several_materials"]);
         others.chain(surfaces.unneeded()).collect()
     }
 }
@@ -145,7 +148,7 @@ impl SceneBuffers {
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
         let surfaces = SurfaceFeatures::of(scene, |_| true);
-        let materials = SceneKinds::of(scene);
+        let materials = SceneKinds::of(scene.materials.iter().map(|material| material.kind));
         let mut lights = LightTables::of(scene, &LightList::of(scene));
         let tables = Tables::of(scene, &materials, &mut lights, &surfaces);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
@@ -169,6 +172,12 @@ impl SceneBuffers {
                 one_sided_lights: lights.one_sided,
                 background: has_map || scene.daylight.is_some() || scene.environment != Vec3::ZERO,
                 daylight: scene.daylight.is_some(),
+                kinds: (0..materials.count())
+                    .map(|number| {
+                        let kind = materials.kind(number);
+                        SurfaceFeatures::of(scene, |material| material.kind == kind)
+                    })
+                    .collect(),
                 materials,
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
                 mirrored: scene.mirrored.contains(&true),
@@ -199,7 +208,7 @@ struct Tables {
 impl Tables {
     fn of(
         scene: &SceneData,
-        kinds: &SceneKinds,
+        kinds: &SceneKinds<MaterialKind>,
         lights: &mut LightTables,
         surfaces: &SurfaceFeatures,
     ) -> Self {

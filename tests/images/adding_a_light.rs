@@ -8,7 +8,9 @@ use raystone::geometry::Camera;
 use raystone::measure::kinds::KindChecks;
 use raystone::measure::known_images::{KnownImage, View, known_images_of};
 use raystone::measure::lights::{LightChecks, LightTwin};
-use raystone::measure::mitsuba::{MITSUBA_FILE, MitsubaSettings, export_mitsuba_of, vector};
+use raystone::measure::mitsuba::{
+    Export, ExportError, MITSUBA_FILE, MitsubaSettings, export_mitsuba_of, vector,
+};
 use raystone::measure::path_oracle::{LightSample, PathOracle, Rounding};
 use raystone::measure::trial_scenes::{TrialScene, trial_scenes_of};
 use raystone::params::ParamValue;
@@ -28,24 +30,21 @@ static BULB: LightKind = LightKind {
 };
 
 static CHECKS: LightChecks = LightChecks {
-    kind: &BULB,
-    twin: LightTwin::Alone(sample),
-    mitsuba: |export, _, light| {
-        // As if it shone evenly.
-        let place = light
-            .place()
-            .map(|(place, _)| vector(place))
-            .unwrap_or_default();
-        export.xml += &format!(
-            "<emitter type=\"point\"><point name=\"position\" value=\"{place}\"/><rgb name=\"intensity\" value=\"{}\"/></emitter>\n",
-            vector(light.color())
-        );
-        Ok(())
-    },
     points: || vec![bulb(vec3(0.2, 2.1, 1.2), vec3(0.8, 0.2, 1.0), 3.0)],
-    trials: || Ok(Vec::new()),
     images,
+    ..LightChecks::new(&BULB, LightTwin::Alone(sample), in_mitsuba)
 };
+
+/// As if it shone evenly.
+fn in_mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
+    let place = light.place().map(|(place, _)| vector(place));
+    export.xml += &format!(
+        "<emitter type=\"point\"><point name=\"position\" value=\"{}\"/><rgb name=\"intensity\" value=\"{}\"/></emitter>\n",
+        place.unwrap_or_default(),
+        vector(light.color())
+    );
+    Ok(())
+}
 
 const AXIS: Vec3 = vec3(0.36, -0.8, 0.48);
 

@@ -23,7 +23,7 @@ use raystone::sampling::Sampler;
 use raystone::scene::{
     DIFFUSE, LoadOptions, Lobes, MATERIAL_KINDS, MaterialKind, SceneData, encode_normal, load,
 };
-use rows::{GAUZE, MINNAERT, minnaert, kinds};
+use rows::{GAUZE, MINNAERT, kinds, minnaert};
 
 const IMAGE: [u32; 2] = [26, 19];
 
@@ -145,12 +145,7 @@ fn single_paths_are_those_of_the_formulas_and_faults_are_seen() {
         (&MINNAERT, &bumpy, "cosine <= 0.0", "cosine <= 0.2"),
         (&GAUZE, &balls, "u.x < passes", "u.x > passes"),
     ] {
-        let record = verdict(
-            &faulty_gpu(kind.sources[0], from, to),
-            scene,
-            &kinds(),
-            &[],
-        );
+        let record = verdict(&faulty_gpu(kind.sources[0], from, to), scene, &kinds(), &[]);
         assert!(record.wrong > 0, "{to}: {record:?}");
     }
 }

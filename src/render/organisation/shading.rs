@@ -34,7 +34,7 @@ pub(super) fn by_kind(
 ) -> Result<(), GpuError> {
     let method = queues.method(steps.gpu(), wavefront)?;
     let words = |of: u32| 4 * u64::from(queues.capacity) * u64::from(of);
-    let number = steps.material_kinds().numbered().len() as u32 + 1;
+    let number = steps.material_kinds().count() as u32 + 1;
     let parts = if method.keeps_apart() { number } else { 1 };
     let kinds = Kinds {
         queues,
@@ -86,8 +86,7 @@ impl Kinds<'_> {
             .buffer("order", &self.kept)
             .buffer("kind_counts", &self.count)
             .buffer("live_groups", &groups);
-        let kinds = steps.material_kinds().numbered();
-        let name = kind.map_or("nothing", |kind| kinds[kind].kind.name);
+        let name = kind.map_or("nothing", |kind| steps.material_kinds().kind(kind).name);
         let plan = self.queues.kernel("organisation/plan_kind");
         let plan = plan.constant("QUEUE", queue);
         steps.run(&format!("plan {name}"), plan, [1, 1, 1], &bindings)?;

@@ -4,6 +4,7 @@ use raystone_core::params::Sources;
 use std::fmt;
 
 /// A kind of light.
+#[derive(Clone)]
 pub struct LightKind {
     /// Name.
     pub name: &'static str,

@@ -37,6 +37,7 @@ pub enum Lobes {
 }
 
 /// A kind of material.
+#[derive(Clone)]
 pub struct MaterialKind {
     /// Name.
     pub name: &'static str,

@@ -4,7 +4,8 @@
 //! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
 //! kernels divide by shows, as does a density that is none of the table.
 
-use super::{FAR, LightChecks, LightTwin, no_lights};
+use super::delta::FAR;
+use super::{LightChecks, LightTwin};
 use crate::known_images::closed::{map_irradiance, map_radiance};
 use crate::known_images::lamps::{NEAR, path, reflected};
 use crate::known_images::lights::image;
@@ -24,12 +25,9 @@ use std::sync::Arc;
 
 /// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[7],
-    twin: LightTwin::Map,
-    mitsuba,
-    points: no_lights,
     trials: trial_lights::skies,
     images,
+    ..LightChecks::new(LIGHT_KINDS[7], LightTwin::Map, mitsuba)
 };
 
 /// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other

@@ -1,6 +1,6 @@
 //! Triangles and parallelograms: points on them evenly.
 
-use super::{LightChecks, LightTwin, no_images, no_lights, no_trials};
+use super::{LightChecks, LightTwin};
 use crate::path_oracle::hits::Hits;
 use crate::path_oracle::texture::Textures;
 use crate::path_oracle::{LightSample, Rounding};
@@ -8,24 +8,12 @@ use glam::DVec3;
 use raystone_scene::{LIGHT_KINDS, SceneData, Source};
 
 /// The row of single ones. Mitsuba is told of them with their meshes.
-pub(super) static TRIANGLES: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[0],
-    twin: LightTwin::Surface,
-    mitsuba: |_, _, _| Ok(()),
-    points: no_lights,
-    trials: no_trials,
-    images: no_images,
-};
+pub(super) static TRIANGLES: LightChecks =
+    LightChecks::new(LIGHT_KINDS[0], LightTwin::Surface, |_, _, _| Ok(()));
 
 /// The row of two that form a parallelogram.
-pub(super) static PARALLELOGRAMS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[1],
-    twin: LightTwin::Surface,
-    mitsuba: |_, _, _| Ok(()),
-    points: no_lights,
-    trials: no_trials,
-    images: no_images,
-};
+pub(super) static PARALLELOGRAMS: LightChecks =
+    LightChecks::new(LIGHT_KINDS[1], LightTwin::Surface, |_, _, _| Ok(()));
 
 pub(crate) fn sample(
     (scene, textures, hits): (&SceneData, &Textures, &Hits),

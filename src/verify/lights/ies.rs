@@ -1,11 +1,11 @@
 //! Luminaires by their measured intensities.
 
-use super::{LightChecks, LightTwin, delta, no_lights, towards};
+use super::{LightChecks, LightTwin, delta};
 use crate::known_images::lamps::{NEAR, path, reflected};
 use crate::known_images::lights::image;
 use crate::known_images::{KnownImage, View};
 use crate::mitsuba::ExportError;
-use crate::path_oracle::{LightSample, Rounding};
+use crate::path_oracle::Rounding;
 use crate::trial_lights;
 use glam::{DQuat, DVec3, Mat3, Quat, Vec3, vec3};
 use raystone_scene::{IesProfile, LIGHT_KINDS, Light, Photometry, SceneError};
@@ -14,38 +14,28 @@ use std::sync::Arc;
 
 /// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[5],
-    twin: LightTwin::Alone(sample),
-    mitsuba: |_, number, light| {
-        let reason = "it has no lights with the intensities of a file";
-        Err(ExportError::light(number, light, reason))
-    },
-    points: no_lights,
     trials: trial_lights::luminaires,
     images,
+    ..LightChecks::new(
+        LIGHT_KINDS[5],
+        LightTwin::Alone(delta::sample),
+        |_, number, light| {
+            let reason = "it has no lights with the intensities of a file";
+            Err(ExportError::light(number, light, reason))
+        },
+    )
 };
-
-fn sample(light: &Light, from: DVec3, _: [f64; 2], rounding: &mut Rounding) -> Option<LightSample> {
-    let Light::Ies {
-        position,
-        rotation,
-        color,
-        profile,
-    } = light
-    else {
-        return None;
-    };
-    let (direction, distance) = towards(*position, from);
-    let candela = candela(profile, *rotation, -direction, rounding);
-    let falloff = distance * distance;
-    delta(direction, distance, color.as_dvec3() * (candela / falloff))
-}
 
 /// Beyond the last angle by this much is not outside yet, degrees.
 const SLACK: f64 = 1e-3;
 
 /// Candela in the direction in which light travels.
-fn candela(profile: &IesProfile, rotation: Quat, travels: DVec3, rounding: &mut Rounding) -> f64 {
+pub(super) fn candela(
+    profile: &IesProfile,
+    rotation: Quat,
+    travels: DVec3,
+    rounding: &mut Rounding,
+) -> f64 {
     let turn = DQuat::from_array(rotation.to_array().map(f64::from)).normalize();
     let DVec3 { x, y, z } = rounding.direction(turn.inverse() * travels);
     // Type C: (sin v cos h, sin v sin h, cos v); B: (sin h, cos h sin v, cos h cos v); A: (cos v sin h, sin v, cos v cos h).

@@ -1,16 +1,16 @@
 //! What checks know of each kind of light: one row, in a file of its own.
 
+mod delta;
 pub(crate) mod environment;
 pub(crate) mod flat;
 mod ies;
-mod point;
 pub(crate) mod sphere;
 
 use crate::known_images::KnownImage;
 use crate::mitsuba::{Export, ExportError};
-use crate::path_oracle::{LightSample, Rounding, around};
+use crate::path_oracle::{LightSample, Rounding};
 use crate::trial_scenes::TrialScene;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use raystone_core::params::{Kinds, Named, Sources};
 use raystone_scene::{Light, LightKind, SceneError};
 
@@ -31,17 +31,31 @@ pub struct LightChecks {
     pub kind: &'static LightKind,
     /// Its formulas in f64.
     pub twin: LightTwin,
-    /// Writes the light of this number for Mitsuba.
-    ///
-    /// # Errors
-    /// [`ExportError::Light`]: Mitsuba has no counterpart.
-    pub mitsuba: fn(&mut Export<'_>, usize, &Light) -> Result<(), ExportError>,
+    /// The light in Mitsuba.
+    pub mitsuba: ToMitsuba,
     /// Those that shine in the trial scene `points`.
     pub points: fn() -> Vec<Light>,
     /// Trial scenes of its own, on which paths of every scene with such a light are checked, too.
     pub trials: fn() -> Result<Vec<TrialScene>, SceneError>,
     /// Known images of its own.
     pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
+}
+
+/// Writes the light of this number for Mitsuba, or says with [`ExportError::Light`] why it cannot be.
+pub type ToMitsuba = fn(&mut Export<'_>, usize, &Light) -> Result<(), ExportError>;
+
+impl LightChecks {
+    /// A kind that nothing shows yet.
+    pub const fn new(kind: &'static LightKind, twin: LightTwin, mitsuba: ToMitsuba) -> Self {
+        Self {
+            kind,
+            twin,
+            mitsuba,
+            points: Vec::new,
+            trials: || Ok(Vec::new()),
+            images: || Ok(Vec::new()),
+        }
+    }
 }
 
 /// The rows of all kinds.
@@ -53,10 +67,10 @@ impl Named for LightChecks {
             &flat::TRIANGLES,
             &flat::PARALLELOGRAMS,
             &sphere::CHECKS,
-            &point::POINTS,
-            &point::SPOTS,
+            &delta::POINTS,
+            &delta::SPOTS,
             &ies::CHECKS,
-            &point::DIRECTIONAL,
+            &delta::DIRECTIONAL,
             &environment::CHECKS,
         ]
     }
@@ -72,36 +86,4 @@ impl Named for LightChecks {
     fn sources(&self) -> Sources {
         self.kind.sources
     }
-}
-
-/// Distance of what has none.
-const FAR: f64 = 1e30;
-
-/// What arrives along one direction, if anything does.
-fn delta(direction: DVec3, distance: f64, radiance: DVec3) -> Option<LightSample> {
-    (radiance.max_element() > 0.0).then_some(LightSample {
-        direction,
-        distance,
-        radiance,
-        density: None,
-        triangles: None,
-    })
-}
-
-/// The unit direction to a place, and how far it is.
-fn towards(place: Vec3, from: DVec3) -> (DVec3, f64) {
-    let to_light = place.as_dvec3() - from;
-    (to_light.normalize(), to_light.length())
-}
-
-fn no_lights() -> Vec<Light> {
-    Vec::new()
-}
-
-fn no_images() -> Result<Vec<KnownImage>, SceneError> {
-    Ok(Vec::new())
-}
-
-fn no_trials() -> Result<Vec<TrialScene>, SceneError> {
-    Ok(Vec::new())
 }

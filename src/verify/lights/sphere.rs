@@ -1,12 +1,12 @@
 //! Spheres: uniform over the solid angle of the cap that is seen, or over the area from inside.
 
-use super::{LightChecks, LightTwin, around, no_trials};
+use super::{LightChecks, LightTwin};
 use crate::known_images::lamps::{NEAR, path, reflected};
 use crate::known_images::lights::image;
 use crate::known_images::{KnownImage, View, closed};
 use crate::mitsuba::{Export, ExportError, vector};
-use crate::path_oracle::LightSample;
 use crate::path_oracle::hits::Segment;
+use crate::path_oracle::{LightSample, around};
 use crate::trial_scenes::Trial;
 use glam::{DVec3, Vec3, vec3};
 use raystone_scene::{LIGHT_KINDS, Light, SceneError};
@@ -15,12 +15,13 @@ use std::fmt::Write as _;
 
 /// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[2],
-    twin: LightTwin::Alone(|light, from, point, _| Ball::of(light)?.sample(from, point)),
-    mitsuba,
     points,
-    trials: no_trials,
     images,
+    ..LightChecks::new(
+        LIGHT_KINDS[2],
+        LightTwin::Alone(|light, from, point, _| Ball::of(light)?.sample(from, point)),
+        mitsuba,
+    )
 };
 
 fn points() -> Vec<Light> {

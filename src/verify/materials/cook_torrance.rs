@@ -7,14 +7,14 @@ use raystone_scene::{COOK_TORRANCE, Fresnel, Masking};
 
 /// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &COOK_TORRANCE,
-    twin: |surface| Box::new(CookTorrance::new(surface)),
-    mitsuba: by_formula,
     python: include_str!("cook_torrance.py"),
     balls,
     planes,
-    trials: no_scenes,
-    images: no_scenes,
+    ..MaterialChecks::new(
+        &COOK_TORRANCE,
+        |surface| Box::new(CookTorrance::new(surface)),
+        by_formula,
+    )
 };
 
 struct CookTorrance<'a> {

@@ -10,14 +10,14 @@ use raystone_scene::DIELECTRIC;
 
 /// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &DIELECTRIC,
-    twin: |surface| Box::new(Dielectric(surface)),
-    mitsuba,
-    python: "",
     balls,
-    planes: none,
     trials,
     images,
+    ..MaterialChecks::new(
+        &DIELECTRIC,
+        |surface| Box::new(Dielectric(surface)),
+        mitsuba,
+    )
 };
 
 struct Dielectric<'a>(&'a Surface<'a>);

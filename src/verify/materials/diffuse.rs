@@ -4,16 +4,8 @@ use super::*;
 use raystone_scene::DIFFUSE;
 
 /// The row.
-pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &DIFFUSE,
-    twin: |surface| Box::new(Diffuse(surface)),
-    mitsuba,
-    python: "",
-    balls: none,
-    planes: none,
-    trials: no_scenes,
-    images: no_scenes,
-};
+pub(crate) static CHECKS: MaterialChecks =
+    MaterialChecks::new(&DIFFUSE, |surface| Box::new(Diffuse(surface)), mitsuba);
 
 struct Diffuse<'a>(&'a Surface<'a>);
 

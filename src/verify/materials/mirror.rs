@@ -8,14 +8,8 @@ use raystone_scene::MIRROR;
 
 /// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &MIRROR,
-    twin: |surface| Box::new(Mirror(surface)),
-    mitsuba,
-    python: "",
-    balls: none,
-    planes: none,
-    trials: no_scenes,
     images,
+    ..MaterialChecks::new(&MIRROR, |surface| Box::new(Mirror(surface)), mitsuba)
 };
 
 struct Mirror<'a>(&'a Surface<'a>);

@@ -45,6 +45,26 @@ pub struct MaterialChecks {
     pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
 }
 
+impl MaterialChecks {
+    /// A kind that nothing shows yet.
+    pub const fn new(
+        kind: &'static MaterialKind,
+        twin: Twin,
+        mitsuba: fn(&Material, &Color, &str, &mut Vec<String>) -> String,
+    ) -> Self {
+        Self {
+            kind,
+            twin,
+            mitsuba,
+            python: "",
+            balls: Vec::new,
+            planes: Vec::new,
+            trials: || Ok(Vec::new()),
+            images: || Ok(Vec::new()),
+        }
+    }
+}
+
 /// The rows of all kinds.
 pub type MaterialRegistry = Kinds<MaterialChecks>;
 
@@ -76,14 +96,4 @@ impl Named for MaterialChecks {
 /// Parameter number `place` of a material; 0 where it has none.
 fn number(material: &Material, place: usize) -> f32 {
     material.parameters.get(place).copied().unwrap_or_default()
-}
-
-/// Where a kind has nothing of its own.
-fn none<T>() -> Vec<T> {
-    Vec::new()
-}
-
-/// The same of scenes.
-fn no_scenes<T>() -> Result<Vec<T>, SceneError> {
-    Ok(Vec::new())
 }

@@ -5,14 +5,10 @@ use raystone_scene::PHONG;
 
 /// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &PHONG,
-    twin: |surface| Box::new(Phong::new(surface)),
-    mitsuba: by_formula,
     python: include_str!("phong.py"),
     balls,
     planes,
-    trials: no_scenes,
-    images: no_scenes,
+    ..MaterialChecks::new(&PHONG, |surface| Box::new(Phong::new(surface)), by_formula)
 };
 
 struct Phong<'a> {

@@ -6,14 +6,14 @@ use raystone_scene::{PRINCIPLED, reflectance_of_ior};
 
 /// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
-    kind: &PRINCIPLED,
-    twin: |surface| Box::new(Principled::new(surface)),
-    mitsuba: by_formula,
     python: include_str!("principled.py"),
     balls,
     planes,
-    trials: no_scenes,
-    images: no_scenes,
+    ..MaterialChecks::new(
+        &PRINCIPLED,
+        |surface| Box::new(Principled::new(surface)),
+        by_formula,
+    )
 };
 
 /// The least width of the facets' distribution.

@@ -43,9 +43,6 @@ pub fn minnaert(exponent: f32) -> Material {
 }
 
 pub static MINNAERT_CHECKS: MaterialChecks = MaterialChecks {
-    kind: &MINNAERT,
-    twin: |surface| Box::new(Minnaert(surface)),
-    mitsuba: by_formula,
     python: "class Minnaert(Opaque):
     distribution = mi.MicrofacetType.Beckmann
 
@@ -60,8 +57,7 @@ mi.register_bsdf(\"raystone-minnaert\", Minnaert)
 ",
     balls: || vec![(None, minnaert(0.5)), (None, minnaert(2.0))],
     planes: || vec![("minnaert", minnaert(0.7))],
-    trials: || Ok(Vec::new()),
-    images: || Ok(Vec::new()),
+    ..MaterialChecks::new(&MINNAERT, |surface| Box::new(Minnaert(surface)), by_formula)
 };
 
 struct Minnaert<'a>(&'a Surface<'a>);
@@ -105,19 +101,17 @@ pub fn gauze() -> Material {
 }
 
 pub static GAUZE_CHECKS: MaterialChecks = MaterialChecks {
-    kind: &GAUZE,
-    twin: |surface| Box::new(Gauze(surface)),
-    mitsuba: |material, color, id, warnings| {
-        let name = &material.name;
-        warnings.push(format!("material {name}: Mitsuba draws its mirror alone"));
-        let color = color.named("specular_reflectance");
-        format!("    <bsdf type=\"conductor\" {id}>{color}</bsdf>\n")
-    },
-    python: "",
     balls: || vec![(None, gauze())],
-    planes: Vec::new,
-    trials: || Ok(Vec::new()),
-    images: || Ok(Vec::new()),
+    ..MaterialChecks::new(
+        &GAUZE,
+        |surface| Box::new(Gauze(surface)),
+        |material, color, id, warnings| {
+            let name = &material.name;
+            warnings.push(format!("material {name}: Mitsuba draws its mirror alone"));
+            let color = color.named("specular_reflectance");
+            format!("    <bsdf type=\"conductor\" {id}>{color}</bsdf>\n")
+        },
+    )
 };
 
 struct Gauze<'a>(&'a Surface<'a>);

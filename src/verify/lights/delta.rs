@@ -1,6 +1,7 @@
-//! Lights of one direction: points, cones, and light from infinitely far away.
+//! Lights of one direction: points, cones, and light from infinitely far away; of luminaires what they have in common with these.
 
-use super::{FAR, LightChecks, LightTwin, delta, no_images, no_trials, towards};
+use super::ies::candela;
+use super::{LightChecks, LightTwin};
 use crate::known_images::lamps::{NEAR, path, reflected};
 use crate::known_images::lights::image;
 use crate::known_images::{KnownImage, View};
@@ -13,139 +14,32 @@ use std::fmt::Write as _;
 
 /// The row of points.
 pub(super) static POINTS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[3],
-    twin: LightTwin::Alone(point),
-    mitsuba: point_in_mitsuba,
-    points,
-    trials: no_trials,
-    images: no_images,
+    points: || {
+        vec![Light::Point {
+            position: vec3(-1.5, 1.2, 0.8),
+            intensity: vec3(1.0, 0.3, 0.2),
+        }]
+    },
+    ..LightChecks::new(LIGHT_KINDS[3], LightTwin::Alone(sample), mitsuba)
 };
-
-fn point(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
-    let Light::Point {
-        position,
-        intensity,
-    } = light
-    else {
-        return None;
-    };
-    let (direction, distance) = towards(*position, from);
-    let radiance = intensity.as_dvec3() / (distance * distance);
-    delta(direction, distance, radiance)
-}
-
-fn points() -> Vec<Light> {
-    vec![Light::Point {
-        position: vec3(-1.5, 1.2, 0.8),
-        intensity: vec3(1.0, 0.3, 0.2),
-    }]
-}
-
-fn point_in_mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
-    let Light::Point {
-        position,
-        intensity,
-    } = light
-    else {
-        return Ok(());
-    };
-    let _ = write!(
-        export.xml,
-        r#"    <emitter type="point">
-        <point name="position" value="{}"/>
-        <rgb name="intensity" value="{}"/>
-    </emitter>
-"#,
-        vector(*position),
-        vector(*intensity)
-    );
-    Ok(())
-}
-
-/// The row of light from far away.
-pub(super) static DIRECTIONAL: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[6],
-    twin: LightTwin::Alone(directional),
-    mitsuba: directional_in_mitsuba,
-    points: suns,
-    trials: no_trials,
-    images: no_images,
-};
-
-fn directional(light: &Light, _: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
-    let Light::Directional {
-        direction,
-        irradiance,
-    } = light
-    else {
-        return None;
-    };
-    let direction = -direction.as_dvec3().normalize();
-    delta(direction, FAR, irradiance.as_dvec3())
-}
-
-fn suns() -> Vec<Light> {
-    vec![Light::Directional {
-        direction: vec3(0.4, -1.0, -0.7),
-        irradiance: vec3(0.2, 0.3, 0.6),
-    }]
-}
-
-fn directional_in_mitsuba(
-    export: &mut Export<'_>,
-    _: usize,
-    light: &Light,
-) -> Result<(), ExportError> {
-    let Light::Directional {
-        direction,
-        irradiance,
-    } = light
-    else {
-        return Ok(());
-    };
-    let _ = write!(
-        export.xml,
-        r#"    <emitter type="directional">
-        <vector name="direction" value="{}"/>
-        <rgb name="irradiance" value="{}"/>
-    </emitter>
-"#,
-        vector(*direction),
-        vector(*irradiance)
-    );
-    Ok(())
-}
 
 /// The row of cones.
 pub(super) static SPOTS: LightChecks = LightChecks {
-    kind: LIGHT_KINDS[4],
-    twin: LightTwin::Alone(spot),
-    mitsuba: spot_in_mitsuba,
     points: spots,
-    trials: no_trials,
     images,
+    ..LightChecks::new(LIGHT_KINDS[4], LightTwin::Alone(sample), spot_in_mitsuba)
 };
 
-fn spot(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
-    let Light::Spot {
-        position,
-        direction: axis,
-        intensity,
-        inner,
-        outer,
-        decay,
-    } = light
-    else {
-        return None;
-    };
-    let (direction, distance) = towards(*position, from);
-    let [inner, outer] = [inner, outer].map(|angle| f64::from(*angle).cos());
-    let cos = -direction.dot(axis.as_dvec3().normalize());
-    let step = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
-    let falloff = if *decay { distance * distance } else { 1.0 };
-    let radiance = intensity.as_dvec3() * (step * step / falloff);
-    delta(direction, distance, radiance)
-}
+/// The row of light from far away.
+pub(super) static DIRECTIONAL: LightChecks = LightChecks {
+    points: || {
+        vec![Light::Directional {
+            direction: vec3(0.4, -1.0, -0.7),
+            irradiance: vec3(0.2, 0.3, 0.6),
+        }]
+    },
+    ..LightChecks::new(LIGHT_KINDS[6], LightTwin::Alone(sample), mitsuba)
+};
 
 fn spots() -> Vec<Light> {
     let spot = |x: f32, decay| Light::Spot {
@@ -157,6 +51,108 @@ fn spots() -> Vec<Light> {
         decay,
     };
     vec![spot(0.8, true), spot(-0.9, false)]
+}
+
+/// Distance of what has none.
+pub(super) const FAR: f64 = 1e30;
+
+/// A point of one of these lights, and of luminaires.
+pub(super) fn sample(
+    light: &Light,
+    from: DVec3,
+    _: [f64; 2],
+    rounding: &mut Rounding,
+) -> Option<LightSample> {
+    let towards = |place: Vec3| {
+        let to_light = place.as_dvec3() - from;
+        (to_light.normalize(), to_light.length())
+    };
+    let (direction, distance, radiance) = match light {
+        Light::Point {
+            position,
+            intensity,
+        } => {
+            let (direction, distance) = towards(*position);
+            (
+                direction,
+                distance,
+                intensity.as_dvec3() / (distance * distance),
+            )
+        }
+        Light::Spot {
+            position,
+            direction: axis,
+            intensity,
+            inner,
+            outer,
+            decay,
+        } => {
+            let (direction, distance) = towards(*position);
+            let [inner, outer] = [inner, outer].map(|angle| f64::from(*angle).cos());
+            let cos = -direction.dot(axis.as_dvec3().normalize());
+            let step = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
+            let falloff = if *decay { distance * distance } else { 1.0 };
+            (
+                direction,
+                distance,
+                intensity.as_dvec3() * (step * step / falloff),
+            )
+        }
+        Light::Ies {
+            position,
+            rotation,
+            color,
+            profile,
+        } => {
+            let (direction, distance) = towards(*position);
+            let candela = candela(profile, *rotation, -direction, rounding);
+            let falloff = distance * distance;
+            (direction, distance, color.as_dvec3() * (candela / falloff))
+        }
+        Light::Directional {
+            direction,
+            irradiance,
+        } => (
+            -direction.as_dvec3().normalize(),
+            FAR,
+            irradiance.as_dvec3(),
+        ),
+        _ => return None,
+    };
+    (radiance.max_element() > 0.0).then_some(LightSample {
+        direction,
+        distance,
+        radiance,
+        density: None,
+        triangles: None,
+    })
+}
+
+/// Points and light from far away.
+fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
+    let (kind, element, place, unit) = match light {
+        Light::Directional { direction, .. } => (
+            "directional",
+            "vector name=\"direction\"",
+            direction,
+            "irradiance",
+        ),
+        Light::Point { position, .. } => {
+            ("point", "point name=\"position\"", position, "intensity")
+        }
+        _ => return Ok(()),
+    };
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="{kind}">
+        <{element} value="{}"/>
+        <rgb name="{unit}" value="{}"/>
+    </emitter>
+"#,
+        vector(*place),
+        vector(light.color())
+    );
+    Ok(())
 }
 
 /// Width and height of the picture that a spot throws: it fades from the middle to the edge in so many texels.
