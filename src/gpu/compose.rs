@@ -210,6 +210,13 @@ impl KernelLibrary {
             paths.insert(module.to_string(), path.clone());
             resolver.add_module(module, text.as_str().into());
         }
+        for (name, text) in &composition.brought {
+            if !self.files.contains_key(name) {
+                let module = module_path(name)?;
+                paths.insert(module.to_string(), PathBuf::from(format!("{name}.wesl")));
+                resolver.add_module(module, text.as_str().into());
+            }
+        }
         let constants = composition.constants.iter();
         let constants: String = constants
             .map(|(name, value)| format!("const {name}: u32 = {value}u;\n"))
@@ -324,6 +331,8 @@ pub struct Composition {
     pub features: BTreeSet<String>,
     /// Constants of `package::active::constants`.
     pub constants: BTreeMap<String, u32>,
+    /// Texts of modules that come with what is rendered: by path (`shading/bsdf/mine`). A module of the library goes before.
+    pub brought: BTreeMap<String, String>,
 }
 
 impl Composition {
@@ -371,6 +380,13 @@ impl Composition {
         if on {
             self.features.insert(name.to_owned());
         }
+        self
+    }
+
+    /// Brings a module along.
+    #[must_use]
+    pub fn bringing(mut self, module: &str, text: impl Into<String>) -> Self {
+        self.brought.insert(module.to_owned(), text.into());
         self
     }
 

@@ -3,12 +3,13 @@
 
 use super::environment_tables::environment_rows;
 use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
+use super::scene_kinds::SceneKinds;
 use super::tables::emits_in_front;
 use super::units::{shared_out, unit_share};
 use glam::Vec3;
 use raystone_gpu::UniformValues;
 use raystone_scene::{
-    IesProfile, LIGHT_KINDS, Light, LightList, ListedLight, Photometry, SceneData, Source,
+    IesProfile, Light, LightKind, LightList, ListedLight, Photometry, SceneData, Source,
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -25,8 +26,8 @@ pub struct LightTables {
     emitters: u32,
     /// First of the spheres among the lights, and how many they are.
     spheres: [u32; 2],
-    /// Which of [`LIGHT_KINDS`] there are.
-    pub kinds: [bool; LIGHT_KINDS.len()],
+    /// Kinds.
+    pub kinds: SceneKinds<LightKind>,
     /// Whether some surface emits from its front alone.
     pub one_sided: bool,
     /// Where the tree over lights with a place begins among the rows, and the leaves of the lights in it.
@@ -49,6 +50,7 @@ impl LightTables {
         let shares = shared_out(&powers);
         let mut tables = Self {
             lights: list.lights.len() as u32,
+            kinds: SceneKinds::of(list.lights.iter().map(|light| light.kind(scene))),
             one_sided: scene.materials.iter().any(emits_in_front),
             ..Self::default()
         };
@@ -58,7 +60,7 @@ impl LightTables {
         let mut below = 0;
         for ((number, light), share) in (0..).zip(&list.lights).zip(shares) {
             below += share;
-            let kind = light.kind(scene).number();
+            let kind = tables.kinds.number(light.kind(scene));
             let link = match light.source {
                 Source::Triangle(id) => {
                     owners.push([id, number, 0, 0]);
@@ -79,7 +81,6 @@ impl LightTables {
             let [upto, own] = [below, share].map(|units| unit_share(units).to_bits());
             tables.rows.push([kind, link, upto, own]);
             tables.rows.extend(own_rows(scene, light));
-            tables.kinds[kind as usize] = true;
             bounds.extend(light_bounds(scene, light));
         }
         tables.emitters = owners.len() as u32;
@@ -105,8 +106,8 @@ impl LightTables {
 
     /// Whether one of them is a map of the environment.
     pub(super) fn has_map(&self) -> bool {
-        let mut kinds = LIGHT_KINDS.iter().zip(self.kinds);
-        kinds.any(|(kind, there)| there && kind.name == "environment")
+        let mut there = self.kinds.present();
+        there.any(|number| self.kinds.kind(number).name == "environment")
     }
 
     /// Whether there is more than one light, or some triangle emits that is not of the one.
@@ -114,11 +115,6 @@ impl LightTables {
         let emits = |of: &&u32| scene.materials[**of as usize].emission != Vec3::ZERO;
         let emissive = scene.material_ids.iter().filter(emits).count();
         self.lights > 1 || emissive != self.emitters as usize
-    }
-
-    /// Features of the kinds that there are.
-    pub fn flags(kinds: &[bool; LIGHT_KINDS.len()]) -> impl Iterator<Item = (&'static str, bool)> {
-        LIGHT_KINDS.iter().map(|kind| kind.feature).zip(*kinds)
     }
 
     /// What `kernels/integrator/frame.wesl` is told.
@@ -203,6 +199,12 @@ fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
             row(Vec3::splat(*scale), 0.0),
             none,
         ],
+        Light::Other {
+            position,
+            color,
+            parameters: [a, b, rest @ ..],
+            ..
+        } => [row(*position, *a), row(*color, *b), rest.map(f32::to_bits)],
     }
 }
 
@@ -269,25 +271,22 @@ fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> 
         }
         Source::Light(place) => place,
     };
-    let around = |center: &Vec3, radius: f32| {
-        let [center, radius] = [center.as_dvec3(), glam::DVec3::splat(radius.into())];
-        LightBounds::everywhere(center - radius, center + radius, power)
-    };
-    match &scene.lights[place as usize] {
-        Light::Sphere { center, radius, .. } => Some(around(center, *radius)),
-        Light::Point { position, .. } | Light::Ies { position, .. } => Some(around(position, 0.0)),
+    let light = &scene.lights[place as usize];
+    let (center, radius) = light.place()?;
+    let [center, radius] = [center.as_dvec3(), glam::DVec3::splat(radius.into())];
+    let around = LightBounds::everywhere(center - radius, center + radius, power);
+    Some(match light {
         Light::Spot {
-            position,
             direction,
             inner,
             outer,
             ..
-        } => Some(LightBounds {
+        } => LightBounds {
             axis: direction.as_dvec3().normalize_or_zero(),
             normals: f64::from(*inner),
             spread: f64::from(outer - inner),
-            ..around(position, 0.0)
-        }),
-        Light::Directional { .. } | Light::Environment { .. } => None,
-    }
+            ..around
+        },
+        _ => around,
+    })
 }

@@ -1,6 +1,7 @@
 //! The passes in which an integrator adds samples to an image.
 
 use super::render::with_sampler;
+use super::scene_kinds::SceneKinds;
 use super::slice::Slice;
 use super::tables::{SceneBuffers, SceneFeatures};
 use super::visibility::Visibility;
@@ -11,6 +12,7 @@ use raystone_core::structure::RAY_QUERIES;
 use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
+use raystone_scene::MaterialKind;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -81,7 +83,7 @@ impl Passes {
         for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
             chosen = chosen.constant(name, value);
         }
-        let chosen = bindings.compose(chosen);
+        let chosen = bindings.compose(scene.features.activate(chosen));
         let in_parts = chosen.features.contains("triangles_1");
         let most = gpu.limits.max_storage_textures_per_shader_stage;
         let chosen = chosen.feature("scene_texels", most >= STORAGE_TEXTURES && !in_parts);
@@ -105,7 +107,7 @@ impl Passes {
             runtime_checks: job.runtime_checks,
             visibility,
             bounds: scene.bounds,
-            scene: scene.features,
+            scene: scene.features.clone(),
             left_out,
             pipelines: RefCell::default(),
             tracers: RefCell::default(),
@@ -347,9 +349,9 @@ impl<'a> ImageSteps<'a> {
         self.passes.bounds
     }
 
-    /// Numbers of the kinds of materials of the scene, as in `kernels/shading/bsdf.wesl`.
-    pub(crate) fn material_kinds(&self) -> Vec<usize> {
-        self.passes.scene.material_kinds().collect()
+    /// Kinds of materials of the scene.
+    pub(crate) fn material_kinds(&self) -> &SceneKinds<MaterialKind> {
+        &self.passes.scene.materials
     }
 
     /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it

@@ -2,7 +2,7 @@
 //! `kernels/integrator/path.wesl`.
 
 use super::kind::CountedRays;
-use super::tables::FEATURE_GROUPS;
+use super::tables::grouped_features;
 use super::{Integrator, IntegratorFacts};
 use raystone_core::parameters;
 use raystone_core::params::{Choice as _, ParameterSchema, Parameters as _, Params};
@@ -158,9 +158,8 @@ impl Carry {
     /// Features that are on whatever the scene.
     fn features(self) -> impl Iterator<Item = &'static str> {
         let is_carried = move |group: &str| self == Self::All || group == self.name();
-        let groups = FEATURE_GROUPS.iter();
-        let carried = groups.filter(move |(group, _)| is_carried(group));
-        carried.flat_map(|(_, features)| features.iter().copied())
+        let carried = grouped_features().filter(move |(group, _)| is_carried(group));
+        carried.map(|(_, feature)| feature)
     }
 }
 

@@ -2,23 +2,24 @@
 
 use super::light_tables::LightTables;
 use super::offset::TransformError;
+use super::scene_kinds::{SceneKind as _, SceneKinds};
 use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
 use glam::Vec3;
 use raystone_accel::{TriangleBuffers, TriangleSoup};
-use raystone_gpu::{Bindings, Gpu, GpuError};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
 use raystone_scene::{
-    DIFFUSE, Daylight, LIGHT_KINDS, LightList, MATERIAL_KINDS, Material, MaterialKind, SceneData,
+    Daylight, LIGHT_KINDS, LightKind, LightList, Material, MaterialKind, SceneData,
 };
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
     /// Textures, normals and colours of vertices.
     pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled.
     pub lights: bool,
-    /// Which of [`LIGHT_KINDS`] they are of.
-    pub light_kinds: [bool; LIGHT_KINDS.len()],
+    /// Kinds of lights.
+    pub light_kinds: SceneKinds<LightKind>,
     /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
     pub many_lights: bool,
     /// Some surface emits from its front alone.
@@ -27,29 +28,20 @@ pub struct SceneFeatures {
     pub background: bool,
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
-    /// Which of [`MATERIAL_KINDS`] some material is of.
-    pub materials: [bool; MATERIAL_KINDS.len()],
-    /// Textures of the materials of each kind, normals and colours of vertices.
-    pub kinds: [SurfaceFeatures; MATERIAL_KINDS.len()],
+    /// Kinds of materials.
+    pub materials: SceneKinds<MaterialKind>,
+    /// Of each of them by number: textures of its materials, normals and colours of vertices.
+    pub kinds: Vec<SurfaceFeatures>,
     /// Instances add to the error of points.
     pub transforms: bool,
     /// Some triangle is mirrored, so that its corners turn the other way round.
     pub mirrored: bool,
 }
 
-/// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need.
-pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
-    (
-        "materials",
-        &[
-            "phong",
-            "cook_torrance",
-            "principled",
-            "mirror",
-            "dielectric",
-            "several_materials",
-        ],
-    ),
+/// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need. Kinds of materials and
+/// lights join theirs.
+const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
+    ("materials", &["several_materials"]),
     (
         "textures",
         &[
@@ -63,59 +55,57 @@ pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
     ("normals", &["normals", "normal_maps"]),
     (
         "lights",
-        &[
-            "lights",
-            "triangle_lights",
-            "rectangle_lights",
-            "sphere_lights",
-            "point_lights",
-            "spot_lights",
-            "ies_lights",
-            "directional_lights",
-            "one_sided_lights",
-            "several_light_kinds",
-        ],
+        &["lights", "one_sided_lights", "several_light_kinds"],
     ),
     ("choice", &["many_lights"]),
-    ("background", &["background", "daylight", "environment_map"]),
+    ("background", &["background", "daylight"]),
     ("transforms", &["transforms", "mirrored_triangles"]),
 ];
 
+/// Features of the kinds of the program and of all else, each with its group.
+pub(super) fn grouped_features() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let others = FEATURE_GROUPS.iter();
+    let others = others.flat_map(|(group, names)| names.iter().map(move |name| (*group, *name)));
+    let materials = SceneKinds::<MaterialKind>::default();
+    let materials: Vec<_> = materials.flags().collect();
+    let materials = materials.into_iter().map(|(name, _)| ("materials", name));
+    let lights = LIGHT_KINDS.iter().map(|kind| (kind.group, kind.feature));
+    others.chain(materials).chain(lights)
+}
+
 impl SceneFeatures {
-    /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
+    /// Feature names as kernels write them, with whether they are on.
     pub fn flags(&self) -> Vec<(&'static str, bool)> {
-        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.feature);
-        let mut flags: Vec<_> = kinds.zip(self.materials).collect();
-        flags.retain(|(name, _)| *name != DIFFUSE.feature);
+        let mut flags: Vec<_> = self.materials.flags().collect();
         flags.extend([
-            ("several_materials", several(&self.materials)),
+            ("several_materials", self.materials.are_several()),
             ("lights", self.lights),
             ("many_lights", self.many_lights),
-            ("several_light_kinds", several(&self.light_kinds)),
+            ("several_light_kinds", self.light_kinds.are_several()),
             ("one_sided_lights", self.one_sided_lights),
             ("background", self.background),
             ("daylight", self.daylight),
             ("transforms", self.transforms),
             ("mirrored_triangles", self.mirrored),
         ]);
-        flags.extend(LightTables::flags(&self.light_kinds));
+        flags.extend(self.light_kinds.flags());
         flags.extend(self.surfaces.flags());
         flags
     }
 
-    /// Numbers of the kinds of materials that there are, as in `kernels/shading/bsdf.wesl`.
-    pub(crate) fn material_kinds(&self) -> impl Iterator<Item = usize> {
-        (0..MATERIAL_KINDS.len()).filter(|kind| self.materials[*kind])
+    /// The kernel with what a scene brings from outside.
+    pub(super) fn activate(&self, kernel: Composition) -> Composition {
+        self.light_kinds.activate(self.materials.activate(kernel))
     }
 
     /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
     pub(crate) fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
-        let feature = kind.map(|kind| MATERIAL_KINDS[kind].feature);
-        let (_, of_materials) = FEATURE_GROUPS[0];
-        let others = of_materials.iter().copied();
-        let own = kind.map_or(SurfaceFeatures::default(), |kind| self.kinds[kind]);
-        let others = others.filter(|name| Some(*name) != feature);
-        others.chain(own.unneeded()).collect()
+        let own = kind.and_then(|number| self.materials.kind(number).feature());
+        let others = self.materials.flags().map(|(name, _)| name);
+        let others = others.filter(|name| own != Some(*name));
+        let surfaces = kind.map_or(SurfaceFeatures::default(), |kind| self.kinds[kind]);
+        let others = others.chain(["several_materials"]);
+        others.chain(surfaces.unneeded()).collect()
     }
 }
 
@@ -158,8 +148,9 @@ impl SceneBuffers {
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
         let surfaces = SurfaceFeatures::of(scene, |_| true);
+        let materials = SceneKinds::of(scene.materials.iter().map(|material| material.kind));
         let mut lights = LightTables::of(scene, &LightList::of(scene));
-        let tables = Tables::of(scene, &mut lights, &surfaces);
+        let tables = Tables::of(scene, &materials, &mut lights, &surfaces);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
@@ -176,14 +167,18 @@ impl SceneBuffers {
             features: SceneFeatures {
                 surfaces,
                 lights: lights.lights > 0,
-                light_kinds: lights.kinds,
+                light_kinds: lights.kinds.clone(),
                 many_lights: lights.are_chosen(scene),
                 one_sided_lights: lights.one_sided,
                 background: has_map || scene.daylight.is_some() || scene.environment != Vec3::ZERO,
                 daylight: scene.daylight.is_some(),
-                materials: MATERIAL_KINDS
-                    .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
-                kinds: MATERIAL_KINDS.map(|kind| SurfaceFeatures::of(scene, |m| m.kind == kind)),
+                kinds: (0..materials.count())
+                    .map(|number| {
+                        let kind = materials.kind(number);
+                        SurfaceFeatures::of(scene, |material| material.kind == kind)
+                    })
+                    .collect(),
+                materials,
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
                 mirrored: scene.mirrored.contains(&true),
             },
@@ -211,7 +206,12 @@ struct Tables {
 }
 
 impl Tables {
-    fn of(scene: &SceneData, lights: &mut LightTables, surfaces: &SurfaceFeatures) -> Self {
+    fn of(
+        scene: &SceneData,
+        kinds: &SceneKinds<MaterialKind>,
+        lights: &mut LightTables,
+        surfaces: &SurfaceFeatures,
+    ) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
             let parameters = words.len() as u32 / 4;
@@ -220,7 +220,7 @@ impl Tables {
             let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
             let [er, eg, eb] = material.emission.to_array().map(f32::to_bits);
             let one_sided = u32::from(emits_in_front(material)) << 31;
-            let kind = number(material.kind) | one_sided;
+            let kind = kinds.number(material.kind) | one_sided;
             let row = [r, g, b, kind, er, eg, eb, parameters];
             let first = MATERIAL_WORDS * index;
             words[first..first + row.len()].copy_from_slice(&row);
@@ -232,17 +232,7 @@ impl Tables {
     }
 }
 
-fn several(kinds: &[bool]) -> bool {
-    kinds.iter().filter(|there| **there).count() > 1
-}
-
 /// Whether the material emits, and from its front alone.
 pub(super) fn emits_in_front(material: &Material) -> bool {
     !material.emits_both_sides && material.emission != Vec3::ZERO
-}
-
-/// Of a kind of material, in kernels.
-fn number(kind: &MaterialKind) -> u32 {
-    let place = MATERIAL_KINDS.iter().position(|known| *known == kind);
-    place.unwrap_or_default() as u32
 }

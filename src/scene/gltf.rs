@@ -91,7 +91,7 @@ fn build(
     document: &gltf::Document,
     buffers: &[Vec<u8>],
 ) -> Result<SceneData, SceneError> {
-    let mut palette = gltf_material::read(files, document, buffers, options.textures);
+    let mut palette = gltf_material::read(files, document, buffers, options);
     let mut geometry = Geometry {
         path,
         buffers,

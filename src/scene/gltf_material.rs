@@ -6,8 +6,8 @@ use super::gltf_texture::{Images, Placed};
 use super::material::{Description, Format, emitted};
 use super::texture::ImageSource;
 use super::{
-    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, PRINCIPLED,
-    approximation_warning,
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, MaterialSource,
+    PRINCIPLED, approximation_warning,
 };
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use gltf::material::AlphaMode;
@@ -46,13 +46,14 @@ pub(super) fn read<'a>(
     files: &'a Files,
     document: &gltf::Document,
     buffers: &'a [Vec<u8>],
-    with_textures: bool,
+    options: &LoadOptions,
 ) -> Palette<'a> {
+    let with_textures = options.textures;
     let mut images = Images::new(files, document, buffers);
     let (mut materials, mut sets, mut told) = (Vec::new(), Vec::new(), Vec::new());
     let mut elsewhere = Vec::new();
     for material in document.materials() {
-        let mut found = convert(&material, files, with_textures, &mut told);
+        let mut found = convert(&material, files, options, &mut told);
         let mut set = None;
         found.mask = mask(&material, &mut images, &mut set);
         if with_textures && textured(&material, &mut found, &mut images, &mut set) {
@@ -149,7 +150,7 @@ fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture:
 fn convert(
     material: &gltf::Material<'_>,
     files: &Files,
-    with_textures: bool,
+    options: &LoadOptions,
     warnings: &mut Vec<String>,
 ) -> Material {
     let (color, _) = base_color(material);
@@ -159,7 +160,7 @@ fn convert(
         emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
     // A texture can make any part of the surface dark: better no light than light everywhere.
     let emission = match material.emissive_texture() {
-        Some(_) if !with_textures => Vec3::ZERO,
+        Some(_) if !options.textures => Vec3::ZERO,
         _ => emission,
     };
     let index = material.index().unwrap_or(0);
@@ -187,7 +188,7 @@ fn convert(
             || material
                 .transmission()
                 .is_some_and(|t| t.transmission_texture().is_some()),
-        is_followed: with_textures,
+        is_followed: options.textures,
         source: &source,
     };
     let name = material.name();
@@ -195,7 +196,7 @@ fn convert(
     Material {
         emission: emitted(emission),
         emits_both_sides: material.double_sided(),
-        ..Material::described(name, &description, &files.model, warnings)
+        ..Material::described(name, &description, options.kinds, &files.model, warnings)
     }
 }
 

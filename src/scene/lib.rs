@@ -56,8 +56,9 @@ pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
 pub use mask::{AlphaChannel, AlphaMask};
 pub use material::{
-    COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
-    Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
+    COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Description, Format, Fresnel,
+    Lobes, Look, MATERIAL_KINDS, MIRROR, Masking, Material, MaterialKind, MaterialSource, PHONG,
+    PRINCIPLED, reflectance_of_ior,
 };
 pub use normals::{GEOMETRIC, decode_normal, encode_normal};
 pub use raystone_core::load::LoadReport;
@@ -138,6 +139,8 @@ pub struct LoadOptions {
     /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
     /// from elsewhere could read any file of this machine.
     pub allow_outside: bool,
+    /// Kinds that a file's materials are looked for among; where one fits several, the last counts.
+    pub kinds: &'static [&'static MaterialKind],
 }
 
 /// What every adapter binds as one storage buffer, bytes (WebGPU's `maxStorageBufferBindingSize`).
@@ -158,6 +161,7 @@ impl Default for LoadOptions {
             max_texture_size: 1024,
             table_bytes: LEAST_BINDING,
             allow_outside: false,
+            kinds: &MATERIAL_KINDS,
         }
     }
 }

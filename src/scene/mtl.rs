@@ -141,7 +141,8 @@ impl Contents {
             source: &source,
         };
         let name = material.name.clone();
-        let found = Material::described(name, &description, file, &mut self.warnings);
+        let found =
+            Material::described(name, &description, options.kinds, file, &mut self.warnings);
         let mask = self.mask(material, folder, options);
         let mut texture = |statement: Option<&str>, is_used: bool| {
             let statement = statement.filter(|_| is_used && options.textures)?;

@@ -1,8 +1,10 @@
 //! Trial scenes of what shines in ways of its own: maps all around, measured luminaires, many lights in a tree.
 
+use crate::lights::LightRegistry;
 use crate::mesh::Mesh;
 use crate::trial_scenes::{Trial, TrialScene, camera, depth, word};
 use glam::{Quat, Vec3, vec3};
+use raystone_core::params::ParamValue;
 use raystone_render::ConfiguredIntegrator;
 use raystone_scene::{
     EnvironmentMap, GEOMETRIC, IesProfile, Light, Material, Photometry, SceneData, SceneError,
@@ -10,37 +12,41 @@ use raystone_scene::{
 };
 use std::sync::Arc;
 
-/// All of them.
-pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
-    let path = |changes: &[_]| -> Trial { ("path", changes.to_vec()) };
-    let tree = || word("light_choice", "tree");
-    Ok(vec![
-        TrialScene {
-            scene: sky()?,
-            trials: vec![
-                path(&[depth(4)]),
-                path(&[
-                    depth(3),
-                    word("lights", "all"),
-                    word("strategy", "mis-power"),
-                ]),
-                path(&[depth(2), word("strategy", "light"), tree()]),
-                path(&[depth(2), word("light_choice", "uniform")]),
-            ],
-        },
-        TrialScene {
-            scene: luminaires()?,
-            trials: vec![path(&[depth(3)])],
-        },
-        TrialScene {
-            scene: many_lamps()?,
-            trials: vec![
-                path(&[depth(4), tree()]),
-                path(&[depth(3), word("strategy", "mis-power")]),
-                path(&[depth(2), word("lights", "all")]),
-            ],
-        },
-    ])
+fn path(changes: &[(&'static str, ParamValue)]) -> Trial {
+    ("path", changes.to_vec())
+}
+
+fn tree() -> (&'static str, ParamValue) {
+    word("light_choice", "tree")
+}
+
+/// Of maps.
+pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
+    Ok(vec![TrialScene {
+        scene: sky()?,
+        trials: vec![
+            path(&[depth(4)]),
+            path(&[
+                depth(3),
+                word("lights", "all"),
+                word("strategy", "mis-power"),
+            ]),
+            path(&[depth(2), word("strategy", "light"), tree()]),
+            path(&[depth(2), word("light_choice", "uniform")]),
+        ],
+    }])
+}
+
+/// Of lights of all kinds in a tree.
+pub(super) fn many() -> Result<TrialScene, SceneError> {
+    Ok(TrialScene {
+        scene: many_lamps()?,
+        trials: vec![
+            path(&[depth(4), tree()]),
+            path(&[depth(3), word("strategy", "mis-power")]),
+            path(&[depth(2), word("lights", "all")]),
+        ],
+    })
 }
 
 /// The trial scenes that a scene's own paths may show too little of: of its maps, its luminaires, and the tree that an integrator chooses
@@ -52,26 +58,21 @@ pub fn trials_of(
     scene: &SceneData,
     integrator: &ConfiguredIntegrator,
 ) -> Result<Vec<TrialScene>, SceneError> {
-    let mut scenes: Vec<SceneData> = Vec::new();
+    let mut scenes = Vec::new();
     if integrator.kind.name() != "path" {
-        return Ok(Vec::new());
+        return Ok(scenes);
     }
-    let has = |is: fn(&Light) -> bool| scene.lights.iter().any(is);
-    if has(|light| matches!(light, Light::Environment { .. })) {
-        scenes.push(sky()?);
-    }
-    if has(|light| matches!(light, Light::Ies { .. })) {
-        scenes.push(luminaires()?);
+    for kind in LightRegistry::default().iter() {
+        if scene.lights.iter().any(|light| light.kind() == kind.kind) {
+            scenes.extend((kind.trials)()?);
+        }
     }
     let choice = integrator.params.0.get("light_choice");
     if choice.is_some_and(|by| by.to_string() == "tree") {
-        scenes.push(many_lamps()?);
+        scenes.push(many()?);
     }
-    let trial = |scene| TrialScene {
-        scene,
-        trials: Vec::new(),
-    };
-    Ok(scenes.into_iter().map(trial).collect())
+    scenes.iter_mut().for_each(|trial| trial.trials.clear());
+    Ok(scenes)
 }
 
 /// Numbers in [0, 1) that look like chance.
@@ -210,13 +211,16 @@ fn luminaire_lights() -> [Light; 4] {
 }
 
 /// A corner with a block between luminaires of all types.
-fn luminaires() -> Result<SceneData, SceneError> {
+pub(super) fn luminaires() -> Result<Vec<TrialScene>, SceneError> {
     let camera = camera(vec3(1.4, 2.1, 3.3), vec3(-0.1, 0.5, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("luminaires", camera, Vec3::ZERO)?;
     room(&mut mesh);
     let mut scene = mesh.done(Vec::new());
     scene.lights = luminaire_lights().into();
-    Ok(scene)
+    Ok(vec![TrialScene {
+        scene,
+        trials: vec![path(&[depth(3)])],
+    }])
 }
 
 /// A floor, two walls, a block.

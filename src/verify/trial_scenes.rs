@@ -2,14 +2,14 @@
 //! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
 //! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
 
+use crate::kinds::KindChecks;
+use crate::lights::LightRegistry;
+use crate::materials::MaterialRegistry;
 use crate::mesh::Mesh;
 use glam::{Vec2, Vec3, vec2, vec3};
 use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
-use raystone_scene::{
-    self as scene, CookTorrance, Fresnel, Light, Masking, Material, SceneData, SceneError, Texture,
-    TextureUse,
-};
+use raystone_scene::{self as scene, Material, SceneData, SceneError, Texture, TextureUse};
 
 /// What is judged on a scene: integrator and the parameters that are not at their defaults.
 pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
@@ -26,11 +26,19 @@ pub use crate::trial_lights::trials_of;
 pub use crate::trial_slivers::sheets;
 pub use crate::trial_surfaces::layers;
 
-/// All of them.
+/// All of the program's kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
 pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
+    trial_scenes_of(&KindChecks::default())
+}
+
+/// All of these kinds of materials and lights.
+///
+/// # Errors
+/// As [`trial_scenes`].
+pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
     let mut lamps_trials = vec![("path", vec![depth(8)])];
     for (strategy, roulette) in [
         ("mis-power", "albedo"),
@@ -62,7 +70,7 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
             trials: lamps_trials,
         },
         TrialScene {
-            scene: points()?,
+            scene: points(&kinds.lights)?,
             trials: vec![
                 ("path", vec![depth(4)]),
                 (
@@ -76,12 +84,13 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
                 ("path", vec![depth(3), word("light_choice", "uniform")]),
             ],
         },
+    ];
+    for kind in kinds.materials.iter() {
+        scenes.extend((kind.trials)()?);
+    }
+    scenes.extend([
         TrialScene {
-            scene: glass()?,
-            trials: vec![("path", vec![depth(12)])],
-        },
-        TrialScene {
-            scene: glossy()?,
+            scene: glossy(&kinds.materials)?,
             trials: vec![
                 ("path", vec![depth(6)]),
                 ("path", vec![depth(3), word("strategy", "bsdf")]),
@@ -100,8 +109,11 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
                 primary(),
             ],
         },
-    ];
-    scenes.extend(crate::trial_lights::scenes()?);
+    ]);
+    for kind in kinds.lights.iter() {
+        scenes.extend((kind.trials)()?);
+    }
+    scenes.push(crate::trial_lights::many()?);
     scenes.extend(crate::trial_surfaces::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
     Ok(scenes)
@@ -192,7 +204,7 @@ fn lamps() -> Result<SceneData, SceneError> {
 }
 
 /// Lights without triangles, of every kind but measured ones and maps, over a floor with a block and a lamp.
-fn points() -> Result<SceneData, SceneError> {
+fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
     let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));
@@ -205,106 +217,17 @@ fn points() -> Result<SceneData, SceneError> {
     mesh.block(vec3(-0.4, 0.0, -0.5), vec3(0.7, 0.9, 0.6), block);
     mesh.plain([vec3(1.5, 0.2, -1.0), vec3(0.0, 0.3, 1.2), Vec3::Y], lamp);
     let mut scene = mesh.done(Vec::new());
-    let spot = |x: f32, decay| Light::Spot {
-        position: vec3(x, 2.5, 1.0),
-        direction: vec3(-0.5 * x, -1.6, -0.6),
-        intensity: vec3(2.0, 3.0, 2.5),
-        inner: 0.25,
-        outer: 0.6,
-        decay,
-    };
-    let ball = |center, radius, power: f32| Light::Sphere {
-        center,
-        radius,
-        radiance: power * vec3(1.0, 0.8, 0.5),
-    };
-    scene.lights = vec![
-        Light::Point {
-            position: vec3(-1.5, 1.2, 0.8),
-            intensity: vec3(1.0, 0.3, 0.2),
-        },
-        spot(0.8, true),
-        spot(-0.9, false),
-        ball(vec3(0.9, 1.6, 0.3), 0.25, 6.0),
-        ball(vec3(-0.9, 0.05, 0.9), 0.04, 300.0),
-        Light::Directional {
-            direction: vec3(0.4, -1.0, -0.7),
-            irradiance: vec3(0.2, 0.3, 0.6),
-        },
-    ];
+    scene.lights = kinds.iter().flat_map(|kind| (kind.points)()).collect();
     Ok(scene)
 }
 
-/// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
-fn glass() -> Result<SceneData, SceneError> {
-    let camera = camera(
-        vec3(0.3, 1.3, 4.1),
-        vec3(0.1, 0.8, 0.0),
-        vec3(-0.08, 1.0, 0.0),
-    );
-    let mut mesh = Mesh::new("glass", camera, vec3(0.5, 0.6, 0.9))?;
-    let [floor, mirror, clear, green, dense, pane, lamp] = [
-        Material::diffuse("floor", vec3(0.6, 0.55, 0.5)),
-        Material::mirror("mirror", vec3(0.9, 0.85, 0.8)),
-        Material::dielectric("clear", Vec3::ONE, 1.5),
-        Material::dielectric("green", vec3(0.7, 0.95, 0.8), 1.33),
-        Material::dielectric("bubble", Vec3::ONE, 0.7),
-        Material::thin_dielectric("pane", vec3(0.9, 0.8, 0.95), 1.6),
-        Material::diffuse("lamp", Vec3::splat(0.4)).emitting(vec3(9.0, 8.0, 6.0)),
-    ]
-    .map(|m| mesh.material(m));
-    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
-    mesh.plain(
-        [vec3(-2.0, 0.1, -2.0), 4.0 * Vec3::X, 2.5 * Vec3::Y],
-        mirror,
-    );
-    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.7, clear);
-    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.35, dense);
-    mesh.block(vec3(0.5, 0.1, -0.4), vec3(0.8, 1.2, 0.8), green);
-    mesh.plain(
-        [vec3(-1.8, 0.2, 1.1), vec3(1.9, 0.0, 0.4), 1.4 * Vec3::Y],
-        pane,
-    );
-    mesh.plain([vec3(-0.8, 2.9, -0.6), 1.4 * Vec3::X, 1.2 * Vec3::Z], lamp);
-    Ok(mesh.done(Vec::new()))
-}
-
 /// A row of balls of every glossy kind over a glossy floor, between two lamps of one side and a sheet.
-fn glossy() -> Result<SceneData, SceneError> {
+fn glossy(kinds: &MaterialRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
-    let cook = |masking, fresnel, roughness| {
-        let of = CookTorrance {
-            diffuse: vec3(0.3, 0.2, 0.1),
-            specular: vec3(0.5, 0.6, 0.4),
-            roughness,
-            ior: 1.7,
-            masking,
-            fresnel,
-        };
-        Material::cook_torrance("cook-torrance", &of)
-    };
-    let principled = |metallic, roughness, f0| {
-        Material::principled("principled", vec3(0.9, 0.6, 0.4), metallic, roughness, f0)
-    };
-    let phong =
-        |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
-    let balls = [
-        phong(3.0),
-        phong(150.0),
-        cook(Masking::VCavities, Fresnel::Schlick, 0.4),
-        cook(Masking::Smith, Fresnel::Exact, 0.15),
-        principled(0.0, 0.3, 0.04),
-        principled(1.0, 0.5, 0.04),
-        principled(0.5, 0.9, 0.08),
-        Material::dielectric("glass", vec3(0.9, 1.0, 0.9), 1.5).with_schlick(),
-        // Rough enough for half of the angles to be masked.
-        cook(Masking::Smith, Fresnel::Schlick, 0.6),
-        cook(Masking::VCavities, Fresnel::Exact, 0.7),
-        // A hemisphere about the mirror direction, which ends at a step.
-        phong(0.0),
-    ];
-    for (place, material) in balls.into_iter().enumerate() {
+    let mut balls: Vec<_> = kinds.iter().flat_map(|kind| (kind.balls)()).collect();
+    balls.sort_by_key(|(place, _)| place.unwrap_or(usize::MAX));
+    for (place, (_, material)) in balls.into_iter().enumerate() {
         let material = mesh.material(material);
         let (column, row) = ((place % 4) as f32, (place / 4) as f32);
         mesh.ball(
@@ -313,7 +236,8 @@ fn glossy() -> Result<SceneData, SceneError> {
             material,
         );
     }
-    let floor = mesh.material(principled(0.2, 0.6, 0.05));
+    let floor = Material::principled("principled", vec3(0.9, 0.6, 0.4), 0.2, 0.6, 0.05);
+    let floor = mesh.material(floor);
     let one_sided =
         Material::diffuse("lamp", Vec3::splat(0.3)).emitting_from_front(vec3(6.0, 7.0, 8.0));
     let both = Material::diffuse("sheet", Vec3::splat(0.5)).emitting(vec3(2.0, 1.5, 1.0));

@@ -4,6 +4,8 @@
 mod support;
 
 mod adaptive;
+mod adding_a_light;
+mod adding_a_material;
 mod dielectric;
 mod foreign;
 mod image_gate;

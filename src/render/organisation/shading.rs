@@ -4,13 +4,9 @@ use super::queued::{Queues, Wavefront};
 use crate::ImageSteps;
 use raystone_gpu::compaction::{Compaction, Stays};
 use raystone_gpu::{Bindings, GpuError, Groups, Storage};
-use raystone_scene::MATERIAL_KINDS;
 use std::sync::Arc;
 
-/// Queues: of what has met nothing, and of each kind by its number. Flags are one more: `kernels/organisation/kinds.wesl`.
-const QUEUES: u32 = MATERIAL_KINDS.len() as u32 + 1;
-
-/// The queue of a kind, or of what has met nothing.
+/// The queue of a kind by its number, or of what has met nothing. Flags are one more: `kernels/organisation/kinds.wesl`.
 fn queue_of(kind: Option<usize>) -> u32 {
     kind.map_or(0, |kind| kind as u32 + 1)
 }
@@ -18,6 +14,8 @@ fn queue_of(kind: Option<usize>) -> u32 {
 /// Where the places of paths are brought, kind by kind.
 struct Kinds<'a> {
     queues: &'a Queues<'a>,
+    /// How many.
+    number: u32,
     method: Arc<dyn Compaction>,
     /// Places of all live paths.
     places: Storage,
@@ -36,17 +34,19 @@ pub(super) fn by_kind(
 ) -> Result<(), GpuError> {
     let method = queues.method(steps.gpu(), wavefront)?;
     let words = |of: u32| 4 * u64::from(queues.capacity) * u64::from(of);
-    let parts = if method.keeps_apart() { QUEUES } else { 1 };
+    let number = steps.material_kinds().count() as u32 + 1;
+    let parts = if method.keeps_apart() { number } else { 1 };
     let kinds = Kinds {
         queues,
+        number,
         method,
         places: order.unwrap_or_else(|| queues.scratch("places", words(1))),
         kept: queues.scratch("kind queues", words(parts)),
-        count: queues.scratch("kind counts", 4 * u64::from(QUEUES)),
+        count: queues.scratch("kind counts", 4 * u64::from(number)),
     };
     kinds.fill(steps)?;
-    let met = steps.material_kinds().into_iter().map(Some);
-    for kind in met.chain([None]) {
+    let met: Vec<_> = steps.material_kinds().present().map(Some).collect();
+    for kind in met.into_iter().chain([None]) {
         kinds.shade(steps, kind)?;
     }
     Ok(())
@@ -61,7 +61,7 @@ impl Kinds<'_> {
         let kernel = self.queues.kernel("organisation/kinds");
         steps.run("kinds", kernel, self.queues.live_groups(), &bindings)?;
         if self.method.keeps_apart() {
-            self.keep(steps, Stays::Apart(QUEUES))?;
+            self.keep(steps, Stays::Apart(self.number))?;
         }
         steps.recording().name_since(place, "kinds");
         Ok(())
@@ -86,7 +86,7 @@ impl Kinds<'_> {
             .buffer("order", &self.kept)
             .buffer("kind_counts", &self.count)
             .buffer("live_groups", &groups);
-        let name = kind.map_or("nothing", |kind| MATERIAL_KINDS[kind].name);
+        let name = kind.map_or("nothing", |kind| steps.material_kinds().kind(kind).name);
         let plan = self.queues.kernel("organisation/plan_kind");
         let plan = plan.constant("QUEUE", queue);
         steps.run(&format!("plan {name}"), plan, [1, 1, 1], &bindings)?;

@@ -1,8 +1,10 @@
 //! The table of kinds of lights.
 
+use raystone_core::params::Sources;
 use std::fmt;
 
 /// A kind of light.
+#[derive(Clone)]
 pub struct LightKind {
     /// Name.
     pub name: &'static str,
@@ -12,15 +14,22 @@ pub struct LightKind {
     pub color: &'static str,
     /// The feature that brings its kernel into those of a scene.
     pub feature: &'static str,
+    /// The group of features that it belongs to: `lights`, or `background` where rays find it that leave the scene.
+    pub group: &'static str,
+    /// Kernel modules that it brings along, because they are not the program's; of `shading/light/<feature>` kernels import
+    /// `<feature>_sample(light, surface, point)`.
+    pub sources: Sources,
 }
 
 macro_rules! kind {
-    ($id:ident, $name:literal, $feature:literal, $color:literal, $description:literal) => {
+    ($id:ident, $name:literal, $feature:literal, $group:literal, $color:literal, $description:literal) => {
         pub(super) static $id: LightKind = LightKind {
             name: $name,
             description: $description,
             color: $color,
             feature: $feature,
+            group: $group,
+            sources: &[],
         };
     };
 }
@@ -29,6 +38,7 @@ kind!(
     TRIANGLE,
     "triangle",
     "triangle_lights",
+    "lights",
     "radiance",
     "a triangle of an emissive material (MTL Ke, glTF emissive)"
 );
@@ -36,6 +46,7 @@ kind!(
     RECTANGLE,
     "rectangle",
     "rectangle_lights",
+    "lights",
     "radiance",
     "two triangles of an emissive material that form a parallelogram, as one light"
 );
@@ -43,6 +54,7 @@ kind!(
     SPHERE,
     "sphere",
     "sphere_lights",
+    "lights",
     "radiance",
     "an analytic sphere: visible, casts shadows, reflects nothing"
 );
@@ -50,6 +62,7 @@ kind!(
     POINT,
     "point",
     "point_lights",
+    "lights",
     "intensity",
     "a point of even intensity (glTF KHR_lights_punctual, candela)"
 );
@@ -57,6 +70,7 @@ kind!(
     SPOT,
     "spot",
     "spot_lights",
+    "lights",
     "intensity",
     "a point that shines into a cone, with or without decay (glTF KHR_lights_punctual, candela)"
 );
@@ -64,6 +78,7 @@ kind!(
     IES,
     "ies",
     "ies_lights",
+    "lights",
     "colour",
     "a point with the measured intensities of a luminaire (IES LM-63, candela)"
 );
@@ -71,6 +86,7 @@ kind!(
     DIRECTIONAL,
     "directional",
     "directional_lights",
+    "lights",
     "irradiance",
     "light from infinitely far away (glTF KHR_lights_punctual, lux)"
 );
@@ -79,6 +95,7 @@ kind!(
     ENVIRONMENT,
     "environment",
     "environment_map",
+    "background",
     "radiance",
     "radiance from all around by an equirectangular map (HDR, EXR, PFM, NPY)"
 );
@@ -97,10 +114,10 @@ pub static LIGHT_KINDS: [&LightKind; 8] = [
 ];
 
 impl LightKind {
-    /// Its place in [`LIGHT_KINDS`].
+    /// Its place in [`LIGHT_KINDS`]; behind them all from outside the program.
     pub fn number(&self) -> u32 {
         let place = LIGHT_KINDS.iter().position(|known| *known == self);
-        place.unwrap_or_default() as u32
+        place.unwrap_or(LIGHT_KINDS.len()) as u32
     }
 }
 
@@ -109,6 +126,8 @@ impl PartialEq for LightKind {
         self.name == other.name
     }
 }
+
+impl Eq for LightKind {}
 
 impl fmt::Debug for LightKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -114,7 +114,7 @@ impl LightList {
             .zip(&scene.lights)
             .map(|(place, light)| (light.kind().number(), place, light))
             .collect();
-        others.sort_by_key(|(kind, place, _)| (*kind, *place));
+        others.sort_by_key(|(kind, place, light)| (light.is_infinite(), *kind, *place));
         for (_, place, light) in others {
             let power = light.power(radius);
             let name = light.kind().name;

@@ -1,6 +1,8 @@
 //! Lights: what shines on a scene. Emission of surfaces is a matter of their materials; the lights here are
-//! those without triangles. A kind of light is a kernel in `kernels/shading/light/`, its line in the table of kernels,
-//! `kernels/shading/lights.wesl`, and its line in [`LIGHT_KINDS`]. How the parts fit: `docs/shading.md`.
+//! those without triangles. A kind of light is a kernel in `kernels/shading/light/` with its lines in the table of kernels,
+//! `kernels/shading/lights.wesl`, a row of [`LIGHT_KINDS`] with what [`Light`] holds of it, its rows of
+//! `shading_tables` (`src/render/light_tables.rs`), and the row of its checks in `src/verify/lights/`. One from outside the program is
+//! a [`Light::Other`] of a kind of its own: two rows and a kernel. How the parts fit: `docs/shading.md`.
 
 mod kind;
 mod list;
@@ -74,6 +76,17 @@ pub enum Light {
         /// Irradiance of a surface that faces it.
         irradiance: Vec3,
     },
+    /// A point of a kind from outside the program, which no ray can find. Lights are chosen as if it shone evenly.
+    Other {
+        /// The kind.
+        kind: &'static LightKind,
+        /// Place.
+        position: Vec3,
+        /// What scales it.
+        color: Vec3,
+        /// Numbers that only this kind has: `a.w`, `b.w` and `c` of the kernel's `Light`.
+        parameters: [f32; 6],
+    },
 }
 
 /// Relative luminance of linear sRGB, by which lights are weighed.
@@ -92,6 +105,7 @@ impl Light {
             Self::Ies { .. } => &kind::IES,
             Self::Directional { .. } => &kind::DIRECTIONAL,
             Self::Environment { .. } => &kind::ENVIRONMENT,
+            Self::Other { kind, .. } => kind,
         }
     }
 
@@ -100,15 +114,54 @@ impl Light {
         match self {
             Self::Sphere { radiance, .. } => *radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => *intensity,
-            Self::Ies { color, .. } => *color,
+            Self::Ies { color, .. } | Self::Other { color, .. } => *color,
             Self::Directional { irradiance, .. } => *irradiance,
             Self::Environment { scale, .. } => Vec3::splat(*scale),
         }
     }
 
+    /// The middle and the radius of what shines; nothing at infinity.
+    pub fn place(&self) -> Option<(Vec3, f32)> {
+        match self {
+            Self::Sphere { center, radius, .. } => Some((*center, *radius)),
+            Self::Point { position, .. }
+            | Self::Spot { position, .. }
+            | Self::Ies { position, .. }
+            | Self::Other { position, .. } => Some((*position, 0.0)),
+            Self::Directional { .. } | Self::Environment { .. } => None,
+        }
+    }
+
     /// Whether it has no place: no tree over places can hold it.
     pub fn is_infinite(&self) -> bool {
-        matches!(self, Self::Directional { .. } | Self::Environment { .. })
+        self.place().is_none()
+    }
+
+    /// The same light turned about the origin and then moved. Maps turn about one axis alone: they stay as they are, and so do
+    /// the directions of kinds from outside.
+    #[must_use]
+    pub fn moved(mut self, turn: Quat, by: Vec3) -> Self {
+        match &mut self {
+            Self::Sphere {
+                center: position, ..
+            }
+            | Self::Point { position, .. }
+            | Self::Other { position, .. } => *position = turn * *position + by,
+            Self::Spot {
+                position,
+                direction,
+                ..
+            } => (*position, *direction) = (turn * *position + by, turn * *direction),
+            Self::Ies {
+                position, rotation, ..
+            } => {
+                *position = turn * *position + by;
+                *rotation = (turn * *rotation).normalize();
+            }
+            Self::Directional { direction, .. } => *direction = turn * *direction,
+            Self::Environment { .. } => {}
+        }
+        self
     }
 
     /// Luminous power in a scene whose bounding sphere has this radius: what lights are chosen by. Without decay and for
@@ -119,7 +172,7 @@ impl Light {
         let disk = PI * scene_radius * scene_radius;
         match self {
             Self::Sphere { radius, .. } => 4.0 * PI * PI * f64::from(*radius).powi(2) * color,
-            Self::Point { .. } => 4.0 * PI * color,
+            Self::Point { .. } | Self::Other { .. } => 4.0 * PI * color,
             Self::Spot {
                 inner,
                 outer,
@@ -161,7 +214,7 @@ impl Light {
                 let fits = radius.is_finite() && *radius > 0.0;
                 fits.then_some(()).ok_or("its radius is not above 0")
             }),
-            Self::Point { position, .. } => placed(position),
+            Self::Point { position, .. } | Self::Other { position, .. } => placed(position),
             Self::Spot {
                 position,
                 direction,

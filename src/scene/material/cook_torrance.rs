@@ -1,7 +1,7 @@
 //! Microfacets with Beckmann's distribution over a diffuse lobe. No model file has them; experiments of
 //! shading do.
 
-use super::{Look, Material, MaterialKind, within};
+use super::{Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
 /// The kind.
@@ -18,6 +18,8 @@ pub static COOK_TORRANCE: MaterialKind = MaterialKind {
         "masking: 0 V-cavities, 1 Smith",
         "Fresnel: 0 Schlick, 1 exact",
     ],
+    lobes: Lobes::Glossy,
+    sources: &[],
     recognise: |_| None,
 };
 

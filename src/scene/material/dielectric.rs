@@ -8,7 +8,7 @@
 //!   and `KHR_materials_ior` (1.5 where it is missing). Walls are thin, as the standard has them, unless
 //!   `KHR_materials_volume` gives them a thickness.
 
-use super::{Description, Format, Look, Material, MaterialKind};
+use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
 /// The kind.
@@ -22,6 +22,8 @@ pub static DIELECTRIC: MaterialKind = MaterialKind {
         "1 if both surfaces of a wall are one triangle, else 0",
         "Fresnel: 0 exact (also where it is missing), 1 Schlick",
     ],
+    lobes: Lobes::Delta,
+    sources: &[],
     recognise,
 };
 

@@ -1,6 +1,6 @@
 //! Lambertian surfaces, and whatever no other kind recognises.
 
-use super::{Look, Material, MaterialKind};
+use super::{Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
 /// The kind.
@@ -9,6 +9,8 @@ pub static DIFFUSE: MaterialKind = MaterialKind {
     feature: "diffuse",
     description: "Lambertian reflection of the (possibly textured) base colour",
     parameters: &[],
+    lobes: Lobes::Diffuse,
+    sources: &[],
     recognise: |_| None,
 };
 

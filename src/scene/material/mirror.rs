@@ -1,6 +1,6 @@
 //! Perfect mirrors.
 
-use super::{Description, Format, Look, Material, MaterialKind};
+use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
 /// The kind.
@@ -9,6 +9,8 @@ pub static MIRROR: MaterialKind = MaterialKind {
     feature: "mirror",
     description: "perfect mirror tinted by the base colour (MTL illum 3, 5, 8; glTF smooth metal)",
     parameters: &[],
+    lobes: Lobes::Delta,
+    sources: &[],
     recognise,
 };
 

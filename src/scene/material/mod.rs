@@ -1,6 +1,7 @@
 //! Materials: what surfaces do with light. A kind of material is three files: its kernel in
-//! `kernels/shading/bsdf/`, a file here with its line in [`MATERIAL_KINDS`], and its line in the table of
-//! kernels, `kernels/shading/bsdf.wesl`. No integrator knows of it. How the parts fit: `docs/shading.md`.
+//! `kernels/shading/bsdf/`, its row here, and the row of its checks in `src/verify/materials/`. Each row stands on a list,
+//! a kind of the program also in the table of kernels, `kernels/shading/bsdf.wesl`; for a kind from outside the table is
+//! written from its row. Nothing else names kinds. How the parts fit: `docs/shading.md`.
 
 mod cook_torrance;
 mod dielectric;
@@ -18,11 +19,25 @@ pub use principled::{PRINCIPLED, reflectance_of_ior};
 
 use super::{AlphaMask, TextureUse};
 use glam::Vec3;
+use raystone_core::params::Sources;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
 
+/// What kernels ask of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lobes {
+    /// `<feature>_sample(surface, u)` and `<feature>_scattering(surface, direction)`. What the lobes send behind a surface
+    /// whose shading normal looks elsewhere is lost.
+    Diffuse,
+    /// The same two. What the lobes send behind the surface is mirrored at it.
+    Glossy,
+    /// `<feature>_sample(surface, u)` alone: there are single directions only, and light samples are of no use.
+    Delta,
+}
+
 /// A kind of material.
+#[derive(Clone)]
 pub struct MaterialKind {
     /// Name.
     pub name: &'static str,
@@ -32,9 +47,13 @@ pub struct MaterialKind {
     pub description: &'static str,
     /// What [`Material::parameters`] holds, in this order.
     pub parameters: &'static [&'static str],
+    /// What kernels ask of it.
+    pub lobes: Lobes,
+    /// Kernel modules that it brings along, because they are not the program's; `shading/bsdf/<feature>` is what kernels import.
+    pub sources: Sources,
     /// How a material that a file describes looks as one of this kind, if it is one. What none recognises
     /// is diffuse.
-    recognise: fn(&Description<'_>) -> Option<Look>,
+    pub recognise: fn(&Description<'_>) -> Option<Look>,
 }
 
 /// The table of kinds; a kind's place is its number in `kernels/shading/bsdf.wesl`. Where a file's material
@@ -53,6 +72,8 @@ impl PartialEq for MaterialKind {
         self.name == other.name
     }
 }
+
+impl Eq for MaterialKind {}
 
 impl fmt::Debug for MaterialKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -91,7 +112,8 @@ pub struct Material {
 }
 
 impl Material {
-    fn looking(name: impl Into<String>, kind: &'static MaterialKind, look: Look) -> Self {
+    /// A material of this kind that looks so.
+    pub fn looking(name: impl Into<String>, kind: &'static MaterialKind, look: Look) -> Self {
         Self {
             name: name.into(),
             kind,
@@ -108,15 +130,16 @@ impl Material {
         }
     }
 
-    /// The material that `file` describes, without texture and emission. One that would reflect more than
+    /// The material of one of these kinds that `file` describes, without texture and emission. One that would reflect more than
     /// arrives is scaled, with a warning.
     pub(super) fn described(
         name: String,
         description: &Description<'_>,
+        kinds: &[&'static MaterialKind],
         file: &Path,
         warnings: &mut Vec<String>,
     ) -> Self {
-        let mut kinds = MATERIAL_KINDS.iter().rev();
+        let mut kinds = kinds.iter().rev();
         let found = kinds.find_map(|&kind| Some((kind, (kind.recognise)(description)?)));
         let plain = || (&DIFFUSE, Look::plain(description.base_color));
         let (kind, look) = found.unwrap_or_else(plain);
@@ -206,13 +229,16 @@ pub struct MaterialSource {
 
 /// The file formats that describe materials, each with its own rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Format {
+pub enum Format {
+    /// Wavefront MTL.
     Mtl,
+    /// glTF 2.0.
     Gltf,
 }
 
 /// What a file says of a material, for the kinds to recognise themselves in.
-pub(super) struct Description<'a> {
+pub struct Description<'a> {
+    /// The format of the file.
     pub format: Format,
     /// MTL `Kd`, glTF base or diffuse colour.
     pub base_color: Vec3,
@@ -220,28 +246,31 @@ pub(super) struct Description<'a> {
     pub is_varied: bool,
     /// Whether the texture of metalness and roughness will be there.
     pub is_followed: bool,
+    /// The rest of what it says.
     pub source: &'a MaterialSource,
 }
 
 /// A description as one kind renders it.
-struct Look {
-    base_color: Vec3,
-    parameters: Vec<f32>,
+pub struct Look {
+    /// Linear RGB reflectance or tint.
+    pub base_color: Vec3,
+    /// As [`MaterialKind::parameters`] names them.
+    pub parameters: Vec<f32>,
     /// The largest part of light that the description reflects. Beyond 1, colours are divided by it.
-    reflected: f32,
+    pub reflected: f32,
 }
 
 impl Look {
     /// One colour and no parameters.
-    fn plain(color: Vec3) -> Self {
+    pub fn plain(color: Vec3) -> Self {
         Self {
             parameters: Vec::new(),
             ..Self::balanced(color, Vec3::ZERO, &[])
         }
     }
 
-    /// Two colours that reflect together, the second of which is the first of the parameters.
-    fn balanced(base: Vec3, specular: Vec3, others: &[f32]) -> Self {
+    /// Two colours that reflect together, the second of which is the first three of the parameters.
+    pub fn balanced(base: Vec3, specular: Vec3, others: &[f32]) -> Self {
         let (base, specular) = (emitted(base), emitted(specular));
         let reflected = (base + specular).max_element();
         let scale = 1.0 / reflected.max(1.0);
@@ -258,7 +287,7 @@ impl Look {
 const ROUNDING: f32 = 1e-4;
 
 /// `x` within these bounds; the lower one where it is NaN.
-fn within(x: f32, least: f32, most: f32) -> f32 {
+pub(crate) fn within(x: f32, least: f32, most: f32) -> f32 {
     if x.is_nan() {
         least
     } else {

@@ -2,7 +2,7 @@
 //!
 //! MTL: illumination model 2 with `Kd`, `Ks` and `Ns`. Together `Kd` and `Ks` reflect at most what arrives.
 
-use super::{Description, Format, Look, Material, MaterialKind, within};
+use super::{Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
 /// The kind.
@@ -16,6 +16,8 @@ pub static PHONG: MaterialKind = MaterialKind {
         "specular blue",
         "exponent",
     ],
+    lobes: Lobes::Glossy,
+    sources: &[],
     recognise,
 };
 

@@ -4,7 +4,7 @@
 //!   Khronos's own converter does: the metalness is solved for from the brightness of both colours.
 //! * MTL: where `Pm` is stated, a later addition to the format; with `Pr`, `Kd` and `Ni`.
 
-use super::{DEFAULT_IOR, Description, Format, Look, Material, MaterialKind, within};
+use super::{DEFAULT_IOR, Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
 /// The kind.
@@ -17,6 +17,8 @@ pub static PRINCIPLED: MaterialKind = MaterialKind {
         "roughness",
         "reflectance of the dielectric part at normal incidence",
     ],
+    lobes: Lobes::Glossy,
+    sources: &[],
     recognise,
 };
 

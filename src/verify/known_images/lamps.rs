@@ -10,9 +10,9 @@ use raystone_scene::{Material, SceneData, SceneError};
 use std::f64::consts::PI;
 
 /// Colour of the floor y = 0.
-pub(super) const FLOOR: Vec3 = vec3(0.6, 0.5, 0.4);
+pub(crate) const FLOOR: Vec3 = vec3(0.6, 0.5, 0.4);
 /// From where a point of the floor is seen: from so close by that no lamp is between.
-pub(super) const NEAR: Vec3 = vec3(0.02, 0.05, -0.04);
+pub(crate) const NEAR: Vec3 = vec3(0.02, 0.05, -0.04);
 
 /// A rectangle that shines on the side from which `along`, `across` turn counter-clockwise.
 #[derive(Clone, Copy)]
@@ -43,12 +43,12 @@ impl Lamp {
 }
 
 /// Radiance of the floor with this irradiance.
-pub(super) fn reflected(irradiance: DVec3) -> DVec3 {
+pub(crate) fn reflected(irradiance: DVec3) -> DVec3 {
     FLOOR.as_dvec3() / PI * irradiance
 }
 
 /// A floor under a sky of this radiance.
-pub(super) fn on_floor(name: &str, sky: Vec3) -> Result<Mesh, SceneError> {
+pub(crate) fn on_floor(name: &str, sky: Vec3) -> Result<Mesh, SceneError> {
     on_floor_of(name, sky, 6.0)
 }
 
@@ -63,7 +63,7 @@ fn on_floor_of(name: &str, sky: Vec3, half: f32) -> Result<Mesh, SceneError> {
 }
 
 /// Parameters of `path`: greatest depth, and names.
-pub(super) fn path(depth: i64, names: &[(&'static str, &str)]) -> super::Trial {
+pub(crate) fn path(depth: i64, names: &[(&'static str, &str)]) -> super::Trial {
     let mut parameters = vec![("max_depth", ParamValue::Integer(depth))];
     let named = |(key, name): &(&'static str, &str)| (*key, ParamValue::Name((*name).to_owned()));
     parameters.extend(names.iter().map(named));

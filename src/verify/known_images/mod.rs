@@ -6,12 +6,13 @@
 //! [`SYSTEMATIC`] beside them, so that no fault above 0.2 % passes but by chance, and one of 0.3 % in no case.
 
 pub mod closed;
-mod lamps;
-mod lights;
+pub(crate) mod lamps;
+pub(crate) mod lights;
 mod occlusion;
 mod surfaces;
 mod textures;
 
+use crate::kinds::KindChecks;
 use crate::trial_scenes::Trial;
 use glam::{DVec3, Quat, Vec3, vec3};
 use raystone_core::geometry::Camera;
@@ -44,7 +45,7 @@ pub struct View {
 
 impl View {
     /// The point `at` from the place `at + from`.
-    fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
+    pub fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
         let camera = Camera {
             eye: at + from,
             target: at,
@@ -72,10 +73,16 @@ pub struct KnownImage {
 }
 
 impl KnownImage {
-    /// The image turned and moved as a whole, so that no plane of it is exact in f32.
+    /// The image turned and moved as a whole, so that no plane of it is exact in f32. Maps turn about one axis alone: an image with
+    /// one stays as it is.
     fn turned(mut self) -> Self {
+        const BY: Vec3 = vec3(0.3, -0.2, 0.5);
+        let is_map = |light: &Light| matches!(light, Light::Environment { .. });
+        if self.scene.lights.iter().any(is_map) {
+            return self;
+        }
         let turn = Quat::from_axis_angle(vec3(0.36, 0.48, 0.8), 0.7);
-        let place = |p: Vec3| turn * p + vec3(0.3, -0.2, 0.5);
+        let place = |p: Vec3| turn * p + BY;
         for triangle in &mut self.scene.triangles {
             *triangle = triangle.map(place);
         }
@@ -84,25 +91,8 @@ impl KnownImage {
                 *word = encode_normal(turn * normal.as_vec3());
             }
         }
-        for light in &mut self.scene.lights {
-            match light {
-                Light::Sphere { center, .. } => *center = place(*center),
-                Light::Point { position, .. } => *position = place(*position),
-                Light::Spot {
-                    position,
-                    direction,
-                    ..
-                } => (*position, *direction) = (place(*position), turn * *direction),
-                Light::Ies {
-                    position, rotation, ..
-                } => {
-                    (*position, *rotation) = (place(*position), (turn * *rotation).normalize());
-                }
-                Light::Directional { direction, .. } => *direction = turn * *direction,
-                // It turns about one axis alone: no image with a map is turned.
-                Light::Environment { .. } => {}
-            }
-        }
+        let lights = std::mem::take(&mut self.scene.lights).into_iter();
+        self.scene.lights = lights.map(|light| light.moved(turn, BY)).collect();
         for View { camera, .. } in &mut self.views {
             (camera.eye, camera.target) = (place(camera.eye), place(camera.target));
             camera.up = turn * camera.up;
@@ -111,22 +101,24 @@ impl KnownImage {
     }
 }
 
-/// All of them.
+/// All of the program's kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
 pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
-    let parts = [
-        lamps::images,
-        lights::images,
-        occlusion::images,
-        surfaces::images,
-        textures::images,
-    ];
-    let mut all = Vec::new();
-    for part in parts {
-        all.extend(part()?);
-    }
+    known_images_of(&KindChecks::default())
+}
+
+/// All of these kinds of materials and lights.
+///
+/// # Errors
+/// As [`known_images`].
+pub fn known_images_of(kinds: &KindChecks) -> Result<Vec<KnownImage>, SceneError> {
+    let mut all = lamps::images()?;
+    all.extend(lights::images(&kinds.lights)?);
+    all.extend(occlusion::images()?);
+    all.extend(surfaces::images(&kinds.materials)?);
+    all.extend(textures::images()?);
     Ok(all)
 }
 

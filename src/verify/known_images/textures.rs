@@ -2,6 +2,7 @@
 
 use super::lamps::{NEAR, path};
 use super::{KnownImage, View};
+use crate::materials::PRINCIPLED_CHECKS;
 use crate::mesh::Mesh;
 use crate::path_oracle::scattered;
 use glam::{DVec3, Mat2, Vec2, Vec3, vec2, vec3};
@@ -267,7 +268,7 @@ fn roughness() -> Result<KnownImage, SceneError> {
     let view = |(k, u): (usize, f32)| {
         let [_, rough, metal] = TEXELS[k].map(|byte| f32::from(byte) / 255.0);
         let there = of(0.9 * metal, 0.8 * rough);
-        let radiance = STRENGTH * scattered(&there, local(from), local(-WAY));
+        let radiance = STRENGTH * scattered(&PRINCIPLED_CHECKS, &there, local(from), local(-WAY));
         let at = point_of(Vec3::ZERO, [u, 0.3]);
         View::new(["first texel", "second texel"][k], at, from, radiance)
     };

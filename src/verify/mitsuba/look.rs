@@ -1,17 +1,15 @@
 //! Materials, textures and skies in Mitsuba's words.
 
 use super::{Export, ExportError, vector};
+use crate::materials::DIFFUSE_CHECKS;
 use glam::Vec3;
 use raystone_image::{Image, Picture};
-use raystone_scene::{
-    AlphaMask, COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED,
-    SceneData, Texture, TextureUse, Wrap,
-};
+use raystone_scene::{AlphaMask, Daylight, Material, SceneData, Texture, TextureUse, Wrap};
 use std::f32::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// Python that teaches Mitsuba the materials that it lacks, and the file that it is written to.
-const MATERIALS: &str = include_str!("materials.py");
+/// Python that the materials build on which Mitsuba lacks, and the file that all are written to.
+const OPAQUE: &str = include_str!("opaque.py");
 const MATERIALS_FILE: &str = "materials.py";
 
 /// Texels of a written mask for one of its image.
@@ -25,15 +23,12 @@ impl Export<'_> {
     pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
         let material = &scene.materials[id];
         let color = self.color(scene, id)?;
-        let known = [&DIFFUSE, &MIRROR, &DIELECTRIC];
-        let by_formula = [&PHONG, &COOK_TORRANCE, &PRINCIPLED].contains(&material.kind);
-        if by_formula && !self.needs_materials {
-            self.needs_materials = true;
-            self.write(MATERIALS_FILE, MATERIALS.as_bytes())?;
-            self.warnings.push(format!(
-                "some materials are those of {MATERIALS_FILE}, which has to be imported in Python before the scene is loaded"
-            ));
-        } else if !by_formula && !known.contains(&material.kind) {
+        let known = self.kinds.materials.get(material.kind.name);
+        let kind = known.unwrap_or(&DIFFUSE_CHECKS);
+        if !kind.python.is_empty() {
+            self.teach()?;
+        }
+        if known.is_none() {
             self.warnings.push(format!(
                 "material {}: {} has no counterpart in Mitsuba, written as diffuse",
                 material.name, material.kind.name
@@ -52,12 +47,6 @@ impl Export<'_> {
                 material.name
             ));
         }
-        if material.kind == &DIELECTRIC && parameter(material, 2) > 0.0 {
-            self.warnings.push(format!(
-                "material {}: Mitsuba takes Fresnel's equations, not Schlick's polynomial",
-                material.name
-            ));
-        }
         let name = format!("id=\"material-{id}\"");
         let opening = self.mask(scene, id, &name)?;
         // The mask has the name, and around it what it cuts.
@@ -65,32 +54,23 @@ impl Export<'_> {
             true => (String::new(), "    </bsdf>\n"),
             false => (name, ""),
         };
-        let _ = match material.kind {
-            kind if kind == &DIELECTRIC => write!(self.xml, "{}", dielectric(material, &id)),
-            kind if kind == &MIRROR => write!(
-                self.xml,
-                r#"    <bsdf type="twosided" {id}>
-        <bsdf type="conductor">
-            <string name="material" value="none"/>
-            {}
-        </bsdf>
-    </bsdf>
-"#,
-                color.named("specular_reflectance")
-            ),
-            _ if by_formula => write!(self.xml, "{}", formula(material, &color, &id)),
-            _ => write!(
-                self.xml,
-                r#"    <bsdf type="twosided" {id}>
-        <bsdf type="diffuse">
-            {}
-        </bsdf>
-    </bsdf>
-"#,
-                color.named("reflectance")
-            ),
-        };
+        self.xml += &(kind.mitsuba)(material, &color, &id, &mut self.warnings);
         self.xml += closing;
+        Ok(())
+    }
+
+    /// Writes the kinds of materials that Mitsuba lacks, once.
+    fn teach(&mut self) -> Result<(), ExportError> {
+        if !self.needs_materials {
+            self.needs_materials = true;
+            let kinds = self.kinds.materials.iter().map(|kind| kind.python);
+            let texts: Vec<&str> = kinds.filter(|text| !text.is_empty()).collect();
+            let python = OPAQUE.to_owned() + &texts.join("\n\n");
+            self.write(MATERIALS_FILE, python.as_bytes())?;
+            self.warnings.push(format!(
+                "some materials are those of {MATERIALS_FILE}, which has to be imported in Python before the scene is loaded"
+            ));
+        }
         Ok(())
     }
 
@@ -186,13 +166,16 @@ impl Export<'_> {
 }
 
 /// A reflectance.
-enum Color {
+pub enum Color {
+    /// Linear RGB.
     Constant(Vec3),
+    /// A file of the exported folder.
     Texture(String),
 }
 
 impl Color {
-    fn named(&self, name: &str) -> String {
+    /// The element that gives it this name.
+    pub fn named(&self, name: &str) -> String {
         match self {
             Self::Constant(color) => {
                 format!("<rgb name=\"{name}\" value=\"{}\"/>", vector(*color))
@@ -204,12 +187,8 @@ impl Color {
     }
 }
 
-fn parameter(material: &Material, at: usize) -> f32 {
-    material.parameters.get(at).copied().unwrap_or_default()
-}
-
-/// A material of [`MATERIALS_FILE`], which takes the same numbers in the same order.
-fn formula(material: &Material, color: &Color, id: &str) -> String {
+/// A material of Python's class `raystone-<kind>`, which takes the same numbers in the same order.
+pub fn by_formula(material: &Material, color: &Color, id: &str, _: &mut Vec<String>) -> String {
     let kind = material.kind.name;
     let mut text = format!(
         "    <bsdf type=\"raystone-{kind}\" {id}>\n        {}\n",
@@ -219,23 +198,6 @@ fn formula(material: &Material, color: &Color, id: &str) -> String {
         let _ = writeln!(text, "        <float name=\"p{k}\" value=\"{value}\"/>");
     }
     text + "    </bsdf>\n"
-}
-
-fn dielectric(material: &Material, id: &str) -> String {
-    let kind = match parameter(material, 1) > 0.0 {
-        true => "thindielectric",
-        false => "dielectric",
-    };
-    format!(
-        r#"    <bsdf type="{kind}" {id}>
-        <float name="int_ior" value="{}"/>
-        <float name="ext_ior" value="1"/>
-        <rgb name="specular_transmittance" value="{}"/>
-    </bsdf>
-"#,
-        parameter(material, 0),
-        vector(material.base_color)
-    )
 }
 
 fn picture(texture: &Texture) -> Picture {

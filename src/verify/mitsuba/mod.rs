@@ -5,15 +5,17 @@
 //! space, the same camera, a box filter, no clipping. Mitsuba's `max_depth` counts vertices behind the camera, ours
 //! bounces: a path of `b` bounces there has depth `b + 1`. What has no counterpart is drawn as something near, and said.
 
-mod lights;
 mod look;
 mod mesh;
 
+pub use look::{Color, by_formula};
+
+use crate::kinds::KindChecks;
 use glam::Vec3;
 use raystone_core::atomic::write_atomic;
 use raystone_core::geometry::Camera;
 use raystone_image::{FileFormat, Image, ImageError, Picture, write_png};
-use raystone_scene::{Bounds, SceneData};
+use raystone_scene::{Bounds, Light, SceneData};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -58,6 +60,18 @@ pub enum ExportError {
     Image(#[from] ImageError),
 }
 
+impl ExportError {
+    /// Why the light of this number cannot be written.
+    pub fn light(number: usize, light: &Light, reason: &'static str) -> Self {
+        let kind = light.kind().name;
+        Self::Light {
+            number,
+            kind,
+            reason,
+        }
+    }
+}
+
 /// Name of the XML file in the folder of an exported scene.
 pub const MITSUBA_FILE: &str = "scene.xml";
 
@@ -75,8 +89,23 @@ pub fn export_mitsuba(
     settings: &MitsubaSettings,
     folder: &Path,
 ) -> Result<Vec<String>, ExportError> {
+    export_mitsuba_of(&KindChecks::default(), scene, settings, folder)
+}
+
+/// The same of a scene of these kinds of materials and lights.
+///
+/// # Errors
+/// As [`export_mitsuba`].
+pub fn export_mitsuba_of(
+    kinds: &KindChecks,
+    scene: &SceneData,
+    settings: &MitsubaSettings,
+    folder: &Path,
+) -> Result<Vec<String>, ExportError> {
     let mut export = Export {
         folder,
+        kinds,
+        scene,
         warnings: Vec::new(),
         needs_materials: false,
         xml: String::new(),
@@ -95,7 +124,7 @@ pub fn export_mitsuba(
     for id in 0..scene.materials.len() {
         export.material(scene, id)?;
     }
-    export.lights(scene)?;
+    export.lights()?;
     export.shapes(scene, settings.fronts_only)?;
     export.xml += "</scene>\n";
     let path = folder.join(MITSUBA_FILE);
@@ -104,13 +133,16 @@ pub fn export_mitsuba(
 }
 
 /// An export under way.
-struct Export<'a> {
+pub struct Export<'a> {
     folder: &'a Path,
+    kinds: &'a KindChecks,
+    /// What is exported.
+    pub scene: &'a SceneData,
     warnings: Vec<String>,
     /// Whether a material is one of those that Mitsuba has to be taught.
     needs_materials: bool,
     /// The text so far.
-    xml: String,
+    pub xml: String,
 }
 
 impl Export<'_> {
@@ -157,6 +189,18 @@ impl Export<'_> {
     </sensor>
 "#
         );
+    }
+
+    /// Every light that shines.
+    fn lights(&mut self) -> Result<(), ExportError> {
+        let all = self.scene.lights.iter().enumerate();
+        for (number, light) in all.filter(|(_, light)| light.problem().is_none()) {
+            let kind = self.kinds.lights.get(light.kind().name);
+            let unknown = "its kind has no row of checks";
+            let kind = kind.ok_or_else(|| ExportError::light(number, light, unknown))?;
+            (kind.mitsuba)(self, number, light)?;
+        }
+        Ok(())
     }
 
     /// A mesh for each material that has triangles, and one for the back of each emitter.
@@ -206,7 +250,11 @@ impl Export<'_> {
         write_atomic(&path, bytes).map_err(unwritable(&path))
     }
 
-    fn write_radiance(&self, name: &str, image: &Image) -> Result<(), ExportError> {
+    /// Writes a linear image; `name` is relative to the folder.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_radiance(&self, name: &str, image: &Image) -> Result<(), ExportError> {
         let path = self.folder.join(name);
         Ok(FileFormat::of(&path)?.write(&path, image, &[])?)
     }
@@ -224,6 +272,6 @@ fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> ExportError + '_ {
 }
 
 /// Three numbers that read back to the same bits.
-fn vector(v: Vec3) -> String {
+pub fn vector(v: Vec3) -> String {
     format!("{} {} {}", v.x, v.y, v.z)
 }

@@ -319,7 +319,7 @@ impl PathOracle<'_> {
             if depth == rules.max_depth {
                 break;
             }
-            let bsdf = bsdf::of(&surface);
+            let bsdf = surface.bsdf();
             if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material)
             {
                 let direct = self.direct(walk, &surface, &*bsdf, depth, rules);

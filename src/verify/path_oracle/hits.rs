@@ -26,7 +26,7 @@ const LAYERED: f64 = 16.0;
 const FAR: f64 = 1e30;
 
 /// The triangles of a scene.
-pub(super) struct Hits<'a> {
+pub(crate) struct Hits<'a> {
     triangles: &'a [Triangle],
     holes: Option<SceneHoles<'a>>,
     groups: Groups,
@@ -35,7 +35,7 @@ pub(super) struct Hits<'a> {
 
 /// Where a ray meets a triangle: distance, and the weights of the second and third corner.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     pub triangle: u32,
     pub distance: f64,
     pub weights: [f64; 2],
@@ -51,7 +51,7 @@ impl Hit {
 
 /// What lies on a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Blocked {
+pub(crate) enum Blocked {
     No,
     /// A layer of the surface that it leaves, which a kernel may have passed.
     ByLayer,
@@ -59,7 +59,7 @@ pub(super) enum Blocked {
 }
 
 /// The nearest hit, as rounding has it.
-pub(super) struct Nearest {
+pub(crate) struct Nearest {
     pub hit: Hit,
     /// Whether rounding alone made it the nearest.
     pub is_swapped: bool,
@@ -69,7 +69,7 @@ pub(super) struct Nearest {
 
 /// A ray with a unit direction; what it does not see again.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment {
+pub(crate) struct Segment {
     /// The point of the surface or lens that it leaves: where light is measured.
     pub start: DVec3,
     /// Of the triangle there, on the viewer's side.
@@ -87,7 +87,7 @@ pub(super) struct Segment {
 }
 
 impl Segment {
-    pub(super) fn endless(origin: DVec3, direction: DVec3, from: Option<u32>) -> Self {
+    pub(crate) fn endless(origin: DVec3, direction: DVec3, from: Option<u32>) -> Self {
         Self {
             start: origin,
             normal: DVec3::ZERO,
@@ -101,13 +101,13 @@ impl Segment {
     }
 
     /// Point and normal where it begins.
-    pub(super) fn place(&self) -> (DVec3, DVec3) {
+    pub(crate) fn place(&self) -> (DVec3, DVec3) {
         (self.start, self.normal)
     }
 }
 
 impl<'a> Hits<'a> {
-    pub(super) fn new(scene: &'a SceneData) -> Self {
+    pub(crate) fn new(scene: &'a SceneData) -> Self {
         let triangles = &scene.triangles;
         let corners = |id: usize| triangles[id].vertices.map(|v| v.to_array());
         let coordinates = triangles.iter().flat_map(|t| t.vertices);
@@ -121,7 +121,7 @@ impl<'a> Hits<'a> {
     }
 
     /// The nearest hit of a segment.
-    pub(super) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
+    pub(crate) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
         let mut found: Vec<(Hit, Blur)> = Vec::new();
         let mut end = f64::INFINITY;
         self.visit(segment, |hit| {
@@ -188,7 +188,7 @@ impl<'a> Hits<'a> {
     }
 
     /// A hit as it is from the point that the ray leaves; as it is found, where the line from there passes the triangle.
-    pub(super) fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
+    pub(crate) fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
         let from_there = Segment {
             origin: segment.start,
             ..*segment
@@ -198,7 +198,7 @@ impl<'a> Hits<'a> {
     }
 
     /// Whether anything lies on a segment, and whether that is a layer of the surface that it leaves and nothing else.
-    pub(super) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
+    pub(crate) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
         let (mut by_layer, mut by_other) = (false, false);
         self.visit(segment, |hit| {
             if !rounding.holds(hit.margin(), self.blur(&hit, segment).of_weights) {
@@ -224,7 +224,7 @@ impl<'a> Hits<'a> {
     }
 
     /// Whether there is no surface at a point of a triangle.
-    pub(super) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
+    pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
         let holes = self.holes.as_ref();
         holes.is_some_and(|holes| holes.is_cut_out(triangle, weights, shift))
     }

@@ -10,19 +10,27 @@
 //!
 //! What single precision may do to a path is found by playing it: see [`Rounding`].
 
-mod bsdf;
+pub(crate) mod bsdf;
 mod camera;
 mod estimator;
-mod hits;
-mod light;
+pub(crate) mod hits;
+pub(crate) mod light;
 mod rounding;
 mod surface;
-mod texture;
+pub(crate) mod texture;
 
+pub use bsdf::{
+    Bounce, Bsdf, Reflected, around, bounce, choose, colour, cosine_density, cosine_direction,
+    diffuse_share, is_above, kept, mirrored, parameter,
+};
 pub use estimator::Estimator;
+pub use light::LightSample;
 pub(crate) use rounding::MOST_ROUNDINGS;
 pub use rounding::Rounding;
+pub use surface::Surface;
 
+use crate::kinds::KindChecks;
+use crate::materials::MaterialChecks;
 use camera::Lens;
 use glam::DVec3;
 use hits::{Blocked, Hits, Nearest, Segment};
@@ -32,7 +40,6 @@ use raystone_render::CountedRays;
 use raystone_sampling::{Coordinate, Sampler, to_unit};
 use raystone_scene::{Material, SceneData};
 use std::fmt;
-use surface::Surface;
 use texture::Textures;
 
 /// One sample of one pixel.
@@ -185,6 +192,8 @@ pub struct PathOracle<'a> {
     hits: Hits<'a>,
     lights: Lights,
     textures: Textures<'a>,
+    /// What is known of the kind of each material.
+    materials: Vec<&'static MaterialChecks>,
     /// Of the box of all triangles.
     diagonal: f64,
 }
@@ -202,16 +211,32 @@ pub struct View<'a> {
 }
 
 impl<'a> PathOracle<'a> {
-    /// The oracle of a scene.
+    /// The oracle of a scene of the program's kinds.
     ///
     /// # Errors
     /// What the scene has that the oracle does not know: nothing can be judged then.
     pub fn new(scene: &'a SceneData) -> Result<Self, String> {
-        bsdf::all_known(scene)?;
+        Self::knowing(scene, &KindChecks::default())
+    }
+
+    /// The oracle of a scene of these kinds of materials and lights.
+    ///
+    /// # Errors
+    /// As [`PathOracle::new`].
+    pub fn knowing(scene: &'a SceneData, kinds: &KindChecks) -> Result<Self, String> {
+        let known = |material: &Material| {
+            let kind = material.kind.name;
+            (kinds.materials.get(kind)).ok_or_else(|| format!("material `{kind}`"))
+        };
         Ok(Self {
+            materials: scene
+                .materials
+                .iter()
+                .map(known)
+                .collect::<Result<_, _>>()?,
             scene,
             hits: Hits::new(scene),
-            lights: Lights::new(scene),
+            lights: Lights::new(scene, &kinds.lights)?,
             textures: Textures::new(scene),
             diagonal: diagonal(scene),
         })
@@ -250,9 +275,14 @@ impl<'a> PathOracle<'a> {
 
 /// f · cos of a material on the plane z = 0 for light that arrives from `from` and leaves towards `out`, both above it; delta lobes
 /// are no part of it.
-pub(crate) fn scattered(material: &Material, out: DVec3, from: DVec3) -> DVec3 {
-    let surface = Surface::flat(material, out);
-    let reflected = bsdf::of(&surface).reflect(from, &mut Rounding::none());
+pub(crate) fn scattered(
+    checks: &'static MaterialChecks,
+    material: &Material,
+    out: DVec3,
+    from: DVec3,
+) -> DVec3 {
+    let surface = Surface::flat(checks, material, out);
+    let reflected = surface.bsdf().reflect(from, &mut Rounding::none());
     reflected.map_or(DVec3::ZERO, |reflected| reflected.value)
 }
 
@@ -340,6 +370,6 @@ impl Walk<'_> {
 }
 
 /// Brightness of a colour, as docs/shading.md defines it.
-fn luminance(c: DVec3) -> f64 {
+pub(crate) fn luminance(c: DVec3) -> f64 {
     0.212_671 * c.x + 0.715_160 * c.y + 0.072_169 * c.z
 }

@@ -1,8 +1,10 @@
 //! From a hit to what materials need.
 
 use super::PathOracle;
+use super::bsdf::Bsdf;
 use super::hits::{Hit, Segment};
 use super::rounding::Rounding;
+use crate::materials::MaterialChecks;
 use glam::DVec3;
 use raystone_scene::{Material, decode_color, decode_normal};
 
@@ -15,8 +17,10 @@ const OFFSET: f64 = 8.0;
 const LEAST_SQUARE: f64 = 1e-12;
 
 /// A point that was hit.
-pub(super) struct Surface<'a> {
+pub struct Surface<'a> {
+    /// Its number.
     pub triangle: u32,
+    /// Where.
     pub position: DVec3,
     /// To where the path came from.
     pub out: DVec3,
@@ -26,19 +30,27 @@ pub(super) struct Surface<'a> {
     pub normal: DVec3,
     /// 1 where that is the front of the triangle, -1 where not.
     pub side: f64,
+    /// What it is made of.
     pub material: &'a Material,
     /// Base colour, with the texture and the colours of vertices.
     pub base: DVec3,
     /// What metalness and roughness are multiplied by.
     pub varied: [f64; 2],
+    /// Radiance that it emits towards `out`.
     pub emission: DVec3,
+    /// What is known of the kind of its material.
+    pub(super) checks: &'static MaterialChecks,
     /// How far rays start off the surface by one rounding.
     offset: f64,
 }
 
 impl<'a> Surface<'a> {
     /// A point of the plane z = 0 seen from its front, without textures.
-    pub(super) fn flat(material: &'a Material, out: DVec3) -> Self {
+    pub(super) fn flat(
+        checks: &'static MaterialChecks,
+        material: &'a Material,
+        out: DVec3,
+    ) -> Self {
         Self {
             triangle: 0,
             position: DVec3::ZERO,
@@ -50,12 +62,18 @@ impl<'a> Surface<'a> {
             base: material.base_color.as_dvec3(),
             varied: [1.0; 2],
             emission: DVec3::ZERO,
+            checks,
             offset: 0.0,
         }
     }
 }
 
 impl Surface<'_> {
+    /// What its material does.
+    pub(super) fn bsdf(&self) -> Box<dyn Bsdf + '_> {
+        (self.checks.twin)(self)
+    }
+
     /// The ray that leaves in this direction.
     pub(super) fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
         let side = direction.dot(self.geometric).signum();
@@ -140,6 +158,7 @@ impl PathOracle<'_> {
                 true => emission,
                 false => DVec3::ZERO,
             },
+            checks: self.materials[id as usize],
             offset: OFFSET * reach,
         }
     }

@@ -5,7 +5,7 @@ use glam::{DMat2, DVec2, DVec3};
 use raystone_scene::{SceneData, TextureUse};
 
 /// The textures of a scene.
-pub(super) struct Textures<'a> {
+pub(crate) struct Textures<'a> {
     scene: &'a SceneData,
     /// Whether triangles have texture coordinates.
     mapped: bool,
@@ -21,7 +21,7 @@ fn linear(byte: u8) -> f64 {
 }
 
 impl<'a> Textures<'a> {
-    pub(super) fn new(scene: &'a SceneData) -> Self {
+    pub(crate) fn new(scene: &'a SceneData) -> Self {
         Self {
             scene,
             mapped: scene.uvs.len() == scene.triangles.len(),
@@ -29,12 +29,12 @@ impl<'a> Textures<'a> {
     }
 
     /// Whether triangles have texture coordinates; without them materials show their constants.
-    pub(super) fn are_mapped(&self) -> bool {
+    pub(crate) fn are_mapped(&self) -> bool {
         self.mapped
     }
 
     /// Texture coordinates of a point of a triangle.
-    pub(super) fn coordinates(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec2 {
+    pub(crate) fn coordinates(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec2 {
         if !self.mapped {
             return DVec2::ZERO;
         }
@@ -43,13 +43,13 @@ impl<'a> Textures<'a> {
     }
 
     /// A linear colour there; white where there is no texture.
-    pub(super) fn colour(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
+    pub(crate) fn colour(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
         let used = used.filter(|_| self.mapped);
         used.map_or(DVec3::ONE, |used| self.bilinear(&used, at, linear))
     }
 
     /// Numbers as they are; 1 where there is no texture.
-    pub(super) fn numbers(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
+    pub(crate) fn numbers(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
         let part = |byte| f64::from(byte) / 255.0;
         let used = used.filter(|_| self.mapped);
         used.map_or(DVec3::ONE, |used| self.bilinear(&used, at, part))
@@ -72,7 +72,7 @@ impl<'a> Textures<'a> {
     }
 
     /// Bends a normal by a map, in the frame of ∂p/∂u and ∂p/∂v.
-    pub(super) fn bent(&self, used: TextureUse, triangle: u32, at: DVec2, normal: DVec3) -> DVec3 {
+    pub(crate) fn bent(&self, used: TextureUse, triangle: u32, at: DVec2, normal: DVec3) -> DVec3 {
         let [a, b, c] = self.scene.triangles[triangle as usize]
             .vertices
             .map(|v| v.as_dvec3());

@@ -1,20 +1,16 @@
-//! Lights, one file for each way of shining, from `docs/shading.md`.
+//! How lights are chosen and joined, from `docs/shading.md`. Each way of shining is a file in `src/verify/lights/`.
 
-mod delta;
-mod environment;
-mod flat;
-mod ies;
 mod sky;
-mod sphere;
 mod tree;
 
 use super::hits::{Blocked, Segment};
 use super::rounding::Rounding;
 use super::surface::Surface;
 use super::{PathOracle, Walk};
+use crate::lights::{LightChecks, LightRegistry, LightTwin, environment, flat, sphere};
 use glam::DVec3;
 use raystone_render::CountedRays;
-use raystone_scene::{Light, LightList, SceneData, Source};
+use raystone_scene::{LightList, SceneData, Source};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
@@ -34,6 +30,8 @@ pub(super) enum Choice {
 /// What shines on a scene.
 pub(super) struct Lights {
     list: LightList,
+    /// What is known of the kind of each.
+    checks: Vec<&'static LightChecks>,
     /// Values below the end of each light where lights are chosen by power.
     ends: Vec<f64>,
     /// The light of an emissive triangle.
@@ -49,7 +47,7 @@ pub(super) struct Lights {
 pub(super) type Place = (DVec3, DVec3);
 
 /// Values that a number can have: those of a draw are multiples of the reciprocal.
-const UNITS: f64 = (1u32 << 24) as f64;
+pub(crate) const UNITS: f64 = (1u32 << 24) as f64;
 
 /// A light that was chosen.
 pub(super) struct Chosen {
@@ -59,8 +57,10 @@ pub(super) struct Chosen {
 }
 
 /// A point of a light, as a surface sees it.
-pub(super) struct LightSample {
+pub struct LightSample {
+    /// From the surface, of length 1.
     pub direction: DVec3,
+    /// How far it is, scene units.
     pub distance: f64,
     /// Radiance; irradiance of a surface that faces a delta light.
     pub radiance: DVec3,
@@ -72,36 +72,37 @@ pub(super) struct LightSample {
 
 impl Lights {
     /// The lights of a scene.
-    pub(super) fn new(scene: &SceneData) -> Self {
+    ///
+    /// # Errors
+    /// There is one of a kind that is none of these.
+    pub(super) fn new(scene: &SceneData, kinds: &LightRegistry) -> Result<Self, String> {
         let list = LightList::of(scene);
         let mut map = None;
         let mut owners = BTreeMap::new();
         let mut spheres = Vec::new();
+        let mut checks = Vec::new();
         for (place, light) in list.lights.iter().enumerate() {
+            let kind = light.kind(scene).name;
+            checks.push((kinds.get(kind)).ok_or_else(|| format!("light `{kind}`"))?);
             match light.source {
                 Source::Triangle(id) => _ = owners.insert(id, place),
                 Source::Parallelogram(of) => owners.extend(of.triangles.map(|id| (id, place))),
-                Source::Light(id) => match &scene.lights[id as usize] {
-                    light @ Light::Sphere { .. } => {
-                        spheres.extend(sphere::Ball::of(light).map(|ball| (place, ball)));
-                    }
-                    Light::Environment {
-                        map: texels,
-                        scale,
-                        turn,
-                    } => map = Some(environment::Map::new(texels, *scale, *turn)),
-                    _ => {}
-                },
+                Source::Light(id) => {
+                    let light = &scene.lights[id as usize];
+                    spheres.extend(sphere::Ball::of(light).map(|ball| (place, ball)));
+                    map = map.or_else(|| environment::Map::of(light));
+                }
             }
         }
-        Self {
+        Ok(Self {
             ends: ends(&list),
             list,
+            checks,
             owners,
             spheres,
             map,
             tree: OnceLock::new(),
-        }
+        })
     }
 
     /// Whether there is nothing to sample.
@@ -229,25 +230,20 @@ impl PathOracle<'_> {
         rounding: &mut Rounding,
     ) -> (usize, Option<LightSample>) {
         let from = surface.position;
-        let light = match self.lights.list.lights[chosen.light].source {
-            Source::Light(id) => match &self.scene.lights[id as usize] {
-                light @ Light::Sphere { .. } => {
-                    sphere::Ball::of(light).and_then(|ball| ball.sample(from, point))
-                }
-                Light::Environment { .. } => {
-                    let map = self.lights.map.as_ref();
-                    let found = map.map(|map| map.sample(point, rounding));
-                    return found.unwrap_or((0, None));
-                }
-                light => delta::sample(light, from, rounding),
-            },
-            flat => flat::sample(
-                (self.scene, &self.textures, &self.hits),
-                flat,
-                from,
-                point,
-                rounding,
-            ),
+        let source = self.lights.list.lights[chosen.light].source;
+        let light = match (self.lights.checks[chosen.light].twin, source) {
+            (LightTwin::Alone(sample), Source::Light(id)) => {
+                sample(&self.scene.lights[id as usize], from, point, rounding)
+            }
+            (LightTwin::Map, _) => {
+                let map = self.lights.map.as_ref();
+                let found = map.map(|map| map.sample(point, rounding));
+                return found.unwrap_or((0, None));
+            }
+            _ => {
+                let of = (self.scene, &self.textures, &self.hits);
+                flat::sample(of, source, from, point, rounding)
+            }
         };
         (0, light)
     }

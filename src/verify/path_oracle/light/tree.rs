@@ -40,15 +40,6 @@ impl Bounds {
             both_sides: scene.materials[scene.material_ids[triangle as usize] as usize]
                 .emits_both_sides,
         };
-        let around = |place: glam::Vec3, radius: f32| Self {
-            low: place.as_dvec3() - f64::from(radius),
-            high: place.as_dvec3() + f64::from(radius),
-            power,
-            axis: DVec3::Z,
-            normals: PI,
-            spread: FRAC_PI_2,
-            both_sides: false,
-        };
         let id = match source {
             Source::Triangle(id) => {
                 let [a, b, c] = scene.outward(id as usize).map(|v| v.as_dvec3());
@@ -61,25 +52,30 @@ impl Bounds {
             }
             Source::Light(id) => id,
         };
-        match &scene.lights[id as usize] {
-            Light::Sphere { center, radius, .. } => Some(around(*center, *radius)),
-            Light::Point { position, .. } | Light::Ies { position, .. } => {
-                Some(around(*position, 0.0))
-            }
-            Light::Spot {
-                position,
-                direction,
-                inner,
-                outer,
-                ..
-            } => Some(Self {
-                axis: direction.as_dvec3().normalize(),
-                normals: f64::from(*inner),
-                spread: f64::from(*outer) - f64::from(*inner),
-                ..around(*position, 0.0)
-            }),
-            Light::Directional { .. } | Light::Environment { .. } => None,
+        let light = &scene.lights[id as usize];
+        let (middle, radius) = light.place()?;
+        let (middle, radius) = (middle.as_dvec3(), f64::from(radius));
+        let mut bounds = Self {
+            low: middle - radius,
+            high: middle + radius,
+            power,
+            axis: DVec3::Z,
+            normals: PI,
+            spread: FRAC_PI_2,
+            both_sides: false,
+        };
+        if let Light::Spot {
+            direction,
+            inner,
+            outer,
+            ..
+        } = light
+        {
+            bounds.axis = direction.as_dvec3().normalize();
+            bounds.normals = f64::from(*inner);
+            bounds.spread = f64::from(*outer) - f64::from(*inner);
         }
+        Some(bounds)
     }
 
     fn and(self, other: Self) -> Self {

@@ -1,13 +1,21 @@
 //! Triangles and parallelograms: points on them evenly.
 
-use super::LightSample;
+use super::{LightChecks, LightTwin};
 use crate::path_oracle::hits::Hits;
-use crate::path_oracle::rounding::Rounding;
 use crate::path_oracle::texture::Textures;
+use crate::path_oracle::{LightSample, Rounding};
 use glam::DVec3;
-use raystone_scene::{SceneData, Source};
+use raystone_scene::{LIGHT_KINDS, SceneData, Source};
 
-pub(super) fn sample(
+/// The row of single ones. Mitsuba is told of them with their meshes.
+pub(super) static TRIANGLES: LightChecks =
+    LightChecks::new(LIGHT_KINDS[0], LightTwin::Surface, |_, _, _| Ok(()));
+
+/// The row of two that form a parallelogram.
+pub(super) static PARALLELOGRAMS: LightChecks =
+    LightChecks::new(LIGHT_KINDS[1], LightTwin::Surface, |_, _, _| Ok(()));
+
+pub(crate) fn sample(
     (scene, textures, hits): (&SceneData, &Textures, &Hits),
     source: Source,
     from: DVec3,

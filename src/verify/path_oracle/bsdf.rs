@@ -1,21 +1,14 @@
-//! Materials, one file each, from `docs/shading.md`.
-
-mod cook_torrance;
-mod dielectric;
-mod diffuse;
-mod mirror;
-mod phong;
-mod principled;
+//! What materials do, in the words of `docs/shading.md`. Each kind is a file in `src/verify/materials/`.
 
 use super::luminance;
 use super::rounding::Rounding;
 use super::surface::Surface;
 use glam::DVec3;
-use raystone_scene::SceneData;
 use std::f64::consts::{PI, TAU};
 
 /// A direction in which a path goes on.
-pub(super) struct Bounce {
+pub struct Bounce {
+    /// Of length 1.
     pub direction: DVec3,
     /// f · cos / density.
     pub weight: DVec3,
@@ -27,7 +20,7 @@ pub(super) struct Bounce {
 
 /// What a material does with light from one direction, delta lobes aside.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reflected {
+pub struct Reflected {
     /// f · cos.
     pub value: DVec3,
     /// Density with which the material samples the direction.
@@ -35,7 +28,7 @@ pub(super) struct Reflected {
 }
 
 /// A material at a point.
-pub(super) trait Bsdf {
+pub trait Bsdf {
     /// Where the path goes on; `None` ends it.
     fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce>;
     /// Value and density of a direction by the shading normal.
@@ -66,42 +59,8 @@ pub(super) trait Bsdf {
     }
 }
 
-type Make = for<'a> fn(&'a Surface<'a>) -> Box<dyn Bsdf + 'a>;
-
-/// Kinds of materials by name.
-const KINDS: [(&str, Make); 6] = [
-    ("diffuse", |s| Box::new(diffuse::Diffuse(s))),
-    ("phong", |s| Box::new(phong::Phong::new(s))),
-    ("cook-torrance", |s| {
-        Box::new(cook_torrance::CookTorrance::new(s))
-    }),
-    ("principled", |s| Box::new(principled::Principled::new(s))),
-    ("mirror", |s| Box::new(mirror::Mirror(s))),
-    ("dielectric", |s| Box::new(dielectric::Dielectric(s))),
-];
-
-fn make(kind: &str) -> Option<Make> {
-    let found = KINDS.iter().find(|(name, _)| *name == kind);
-    found.map(|(_, make)| *make)
-}
-
-/// The material at a point, whose kind is known.
-pub(super) fn of<'a>(surface: &'a Surface<'a>) -> Box<dyn Bsdf + 'a> {
-    let diffuse: Make = KINDS[0].1;
-    make(surface.material.kind.name).unwrap_or(diffuse)(surface)
-}
-
-/// Whether there is a formula for every material.
-pub(super) fn all_known(scene: &SceneData) -> Result<(), String> {
-    let mut kinds = scene.materials.iter().map(|m| m.kind.name);
-    match kinds.find(|kind| make(kind).is_none()) {
-        Some(kind) => Err(format!("material `{kind}`")),
-        None => Ok(()),
-    }
-}
-
 /// Unit vectors across `n`: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
-pub(super) fn basis(n: DVec3) -> [DVec3; 2] {
+pub(crate) fn basis(n: DVec3) -> [DVec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
@@ -111,14 +70,14 @@ pub(super) fn basis(n: DVec3) -> [DVec3; 2] {
     ]
 }
 
-/// The direction of local coordinates around `n`.
-pub(super) fn around(n: DVec3, local: DVec3) -> DVec3 {
+/// The direction of local coordinates around a unit vector `n`.
+pub fn around(n: DVec3, local: DVec3) -> DVec3 {
     let [x, y] = basis(n);
     (x * local.x + y * local.y + n * local.z).normalize()
 }
 
 /// A direction whose density is cos / π.
-pub(super) fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
+pub fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     let (sin, cos) = (TAU * v).sin_cos();
     around(
         n,
@@ -127,28 +86,28 @@ pub(super) fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
 }
 
 /// Density of [`cosine_direction`].
-pub(super) fn cosine_density(n: DVec3, direction: DVec3) -> f64 {
+pub fn cosine_density(n: DVec3, direction: DVec3) -> f64 {
     n.dot(direction).max(0.0) / PI
 }
 
 /// The mirror direction of `o` about `n`.
-pub(super) fn mirrored(o: DVec3, n: DVec3) -> DVec3 {
+pub fn mirrored(o: DVec3, n: DVec3) -> DVec3 {
     (2.0 * n.dot(o) * n - o).normalize()
 }
 
 /// Parameter number `place` of the material.
-pub(super) fn parameter(surface: &Surface, place: usize) -> f64 {
+pub fn parameter(surface: &Surface, place: usize) -> f64 {
     let parameters = &surface.material.parameters;
     parameters.get(place).copied().unwrap_or_default().into()
 }
 
 /// The colour whose components are the first three parameters.
-pub(super) fn colour(surface: &Surface) -> DVec3 {
+pub fn colour(surface: &Surface) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|place| parameter(surface, place)))
 }
 
 /// Whether the first of two lobes is chosen, of probability `p`, and the number that is left of `u`.
-pub(super) fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
+pub fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
     let u = rounding.share(u).clamp(0.0, 1.0);
     match u < p {
         true => (true, u / p),
@@ -157,7 +116,7 @@ pub(super) fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
 }
 
 /// Probability of the diffuse lobe beside a specular one of this colour.
-pub(super) fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
+pub fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
     let (base, specular) = (luminance(base), luminance(specular));
     match base + specular > 0.0 {
         true => base / (base + specular),
@@ -166,10 +125,10 @@ pub(super) fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
 }
 
 /// The least n·o that is told apart from 0.
-pub(super) const LEAST_COSINE: f64 = 1e-7;
+pub(crate) const LEAST_COSINE: f64 = 1e-7;
 
 /// Whether light that arrives from there is reflected at all by a surface that is not [`Bsdf::folded`].
-pub(super) fn is_above(surface: &Surface, direction: DVec3) -> bool {
+pub fn is_above(surface: &Surface, direction: DVec3) -> bool {
     direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
 }
 
@@ -179,7 +138,7 @@ fn across(surface: &Surface, direction: DVec3) -> DVec3 {
 }
 
 /// A direction of a delta lobe, mirrored at the surface where that and the shading normal have it on different sides.
-pub(super) fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
+pub fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
     let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
     match meant == found {
         true => direction,
@@ -188,7 +147,7 @@ pub(super) fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
 }
 
 /// The direction of a lobe with the weight of the whole material.
-pub(super) fn bounce(
+pub fn bounce(
     bsdf: &(impl Bsdf + ?Sized),
     direction: DVec3,
     rounding: &mut Rounding,

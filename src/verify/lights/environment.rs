@@ -4,16 +4,62 @@
 //! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
 //! kernels divide by shows, as does a density that is none of the table.
 
-use super::{LightSample, UNITS};
-use crate::path_oracle::rounding::Rounding;
-use glam::DVec3;
+use super::delta::FAR;
+use super::{LightChecks, LightTwin};
+use crate::known_images::closed::{map_irradiance, map_radiance};
+use crate::known_images::lamps::{NEAR, path, reflected};
+use crate::known_images::lights::image;
+use crate::known_images::{KnownImage, View};
+use crate::mitsuba::{Export, ExportError};
+use crate::path_oracle::light::UNITS;
+use crate::path_oracle::{LightSample, Rounding};
+use crate::trial_lights;
+use crate::trial_scenes::Trial;
+use glam::{DVec3, Vec3, vec3};
+use raystone_image::Image;
 use raystone_render::environment_aliases;
-use raystone_scene::EnvironmentMap;
+use raystone_scene::{EnvironmentMap, LIGHT_KINDS, Light, SceneError};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Distance of what has none.
-const FAR: f64 = 1e30;
+/// The row.
+pub(super) static CHECKS: LightChecks = LightChecks {
+    trials: trial_lights::skies,
+    images,
+    ..LightChecks::new(LIGHT_KINDS[7], LightTwin::Map, mitsuba)
+};
+
+/// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other
+/// row of twice as many and one is one of ours. Columns run the same way.
+fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
+    let Light::Environment { map, scale, turn } = light else {
+        return Ok(());
+    };
+    let (width, height) = (map.width, 2 * map.height + 1);
+    let texel = |x: u32, y: u32| map.texels[(y * width + x) as usize];
+    let between = |at: u32| {
+        let (x, y) = (at % width, at / width);
+        let [above, below] = [y.saturating_sub(1) / 2, (y / 2).min(map.height - 1)];
+        (0.5 * (texel(x, above) + texel(x, below))).to_array()
+    };
+    let texels = (0..width * height).map(between).collect();
+    let name = "textures/environment.exr";
+    export.write_radiance(name, &Image::new(width, height, texels)?)?;
+    let _ = write!(
+        export.xml,
+        r#"    <emitter type="envmap">
+        <string name="filename" value="{name}"/>
+        <float name="scale" value="{scale}"/>
+        <transform name="to_world">
+            <rotate y="1" angle="{}"/>
+        </transform>
+    </emitter>
+"#,
+        turn.to_degrees()
+    );
+    Ok(())
+}
 
 /// A choice by one number: threshold and alias of each part, and with what probability each entry is chosen.
 struct Aliases {
@@ -53,7 +99,7 @@ impl Aliases {
 }
 
 /// A map with the tables that choose its texels.
-pub(super) struct Map {
+pub(crate) struct Map {
     map: Arc<EnvironmentMap>,
     scale: f64,
     turn: f64,
@@ -63,7 +109,15 @@ pub(super) struct Map {
 }
 
 impl Map {
-    pub(super) fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
+    /// The map that a light is, if it is one.
+    pub(crate) fn of(light: &Light) -> Option<Self> {
+        let Light::Environment { map, scale, turn } = light else {
+            return None;
+        };
+        Some(Self::new(map, *scale, *turn))
+    }
+
+    fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
         let parts: Vec<(u32, usize)> = (environment_aliases(map).into_iter())
             .map(|(threshold, alias)| (threshold, alias as usize))
             .collect();
@@ -103,7 +157,7 @@ impl Map {
     }
 
     /// Bilinear between the centres of texels.
-    pub(super) fn radiance(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn radiance(&self, direction: DVec3) -> DVec3 {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
         let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, height as f64 - 1.0));
@@ -119,7 +173,7 @@ impl Map {
     }
 
     /// The texel of a direction, and the density with which light samples find it.
-    pub(super) fn density(&self, direction: DVec3) -> (usize, f64) {
+    pub(crate) fn density(&self, direction: DVec3) -> (usize, f64) {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
         let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
@@ -131,7 +185,7 @@ impl Map {
     }
 
     /// A direction: the second number chooses the row and the place along it, the first one the column.
-    pub(super) fn sample(
+    pub(crate) fn sample(
         &self,
         [u, v]: [f64; 2],
         rounding: &mut Rounding,
@@ -156,4 +210,40 @@ impl Map {
         let texel = row * self.map.width as usize + column;
         (texel, (density > 0.0).then_some(sample))
     }
+}
+
+fn images() -> Result<Vec<KnownImage>, SceneError> {
+    [("map", "mis-balance"), ("map, by the light", "light")]
+        .map(|(name, strategy)| shown(name, path(1, &[("strategy", strategy)])))
+        .into_iter()
+        .collect()
+}
+
+/// A map that is brighter towards one side and the horizon, turned.
+fn shown(name: &'static str, trial: Trial) -> Result<KnownImage, SceneError> {
+    const TURN: f32 = 0.4;
+    let texel = |k: u32| {
+        let (x, y) = ((k % 12) as f32, (k / 12) as f32);
+        let sun = if (x, y) == (3.0, 1.0) { 4.0 } else { 0.0 };
+        vec3(0.2 + 0.1 * x, 0.3 + 0.3 * y + sun, 1.5 - 0.1 * x)
+    };
+    let texels = (0..72).map(texel).collect();
+    let map = EnvironmentMap::new("map", [12, 6], texels, &mut Vec::new());
+    let map = map.map_err(|e| SceneError::malformed(std::path::Path::new("map"), "", e))?;
+    let turn = f64::from(TURN);
+    let floor = reflected(map_irradiance(&map, turn));
+    let mut views = vec![View::new("floor", Vec3::ZERO, NEAR, floor)];
+    for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4)] {
+        let (sin, cos) = polar.sin_cos();
+        let direction = DVec3::new(azimuth.sin() * sin, cos, -azimuth.cos() * sin).as_vec3();
+        let seen = map_radiance(&map, turn, polar, azimuth);
+        let eye = Vec3::Y;
+        views.push(View::new("sky", eye + direction, -direction, seen));
+    }
+    let lights = vec![Light::Environment {
+        map: Arc::new(map),
+        scale: 1.0,
+        turn: TURN,
+    }];
+    image(name, lights, trial, views)
 }

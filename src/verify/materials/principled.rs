@@ -2,11 +2,24 @@
 
 use super::dielectric::schlick;
 use super::*;
+use raystone_scene::{PRINCIPLED, reflectance_of_ior};
+
+/// The row.
+pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
+    python: include_str!("principled.py"),
+    balls,
+    planes,
+    ..MaterialChecks::new(
+        &PRINCIPLED,
+        |surface| Box::new(Principled::new(surface)),
+        by_formula,
+    )
+};
 
 /// The least width of the facets' distribution.
 const LEAST_ALPHA: f64 = 0.001;
 
-pub(super) struct Principled<'a> {
+struct Principled<'a> {
     surface: &'a Surface<'a>,
     metallic: f64,
     roughness: f64,
@@ -20,7 +33,7 @@ pub(super) struct Principled<'a> {
 }
 
 impl<'a> Principled<'a> {
-    pub(super) fn new(surface: &'a Surface<'a>) -> Self {
+    fn new(surface: &'a Surface<'a>) -> Self {
         let [metallic, roughness, f0] = [0, 1, 2].map(|place| parameter(surface, place));
         let [metallic, roughness] = [metallic * surface.varied[0], roughness * surface.varied[1]];
         let n_o = surface.normal.dot(surface.out).max(LEAST_COSINE);
@@ -117,4 +130,34 @@ impl Bsdf for Principled<'_> {
             density: self.diffuse * cosine_density(n, direction) + (1.0 - self.diffuse) * density,
         })
     }
+}
+
+fn balls() -> Vec<(Option<usize>, Material)> {
+    let color = vec3(0.9, 0.6, 0.4);
+    [
+        (4, 0.0, 0.3, 0.04),
+        (5, 1.0, 0.5, 0.04),
+        (6, 0.5, 0.9, 0.08),
+    ]
+    .map(|(place, metallic, roughness, f0)| {
+        let ball = Material::principled("principled", color, metallic, roughness, f0);
+        (Some(place), ball)
+    })
+    .into()
+}
+
+fn planes() -> Vec<(&'static str, Material)> {
+    [
+        ("plastic", 0.0, 0.5, reflectance_of_ior(1.5)),
+        ("metal", 1.0, 0.6, 0.04),
+        ("between", 0.4, 0.7, 0.08),
+    ]
+    .map(|(name, metallic, roughness, f0)| {
+        let base = vec3(0.5, 0.3, 0.2);
+        (
+            name,
+            Material::principled(name, base, metallic, roughness, f0),
+        )
+    })
+    .into()
 }

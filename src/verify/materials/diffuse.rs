@@ -1,8 +1,13 @@
 //! f = base/π.
 
 use super::*;
+use raystone_scene::DIFFUSE;
 
-pub(super) struct Diffuse<'a>(pub &'a Surface<'a>);
+/// The row.
+pub(crate) static CHECKS: MaterialChecks =
+    MaterialChecks::new(&DIFFUSE, |surface| Box::new(Diffuse(surface)), mitsuba);
+
+struct Diffuse<'a>(&'a Surface<'a>);
 
 impl Bsdf for Diffuse<'_> {
     fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
@@ -16,4 +21,16 @@ impl Bsdf for Diffuse<'_> {
             density,
         })
     }
+}
+
+fn mitsuba(_: &Material, color: &Color, id: &str, _: &mut Vec<String>) -> String {
+    format!(
+        r#"    <bsdf type="twosided" {id}>
+        <bsdf type="diffuse">
+            {}
+        </bsdf>
+    </bsdf>
+"#,
+        color.named("reflectance")
+    )
 }

@@ -1,8 +1,17 @@
 //! Lambert and a normalised power of the cosine to the mirror direction.
 
 use super::*;
+use raystone_scene::PHONG;
 
-pub(super) struct Phong<'a> {
+/// The row.
+pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
+    python: include_str!("phong.py"),
+    balls,
+    planes,
+    ..MaterialChecks::new(&PHONG, |surface| Box::new(Phong::new(surface)), by_formula)
+};
+
+struct Phong<'a> {
     surface: &'a Surface<'a>,
     specular: DVec3,
     exponent: f64,
@@ -11,7 +20,7 @@ pub(super) struct Phong<'a> {
 }
 
 impl<'a> Phong<'a> {
-    pub(super) fn new(surface: &'a Surface<'a>) -> Self {
+    fn new(surface: &'a Surface<'a>) -> Self {
         let specular = colour(surface);
         Self {
             surface,
@@ -59,4 +68,18 @@ impl Bsdf for Phong<'_> {
             density: self.diffuse * cosine + (1.0 - self.diffuse) * lobe,
         })
     }
+}
+
+fn balls() -> Vec<(Option<usize>, Material)> {
+    let phong =
+        |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
+    // The last is a hemisphere about the mirror direction, which ends at a step.
+    [(0, 3.0), (1, 150.0), (10, 0.0)]
+        .map(|(place, exponent)| (Some(place), phong(exponent)))
+        .into()
+}
+
+fn planes() -> Vec<(&'static str, Material)> {
+    let phong = Material::phong("phong", vec3(0.5, 0.3, 0.2), Vec3::splat(0.4), 12.0);
+    vec![("phong", phong)]
 }

@@ -2,8 +2,22 @@
 
 use super::dielectric::{fresnel, normal_reflectance, schlick};
 use super::*;
+use raystone_scene as scene;
+use raystone_scene::{COOK_TORRANCE, Fresnel, Masking};
 
-pub(super) struct CookTorrance<'a> {
+/// The row.
+pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
+    python: include_str!("cook_torrance.py"),
+    balls,
+    planes,
+    ..MaterialChecks::new(
+        &COOK_TORRANCE,
+        |surface| Box::new(CookTorrance::new(surface)),
+        by_formula,
+    )
+};
+
+struct CookTorrance<'a> {
     surface: &'a Surface<'a>,
     specular: DVec3,
     roughness: f64,
@@ -15,7 +29,7 @@ pub(super) struct CookTorrance<'a> {
 }
 
 impl<'a> CookTorrance<'a> {
-    pub(super) fn new(surface: &'a Surface<'a>) -> Self {
+    fn new(surface: &'a Surface<'a>) -> Self {
         let specular = colour(surface);
         Self {
             surface,
@@ -99,4 +113,43 @@ impl Bsdf for CookTorrance<'_> {
             density: self.diffuse * cosine + (1.0 - self.diffuse) * facets * n_h / (4.0 * o_h),
         })
     }
+}
+
+fn of(
+    [diffuse, specular]: [Vec3; 2],
+    ior: f32,
+    (masking, fresnel, roughness): (Masking, Fresnel, f32),
+) -> Material {
+    let of = scene::CookTorrance {
+        diffuse,
+        specular,
+        roughness,
+        ior,
+        masking,
+        fresnel,
+    };
+    Material::cook_torrance("cook-torrance", &of)
+}
+
+fn balls() -> Vec<(Option<usize>, Material)> {
+    let colours = [vec3(0.3, 0.2, 0.1), vec3(0.5, 0.6, 0.4)];
+    [
+        (2, (Masking::VCavities, Fresnel::Schlick, 0.4)),
+        (3, (Masking::Smith, Fresnel::Exact, 0.15)),
+        // Rough enough for half of the angles to be masked.
+        (8, (Masking::Smith, Fresnel::Schlick, 0.6)),
+        (9, (Masking::VCavities, Fresnel::Exact, 0.7)),
+    ]
+    .map(|(place, facets)| (Some(place), of(colours, 1.7, facets)))
+    .into()
+}
+
+fn planes() -> Vec<(&'static str, Material)> {
+    let colours = [vec3(0.5, 0.3, 0.2), vec3(0.3, 0.5, 0.6)];
+    [
+        ("V-cavities", (Masking::VCavities, Fresnel::Schlick, 0.4)),
+        ("Smith", (Masking::Smith, Fresnel::Exact, 0.5)),
+    ]
+    .map(|(name, facets)| (name, of(colours, 1.6, facets)))
+    .into()
 }
