@@ -442,7 +442,9 @@ pub(super) fn check_finite(
         errors: Vec::new(),
         ..record.clone()
     }));
-    session.recorder.write(&found.hashed(failure_hash(&cell.to_string(), &reason)))?;
+    session
+        .recorder
+        .write(&found.hashed(failure_hash(&cell.to_string(), &reason)))?;
     Err(reason.into())
 }
 

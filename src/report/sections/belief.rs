@@ -1,6 +1,6 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
-use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
+use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, without_repeats};
 use crate::document::*;
 use crate::format::{self, count, plural};
 use crate::samplers::REFERENCE_SHARE;
@@ -29,6 +29,8 @@ pub fn section(data: &RunData) -> Section {
 
 /// Detail of a check that had nothing to look at.
 const NOTHING: &str = "nothing to test.";
+/// Reasons why cells were left out that a check names.
+const MOST_REASONS: usize = 3;
 
 /// Every check.
 pub fn checks(data: &RunData) -> Vec<Check> {
@@ -302,12 +304,27 @@ fn complete(data: &RunData) -> Check {
         let detail = format!("The run did not finish{}.", why.unwrap_or_default());
         return check(title, true, true, detail);
     };
-    let skipped = plural(finished.skipped, "cell");
-    let detail = format!(
-        "{} failed, {skipped} skipped.",
-        plural(finished.failed, "cell")
-    );
+    let failed = plural(finished.failed, "cell");
+    let left_out = plural(finished.skipped, "cell");
+    let why = reasons(data);
+    let detail = format!("{failed} failed, {left_out} left out{why}.");
     check(title, true, finished.failed > 0, detail)
+}
+
+/// Why cells were left out, each reason once; the first few.
+fn reasons(data: &RunData) -> String {
+    let all = data.skipped.iter().map(|skipped| skipped.reason.clone());
+    let all = without_repeats(all.collect());
+    if all.is_empty() {
+        return String::new();
+    }
+    let shown = all.len().min(MOST_REASONS);
+    let more = match all.len() - shown {
+        0 => String::new(),
+        1 => "; and one more reason, listed below".to_owned(),
+        n => format!("; and {n} more reasons, listed below"),
+    };
+    format!(": {}{more}", all[..shown].join("; "))
 }
 
 fn join(details: Vec<String>) -> String {
