@@ -22,6 +22,16 @@ pub enum Place {
     Default,
 }
 
+impl Place {
+    /// The first line of a file, for what is missing from it.
+    pub(super) fn start_of(file: &str) -> Self {
+        Self::File {
+            file: file.into(),
+            line: 1,
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

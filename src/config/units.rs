@@ -1,8 +1,8 @@
 //! The units of a plan: what is measured as one, kept as one when a run is resumed, and given to one shard.
 
+use super::axis::Axis;
 use super::cells::Cell;
 use super::experiment::Experiment;
-use super::keys::Axis;
 use super::plan::Plan;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -56,7 +56,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
     }
     let timing = session.experiment.timing;
-    let seed = u64::from(session.experiment.seed);
+    let seed = u64::from(session.experiment.run.seed);
     let (progress, weight) = (session.progress.clone(), session.weights.compaction);
     session.say("timing compactions");
     let measured = (session.clock).time("gpu", || {
@@ -119,7 +119,7 @@ fn prepare(
     let inputs = match uploaded.iter().find(|(known, _)| *known == kind) {
         Some((_, inputs)) => Arc::clone(inputs),
         None => {
-            let seed = u64::from(session.experiment.seed);
+            let seed = u64::from(session.experiment.run.seed);
             let flags = stream::flags(longest, load.valid, method.buckets(), seed);
             let inputs = Arc::new(Inputs::upload(gpu, flags, load.bytes)?);
             uploaded.push((kind, Arc::clone(&inputs)));

@@ -133,8 +133,8 @@ fn passes<'a>(
     fastest: &Gated,
     cell: &Cell,
 ) -> Result<Vec<Pass<'a>>, String> {
-    let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let most = session.experiment.spp.max();
+    let spps: Vec<u32> = session.experiment.run.spp.counts().collect();
+    let most = session.experiment.run.spp.max();
     let whole = Estimator::new(session, cell, most)?;
     let estimators = if whole.sampler.by_count() {
         let single = |spp| {
@@ -189,11 +189,11 @@ fn sampler_error(
         format!(
             "{:?}",
             (
-                &session.experiment.spp,
+                &session.experiment.run.spp,
                 session.experiment.seeds().replicates
             )
         ),
-        format!("{:?}", (world.camera, session.experiment.resolution)),
+        format!("{:?}", (world.camera, session.experiment.run.resolution)),
     ];
     let rule = session.experiment.stop;
     let stop = rule.map(|rule| format!("{rule:?}")).unwrap_or_default();
@@ -291,7 +291,7 @@ fn all_samples(
         session.progress.add(session.weights.replicate);
     }
     Ok(Replicates {
-        spp: session.experiment.spp.max(),
+        spp: session.experiment.run.spp.max(),
         images,
     })
 }
@@ -393,7 +393,7 @@ fn spectrum_record(
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<SpectrumRecord, String> {
-    let size = session.experiment.resolution.map(|edge| edge as usize);
+    let size = session.experiment.run.resolution.map(|edge| edge as usize);
     let spectrum = |image: &Image| {
         let error = luminance_error(image, yardstick.reference.image());
         error.map(|error| error_spectrum(&error, size))
@@ -425,7 +425,7 @@ pub(super) fn blank_record(
         randomised: cell.randomised,
         replicate,
         seed,
-        resolution: session.experiment.resolution,
+        resolution: session.experiment.run.resolution,
         errors: Vec::new(),
         stop: None,
         non_finite_pixels: 0,
@@ -509,7 +509,7 @@ fn bias_record(
     let defaults = BiasOptions::default();
     let options = BiasOptions {
         alpha: defaults.alpha / tested.max(1) as f64,
-        rounding: rounding_bound(session.experiment.spp.max()) + yardstick.rounding,
+        rounding: rounding_bound(session.experiment.run.spp.max()) + yardstick.rounding,
         ..defaults
     };
     let check = check_bias(images, yardstick.reference.parts(), options);

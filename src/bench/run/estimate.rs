@@ -101,7 +101,7 @@ impl<'a> Estimate<'a> {
 
     /// Rays of an image.
     fn image(&self, integrator: &Variant, spp: u32) -> u64 {
-        let [width, height] = self.experiment.resolution.map(u64::from);
+        let [width, height] = self.experiment.run.resolution.map(u64::from);
         let rays = self.rays_per_sample.get(integrator.label.as_str());
         width * height * u64::from(spp) * rays.copied().unwrap_or(1)
     }
@@ -128,7 +128,7 @@ impl<'a> Estimate<'a> {
             },
             UnitKind::Sampler => Work {
                 rays: u64::from(self.plan.renders(cell))
-                    * self.image(integrator, experiment.spp.max()),
+                    * self.image(integrator, experiment.run.spp.max()),
                 ..Work::default()
             },
             UnitKind::Time => Work {

@@ -1,7 +1,7 @@
 //! What the figures of a cell depend on, and whether those of an earlier run still hold.
 
 use super::kernels::Kernels;
-use raystone_config::{Axis, Experiment, Unit, UnitKind, is_compaction};
+use raystone_config::{Axis, Experiment, Run, Unit, UnitKind, is_compaction};
 use raystone_core::text::cell_hash;
 use raystone_record::Environment;
 use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
@@ -51,12 +51,16 @@ fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> St
         excludes: _,
         includes: _,
         conditions: _,
-        replicates,
-        seed,
-        resolution,
-        spp,
+        run:
+            Run {
+                name: _,
+                replicates,
+                seed,
+                resolution,
+                spp,
+                runtime_checks,
+            },
         stop,
-        runtime_checks,
         camera,
         axes,
         reference,
@@ -65,9 +69,10 @@ fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> St
         discrepancy,
         coherence,
         animation,
+        further,
     } = experiment;
     let image = (seed, camera, resolution, runtime_checks);
-    match kind {
+    let known = match kind {
         UnitKind::Structure | UnitKind::Peer => format!("{:?}", (image, gate, timing, coherence)),
         UnitKind::Animation => format!("{:?}", (image, gate, timing, animation)),
         UnitKind::Sampler => {
@@ -85,6 +90,11 @@ fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> St
             let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
             format!("{:?}", (seed, resolution, discrepancy, drawn))
         }
+    };
+    // Sections that others add may matter to any kind.
+    match further.is_empty() {
+        true => known,
+        false => format!("{known}{further:?}"),
     }
 }
 

@@ -81,7 +81,7 @@ impl Weights {
             rays: rays(timing.rays) + warmup,
             compile: 0.3,
             image: image(timing.spp) + warmup,
-            replicate: image(experiment.spp.max()),
+            replicate: image(experiment.run.spp.max()),
             reference_part: image(experiment.reference.spp / REFERENCE_PARTS),
             stream: 0.6,
             compaction: of_compactions / compactions / (rounds + 1.0),

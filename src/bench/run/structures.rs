@@ -62,7 +62,7 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
         cell: cell.clone(),
         traced: None,
         structural: None,
-        record: empty_record(cell, session.experiment.runtime_checks),
+        record: empty_record(cell, session.experiment.run.runtime_checks),
     };
     let kind = match session.registries.accel.named("structure", &accel.name) {
         Ok(kind) => kind,
@@ -118,7 +118,7 @@ fn gate_with(
         Err(reason) => return Ok(candidate.failed(reason)),
     };
     candidate.traced = Some(traced.clone());
-    let checks = session.experiment.runtime_checks;
+    let checks = session.experiment.run.runtime_checks;
     let gated = session.clock.time("gate", || {
         let verdict = gate_twice(checks, world, gpu, &traced)?;
         let hash = kernel_hash(gpu, &world.buffers.triangles, &traced)?;

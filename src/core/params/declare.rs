@@ -1,7 +1,10 @@
 //! The macro that declares parameters, and the traits that it implements.
 
-use super::{ParamError, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use super::{
+    Length, ParamError, ParamRange, ParamValue, Parameter, ParameterSchema, Params, Variant,
+};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// A struct of parameters, declared by [`parameters!`](crate::parameters). Its default has every parameter
 /// at its own.
@@ -43,15 +46,18 @@ pub trait ParameterType: Sized {
 }
 
 /// A type whose parameters need a range: `in low..=high`.
-pub trait Bounded: ParameterType + Clone {
+pub trait Bounded: ParameterType {
+    /// What is bounded: the value itself, or each one in a list.
+    type Bound;
+
     /// The range as parser and help read it.
-    fn range(range: RangeInclusive<Self>) -> ParamRange;
+    fn range(range: RangeInclusive<Self::Bound>) -> ParamRange;
 }
 
 /// A type whose parameters take any of its values.
 pub trait Unbounded: ParameterType {
     /// All of its values.
-    const RANGE: ParamRange;
+    fn range() -> ParamRange;
 }
 
 /// An enum of names, declared by [`parameters!`](crate::parameters).
@@ -86,6 +92,8 @@ impl ParameterType for f64 {
 }
 
 impl Bounded for f64 {
+    type Bound = Self;
+
     fn range(range: RangeInclusive<Self>) -> ParamRange {
         let (min, max) = range.into_inner();
         ParamRange::Number { min, max }
@@ -108,6 +116,8 @@ impl ParameterType for f32 {
 }
 
 impl Bounded for f32 {
+    type Bound = Self;
+
     fn range(range: RangeInclusive<Self>) -> ParamRange {
         f64::range(widen(*range.start())..=widen(*range.end()))
     }
@@ -129,6 +139,8 @@ macro_rules! integers {
         }
 
         impl Bounded for $type {
+            type Bound = Self;
+
             fn range(range: RangeInclusive<Self>) -> ParamRange {
                 let bound = |x: &Self| i64::try_from(*x).unwrap_or(i64::MAX);
                 ParamRange::Integer {
@@ -156,7 +168,9 @@ impl ParameterType for bool {
 }
 
 impl Unbounded for bool {
-    const RANGE: ParamRange = ParamRange::Flag;
+    fn range() -> ParamRange {
+        ParamRange::Flag
+    }
 }
 
 impl ParameterType for String {
@@ -173,7 +187,120 @@ impl ParameterType for String {
 }
 
 impl Unbounded for String {
-    const RANGE: ParamRange = ParamRange::Text;
+    fn range() -> ParamRange {
+        ParamRange::Text
+    }
+}
+
+/// A path, as it is written.
+impl ParameterType for PathBuf {
+    fn value(&self) -> ParamValue {
+        ParamValue::Name(self.display().to_string())
+    }
+
+    fn parse(value: &ParamValue) -> Option<Self> {
+        String::parse(value).map(Self::from)
+    }
+}
+
+impl Unbounded for PathBuf {
+    fn range() -> ParamRange {
+        ParamRange::Text
+    }
+}
+
+/// A registry entry by its name; whoever reads it looks up its parameters.
+impl ParameterType for Variant {
+    fn value(&self) -> ParamValue {
+        ParamValue::Name(self.name.clone())
+    }
+
+    fn parse(value: &ParamValue) -> Option<Self> {
+        String::parse(value).map(|name| Self::plain(&name))
+    }
+}
+
+impl Unbounded for Variant {
+    fn range() -> ParamRange {
+        ParamRange::Filled
+    }
+}
+
+/// What may be left out. The empty text stands for nothing, as in [`ParamRange::Text`], and cannot be written.
+impl<T: ParameterType> ParameterType for Option<T> {
+    fn value(&self) -> ParamValue {
+        let nothing = ParamValue::Name(String::new());
+        self.as_ref().map_or(nothing, ParameterType::value)
+    }
+
+    fn parse(value: &ParamValue) -> Option<Self> {
+        match value {
+            ParamValue::Name(x) if x.is_empty() => Some(None),
+            value => T::parse(value).map(Some),
+        }
+    }
+}
+
+impl<T: Bounded> Bounded for Option<T> {
+    type Bound = T::Bound;
+
+    fn range(range: RangeInclusive<T::Bound>) -> ParamRange {
+        T::range(range)
+    }
+}
+
+impl<T: Unbounded> Unbounded for Option<T> {
+    fn range() -> ParamRange {
+        match T::range() {
+            ParamRange::Text => ParamRange::Filled,
+            range => range,
+        }
+    }
+}
+
+impl<T: ParameterType> ParameterType for Vec<T> {
+    fn value(&self) -> ParamValue {
+        ParamValue::List(self.iter().map(ParameterType::value).collect())
+    }
+
+    fn parse(value: &ParamValue) -> Option<Self> {
+        match value {
+            ParamValue::List(items) => items.iter().map(T::parse).collect(),
+            _ => None,
+        }
+    }
+}
+
+impl<T: Bounded> Bounded for Vec<T> {
+    type Bound = T::Bound;
+
+    fn range(range: RangeInclusive<T::Bound>) -> ParamRange {
+        ParamRange::List {
+            of: Box::new(T::range(range)),
+            length: Length::Any,
+        }
+    }
+}
+
+impl<T: ParameterType, const N: usize> ParameterType for [T; N] {
+    fn value(&self) -> ParamValue {
+        ParamValue::List(self.iter().map(ParameterType::value).collect())
+    }
+
+    fn parse(value: &ParamValue) -> Option<Self> {
+        Vec::parse(value)?.try_into().ok()
+    }
+}
+
+impl<T: Bounded, const N: usize> Bounded for [T; N] {
+    type Bound = T::Bound;
+
+    fn range(range: RangeInclusive<T::Bound>) -> ParamRange {
+        ParamRange::List {
+            of: Box::new(T::range(range)),
+            length: Length::Exactly(N),
+        }
+    }
 }
 
 impl<C: Choice> ParameterType for C {
@@ -190,7 +317,9 @@ impl<C: Choice> ParameterType for C {
 }
 
 impl<C: Choice> Unbounded for C {
-    const RANGE: ParamRange = ParamRange::Choice(C::NAMES);
+    fn range() -> ParamRange {
+        ParamRange::Choice(C::NAMES)
+    }
 }
 
 /// The name of a field as a user types it: `loop` where Rust has to write `r#loop`.
@@ -219,21 +348,25 @@ pub fn redeclare<S, T: Bounded>(
     field: &'static str,
     _: fn(&S) -> &T,
     default: T,
-    range: RangeInclusive<T>,
+    range: RangeInclusive<T::Bound>,
 ) {
+    let range = T::range(range);
     for parameter in schema.iter_mut().filter(|p| p.name == named(field)) {
         parameter.default = default.value();
-        parameter.range = T::range(range.clone());
+        parameter.range = range.clone();
     }
 }
 
 /// Declares structs of parameters and enums of choices; see [the module](crate::params).
 ///
 /// A field is `name: type = default;` with its meaning as doc comment; numbers have a range,
-/// `name: type = default, in low..=high;`. Types are those of [`ParameterType`]. A field without a default,
+/// `name: type = default, in low..=high;`, which one of [`ParamRange`]'s methods can narrow behind it:
+/// `in 2..=64, where power_of_two();`. Types are those of [`ParameterType`]: numbers, switches, texts, choices, lists and arrays of
+/// them, and `Option`, whose default may be `None`. A default need not be in the range: it then stands for nothing
+/// that could be written, and the meaning says what it does. A field without a default,
 /// `name: Struct;`, holds another declared struct, whose parameters join these under their own names;
 /// `name: Struct { field = default, in low..=high; };` gives one of them another default and range.
-/// Choices are `Variant = "name"`.
+/// Choices are `Variant = "name"`. Structs and enums may derive more, and their fields have an attribute of serde, for records.
 #[macro_export]
 macro_rules! parameters {
     () => {};
@@ -265,12 +398,14 @@ macro_rules! parameters {
     };
     (
         $(#[doc = $about:literal])*
+        $(#[derive $derive:tt])?
         $vis:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
+                $(#[serde $serde:tt])?
                 $field:ident : $type:ty
                     $({ $($inner:ident = $inner_default:expr, in $inner_range:expr;)+ })?
-                    $(= $default:expr $(, in $range:expr)?)?
+                    $(= $default:expr $(, in $range:expr)? $(, where $rule:ident $arguments:tt)?)?
                 ;
             )*
         }
@@ -278,8 +413,9 @@ macro_rules! parameters {
     ) => {
         $(#[doc = $about])*
         #[derive(Debug, Clone, PartialEq)]
+        $(#[derive $derive])?
         $vis struct $name {
-            $($(#[doc = $doc])* pub $field: $type,)*
+            $($(#[doc = $doc])* $(#[serde $serde])? pub $field: $type,)*
         }
 
         impl Default for $name {
@@ -300,7 +436,7 @@ macro_rules! parameters {
                 let mut schema = Vec::new();
                 $($crate::__parameter!(
                     schema schema, $field, $type, [$($doc),*]
-                    $(= $default $(, in $range)?)?
+                    $(= $default, [$(, $range)?] [$(. $rule $arguments)?])?
                     $({ $($inner = $inner_default, in $inner_range;)+ })?
                 );)*
                 schema
@@ -339,13 +475,14 @@ macro_rules! __parameter {
     (read $params:ident, $field:ident, $type:ty,) => {
         <$type as $crate::params::Parameters>::read($params)?
     };
-    (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*] = $default:expr $(, in $range:expr)?) => {{
+    (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*]
+        = $default:expr, [$(, $range:expr)?] [$($rule:tt)*]) => {{
         let default: $type = $default;
         $schema.push($crate::params::Parameter {
             name: $crate::params::named(stringify!($field)),
             description: concat!($($doc),*).trim(),
             default: $crate::params::ParameterType::value(&default),
-            range: $crate::__parameter!(range $type $(, $range)?),
+            range: $crate::__parameter!(range $type $(, $range)?) $($rule)*,
         });
     }};
     (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*]
@@ -360,7 +497,7 @@ macro_rules! __parameter {
         );)+)?
     };
     (range $type:ty) => {
-        <$type as $crate::params::Unbounded>::RANGE
+        <$type as $crate::params::Unbounded>::range()
     };
     (range $type:ty, $range:expr) => {
         <$type as $crate::params::Bounded>::range($range)

@@ -51,5 +51,5 @@ pub use declare::{Bounded, Choice, ParameterType, Parameters, Unbounded, named, 
 pub use entry::{Entry, Variant};
 pub use kinds::{Kinds, Named, Sources};
 pub use registry::{Registered, Registry};
-pub use schema::{ParamError, ParamRange, Parameter, ParameterSchema};
+pub use schema::{Length, ParamError, ParamRange, Parameter, ParameterSchema, Step, repeated};
 pub use value::{ParamValue, Params};

@@ -22,27 +22,189 @@ pub enum ParamRange {
         /// Greatest value.
         max: i64,
     },
+    /// Some of the integers in `[min, max]`.
+    Stepped {
+        /// Least value.
+        min: i64,
+        /// Greatest value.
+        max: i64,
+        /// Which ones.
+        step: Step,
+    },
     /// A switch.
     Flag,
     /// One of these names.
     Choice(&'static [&'static str]),
+    /// The name of an entry of this registry.
+    Entry(&'static str),
     /// Any text; the empty one stands for nothing.
     Text,
+    /// Any text but the empty one.
+    Filled,
+    /// A list.
+    List {
+        /// What each of its values may be.
+        of: Box<ParamRange>,
+        /// How many there are.
+        length: Length,
+    },
+    /// A list, not empty, of ascending integers in `[1, max]`. Files may abbreviate it, `{ pow2 = [lo, hi] }`.
+    Ascending {
+        /// Greatest value.
+        max: i64,
+    },
 }
 
-impl fmt::Display for ParamRange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+/// Some integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// 1, 2, 4, 8, …
+    PowerOfTwo,
+    /// Multiples of this one.
+    MultipleOf(i64),
+}
+
+/// Lengths of lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Length {
+    /// Any, and each value once.
+    Any,
+    /// This one.
+    Exactly(usize),
+    /// This one, and each value once.
+    Different(usize),
+}
+
+impl Length {
+    /// Whether a list may have so many values.
+    pub fn allows(self, count: usize) -> bool {
         match self {
-            Self::Number { min, max } => write!(f, "a number in [{min}, {max}]"),
-            Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
-            Self::Flag => f.write_str("true or false"),
-            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
-            Self::Text => f.write_str("a text"),
+            Self::Any => true,
+            Self::Exactly(length) | Self::Different(length) => count == length,
         }
     }
 }
 
+impl fmt::Display for ParamRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words(false))
+    }
+}
+
+/// An interval. An end next to a number of fewer digits stands for that number, which itself is not in the interval.
+fn interval(min: f64, max: f64) -> String {
+    let is_next = |end: f64, next: f64| next.to_string().len() < end.to_string().len();
+    let low = match is_next(min, min.next_down()) {
+        true => format!("({}", min.next_down()),
+        false => format!("[{min}"),
+    };
+    match is_next(max, max.next_up()) {
+        true => format!("{low}, {})", max.next_up()),
+        false => format!("{low}, {max}]"),
+    }
+}
+
 impl ParamRange {
+    /// Those that are powers of two, of integers or of lists of them.
+    #[must_use]
+    pub fn power_of_two(self) -> Self {
+        self.stepped(Step::PowerOfTwo)
+    }
+
+    /// Those that are multiples of `step`, of integers or of lists of them.
+    #[must_use]
+    pub fn multiple_of(self, step: i64) -> Self {
+        self.stepped(Step::MultipleOf(step))
+    }
+
+    fn stepped(self, step: Step) -> Self {
+        match self {
+            Self::Integer { min, max } => Self::Stepped { min, max, step },
+            Self::List { of, length } => Self::List {
+                of: Box::new(of.stepped(step)),
+                length,
+            },
+            other => other,
+        }
+    }
+
+    /// Of lists of integers those that ascend from 1 or more, and are not empty.
+    #[must_use]
+    pub fn ascending(self) -> Self {
+        match self {
+            Self::List { of, .. } if matches!(*of, Self::Integer { .. }) => match *of {
+                Self::Integer { max, .. } => Self::Ascending { max },
+                other => other,
+            },
+            other => other,
+        }
+    }
+
+    /// Of lists of arrays those whose arrays have each value once.
+    #[must_use]
+    pub fn different(self) -> Self {
+        match self {
+            Self::List { of, length } => Self::List {
+                of: Box::new(of.different()),
+                length: match length {
+                    Length::Exactly(length) => Length::Different(length),
+                    other => other,
+                },
+            },
+            other => other,
+        }
+    }
+
+    /// Of texts those that name an entry of a registry.
+    #[must_use]
+    pub fn entry_of(self, registry: &'static str) -> Self {
+        Self::Entry(registry)
+    }
+
+    /// The values in words: one of them, or several.
+    fn words(&self, many: bool) -> String {
+        let noun = |one: &str, several: &str| if many { several } else { one }.to_owned();
+        match self {
+            Self::Number { min, max }
+                if *min <= f64::from(f32::MIN) && *max >= f64::from(f32::MAX) =>
+            {
+                noun(
+                    "a finite number of single precision",
+                    "finite numbers of single precision",
+                )
+            }
+            Self::Number { min, max } => {
+                format!(
+                    "{} in {}",
+                    noun("a number", "numbers"),
+                    interval(*min, *max)
+                )
+            }
+            Self::Integer { min, max } => {
+                format!("{} in [{min}, {max}]", noun("an integer", "integers"))
+            }
+            Self::Stepped { min, max, step } => {
+                let step = match step {
+                    Step::PowerOfTwo => noun("a power of two", "powers of two"),
+                    Step::MultipleOf(x) => {
+                        format!("{} of {x}", noun("a multiple", "multiples"))
+                    }
+                };
+                format!("{step} in [{min}, {max}]")
+            }
+            Self::Flag => "true or false".to_owned(),
+            Self::Choice(names) => format!("one of {}", names.join(", ")),
+            Self::Entry(registry) => format!("the name of one {registry}"),
+            Self::Text => noun("a text", "texts"),
+            Self::Filled => noun("a text that is not empty", "texts that are not empty"),
+            Self::List { of, length } => list_in_words(of, *length, many),
+            Self::Ascending { max } => format!(
+                "a list of ascending integers in [1, {max}], or a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {}",
+                max.ilog2()
+            ),
+        }
+    }
+
     /// Whether a parameter may have this value. Integers are numbers.
     pub fn allows(&self, value: &ParamValue) -> bool {
         match (self, value) {
@@ -51,10 +213,56 @@ impl ParamRange {
                 (*min..=*max).contains(&(*x as f64))
             }
             (Self::Integer { min, max }, ParamValue::Integer(x)) => (min..=max).contains(&x),
+            (Self::Stepped { min, max, step }, ParamValue::Integer(x)) => {
+                let is_step = match step {
+                    Step::PowerOfTwo => x.count_ones() == 1,
+                    Step::MultipleOf(step) => x % step == 0,
+                };
+                is_step && (min..=max).contains(&x)
+            }
             (Self::Choice(names), ParamValue::Name(x)) => names.contains(&x.as_str()),
+            (Self::Entry(_) | Self::Filled, ParamValue::Name(x)) => !x.is_empty(),
             (Self::Flag, ParamValue::Flag(_)) | (Self::Text, ParamValue::Name(_)) => true,
+            (Self::List { of, length }, ParamValue::List(items)) => {
+                let may_repeat = matches!(length, Length::Exactly(_));
+                length.allows(items.len())
+                    && items.iter().all(|item| of.allows(item))
+                    && (may_repeat || repeated(items).is_none())
+            }
+            (Self::Ascending { max }, ParamValue::List(items)) => {
+                let counts: Option<Vec<i64>> = items.iter().map(ParamValue::as_integer).collect();
+                counts.is_some_and(|counts| {
+                    let ends = counts.first().zip(counts.last());
+                    ends.is_some_and(|(first, last)| *first > 0 && last <= max)
+                        && counts.is_sorted_by(|a, b| a < b)
+                })
+            }
             _ => false,
         }
+    }
+}
+
+/// The place of the first value that stands before it as well.
+pub fn repeated(items: &[ParamValue]) -> Option<usize> {
+    (0..items.len()).find(|&i| items[..i].contains(&items[i]))
+}
+
+fn list_in_words(of: &ParamRange, length: Length, many: bool) -> String {
+    let of = of.words(true);
+    let count = |n: usize| match n {
+        2 => "two".to_owned(),
+        3 => "three".to_owned(),
+        n => n.to_string(),
+    };
+    match (length, many) {
+        (Length::Any, false) => format!("a list of {of}"),
+        (Length::Any, true) => format!("lists of {of}"),
+        (Length::Exactly(2), true) => format!("pairs of {of}"),
+        (Length::Different(2), true) => format!("pairs of different {of}"),
+        (Length::Exactly(n), true) => format!("lists of {} {of}", count(n)),
+        (Length::Different(n), true) => format!("lists of {} different {of}", count(n)),
+        (Length::Exactly(n), false) => format!("a list of {} {of}", count(n)),
+        (Length::Different(n), false) => format!("a list of {} different {of}", count(n)),
     }
 }
 
@@ -65,10 +273,17 @@ pub struct Parameter {
     pub name: &'static str,
     /// One line: meaning, unit, source.
     pub description: &'static str,
-    /// Value when the experiment says nothing.
+    /// Value when the experiment says nothing. One that is not in the range stands for nothing.
     pub default: ParamValue,
     /// Allowed values.
     pub range: ParamRange,
+}
+
+impl Parameter {
+    /// The default; nothing where it stands for nothing that can be written.
+    pub fn default_written(&self) -> Option<&ParamValue> {
+        self.range.allows(&self.default).then_some(&self.default)
+    }
 }
 
 /// The parameters of a registry entry: the parser, the help, the docs table and sweeps read it.
@@ -112,8 +327,9 @@ impl Params {
             }
         }
         let one = |parameter: &Parameter| {
-            let value = self.0.get(parameter.name).unwrap_or(&parameter.default);
-            if parameter.range.allows(value) {
+            let given = self.0.get(parameter.name);
+            let value = given.unwrap_or(&parameter.default);
+            if given.is_none() || parameter.range.allows(value) {
                 return Ok((parameter.name.to_owned(), value.clone()));
             }
             Err(ParamError::Value {

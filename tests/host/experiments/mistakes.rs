@@ -82,8 +82,11 @@ impl Case {
 /// What the hashes of cells are made of, see `measure`'s inputs.
 fn settings(e: &Experiment) -> String {
     [
-        format!("{:?}", (&e.name, e.replicates, e.seed, e.resolution)),
-        format!("{:?}", (&e.spp, &e.stop, e.runtime_checks)),
+        format!(
+            "{:?}",
+            (&e.name, e.run.replicates, e.run.seed, e.run.resolution)
+        ),
+        format!("{:?}", (&e.run.spp, &e.stop, e.run.runtime_checks)),
         format!("{:?}", e.camera),
         format!("{:?}", e.reference),
         format!("{:?}", e.timing),
