@@ -5,7 +5,7 @@ use super::axis::Axis;
 use super::error::{ConfigError, Place};
 use super::experiment::Axes;
 use super::pattern::Pattern;
-use super::settings::{Section, as_table};
+use super::settings::Section;
 use super::tree::{Item, Table, Value};
 use super::{Catalogue, variants};
 
@@ -20,17 +20,17 @@ pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), 
     let axes = Axis::ALL.map(Axis::name);
     for (name, item) in tree {
         if let Some(axis) = Axis::from_name(name) {
-            let section = as_table(item, name, "sections [NAME] of parameters")?;
+            let section = item.table(name, "sections [NAME] of parameters")?;
             for (entry, item) in section {
                 variants::resolve(axis, &item.at, entry, catalogue)?;
                 parameter_tables(axis, entry, item)?;
             }
         } else if CELL_SETS.contains(&name.as_str()) {
             for (_, table) in cell_tables(name, item)? {
-                check_keys(name, table, &axes)?;
+                check_keys(&key_in(name), table, &axes)?;
             }
         } else if name == AXES {
-            check_keys(name, as_table(item, name, "a section")?, &axes)?;
+            check_keys(&key_in(name), item.table(name, "a section")?, &axes)?;
         } else if catalogue.keys_of(name).is_empty() {
             return Err(unknown_section(name, item, catalogue));
         } else {
@@ -47,8 +47,8 @@ fn check_settings(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), 
         true => format!("a table of {}", keys.join(", ")),
         false => "a section".to_owned(),
     };
-    let table = as_table(item, name, &expected)?;
-    check_keys(name, table, &keys)?;
+    let table = item.table(name, &expected)?;
+    check_keys(&key_in(name), table, &keys)?;
     for (key, item) in table {
         let within = format!("{name}.{key}");
         if !catalogue.keys_of(&within).is_empty() {
@@ -74,28 +74,28 @@ fn unknown_section(name: &str, item: &Item, catalogue: &Catalogue) -> ConfigErro
         .chain([AXES])
         .chain(CELL_SETS)
         .chain(Axis::ALL.map(Axis::name));
-    ConfigError::Unknown {
-        at: item.at.clone(),
-        what: match item.value {
-            Value::Table(_) => "section".to_owned(),
-            _ => "key outside all sections".to_owned(),
-        },
-        name: name.to_owned(),
-        known: known.map(str::to_owned).collect(),
-    }
+    let what = match item.value {
+        Value::Table(_) => "section",
+        _ => "key outside all sections",
+    };
+    ConfigError::unknown(&item.at, what, name, known)
 }
 
-fn check_keys(section: &str, table: &Table, known: &[&str]) -> Result<(), ConfigError> {
-    let unknown = |(name, _): &(&String, &Item)| !known.contains(&name.as_str());
-    let Some((name, item)) = table.iter().find(unknown) else {
-        return Ok(());
-    };
-    Err(ConfigError::Unknown {
-        at: item.at.clone(),
-        what: format!("key in [{section}]"),
-        name: name.clone(),
-        known: known.iter().map(|name| (*name).to_owned()).collect(),
-    })
+/// What messages call a key of a section.
+pub(super) fn key_in(section: &str) -> String {
+    format!("key in [{section}]")
+}
+
+/// Keys that are written must be among those known; `what` is what messages call them.
+pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<(), ConfigError> {
+    let is_known = |name: &String| known.contains(&name.as_str());
+    match table.iter().find(|(name, _)| !is_known(name)) {
+        None => Ok(()),
+        Some((name, item)) => {
+            let known = known.iter().copied();
+            Err(ConfigError::unknown(&item.at, what, name, known))
+        }
+    }
 }
 
 /// The tables of a section that names cells.
@@ -107,14 +107,9 @@ pub(super) fn cell_tables<'t>(
     match &item.value {
         Value::List(items) => items
             .iter()
-            .map(|item| Ok((&item.at, as_table(item, section, &expected)?)))
+            .map(|item| Ok((&item.at, item.table(section, &expected)?)))
             .collect(),
-        other => Err(ConfigError::WrongType {
-            at: item.at.clone(),
-            key: section.to_owned(),
-            expected,
-            found: other.describe(),
-        }),
+        _ => Err(item.wrong_type(section, expected)),
     }
 }
 
@@ -130,9 +125,9 @@ pub(super) fn parameter_tables<'t>(
     match &item.value {
         Value::List(items) if !items.is_empty() => items
             .iter()
-            .map(|item| as_table(item, &key, EXPECTED))
+            .map(|item| item.table(&key, EXPECTED))
             .collect(),
-        _ => Ok(vec![as_table(item, &key, EXPECTED)?]),
+        _ => Ok(vec![item.table(&key, EXPECTED)?]),
     }
 }
 
@@ -187,22 +182,14 @@ pub(super) fn texts<'t>(
     key: &str,
     item: &'t Item,
 ) -> Result<Vec<(&'t Item, &'t str)>, ConfigError> {
-    let wrong_type = |item: &Item| ConfigError::WrongType {
-        at: item.at.clone(),
-        key: key.to_owned(),
-        expected: "a text or a list of texts".to_owned(),
-        found: item.value.describe(),
-    };
+    let wrong_type = |item: &Item| item.wrong_type(key, "a text or a list of texts");
     let items = match &item.value {
         Value::Text(_) => std::slice::from_ref(item),
         Value::List(items) => items,
         _ => return Err(wrong_type(item)),
     };
     if items.is_empty() {
-        return Err(ConfigError::Empty {
-            at: item.at.clone(),
-            key: key.to_owned(),
-        });
+        return Err(item.empty(key));
     }
     let text = |item: &'t Item| match &item.value {
         Value::Text(text) => Ok((item, text.as_str())),

@@ -209,6 +209,23 @@ pub enum ConfigError {
     },
 }
 
+impl ConfigError {
+    /// The error for a name that is not among those known.
+    pub(super) fn unknown<'n>(
+        at: &Place,
+        what: impl Into<String>,
+        name: &str,
+        known: impl IntoIterator<Item = &'n str>,
+    ) -> Self {
+        Self::Unknown {
+            at: at.clone(),
+            what: what.into(),
+            name: name.to_owned(),
+            known: known.into_iter().map(str::to_owned).collect(),
+        }
+    }
+}
+
 /// Longest list of known names that an error message spells out.
 const LIST_LIMIT: usize = 16;
 

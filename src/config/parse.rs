@@ -3,18 +3,18 @@
 use super::axis::Axis;
 use super::cells::COMPACTIONS;
 use super::check::{
-    AXES, cell_tables, check_on_axis, check_sections, parameter_tables, pattern_list, texts,
+    AXES, cell_tables, check_keys, check_on_axis, check_sections, parameter_tables, pattern_list,
+    texts,
 };
 use super::error::{ConfigError, Place};
 use super::experiment::{Axes, CellSet, Condition, Experiment};
 use super::sections::{Coherence, Reference, Run, View};
-use super::settings::{Settings as _, as_table, not_allowed, read_all, take};
+use super::settings::{find, not_allowed, read_all, take};
 use super::tree::{self, Item, Table};
 use super::variants::WHEN;
 use super::{Catalogue, expect, variants};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{Entry, Variant};
-use std::borrow::Cow;
 use std::path::Path;
 
 /// Parses and checks an experiment; see [`Experiment::parse`].
@@ -26,7 +26,7 @@ pub(super) fn parse(
 ) -> Result<Experiment, ConfigError> {
     let tree = layers(text, file, overrides)?;
     check_sections(&tree, catalogue)?;
-    let mut read = read_all(catalogue.sections(), &tree, file)?;
+    let mut read = read_all(catalogue.sections(), &tree)?;
     let reader = Reader::new(&tree, file, catalogue)?;
     let axes = Axes::try_new(|axis| reader.axis(axis))?;
     let run: Run = take(&mut read).unwrap_or_default();
@@ -90,8 +90,8 @@ fn file_stem(file: &str) -> String {
 /// Reads sections of the merged tree.
 struct Reader<'t> {
     tree: &'t Table,
-    /// What is written under `[axes]`.
-    axes: Cow<'t, Table>,
+    /// What is written under `[axes]`, and what stands on the others.
+    axes: Table,
     file: &'t str,
     catalogue: &'t Catalogue,
 }
@@ -115,19 +115,15 @@ fn least_name(axis: Axis, integrators: &Item) -> Option<&'static str> {
 impl<'t> Reader<'t> {
     fn new(tree: &'t Table, file: &'t str, catalogue: &'t Catalogue) -> Result<Self, ConfigError> {
         let mut axes = match tree.get(AXES) {
-            Some(item) => Cow::Borrowed(as_table(item, AXES, "a section")?),
-            None => Cow::Owned(Table::new()),
+            Some(item) => item.table(AXES, "a section")?.clone(),
+            None => Table::new(),
         };
         let integrators = axes.get(Axis::Integrator.name()).cloned();
         for axis in Axis::ALL {
-            let least = integrators
-                .as_ref()
-                .and_then(|names| least_name(axis, names));
-            if let Some(name) = axis.default_name().or(least)
-                && !axes.contains_key(axis.name())
-            {
-                let name = Item::default_text(name);
-                axes.to_mut().insert(axis.name().to_owned(), name);
+            let least = (integrators.as_ref()).and_then(|names| least_name(axis, names));
+            if let Some(name) = axis.default_name().or(least) {
+                let written = axes.entry(axis.name().to_owned());
+                written.or_insert_with(|| Item::default_text(name));
             }
         }
         Ok(Self {
@@ -141,7 +137,7 @@ impl<'t> Reader<'t> {
     /// The section of parameters of entries on an axis.
     fn parameters(&self, axis: Axis) -> Result<Option<&'t Table>, ConfigError> {
         let item = self.tree.get(axis.name());
-        item.map(|item| as_table(item, axis.name(), "sections"))
+        item.map(|item| item.table(axis.name(), "sections"))
             .transpose()
     }
 
@@ -169,11 +165,7 @@ impl<'t> Reader<'t> {
         let mut used: Vec<String> = Vec::new();
         for (item, name) in names {
             if used.iter().any(|other| other == name) {
-                return Err(ConfigError::Duplicate {
-                    at: item.at.clone(),
-                    key,
-                    value: format!("\"{name}\""),
-                });
+                return Err(item.duplicate(&key));
             }
             used.push(name.to_owned());
             let entry = variants::resolve(axis, &item.at, name, self.catalogue)?;
@@ -282,20 +274,9 @@ impl<'t> Reader<'t> {
         axes: &Axes,
     ) -> Result<CellSet, ConfigError> {
         let key = format!("{axis}.{name}.{WHEN}");
-        let table = as_table(
-            item,
-            &key,
-            "axes with patterns, as in { scene = \"sponza\" }",
-        )?;
-        let unknown = |(name, _): &(&String, &Item)| Axis::from_name(name).is_none();
-        if let Some((name, item)) = table.iter().find(unknown) {
-            return Err(ConfigError::Unknown {
-                at: item.at.clone(),
-                what: format!("axis in `{key}`"),
-                name: name.clone(),
-                known: Axis::ALL.map(|axis| axis.name().to_owned()).to_vec(),
-            });
-        }
+        let table = item.table(&key, "axes with patterns, as in { scene = \"sponza\" }")?;
+        let axis = format!("axis in `{key}`");
+        check_keys(&axis, table, &Axis::ALL.map(Axis::name))?;
         self.cell_set(&key, (&item.at, table), axes)
     }
 
@@ -318,24 +299,14 @@ impl<'t> Reader<'t> {
         Ok(changed || matches!(self.names(axis)?.at, Place::Override(_)))
     }
 
-    /// What is written under `[reference]`.
-    fn reference_table(&self) -> Result<Cow<'t, Table>, ConfigError> {
-        let name = Reference::SECTION;
-        Ok(match self.tree.get(name) {
-            Some(item) => Cow::Borrowed(as_table(item, name, "a section")?),
-            None => Cow::Owned(Table::new()),
-        })
-    }
-
     /// The reference with its sampler as the catalogue knows it.
     fn reference(&self, mut reference: Reference, axes: &Axes) -> Result<Reference, ConfigError> {
-        let table = self.reference_table()?;
         let places = [
             (Axis::Sequence, &mut reference.sequence),
             (Axis::Decorrelation, &mut reference.decorrelation),
         ];
         for (axis, variant) in places {
-            let item = table.get(axis.name());
+            let item = find(self.tree, &format!("reference.{axis}"));
             let at = item.map_or(&Place::Default, |item| &item.at);
             let entry = variants::resolve(axis, at, &variant.name, self.catalogue)?;
             *variant = entry.default_variant();
@@ -345,7 +316,7 @@ impl<'t> Reader<'t> {
         if reference.file.is_some() && scenes > 1 {
             let expected =
                 format!("left out where `axes.scene` has {scenes} scenes: it is an image of one");
-            return Err(not_allowed(&table, "reference.file", None, expected));
+            return Err(not_allowed(self.tree, "reference.file", "", expected));
         }
         Ok(reference)
     }
@@ -365,12 +336,7 @@ impl<'t> Reader<'t> {
             experiment.run.replicates,
             experiment.run.seed
         );
-        let seed = experiment.reference.seed.to_string();
-        Err(not_allowed(
-            &self.reference_table()?.into_owned(),
-            "reference.seed",
-            Some(seed),
-            expected,
-        ))
+        let seed = experiment.reference.seed;
+        Err(not_allowed(self.tree, "reference.seed", seed, expected))
     }
 }

@@ -49,12 +49,12 @@ impl Section {
     }
 
     /// Its values where it is written in a tree.
-    fn read(&self, tree: &Table, file: &str) -> Result<Option<Params>, ConfigError> {
+    fn read(&self, tree: &Table) -> Result<Option<Params>, ConfigError> {
         let name = self.name();
-        let Some(item) = find(tree, name)? else {
+        let Some(item) = find(tree, name) else {
             return Ok(None);
         };
-        let table = as_table(item, name, "a section")?;
+        let table = item.table(name, "a section")?;
         let key = |key: &str| format!("{name}.{key}");
         let mut params = Params::default();
         for parameter in &self.entry.schema {
@@ -66,7 +66,7 @@ impl Section {
                 }
                 None if self.required.contains(&name) => {
                     return Err(ConfigError::Missing {
-                        at: place_in(file, item),
+                        at: item.at.clone(),
                         key: key(name),
                         expected: parameter.range.to_string(),
                     });
@@ -77,9 +77,10 @@ impl Section {
         match (self.check)(&params) {
             Ok(None) => Ok(Some(params)),
             Ok(Some((name, expected))) => {
-                let default = self.entry.schema.iter().find(|p| p.name == name);
-                let default = default.map(|p| p.default.to_string());
-                Err(not_allowed(table, &key(name), default, expected))
+                let known = self.entry.schema.iter();
+                let default = known.filter(|p| p.name == name).map(|p| &p.default);
+                let default: String = default.map(ToString::to_string).collect();
+                Err(not_allowed(tree, &key(name), default, expected))
             }
             Err(error) => Err(ConfigError::Refused {
                 at: format!("{}: [{name}]", item.at),
@@ -89,41 +90,29 @@ impl Section {
     }
 }
 
-/// Where something is missing from `item`; the begin of the file, if the item is not written there.
-fn place_in(file: &str, item: &Item) -> Place {
-    match &item.at {
-        Place::Default => Place::start_of(file),
-        at => at.clone(),
-    }
-}
-
 /// The error for a value that its own range allows and another key forbids.
 pub(super) fn not_allowed(
-    section: &Table,
+    tree: &Table,
     key: &str,
-    default: Option<String>,
+    default: impl ToString,
     expected: String,
 ) -> ConfigError {
-    let name = key.rsplit('.').next().unwrap_or(key);
-    let item = section.get(name);
-    ConfigError::OutOfRange {
-        at: item.map_or(Place::Default, |item| item.at.clone()),
+    let unwritten = || ConfigError::OutOfRange {
+        at: Place::Default,
         key: key.to_owned(),
-        value: match item {
-            Some(item) => item.value.to_string(),
-            None => default.unwrap_or_default(),
-        },
-        expected,
-    }
+        value: default.to_string(),
+        expected: expected.clone(),
+    };
+    find(tree, key).map_or_else(unwritten, |item| item.out_of_range(key, &expected))
 }
 
-/// The item of a section, or of a table within one.
-fn find<'t>(tree: &'t Table, name: &str) -> Result<Option<&'t Item>, ConfigError> {
+/// The item of a section, or behind dots of what is within.
+pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
     match name.split_once('.') {
-        None => Ok(tree.get(name)),
-        Some((outer, inner)) => match tree.get(outer) {
-            Some(item) => find(as_table(item, outer, "a section")?, inner),
-            None => Ok(None),
+        None => tree.get(name),
+        Some((outer, inner)) => match &tree.get(outer)?.value {
+            Value::Table(table) => find(table, inner),
+            _ => None,
         },
     }
 }
@@ -132,38 +121,16 @@ fn find<'t>(tree: &'t Table, name: &str) -> Result<Option<&'t Item>, ConfigError
 pub(super) type Read = BTreeMap<String, Params>;
 
 /// Reads and checks the values of all sections.
-pub(super) fn read_all(
-    sections: &[Section],
-    tree: &Table,
-    file: &str,
-) -> Result<Read, ConfigError> {
-    let mut read = Read::new();
-    for section in sections {
-        if let Some(params) = section.read(tree, file)? {
-            read.insert(section.name().to_owned(), params);
-        }
-    }
-    Ok(read)
+pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, ConfigError> {
+    let read = sections.iter().filter_map(|section| {
+        let params = section.read(tree).transpose()?;
+        Some(params.map(|params| (section.name().to_owned(), params)))
+    });
+    read.collect()
 }
 
 /// Takes the settings of a section, which were checked.
 pub(super) fn take<S: Settings>(read: &mut Read) -> Option<S> {
     read.remove(S::SECTION)
         .map(|params| S::from_checked(&params))
-}
-
-pub(super) fn as_table<'t>(
-    item: &'t Item,
-    key: &str,
-    expected: &str,
-) -> Result<&'t Table, ConfigError> {
-    match &item.value {
-        Value::Table(table) => Ok(table),
-        other => Err(ConfigError::WrongType {
-            at: item.at.clone(),
-            key: key.to_owned(),
-            expected: expected.to_owned(),
-            found: other.describe(),
-        }),
-    }
 }

@@ -18,6 +18,51 @@ pub(super) struct Item {
 }
 
 impl Item {
+    /// The table that it has to be; messages call it `key`, and say what is expected.
+    pub(crate) fn table(&self, key: &str, expected: &str) -> Result<&Table, ConfigError> {
+        match &self.value {
+            Value::Table(table) => Ok(table),
+            _ => Err(self.wrong_type(key, expected)),
+        }
+    }
+
+    /// The error for a value of a type that `key` does not have.
+    pub(crate) fn wrong_type(&self, key: &str, expected: impl ToString) -> ConfigError {
+        ConfigError::WrongType {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            expected: expected.to_string(),
+            found: self.value.describe(),
+        }
+    }
+
+    /// The error for a value that `key` must not have.
+    pub(crate) fn out_of_range(&self, key: &str, expected: impl ToString) -> ConfigError {
+        ConfigError::OutOfRange {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            value: self.value.to_string(),
+            expected: expected.to_string(),
+        }
+    }
+
+    /// The error for a list without a value.
+    pub(crate) fn empty(&self, key: &str) -> ConfigError {
+        ConfigError::Empty {
+            at: self.at.clone(),
+            key: key.to_owned(),
+        }
+    }
+
+    /// The error for a value that stands before it in a list.
+    pub(crate) fn duplicate(&self, key: &str) -> ConfigError {
+        ConfigError::Duplicate {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            value: self.value.to_string(),
+        }
+    }
+
     /// A text that nobody wrote.
     pub(crate) fn default_text(text: &str) -> Self {
         Self {

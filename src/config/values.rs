@@ -1,8 +1,11 @@
 //! From what is written to the value of a parameter or a key.
 
+use super::check::{check_keys, key_in};
 use super::error::ConfigError;
 use super::tree::{Item, Table, Value};
-use raystone_core::params::{Length, ParamRange, ParamValue, repeated};
+use raystone_core::params::{
+    Bounded as _, Length, ParamRange, ParamValue, ParameterType as _, repeated,
+};
 
 /// The value that is written, if `range` allows it. `key` is what messages call it.
 ///
@@ -23,7 +26,7 @@ impl Wanted<'_> {
         let value = match (range, &item.value) {
             (ParamRange::Number { .. }, Value::Number(x)) => ParamValue::Number(*x),
             (ParamRange::Number { .. }, Value::Integer(x)) => ParamValue::Number(*x as f64),
-            (ParamRange::Integer { .. } | ParamRange::Stepped { .. }, Value::Integer(x)) => {
+            (ParamRange::Integer { .. } | ParamRange::Stepped(..), Value::Integer(x)) => {
                 ParamValue::Integer(*x)
             }
             (ParamRange::Flag, Value::Flag(x)) => ParamValue::Flag(*x),
@@ -34,28 +37,25 @@ impl Wanted<'_> {
                 | ParamRange::Filled,
                 Value::Text(x),
             ) => ParamValue::Name(x.clone()),
-            (ParamRange::List { of, length }, Value::List(items)) if length.allows(items.len()) => {
+            (ParamRange::List(of, length), Value::List(items)) if length.allows(items.len()) => {
                 self.list(items, of, *length)?
             }
-            (ParamRange::Ascending { max }, Value::List(items)) => {
+            (ParamRange::Ascending(max), Value::List(items)) => {
                 let count = ParamRange::Integer { min: 1, max: *max };
                 // Repetition is a matter of order here.
                 self.list(items, &count, Length::Exactly(items.len()))?
             }
-            (ParamRange::Ascending { max }, Value::Table(table)) => {
-                self.powers(item, table, *max)?
-            }
-            _ => return Err(self.wrong_type(item)),
+            (ParamRange::Ascending(max), Value::Table(table)) => self.powers(item, table, *max)?,
+            _ => return Err(item.wrong_type(self.key, self.range)),
         };
         match range {
             _ if range.allows(&value) => Ok(value),
-            ParamRange::Choice(names) => Err(ConfigError::Unknown {
-                at: item.at.clone(),
-                what: format!("value of `{}`", self.key),
-                name: value.to_string(),
-                known: names.iter().map(|name| (*name).to_owned()).collect(),
-            }),
-            _ => Err(self.out_of_range(item)),
+            ParamRange::Choice(names) => {
+                let what = format!("value of `{}`", self.key);
+                let (name, known) = (value.to_string(), names.iter().copied());
+                Err(ConfigError::unknown(&item.at, what, &name, known))
+            }
+            _ => Err(item.out_of_range(self.key, self.range)),
         }
     }
 
@@ -68,61 +68,24 @@ impl Wanted<'_> {
         let values = items.iter().map(|item| self.value(item, of));
         let values: Vec<ParamValue> = values.collect::<Result<_, _>>()?;
         match repeated(&values) {
-            Some(again) if length == Length::Any => Err(ConfigError::Duplicate {
-                at: items[again].at.clone(),
-                key: self.key.to_owned(),
-                value: items[again].value.to_string(),
-            }),
+            Some(again) if length == Length::Any => Err(items[again].duplicate(self.key)),
             _ => Ok(ParamValue::List(values)),
         }
     }
 
     /// The powers of two that `{ pow2 = [lo, hi] }` stands for.
     fn powers(&self, item: &Item, table: &Table, max: i64) -> Result<ParamValue, ConfigError> {
-        if let Some((other, item)) = table.iter().find(|(key, _)| *key != "pow2") {
-            return Err(ConfigError::Unknown {
-                at: item.at.clone(),
-                what: format!("key in `{}`", self.key),
-                name: other.clone(),
-                known: vec!["pow2".to_owned()],
-            });
-        }
-        let item = table.get("pow2").ok_or_else(|| self.wrong_type(item))?;
-        let exponent = ParamRange::Integer {
-            min: 0,
-            max: max.ilog2().into(),
-        };
-        let ends = ParamRange::List {
-            of: Box::new(exponent),
-            length: Length::Exactly(2),
-        };
-        let ParamValue::List(ends) = self.value(item, &ends)? else {
-            return Err(self.wrong_type(item));
-        };
-        let ends: Vec<i64> = ends.iter().filter_map(ParamValue::as_integer).collect();
-        match ends[..] {
-            [low, high] if low <= high => Ok(ParamValue::List(
-                (low..=high).map(|x| ParamValue::Integer(1 << x)).collect(),
-            )),
-            _ => Err(self.out_of_range(item)),
-        }
-    }
-
-    fn wrong_type(&self, item: &Item) -> ConfigError {
-        ConfigError::WrongType {
-            at: item.at.clone(),
-            key: self.key.to_owned(),
-            expected: self.range.to_string(),
-            found: item.value.describe(),
-        }
-    }
-
-    fn out_of_range(&self, item: &Item) -> ConfigError {
-        ConfigError::OutOfRange {
-            at: item.at.clone(),
-            key: self.key.to_owned(),
-            value: item.value.to_string(),
-            expected: self.range.to_string(),
+        check_keys(&key_in(self.key), table, &["pow2"])?;
+        let item = table
+            .get("pow2")
+            .ok_or_else(|| item.wrong_type(self.key, self.range))?;
+        let ends = self.value(item, &<[u32; 2]>::range(0..=max.ilog2()))?;
+        match <[u32; 2]>::parse(&ends) {
+            Some([low, high]) if low <= high => {
+                let powers = (low..=high).map(|x| ParamValue::Integer(1 << x));
+                Ok(ParamValue::List(powers.collect()))
+            }
+            _ => Err(item.out_of_range(self.key, self.range)),
         }
     }
 }

@@ -42,12 +42,8 @@ pub(super) fn resolve(
         }
         axis => axis.name(),
     };
-    Err(ConfigError::Unknown {
-        at: at.clone(),
-        what: what.to_owned(),
-        name: text.to_owned(),
-        known: entries.iter().map(|entry| entry.name.clone()).collect(),
-    })
+    let known = entries.iter().map(|entry| entry.name.as_str());
+    Err(ConfigError::unknown(at, what, text, known))
 }
 
 /// Parameters that all entries of an axis have: files have them, too.
@@ -85,12 +81,9 @@ pub(super) fn expand(
         .filter(|(name, _)| name.as_str() != WHEN)
         .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
     {
-        return Err(ConfigError::Unknown {
-            at: item.at.clone(),
-            what: format!("parameter of {axis} {}", entry.name),
-            name: name.clone(),
-            known: entry.schema.iter().map(|p| p.name.to_owned()).collect(),
-        });
+        let what = format!("parameter of {axis} {}", entry.name);
+        let known = entry.schema.iter().map(|p| p.name);
+        return Err(ConfigError::unknown(&item.at, what, name, known));
     }
     let mut products = vec![Vec::new()];
     for parameter in &entry.schema {
@@ -137,31 +130,19 @@ pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), C
 fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>, ConfigError> {
     let items = match &item.value {
         // A list is one value of a parameter that takes lists.
-        Value::List(items)
-            if !matches!(
-                range,
-                ParamRange::List { .. } | ParamRange::Ascending { .. }
-            ) =>
-        {
+        Value::List(items) if !matches!(range, ParamRange::List(..) | ParamRange::Ascending(_)) => {
             items
         }
         _ => std::slice::from_ref(item),
     };
     if items.is_empty() {
-        return Err(ConfigError::Empty {
-            at: item.at.clone(),
-            key: key.to_owned(),
-        });
+        return Err(item.empty(key));
     }
     let values = items.iter().map(|item| value(key, item, range));
     let values: Vec<ParamValue> = values.collect::<Result<_, _>>()?;
     match repeated(&values) {
         None => Ok(values),
-        Some(again) => Err(ConfigError::Duplicate {
-            at: items[again].at.clone(),
-            key: key.to_owned(),
-            value: values[again].to_string(),
-        }),
+        Some(again) => Err(items[again].duplicate(key)),
     }
 }
 

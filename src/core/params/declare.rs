@@ -167,12 +167,6 @@ impl ParameterType for bool {
     }
 }
 
-impl Unbounded for bool {
-    fn range() -> ParamRange {
-        ParamRange::Flag
-    }
-}
-
 impl ParameterType for String {
     fn value(&self) -> ParamValue {
         ParamValue::Name(self.clone())
@@ -186,11 +180,22 @@ impl ParameterType for String {
     }
 }
 
-impl Unbounded for String {
-    fn range() -> ParamRange {
-        ParamRange::Text
-    }
+macro_rules! unbounded {
+    ($($type:ty: $range:expr),*) => {$(
+        impl Unbounded for $type {
+            fn range() -> ParamRange {
+                $range
+            }
+        }
+    )*};
 }
+
+unbounded!(
+    bool: ParamRange::Flag,
+    String: ParamRange::Text,
+    PathBuf: ParamRange::Text,
+    Variant: ParamRange::Filled
+);
 
 /// A path, as it is written.
 impl ParameterType for PathBuf {
@@ -203,12 +208,6 @@ impl ParameterType for PathBuf {
     }
 }
 
-impl Unbounded for PathBuf {
-    fn range() -> ParamRange {
-        ParamRange::Text
-    }
-}
-
 /// A registry entry by its name; whoever reads it looks up its parameters.
 impl ParameterType for Variant {
     fn value(&self) -> ParamValue {
@@ -217,12 +216,6 @@ impl ParameterType for Variant {
 
     fn parse(value: &ParamValue) -> Option<Self> {
         String::parse(value).map(|name| Self::plain(&name))
-    }
-}
-
-impl Unbounded for Variant {
-    fn range() -> ParamRange {
-        ParamRange::Filled
     }
 }
 
@@ -275,10 +268,7 @@ impl<T: Bounded> Bounded for Vec<T> {
     type Bound = T::Bound;
 
     fn range(range: RangeInclusive<T::Bound>) -> ParamRange {
-        ParamRange::List {
-            of: Box::new(T::range(range)),
-            length: Length::Any,
-        }
+        ParamRange::List(Box::new(T::range(range)), Length::Any)
     }
 }
 
@@ -296,10 +286,7 @@ impl<T: Bounded, const N: usize> Bounded for [T; N] {
     type Bound = T::Bound;
 
     fn range(range: RangeInclusive<T::Bound>) -> ParamRange {
-        ParamRange::List {
-            of: Box::new(T::range(range)),
-            length: Length::Exactly(N),
-        }
+        ParamRange::List(Box::new(T::range(range)), Length::Exactly(N))
     }
 }
 

@@ -1,8 +1,9 @@
 //! What values parameters may take, and why some do not fit.
 
-use super::{ParamValue, Params};
+use super::{ParamValue, ParameterType as _, Params};
 use crate::text::nearest;
 use std::fmt;
+use std::ops::RangeInclusive;
 use thiserror::Error;
 
 /// What values a parameter may take.
@@ -22,15 +23,8 @@ pub enum ParamRange {
         /// Greatest value.
         max: i64,
     },
-    /// Some of the integers in `[min, max]`.
-    Stepped {
-        /// Least value.
-        min: i64,
-        /// Greatest value.
-        max: i64,
-        /// Which ones.
-        step: Step,
-    },
+    /// Some of the integers in a range.
+    Stepped(Step, RangeInclusive<i64>),
     /// A switch.
     Flag,
     /// One of these names.
@@ -41,18 +35,10 @@ pub enum ParamRange {
     Text,
     /// Any text but the empty one.
     Filled,
-    /// A list.
-    List {
-        /// What each of its values may be.
-        of: Box<ParamRange>,
-        /// How many there are.
-        length: Length,
-    },
-    /// A list, not empty, of ascending integers in `[1, max]`. Files may abbreviate it, `{ pow2 = [lo, hi] }`.
-    Ascending {
-        /// Greatest value.
-        max: i64,
-    },
+    /// A list of so many such values.
+    List(Box<ParamRange>, Length),
+    /// A list, not empty, of ascending integers from 1 to this one. Files may abbreviate it, `{ pow2 = [lo, hi] }`.
+    Ascending(i64),
 }
 
 /// Some integers.
@@ -85,6 +71,25 @@ impl Length {
     }
 }
 
+/// How many, before what: `two different `.
+impl fmt::Display for Length {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Exactly(length) | Self::Different(length)) = self else {
+            return Ok(());
+        };
+        match length {
+            2 => f.write_str("two ")?,
+            3 => f.write_str("three ")?,
+            length => write!(f, "{length} ")?,
+        }
+        f.write_str(if matches!(self, Self::Different(_)) {
+            "different "
+        } else {
+            ""
+        })
+    }
+}
+
 impl fmt::Display for ParamRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.words(false))
@@ -95,8 +100,8 @@ impl fmt::Display for ParamRange {
 fn interval(min: f64, max: f64) -> String {
     let is_next = |end: f64, next: f64| next.to_string().len() < end.to_string().len();
     let low = match is_next(min, min.next_down()) {
-        true => format!("({}", min.next_down()),
-        false => format!("[{min}"),
+        true => format!(" in ({}", min.next_down()),
+        false => format!(" in [{min}"),
     };
     match is_next(max, max.next_up()) {
         true => format!("{low}, {})", max.next_up()),
@@ -119,11 +124,8 @@ impl ParamRange {
 
     fn stepped(self, step: Step) -> Self {
         match self {
-            Self::Integer { min, max } => Self::Stepped { min, max, step },
-            Self::List { of, length } => Self::List {
-                of: Box::new(of.stepped(step)),
-                length,
-            },
+            Self::Integer { min, max } => Self::Stepped(step, min..=max),
+            Self::List(of, length) => Self::List(Box::new(of.stepped(step)), length),
             other => other,
         }
     }
@@ -132,25 +134,18 @@ impl ParamRange {
     #[must_use]
     pub fn ascending(self) -> Self {
         match self {
-            Self::List { of, .. } if matches!(*of, Self::Integer { .. }) => match *of {
-                Self::Integer { max, .. } => Self::Ascending { max },
-                other => other,
-            },
+            Self::List(of, _) => of.ascending(),
+            Self::Integer { max, .. } => Self::Ascending(max),
             other => other,
         }
     }
 
-    /// Of lists of arrays those whose arrays have each value once.
+    /// Of arrays, or lists of them, those that have each value once.
     #[must_use]
     pub fn different(self) -> Self {
         match self {
-            Self::List { of, length } => Self::List {
-                of: Box::new(of.different()),
-                length: match length {
-                    Length::Exactly(length) => Length::Different(length),
-                    other => other,
-                },
-            },
+            Self::List(of, Length::Exactly(n)) => Self::List(of, Length::Different(n)),
+            Self::List(of, length) => Self::List(Box::new(of.different()), length),
             other => other,
         }
     }
@@ -161,48 +156,46 @@ impl ParamRange {
         Self::Entry(registry)
     }
 
-    /// The values in words: one of them, or several.
+    /// One of the values in words, or many.
     fn words(&self, many: bool) -> String {
-        let noun = |one: &str, several: &str| if many { several } else { one }.to_owned();
-        match self {
-            Self::Number { min, max }
-                if *min <= f64::from(f32::MIN) && *max >= f64::from(f32::MAX) =>
-            {
-                noun(
-                    "a finite number of single precision",
-                    "finite numbers of single precision",
-                )
-            }
-            Self::Number { min, max } => {
-                format!(
-                    "{} in {}",
-                    noun("a number", "numbers"),
-                    interval(*min, *max)
-                )
-            }
-            Self::Integer { min, max } => {
-                format!("{} in [{min}, {max}]", noun("an integer", "integers"))
-            }
-            Self::Stepped { min, max, step } => {
-                let step = match step {
-                    Step::PowerOfTwo => noun("a power of two", "powers of two"),
-                    Step::MultipleOf(x) => {
-                        format!("{} of {x}", noun("a multiple", "multiples"))
-                    }
-                };
-                format!("{step} in [{min}, {max}]")
-            }
-            Self::Flag => "true or false".to_owned(),
-            Self::Choice(names) => format!("one of {}", names.join(", ")),
-            Self::Entry(registry) => format!("the name of one {registry}"),
-            Self::Text => noun("a text", "texts"),
-            Self::Filled => noun("a text that is not empty", "texts that are not empty"),
-            Self::List { of, length } => list_in_words(of, *length, many),
-            Self::Ascending { max } => format!(
-                "a list of ascending integers in [1, {max}], or a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {}",
-                max.ilog2()
+        let (one, several, which) = match self {
+            Self::Number { min, max } if *max >= f32::MAX.into() && *min <= f32::MIN.into() => (
+                "a finite number",
+                "finite numbers",
+                " of single precision".to_owned(),
             ),
-        }
+            Self::Number { min, max } => ("a number", "numbers", interval(*min, *max)),
+            Self::Integer { min, max } => ("an integer", "integers", format!(" in [{min}, {max}]")),
+            Self::Stepped(step, range) => {
+                let which = format!(" in [{}, {}]", range.start(), range.end());
+                match step {
+                    Step::PowerOfTwo => ("a power of two", "powers of two", which),
+                    Step::MultipleOf(x) => ("a multiple", "multiples", format!(" of {x}{which}")),
+                }
+            }
+            Self::Flag => ("true or false", "true or false", String::new()),
+            Self::Choice(names) => ("one of ", "some of ", names.join(", ")),
+            Self::Entry(registry) => ("the name of one ", "names of one ", (*registry).to_owned()),
+            Self::Text => ("a text", "texts", String::new()),
+            Self::Filled => ("a text", "texts", " that is not empty".to_owned()),
+            Self::List(of, length) if many && length.allows(2) && *length != Length::Any => {
+                let length = length.to_string();
+                let length = length.trim_start_matches("two ");
+                ("", "pairs", format!(" of {length}{}", of.words(true)))
+            }
+            Self::List(of, length) => {
+                ("a list", "lists", format!(" of {length}{}", of.words(true)))
+            }
+            Self::Ascending(max) => (
+                "a list",
+                "lists",
+                format!(
+                    " of ascending integers in [1, {max}], or a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {}",
+                    max.ilog2()
+                ),
+            ),
+        };
+        format!("{}{which}", if many { several } else { one })
     }
 
     /// Whether a parameter may have this value. Integers are numbers.
@@ -213,30 +206,27 @@ impl ParamRange {
                 (*min..=*max).contains(&(*x as f64))
             }
             (Self::Integer { min, max }, ParamValue::Integer(x)) => (min..=max).contains(&x),
-            (Self::Stepped { min, max, step }, ParamValue::Integer(x)) => {
+            (Self::Stepped(step, range), ParamValue::Integer(x)) => {
                 let is_step = match step {
                     Step::PowerOfTwo => x.count_ones() == 1,
                     Step::MultipleOf(step) => x % step == 0,
                 };
-                is_step && (min..=max).contains(&x)
+                is_step && range.contains(x)
             }
             (Self::Choice(names), ParamValue::Name(x)) => names.contains(&x.as_str()),
             (Self::Entry(_) | Self::Filled, ParamValue::Name(x)) => !x.is_empty(),
             (Self::Flag, ParamValue::Flag(_)) | (Self::Text, ParamValue::Name(_)) => true,
-            (Self::List { of, length }, ParamValue::List(items)) => {
+            (Self::List(of, length), ParamValue::List(items)) => {
                 let may_repeat = matches!(length, Length::Exactly(_));
                 length.allows(items.len())
                     && items.iter().all(|item| of.allows(item))
                     && (may_repeat || repeated(items).is_none())
             }
-            (Self::Ascending { max }, ParamValue::List(items)) => {
-                let counts: Option<Vec<i64>> = items.iter().map(ParamValue::as_integer).collect();
-                counts.is_some_and(|counts| {
-                    let ends = counts.first().zip(counts.last());
-                    ends.is_some_and(|(first, last)| *first > 0 && last <= max)
-                        && counts.is_sorted_by(|a, b| a < b)
-                })
-            }
+            (Self::Ascending(max), value) => <Vec<u32>>::parse(value).is_some_and(|counts| {
+                let ends = counts.first().zip(counts.last());
+                let within = |(first, last): (&u32, &u32)| *first > 0 && i64::from(*last) <= *max;
+                ends.is_some_and(within) && counts.is_sorted_by(|a, b| a < b)
+            }),
             _ => false,
         }
     }
@@ -245,25 +235,6 @@ impl ParamRange {
 /// The place of the first value that stands before it as well.
 pub fn repeated(items: &[ParamValue]) -> Option<usize> {
     (0..items.len()).find(|&i| items[..i].contains(&items[i]))
-}
-
-fn list_in_words(of: &ParamRange, length: Length, many: bool) -> String {
-    let of = of.words(true);
-    let count = |n: usize| match n {
-        2 => "two".to_owned(),
-        3 => "three".to_owned(),
-        n => n.to_string(),
-    };
-    match (length, many) {
-        (Length::Any, false) => format!("a list of {of}"),
-        (Length::Any, true) => format!("lists of {of}"),
-        (Length::Exactly(2), true) => format!("pairs of {of}"),
-        (Length::Different(2), true) => format!("pairs of different {of}"),
-        (Length::Exactly(n), true) => format!("lists of {} {of}", count(n)),
-        (Length::Different(n), true) => format!("lists of {} different {of}", count(n)),
-        (Length::Exactly(n), false) => format!("a list of {} {of}", count(n)),
-        (Length::Different(n), false) => format!("a list of {} different {of}", count(n)),
-    }
 }
 
 /// One parameter of a registry entry.

@@ -20,16 +20,6 @@ pub enum ParamValue {
     List(Vec<ParamValue>),
 }
 
-impl ParamValue {
-    /// The value, if it is an integer.
-    pub fn as_integer(&self) -> Option<i64> {
-        match self {
-            Self::Integer(x) => Some(*x),
-            _ => None,
-        }
-    }
-}
-
 impl fmt::Display for ParamValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
