@@ -74,19 +74,16 @@ impl Length {
 /// How many, before what: `two different `.
 impl fmt::Display for Length {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (Self::Exactly(length) | Self::Different(length)) = self else {
-            return Ok(());
+        let (length, which) = match self {
+            Self::Any => return Ok(()),
+            Self::Exactly(length) => (length, ""),
+            Self::Different(length) => (length, "different "),
         };
         match length {
-            2 => f.write_str("two ")?,
-            3 => f.write_str("three ")?,
-            length => write!(f, "{length} ")?,
+            2 => write!(f, "two {which}"),
+            3 => write!(f, "three {which}"),
+            length => write!(f, "{length} {which}"),
         }
-        f.write_str(if matches!(self, Self::Different(_)) {
-            "different "
-        } else {
-            ""
-        })
     }
 }
 
