@@ -43,9 +43,10 @@ pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), 
 /// Keys of a section of settings, and of the tables within it.
 fn check_settings(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), ConfigError> {
     let keys = catalogue.keys_of(name);
-    let expected = match name.contains('.') {
-        true => format!("a table of {}", keys.join(", ")),
-        false => "a section".to_owned(),
+    let expected = if name.contains('.') {
+        format!("a table of {}", keys.join(", "))
+    } else {
+        "a section".to_owned()
     };
     let table = item.table(name, &expected)?;
     check_keys(&key_in(name), table, &keys)?;

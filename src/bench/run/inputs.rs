@@ -92,9 +92,10 @@ fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> St
         }
     };
     // Sections that others add may matter to any kind.
-    match further.is_empty() {
-        true => known,
-        false => format!("{known}{further:?}"),
+    if further.is_empty() {
+        known
+    } else {
+        format!("{known}{further:?}")
     }
 }
 

@@ -96,14 +96,18 @@ impl fmt::Display for ParamRange {
 /// An interval. An end next to a number of fewer digits stands for that number, which itself is not in the interval.
 fn interval(min: f64, max: f64) -> String {
     let is_next = |end: f64, next: f64| next.to_string().len() < end.to_string().len();
-    let low = match is_next(min, min.next_down()) {
-        true => format!(" in ({}", min.next_down()),
-        false => format!(" in [{min}"),
+    let (below, above) = (min.next_down(), max.next_up());
+    let low = if is_next(min, below) {
+        format!("({below}")
+    } else {
+        format!("[{min}")
     };
-    match is_next(max, max.next_up()) {
-        true => format!("{low}, {})", max.next_up()),
-        false => format!("{low}, {max}]"),
-    }
+    let high = if is_next(max, above) {
+        format!("{above})")
+    } else {
+        format!("{max}]")
+    };
+    format!(" in {low}, {high}")
 }
 
 impl ParamRange {

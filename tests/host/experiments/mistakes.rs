@@ -2,11 +2,12 @@
 //!
 //! `mistakes.txt` has a case behind each line `= name`: lines that follow [`AXES`], directives (`% …`), and behind `>` what
 //! comes out. Directives: `whole` (nothing goes before), `set` and `only` (as on the command line), `load` (a file),
-//! `refuse` (the sequence `halton` goes with nothing), `settings` (what hashes are made of, not only whether it is accepted).
+//! `refuse` (of sequences, `pixel-hash` alone makes sense), `settings` (what hashes are made of, not only whether it is accepted).
 //! `RAYSTONE_WRITE_MISTAKES=1` writes the answers anew, for a change on purpose.
 
 use super::{AXES, assert_says, catalogue, parse};
 use raystone::config::{ConfigError, Experiment, Plan};
+use raystone::params::Variant;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -64,17 +65,17 @@ impl Case {
         let experiment =
             Experiment::parse(&text, "dir/trial.toml", &self.directives("set"), &known)?;
         let refuses = self.has("refuse");
-        let plan = Plan::new(
-            &experiment,
-            &self.directives("only"),
-            |sequence, _| match refuses && sequence.name != "pixel-hash" {
-                true => Err(format!("{} goes with nothing", sequence.name)),
-                false => Ok(true),
-            },
-        )?;
-        Ok(match self.has("settings") {
-            true => settings(&experiment),
-            false => format!("accepted, {} cells", plan.times.len()),
+        let is_randomised = |sequence: &Variant, _: &Variant| {
+            if refuses && sequence.name != "pixel-hash" {
+                return Err(format!("{} goes with nothing", sequence.name));
+            }
+            Ok(true)
+        };
+        let plan = Plan::new(&experiment, &self.directives("only"), is_randomised)?;
+        Ok(if self.has("settings") {
+            settings(&experiment)
+        } else {
+            format!("accepted, {} cells", plan.times.len())
         })
     }
 }
