@@ -34,5 +34,5 @@ pub use sections::{
     Animation, Coherence, Discrepancy, Gate, Motion, Reference, Rule, Run, SppCounts, StopRule,
     Timing, View,
 };
-pub use settings::{Section, Settings};
+pub use settings::{Contradiction, Section, Settings};
 pub use units::{Shard, Unit, UnitKind, shards, unit_name};

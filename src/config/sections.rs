@@ -1,7 +1,7 @@
 //! The sections of settings that experiments have: a key is a field, with its meaning, type, default and range.
 //! From these declarations come the parser, its messages, the defaults and the table in `docs/experiments.md`.
 
-use super::settings::Settings;
+use super::settings::{Contradiction, Settings};
 use raystone_core::geometry::Camera;
 use raystone_core::parameters;
 use raystone_core::params::Bounded;
@@ -227,7 +227,7 @@ parameters! {
 impl Settings for Run {
     const SECTION: &'static str = "run";
 
-    fn contradiction(&self) -> Option<(&'static str, String)> {
+    fn contradiction(&self) -> Option<Contradiction> {
         let name = self.name.as_ref()?;
         let expected = || ("name", "a text without control characters".to_owned());
         name.contains(char::is_control).then(expected)
@@ -243,7 +243,7 @@ impl Settings for View {
     const SECTION: &'static str = "camera";
     const REQUIRED: &'static [&'static str] = &["eye", "target"];
 
-    fn contradiction(&self) -> Option<(&'static str, String)> {
+    fn contradiction(&self) -> Option<Contradiction> {
         let camera = Camera::from(*self);
         // `try_normalize` also refuses lengths that overflow.
         let Some(view) = (camera.target - camera.eye).try_normalize() else {
@@ -275,7 +275,7 @@ impl Settings for Reference {
 impl Settings for Timing {
     const SECTION: &'static str = "timing";
 
-    fn contradiction(&self) -> Option<(&'static str, String)> {
+    fn contradiction(&self) -> Option<Contradiction> {
         let expected = || {
             (
                 "max_warmup_ms",

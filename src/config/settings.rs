@@ -6,6 +6,9 @@ use super::values;
 use raystone_core::params::{Entry, ParamError, Parameters, Params};
 use std::collections::BTreeMap;
 
+/// A key whose value others forbid, and what it must be.
+pub type Contradiction = (&'static str, String);
+
 /// A section of settings of an experiment, declared by [`parameters!`](raystone_core::parameters).
 pub trait Settings: Parameters {
     /// Name of the section; behind a dot, of a table within a section.
@@ -13,8 +16,8 @@ pub trait Settings: Parameters {
     /// Keys that must be given where the section is. Their defaults are not in their ranges.
     const REQUIRED: &'static [&'static str] = &[];
 
-    /// The key whose value others forbid, and what it must be.
-    fn contradiction(&self) -> Option<(&'static str, String)> {
+    /// What two of its values must not say together.
+    fn contradiction(&self) -> Option<Contradiction> {
         None
     }
 }
@@ -26,7 +29,7 @@ pub struct Section {
     pub entry: Entry,
     /// Keys that must be given.
     pub required: &'static [&'static str],
-    check: fn(&Params) -> Result<Option<(&'static str, String)>, ParamError>,
+    check: fn(&Params) -> Result<Option<Contradiction>, ParamError>,
 }
 
 impl Section {
