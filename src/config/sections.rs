@@ -4,8 +4,7 @@
 use super::settings::{Contradiction, Settings};
 use raystone_core::geometry::Camera;
 use raystone_core::parameters;
-use raystone_core::params::Bounded;
-use raystone_core::params::{ParamRange, ParamValue, ParameterType, Variant};
+use raystone_core::params::{Bounded, ParamRange, ParamValue, ParameterType, Variant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
