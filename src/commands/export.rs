@@ -82,8 +82,8 @@ impl ExportMitsuba {
         raystone::scene::check_camera(&camera)?;
         let settings = MitsubaSettings {
             camera,
-            size: experiment.resolution,
-            spp: experiment.spp.max(),
+            size: experiment.run.resolution,
+            spp: experiment.run.spp.max(),
             bounces: bounces.1,
             fronts_only: self.fronts_only,
         };

@@ -5,7 +5,7 @@ use super::list_json::lists;
 use super::output::{OutputArguments, print, print_json};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use raystone::config::Axis;
+use raystone::config::{Axis, Catalogue};
 use raystone::discrepancy::Measure;
 use raystone::export::FORMATS;
 use raystone::measure::figure::{Better, FIGURES};
@@ -16,7 +16,7 @@ use raystone::scene::{LIGHT_KINDS, MATERIAL_KINDS};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-/// List everything that can be named: scenes, structures, samplers, integrators, materials, lights, metrics,
+/// List everything that can be named: scenes, structures, samplers, integrators, settings, materials, lights, metrics,
 /// measures, figures, formats, adapters
 #[derive(Args)]
 pub struct List {
@@ -54,6 +54,8 @@ pub enum Topic {
     Peer,
     #[value(alias = "workgroups")]
     Workgroup,
+    #[value(alias = "settings")]
+    Setting,
     #[value(alias = "metrics")]
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
@@ -104,7 +106,8 @@ impl List {
         let sections: Vec<String> = topics
             .iter()
             .map(|topic| match (topic, topic.axis()) {
-                (_, Some(axis)) => entries(axis, &catalogue[axis]),
+                (_, Some(axis)) => entries(&heading(axis), &catalogue[axis]),
+                (Topic::Setting, _) => settings(&catalogue),
                 (Topic::Material, _) => materials(),
                 (Topic::Light, _) => lights(),
                 (Topic::Metric, _) => metrics(),
@@ -126,20 +129,33 @@ impl List {
     }
 }
 
-fn entries(axis: Axis, entries: &[Entry]) -> String {
-    let width = entries.iter().map(|e| e.name.len()).max().unwrap_or(0);
-    let mut text = match axis {
-        Axis::Scene => {
-            "scene: built in, or the path of a .obj, .gltf, .glb, .ply or Nori .xml file\n".into()
-        }
-        Axis::Triangle => "triangle: ray-triangle test of all structures\n".into(),
-        Axis::BoxTest => "box_test: of all structures\n".into(),
-        Axis::Offset => "offset: how rays leave a surface\n".into(),
-        Axis::Organisation => "organisation: of the path tracer on the device\n".into(),
-        Axis::Peer => "peer: ray casters of others, to measure against\n".into(),
-        Axis::Workgroup => "workgroup: of kernels that trace\n".into(),
-        axis => format!("{axis}\n"),
+/// What is said of an axis before its entries.
+fn heading(axis: Axis) -> String {
+    let of = match axis {
+        Axis::Scene => ": built in, or the path of a .obj, .gltf, .glb, .ply or Nori .xml file",
+        Axis::Triangle => ": ray-triangle test of all structures",
+        Axis::BoxTest => ": of all structures",
+        Axis::Offset => ": how rays leave a surface",
+        Axis::Organisation => ": of the path tracer on the device",
+        Axis::Peer => ": ray casters of others, to measure against",
+        Axis::Workgroup => ": of kernels that trace",
+        _ => "",
     };
+    format!("{axis}{of}\n")
+}
+
+fn settings(catalogue: &Catalogue) -> String {
+    let sections = catalogue.sections().iter();
+    let sections: Vec<Entry> = sections.map(|section| section.entry.clone()).collect();
+    entries(
+        "setting: sections of experiment files, and their keys\n",
+        &sections,
+    )
+}
+
+fn entries(heading: &str, entries: &[Entry]) -> String {
+    let width = entries.iter().map(|e| e.name.len()).max().unwrap_or(0);
+    let mut text = heading.to_owned();
     // Writing to a string cannot fail.
     for (i, entry) in entries.iter().enumerate() {
         let _ = writeln!(text, "  {:width$}  {}", entry.name, entry.description);
@@ -148,7 +164,11 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
             let _ = writeln!(
                 text,
                 "  {:width$}    {} = {}: {} ({})",
-                "", parameter.name, parameter.default, parameter.description, parameter.range,
+                "",
+                parameter.name,
+                default(parameter),
+                parameter.description,
+                parameter.range,
             );
         }
         if let Some((from, names)) = shared {
@@ -156,6 +176,12 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
         }
     }
     text
+}
+
+/// The default of a parameter; a dash where it has none that could be written.
+pub fn default(parameter: &Parameter) -> String {
+    let default = parameter.default_written();
+    default.map_or("–".to_owned(), ToString::to_string)
 }
 
 fn lights() -> String {

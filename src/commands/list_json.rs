@@ -1,7 +1,7 @@
 //! `raystone list --json`.
 
 use super::adapters;
-use super::list::Topic;
+use super::list::{Topic, default};
 use clap::ValueEnum as _;
 use raystone::config::Catalogue;
 use raystone::discrepancy::Measure;
@@ -30,6 +30,7 @@ fn list(topic: Topic, catalogue: &Catalogue) -> Value {
     }
     let named = |name: &str, description: &str| json!({ "name": name, "description": description });
     match topic {
+        Topic::Setting => catalogue.sections().iter().map(|section| entry(&section.entry)).collect(),
         Topic::Material => (MATERIAL_KINDS.iter())
             .map(|kind| json!({ "name": kind.name, "description": kind.description, "parameters": kind.parameters }))
             .collect(),
@@ -46,7 +47,7 @@ fn entry(entry: &Entry) -> Value {
     let parameters = entry.schema.iter().map(|p| {
         json!({
             "name": p.name,
-            "default": p.default.to_string(),
+            "default": default(p),
             "range": p.range.to_string(),
             "description": p.description,
         })

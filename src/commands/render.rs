@@ -100,7 +100,7 @@ impl Render {
                 preview: self.preview.as_deref(),
             },
         )?;
-        super::output::tell(summary(&rendering, experiment.resolution).trim_end());
+        super::output::tell(summary(&rendering, experiment.run.resolution).trim_end());
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -225,8 +225,8 @@ mod tests {
         let flags =
             "--spp 12 --size 64x48 --seed 9001 --accel roped-bvh --set run.resolution=[32,24]";
         let experiment = experiment(&flags.split(' ').collect::<Vec<_>>()).unwrap();
-        assert_eq!((experiment.spp.max(), experiment.seed), (12, 9001));
-        assert_eq!(experiment.resolution, [32, 24]);
+        assert_eq!((experiment.run.spp.max(), experiment.run.seed), (12, 9001));
+        assert_eq!(experiment.run.resolution, [32, 24]);
         assert_eq!(experiment.axes[Axis::Accel][0].name, "roped-bvh");
         assert_eq!(experiment.axes[Axis::Scene][0].name, "cornell-box");
     }

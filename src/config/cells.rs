@@ -1,7 +1,6 @@
 //! The cells of a plan.
 
-use super::axis_map::AxisMap;
-use super::keys::Axis;
+use super::axis::{Axis, AxisMap};
 use raystone_core::params::{Params, Variant};
 use std::collections::BTreeMap;
 use std::fmt;

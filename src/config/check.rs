@@ -1,85 +1,101 @@
 //! Checks of the merged tree that need no typed reading: is every section, key and name known, and
 //! does every section and pattern concern something that is on an axis.
 
+use super::axis::Axis;
 use super::error::{ConfigError, Place};
 use super::experiment::Axes;
-use super::keys::{self, Axis};
 use super::pattern::Pattern;
+use super::settings::Section;
 use super::tree::{Item, Table, Value};
 use super::{Catalogue, variants};
 
-fn owned(names: &[&str]) -> Vec<String> {
-    names.iter().map(|name| (*name).to_owned()).collect()
-}
+/// The section of what is varied.
+pub(super) const AXES: &str = "axes";
+
+/// The sections of tables that each name cells.
+const CELL_SETS: [&str; 2] = ["exclude", "include"];
 
 /// Every section, key and entry that is written must be known.
 pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), ConfigError> {
-    let sections = keys::sections();
+    let axes = Axis::ALL.map(Axis::name);
     for (name, item) in tree {
-        if name == "intersection" {
-            return Err(ConfigError::Refused {
-                at: item.at.to_string(),
-                reason: "its keys are axes: write `triangle`, `box_test` and `offset` under [axes], each a \
-                         name or a list of names"
-                    .to_owned(),
-            });
-        }
-        if !sections.contains(&name.as_str()) {
-            let what = match item.value {
-                Value::Table(_) => "section",
-                _ => "key outside all sections",
-            };
-            return Err(ConfigError::Unknown {
-                at: item.at.clone(),
-                what: what.to_owned(),
-                name: name.clone(),
-                known: owned(&sections),
-            });
-        }
         if let Some(axis) = Axis::from_name(name) {
-            let section = as_table(item, name, "sections [NAME] of parameters")?;
+            let section = item.table(name, "sections [NAME] of parameters")?;
             for (entry, item) in section {
-                variants::resolve(axis, item, entry, catalogue)?;
+                variants::resolve(axis, &item.at, entry, catalogue)?;
                 parameter_tables(axis, entry, item)?;
             }
-        } else if name == "exclude" || name == "include" {
+        } else if CELL_SETS.contains(&name.as_str()) {
             for (_, table) in cell_tables(name, item)? {
-                check_keys(name, table)?;
+                check_keys(&key_in(name), table, &axes)?;
             }
+        } else if name == AXES {
+            check_keys(&key_in(name), item.table(name, "a section")?, &axes)?;
+        } else if catalogue.keys_of(name).is_empty() {
+            return Err(unknown_section(name, item, catalogue));
         } else {
-            check_keys(name, as_table(item, name, "a section")?)?;
+            check_settings(name, item, catalogue)?;
         }
     }
     Ok(())
 }
 
-fn check_keys(section: &str, table: &Table) -> Result<(), ConfigError> {
-    for (name, item) in table {
-        if keys::find(section, name).is_none() {
-            return Err(ConfigError::Unknown {
-                at: item.at.clone(),
-                what: format!("key in [{section}]"),
-                name: name.clone(),
-                known: owned(&keys::names_in(section)),
-            });
+/// Keys of a section of settings, and of the tables within it.
+fn check_settings(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), ConfigError> {
+    let keys = catalogue.keys_of(name);
+    let expected = if name.contains('.') {
+        format!("a table of {}", keys.join(", "))
+    } else {
+        "a section".to_owned()
+    };
+    let table = item.table(name, &expected)?;
+    check_keys(&key_in(name), table, &keys)?;
+    for (key, item) in table {
+        let within = format!("{name}.{key}");
+        if !catalogue.keys_of(&within).is_empty() {
+            check_settings(&within, item, catalogue)?;
         }
     }
     Ok(())
 }
 
-pub(super) fn as_table<'t>(
-    item: &'t Item,
-    key: &str,
-    expected: &str,
-) -> Result<&'t Table, ConfigError> {
-    match &item.value {
-        Value::Table(table) => Ok(table),
-        other => Err(ConfigError::WrongType {
-            at: item.at.clone(),
-            key: key.to_owned(),
-            expected: expected.to_owned(),
-            found: other.describe(),
-        }),
+fn unknown_section(name: &str, item: &Item, catalogue: &Catalogue) -> ConfigError {
+    if name == "intersection" {
+        return ConfigError::Refused {
+            at: item.at.to_string(),
+            reason:
+                "its keys are axes: write `triangle`, `box_test` and `offset` under [axes], each a \
+                     name or a list of names"
+                    .to_owned(),
+        };
+    }
+    let settings = catalogue.sections().iter().map(Section::name);
+    let settings = settings.filter(|name| !name.contains('.'));
+    let known = settings
+        .chain([AXES])
+        .chain(CELL_SETS)
+        .chain(Axis::ALL.map(Axis::name));
+    let what = match item.value {
+        Value::Table(_) => "section",
+        _ => "key outside all sections",
+    };
+    ConfigError::unknown(&item.at, what, name, known)
+}
+
+/// What messages call a key of a section.
+pub(super) fn key_in(section: &str) -> String {
+    format!("key in [{section}]")
+}
+
+/// Keys that are written must be among those known; `what` is what messages call them.
+pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<(), ConfigError> {
+    let is_known = |name: &String| known.contains(&name.as_str());
+    match table.iter().find(|(name, _)| !is_known(name)) {
+        None => Ok(()),
+        Some((name, item)) => {
+            let known = known.iter().copied();
+            Err(ConfigError::unknown(&item.at, what, name, known))
+        }
     }
 }
 
@@ -92,14 +108,9 @@ pub(super) fn cell_tables<'t>(
     match &item.value {
         Value::List(items) => items
             .iter()
-            .map(|item| Ok((&item.at, as_table(item, section, &expected)?)))
+            .map(|item| Ok((&item.at, item.table(section, &expected)?)))
             .collect(),
-        other => Err(ConfigError::WrongType {
-            at: item.at.clone(),
-            key: section.to_owned(),
-            expected,
-            found: other.describe(),
-        }),
+        _ => Err(item.wrong_type(section, expected)),
     }
 }
 
@@ -115,9 +126,9 @@ pub(super) fn parameter_tables<'t>(
     match &item.value {
         Value::List(items) if !items.is_empty() => items
             .iter()
-            .map(|item| as_table(item, &key, EXPECTED))
+            .map(|item| item.table(&key, EXPECTED))
             .collect(),
-        _ => Ok(vec![as_table(item, &key, EXPECTED)?]),
+        _ => Ok(vec![item.table(&key, EXPECTED)?]),
     }
 }
 
@@ -165,4 +176,25 @@ pub(super) fn pattern_list(
         Ok(pattern)
     });
     patterns.collect()
+}
+
+/// The texts of a list that is not empty; a text alone is a list of one.
+pub(super) fn texts<'t>(
+    key: &str,
+    item: &'t Item,
+) -> Result<Vec<(&'t Item, &'t str)>, ConfigError> {
+    let wrong_type = |item: &Item| item.wrong_type(key, "a text or a list of texts");
+    let items = match &item.value {
+        Value::Text(_) => std::slice::from_ref(item),
+        Value::List(items) => items,
+        _ => return Err(wrong_type(item)),
+    };
+    if items.is_empty() {
+        return Err(item.empty(key));
+    }
+    let text = |item: &'t Item| match &item.value {
+        Value::Text(text) => Ok((item, text.as_str())),
+        _ => Err(wrong_type(item)),
+    };
+    items.iter().map(text).collect()
 }

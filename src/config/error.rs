@@ -22,6 +22,16 @@ pub enum Place {
     Default,
 }
 
+impl Place {
+    /// The first line of a file, for what is missing from it.
+    pub(super) fn start_of(file: &str) -> Self {
+        Self::File {
+            file: file.into(),
+            line: 1,
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -197,6 +207,23 @@ pub enum ConfigError {
         /// What removed the last cell.
         reason: String,
     },
+}
+
+impl ConfigError {
+    /// The error for a name that is not among those known.
+    pub(super) fn unknown<'n>(
+        at: &Place,
+        what: impl Into<String>,
+        name: &str,
+        known: impl IntoIterator<Item = &'n str>,
+    ) -> Self {
+        Self::Unknown {
+            at: at.clone(),
+            what: what.into(),
+            name: name.to_owned(),
+            known: known.into_iter().map(str::to_owned).collect(),
+        }
+    }
 }
 
 /// Longest list of known names that an error message spells out.

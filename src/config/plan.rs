@@ -5,9 +5,9 @@
 //! for every full cell, at few samples per pixel. The plan counts what this saves.
 
 use super::ConfigError;
+use super::axis::Axis;
 use super::cells::{Cell, NO_PEER, is_compaction};
 use super::experiment::Experiment;
-use super::keys::Axis;
 use super::pattern::Selector;
 use super::product::{
     Point, asked_once, check_size, excluded, filter, included, product, refused, shared, unmet,
@@ -128,7 +128,7 @@ impl Plan {
             samplers,
             kernels: Vec::new(),
             skipped,
-            replicates: experiment.replicates,
+            replicates: experiment.run.replicates,
             only: only.to_vec(),
         };
         plan.finished(experiment, refused, only)

@@ -1,11 +1,10 @@
 //! The product of the axes: its points, filters and excludes.
 
 use super::ConfigError;
-use super::axis_map::AxisMap;
+use super::axis::{Axis, AxisMap};
 use super::cells::Cell;
 use super::error::Place;
 use super::experiment::{Axes, CellSet, Condition, Experiment};
-use super::keys::Axis;
 use super::pattern::Selector;
 use super::plan::Skipped;
 use raystone_core::params::Variant;
@@ -23,10 +22,7 @@ pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
         return Ok(());
     }
     Err(ConfigError::TooMany {
-        at: Place::File {
-            file: experiment.source.as_str().into(),
-            line: 1,
-        },
+        at: Place::start_of(&experiment.source),
         what: "the cells of all axes".to_owned(),
         count: cells,
         limit: MAX_CELLS,

@@ -1,11 +1,11 @@
 //! TOML values that remember where they were written, and layers of them.
 //!
-//! An experiment is three layers merged into one tree: the defaults of [`super::keys::KEYS`], the
-//! file, and the overrides of the command line. Since every item keeps its [`Place`], one walk of
-//! the merged tree checks all three and still says where a fault was written.
+//! The file and the overrides of the command line are merged into one tree. Since every item keeps its [`Place`], one walk
+//! of it checks both and still says where a fault was written.
 
 use super::error::{ConfigError, Place};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
@@ -18,6 +18,59 @@ pub(super) struct Item {
 }
 
 impl Item {
+    /// The table that it has to be; messages call it `key`, and say what is expected.
+    pub(crate) fn table(&self, key: &str, expected: &str) -> Result<&Table, ConfigError> {
+        match &self.value {
+            Value::Table(table) => Ok(table),
+            _ => Err(self.wrong_type(key, expected)),
+        }
+    }
+
+    /// The error for a value of a type that `key` does not have.
+    pub(crate) fn wrong_type(&self, key: &str, expected: impl ToString) -> ConfigError {
+        ConfigError::WrongType {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            expected: expected.to_string(),
+            found: self.value.describe(),
+        }
+    }
+
+    /// The error for a value that `key` must not have.
+    pub(crate) fn out_of_range(&self, key: &str, expected: impl ToString) -> ConfigError {
+        ConfigError::OutOfRange {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            value: self.value.to_string(),
+            expected: expected.to_string(),
+        }
+    }
+
+    /// The error for a list without a value.
+    pub(crate) fn empty(&self, key: &str) -> ConfigError {
+        ConfigError::Empty {
+            at: self.at.clone(),
+            key: key.to_owned(),
+        }
+    }
+
+    /// The error for a value that stands before it in a list.
+    pub(crate) fn duplicate(&self, key: &str) -> ConfigError {
+        ConfigError::Duplicate {
+            at: self.at.clone(),
+            key: key.to_owned(),
+            value: self.value.to_string(),
+        }
+    }
+
+    /// A text that nobody wrote.
+    pub(crate) fn default_text(text: &str) -> Self {
+        Self {
+            at: Place::Default,
+            value: Value::Text(text.to_owned()),
+        }
+    }
+
     /// Whether any part of the item was written on the command line.
     pub(crate) fn has_override(&self) -> bool {
         let inside = match &self.value {
@@ -55,6 +108,25 @@ impl Value {
             Self::Other(text) => text.clone(),
             Self::List(items) => format!("a list of {}", items.len()),
             Self::Table(_) => "a table".to_owned(),
+        }
+    }
+}
+
+/// The value as a file would say it.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // Control characters must not reach a terminal.
+            Self::Text(text) => write!(f, "{text:?}"),
+            Self::Integer(x) => write!(f, "{x}"),
+            Self::Number(x) => write!(f, "{x}"),
+            Self::Flag(x) => write!(f, "{x}"),
+            Self::Other(text) => f.write_str(text),
+            Self::List(items) => {
+                let items: Vec<_> = items.iter().map(|item| item.value.to_string()).collect();
+                write!(f, "[{}]", items.join(", "))
+            }
+            Self::Table(_) => f.write_str("a table"),
         }
     }
 }
@@ -163,36 +235,20 @@ fn sole_leaf(table: &mut Table) -> Option<&mut Item> {
     }
 }
 
-/// Parses the TOML text of a default.
-///
-/// # Panics
-/// If the text is not TOML: a fault of the table of keys, which tests walk.
-pub(super) fn default_value(text: &str) -> Value {
-    match DeValue::parse(text) {
-        Ok(value) => convert(value.get_ref(), &|_| Place::Default),
-        Err(error) => panic!("default {text} is not TOML: {error}"),
-    }
-}
-
 /// Lays `over` on `base`: tables merge key by key, everything else is replaced.
 pub(super) fn merge(base: &mut Table, over: Table) {
     for (key, item) in over {
         match (base.get_mut(&key), item) {
             (
                 Some(Item {
-                    at,
                     value: Value::Table(base),
+                    ..
                 }),
                 Item {
-                    at: over_at,
                     value: Value::Table(over),
+                    ..
                 },
-            ) => {
-                if *at == Place::Default {
-                    *at = over_at;
-                }
-                merge(base, over);
-            }
+            ) => merge(base, over),
             (_, item) => {
                 base.insert(key, item);
             }

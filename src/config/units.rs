@@ -1,8 +1,8 @@
 //! Parts that a plan is divided into.
 
+use super::axis::Axis;
 use super::cells::Cell;
 use super::experiment::Experiment;
-use super::keys::Axis;
 use super::plan::Plan;
 use std::fmt;
 use std::str::FromStr;

@@ -1,10 +1,13 @@
 //! From names and parameter lists to the variants of an axis.
 
 use super::Catalogue;
-use super::error::ConfigError;
-use super::keys::Axis;
+use super::axis::Axis;
+use super::error::{ConfigError, Place};
 use super::tree::{Item, Table, Value};
-use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant};
+use super::values::value;
+use raystone_core::params::{
+    Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant, repeated,
+};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.
@@ -13,7 +16,7 @@ const MODEL_EXTENSIONS: [&str; 5] = ["obj", "gltf", "glb", "ply", "xml"];
 /// The entry called `name`; also one made up for the path of a model or a folder of kernels.
 pub(super) fn resolve(
     axis: Axis,
-    name: &Item,
+    at: &Place,
     text: &str,
     catalogue: &Catalogue,
 ) -> Result<Entry, ConfigError> {
@@ -39,12 +42,8 @@ pub(super) fn resolve(
         }
         axis => axis.name(),
     };
-    Err(ConfigError::Unknown {
-        at: name.at.clone(),
-        what: what.to_owned(),
-        name: text.to_owned(),
-        known: entries.iter().map(|entry| entry.name.clone()).collect(),
-    })
+    let known = entries.iter().map(|entry| entry.name.as_str());
+    Err(ConfigError::unknown(at, what, text, known))
 }
 
 /// Parameters that all entries of an axis have: files have them, too.
@@ -82,12 +81,9 @@ pub(super) fn expand(
         .filter(|(name, _)| name.as_str() != WHEN)
         .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
     {
-        return Err(ConfigError::Unknown {
-            at: item.at.clone(),
-            what: format!("parameter of {axis} {}", entry.name),
-            name: name.clone(),
-            known: entry.schema.iter().map(|p| p.name.to_owned()).collect(),
-        });
+        let what = format!("parameter of {axis} {}", entry.name);
+        let known = entry.schema.iter().map(|p| p.name);
+        return Err(ConfigError::unknown(&item.at, what, name, known));
     }
     let mut products = vec![Vec::new()];
     for parameter in &entry.schema {
@@ -95,7 +91,7 @@ pub(super) fn expand(
             continue;
         };
         let key = format!("{axis}.{}.{}", entry.name, parameter.name);
-        let values = values(&key, item, parameter)?;
+        let values = listed(&key, item, &parameter.range)?;
         check_count(axis, item, products.len().saturating_mul(values.len()))?;
         products = products
             .iter()
@@ -131,62 +127,22 @@ pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), C
 }
 
 /// The values that an experiment gives to one parameter: one, or a list of different ones.
-fn values(key: &str, item: &Item, parameter: &Parameter) -> Result<Vec<ParamValue>, ConfigError> {
-    let Value::List(items) = &item.value else {
-        return Ok(vec![value(key, item, parameter)?]);
+fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>, ConfigError> {
+    let items = match &item.value {
+        // A list is one value of a parameter that takes lists.
+        Value::List(items) if !matches!(range, ParamRange::List(..) | ParamRange::Ascending(_)) => {
+            items
+        }
+        _ => std::slice::from_ref(item),
     };
     if items.is_empty() {
-        return Err(ConfigError::Empty {
-            at: item.at.clone(),
-            key: key.to_owned(),
-        });
+        return Err(item.empty(key));
     }
-    let mut values = Vec::with_capacity(items.len());
-    for item in items {
-        let value = value(key, item, parameter)?;
-        if values.contains(&value) {
-            return Err(ConfigError::Duplicate {
-                at: item.at.clone(),
-                key: key.to_owned(),
-                value: value.to_string(),
-            });
-        }
-        values.push(value);
-    }
-    Ok(values)
-}
-
-fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, ConfigError> {
-    let range = &parameter.range;
-    let value = match (range, &item.value) {
-        (ParamRange::Number { .. }, Value::Number(x)) => ParamValue::Number(*x),
-        (ParamRange::Number { .. }, Value::Integer(x)) => ParamValue::Number(*x as f64),
-        (ParamRange::Integer { .. }, Value::Integer(x)) => ParamValue::Integer(*x),
-        (ParamRange::Flag, Value::Flag(x)) => ParamValue::Flag(*x),
-        (ParamRange::Choice(_) | ParamRange::Text, Value::Text(x)) => ParamValue::Name(x.clone()),
-        (_, found) => {
-            return Err(ConfigError::WrongType {
-                at: item.at.clone(),
-                key: key.to_owned(),
-                expected: range.to_string(),
-                found: found.describe(),
-            });
-        }
-    };
-    match range {
-        _ if range.allows(&value) => Ok(value),
-        ParamRange::Choice(names) => Err(ConfigError::Unknown {
-            at: item.at.clone(),
-            what: format!("value of `{key}`"),
-            name: value.to_string(),
-            known: names.iter().map(|name| (*name).to_owned()).collect(),
-        }),
-        _ => Err(ConfigError::OutOfRange {
-            at: item.at.clone(),
-            key: key.to_owned(),
-            value: value.to_string(),
-            expected: range.to_string(),
-        }),
+    let values = items.iter().map(|item| value(key, item, range));
+    let values: Vec<ParamValue> = values.collect::<Result<_, _>>()?;
+    match repeated(&values) {
+        None => Ok(values),
+        Some(again) => Err(items[again].duplicate(key)),
     }
 }
 

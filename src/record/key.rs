@@ -6,32 +6,34 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Names of axes, in the order in which exports show them.
+/// Names of axes, in the order in which exports show them: those of experiments, and others that figures have.
 pub mod axis {
+    use raystone_config::Axis;
+
     /// What is traced.
-    pub const SCENE: &str = "scene";
+    pub const SCENE: &str = Axis::Scene.name();
     /// Acceleration structure.
-    pub const ACCEL: &str = "accel";
+    pub const ACCEL: &str = Axis::Accel.name();
     /// What is computed.
-    pub const INTEGRATOR: &str = "integrator";
+    pub const INTEGRATOR: &str = Axis::Integrator.name();
     /// Sample sequence.
-    pub const SEQUENCE: &str = "sequence";
+    pub const SEQUENCE: &str = Axis::Sequence.name();
     /// How the sequence is moved from pixel to pixel.
-    pub const DECORRELATION: &str = "decorrelation";
+    pub const DECORRELATION: &str = Axis::Decorrelation.name();
     /// Kernels in the place of the embedded ones; absent for these.
-    pub const KERNELS: &str = "kernels";
+    pub const KERNELS: &str = Axis::Kernels.name();
     /// Ray–triangle test; absent where no ray is traced.
-    pub const TRIANGLE: &str = "triangle";
+    pub const TRIANGLE: &str = Axis::Triangle.name();
     /// Ray–box test; absent where no ray is traced.
-    pub const BOX_TEST: &str = "box_test";
+    pub const BOX_TEST: &str = Axis::BoxTest.name();
     /// How rays are moved off the surface that they leave; absent where none is.
-    pub const OFFSET: &str = "offset";
+    pub const OFFSET: &str = Axis::Offset.name();
     /// How the path tracer is organised; absent where none runs.
-    pub const ORGANISATION: &str = "organisation";
+    pub const ORGANISATION: &str = Axis::Organisation.name();
     /// Ray caster of others; absent for what is this crate's.
-    pub const PEER: &str = "peer";
+    pub const PEER: &str = Axis::Peer.name();
     /// In which workgroups kernels trace; absent where none does.
-    pub const WORKGROUP: &str = "workgroup";
+    pub const WORKGROUP: &str = Axis::Workgroup.name();
     /// Family of hard scenes and rays.
     pub const FAMILY: &str = "family";
     /// Mesh that is shot at.

@@ -57,7 +57,7 @@ impl Measurement for CameraRays {
     }
 
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
-        format!("{:?} {:?}", experiment.resolution, experiment.timing)
+        format!("{:?} {:?}", experiment.run.resolution, experiment.timing)
     }
 
     fn cost(&self, _: &Cell, cost: &Cost) -> Work {
@@ -67,7 +67,7 @@ impl Measurement for CameraRays {
     fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         Box::new(cells.iter().map(move |cell| {
             let stage = at.stage.expect("its cells have a scene");
-            let [width, height] = at.experiment.resolution;
+            let [width, height] = at.experiment.run.resolution;
             let camera = stage.scene.view(width as f32 / height as f32);
             let mut rays = primary_rays(camera, width, height);
             rays.reverse();

@@ -1,6 +1,6 @@
 //! Parameters that a library user declares: read, refused and swept like those of the program.
 
-use raystone::config::{Axis, Catalogue, Experiment};
+use raystone::config::{Axis, Catalogue, Experiment, Settings};
 use raystone::parameters;
 use raystone::params::{
     Choice as _, Entry, ParamError, ParamRange, ParamValue, Parameters as _, Params,
@@ -28,12 +28,37 @@ parameters! {
         clear: f32 = 0.2, in 0.0..=1.0;
     }
 
+    /// A measurement of its own.
+    pub struct Warmth {
+        /// Times of day, hours
+        hours: Vec<u32> = vec![6, 12], in 0..=23;
+        /// Edges of a window, pixels
+        window: [u32; 2] = [8, 8], in 1..=64, where power_of_two();
+        /// A file that says more
+        notes: Option<String> = None;
+        /// Degrees at which it ends
+        limit: f32 = f32::NAN, in -40.0..=60.0;
+        /// Where it is measured
+        place: Place = Place::OnTheCeiling;
+    }
+
     /// Where a lamp stands.
     pub enum Place {
         /// Above.
         OnTheCeiling = "on-the-ceiling",
         /// Below.
         OnTheFloor = "on-the-floor",
+    }
+}
+
+/// All that a measurement adds to have a section of its own.
+impl Settings for Warmth {
+    const SECTION: &'static str = "warmth";
+    const REQUIRED: &'static [&'static str] = &["limit"];
+
+    fn contradiction(&self) -> Option<(&'static str, String)> {
+        let is_cold = self.place == Place::OnTheFloor && self.limit > 30.0;
+        is_cold.then(|| ("limit", "at most 30 on the floor".to_owned()))
     }
 }
 
@@ -153,5 +178,86 @@ fn an_experiment_sweeps_them() {
     ] {
         let error = parse(values).expect_err(values).to_string();
         assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn a_section_of_settings_is_added_in_one_place_and_read() {
+    let mut catalogue: Catalogue = raystone::run::Registries::default().catalogue();
+    let text = |more: &str| {
+        format!("[axes]\nscene = \"city\"\naccel = \"bvh\"\nsequence = \"sobol\"\n{more}")
+    };
+    let parse = |more: &str, known: &Catalogue| {
+        Experiment::parse(
+            &text(more),
+            "warm.toml",
+            &["timing.rounds=4".to_owned()],
+            known,
+        )
+    };
+    let unknown = parse("[warmth]\nlimit = 3\n", &catalogue).expect_err("no such section");
+    assert!(
+        unknown.to_string().contains("unknown section `warmth`"),
+        "{unknown}"
+    );
+    catalogue.add_section::<Warmth>();
+    let read = |more: &str| parse(more, &catalogue).map(|e| e.settings::<Warmth>());
+    assert_eq!(read("").expect("it may be left out"), None);
+    let written = "[warmth]\nlimit = 21\nhours = [3, 1]\nwindow = [2, 64]\nnotes = \"a.txt\"\n";
+    let warmth = read(written)
+        .expect("values in their ranges")
+        .expect("settings");
+    assert_eq!((&warmth.hours[..], warmth.window), (&[3, 1][..], [2, 64]));
+    assert_eq!(
+        (warmth.notes.as_deref(), warmth.limit),
+        (Some("a.txt"), 21.0)
+    );
+    assert_eq!(warmth.place, Place::OnTheCeiling);
+    for (more, message) in [
+        (
+            "",
+            ":5: `warmth.limit` is missing; add it, as a number in [-40, 60]",
+        ),
+        (
+            "limit = 3\nhour = [1]\n",
+            ":7: unknown key in [warmth] `hour`; did you mean `hours`?",
+        ),
+        (
+            "limit = 3\nhours = [\n1,\n24]\n",
+            ":9: `warmth.hours` = 24 is not allowed",
+        ),
+        (
+            "limit = 3\nhours = [1, 1]\n",
+            ":7: `warmth.hours` lists 1 twice",
+        ),
+        (
+            "limit = 3\nwindow = [3, 4]\n",
+            "it must be a list of two powers of two in [1, 64]",
+        ),
+        (
+            "limit = 3\nplace = \"floor\"\n",
+            "did you mean `on-the-floor`?",
+        ),
+        (
+            "limit = 40\nplace = \"on-the-floor\"\n",
+            ":6: `warmth.limit` = 40 is not allowed; it must be at most 30",
+        ),
+    ] {
+        let error = read(&format!("[warmth]\n{more}"))
+            .expect_err(more)
+            .to_string();
+        assert!(
+            error.starts_with("warm.toml:") && error.contains(message),
+            "{error}"
+        );
+    }
+    let table = catalogue.table();
+    for row in [
+        "| **`[warmth]`** | | | A measurement of its own. |",
+        "| `warmth.hours` | a list of integers in [0, 23] | `[6, 12]` | Times of day, hours |",
+        "| `warmth.notes` | a text that is not empty | – | A file that says more |",
+        "| `warmth.place` | one of on-the-ceiling, on-the-floor | `\"on-the-ceiling\"` | Where it is measured |",
+    ] {
+        assert!(table.contains(row), "{table}");
     }
 }

@@ -35,6 +35,7 @@ fn hostile(schema: &ParameterSchema) -> Vec<(Params, String)> {
             ParamRange::Flag => vec![ParamValue::Integer(1), text],
             ParamRange::Choice(_) => vec![ParamValue::Integer(1), text],
             ParamRange::Text => vec![ParamValue::Flag(false), ParamValue::Number(0.5)],
+            range => panic!("{}: {range} has no wrong values here yet", parameter.name),
         };
         let within = |value: &ParamValue| match (&parameter.range, value) {
             (ParamRange::Integer { min, max }, ParamValue::Integer(x)) => (min..=max).contains(&x),

@@ -86,6 +86,7 @@ fn variant(entries: &[Entry], name: &str, changes: Changes) -> Result<Variant, C
             ParamValue::Integer(_) => ParamValue::Integer(text.parse().map_err(|_| bad())?),
             ParamValue::Flag(_) => ParamValue::Flag(text.parse().map_err(|_| bad())?),
             ParamValue::Name(_) => ParamValue::Name((*text).to_owned()),
+            ParamValue::List(_) => return Err(bad()),
         };
     }
     Ok(variant)

@@ -25,7 +25,7 @@ pub(super) fn by_tile(
     (rule, edge): (StopRule, u32),
 ) -> Result<Replicates, Fault> {
     let tiles = Tiles {
-        size: session.experiment.resolution,
+        size: session.experiment.run.resolution,
         edge,
     };
     let seeds = replicates(session, cell);

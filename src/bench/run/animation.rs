@@ -157,7 +157,7 @@ fn frame(
     parts: &mut [Part],
 ) -> Result<(), String> {
     let experiment = session.experiment;
-    let seed = u64::from(experiment.seed);
+    let seed = u64::from(experiment.run.seed);
     let scene = moved(&world.scene, animation, number)?;
     let tests = world.soup.intersection;
     let stage = Stage::new(world.gpu, scene, tests).map_err(|e| e.to_string())?;
@@ -179,7 +179,7 @@ fn frame(
         stage: &stage,
         judge: &judge.map_err(|e| e.to_string())?,
         probe: &world.probe,
-        runtime_checks: experiment.runtime_checks,
+        runtime_checks: experiment.run.runtime_checks,
         timing: &experiment.timing,
         seed,
     };

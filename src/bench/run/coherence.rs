@@ -52,7 +52,11 @@ impl Measurement for Models {
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
         format!(
             "{:?}",
-            (experiment.seed, &experiment.camera, &experiment.coherence)
+            (
+                experiment.run.seed,
+                &experiment.camera,
+                &experiment.coherence
+            )
         )
     }
 

@@ -35,7 +35,7 @@ impl Measurement for Compactions {
     }
 
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
-        format!("{:?}", (experiment.seed, experiment.timing))
+        format!("{:?}", (experiment.run.seed, experiment.timing))
     }
 
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
@@ -139,7 +139,7 @@ impl Streams<'_> {
         let inputs = match known {
             Some((_, inputs)) => Arc::clone(inputs),
             None => {
-                let seed = u64::from(self.at.experiment.seed);
+                let seed = u64::from(self.at.experiment.run.seed);
                 let longest = self.longest(kind).unwrap_or(load.elements);
                 let flags = stream::flags(longest, load.valid, method.buckets(), seed);
                 let inputs = Arc::new(Inputs::upload(gpu, flags, load.bytes)?);

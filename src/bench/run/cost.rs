@@ -201,7 +201,7 @@ impl<'a> Cost<'a> {
 
     /// An image of the experiment's size.
     pub fn image(&self, integrator: &Variant, spp: u32) -> Work {
-        let [width, height] = self.experiment.resolution.map(f64::from);
+        let [width, height] = self.experiment.run.resolution.map(f64::from);
         let rays = self.rays_per_sample.get(integrator.label.as_str());
         Work {
             rays: width * height * f64::from(spp) * rays.copied().unwrap_or(1.0),

@@ -101,7 +101,7 @@ fn time(
     let step_s = steps / all.len().max(1) as f64;
     session.say(format!("timing {}", measurement.plural()));
     let timing = session.experiment.timing;
-    let seed = u64::from(session.experiment.seed);
+    let seed = u64::from(session.experiment.run.seed);
     let progress = session.progress.clone();
     let samples = (session.clock).time("gpu", || {
         interleave(&all, &timing, seed, || progress.add(step_s))
@@ -128,7 +128,7 @@ fn write(
     };
     session.ledger.failed += usize::from(failure.is_some());
     let ran = Ran {
-        unchecked: at.stage.is_some() && !session.experiment.runtime_checks,
+        unchecked: at.stage.is_some() && !session.experiment.run.runtime_checks,
         ..Ran::default()
     };
     let body = MeasuredRecord {

@@ -60,12 +60,18 @@ impl Measurement for Errors {
         let reference = (&e.reference, reference_file);
         format!(
             "{:?}",
-            (image_settings(e), e.replicates, &e.spp, &e.stop, reference)
+            (
+                image_settings(e),
+                e.run.replicates,
+                &e.run.spp,
+                &e.stop,
+                reference
+            )
         )
     }
 
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
-        let image = cost.image(&cell[Axis::Integrator], cost.experiment.spp.max());
+        let image = cost.image(&cell[Axis::Integrator], cost.experiment.run.spp.max());
         image * f64::from(cost.plan.renders(cell))
     }
 }
@@ -180,8 +186,8 @@ fn passes<'a>(
     fastest: &Gated,
     cell: &Cell,
 ) -> Result<Vec<Pass<'a>>, String> {
-    let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let most = session.experiment.spp.max();
+    let spps: Vec<u32> = session.experiment.run.spp.counts().collect();
+    let most = session.experiment.run.spp.max();
     let whole = Estimator::new(session, cell, most)?;
     let estimators = if whole.sampler.by_count() {
         let single = |spp| {
@@ -236,11 +242,11 @@ fn sampler_error(
         format!(
             "{:?}",
             (
-                &session.experiment.spp,
+                &session.experiment.run.spp,
                 session.experiment.seeds().replicates
             )
         ),
-        format!("{:?}", (world.camera, session.experiment.resolution)),
+        format!("{:?}", (world.camera, session.experiment.run.resolution)),
     ];
     let rule = session.experiment.stop;
     let stop = rule.map(|rule| format!("{rule:?}")).unwrap_or_default();
@@ -342,7 +348,7 @@ fn all_samples(
         session.progress.add(replicate_s(session, cell));
     }
     Ok(Replicates {
-        spp: session.experiment.spp.max(),
+        spp: session.experiment.run.spp.max(),
         images,
     })
 }
@@ -455,7 +461,7 @@ fn spectrum_record(
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<SpectrumRecord, String> {
-    let size = session.experiment.resolution.map(|edge| edge as usize);
+    let size = session.experiment.run.resolution.map(|edge| edge as usize);
     let spectrum = |image: &Image| {
         let error = luminance_error(image, yardstick.reference.image());
         error.map(|error| error_spectrum(&error, size))
@@ -487,7 +493,7 @@ pub(super) fn blank_record(
         randomised: cell.randomised,
         replicate,
         seed,
-        resolution: session.experiment.resolution,
+        resolution: session.experiment.run.resolution,
         errors: Vec::new(),
         stop: None,
         non_finite_pixels: 0,
@@ -571,7 +577,7 @@ fn bias_record(
     let defaults = BiasOptions::default();
     let options = BiasOptions {
         alpha: defaults.alpha / tested.max(1) as f64,
-        rounding: rounding_bound(session.experiment.spp.max()) + yardstick.rounding,
+        rounding: rounding_bound(session.experiment.run.spp.max()) + yardstick.rounding,
         ..defaults
     };
     let check = check_bias(images, yardstick.reference.parts(), options);
@@ -610,6 +616,6 @@ pub(super) fn image_hash(image: &Image) -> String {
 
 /// Seconds that a replicate of a sampler is expected to take.
 pub(super) fn replicate_s(session: &Session, cell: &Cell) -> f64 {
-    let image = (session.cost).image(&cell[Axis::Integrator], session.experiment.spp.max());
+    let image = (session.cost).image(&cell[Axis::Integrator], session.experiment.run.spp.max());
     image.seconds()
 }

@@ -101,7 +101,7 @@ impl Estimator {
     /// # Errors
     /// A name is not registered, or the sampler has too few dimensions or samples.
     pub(super) fn new(session: &Session, cell: &Cell, samples: u32) -> Result<Self, String> {
-        Self::for_width(session, cell, samples, session.experiment.resolution[0])
+        Self::for_width(session, cell, samples, session.experiment.run.resolution[0])
     }
 
     /// The same for images of another width than the experiment's.
@@ -135,7 +135,7 @@ impl Estimator {
         runtime_checks: bool,
     ) -> RenderJob<'_> {
         RenderJob {
-            size: session.experiment.resolution,
+            size: session.experiment.run.resolution,
             camera,
             sampler: &self.sampler,
             integrator: &self.integrator,

@@ -62,7 +62,16 @@ impl<'a> Current<'a> {
         kernels: &'a Kernels,
     ) -> Self {
         let measurements = registries.measurements.iter();
-        let settings = measurements.map(|m| (m.name(), m.settings(experiment, reference_file)));
+        // Sections that others add may matter to any measurement.
+        let further = if experiment.further.is_empty() {
+            String::new()
+        } else {
+            format!("{:?}", experiment.further)
+        };
+        let settings = measurements.map(|m| {
+            let own = m.settings(experiment, reference_file);
+            (m.name(), own + &further)
+        });
         Self {
             settings: settings.collect(),
             kernels,

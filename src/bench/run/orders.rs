@@ -35,8 +35,8 @@ pub(super) fn of_cell(
     let gpu = gpu.map_err(|e| e.to_string())?;
     let job = estimator.job(session, world.camera, structure.runtime_checks);
     let renderer = PartRenderer::new(gpu, &world.buffers, &structure.traced, &job).map_err(text)?;
-    let of_image = (timing.spp, session.experiment.seed);
-    let mut random = Pcg32::new(u64::from(session.experiment.seed));
+    let of_image = (timing.spp, session.experiment.run.seed);
+    let mut random = Pcg32::new(u64::from(session.experiment.run.seed));
     let mut turns: Vec<(Order, Vec<InOrder>)> = Order::ALL
         .iter()
         .map(|order| (*order, Vec::new()))

@@ -252,7 +252,7 @@ fn judged(
 ) -> Result<(PathsRecord, Ran), String> {
     let cell = subject.cell;
     let oracle = (session.clock).time("judge", || PathOracle::new(&subject.stage.scene))?;
-    let spp = session.experiment.spp.max();
+    let spp = session.experiment.run.spp.max();
     let demand = integrator.demand(spp, SIZE[0]);
     let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
     let samplers = &session.registries.samplers;

@@ -66,7 +66,7 @@ impl Turns {
         gpu: &Gpu,
         visibility: &Visibility,
     ) -> Result<Self, GpuError> {
-        let [width, height] = session.experiment.resolution;
+        let [width, height] = session.experiment.run.resolution;
         let rays = primary_rays(world.camera, width, height);
         let ask = Ask {
             coherent: true,
@@ -114,7 +114,7 @@ fn centred(
     let seeds = session.experiment.seeds().replicates;
     let of_kernel = [structure.runtime_checks, false];
     let renderer = estimator.renderer(session, world, &structure.traced, &seeds, of_kernel)?;
-    let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
+    let (spp, seed) = (session.experiment.timing.spp, session.experiment.run.seed);
     let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
     let shots = shots.map_err(|e| e.to_string())?;
     let last = shots.into_iter().next_back();

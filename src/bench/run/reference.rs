@@ -195,7 +195,7 @@ fn parts(
     (spp, seeds, hash, expected_s): (u32, &[u32], &str, f64),
     wanted: impl Iterator<Item = usize>,
 ) -> Result<Vec<Part>, Fault> {
-    let size = session.experiment.resolution;
+    let size = session.experiment.run.resolution;
     let mut parts = Vec::new();
     for number in wanted {
         let folder = session.options.cache.as_ref();
@@ -229,7 +229,7 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
     let [seeds, camera, size] = [
         format!("{seeds:?}"),
         format!("{:?}", world.camera),
-        format!("{:?}", session.experiment.resolution),
+        format!("{:?}", session.experiment.run.resolution),
     ];
     let made_of = [
         ("sampler", points),
@@ -269,7 +269,7 @@ fn exact_reference(
     cell: &Cell,
     value: f64,
 ) -> Result<Yardstick, Fault> {
-    let [width, height] = session.experiment.resolution;
+    let [width, height] = session.experiment.run.resolution;
     let pixels = vec![[value as f32; 3]; width as usize * height as usize];
     let reference = Image::new(width, height, pixels)
         .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))

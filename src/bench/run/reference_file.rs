@@ -27,7 +27,7 @@ impl ReferenceFile {
         };
         let name = path.display().to_string();
         let image = read_linear(path).map_err(|e| RunError::Input(format!("reference: {e}")))?;
-        let [width, height] = experiment.resolution;
+        let [width, height] = experiment.run.resolution;
         if [image.width, image.height] != [width, height] {
             let [w, h] = [image.width, image.height];
             return Err(RunError::Input(format!(

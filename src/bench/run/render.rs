@@ -58,7 +58,7 @@ pub struct Pictures<'a> {
     pub preview: Option<&'a Path>,
 }
 
-/// Renders the first scene, structure, sampler and integrator of the axes at `experiment.spp.max()`
+/// Renders the first scene, structure, sampler and integrator of the axes at `experiment.run.spp.max()`
 /// samples into a file, whose ending chooses the format. The file is there after the first sample
 /// and is written again while more are added; in an order of passes it is there as soon as no pixel is without a colour.
 ///
@@ -104,7 +104,7 @@ pub fn render(
     stage.soup = TriangleSoup::default();
     let scene = &stage.scene;
     session.say("compiling the kernel");
-    let spp = experiment.spp.max();
+    let spp = experiment.run.spp.max();
     let estimator = Estimator::new(&session, cell, spp);
     let estimator = estimator.map_err(RunError::Input)?;
     if let Some(reason) = estimator.integrator.refusal(&traced) {
@@ -127,7 +127,7 @@ pub fn render(
             rendering.first_picture_s = start.elapsed().as_secs_f64();
         }
         let sampler = estimator.sampler.label();
-        let about = attributes(&options.program, cell, &sampler, done, experiment.seed);
+        let about = attributes(&options.program, cell, &sampler, done, experiment.run.seed);
         let format = FileFormat::of(file).map_err(input)?;
         format.write(file, image, &about).map_err(input)
     };
@@ -136,7 +136,7 @@ pub fn render(
         let renderer = PartRenderer::new(gpu, &stage.buffers, &traced, &job)?;
         compiled = Instant::now();
         let first = pictures.preview.unwrap_or(pictures.file);
-        let samples = (spp, experiment.seed);
+        let samples = (spp, experiment.run.seed);
         let spent = renderer.render(order, samples, |renderer| match renderer.preview()? {
             Some(preview) => show(&preview, 1, first),
             None => Ok(()),
@@ -186,7 +186,7 @@ fn add_all_samples(
     spp: u32,
     mut show: impl FnMut(&Image, u32) -> Result<(), RunError>,
 ) -> Result<Image, RunError> {
-    let seed = session.experiment.seed;
+    let seed = session.experiment.run.seed;
     let style =
         ProgressStyle::with_template("{bar:32} {pos}/{len} spp · {elapsed} · about {eta} left");
     if let Ok(style) = style {

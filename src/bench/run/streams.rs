@@ -75,7 +75,10 @@ impl Measurement for Streams {
             .iter()
             .filter(|i| !is_compaction(i));
         let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
-        format!("{:?}", (e.seed, e.resolution, &e.discrepancy, drawn))
+        format!(
+            "{:?}",
+            (e.run.seed, e.run.resolution, &e.discrepancy, drawn)
+        )
     }
 
     fn cost(&self, _: &Cell, _: &Cost) -> Work {
@@ -259,14 +262,14 @@ fn worst_pair(
 /// Pixels that are tapped, one for each seed: the first one, the last one, and others in between. The seeds
 /// begin with those of the replicates; streams are cheap and may have more.
 fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
-    let [width, height] = session.experiment.resolution;
+    let [width, height] = session.experiment.run.resolution;
     let pixels = width * height;
     let pixel = |k: u32| match k {
         0 => 0,
         1 => pixels - 1,
         _ => pcg_hash(k) % pixels,
     };
-    let first = session.experiment.seed;
+    let first = session.experiment.run.seed;
     (0..count)
         .map(|k| (pixel(k), first.wrapping_add(k)))
         .collect()
@@ -359,7 +362,7 @@ fn check_shared(
         .collect();
     for (sampler, counts) in sets {
         let most = counts.last().map_or(0, |&n| n as u32);
-        let seed = session.experiment.seed;
+        let seed = session.experiment.run.seed;
         let points = session.clock.time("gpu", || {
             dump_points(gpu, sampler, &pixels, most, pair, seed)
         })?;
@@ -464,7 +467,7 @@ fn sampler_of(
     let demand = Demand {
         samples: Some(samples),
         dimensions: highest + 1,
-        width: Some(session.experiment.resolution[0]),
+        width: Some(session.experiment.run.resolution[0]),
     };
     let samplers = &session.registries.samplers;
     let made = samplers.sampler(&cell[Axis::Sequence], &cell[Axis::Decorrelation], &demand);

@@ -93,7 +93,7 @@ pub(super) fn time_all(
     let (cast, refused) = peers::batches(&rivals, world);
     session.recorder.note_kernels("peers");
     let timing = session.experiment.timing;
-    let seed = u64::from(session.experiment.seed);
+    let seed = u64::from(session.experiment.run.seed);
     let turns = session.cost.timed(Work::rays(timing.rays));
     let (progress, step_s) = (session.progress.clone(), session.cost.step_s(turns));
     let ours = timed.iter().map(|item| item as &dyn Measured);
@@ -201,7 +201,7 @@ pub(super) fn draw_heat_maps(
     world: &World,
     mut gated: Vec<Gated>,
 ) -> Result<Vec<Gated>, RunError> {
-    let [width, height] = session.experiment.resolution;
+    let [width, height] = session.experiment.run.resolution;
     let rays = primary_rays(world.camera, width, height);
     let pixels = primary_pixels(width, height);
     for structure in &mut gated {

@@ -51,7 +51,7 @@ impl Measurement for Structures {
 /// The settings that an image depends on, in all measurements that render or record rays.
 pub(super) fn image_settings(experiment: &Experiment) -> impl std::fmt::Debug + use<> {
     let e = experiment;
-    (e.seed, e.camera, e.resolution, e.runtime_checks)
+    (e.run.seed, e.camera, e.run.resolution, e.run.runtime_checks)
 }
 
 /// A structure that passed its gate.
@@ -102,7 +102,7 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
         cell: cell.clone(),
         traced: None,
         structural: None,
-        record: empty_record(cell, session.experiment.runtime_checks),
+        record: empty_record(cell, session.experiment.run.runtime_checks),
     };
     let kind = match session.registries.accel.named("structure", &accel.name) {
         Ok(kind) => kind,
@@ -158,7 +158,7 @@ fn gate_with(
         Err(reason) => return Ok(candidate.failed(reason)),
     };
     candidate.traced = Some(traced.clone());
-    let checks = session.experiment.runtime_checks;
+    let checks = session.experiment.run.runtime_checks;
     let gated = session.clock.time("gate", || {
         let verdict = gate_twice(checks, world, gpu, &traced)?;
         let hash = kernel_hash(gpu, &world.buffers.triangles, &traced)?;

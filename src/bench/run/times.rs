@@ -52,7 +52,7 @@ impl Measurement for Times {
             (
                 image_settings(experiment),
                 &experiment.timing,
-                &experiment.spp
+                &experiment.run.spp
             )
         )
     }
@@ -125,7 +125,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     }
     session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
-    let seed = u64::from(session.experiment.seed);
+    let seed = u64::from(session.experiment.run.seed);
     let cost = &session.cost;
     let image = |item: &Timed| cost.image(&item.cell[Axis::Integrator], timing.spp);
     let steps: f64 = timed
@@ -243,7 +243,7 @@ fn refusal(session: &Session, cell: &Cell) -> Option<String> {
 /// neighbouring pixels lie may depend on how many there are. So many are in that set.
 pub(super) fn samples(session: &Session) -> u32 {
     let experiment = &session.experiment;
-    experiment.spp.max().max(experiment.timing.spp)
+    experiment.run.spp.max().max(experiment.timing.spp)
 }
 
 fn renderer<'a>(
@@ -270,7 +270,7 @@ fn compile<'a>(
         renderer: renderer(session, world, structure, &cell, [checks, false])?,
         cell,
         spp: session.experiment.timing.spp,
-        seed: session.experiment.seed,
+        seed: session.experiment.run.seed,
         runtime_checks: checks,
         space: structure.traced.space,
         watch: Watch::default(),
@@ -410,11 +410,11 @@ fn count_rays(
 
 fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRecord> {
     let ran = Ran {
-        unchecked: !session.experiment.runtime_checks,
+        unchecked: !session.experiment.run.runtime_checks,
         ..Ran::default()
     };
     let record = TimeRecord {
-        resolution: session.experiment.resolution,
+        resolution: session.experiment.run.resolution,
         spp: session.experiment.timing.spp,
         ms: Vec::new(),
         wall_ms: Vec::new(),

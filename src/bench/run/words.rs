@@ -19,7 +19,7 @@ pub(super) fn check(
     let used = Used {
         samples: sampler.demand.samples.unwrap_or(1),
         dimensions: sampler.demand.dimensions,
-        size: session.experiment.resolution,
+        size: session.experiment.run.resolution,
         seeds: seeds.to_vec(),
     };
     let kernel = kernel_hash(gpu, sampler)?;

@@ -137,7 +137,7 @@ impl<'a> World<'a> {
         let mut settings = experiment.gate;
         settings.rays = settings.rays.max(experiment.timing.rays);
         let judge = session.clock.time("judge", || {
-            let seed = u64::from(experiment.seed);
+            let seed = u64::from(experiment.run.seed);
             Judge::new(
                 &stage.scene,
                 &stage.soup,

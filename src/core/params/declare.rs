@@ -1,6 +1,6 @@
 //! The macro that declares parameters, and the traits that it implements.
 
-use super::{ParamError, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use super::{Bounded, ParamError, ParamValue, Parameter, ParameterSchema, ParameterType, Params};
 use std::ops::RangeInclusive;
 
 /// A struct of parameters, declared by [`parameters!`](crate::parameters). Its default has every parameter
@@ -33,166 +33,6 @@ pub trait Parameters: Default + Sized {
     }
 }
 
-/// A type that a declared parameter can have.
-pub trait ParameterType: Sized {
-    /// The value as files and records hold it.
-    fn value(&self) -> ParamValue;
-
-    /// The value that was written, if it is one of this type.
-    fn parse(value: &ParamValue) -> Option<Self>;
-}
-
-/// A type whose parameters need a range: `in low..=high`.
-pub trait Bounded: ParameterType + Clone {
-    /// The range as parser and help read it.
-    fn range(range: RangeInclusive<Self>) -> ParamRange;
-}
-
-/// A type whose parameters take any of its values.
-pub trait Unbounded: ParameterType {
-    /// All of its values.
-    const RANGE: ParamRange;
-}
-
-/// An enum of names, declared by [`parameters!`](crate::parameters).
-pub trait Choice: Copy + 'static {
-    /// All choices, in the order of the declaration.
-    const ALL: &'static [Self];
-    /// Their names.
-    const NAMES: &'static [&'static str];
-
-    /// Name as a user types it.
-    fn name(self) -> &'static str;
-
-    /// The choice of this name.
-    fn from_name(name: &str) -> Option<Self> {
-        let index = Self::NAMES.iter().position(|known| *known == name)?;
-        Self::ALL.get(index).copied()
-    }
-}
-
-impl ParameterType for f64 {
-    fn value(&self) -> ParamValue {
-        ParamValue::Number(*self)
-    }
-
-    fn parse(value: &ParamValue) -> Option<Self> {
-        match value {
-            ParamValue::Number(x) => Some(*x),
-            ParamValue::Integer(x) => Some(*x as f64),
-            _ => None,
-        }
-    }
-}
-
-impl Bounded for f64 {
-    fn range(range: RangeInclusive<Self>) -> ParamRange {
-        let (min, max) = range.into_inner();
-        ParamRange::Number { min, max }
-    }
-}
-
-/// The f64 of the same decimal digits, so that 0.2 is what a file calls 0.2.
-fn widen(x: f32) -> f64 {
-    x.to_string().parse().unwrap_or_else(|_| f64::from(x))
-}
-
-impl ParameterType for f32 {
-    fn value(&self) -> ParamValue {
-        ParamValue::Number(widen(*self))
-    }
-
-    fn parse(value: &ParamValue) -> Option<Self> {
-        f64::parse(value).map(|x| x as f32)
-    }
-}
-
-impl Bounded for f32 {
-    fn range(range: RangeInclusive<Self>) -> ParamRange {
-        f64::range(widen(*range.start())..=widen(*range.end()))
-    }
-}
-
-macro_rules! integers {
-    ($($type:ty),*) => {$(
-        impl ParameterType for $type {
-            fn value(&self) -> ParamValue {
-                ParamValue::Integer(i64::try_from(*self).unwrap_or(i64::MAX))
-            }
-
-            fn parse(value: &ParamValue) -> Option<Self> {
-                match value {
-                    ParamValue::Integer(x) => Self::try_from(*x).ok(),
-                    _ => None,
-                }
-            }
-        }
-
-        impl Bounded for $type {
-            fn range(range: RangeInclusive<Self>) -> ParamRange {
-                let bound = |x: &Self| i64::try_from(*x).unwrap_or(i64::MAX);
-                ParamRange::Integer {
-                    min: bound(range.start()),
-                    max: bound(range.end()),
-                }
-            }
-        }
-    )*};
-}
-
-integers!(u32, u64, usize);
-
-impl ParameterType for bool {
-    fn value(&self) -> ParamValue {
-        ParamValue::Flag(*self)
-    }
-
-    fn parse(value: &ParamValue) -> Option<Self> {
-        match value {
-            ParamValue::Flag(x) => Some(*x),
-            _ => None,
-        }
-    }
-}
-
-impl Unbounded for bool {
-    const RANGE: ParamRange = ParamRange::Flag;
-}
-
-impl ParameterType for String {
-    fn value(&self) -> ParamValue {
-        ParamValue::Name(self.clone())
-    }
-
-    fn parse(value: &ParamValue) -> Option<Self> {
-        match value {
-            ParamValue::Name(x) => Some(x.clone()),
-            _ => None,
-        }
-    }
-}
-
-impl Unbounded for String {
-    const RANGE: ParamRange = ParamRange::Text;
-}
-
-impl<C: Choice> ParameterType for C {
-    fn value(&self) -> ParamValue {
-        ParamValue::Name(self.name().to_owned())
-    }
-
-    fn parse(value: &ParamValue) -> Option<Self> {
-        match value {
-            ParamValue::Name(x) => Self::from_name(x),
-            _ => None,
-        }
-    }
-}
-
-impl<C: Choice> Unbounded for C {
-    const RANGE: ParamRange = ParamRange::Choice(C::NAMES);
-}
-
 /// The name of a field as a user types it: `loop` where Rust has to write `r#loop`.
 pub fn named(field: &'static str) -> &'static str {
     field.strip_prefix("r#").unwrap_or(field)
@@ -219,21 +59,25 @@ pub fn redeclare<S, T: Bounded>(
     field: &'static str,
     _: fn(&S) -> &T,
     default: T,
-    range: RangeInclusive<T>,
+    range: RangeInclusive<T::Bound>,
 ) {
+    let range = T::range(range);
     for parameter in schema.iter_mut().filter(|p| p.name == named(field)) {
         parameter.default = default.value();
-        parameter.range = T::range(range.clone());
+        parameter.range = range.clone();
     }
 }
 
 /// Declares structs of parameters and enums of choices; see [the module](crate::params).
 ///
 /// A field is `name: type = default;` with its meaning as doc comment; numbers have a range,
-/// `name: type = default, in low..=high;`. Types are those of [`ParameterType`]. A field without a default,
+/// `name: type = default, in low..=high;`, which one of [`ParamRange`]'s methods can narrow behind it:
+/// `in 2..=64, where power_of_two();`. Types are those of [`ParameterType`]: numbers, switches, texts, choices, lists and arrays of
+/// them, and `Option`, whose default may be `None`. A default need not be in the range: it then stands for nothing
+/// that could be written, and the meaning says what it does. A field without a default,
 /// `name: Struct;`, holds another declared struct, whose parameters join these under their own names;
 /// `name: Struct { field = default, in low..=high; };` gives one of them another default and range.
-/// Choices are `Variant = "name"`.
+/// Choices are `Variant = "name"`. Structs and enums may derive more, and their fields have an attribute of serde, for records.
 #[macro_export]
 macro_rules! parameters {
     () => {};
@@ -265,12 +109,14 @@ macro_rules! parameters {
     };
     (
         $(#[doc = $about:literal])*
+        $(#[derive $derive:tt])?
         $vis:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
+                $(#[serde $serde:tt])?
                 $field:ident : $type:ty
                     $({ $($inner:ident = $inner_default:expr, in $inner_range:expr;)+ })?
-                    $(= $default:expr $(, in $range:expr)?)?
+                    $(= $default:expr $(, in $range:expr)? $(, where $rule:ident $arguments:tt)?)?
                 ;
             )*
         }
@@ -278,8 +124,9 @@ macro_rules! parameters {
     ) => {
         $(#[doc = $about])*
         #[derive(Debug, Clone, PartialEq)]
+        $(#[derive $derive])?
         $vis struct $name {
-            $($(#[doc = $doc])* pub $field: $type,)*
+            $($(#[doc = $doc])* $(#[serde $serde])? pub $field: $type,)*
         }
 
         impl Default for $name {
@@ -300,7 +147,7 @@ macro_rules! parameters {
                 let mut schema = Vec::new();
                 $($crate::__parameter!(
                     schema schema, $field, $type, [$($doc),*]
-                    $(= $default $(, in $range)?)?
+                    $(= $default, [$(, $range)?] [$(. $rule $arguments)?])?
                     $({ $($inner = $inner_default, in $inner_range;)+ })?
                 );)*
                 schema
@@ -339,13 +186,14 @@ macro_rules! __parameter {
     (read $params:ident, $field:ident, $type:ty,) => {
         <$type as $crate::params::Parameters>::read($params)?
     };
-    (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*] = $default:expr $(, in $range:expr)?) => {{
+    (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*]
+        = $default:expr, [$(, $range:expr)?] [$($rule:tt)*]) => {{
         let default: $type = $default;
         $schema.push($crate::params::Parameter {
             name: $crate::params::named(stringify!($field)),
             description: concat!($($doc),*).trim(),
             default: $crate::params::ParameterType::value(&default),
-            range: $crate::__parameter!(range $type $(, $range)?),
+            range: $crate::__parameter!(range $type $(, $range)?) $($rule)*,
         });
     }};
     (schema $schema:ident, $field:ident, $type:ty, [$($doc:literal),*]
@@ -360,7 +208,7 @@ macro_rules! __parameter {
         );)+)?
     };
     (range $type:ty) => {
-        <$type as $crate::params::Unbounded>::RANGE
+        <$type as $crate::params::Unbounded>::range()
     };
     (range $type:ty, $range:expr) => {
         <$type as $crate::params::Bounded>::range($range)

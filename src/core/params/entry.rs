@@ -60,6 +60,17 @@ pub struct Variant {
     pub label: String,
 }
 
+impl Variant {
+    /// An entry without parameters.
+    pub fn plain(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            params: Params::default(),
+            label: name.to_owned(),
+        }
+    }
+}
+
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.label)

@@ -45,11 +45,13 @@ mod entry;
 mod kinds;
 mod registry;
 mod schema;
+mod types;
 mod value;
 
-pub use declare::{Bounded, Choice, ParameterType, Parameters, Unbounded, named, read, redeclare};
+pub use declare::{Parameters, named, read, redeclare};
 pub use entry::{Entry, Variant};
 pub use kinds::{Kinds, Named, Sources};
 pub use registry::{Registered, Registry};
-pub use schema::{ParamError, ParamRange, Parameter, ParameterSchema};
+pub use schema::{Length, ParamError, ParamRange, Parameter, ParameterSchema, Step, repeated};
+pub use types::{Bounded, Choice, ParameterType, Unbounded};
 pub use value::{ParamValue, Params};

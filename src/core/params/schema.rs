@@ -1,8 +1,9 @@
 //! What values parameters may take, and why some do not fit.
 
-use super::{ParamValue, Params};
+use super::{ParamValue, ParameterType as _, Params};
 use crate::text::nearest;
 use std::fmt;
+use std::ops::RangeInclusive;
 use thiserror::Error;
 
 /// What values a parameter may take.
@@ -22,27 +23,182 @@ pub enum ParamRange {
         /// Greatest value.
         max: i64,
     },
+    /// Some of the integers in a range.
+    Stepped(Step, RangeInclusive<i64>),
     /// A switch.
     Flag,
     /// One of these names.
     Choice(&'static [&'static str]),
+    /// The name of an entry of this registry.
+    Entry(&'static str),
     /// Any text; the empty one stands for nothing.
     Text,
+    /// Any text but the empty one.
+    Filled,
+    /// A list of so many such values.
+    List(Box<ParamRange>, Length),
+    /// A list, not empty, of ascending integers from 1 to this one. Files may abbreviate it, `{ pow2 = [lo, hi] }`.
+    Ascending(i64),
 }
 
-impl fmt::Display for ParamRange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+/// Some integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// 1, 2, 4, 8, …
+    PowerOfTwo,
+    /// Multiples of this one.
+    MultipleOf(i64),
+}
+
+/// Lengths of lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Length {
+    /// Any, and each value once.
+    Any,
+    /// This one.
+    Exactly(usize),
+    /// This one, and each value once.
+    Different(usize),
+}
+
+impl Length {
+    /// Whether a list may have so many values.
+    pub fn allows(self, count: usize) -> bool {
         match self {
-            Self::Number { min, max } => write!(f, "a number in [{min}, {max}]"),
-            Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
-            Self::Flag => f.write_str("true or false"),
-            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
-            Self::Text => f.write_str("a text"),
+            Self::Any => true,
+            Self::Exactly(length) | Self::Different(length) => count == length,
         }
     }
 }
 
+/// How many, before what: `two different `.
+impl fmt::Display for Length {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (length, which) = match self {
+            Self::Any => return Ok(()),
+            Self::Exactly(length) => (length, ""),
+            Self::Different(length) => (length, "different "),
+        };
+        match length {
+            2 => write!(f, "two {which}"),
+            3 => write!(f, "three {which}"),
+            length => write!(f, "{length} {which}"),
+        }
+    }
+}
+
+impl fmt::Display for ParamRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words(false))
+    }
+}
+
+/// An interval. An end next to a number of fewer digits stands for that number, which itself is not in the interval.
+fn interval(min: f64, max: f64) -> String {
+    let is_next = |end: f64, next: f64| next.to_string().len() < end.to_string().len();
+    let (below, above) = (min.next_down(), max.next_up());
+    let low = if is_next(min, below) {
+        format!("({below}")
+    } else {
+        format!("[{min}")
+    };
+    let high = if is_next(max, above) {
+        format!("{above})")
+    } else {
+        format!("{max}]")
+    };
+    format!(" in {low}, {high}")
+}
+
 impl ParamRange {
+    /// Those that are powers of two, of integers or of lists of them.
+    #[must_use]
+    pub fn power_of_two(self) -> Self {
+        self.stepped(Step::PowerOfTwo)
+    }
+
+    /// Those that are multiples of `step`, of integers or of lists of them.
+    #[must_use]
+    pub fn multiple_of(self, step: i64) -> Self {
+        self.stepped(Step::MultipleOf(step))
+    }
+
+    fn stepped(self, step: Step) -> Self {
+        match self {
+            Self::Integer { min, max } => Self::Stepped(step, min..=max),
+            Self::List(of, length) => Self::List(Box::new(of.stepped(step)), length),
+            other => other,
+        }
+    }
+
+    /// Of lists of integers those that ascend from 1 or more, and are not empty.
+    #[must_use]
+    pub fn ascending(self) -> Self {
+        match self {
+            Self::List(of, _) => of.ascending(),
+            Self::Integer { max, .. } => Self::Ascending(max),
+            other => other,
+        }
+    }
+
+    /// Of arrays, or lists of them, those that have each value once.
+    #[must_use]
+    pub fn different(self) -> Self {
+        match self {
+            Self::List(of, Length::Exactly(n)) => Self::List(of, Length::Different(n)),
+            Self::List(of, length) => Self::List(Box::new(of.different()), length),
+            other => other,
+        }
+    }
+
+    /// Of texts those that name an entry of a registry.
+    #[must_use]
+    pub fn entry_of(self, registry: &'static str) -> Self {
+        Self::Entry(registry)
+    }
+
+    /// One of the values in words, or many.
+    fn words(&self, many: bool) -> String {
+        let (one, several, which) = match self {
+            Self::Number { min, max } if *max >= f32::MAX.into() && *min <= f32::MIN.into() => (
+                "a finite number",
+                "finite numbers",
+                " of single precision".to_owned(),
+            ),
+            Self::Number { min, max } => ("a number", "numbers", interval(*min, *max)),
+            Self::Integer { min, max } => ("an integer", "integers", format!(" in [{min}, {max}]")),
+            Self::Stepped(step, range) => {
+                let which = format!(" in [{}, {}]", range.start(), range.end());
+                match step {
+                    Step::PowerOfTwo => ("a power of two", "powers of two", which),
+                    Step::MultipleOf(x) => ("a multiple", "multiples", format!(" of {x}{which}")),
+                }
+            }
+            Self::Flag => ("true or false", "true or false", String::new()),
+            Self::Choice(names) => ("one of ", "some of ", names.join(", ")),
+            Self::Entry(registry) => ("the name of one ", "names of one ", (*registry).to_owned()),
+            Self::Text => ("a text", "texts", String::new()),
+            Self::Filled => ("a text", "texts", " that is not empty".to_owned()),
+            Self::List(of, length) if many && length.allows(2) && *length != Length::Any => {
+                let length = length.to_string();
+                let length = length.trim_start_matches("two ");
+                ("", "pairs", format!(" of {length}{}", of.words(true)))
+            }
+            Self::List(of, length) => {
+                ("a list", "lists", format!(" of {length}{}", of.words(true)))
+            }
+            Self::Ascending(max) => (
+                "a list",
+                "lists",
+                format!(
+                    " of ascending integers in [1, {max}], or a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {}",
+                    max.ilog2()
+                ),
+            ),
+        };
+        format!("{}{which}", if many { several } else { one })
+    }
+
     /// Whether a parameter may have this value. Integers are numbers.
     pub fn allows(&self, value: &ParamValue) -> bool {
         match (self, value) {
@@ -51,11 +207,35 @@ impl ParamRange {
                 (*min..=*max).contains(&(*x as f64))
             }
             (Self::Integer { min, max }, ParamValue::Integer(x)) => (min..=max).contains(&x),
+            (Self::Stepped(step, range), ParamValue::Integer(x)) => {
+                let is_step = match step {
+                    Step::PowerOfTwo => x.count_ones() == 1,
+                    Step::MultipleOf(step) => x % step == 0,
+                };
+                is_step && range.contains(x)
+            }
             (Self::Choice(names), ParamValue::Name(x)) => names.contains(&x.as_str()),
+            (Self::Entry(_) | Self::Filled, ParamValue::Name(x)) => !x.is_empty(),
             (Self::Flag, ParamValue::Flag(_)) | (Self::Text, ParamValue::Name(_)) => true,
+            (Self::List(of, length), ParamValue::List(items)) => {
+                let may_repeat = matches!(length, Length::Exactly(_));
+                length.allows(items.len())
+                    && items.iter().all(|item| of.allows(item))
+                    && (may_repeat || repeated(items).is_none())
+            }
+            (Self::Ascending(max), value) => <Vec<u32>>::parse(value).is_some_and(|counts| {
+                let ends = counts.first().zip(counts.last());
+                let within = |(first, last): (&u32, &u32)| *first > 0 && i64::from(*last) <= *max;
+                ends.is_some_and(within) && counts.is_sorted_by(|a, b| a < b)
+            }),
             _ => false,
         }
     }
+}
+
+/// The place of the first value that stands before it as well.
+pub fn repeated(items: &[ParamValue]) -> Option<usize> {
+    (0..items.len()).find(|&i| items[..i].contains(&items[i]))
 }
 
 /// One parameter of a registry entry.
@@ -65,10 +245,17 @@ pub struct Parameter {
     pub name: &'static str,
     /// One line: meaning, unit, source.
     pub description: &'static str,
-    /// Value when the experiment says nothing.
+    /// Value when the experiment says nothing. One that is not in the range stands for nothing.
     pub default: ParamValue,
     /// Allowed values.
     pub range: ParamRange,
+}
+
+impl Parameter {
+    /// The default; nothing where it stands for nothing that can be written.
+    pub fn default_written(&self) -> Option<&ParamValue> {
+        self.range.allows(&self.default).then_some(&self.default)
+    }
 }
 
 /// The parameters of a registry entry: the parser, the help, the docs table and sweeps read it.
@@ -112,8 +299,9 @@ impl Params {
             }
         }
         let one = |parameter: &Parameter| {
-            let value = self.0.get(parameter.name).unwrap_or(&parameter.default);
-            if parameter.range.allows(value) {
+            let given = self.0.get(parameter.name);
+            let value = given.unwrap_or(&parameter.default);
+            if given.is_none() || parameter.range.allows(value) {
                 return Ok((parameter.name.to_owned(), value.clone()));
             }
             Err(ParamError::Value {

@@ -16,6 +16,8 @@ pub enum ParamValue {
     Flag(bool),
     /// One of a closed list of names, or a text.
     Name(String),
+    /// Values of one kind.
+    List(Vec<ParamValue>),
 }
 
 impl fmt::Display for ParamValue {
@@ -25,6 +27,10 @@ impl fmt::Display for ParamValue {
             Self::Integer(x) => write!(f, "{x}"),
             Self::Flag(x) => write!(f, "{x}"),
             Self::Name(x) => write!(f, "{x}"),
+            Self::List(items) => {
+                let items: Vec<String> = items.iter().map(Self::to_string).collect();
+                write!(f, "[{}]", items.join(", "))
+            }
         }
     }
 }

@@ -43,6 +43,7 @@ fn params(changes: &[&str]) -> Params {
             ParamValue::Number(_) => ParamValue::Number(text.parse().expect("a number")),
             ParamValue::Flag(_) => ParamValue::Flag(text.parse().expect("a flag")),
             ParamValue::Name(_) => ParamValue::Name(text.to_owned()),
+            ParamValue::List(_) => panic!("{name} is a list"),
         };
     }
     out

@@ -3,7 +3,7 @@
 
 mod mistakes;
 
-use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan, keys};
+use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan};
 use raystone::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone::run::Registries;
 use std::collections::BTreeSet;
@@ -115,14 +115,14 @@ fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
 fn a_minimal_file_gets_the_documented_defaults() {
     let experiment = good("");
     assert_eq!(experiment.name, "trial");
-    assert_eq!(experiment.replicates, 16);
-    assert_eq!(experiment.resolution, [192, 144]);
+    assert_eq!(experiment.run.replicates, 16);
+    assert_eq!(experiment.run.resolution, [192, 144]);
     assert_eq!(
-        experiment.spp.counts().collect::<Vec<_>>(),
+        experiment.run.spp.counts().collect::<Vec<_>>(),
         [1, 2, 4, 8, 16, 32]
     );
-    assert_eq!(experiment.spp.max(), 32);
-    assert!(experiment.runtime_checks);
+    assert_eq!(experiment.run.spp.max(), 32);
+    assert!(experiment.run.runtime_checks);
     assert!(experiment.camera.is_none());
     assert_eq!(labels(&experiment.axes[Axis::Decorrelation]), ["none"]);
     assert_eq!(labels(&experiment.axes[Axis::Integrator]), ["path"]);
@@ -154,9 +154,9 @@ fn every_section_is_read() {
     );
     assert_eq!(experiment.name, "n");
     assert_eq!(experiment.seeds().replicates, [7, 8]);
-    assert_eq!(experiment.resolution, [64, 48]);
-    assert_eq!(experiment.spp.counts().collect::<Vec<_>>(), [2, 4, 8]);
-    assert!(!experiment.runtime_checks);
+    assert_eq!(experiment.run.resolution, [64, 48]);
+    assert_eq!(experiment.run.spp.counts().collect::<Vec<_>>(), [2, 4, 8]);
+    assert!(!experiment.run.runtime_checks);
     let stop = experiment.stop.expect("a rule");
     assert_eq!((stop.relmse, stop.confidence), (1e-3, 0.9));
     let camera = experiment.camera.expect("a camera");
@@ -239,8 +239,8 @@ fn overrides_replace_values_of_the_file_and_are_cited() {
         "timing.rounds=4",
     ];
     let experiment = parse_with(&text, &overrides).expect("good overrides");
-    assert_eq!(experiment.resolution, [32, 16]);
-    assert_eq!(experiment.spp.max(), 4);
+    assert_eq!(experiment.run.resolution, [32, 16]);
+    assert_eq!(experiment.run.spp.max(), 4);
     assert_eq!(experiment.name, "other name");
     assert_eq!(
         labels(&experiment.axes[Axis::Scene]),
@@ -468,8 +468,8 @@ fn filters_and_excludes_that_fit_nothing_are_mistakes() {
 fn the_documentation_holds_the_table_of_all_keys() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/experiments.md");
     let text = std::fs::read_to_string(&path).expect("docs/experiments.md");
-    let table = keys::reference_table();
-    assert!(keys::KEYS.len() > 30);
+    let table = Registries::default().catalogue().table();
+    assert!(table.lines().count() > 60);
     assert!(
         text.contains(&table),
         "docs/experiments.md lacks this table; paste it there:\n{table}"
@@ -478,22 +478,32 @@ fn the_documentation_holds_the_table_of_all_keys() {
 
 #[test]
 fn every_default_is_accepted_by_the_parser() {
-    for key in keys::KEYS {
-        let Some(default) = key.default else { continue };
-        let (section, name) = (key.section, key.name);
-        let mut text = String::new();
-        if section == "axes" {
-            if !AXES.contains(&format!("\n{name} = ")) {
-                text = format!("{name} = {default}\n");
+    let mut accepted = 0;
+    for section in catalogue().sections() {
+        let (name, schema) = (section.name(), &section.entry.schema);
+        let required: String = match name {
+            "camera" => "eye = [0, 0, 0]\ntarget = [0, 0, 1]\n".to_owned(),
+            "run.stop" => "relmse = 0.1\nconfidence = 0.9\n".to_owned(),
+            _ => String::new(),
+        };
+        for key in schema {
+            let has_default = key.range.allows(&key.default);
+            let is_required = section.required.contains(&key.name);
+            assert!(!(has_default && is_required), "{name}.{}", key.name);
+            if has_default {
+                let value = match &key.default {
+                    ParamValue::Name(text) => format!("\"{text}\""),
+                    value => value.to_string(),
+                };
+                good(&format!("[{name}]\n{required}{} = {value}\n", key.name));
+                accepted += 1;
             }
-        } else {
-            text = format!("[{section}]\n{name} = {default}\n");
         }
-        if section == "camera" {
-            text += "eye = [0, 0, 0]\ntarget = [0, 0, 1]\n";
-        }
-        good(&text);
+        let known = |required: &&str| schema.iter().any(|key| key.name == *required);
+        assert!(section.required.iter().all(known), "{name}");
+        good(&format!("[{name}]\n{required}"));
     }
+    assert!(accepted > 35, "{accepted}");
 }
 
 #[test]

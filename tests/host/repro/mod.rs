@@ -127,7 +127,7 @@ fn a_whole_run_is_smaller_on_a_software_adapter_where_its_file_says_so_and_a_sho
         };
         let prepared = prepare(&source, &settings, &registries.catalogue()).expect("a sound file");
         let first = prepared.changes.first().cloned();
-        (prepared.experiment.resolution, first)
+        (prepared.experiment.run.resolution, first)
     };
     let change = |text: &str| Some(text.to_owned());
     assert_eq!(resolution(false, false), ([1280, 720], None));

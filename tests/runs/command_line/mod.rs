@@ -196,6 +196,14 @@ fn list_mentions_every_entry_of_every_registry() {
             }
         }
     }
+    let settings = stdout(&run(&["list", "setting"]));
+    for section in catalogue.sections() {
+        assert!(settings.contains(&section.entry.description), "{settings}");
+        for key in &section.entry.schema {
+            let line = format!("{} ({})", key.description, key.range);
+            assert!(settings.contains(&line) && words.contains(&line), "{line}");
+        }
+    }
     for metric in METRICS {
         assert!(words.contains(metric.id), "{}", metric.id);
     }

@@ -1,0 +1,147 @@
+//! Everything that an experiment may say: the entries of each axis, and sections of settings.
+
+use super::axis::{Axis, AxisMap};
+use super::sections::{
+    Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, View,
+};
+use super::settings::{Section, Settings};
+use raystone_core::params::{Entry, ParamValue, Parameter};
+use std::fmt::Write as _;
+use std::ops::{Index, IndexMut};
+
+/// Every name that an experiment may use, by axis, and every section of settings. Built from the registries, so that a new
+/// entry is known to the parser, `raystone list` and the docs without another edit. Scenes may be paths besides, kernels are
+/// nothing else.
+#[derive(Debug, Clone)]
+pub struct Catalogue {
+    entries: AxisMap<Vec<Entry>>,
+    sections: Vec<Section>,
+}
+
+/// No entries, and the sections that every experiment has.
+impl Default for Catalogue {
+    fn default() -> Self {
+        Self {
+            entries: AxisMap::default(),
+            sections: vec![
+                Section::of::<Run>(),
+                Section::of::<StopRule>(),
+                Section::of::<View>(),
+                Section::of::<Reference>(),
+                Section::of::<Timing>(),
+                Section::of::<Gate>(),
+                Section::of::<Discrepancy>(),
+                Section::of::<Coherence>(),
+                Section::of::<Animation>(),
+            ],
+        }
+    }
+}
+
+impl Index<Axis> for Catalogue {
+    type Output = Vec<Entry>;
+
+    fn index(&self, axis: Axis) -> &Vec<Entry> {
+        &self.entries[axis]
+    }
+}
+
+impl IndexMut<Axis> for Catalogue {
+    fn index_mut(&mut self, axis: Axis) -> &mut Vec<Entry> {
+        &mut self.entries[axis]
+    }
+}
+
+impl Catalogue {
+    /// The sections of settings.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Adds a section of settings, for [`Experiment::settings`](super::Experiment::settings).
+    pub fn add_section<S: Settings>(&mut self) {
+        self.sections.retain(|section| section.name() != S::SECTION);
+        self.sections.push(Section::of::<S>());
+    }
+
+    /// What may stand in a section of settings: its keys, and the tables within it.
+    pub(super) fn keys_of(&self, section: &str) -> Vec<&str> {
+        let mut keys = Vec::new();
+        for known in &self.sections {
+            match known.name().split_once('.') {
+                Some((outer, inner)) if outer == section => keys.push(inner),
+                _ if known.name() == section => {
+                    keys.extend(known.entry.schema.iter().map(|key| key.name));
+                }
+                _ => {}
+            }
+        }
+        keys
+    }
+
+    /// The table of all keys in Markdown, as `docs/experiments.md` holds it.
+    pub fn table(&self) -> String {
+        let mut text = String::from("| Key | Value | Default | Meaning |\n|---|---|---|---|\n");
+        axes(&mut text);
+        // Writing to a string cannot fail.
+        for section in &self.sections {
+            let Entry {
+                name,
+                description,
+                schema,
+            } = &section.entry;
+            let _ = writeln!(text, "| **`[{name}]`** | | | {description} |");
+            for key in schema {
+                let _ = writeln!(
+                    text,
+                    "| `{name}.{}` | {} | {} | {} |",
+                    key.name,
+                    key.range,
+                    default(section, key),
+                    key.description
+                );
+            }
+        }
+        text
+    }
+}
+
+/// The default of a key as a file would say it.
+fn default(section: &Section, key: &Parameter) -> String {
+    match key.default_written() {
+        None if section.required.contains(&key.name) => NEEDED.to_owned(),
+        None => "–".to_owned(),
+        Some(ParamValue::Name(text)) => format!("`\"{text}\"`"),
+        Some(value) => format!("`{value}`"),
+    }
+}
+
+/// What stands in the table for the default of a key that must be given.
+const NEEDED: &str = "needed";
+
+fn axes(text: &mut String) {
+    let _ = writeln!(text, "| **`[axes]`** | | | What is varied. |");
+    for axis in Axis::ALL {
+        let default = axis
+            .default_name()
+            .map_or(NEEDED.to_owned(), |name| format!("`[\"{name}\"]`"));
+        let _ = writeln!(
+            text,
+            "| `axes.{axis}` | {} | {default} | {} |",
+            axis.expected(),
+            axis.meaning()
+        );
+    }
+    for (section, meaning) in [
+        (
+            "exclude",
+            "Cells that fit a pattern on every axis named are left out …",
+        ),
+        ("include", "… but those are kept that one of these fits."),
+    ] {
+        let _ = writeln!(
+            text,
+            "| `{section}.AXIS` | one pattern or a list of them, for any axis | – | {meaning} |"
+        );
+    }
+}

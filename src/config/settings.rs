@@ -1,0 +1,139 @@
+//! Sections of settings, which are declared as structs: what is known of them, and how they are read.
+
+use super::error::{ConfigError, Place};
+use super::tree::{Item, Table, Value};
+use super::values;
+use raystone_core::params::{Entry, ParamError, Parameters, Params};
+use std::collections::BTreeMap;
+
+/// A key whose value others forbid, and what it must be.
+pub type Contradiction = (&'static str, String);
+
+/// A section of settings of an experiment, declared by [`parameters!`](raystone_core::parameters).
+pub trait Settings: Parameters {
+    /// Name of the section; behind a dot, of a table within a section.
+    const SECTION: &'static str;
+    /// Keys that must be given where the section is. Their defaults are not in their ranges.
+    const REQUIRED: &'static [&'static str] = &[];
+
+    /// What two of its values must not say together.
+    fn contradiction(&self) -> Option<Contradiction> {
+        None
+    }
+}
+
+/// What the parser knows of a section of settings.
+#[derive(Debug, Clone)]
+pub struct Section {
+    /// Name, meaning and keys.
+    pub entry: Entry,
+    /// Keys that must be given.
+    pub required: &'static [&'static str],
+    check: fn(&Params) -> Result<Option<Contradiction>, ParamError>,
+}
+
+impl Section {
+    /// The section that `S` declares.
+    pub fn of<S: Settings>() -> Self {
+        Self {
+            entry: Entry {
+                name: S::SECTION.to_owned(),
+                description: S::ABOUT.to_owned(),
+                schema: S::schema(),
+            },
+            required: S::REQUIRED,
+            check: |params| Ok(S::from_params(params)?.contradiction()),
+        }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.entry.name
+    }
+
+    /// Its values where it is written in a tree.
+    fn read(&self, tree: &Table) -> Result<Option<Params>, ConfigError> {
+        let name = self.name();
+        let Some(item) = find(tree, name) else {
+            return Ok(None);
+        };
+        let table = item.table(name, "a section")?;
+        let key = |key: &str| format!("{name}.{key}");
+        let mut params = Params::default();
+        for parameter in &self.entry.schema {
+            let name = parameter.name;
+            match table.get(name) {
+                Some(item) => {
+                    let value = values::value(&key(name), item, &parameter.range)?;
+                    params.0.insert(name.to_owned(), value);
+                }
+                None if self.required.contains(&name) => {
+                    return Err(ConfigError::Missing {
+                        at: item.at.clone(),
+                        key: key(name),
+                        expected: parameter.range.to_string(),
+                    });
+                }
+                None => {}
+            }
+        }
+        match (self.check)(&params) {
+            Ok(None) => Ok(Some(params)),
+            Ok(Some((name, expected))) => {
+                let known = self.entry.schema.iter();
+                let default = known.filter(|p| p.name == name).map(|p| &p.default);
+                let default: String = default.map(ToString::to_string).collect();
+                Err(not_allowed(tree, &key(name), default, expected))
+            }
+            Err(error) => Err(ConfigError::Refused {
+                at: format!("{}: [{name}]", item.at),
+                reason: error.to_string(),
+            }),
+        }
+    }
+}
+
+/// The error for a value that its own range allows and another key forbids.
+pub(super) fn not_allowed(
+    tree: &Table,
+    key: &str,
+    default: impl ToString,
+    expected: String,
+) -> ConfigError {
+    let unwritten = || ConfigError::OutOfRange {
+        at: Place::Default,
+        key: key.to_owned(),
+        value: default.to_string(),
+        expected: expected.clone(),
+    };
+    find(tree, key).map_or_else(unwritten, |item| item.out_of_range(key, &expected))
+}
+
+/// The item of a section, or behind dots of what is within.
+pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
+    match name.split_once('.') {
+        None => tree.get(name),
+        Some((outer, inner)) => match &tree.get(outer)?.value {
+            Value::Table(table) => find(table, inner),
+            _ => None,
+        },
+    }
+}
+
+/// The settings of all sections that are written.
+pub(super) type Read = BTreeMap<String, Params>;
+
+/// Reads and checks the values of all sections.
+pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, ConfigError> {
+    let read = sections.iter().filter_map(|section| {
+        let params = section.read(tree).transpose()?;
+        Some(params.map(|params| (section.name().to_owned(), params)))
+    });
+    read.collect()
+}
+
+/// Takes the settings of a section, which were checked.
+pub(super) fn take<S: Settings>(read: &mut Read) -> Option<S> {
+    read.remove(S::SECTION)
+        .map(|params| S::from_checked(&params))
+}
