@@ -52,7 +52,7 @@ pub mod measure {
     pub use raystone_record::{figure, replicates};
     pub use raystone_stats::{
         adaptive, bias, comparison, flip, growth, heavy_tails, hypothesis, interval, metrics,
-        statistics,
+        signed_rank, statistics,
     };
     pub use raystone_verify::*;
 }

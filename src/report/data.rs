@@ -7,8 +7,9 @@ use raystone_core::params::Variant;
 use raystone_record::figure::{EPO, FIGURES, Figure};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
+use raystone_stats::comparison::LogFigure;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Deref;
 
 /// Everything a run recorded.
@@ -32,8 +33,8 @@ pub struct RunData<'a> {
     pub measured: Vec<Recorded<'a, MeasuredRecord>>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
-    /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
-    pub sittings: BTreeSet<u64>,
+    /// The lines that it was sorted from.
+    pub lines: &'a [Line],
     /// What failed without a record of its own kind.
     pub failed: Vec<&'a SkippedRecord>,
     /// The last word on each cell; empty in old records.
@@ -94,8 +95,47 @@ pub struct Measured<'a, T> {
     pub sampler: String,
     /// What ran.
     pub ran: &'a Ran,
+    /// The cell that it was recorded of, where a line says.
+    pub cell: Option<&'a CellRecord>,
     /// The record.
     pub body: &'a T,
+}
+
+impl<T> Measured<'_, T> {
+    /// Times of it, round by round; see [`sitting`].
+    pub(crate) fn rounds(&self, kind: &str, ms: &[f64]) -> Option<LogFigure> {
+        LogFigure::of_rounds(&sitting(kind, &self.key, self.cell), ms)
+    }
+}
+
+/// What takes turns in rounds of its own: structures with the rays of all classes, full cells, compactions.
+pub(crate) const RAYS: &str = "rays";
+pub(crate) const FULL_CELLS: &str = "full cells";
+
+/// What times have in common that were measured in the same rounds: one process took them, on one scene with one triangle
+/// test and box test, all of one kind in turns. Empty where that is not known: records of older programs do not say
+/// when they were taken, so that their rounds may be those of several runs.
+pub(crate) fn sitting(kind: &str, key: &Key, cell: Option<&CellRecord>) -> String {
+    let Some(cell) = cell.filter(|cell| cell.run_began_unix_s > 0) else {
+        return String::new();
+    };
+    let world = [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST].map(|axis| key.label(axis));
+    format!(
+        "{kind}\n{}\n{}\n{}",
+        cell.run_began_unix_s,
+        cell.inputs.device,
+        world.join("\n")
+    )
+}
+
+/// The cell that each line belongs to, by the line's hash.
+pub(crate) type Cells<'a> = HashMap<&'a str, &'a CellRecord>;
+
+/// The cells of these lines.
+pub(crate) fn cells_of<'l>(lines: &'l [Line]) -> Cells<'l> {
+    let cells = all_of::<CellRecord>(lines).map(|cell| cell.body);
+    let hashes = |cell: &'l CellRecord| cell.lines.iter().map(move |hash| (&**hash, cell));
+    cells.flat_map(hashes).collect()
 }
 
 impl<T> Deref for Measured<'_, T> {
@@ -160,8 +200,10 @@ impl<'a> RunData<'a> {
     pub fn new(lines: &'a [Line]) -> Self {
         let mut data = Self {
             names: Names::new(lines),
+            lines,
             ..Self::default()
         };
+        let cells = cells_of(lines);
         for line in lines {
             match &line.body {
                 Body::Run(record) => {
@@ -185,12 +227,12 @@ impl<'a> RunData<'a> {
                     data.scene(line.key.label(axis::SCENE)).record = Some(record)
                 }
                 Body::Animation(record) => {
-                    let measured = data.of_structure(line, record);
+                    let measured = data.of_structure(line, record, &cells);
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.animations, measured, |a, b| a.key == b.key)
                 }
                 Body::Structure(record) => {
-                    let measured = data.of_structure(line, record);
+                    let measured = data.of_structure(line, record, &cells);
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.structures, measured, |a, b| a.key == b.key)
                 }
@@ -201,18 +243,15 @@ impl<'a> RunData<'a> {
                 Body::Reference(_) | Body::Kernels(_) => {}
                 Body::Cell(record) => {
                     data.cells.insert(&record.unit, record);
-                    if !record.inputs.device.is_empty() {
-                        data.sittings.insert(record.run_began_unix_s);
-                    }
                 }
                 Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
-                    let measured = data.of_cell(line, record);
+                    let measured = data.of_cell(line, record, &cells);
                     let view = data.view(&line.key);
                     put(&mut view.times, measured, |a, b| a.key == b.key);
                 }
                 Body::Coherence(record) => {
-                    let measured = data.of_cell(line, record);
+                    let measured = data.of_cell(line, record, &cells);
                     let view = data.view(&line.key);
                     put(&mut view.coherence, measured, |a, b| a.key == b.key);
                 }
@@ -232,24 +271,26 @@ impl<'a> RunData<'a> {
     }
 
     /// What was measured of a structure alone.
-    fn of_structure<T>(&self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
+    fn of_structure<T>(&self, line: &'a Line, body: &'a T, cells: &Cells<'a>) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
             structure: self.names.structure(&key),
             sampler: String::new(),
             ran: &line.ran,
+            cell: cells.get(&*line.hash).copied(),
             key,
             body,
         }
     }
 
     /// What was measured of a full cell.
-    fn of_cell<T>(&mut self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
+    fn of_cell<T>(&mut self, line: &'a Line, body: &'a T, cells: &Cells<'a>) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
             structure: key.label(axis::ACCEL).to_owned(),
             sampler: self.sampler(&line.key).name.clone(),
             ran: &line.ran,
+            cell: cells.get(&*line.hash).copied(),
             key,
             body,
         }
@@ -407,6 +448,13 @@ impl<'a> RunData<'a> {
         let told = self.failed.iter();
         let told = told.map(|failed| (failed.cell.as_str(), failed.reason.as_str()));
         cells.chain(told).collect()
+    }
+
+    /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
+    pub(crate) fn sittings(&self) -> BTreeSet<u64> {
+        let cells = all_of::<CellRecord>(self.lines);
+        let timed = cells.filter(|cell| !cell.inputs.device.is_empty());
+        timed.map(|cell| cell.run_began_unix_s).collect()
     }
 
     /// Every view with its scene.

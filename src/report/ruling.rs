@@ -20,7 +20,7 @@ pub(crate) struct Contender {
     pub log: Option<LogFigure>,
 }
 
-/// The outcome of a comparison.
+/// The outcome of a comparison of all with all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Ruling {
     /// Nothing was measured.
@@ -29,52 +29,61 @@ pub(crate) enum Ruling {
     Withheld(String),
     /// There was no competition.
     Alone(Contender),
-    /// The winner and the next one: the winner differs from every other. How many pairs were compared.
-    Winner(Contender, Contender, usize),
-    /// The best one and all that it does not differ from, best first. How many pairs were compared.
-    Unclear(Vec<Contender>, usize),
+    /// The winner, the next one and how many times the figure of either that is, if both are positive: the winner differs from
+    /// every other. How many pairs were compared.
+    Winner(Contender, Contender, f64, usize),
+    /// The best one and all that it does not differ from, best first, and the ratio of the first two. How many pairs were
+    /// compared.
+    Unclear(Vec<Contender>, f64, usize),
 }
 
-/// Judges the contenders: the best one wins if it differs from every other by Welch's test on logarithms, corrected
-/// for all pairs ([`Pairs`]).
+/// Judges the contenders: the best one wins if it differs from every other by the test of their ratio on logarithms, corrected
+/// for all pairs ([`Pairs`]). Which one is best, and how much better, the pairs say too: what was timed in the same rounds is
+/// known better against each other than by itself.
 pub(crate) fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
     if let [only] = &contenders[..] {
         return Ruling::Alone(only.clone());
     }
     let measured = contenders.len();
-    contenders.retain(|c| c.log.is_some());
-    if contenders.is_empty() && measured > 0 {
-        return Ruling::Withheld(
-            "too few measurements to know their spread, or intervals that are not to be trusted"
-                .into(),
-        );
+    let (mut contenders, mut logs): (Vec<Contender>, Vec<LogFigure>) = contenders
+        .into_iter()
+        .filter_map(|mut c| c.log.take().map(|log| (c, log)))
+        .unzip();
+    if contenders.is_empty() {
+        return match measured {
+            0 => Ruling::Nobody,
+            _ => Ruling::Withheld(
+                "too few measurements to know their spread, or intervals that are not to be trusted"
+                    .into(),
+            ),
+        };
     }
-    contenders.sort_by(|a, b| {
-        let by_value = a.figure.value.total_cmp(&b.figure.value);
-        if better == Better::Higher {
-            by_value.reverse()
-        } else {
-            by_value
-        }
+    if better == Better::Higher {
+        logs = logs.iter().map(LogFigure::inverse).collect();
+    }
+    let pairs = Pairs::of(&logs.iter().collect::<Vec<_>>());
+    let best = pairs.least().unwrap_or(0);
+    let mut others: Vec<usize> = (0..logs.len()).filter(|i| *i != best).collect();
+    others.sort_by(|a, b| {
+        pairs
+            .log_ratio(*a, best)
+            .total_cmp(&pairs.log_ratio(*b, best))
     });
-    let logs: Vec<&LogFigure> = contenders.iter().filter_map(|c| c.log.as_ref()).collect();
-    let pairs = Pairs::of(&logs);
-    // Medians, which sort them, and the means that are compared may disagree.
-    let in_order = |i: usize| match better {
-        Better::Higher => logs[0].log > logs[i].log,
-        Better::Lower | Better::Neither => logs[0].log < logs[i].log,
-    };
-    let is_close = |i: &usize| !(pairs.differ(0, *i) && in_order(*i));
-    let close: Vec<usize> = (1..logs.len()).filter(is_close).collect();
+    let is_close = |i: &&usize| !(pairs.differ(best, **i) && pairs.log_ratio(**i, best) > 0.0);
+    let close: Vec<usize> = others.iter().filter(is_close).copied().collect();
     let count = pairs.count();
-    match &contenders[..] {
-        [] => Ruling::Nobody,
-        [only] => Ruling::Alone(only.clone()),
-        [best, next, ..] if close.is_empty() => Ruling::Winner(best.clone(), next.clone(), count),
-        [best, ..] => {
-            let close = close.iter().map(|i| contenders[*i].clone());
-            Ruling::Unclear(std::iter::once(best.clone()).chain(close).collect(), count)
+    let ratio = |i: usize| pairs.log_ratio(i, best).abs().exp();
+    match (&close[..], &others[..]) {
+        (_, []) => Ruling::Alone(contenders.swap_remove(best)),
+        ([], [next, ..]) => {
+            let [winner, second] = [best, *next].map(|i| contenders[i].clone());
+            Ruling::Winner(winner, second, ratio(*next), count)
+        }
+        ([next, ..], _) => {
+            let named = std::iter::once(&best).chain(&close);
+            let named = named.map(|i| contenders[*i].clone()).collect();
+            Ruling::Unclear(named, ratio(*next), count)
         }
     }
 }
@@ -87,7 +96,7 @@ impl Ruling {
             Self::Withheld(reason) => format!("no winner: {reason}"),
             Self::Alone(only) => format!("{} (alone)", only.name),
             Self::Winner(best, ..) => best.name.clone(),
-            Self::Unclear(close, _) => {
+            Self::Unclear(close, ..) => {
                 let names: Vec<&str> = close.iter().map(|c| c.name.as_str()).collect();
                 let shown = &names[..names.len().min(MOST_NAMES)];
                 let more = match names.len() - shown.len() {
@@ -109,7 +118,7 @@ impl Ruling {
         match self {
             Self::Nobody | Self::Withheld(_) => format::ABSENT.into(),
             Self::Alone(best) | Self::Winner(best, ..) => format::interval(&best.figure),
-            Self::Unclear(close, _) => close
+            Self::Unclear(close, ..) => close
                 .first()
                 .map_or(format::ABSENT.into(), |c| format::interval(&c.figure)),
         }
@@ -117,24 +126,23 @@ impl Ruling {
 
     /// The next one with its figure and, of positive figures, the ratio of the two.
     pub(crate) fn runner_up(&self) -> String {
-        let (best, next) = match self {
-            Self::Winner(best, next, _) => (best, next),
-            Self::Unclear(close, _) if close.len() > 1 => (&close[0], &close[1]),
+        let (best, next, ratio) = match self {
+            Self::Winner(best, next, ratio, _) => (best, next, ratio),
+            Self::Unclear(close, ratio, _) if close.len() > 1 => (&close[0], &close[1], ratio),
             _ => return format::ABSENT.into(),
         };
         let text = format!("{} {}", next.name, format::interval(&next.figure));
         if best.figure.value <= 0.0 || next.figure.value <= 0.0 {
             return text;
         }
-        let ratio = best.figure.value / next.figure.value;
-        format!("{text} ({}×)", format::number(ratio.max(1.0 / ratio)))
+        format!("{text} ({}×)", format::number(*ratio))
     }
 
     /// How many pairs were compared.
     pub(crate) fn comparisons(&self) -> usize {
         match self {
             Self::Nobody | Self::Withheld(_) | Self::Alone(_) => 0,
-            Self::Winner(_, _, pairs) | Self::Unclear(_, pairs) => *pairs,
+            Self::Winner(.., pairs) | Self::Unclear(.., pairs) => *pairs,
         }
     }
 }
@@ -142,20 +150,16 @@ impl Ruling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone_stats::statistics::Spread;
+    use raystone_stats::interval::Spread;
 
     /// What is said of contenders with these figures, relative standard errors and known spreads, called a, b, c.
     fn said(better: Better, figures: &[(f64, f64, bool)]) -> [String; 3] {
         let contenders = figures.iter().zip(["a", "b", "c"]);
         let contenders = contenders.map(|((value, error, has_spread), name)| {
-            let log = LogFigure {
-                log: value.ln(),
-                own: vec![Spread {
-                    variance: error * error,
-                    freedom: 15.0,
-                }],
-                shared: Vec::new(),
-            };
+            let log = LogFigure::exact(*value).with_noise(Some(Spread {
+                variance: error * error,
+                freedom: 15.0,
+            }));
             Contender {
                 name: name.into(),
                 figure: log.interval(),

@@ -1,10 +1,10 @@
 //! What the replicates of a sampler say together.
 
-use super::data::View;
+use super::data::{FULL_CELLS, Measured, View};
 use super::format;
 use raystone_record::figure::figure;
 use raystone_record::replicates::{Replicates, Without};
-use raystone_record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
+use raystone_record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord, axis};
 use raystone_stats::bias::BiasVerdict;
 use raystone_stats::comparison::LogFigure;
 use raystone_stats::heavy_tails::is_heavy;
@@ -336,6 +336,24 @@ impl<'a> MeasuredSampler<'a> {
 }
 
 impl View<'_> {
+    /// Whether the images of a sampler are, to the bit, those of the same sampler with the program's own kernels: then it has no
+    /// error of its own.
+    pub(crate) fn is_same_image(&self, sampler: &MeasuredSampler) -> bool {
+        if sampler.key.label(axis::KERNELS).is_empty() {
+            return false;
+        }
+        let hashes = |s: &MeasuredSampler| -> Vec<(u32, String)> {
+            let images = s.replicates.iter();
+            images
+                .map(|r| (r.replicate, r.image_hash.clone()))
+                .collect()
+        };
+        let original = sampler.key.clone().with(axis::KERNELS, "");
+        let is_known = sampler.replicates.iter().all(|r| !r.image_hash.is_empty());
+        let mut samplers = self.samplers.iter();
+        is_known && samplers.any(|s| s.key == original && hashes(s) == hashes(sampler))
+    }
+
     /// Why the errors of this view may not be ranked: the reference is absent, or too noisy for the
     /// least of them.
     pub(crate) fn reference_fault(&self) -> Option<String> {
@@ -413,18 +431,12 @@ fn rounded_up(value: f64) -> u64 {
     ((value / unit).floor() + 1.0) as u64 * unit as u64
 }
 
-/// Variance of a median over that of the trimmed mean that [`LogFigure::of_times`] takes, for normal noise.
-const MEDIAN_VARIANCE: f64 = 1.4;
-
-/// The median time per sample per pixel, milliseconds, with its noise: none where it was not measured often
-/// enough.
-pub(crate) fn log_time(time: &TimeRecord) -> Option<LogFigure> {
-    let log = time.ms_per_spp?.value.ln();
+/// The time per sample per pixel, milliseconds, with its noise: none where it was not measured often enough.
+pub(crate) fn log_time(time: &Measured<TimeRecord>) -> Option<LogFigure> {
     let often = time.ms.len() >= LEAST_FOR_MEDIAN;
-    let trimmed = LogFigure::of_times(&time.ms).filter(|_| often);
-    let noise = trimmed.and_then(|trimmed| trimmed.own.first().copied());
-    let noise = noise.map(|noise| noise.times(MEDIAN_VARIANCE));
-    Some(LogFigure::new(log, &[], Vec::new())?.with_noise(noise))
+    let known = time.rounds(FULL_CELLS, &time.ms).filter(|_| often);
+    let known = known.map(|known| known.scaled(1.0 / f64::from(time.spp)));
+    known.or_else(|| Some(LogFigure::exact(time.ms_per_spp?.value)))
 }
 
 /// Where `seconds` lies on a curve of growing seconds: the indices of the neighbours, and the share of the way

@@ -117,7 +117,8 @@ impl Screen {
 
 /// Every table that the end of a run shows.
 fn tables(data: &RunData) -> Vec<Table> {
-    let mut tables = Vec::new();
+    let against_original = kernels::against_original(data).into_iter();
+    let mut tables: Vec<Table> = against_original.map(|(table, _)| table).collect();
     for scene in &data.scenes {
         let values = of_structures(data, scene);
         tables.push(structures::speed_table(scene, &values));

@@ -174,11 +174,7 @@ mod tests {
 
     #[test]
     fn a_tile_takes_the_fewest_samples_that_are_enough() {
-        let exact = |error: f64| LogFigure {
-            log: error.ln(),
-            own: Vec::new(),
-            shared: Vec::new(),
-        };
+        let exact = LogFigure::exact;
         let counts = [4, 8, 16, 32];
         let needed = |error| samples_needed(Some(&exact(error)), &counts, 0.01, 0.95);
         assert_eq!(

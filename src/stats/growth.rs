@@ -7,14 +7,12 @@
 //! itself, so that its spread over rounds is known, and a model is named only where the whole interval speaks for it.
 
 use crate::interval::Interval;
-use crate::statistics::{LEAST_FOR_MEDIAN, median, median_interval};
+use crate::statistics::{LEAST_FOR_MEDIAN, ROUNDING, median, median_interval};
 
 /// Fewer sizes do not tell two models of two constants apart.
 pub(crate) const LEAST_SIZES: usize = 5;
 /// Criteria that differ by less support both models (Burnham and Anderson 2002, section 2.6).
 const NO_DIFFERENCE: f64 = 2.0;
-/// Residuals that are rounding are no better than others that are.
-const ROUNDING: f64 = 1e-12;
 
 /// A model of growth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +81,7 @@ pub fn growth(rounds: &[Vec<(f64, f64)>]) -> Option<Growth> {
     };
     let (linear, linearithmic) = (of(Model::Linear)?, of(Model::Linearithmic)?);
     let difference = |((a, b), round): ((&f64, &f64), &Vec<(f64, f64)>)| {
+        // Residuals that are rounding are no better than others that are.
         2.0 * round.len() as f64 * (a.max(ROUNDING) / b.max(ROUNDING)).ln()
     };
     let pairs = linear.iter().zip(&linearithmic).zip(rounds);

@@ -9,6 +9,8 @@ pub mod growth;
 pub mod heavy_tails;
 pub mod hypothesis;
 pub mod interval;
+mod log_figure;
 pub mod metrics;
 mod shown;
+pub mod signed_rank;
 pub mod statistics;

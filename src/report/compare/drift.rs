@@ -7,7 +7,7 @@
 //! widens intervals and shifts none. A cell whose own rounds are noisier than those of controls has that much more.
 
 use crate::format::plural;
-use raystone_stats::statistics::Spread;
+use raystone_stats::interval::Spread;
 
 /// Fewer controls show no drift.
 pub(crate) const LEAST_CONTROLS: usize = 3;

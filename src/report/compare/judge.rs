@@ -1,12 +1,12 @@
 //! From two pieces of evidence to what can be said of their difference.
 
-use super::signed_rank::SignedRank;
 use super::taken::Evidence;
 use raystone_record::Interval;
 use raystone_record::figure::{Better, Figure, Shown};
-use raystone_stats::comparison::LogFigure;
-use raystone_stats::hypothesis::{capped_t_test, student_t_quantile, student_t_two_sided};
-use raystone_stats::statistics::{Spread, mean, median, variance};
+use raystone_stats::comparison::{LEVEL, LogFigure};
+use raystone_stats::interval::Spread;
+use raystone_stats::signed_rank::SignedRank;
+use raystone_stats::statistics::{mean, median};
 
 /// What a comparison says of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -97,9 +97,6 @@ pub enum Outcome {
 fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
     Outcome::Known(verdict, why.into())
 }
-
-/// Probability with which an interval misses.
-pub(crate) const ALPHA: f64 = 0.05;
 
 /// Compares everything but times: what they need beside the samples is in [`TimeRatio`].
 pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -> Outcome {
@@ -226,7 +223,7 @@ fn pairs(gaps: &[f64], margin: f64) -> Outcome {
     let Some(test) = SignedRank::new(gaps) else {
         return known(Verdict::Undecided, "a value is no finite number");
     };
-    let [low, high] = test.interval(ALPHA);
+    let [low, high] = test.interval(LEVEL);
     Outcome::Tested(Measured {
         change: Interval {
             value: test.estimate(),
@@ -246,21 +243,20 @@ fn two_samples(old: &[f64], new: &[f64], unit: f64, margin: f64, same_reference:
             "the references differ, and what is measured against them shares their noise",
         );
     }
-    let Some(test) = capped_t_test(new, old, 0.0) else {
+    let side = |values: &[f64]| {
+        let scaled: Vec<f64> = values.iter().map(|x| x / unit).collect();
+        mean(&scaled).zip(Spread::of_mean(&scaled))
+    };
+    let Some(((old, a), (new, b))) = side(old).zip(side(new)) else {
         return known(Verdict::Undecided, "a value is no finite number");
     };
-    let gap = (mean(new).unwrap_or(f64::NAN) - mean(old).unwrap_or(f64::NAN)) / unit;
-    let half = student_t_quantile(ALPHA, test.degrees_of_freedom) * test.standard_error / unit;
-    Outcome::Tested(Measured {
-        change: Interval {
-            value: gap,
-            low: gap - half,
-            high: gap + half,
-        },
-        p: test.p,
+    let spread = Spread::of_difference(a, b);
+    Outcome::Tested(student(
+        new - old,
+        spread,
         margin,
-        how: "two samples of different seeds",
-    })
+        "two samples of different seeds",
+    ))
 }
 
 /// Intervals whose samples are not kept, of about Student's distribution.
@@ -275,11 +271,10 @@ fn summaries(
     }
     let (margin, relative) = margin_of(figure, effects);
     let unit = if relative { a.0.value.abs() } else { 1.0 };
-    let spread = |(i, freedom): (Interval, f64)| Spread {
-        variance: (0.5 * (i.high - i.low) / unit / student_t_quantile(ALPHA, freedom)).powi(2),
-        freedom,
+    let spread = |(i, freedom): (Interval, f64)| {
+        Spread::of_half_width(0.5 * (i.high - i.low) / unit, freedom)
     };
-    let together = Spread::together(&[spread(a), spread(b)]);
+    let together = Spread::of_difference(spread(a), spread(b));
     if unit == 0.0 || !together.variance.is_finite() || together.variance == 0.0 {
         return known(Verdict::Undecided, "nothing is known of its spread");
     }
@@ -289,17 +284,9 @@ fn summaries(
 
 /// Student's test and interval.
 fn student(gap: f64, spread: Spread, margin: f64, how: &'static str) -> Measured {
-    let half = student_t_quantile(ALPHA, spread.freedom) * spread.variance.sqrt();
     Measured {
-        change: Interval {
-            value: gap,
-            low: gap - half,
-            high: gap + half,
-        },
-        p: match gap == 0.0 {
-            true => 1.0,
-            false => student_t_two_sided(gap / spread.variance.sqrt(), spread.freedom),
-        },
+        change: spread.interval(gap),
+        p: spread.p(gap),
         margin,
         how,
     }
@@ -346,14 +333,19 @@ impl TimeRatio {
                 "processor time (the values are by the adapter's clock)",
             ),
         };
-        match in_rounds && a.len() == b.len() {
-            true => {
-                let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
-                let ratio = Self::of_rounds(&ratios, clock)?;
-                Some(ratio.of_compilations(compilations))
-            }
-            false => Self::of_samples(LogFigure::of_times(a)?, LogFigure::of_times(b)?, clock),
+        if in_rounds && a.len() == b.len() {
+            let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
+            let ratio = Self::of_rounds(&ratios, clock)?;
+            return Some(ratio.of_compilations(compilations));
         }
+        let [a, b] = [a, b].map(|ms| LogFigure::of_times(ms));
+        let (a, b) = a.zip(b)?;
+        Some(Self {
+            log: b.log - a.log,
+            rounds: Spread::of_difference(a.spread(), b.spread()),
+            by_round: Vec::new(),
+            clock,
+        })
     }
 
     /// Of the ratios of both in the same rounds.
@@ -362,7 +354,7 @@ impl TimeRatio {
         Some(Self {
             by_round: ratios.iter().map(|x| x.ln()).collect(),
             log: figure.log,
-            rounds: Spread::together(&figure.own),
+            rounds: figure.spread(),
             clock,
         })
     }
@@ -375,26 +367,11 @@ impl TimeRatio {
             median(&rounds.copied().collect::<Vec<_>>())
         };
         let medians: Option<Vec<f64>> = (0..count).map(of).collect();
-        if let Some(variance) = medians.and_then(|medians| variance(&medians)) {
-            let variance = variance / count as f64;
-            if variance > self.rounds.variance {
-                self.rounds = Spread {
-                    variance,
-                    freedom: count as f64 - 1.0,
-                };
-            }
+        let of_compilations = medians.and_then(|medians| Spread::of_mean(&medians));
+        if let Some(spread) = of_compilations.filter(|s| s.variance > self.rounds.variance) {
+            self.rounds = spread;
         }
         self
-    }
-
-    fn of_samples(a: LogFigure, b: LogFigure, clock: &'static str) -> Option<Self> {
-        let log = b.log - a.log;
-        log.is_finite().then(|| Self {
-            log,
-            rounds: Spread::together(&[a.own, b.own].concat()),
-            by_round: Vec::new(),
-            clock,
-        })
     }
 
     /// The difference of a figure, given the noise of what did not change; without it that of the rounds. Rounds of both

@@ -10,13 +10,13 @@ mod facts;
 pub mod judge;
 pub mod show;
 pub mod side;
-pub mod signed_rank;
 pub mod taken;
 mod work;
 
 use judge::{Effects, Measured, TimeRatio, Verdict};
 use raystone_record::Key;
 use raystone_record::figure::Figure;
+use raystone_stats::comparison::LEVEL;
 use side::Side;
 use std::collections::BTreeMap;
 use work::Work;
@@ -36,7 +36,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            alpha: judge::ALPHA,
+            alpha: LEVEL,
             effects: Effects::default(),
             judge_times: true,
         }

@@ -90,7 +90,7 @@ fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
 }
 
 /// The difference with its interval, in the figure's own direction.
-fn change(finding: &Finding) -> String {
+pub(crate) fn change(finding: &Finding) -> String {
     let Some(measured) = finding.measured else {
         return exact_change(finding).unwrap_or_default();
     };

@@ -1,13 +1,15 @@
 //! An expectation against what a run found: a row for each place where it speaks.
 
-use super::judge::{Bounds, Verdict, factor, ratio, slope, spread};
+use super::judge::{Bounds, Verdict, factor, spread};
 use super::rounds::Rounds;
 use super::select::{fits, merged, partner, select, words};
 use crate::format;
 use crate::samplers::HEAVY_TAILED;
 use crate::values::{Reading, Value};
+use raystone_config::Pattern;
 use raystone_config::expect::{At, Compare, Expect, Pick, Speaks};
 use raystone_record::{Interval, Key};
+use raystone_stats::comparison::LogFigure;
 
 /// What is known of a run beside its values.
 #[derive(Debug, Clone, Default)]
@@ -54,6 +56,43 @@ pub fn judge(expect: &Expect, values: &[Value], context: &Context) -> Vec<Row> {
     };
     let at = |at: &At| Place::new(expect, at, context).rows(values);
     places.iter().flat_map(at).collect()
+}
+
+/// What an expectation says that its comparison has no use for, and what to do about it: a bound of an order would be passed over,
+/// and the claim judged as if it were not there.
+pub(crate) fn unused(expect: &Expect) -> Option<String> {
+    use Compare::{Order, Ratio, Shown, Slope};
+    let compare = expect.compare;
+    let at = |has: fn(&At) -> bool| expect.at.iter().any(has);
+    let bounds = [
+        (
+            "least",
+            expect.least.is_some() || at(|at| at.least.is_some()),
+        ),
+        ("most", expect.most.is_some() || at(|at| at.most.is_some())),
+        ("within", expect.within.is_some()),
+        ("off_by", expect.off_by.is_some()),
+    ];
+    let bounds = bounds.map(|(key, is_said)| (key, is_said && matches!(compare, Order | Shown)));
+    let over = !expect.over.is_empty() || at(|at| !at.over.is_empty());
+    let others = [
+        ("over", over && !matches!(compare, Order | Ratio)),
+        ("order", !expect.order.is_empty() && compare != Order),
+        ("along", expect.along.is_some() && compare != Slope),
+    ];
+    let (key, _) = bounds
+        .into_iter()
+        .chain(others)
+        .find(|(_, is_unused)| *is_unused)?;
+    let instead = match (key, compare) {
+        ("over" | "order" | "along", _) => "or choose the `compare` that needs it (docs/repro.md)",
+        (_, Order) => "or bound each step by an expectation of its own with compare = \"ratio\"",
+        _ => "or judge the values with compare = \"bound\"",
+    };
+    Some(format!(
+        "[[expect]] id = \"{}\": this comparison has no use for `{key}`: take it out, {instead}",
+        expect.id
+    ))
 }
 
 struct Place<'e> {
@@ -104,26 +143,38 @@ impl<'e> Place<'e> {
         };
         match found {
             Ok(rows) => rows,
-            Err((pick, problem)) => vec![self.absent(&pick, problem)],
+            Err((pick, problem)) => vec![self.absent(&pick, problem, values)],
         }
     }
 
     /// Nothing was found: what was left out for a reason cannot be tested, else the expectation is at fault.
-    fn absent(&self, pick: &Pick, problem: String) -> Row {
-        let of_cells: Pick = (pick.iter())
-            .filter(|(axis, _)| {
-                self.context
-                    .absent
-                    .iter()
-                    .any(|(k, _)| k.get(axis).is_some())
-            })
-            .map(|(axis, pattern)| (axis.clone(), pattern.clone()))
-            .collect();
-        let mut left_out = self.context.absent.iter();
-        let left_out = left_out.find(|(key, _)| fits(key, &of_cells));
-        match left_out {
-            Some((_, reason)) => self.row(None, Verdict::NotTestable, reason.clone()),
-            None => self.row(None, Verdict::Faulty, problem),
+    fn absent(&self, pick: &Pick, problem: String, values: &[Value]) -> Row {
+        let is_known = |(axis, pattern): (&String, &String)| {
+            let keys = values.iter().map(|value| &value.key);
+            let keys = keys.chain(self.context.absent.iter().map(|(key, _)| key));
+            let mut labels = keys.filter(|key| key.get(axis).is_some()).peekable();
+            let pattern = Pattern::new(pattern.as_str());
+            let unseen = labels.peek().is_none() || pattern.fits_text("");
+            unseen || labels.any(|key| pattern.fits_text(key.label(axis)))
+        };
+        let of_figure = values.iter().filter(|v| v.figure.id == self.expect.figure);
+        let of_figure: Vec<&Key> = of_figure.map(|value| &value.key).collect();
+        // A cell on an axis that the figure never has, as a structure beside point sets, is another's.
+        let is_its = |key: &Key| {
+            let axes = key.labels().map(|(axis, _)| axis);
+            let has = |axis: &str| of_figure.iter().any(|known| known.get(axis).is_some());
+            of_figure.is_empty() || axes.into_iter().all(has)
+        };
+        let explains = |(key, _): &&(Key, String)| {
+            let mut shared = pick.clone();
+            shared.retain(|axis, _| key.get(axis).is_some());
+            !shared.is_empty() && fits(key, &shared) && is_its(key)
+        };
+        // What no cell is called, measured or not, is misspelt.
+        let is_sound = pick.iter().all(is_known);
+        match self.context.absent.iter().find(explains) {
+            Some((_, reason)) if is_sound => self.row(None, Verdict::NotTestable, reason.clone()),
+            _ => self.row(None, Verdict::Faulty, problem),
         }
     }
 
@@ -273,32 +324,21 @@ impl<'e> Place<'e> {
         upper.into_iter().map(pair).collect()
     }
 
-    /// A ratio with its interval: of what is known part by part (times of the same rounds) by these, else as of
-    /// independent figures.
-    fn ratio(&self, a: &Value, b: &Value) -> Option<Interval> {
-        let paired = self.context.rounds.product(&[(a, 1.0), (b, -1.0)]);
-        paired.or_else(|| Some(ratio(known(a)?, known(b)?)))
+    /// What a value is compared by: what is known of it part by part (times round by round), else its interval.
+    fn figure(&self, value: &Value) -> Option<LogFigure> {
+        let by_parts = self.context.rounds.of(value).cloned();
+        by_parts.or_else(|| LogFigure::of_interval(known(value)?, f64::INFINITY))
     }
 
-    /// The ratio of two gains.
-    fn growth(&self, after: &Gain, before: &Gain) -> Option<Interval> {
-        let (Some(over), Some(under)) = (after.over, before.over) else {
-            return self.ratio(after.value, before.value);
-        };
-        let terms = [
-            (after.value, 1.0),
-            (over, -1.0),
-            (before.value, -1.0),
-            (under, 1.0),
-        ];
-        let paired = self.context.rounds.product(&terms);
-        paired.or_else(|| Some(ratio(self.gained(after)?, self.gained(before)?)))
+    /// A ratio with its interval. Nothing is known of one of figures that are not positive.
+    fn ratio(&self, a: &Value, b: &Value) -> Interval {
+        over(self.figure(a), self.figure(b))
     }
 
     fn ratios(&self, values: &[Value], figure: &str) -> Result<Vec<Row>, (Pick, String)> {
         let row = |[a, b]: &[&Value; 2]| match (known(a), known(b)) {
             (Some(_), Some(_)) => {
-                let mut row = self.judged(self.ratio(a, b)?, "", &a.key);
+                let mut row = self.judged(self.ratio(a, b), "", &a.key);
                 row.counted = self.counted(values, |figure| {
                     let pairs = self.pairs(values, figure).ok()?;
                     let same = pairs.iter().find(|[c, _]| agrees(&c.key, &a.key))?;
@@ -351,12 +391,23 @@ impl<'e> Place<'e> {
         Ok(rows)
     }
 
+    /// What a part of an order is compared by.
+    fn gained(&self, gain: &Gain) -> Option<LogFigure> {
+        let value = self.figure(gain.value)?;
+        let Some(over) = gain.over else {
+            return Some(value);
+        };
+        Some(LogFigure::product(&[
+            (&value, 1.0),
+            (&self.figure(over)?, -1.0),
+        ]))
+    }
+
     /// The number of a part of an order.
-    fn gained(&self, gain: &Gain) -> Option<Interval> {
-        match gain.over {
-            None => known(gain.value),
-            Some(over) => self.ratio(gain.value, over),
-        }
+    fn number(&self, gain: &Gain) -> f64 {
+        let value = known(gain.value).map_or(f64::NAN, |i| i.value);
+        gain.over
+            .map_or(value, |over| self.ratio(gain.value, over).value)
     }
 
     fn ordered(&self, chain: &[Gain], picks: &[Pick]) -> Row {
@@ -364,10 +415,11 @@ impl<'e> Place<'e> {
         if let Some(row) = values.find_map(|value| self.unread(value?)) {
             return row;
         }
-        let numbers: Vec<Interval> = chain.iter().filter_map(|gain| self.gained(gain)).collect();
-        let steps = chain.windows(2);
-        let steps = steps.filter_map(|pair| self.growth(&pair[1], &pair[0]));
-        let steps: Vec<Interval> = steps.collect();
+        let gained: Vec<Option<LogFigure>> = chain.iter().map(|gain| self.gained(gain)).collect();
+        let steps = gained.windows(2);
+        let steps: Vec<Interval> = steps
+            .map(|pair| over(pair[1].clone(), pair[0].clone()))
+            .collect();
         let ascends = Bounds::new(Some(1.0), None);
         let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
         let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
@@ -378,16 +430,12 @@ impl<'e> Place<'e> {
         if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
             row.verdict = verdict;
         }
-        let named = picks
-            .iter()
-            .zip(chain)
-            .zip(&numbers)
-            .map(|((pick, Gain { value, .. }), i)| {
-                let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
-                let labels = pick.keys().filter(own).map(|axis| value.key.label(axis));
-                let labels: Vec<&str> = labels.collect();
-                format!("{} {}", labels.join(" "), format::number(i.value))
-            });
+        let named = picks.iter().zip(chain).map(|(pick, gain)| {
+            let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
+            let labels = pick.keys().filter(own);
+            let labels: Vec<&str> = labels.map(|axis| gain.value.key.label(axis)).collect();
+            format!("{} {}", labels.join(" "), format::number(self.number(gain)))
+        });
         let named = named.collect::<Vec<_>>().join(" → ");
         row.reason = match row.verdict {
             Verdict::NotTestable | Verdict::Faulty => format!("{}; {named}", row.reason),
@@ -401,27 +449,35 @@ impl<'e> Place<'e> {
         let chosen = self.chosen(values, &self.expect.figure, &pick)?;
         let along = self.expect.along.as_deref().unwrap_or_default();
         let without = |key: &Key| key.clone().with(along, "");
-        let mut groups: Vec<(Key, Vec<(f64, Interval)>)> = Vec::new();
+        let mut groups: Vec<(Key, Vec<(f64, &Value)>)> = Vec::new();
         for value in chosen {
-            let (Ok(x), Some(y)) = (value.key.label(along).parse::<f64>(), known(value)) else {
+            let (Ok(x), Some(_)) = (value.key.label(along).parse::<f64>(), known(value)) else {
                 continue;
             };
             let key = without(&value.key);
             match groups.iter_mut().find(|(known, _)| *known == key) {
-                Some((_, points)) => points.push((x, y)),
-                None => groups.push((key, vec![(x, y)])),
+                Some((_, points)) => points.push((x, value)),
+                None => groups.push((key, vec![(x, value)])),
             }
         }
         if groups.is_empty() {
             return Err((pick, format!("no number on the axis {along}")));
         }
-        let row = |(key, points): &(Key, Vec<(f64, Interval)>)| match slope(points) {
-            Some(exponent) => self.judged(exponent, "", key),
-            None => self.row(
-                None,
-                Verdict::Faulty,
-                format!("one point only along {along} at {key}"),
-            ),
+        let row = |(key, points): &(Key, Vec<(f64, &Value)>)| {
+            let fault = |problem: &str| {
+                let problem = format!("{problem} along {along} at {key}");
+                self.row(None, Verdict::Faulty, problem)
+            };
+            let figures = points
+                .iter()
+                .map(|(x, value)| Some((*x, self.figure(value)?)));
+            let Some(figures) = figures.collect::<Option<Vec<(f64, LogFigure)>>>() else {
+                return fault("a figure that is not positive has no exponent: there is one");
+            };
+            match LogFigure::exponent(&figures) {
+                Some(slope) => self.judged(slope.log_interval(), "", key),
+                None => fault("one point only"),
+            }
         };
         Ok(groups.iter().map(row).collect())
     }
@@ -446,6 +502,16 @@ fn known(value: &Value) -> Option<Interval> {
         Reading::Known(i) if i.value.is_finite() => Some(spread(&value.figure, i)),
         _ => None,
     }
+}
+
+/// The ratio of two figures; any, where one of them is not positive.
+fn over(a: Option<LogFigure>, b: Option<LogFigure>) -> Interval {
+    let unknown = Interval {
+        value: f64::NAN,
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+    a.zip(b).map_or(unknown, |(a, b)| a.compared_with(&b).ratio)
 }
 
 /// Whether two keys agree on all axes that both have.

@@ -1,9 +1,4 @@
-//! Verdicts: an interval against bounds, and how intervals of ratios and slopes are made.
-//!
-//! The interval of a ratio or of a fitted exponent is that of the *method of variance estimates recovery* on
-//! logarithms (Zou & Donner 2008; Donner & Zou 2012): each side's own 95 % interval, asymmetric as it is, gives its
-//! part of the spread, and the parts add in squares. It takes both sides for independent; ratios of what was timed in the
-//! same rounds are those of [`super::rounds`].
+//! Verdicts: an interval against bounds. Ratios and exponents have theirs from [`raystone_stats::comparison`].
 
 use raystone_record::Interval;
 use raystone_record::figure::{Figure, Spread};
@@ -119,57 +114,6 @@ pub(crate) fn spread(figure: &Figure, i: Interval) -> Interval {
     }
 }
 
-/// Logarithms of an interval; the lower end of one that reaches 0 has none.
-fn logs(i: Interval) -> [f64; 3] {
-    [i.low.max(0.0).ln(), i.value.ln(), i.high.ln()]
-}
-
-/// `Σ wᵢ ln xᵢ` with its interval.
-fn combined(terms: impl Iterator<Item = (f64, Interval)>) -> Interval {
-    let (mut value, mut below, mut above) = (0.0, 0.0, 0.0);
-    for (weight, interval) in terms {
-        let [low, at, high] = logs(interval);
-        let (down, up) = (weight * (at - low), weight * (high - at));
-        // A negative weight turns the ends round.
-        let (down, up) = if weight < 0.0 {
-            (-up, -down)
-        } else {
-            (down, up)
-        };
-        value += weight * at;
-        below += down * down;
-        above += up * up;
-    }
-    Interval {
-        value,
-        low: value - f64::sqrt(below),
-        high: value + f64::sqrt(above),
-    }
-}
-
-/// `a / b`, both positive.
-pub fn ratio(a: Interval, b: Interval) -> Interval {
-    let log = combined([(1.0, a), (-1.0, b)].into_iter());
-    // Not by logarithms: what is exact stays exact.
-    let value = a.value / b.value;
-    Interval {
-        value,
-        low: value * (log.low - log.value).exp(),
-        high: value * (log.high - log.value).exp(),
-    }
-}
-
-/// The exponent of a power law through points `(x, y)`, by least squares of logarithms; `None` with fewer than two
-/// different x.
-pub(crate) fn slope(points: &[(f64, Interval)]) -> Option<Interval> {
-    let n = points.len() as f64;
-    let mean = points.iter().map(|(x, _)| x.ln()).sum::<f64>() / n;
-    let square: f64 = points.iter().map(|(x, _)| (x.ln() - mean).powi(2)).sum();
-    let usable = square > 0.0 && points.iter().all(|(x, y)| *x > 0.0 && y.value > 0.0);
-    let weight = |x: f64| (x.ln() - mean) / square;
-    usable.then(|| combined(points.iter().map(|(x, y)| (weight(*x), *y))))
-}
-
 /// Factor from one unit into another; `None` where they measure different things.
 pub(crate) fn factor(from: &str, to: &str) -> Option<f64> {
     const UNITS: [(&str, &str, f64); 9] = [
@@ -229,34 +173,6 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_has_its_side_up_and_the_spread_of_both_sides() {
-        let r = ratio(i(1.8, 2.0, 2.2), i(0.9, 1.0, 1.1));
-        assert!((r.value - 2.0).abs() < 1e-12);
-        // Each side alone has a lower end 10 % down; together √2 of that on logarithms.
-        let down = (f64::ln(2.0 / 1.8).powi(2) + f64::ln(1.1f64).powi(2)).sqrt();
-        assert!((r.low - (2f64.ln() - down).exp()).abs() < 1e-12);
-        assert!(r.low > 1.8 / 1.1 && r.low < 1.8 && r.high > 2.2);
-        assert_eq!(ratio(i(3.0, 3.0, 3.0), i(2.0, 2.0, 2.0)).low, 1.5);
-        // An error whose interval reaches 0 has a ratio that may be anything below.
-        assert_eq!(ratio(i(0.0, 1.0, 2.0), i(1.0, 1.0, 1.0)).low, 0.0);
-    }
-
-    #[test]
-    fn a_slope_is_the_exponent_and_an_uncertain_point_makes_it_uncertain() {
-        let points: Vec<_> = [8.0f64, 16.0, 32.0, 64.0]
-            .map(|n| (n, Interval::exact(3.0 * n.powf(-0.7))))
-            .to_vec();
-        let exact = slope(&points).expect("a slope");
-        assert!((exact.value + 0.7).abs() < 1e-12 && (exact.high - exact.low).abs() < 1e-12);
-        let mut wide = points;
-        wide[0].1.high *= 1.2;
-        let wide = slope(&wide).expect("a slope");
-        // A higher first point makes the fall steeper, so the lower end moves.
-        assert!(wide.low < exact.low - 0.01 && (wide.high - exact.high).abs() < 1e-12);
-        assert!(slope(&[(8.0, Interval::exact(1.0))]).is_none());
-    }
-
-    #[test]
     fn units_convert_within_their_kind() {
         assert_eq!(factor("s", "ms"), Some(1000.0));
         assert_eq!(factor("%", ""), Some(0.01));
@@ -270,11 +186,14 @@ mod tests {
     #[test]
     fn what_was_measured_once_is_not_taken_for_exact() {
         use raystone_record::figure::figure;
+        use raystone_stats::comparison::LogFigure;
         let build = spread(figure("build-ms/v1"), Interval::exact(100.0));
         assert_eq!((build.low, build.high), (60.0, 165.0));
         // A build of a millisecond may have taken none: neither is faster than the other.
         let short = |ms| spread(figure("build-ms/v1"), Interval::exact(ms));
-        let faster = Bounds::new(Some(1.0), None).judge(ratio(short(6.0), short(0.1)));
+        let [slow, fast] =
+            [6.0, 0.1].map(|ms| LogFigure::of_interval(short(ms), f64::INFINITY).expect("a time"));
+        let faster = Bounds::new(Some(1.0), None).judge(slow.compared_with(&fast).ratio);
         assert_eq!(faster, Verdict::Undecided);
         let nodes = spread(figure("nodes-per-ray/v1"), Interval::exact(3.0));
         assert_eq!(nodes, Interval::exact(3.0));

@@ -1,7 +1,7 @@
 //! What runs for a table, and what its records say of each expectation.
 
 use super::Source;
-use super::claim::{Context, Row, judge};
+use super::claim::{Context, Row, judge, unused};
 use super::judge::Verdict;
 use super::rounds::Rounds;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
@@ -99,6 +99,10 @@ pub fn prepare(
     catalogue: &Catalogue,
 ) -> Result<Prepared, ConfigError> {
     let thesis = source.thesis()?;
+    let at = format!("{}.toml", source.name);
+    if let Some(reason) = thesis.expects.iter().find_map(unused) {
+        return Err(ConfigError::Refused { at, reason });
+    }
     let stand_in = |s: &Substitute| (s.clone(), scene_of(s, settings));
     let scenes: Vec<_> = thesis.substitutes.iter().map(stand_in).collect();
     let changes = match (settings.quick, settings.software) {

@@ -1,15 +1,196 @@
-//! What kernels were made of: features compiled in and out, and what leaving them out gained.
+//! What other kernels change, beside the program's own, and what kernels were made of: features compiled in and out, and what
+//! leaving them out gained.
 
-use crate::data::{SceneGroup, View};
+use crate::compare::judge::Verdict;
+use crate::compare::show::change;
+use crate::compare::side::{EMBEDDED, Side};
+use crate::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
+use crate::data::{FULL_CELLS, Measured, RunData, SceneGroup, View, without_repeats};
 use crate::document::*;
+use crate::format;
 use crate::pivot::Rows;
 use crate::values::Value;
 use raystone_record::{Interval, Key, Ran, TimeRecord, axis};
-use raystone_stats::comparison::LogFigure;
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// The parameter that makes a kernel carry what its scene does not need.
 const CARRY: &str = "carry";
+
+/// The answer that a run with several sets of kernels was made for: each against the first, by the comparison of
+/// docs/compare.md, structure by structure. Those whose composed kernels are equal to the letter are the unchanged control.
+pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
+    if ideas(data).is_empty() {
+        return Vec::new();
+    }
+    let run = Side::new("this run", data.lines.to_vec(), Vec::new());
+    let labels = run.kernels();
+    let original = labels.iter().find(|label| *label == EMBEDDED);
+    let Some(original) = original.or(labels.first()) else {
+        return Vec::new();
+    };
+    let against = |idea: &String| {
+        let sides = run
+            .of_kernels(Some([original.as_str(), idea.as_str()]))
+            .ok()?;
+        let found = compare_sides(&sides[0], &sides[1], &Options::default(), &Confirmed::new());
+        let caption =
+            format!("What the kernels @{idea} change, against {original}: time, lower is better");
+        let heads = ["structure", ":answer", ":change of time [95 % interval]"];
+        let mut table = Table::new(caption, &heads);
+        table.rows = structures(data, &found);
+        let mut notes = found.notes.clone();
+        notes.push(beside_times(&found));
+        Some((table, notes)).filter(|(table, _)| !table.rows.is_empty())
+    };
+    let ideas = labels.iter().filter(|label| *label != original);
+    ideas.filter_map(against).collect()
+}
+
+/// Names of the sets of kernels that stand against the first one.
+pub(crate) fn ideas(data: &RunData) -> Vec<String> {
+    let labels = data.scenes.iter().flat_map(|scene| {
+        let structures = scene.structures.iter().map(|s| &s.key);
+        structures.chain(
+            scene
+                .views
+                .iter()
+                .flat_map(|v| v.times.iter().map(|t| &t.key)),
+        )
+    });
+    let labels = labels.map(|key| key.label(axis::KERNELS).to_owned());
+    let mut labels = without_repeats(labels.collect());
+    let original = labels.iter().position(String::is_empty).unwrap_or(0);
+    if !labels.is_empty() {
+        labels.remove(original);
+    }
+    labels
+}
+
+/// A row for each structure, those that the kernels change first.
+fn structures(data: &RunData, found: &Comparison) -> Vec<Vec<TableCell>> {
+    const WHERE: [&str; 5] = [
+        axis::SCENE,
+        axis::ACCEL,
+        axis::TRIANGLE,
+        axis::BOX_TEST,
+        axis::WORKGROUP,
+    ];
+    let mut groups: Vec<(Key, Vec<&Finding>)> = Vec::new();
+    for finding in found.findings.iter().filter(|f| f.is_time) {
+        let key = finding.key.only(&WHERE);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, findings)) => findings.push(finding),
+            None => groups.push((key, vec![finding])),
+        }
+    }
+    groups.sort_by_key(|(_, findings)| findings.iter().all(|f| f.is_control));
+    let row = |(key, findings): (Key, Vec<&Finding>)| {
+        let scene = key.label(axis::SCENE);
+        let structure = match key.label(axis::ACCEL) {
+            "" => "compaction".to_owned(),
+            _ => data.names.structure(&key),
+        };
+        let name = if data.scenes.len() > 1 && !scene.is_empty() {
+            format!("{structure}, {scene}")
+        } else {
+            structure
+        };
+        let (answer, tone) = answer(&findings);
+        let changed: Vec<String> = findings.iter().map(|f| change_of(f)).collect();
+        let answer = TableCell::from(answer).toned(tone);
+        vec![name.into(), answer, changed.join("; ").into()]
+    };
+    groups.into_iter().map(row).collect()
+}
+
+/// What the times of one structure come to.
+fn answer(findings: &[&Finding]) -> (String, Tone) {
+    let changed: Vec<&&Finding> = findings.iter().filter(|f| !f.is_control).collect();
+    if changed.is_empty() {
+        let moved = findings.iter().any(|f| f.verdict == Verdict::Undecided);
+        return if moved {
+            (
+                "unchanged control, which moved all the same".into(),
+                Tone::Bad,
+            )
+        } else {
+            ("unchanged control".into(), Tone::Plain)
+        };
+    }
+    let words = [
+        (Verdict::Worse, "slower", Tone::Bad),
+        (Verdict::Better, "faster", Tone::Good),
+        (Verdict::Undecided, "undecided", Tone::Note),
+        (Verdict::Same, "same", Tone::Plain),
+    ];
+    let counted = words.map(|(verdict, word, tone)| {
+        let count = changed.iter().filter(|f| f.verdict == verdict).count();
+        (count, word, tone)
+    });
+    let found = || counted.iter().filter(|(count, ..)| *count > 0);
+    let tone = found().next().map_or(Tone::Note, |(.., tone)| *tone);
+    let text: Vec<String> = found()
+        .map(|(count, word, _)| {
+            if *count == changed.len() {
+                (*word).to_owned()
+            } else {
+                format!("{word} in {count}")
+            }
+        })
+        .collect();
+    (text.join(", "), tone)
+}
+
+/// One time: what it is of, and by how much it changed.
+fn change_of(finding: &Finding) -> String {
+    let of = match finding.key.label(axis::RAYS) {
+        "" => {
+            let axes = [axis::INTEGRATOR, axis::SEQUENCE, axis::DECORRELATION];
+            let labels = finding.key.labels_on(&axes);
+            let labels: Vec<&str> = labels
+                .into_iter()
+                .filter(|label| !label.is_empty())
+                .collect();
+            labels.join(" × ")
+        }
+        rays => format!("{rays} rays"),
+    };
+    let change = change(finding);
+    let change = if change.is_empty() {
+        &finding.why
+    } else {
+        &change
+    };
+    let control = if finding.is_control { " (control)" } else { "" };
+    format!("{of} {change}{control}")
+}
+
+/// What of the figures beside times is not the same.
+fn beside_times(found: &Comparison) -> String {
+    let others = || found.findings.iter().filter(|f| !f.is_time);
+    let not_same = others().filter(|f| f.verdict != Verdict::Same).count();
+    let of = format!(
+        "{not_same} of {} beside times are not the same",
+        format::plural(others().count(), "figure")
+    );
+    format!("{of}; `raystone compare` on this run lists all.")
+}
+
+/// Whether what was measured is another's over again: the same but for the label of its kernels, which are equal to the letter.
+/// In a contest it would be a rival of itself.
+pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
+    let bare = |key: &Key| key.clone().with(axis::KERNELS, "");
+    let is_embedded = |of: &Measured<T>| of.key.label(axis::KERNELS).is_empty();
+    let hash = &one.ran.kernel_hash;
+    if hash.is_empty() || is_embedded(one) {
+        return false;
+    }
+    let at = all.iter().position(|other| other.key == one.key);
+    all.iter().enumerate().any(|(place, other)| {
+        let is_before = is_embedded(other) || at.is_some_and(|at| place < at);
+        is_before && other.ran.kernel_hash == *hash && bare(&other.key) == bare(&one.key)
+    })
+}
 
 /// The tables on the kernels of a scene.
 pub fn blocks(scene: &SceneGroup, values: &[Value]) -> Vec<Block> {
@@ -105,14 +286,15 @@ pub(crate) fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
 }
 
 /// What a full cell takes over another, if both were timed often enough for an interval.
-pub(crate) fn time_over(time: &TimeRecord, base: &TimeRecord) -> Option<Interval> {
+pub(crate) fn time_over(
+    time: &Measured<TimeRecord>,
+    base: &Measured<TimeRecord>,
+) -> Option<Interval> {
     let [own, base] = [time, base].map(|time| {
         let often = time.ms.len() >= LEAST_FOR_MEDIAN;
-        LogFigure::of_times(&time.ms).filter(|_| often)
+        time.rounds(FULL_CELLS, &time.ms).filter(|_| often)
     });
-    let (own, base) = own.zip(base)?;
-    let noise = base.own.first().copied();
-    Some(own.scaled((-base.log).exp()).with_noise(noise).interval())
+    Some(own?.compared_with(&base?).ratio)
 }
 
 /// The label of an integrator without the parameter; `None` for one that does not have it.

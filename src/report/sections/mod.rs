@@ -164,13 +164,14 @@ fn loaded(data: &RunData) -> Vec<String> {
 
 /// That times are of different hours.
 fn sittings(data: &RunData) -> Option<String> {
-    let (first, last) = (data.sittings.first()?, data.sittings.last()?);
+    let sittings = data.sittings();
+    let (first, last) = (sittings.first()?, sittings.last()?);
     (first != last).then(|| {
         format!(
             "Times were measured in {} runs that began between {} and {} (resumed, or joined of parts). What stands in \
              one table of a scene was timed in turns within one of them; across scenes and samplers the machine may \
              have been another.",
-            data.sittings.len(),
+            sittings.len(),
             format::utc(*first),
             format::utc(*last)
         )

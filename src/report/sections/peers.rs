@@ -50,8 +50,7 @@ fn of_peer(peer: &Recorded<PeerRecord>, timing: &PeerTiming) -> Vec<Value<'stati
 fn over(ours: &ClassTiming, theirs: &PeerTiming) -> Option<Interval> {
     let [own, base] = [&ours.cpu_ms, &theirs.cpu_ms].map(|ms| LogFigure::of_times(ms));
     let (own, base) = own.zip(base)?;
-    let noise = base.own.first().copied();
-    Some(own.scaled((-base.log).exp()).with_noise(noise).interval())
+    Some(own.compared_with(&base).ratio)
 }
 
 /// All figures of a scene's peers, and of its structures against them.

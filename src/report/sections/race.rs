@@ -1,5 +1,6 @@
 //! Samplers at equal time.
 
+use super::kernels::is_repeat;
 use super::verdict::rank;
 use crate::data::View;
 use crate::format;
@@ -8,7 +9,6 @@ use crate::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
 use crate::values::{Reading, Value};
 use raystone_record::axis;
 use raystone_stats::comparison::LogFigure;
-use raystone_stats::statistics::Spread;
 
 /// Samplers at equal time, under the fastest structure.
 pub(crate) struct Race<'a> {
@@ -43,14 +43,17 @@ impl<'a> Runner<'a> {
 
     /// Whether all its noise is known.
     fn is_ranked(&self) -> bool {
-        self.sampler.is_ranked() && !self.time.own.is_empty()
+        self.sampler.is_ranked() && self.time.has_noise()
     }
 
-    /// The noise of the time in a figure that goes as this power of it; none beside an image whose own noise is not
-    /// known.
-    fn noise(&self, power: f64) -> Option<Spread> {
-        let noise = self.time.own.first().filter(|_| self.sampler.is_ranked())?;
-        Some(noise.times(power * power))
+    /// A figure with the noise of the time, which it goes with as with this power of it; without it beside an image whose own
+    /// noise is not known.
+    fn with_time(&self, figure: LogFigure, power: f64) -> LogFigure {
+        if self.sampler.is_ranked() {
+            figure.with_noise_of(&self.time, power)
+        } else {
+            figure
+        }
     }
 
     /// The error after so many seconds. A time per sample that is off by a part moves it along the curve.
@@ -60,30 +63,26 @@ impl<'a> Runner<'a> {
         let [a, b] = neighbours.map(|i| self.curve[i].0);
         let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
         // At a point of the curve, errors are taken to fall as one over the samples.
-        let slope = match a < b {
-            true => {
-                (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log)
-                    / (f64::from(b) / f64::from(a)).ln()
-            }
-            false => -1.0,
+        let slope = if a < b {
+            let fall = error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log;
+            fall / (f64::from(b) / f64::from(a)).ln()
+        } else {
+            -1.0
         };
-        Some(error([a, b], share)?.with_noise(self.noise(slope)))
+        Some(self.with_time(error([a, b], share)?, -slope))
     }
 
     /// Error × seconds, one over the efficiency.
     fn error_seconds(&self, spp: u32) -> Option<LogFigure> {
         let error = self.sampler.log_error(Metric::RelMse, [spp; 2], 0.0)?;
         let seconds = f64::from(spp) * self.time.log.exp() / 1000.0;
-        Some(error.scaled(seconds).with_noise(self.noise(1.0)))
+        Some(self.with_time(error.scaled(seconds), 1.0))
     }
 
     /// Seconds until the error falls to `target`.
     fn seconds_to(&self, target: f64) -> Option<LogFigure> {
         let spp = self.sampler.spp_to(Metric::RelMse, target)?;
-        Some(
-            spp.scaled(self.time.log.exp() / 1000.0)
-                .with_noise(self.noise(1.0)),
-        )
+        Some(self.with_time(spp.scaled(self.time.log.exp() / 1000.0), 1.0))
     }
 }
 
@@ -92,6 +91,10 @@ impl<'a> Race<'a> {
     pub(crate) fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a MeasuredSampler<'a>| {
+            let time = view.time(&structure, &sampler.name)?;
+            if is_repeat(time, &view.times) && view.is_same_image(sampler) {
+                return None;
+            }
             let runner = Runner::new(view, &structure, sampler)?;
             (!runner.curve.is_empty() && sampler.fault().is_none()).then_some(runner)
         };

@@ -1,13 +1,14 @@
 //! Which structure renders fastest, by the times of whole cells, and where the speeds of ray classes say otherwise.
 
+use super::kernels::is_repeat;
 use super::verdict::{class_speed, ray_classes};
-use crate::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
+use crate::data::{FULL_CELLS, Measured, STRUCTURE_AXES, SceneGroup, View};
 use crate::ruling::{Contender, Ruling, judge};
 use crate::{format, trust};
 use raystone_record::figure::Better;
 use raystone_record::{Key, axis};
 use raystone_stats::comparison::{LEVEL, LogFigure, Pairs};
-use raystone_stats::statistics::{LEAST_FOR_MEDIAN, Spread};
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// What else of a sampler than its kernels, which are those of the structure.
 const POINT_AXES: [&str; 3] = [axis::SEQUENCE, axis::DECORRELATION, axis::OFFSET];
@@ -25,11 +26,14 @@ struct Renderer {
 /// Structures that were timed with the most samplers, and how long each takes with these.
 fn renderers(scene: &SceneGroup, view: &View) -> Vec<Renderer> {
     let mut found: Vec<(Key, Vec<Key>, Vec<LogFigure>, bool)> = Vec::new();
-    for time in view.valid_times() {
-        let Some(mut log) = LogFigure::of_times(&time.ms) else {
+    for time in view
+        .valid_times()
+        .filter(|time| !is_repeat(time, &view.times))
+    {
+        let Some(log) = time.rounds(FULL_CELLS, &time.ms) else {
             continue;
         };
-        log.log -= f64::from(time.spp).ln();
+        let log = log.scaled(1.0 / f64::from(time.spp));
         let key = time.key.only(&STRUCTURE_AXES);
         let points = time.key.only(&POINT_AXES);
         let often = time.ms.len() >= LEAST_FOR_MEDIAN;
@@ -59,14 +63,9 @@ fn renderers(scene: &SceneGroup, view: &View) -> Vec<Renderer> {
 }
 
 fn geometric_mean(logs: &[LogFigure]) -> LogFigure {
-    let n = logs.len() as f64;
-    let own = logs.iter().flat_map(|log| &log.own);
-    let own: Vec<Spread> = own.map(|spread| spread.times(1.0 / (n * n))).collect();
-    LogFigure {
-        log: logs.iter().map(|log| log.log).sum::<f64>() / n,
-        own,
-        shared: Vec::new(),
-    }
+    let share = 1.0 / logs.len() as f64;
+    let terms: Vec<(&LogFigure, f64)> = logs.iter().map(|log| (log, share)).collect();
+    LogFigure::product(&terms)
 }
 
 /// Which structure renders fastest.
@@ -97,10 +96,10 @@ fn disagreements_of(scene: &SceneGroup, view: &View) -> Vec<String> {
     let mut ranked = renderers(scene, view);
     ranked.retain(|renderer| renderer.is_ranked);
     let times: Vec<&LogFigure> = ranked.iter().map(|r| &r.time).collect();
-    let Some(best) = (0..times.len()).min_by(|a, b| times[*a].log.total_cmp(&times[*b].log)) else {
+    let renders = Pairs::of(&times);
+    let Some(best) = renders.least() else {
         return Vec::new();
     };
-    let renders = Pairs::of(&times);
     let mut lines = Vec::new();
     for class in ray_classes(scene) {
         let speed_of = |renderer: &Renderer| {
@@ -118,7 +117,8 @@ fn disagreements_of(scene: &SceneGroup, view: &View) -> Vec<String> {
                 continue;
             };
             let faster = speed.compared_with(speed_of_best);
-            let slower = renders.differ(best, other) && times[other].log > times[best].log;
+            let times_as_long = renders.log_ratio(other, best);
+            let slower = renders.differ(best, other) && times_as_long > 0.0;
             if slower && faster.log_ratio > 0.0 && faster.p * pairs <= LEVEL {
                 lines.push(format!(
                     "{}, {}: {} renders fastest, but {} rays rank {} before it ({}× as fast), which takes {}× the time \
@@ -129,7 +129,7 @@ fn disagreements_of(scene: &SceneGroup, view: &View) -> Vec<String> {
                     format::ray_class(class),
                     ranked[other].name,
                     format::number(faster.log_ratio.exp()),
-                    format::number((times[other].log - times[best].log).exp()),
+                    format::number(times_as_long.exp()),
                 ));
             }
         }

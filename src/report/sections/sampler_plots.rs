@@ -126,7 +126,7 @@ pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<I
             let log_time = view.time(name, &sampler.name).and_then(|t| log_time(t));
             if let (Some(time), Some(error)) = (log_time, log_error)
                 && sampler.is_ranked()
-                && !time.own.is_empty()
+                && time.has_noise()
             {
                 known.push(points.len());
                 figures.push([time, error]);

@@ -1,7 +1,8 @@
 //! What was asked, who wins, what failed, whether to believe it.
 
+use super::kernels::{self, is_repeat};
 use super::{belief, compactions, rendering, run};
-use crate::data::{Measured, RunData, SceneGroup, View, without_repeats};
+use crate::data::{Measured, RAYS, RunData, SceneGroup, View, without_repeats};
 use crate::document::*;
 use crate::ruling::{Contender, Ruling, judge};
 use crate::samplers::{MeasuredSampler, Metric};
@@ -13,8 +14,7 @@ use raystone_record::{
     Verdict, axis,
 };
 use raystone_stats::comparison::LogFigure;
-use raystone_stats::hypothesis::student_t_quantile;
-use raystone_stats::statistics::{LEAST_FOR_MEDIAN, Spread};
+use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 use std::path::Path;
 
 pub(crate) use super::race::Race;
@@ -35,6 +35,10 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     let blocks = &mut section.blocks;
     blocks.push(asked(dir, data));
     blocks.extend(failed(data));
+    for (table, notes) in kernels::against_original(data) {
+        blocks.extend(table.into_block());
+        blocks.push(Block::Paragraph(notes.join(" ")));
+    }
     for (index, scene) in data.scenes.iter().enumerate() {
         let answers = of_scene(scene);
         match index < OPEN_SCENES {
@@ -97,6 +101,11 @@ fn question(data: &RunData) -> String {
     let views = data.views().map(|(_, view)| view.name.clone());
     let views = without_repeats(views.collect());
     let mut parts = Vec::new();
+    let ideas = kernels::ideas(data);
+    if !ideas.is_empty() {
+        let ideas: Vec<String> = ideas.iter().map(|idea| format!("@{idea}")).collect();
+        parts.push(format!("what the kernels {} change", ideas.join(", ")));
+    }
     let of = |names: &[String], noun, one: &str, many: &str| match names {
         [] => None,
         [only] => Some(format!("{one} {only}")),
@@ -289,8 +298,8 @@ fn rule(data: &RunData) -> String {
     let compared = || rulings().map(|(_, ruling)| ruling.comparisons());
     let questions = compared().filter(|pairs| *pairs > 0).count();
     format!(
-        "A winner is named only where it differs from every other: by Welch's test of the logarithms, with the noise of \
-         images, reference and times together, at 5 % for all pairs of a question (Holm's correction). Where a question \
+        "A winner is named only where it differs from every other: by a test of their ratio, of times round by round where \
+         both were timed in the same rounds, with the noise of images, reference and times together, at 5 % for all pairs of a question (Holm's correction). Where a question \
          stays undecided, those are named that do not differ from the best. {} made in {}.",
         format::plural(compared().sum(), "comparison"),
         format::plural(questions, "question")
@@ -406,27 +415,11 @@ fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
 
 /// D* with its noise over seeds; that of a deterministic set is exact.
 fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigure> {
-    let Interval { value, low, high } = at.value;
-    if value.is_nan() || value <= 0.0 {
-        return None;
+    if !stream.randomised {
+        return LogFigure::of_interval(Interval::exact(at.value.value), f64::INFINITY);
     }
     let freedom = stream.seeds.saturating_sub(1) as f64;
-    let own = match stream.randomised {
-        false => Vec::new(),
-        true if freedom < 1.0 => return None,
-        true => {
-            let error = 0.5 * (high - low) / student_t_quantile(0.05, freedom) / value;
-            vec![Spread {
-                variance: error * error,
-                freedom,
-            }]
-        }
-    };
-    Some(LogFigure {
-        log: value.ln(),
-        own,
-        shared: Vec::new(),
-    })
+    LogFigure::of_interval(at.value, freedom).filter(|_| freedom > 0.0)
 }
 
 /// Who may not win, with the reason, and who is shown without being ranked.
@@ -477,7 +470,7 @@ pub(crate) fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
     let timing = s.timings.iter().find(|timing| timing.class == class)?;
     let often = timing.ms.len() >= LEAST_FOR_MEDIAN && s.fault().is_none();
-    let ms = LogFigure::of_times(&timing.ms).filter(|_| often)?;
+    let ms = s.rounds(RAYS, &timing.ms).filter(|_| often)?;
     Some(ms.inverse().scaled(1e-3 * timing.rays as f64))
 }
 
@@ -485,7 +478,8 @@ pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Opt
 pub(crate) fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        s.fault().is_none().then_some(Contender {
+        let is_fair = s.fault().is_none() && !is_repeat(s, &scene.structures);
+        is_fair.then_some(Contender {
             name: s.structure.clone(),
             figure: timing.mrays_s,
             log: class_speed(s, class),
@@ -509,7 +503,8 @@ pub(crate) fn best_per_sample(view: &View, spp: u32) -> Ruling {
             log: (sampler.log_error(Metric::RelMse, [spp; 2], 0.0)).filter(|_| sampler.is_ranked()),
         })
     };
-    let fair = view.samplers.iter().filter(|s| s.fault().is_none());
+    let fair = view.samplers.iter();
+    let fair = fair.filter(|s| s.fault().is_none() && !view.is_same_image(s));
     rank(view, fair.filter_map(contender).collect())
 }
 

@@ -7,9 +7,8 @@ use raystone::compare::judge::{Effects, Measured, Outcome, TimeRatio, Verdict, c
 use raystone::compare::side::Side;
 use raystone::compare::taken::{Evidence, taken};
 use raystone::measure::figure::figure;
-use raystone::measure::hypothesis::student_t_quantile;
+use raystone::measure::interval::Spread;
 use raystone::measure::record::{Body, Interval, Line};
-use raystone::measure::statistics::Spread;
 
 const ERROR: &str = "relmse-unbiased/v1";
 
@@ -95,9 +94,8 @@ fn intervals_without_samples_are_tested_by_their_widths() {
     let interval = |value, low, high| Evidence::Summary(Interval { value, low, high }, 8.0);
     let base = interval(10.0, 9.0, 11.0);
     let both = tested(outcome(ERROR, &base, &interval(11.0, 9.0, 13.0)));
-    // Welch's: variances are as 1 to 4, freedom is 25 / (1/8 + 16/8).
-    let error = 0.1 * 5f64.sqrt() / student_t_quantile(0.05, 8.0);
-    let half = error * student_t_quantile(0.05, 25.0 / 2.125);
+    // Variances are as 1 to 4; freedom by Welch would be 25 / (1/8 + 16/8), and is no more than either side has.
+    let half = 0.1 * 5f64.sqrt();
     assert!((both.change.value - 0.1).abs() < 1e-12, "{both:?}");
     assert!(
         (both.change.high - 0.1 - half).abs() < 1e-6,
@@ -108,6 +106,65 @@ fn intervals_without_samples_are_tested_by_their_widths() {
     assert_eq!(
         verdict(outcome(ERROR, &exact(1.0), &exact(2.0))),
         Verdict::Undecided
+    );
+}
+
+#[test]
+fn swapping_the_sides_turns_the_difference_and_leaves_its_p() {
+    let even = [
+        1.0, 1.01, 0.99, 1.02, 0.98, 1.0, 1.01, 0.99, 1.0, 1.03, 0.97, 1.0,
+    ];
+    let few = [1.04, 1.05];
+    let again = even.map(|x| 1.01 * x + 0.001 * (37.0 * x).sin());
+    let interval = |value, half: f64, freedom| {
+        let (low, high) = (value - half, value + half);
+        Evidence::Summary(Interval { value, low, high }, freedom)
+    };
+    let kinds = [
+        (seeds(1, &even), seeds(1, &again)),
+        (seeds(1, &even), seeds(50, &few)),
+        (interval(10.0, 1.0, 15.0), interval(12.0, 0.2, 1.0)),
+    ];
+    for (a, b) in kinds {
+        let [there, back] = [outcome(ERROR, &a, &b), outcome(ERROR, &b, &a)].map(tested);
+        assert!((there.p - back.p).abs() < 1e-12, "{there:?} {back:?}");
+        assert!(there.change.value * back.change.value < 0.0);
+    }
+    let times = |ms: &[f64]| Evidence::Times {
+        adapter: ms.to_vec(),
+        processors: Vec::new(),
+    };
+    let apart = (times(&even), times(&[1.1, 1.12, 1.09, 1.1]));
+    for ((a, b), in_rounds) in [((times(&even), times(&again)), true), (apart, false)] {
+        for compilations in [1, 3] {
+            let p = |a: &Evidence, b: &Evidence| {
+                let ratio = TimeRatio::new(a, b, in_rounds, compilations).expect("a ratio");
+                ratio.measured(figure("ms-per-spp/v1"), None, 0.02).p
+            };
+            assert!((p(&a, &b) - p(&b, &a)).abs() < 1e-12, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn two_replicates_against_sixteen_raise_no_more_alarms_than_promised_on_either_side() {
+    let mut random = super::records::Random::new(5);
+    let trials = 2000;
+    let mut alarms = [0; 2];
+    for _ in 0..trials {
+        let mut of = |first: u32, n: u32| {
+            let values: Vec<f64> = (0..n).map(|_| 1.0 + 0.1 * random.normal()).collect();
+            seeds(first, &values)
+        };
+        let (few, many) = (of(1, 2), of(10, 16));
+        for (count, (a, b)) in alarms.iter_mut().zip([(&few, &many), (&many, &few)]) {
+            *count += usize::from(tested(outcome(ERROR, a, b)).p <= 0.05);
+        }
+    }
+    println!("{alarms:?} of {trials}");
+    assert!(
+        alarms.iter().all(|count| *count <= trials * 6 / 100),
+        "{alarms:?}"
     );
 }
 

@@ -5,7 +5,7 @@ use super::{compared, said};
 use raystone::compare::judge::{IN_TURNS, TimeRatio, Verdict};
 use raystone::compare::{Confirmed, Options, compare_sides};
 use raystone::measure::figure::figure;
-use raystone::measure::statistics::Spread;
+use raystone::measure::interval::Spread;
 
 #[test]
 fn students_test_of_a_ratio_agrees_with_scipy() {

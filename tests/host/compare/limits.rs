@@ -7,10 +7,10 @@ use raystone::compare::Finding;
 use raystone::compare::drift::{Drift, Place};
 use raystone::compare::judge::{Effects, Outcome, TimeRatio, Verdict, compare};
 use raystone::compare::side::Side;
-use raystone::compare::signed_rank::SignedRank;
 use raystone::compare::taken::Evidence;
 use raystone::measure::figure::figure;
 use raystone::measure::record::{Body, Line, SkippedRecord};
+use raystone::measure::signed_rank::SignedRank;
 use raystone::params::{ParamValue, Params, Variant};
 
 fn side(lines: Vec<Line>) -> Side {

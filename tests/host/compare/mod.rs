@@ -4,6 +4,7 @@ mod alarms;
 mod evidence;
 mod inputs;
 mod judged;
+mod kernels;
 mod limits;
 mod machine;
 mod program;

@@ -290,3 +290,55 @@ fn a_time_per_sample_is_paired_as_such() {
         "{row:?}"
     );
 }
+
+/// The row of a question in the tables of a run.
+fn answer(lines: &[Line], question: &str) -> String {
+    let tables = raystone::report::terminal_tables(lines);
+    let row = tables.lines().find(|line| line.starts_with(question));
+    row.unwrap_or_else(|| panic!("{tables}")).to_owned()
+}
+
+#[test]
+fn winners_of_a_report_are_found_by_the_rounds_that_both_were_timed_in() {
+    let near: Vec<f64> = drifted(B).iter().map(|ms| 1.1 * ms).collect();
+    let of = |slow: Sitting| {
+        let cells = [
+            traced("slow", slow, [&near, &near]),
+            traced("fast", HERE, [&drifted(B), &drifted(B)]),
+            timed("slow", slow, &near),
+            timed("fast", HERE, &drifted(B)),
+        ];
+        cells.concat()
+    };
+    for question in ["fastest, primary rays", "fastest for rendering"] {
+        let row = answer(&of(HERE), question);
+        assert!(
+            row.contains(" fast ") && !row.contains("undecided"),
+            "{row}"
+        );
+        assert!(row.contains("(1.10×)"), "{row}");
+        // In another run the drift is another.
+        let later = Sitting {
+            began: HERE.began + 60,
+            ..HERE
+        };
+        let unsaid = Sitting { began: 0, ..HERE };
+        for apart in [later, unsaid] {
+            let row = answer(&of(apart), question);
+            assert!(row.contains("undecided: "), "{row}");
+        }
+    }
+}
+
+#[test]
+fn the_best_of_a_report_is_the_one_that_is_best_in_the_rounds_of_both() {
+    // By its median the second one seems faster, since the machine was slow in other rounds of it than of the first … were they
+    // apart; in seven of eight rounds the first is.
+    let machine = [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0];
+    let first: Vec<f64> = machine.iter().map(|m| 0.9 * m).collect();
+    let mut second = machine.to_vec();
+    (second[3], second[4]) = (0.8, 0.85);
+    let cells = [timed("first", HERE, &first), timed("second", HERE, &second)];
+    let row = answer(&cells.concat(), "fastest for rendering");
+    assert!(!row.contains("undecided: second"), "{row}");
+}

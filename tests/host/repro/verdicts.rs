@@ -4,9 +4,10 @@ use raystone::config::Experiment;
 use raystone::config::expect::{Expect, Thesis};
 use raystone::measure::record::{Interval, Key};
 use raystone::report::values::{Reading, Value};
-use raystone::repro::SOURCES;
 use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
+use raystone::repro::run::{Settings, prepare};
+use raystone::repro::{SOURCES, Source};
 use raystone::run::Registries;
 
 fn value(accel: &str, n: u32, figure: &str, low: f64, at: f64, high: f64) -> Value<'static> {
@@ -379,4 +380,185 @@ fn curves_of_two_structures_have_two_slopes() {
         .filter_map(|row| row.ours.map(|i| (100.0 * i.value).round()))
         .collect();
     assert_eq!(slopes, [-50.0, -100.0]);
+}
+
+fn absent(cells: &[(&[(&str, &str)], &str)]) -> Context {
+    let key = |axes: &[(&str, &str)]| {
+        let axes = axes.iter();
+        axes.fold(Key::default(), |key, (axis, label)| key.with(axis, label))
+    };
+    let absent = cells
+        .iter()
+        .map(|(axes, why)| (key(axes), (*why).to_owned()));
+    Context {
+        absent: absent.collect(),
+        ..Context::default()
+    }
+}
+
+/// Point sets of two sequences.
+fn discrepancies() -> Vec<Value<'static>> {
+    let of = |sequence: &str, points: u32| {
+        let key = Key::default()
+            .with("sequence", sequence)
+            .with("decorrelation", "none");
+        let key = key
+            .with("dimensions", "path dimensions 0 and 1")
+            .with("points", points);
+        Value::new(&key, "star/v1", Interval::exact(0.1))
+    };
+    vec![
+        of("halton", 16),
+        of("halton", 64),
+        of("sobol", 16),
+        of("sobol", 64),
+    ]
+}
+
+#[test]
+fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
+    let values: Vec<Value> = values().into_iter().chain(discrepancies()).collect();
+    let found = |body: &str, context: &Context| {
+        let row = judge(&expect(body), &values, context).remove(0);
+        (row.verdict, row.reason)
+    };
+    let discrepancy = |of: &str| {
+        format!("figure = \"star/v1\"\ncompare = \"bound\"\nof = {{ {of} }}\nmost = 1.0\n")
+    };
+    let left_out = absent(&[
+        (&[("scene", "box"), ("accel", "grid")], "it was too big"),
+        (
+            &[("scene", "box"), ("accel", "grid"), ("sequence", "sobol")],
+            "so was this",
+        ),
+    ]);
+    // A structure that was left out is no reason for a point set that nobody measured.
+    for of in [
+        "sequence = \"haltn*\"",
+        "sequence = \"halton\", points = \"46\"",
+        "sequence = \"sobol\", points = \"46\"",
+        "sequence = \"sobol\", dimensions = \"*dimensions 0 and 11\"",
+        "points = \"46\"",
+    ] {
+        let (verdict, reason) = found(&discrepancy(of), &left_out);
+        assert_eq!(verdict, Verdict::Faulty, "{of}: {reason}");
+        assert!(reason.contains("no star/v1 was found"), "{of}: {reason}");
+    }
+    // Nor is one for a sampler or a number of samples of another cell on the same scene.
+    let rmse = |of: &str| {
+        format!("figure = \"rmse-unbiased/v1\"\ncompare = \"bound\"\nof = {{ {of} }}\nmost = 1.0\n")
+    };
+    for of in [
+        "scene = \"box\", spp = \"9\"",
+        "accel = \"grid\", spp = \"9\"",
+        "scene = \"bx\"",
+    ] {
+        assert_eq!(found(&rmse(of), &left_out).0, Verdict::Faulty, "{of}");
+    }
+    // The cell itself, and all that would have been of it, cannot be tested.
+    for of in [
+        "accel = \"grid\"",
+        "accel = \"gr*\", spp = \"8\"",
+        "scene = \"box\", accel = \"grid\"",
+    ] {
+        let said = found(&rmse(of), &left_out);
+        assert_eq!(
+            said,
+            (Verdict::NotTestable, "it was too big".to_owned()),
+            "{of}"
+        );
+    }
+    // Where a figure was measured nowhere, its axes are not known, and a reason is one.
+    let body = rmse("accel = \"grid\", rays = \"primary\"").replace("rmse-unbiased", "nowhere");
+    assert_eq!(found(&body, &left_out).0, Verdict::NotTestable);
+}
+
+#[test]
+fn what_a_comparison_would_pass_over_is_refused_with_what_to_do() {
+    let registries = Registries::default();
+    let (experiment, _) = SOURCES[0].text.split_once("[thesis]").expect("a thesis");
+    let refusal = |body: &str| {
+        let head =
+            "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[expect]]\nid = \"x\"\nsays = \"y\"\n";
+        let text: &'static str = format!("{experiment}{head}{body}").leak();
+        let source = Source { name: "made", text };
+        let found = prepare(&source, &Settings::default(), &registries.catalogue());
+        found.err().map(|error| error.to_string())
+    };
+    let order = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\norder = [{ accel = \"a\" }, { accel = \"b\" }]\n";
+    let bound = "figure = \"ms-per-spp/v1\"\ncompare = \"bound\"\nmost = 1.0\n";
+    let refused = [
+        (format!("{order}least = 1.2\n"), "least"),
+        (format!("{order}most = 1.2\n"), "most"),
+        (
+            format!("{order}at = [{{ row = \"r\", least = 1.2 }}]\n"),
+            "least",
+        ),
+        (
+            format!("{order}within = 1.2\nat = [{{ thesis = 1.0 }}]\n"),
+            "within",
+        ),
+        (
+            format!("{order}off_by = 1.2\nat = [{{ thesis = 1.0 }}]\n"),
+            "off_by",
+        ),
+        (bound.replace("bound", "shown"), "most"),
+        (format!("{bound}over = {{ accel = \"a\" }}\n"), "over"),
+        (
+            format!("{bound}at = [{{ over = {{ accel = \"a\" }} }}]\n"),
+            "over",
+        ),
+        (format!("{bound}order = [{{ accel = \"a\" }}]\n"), "order"),
+        (format!("{bound}along = \"spp\"\n"), "along"),
+    ];
+    for (body, key) in refused {
+        let error = refusal(&body).expect(&body);
+        let says = |part: &str| assert!(error.contains(part), "{body}{error}");
+        says("made.toml");
+        says("id = \"x\"");
+        says(&format!("`{key}`"));
+        says("take it out");
+    }
+    for sound in [order, bound] {
+        assert_eq!(refusal(sound), None);
+    }
+}
+
+#[test]
+fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
+    let slope = "figure = \"rmse-unbiased/v1\"\ncompare = \"slope\"\nalong = \"spp\"\n";
+    let at = |low: [f64; 3], bound: &str| {
+        let points = [(8, 0.8), (32, 0.4), (128, 0.2)].iter().zip(low);
+        let points =
+            points.map(|((n, y), low)| value("a", *n, "rmse-unbiased/v1", low * y, *y, 1.01 * y));
+        let rows = judge(
+            &expect(&format!("{slope}{bound}")),
+            &points.collect::<Vec<_>>(),
+            &gpu(),
+        );
+        rows[0].verdict
+    };
+    // The middle of three points has no weight in the slope: nothing times whatever its interval holds.
+    assert_eq!(
+        at([0.99, 0.0, 0.99], "least = -0.6\nmost = -0.4\n"),
+        Verdict::Supported
+    );
+    assert_eq!(
+        at([0.99, 0.0, 0.99], "least = 0.5\n"),
+        Verdict::Contradicted
+    );
+    // The last may be anything below: the fall may be steeper and is no flatter.
+    assert_eq!(at([0.99, 0.99, 0.0], "most = -0.4\n"), Verdict::Supported);
+    assert_eq!(at([0.99, 0.99, 0.0], "least = -0.6\n"), Verdict::Undecided);
+    // A count of nothing is a number, and has a ratio; nothing over nothing has none.
+    let ratio = |a: f64, b: f64, bound: &str| {
+        let of = |accel: &str, x: f64| value(accel, 8, "nodes-per-ray/v1", x, x, x);
+        let body = RATIO.replace("ms-per-spp", "nodes-per-ray") + bound;
+        judge(&expect(&body), &[of("slow", a), of("fast", b)], &gpu())[0].verdict
+    };
+    assert_eq!(ratio(0.0, 3.0, "most = 0.5\n"), Verdict::Supported);
+    assert_eq!(ratio(0.0, 3.0, "least = 0.5\n"), Verdict::Contradicted);
+    assert_eq!(ratio(0.0, 0.0, "least = 0.5\n"), Verdict::Undecided);
+    // A figure that is not positive is said, and not left out.
+    assert_eq!(ratio(-1.0, 3.0, "most = 0.5\n"), Verdict::Undecided);
 }

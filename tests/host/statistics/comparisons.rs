@@ -2,7 +2,8 @@
 
 use raystone::config::StopRule;
 use raystone::measure::comparison::*;
-use raystone::measure::statistics::{Spread, leave_one_out};
+use raystone::measure::interval::{Interval, Spread};
+use raystone::measure::statistics::{leave_one_out, mean, variance};
 use raystone::measure::stopping::is_met;
 use raystone::random::Pcg32;
 
@@ -38,9 +39,7 @@ fn times(median: f64, g: &mut Pcg32) -> Vec<f64> {
 
 /// Error × time.
 fn efficiency(error: LogFigure, time: &LogFigure) -> LogFigure {
-    error
-        .with_noise(time.own.first().copied())
-        .scaled(time.log.exp())
+    error.with_noise_of(time, 1.0).scaled(time.log.exp())
 }
 
 /// Whether the least of some figures differs from all others.
@@ -128,8 +127,8 @@ fn an_interruption_moves_no_time() {
     let calm = LogFigure::of_times(&[1.0, 1.01, 0.99, 1.0, 1.02, 0.98, 1.0]).unwrap();
     let hit = LogFigure::of_times(&[1.0, 1.01, 0.99, 1.0, 90.0, 0.98, 1.0]).unwrap();
     assert!((calm.log - hit.log).abs() < 0.005, "{calm:?} {hit:?}");
-    assert!(hit.own[0].variance < 4.0 * calm.own[0].variance);
-    assert_eq!(calm.own[0].freedom, 4.0);
+    assert!(hit.spread().variance < 4.0 * calm.spread().variance);
+    assert_eq!(calm.spread().freedom, 4.0);
     assert_eq!(LogFigure::of_times(&[1.0]), None);
     assert_eq!(LogFigure::of_times(&[0.0, 1.0, 1.0]), None);
 }
@@ -163,14 +162,10 @@ fn intervals_of_times_and_of_errors_per_second_cover_the_truth() {
 
 /// A figure with this value and relative standard error.
 fn known(value: f64, error: f64) -> LogFigure {
-    LogFigure {
-        log: value.ln(),
-        own: vec![Spread {
-            variance: error * error,
-            freedom: 15.0,
-        }],
-        shared: Vec::new(),
-    }
+    LogFigure::exact(value).with_noise(Some(Spread {
+        variance: error * error,
+        freedom: 15.0,
+    }))
 }
 
 #[test]
@@ -307,4 +302,231 @@ fn a_cell_with_room_to_its_target_ends_and_its_error_is_hardly_too_small() {
     // The target is met at the third look exactly, so that the fourth, with half of the error, ends it.
     assert!(ended[3] > trials * 8 / 10, "{ended:?}");
     assert!(ended[0] + ended[1] == 0, "{ended:?}");
+}
+
+fn interval(low: f64, value: f64, high: f64) -> Interval {
+    Interval { value, low, high }
+}
+
+fn summary(low: f64, value: f64, high: f64) -> LogFigure {
+    LogFigure::of_interval(interval(low, value, high), f64::INFINITY).expect("a figure")
+}
+
+#[test]
+fn a_ratio_of_intervals_has_its_side_up_and_the_spread_of_both_sides() {
+    let r = summary(1.8, 2.0, 2.2)
+        .compared_with(&summary(0.9, 1.0, 1.1))
+        .ratio;
+    assert!((r.value - 2.0).abs() < 1e-12);
+    // Each side alone has a lower end 10 % down; together √2 of that on logarithms (Zou and Donner 2008).
+    let down = (f64::ln(2.0 / 1.8).powi(2) + f64::ln(1.1f64).powi(2)).sqrt();
+    assert!((r.low - (2f64.ln() - down).exp()).abs() < 1e-12, "{r:?}");
+    assert!(r.low > 1.8 / 1.1 && r.low < 1.8 && r.high > 2.2);
+    let exact = |x: f64| summary(x, x, x);
+    let ratio = |a: &LogFigure, b: &LogFigure| a.compared_with(b).ratio;
+    // What is exact stays exact, to the last digit.
+    for (a, b) in [(3.0, 2.0), (30.0, 10.0), (7.0, 49.0), (0.0, 3.0)] {
+        assert_eq!(ratio(&exact(a), &exact(b)), Interval::exact(a / b));
+    }
+    // An error whose interval reaches 0 has a ratio that may be anything below.
+    let open = ratio(&summary(0.0, 1.0, 2.0), &exact(1.0));
+    assert_eq!(open.low, 0.0);
+    assert!((open.high - 2.0).abs() < 1e-12);
+    let above = ratio(&exact(1.0), &summary(0.0, 1.0, 2.0));
+    assert!((above.low - 0.5).abs() < 1e-12 && above.high == f64::INFINITY);
+    for bad in [
+        interval(-2.0, -1.0, 0.0),
+        interval(0.0, 0.0, 1.0),
+        interval(2.0, 1.0, 3.0),
+    ] {
+        assert_eq!(LogFigure::of_interval(bad, 8.0), None, "{bad:?}");
+    }
+}
+
+#[test]
+fn an_exponent_is_that_of_the_power_law_and_an_uncertain_point_makes_it_uncertain() {
+    let points = |ends: [f64; 3]| -> Vec<(f64, LogFigure)> {
+        let points = [8.0f64, 16.0, 32.0].iter().zip(ends);
+        let point = |(n, low): (&f64, f64)| {
+            let y = 3.0 * n.powf(-0.7);
+            (*n, summary(low * y, y, y))
+        };
+        points.map(point).collect()
+    };
+    let slope = |points: &[_]| LogFigure::exponent(points).expect("a slope").log_interval();
+    let exact = slope(&points([1.0; 3]));
+    assert!(
+        (exact.value + 0.7).abs() < 1e-12 && exact.low == exact.high,
+        "{exact:?}"
+    );
+    // A lower last point makes the fall steeper: by its logarithm over twice ln 2, which is its weight.
+    let wide = slope(&points([1.0, 1.0, 0.8]));
+    let down = 0.8f64.ln() / (2.0 * 2f64.ln());
+    assert!(
+        (wide.low - exact.low - down).abs() < 1e-12 && wide.high - exact.high < 1e-12,
+        "{wide:?}"
+    );
+    // The middle point counts for nothing, however uncertain it is.
+    let middle = slope(&points([1.0, 0.0, 1.0]));
+    assert!((middle.low - exact.low).abs() < 1e-12, "{middle:?}");
+    let open = slope(&points([1.0, 1.0, 0.0]));
+    assert!(
+        open.low == f64::NEG_INFINITY && open.high - exact.high < 1e-12,
+        "{open:?}"
+    );
+    assert!(LogFigure::exponent(&[(8.0, LogFigure::exact(1.0))]).is_none());
+    let zero = [(8.0, LogFigure::exact(1.0)), (16.0, LogFigure::exact(0.0))];
+    assert!(LogFigure::exponent(&zero).is_none());
+}
+
+/// What a machine does in each of some rounds: up to three times as slow, with long tails.
+fn drift(rounds: usize, g: &mut Pcg32) -> Vec<f64> {
+    (0..rounds)
+        .map(|_| (0.3 * normal(g).powi(2)).exp())
+        .collect()
+}
+
+/// Times of two cells in the same rounds, with noise of their own of 2 %.
+fn rounds(ratio: f64, g: &mut Pcg32) -> [Vec<f64>; 2] {
+    let machine = drift(7, g);
+    [ratio, 1.0].map(|of| {
+        machine
+            .iter()
+            .map(|d| of * d * (0.02 * normal(g)).exp())
+            .collect()
+    })
+}
+
+#[test]
+fn rounds_of_one_sitting_are_paired_and_those_of_two_are_not() {
+    let g = &mut Pcg32::new(71);
+    let machine = drift(9, g);
+    let twice: Vec<f64> = machine.iter().map(|ms| 2.0 * ms).collect();
+    let of = |sitting: &str, ms: &[f64]| LogFigure::of_rounds(sitting, ms).expect("rounds");
+    let paired = of("one", &twice).compared_with(&of("one", &machine));
+    assert!((paired.ratio.value - 2.0).abs() < 1e-12 && paired.p == 0.0);
+    assert_eq!(paired.ratio.low, paired.ratio.high);
+    // The same numbers, which nothing says to be of the same rounds.
+    for (a, b) in [("one", "two"), ("", "")] {
+        let apart = of(a, &twice).compared_with(&of(b, &machine));
+        assert!(apart.ratio.low < 1.8 && apart.p > 0.0, "{apart:?}");
+    }
+    let fewer = of("one", &twice[..8]).compared_with(&of("one", &machine));
+    assert!(fewer.ratio.low < 1.8, "{fewer:?}");
+    // A gain that grows is one of four cells of the same rounds, and a mean of samplers is, too.
+    let gain = LogFigure::product(&[(&of("one", &twice), 1.0), (&of("one", &machine), -1.0)]);
+    let growth = gain.compared_with(&LogFigure::exact(1.0)).ratio;
+    assert!((growth.low - 2.0).abs() < 1e-12 && (growth.high - 2.0).abs() < 1e-12);
+    let mean = LogFigure::product(&[(&of("one", &twice), 0.5), (&of("one", &machine), 0.5)]);
+    let half = mean.compared_with(&of("one", &machine)).ratio;
+    assert!((half.low - 2f64.sqrt()).abs() < 1e-12, "{half:?}");
+}
+
+#[test]
+fn intervals_of_paired_rounds_cover_the_truth_and_equals_differ_as_rarely_as_promised() {
+    let mut generator = Pcg32::new(72);
+    let trials = 4000;
+    let (mut covered, mut alarms, mut found, mut found_apart) = (0, 0, 0, 0);
+    for _ in 0..trials {
+        let g = &mut generator;
+        let compare = |ratio: f64, sittings: [&str; 2], g: &mut Pcg32| {
+            let [a, b] = rounds(ratio, g);
+            let a = LogFigure::of_rounds(sittings[0], &a).expect("rounds");
+            a.compared_with(&LogFigure::of_rounds(sittings[1], &b).expect("rounds"))
+        };
+        let equal = compare(1.0, ["one"; 2], g);
+        covered += usize::from(equal.ratio.low <= 1.0 && 1.0 <= equal.ratio.high);
+        alarms += usize::from(equal.p <= 0.05);
+        found += usize::from(compare(1.1, ["one"; 2], g).p <= 0.05);
+        found_apart += usize::from(compare(1.1, ["one", "two"], g).p <= 0.05);
+    }
+    println!("{covered} covered, {alarms} alarms, {found} and {found_apart} found of {trials}");
+    // 5 % is 200, and the standard deviation 14. The trimmed t of five that are left is within a percent of its level.
+    assert!((140..=260).contains(&alarms), "{alarms}");
+    assert_eq!(
+        covered + alarms,
+        trials,
+        "the test and the interval are one"
+    );
+    assert!(found > trials * 95 / 100, "{found}");
+    // Negative control: the same cells by themselves.
+    assert!(found_apart < trials / 4, "{found_apart}");
+}
+
+#[test]
+fn two_replicates_against_sixteen_are_no_surer_than_two() {
+    // Two of normal noise and an exact side: Student's distribution of one degree of freedom is Cauchy's, in closed form.
+    let known = Spread {
+        variance: 0.01,
+        freedom: 1.0,
+    };
+    let exact = Spread {
+        variance: 0.0,
+        freedom: 15.0,
+    };
+    let p = Spread::of_difference(known, exact).p(0.3);
+    let cauchy = 2.0 / std::f64::consts::PI * (1.0f64 / 3.0).atan();
+    assert!((p - cauchy).abs() < 1e-12, "{p}");
+    let mut generator = Pcg32::new(73);
+    let trials = 4000;
+    let (mut capped, mut swapped, mut plain) = (0, 0, 0);
+    for _ in 0..trials {
+        let mut sample = |n: usize| -> (f64, Spread) {
+            let values: Vec<f64> = (0..n).map(|_| normal(&mut generator)).collect();
+            (mean(&values).unwrap(), Spread::of_mean(&values).unwrap())
+        };
+        let ((a, few), (b, many)) = (sample(2), sample(16));
+        let alarm = |spread: Spread, gap: f64| usize::from(spread.p(gap) <= 0.05);
+        capped += alarm(Spread::of_difference(few, many), a - b);
+        swapped += alarm(Spread::of_difference(many, few), b - a);
+        plain += alarm(Spread::together(&[few, many]), a - b);
+    }
+    println!("{capped} capped, {plain} by Welch and Satterthwaite of {trials}");
+    assert_eq!(capped, swapped);
+    assert!(capped <= trials * 6 / 100, "{capped}");
+    // Negative control: the degrees of freedom of the other side.
+    assert!(plain > trials * 9 / 100, "{plain}");
+}
+
+#[test]
+fn figures_of_groups_have_the_jackknife_of_their_quotient() {
+    let groups = [[4.0, 2.0], [9.0, 3.0], [2.0, 2.0], [8.0, 4.0]];
+    let figure = LogFigure::of_groups("groups", &groups);
+    assert!((figure.log - (23.0f64 / 11.0).ln()).abs() < 1e-12);
+    let without = [[19.0, 9.0], [14.0, 8.0], [21.0, 9.0], [15.0, 7.0]];
+    let logs = without.map(|[sum, of]: [f64; 2]| (sum / of).ln());
+    let by_hand = variance(&logs).unwrap() * 9.0 / 4.0;
+    assert!((figure.spread().variance - by_hand).abs() < 1e-12);
+    assert_eq!(figure.spread().freedom, 3.0);
+    // The same groups on both sides: what they share is no noise.
+    let twice = groups.map(|[sum, of]| [2.0 * sum, of]);
+    let ratio = |of: &str| {
+        LogFigure::of_groups(of, &twice)
+            .compared_with(&figure)
+            .ratio
+    };
+    assert!((ratio("groups").low - 2.0).abs() < 1e-12 && ratio("others").low < 1.9);
+    for unknown in [&groups[..1], &[[1.0, 0.0], [2.0, 1.0]]] {
+        let i = LogFigure::of_groups("groups", unknown).interval();
+        assert_eq!((i.low, i.high), (0.0, f64::INFINITY), "{unknown:?}");
+    }
+}
+
+#[test]
+fn sums_of_equal_numbers_have_no_noise_however_many_there_are() {
+    for n in [2, 7, 30, 300, 1000] {
+        let equal = vec![0.1; n];
+        let figure = of_mean(&equal).interval();
+        assert_eq!(figure.low, figure.high, "{n}");
+        // The sums of one order differ from those of another.
+        let turned: Vec<f64> = (0..n).map(|i| 0.1 * f64::from((i % 7) as u32)).collect();
+        let mut back = turned.clone();
+        back.reverse();
+        let [a, b] = [turned, back].map(|x| LogFigure::exact(mean_of(&x).max(0.01)));
+        assert_eq!(a.compared_with(&b).p, 1.0, "{n}");
+    }
+    // A nanosecond in ten seconds is no rounding.
+    let ms = [1e4, 1e4, 1e4 + 1e-6, 1e4, 1e4 + 1e-6, 1e4 + 1e-6];
+    let time = LogFigure::of_times(&ms).expect("times").interval();
+    assert!(time.low < time.high);
 }
