@@ -1,5 +1,6 @@
 //! What is recorded of the coherence of rays: counts of a model, see [`crate::coherence`].
 
+use crate::figure::{self, Figure};
 use raystone_config::Coherence;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -125,24 +126,24 @@ impl Tally {
     }
 
     /// Figures by id, those that there are.
-    pub fn figures(&self, line_bytes: u32) -> [(&'static str, Option<f64>); 9] {
+    pub fn figures(&self, line_bytes: u32) -> [(&'static Figure, Option<f64>); 9] {
         let line = u64::from(line_bytes);
         [
-            ("simt-efficiency/v1", self.efficiency()),
-            ("lines-per-issue/v1", ratio(self.lines, self.issues)),
-            ("l1-hits/v1", ratio(self.l1_hits, self.lines)),
-            ("l2-hits/v1", ratio(self.l2_hits, self.l2_accesses())),
-            ("issues-per-ray/v1", ratio(self.issues, self.rays)),
-            ("asked-bytes-per-ray/v1", ratio(self.bytes, self.rays)),
+            (&figure::SIMT_EFFICIENCY, self.efficiency()),
+            (&figure::LINES_PER_ISSUE, ratio(self.lines, self.issues)),
+            (&figure::L1_HITS, ratio(self.l1_hits, self.lines)),
+            (&figure::L2_HITS, ratio(self.l2_hits, self.l2_accesses())),
+            (&figure::ISSUES_PER_RAY, ratio(self.issues, self.rays)),
+            (&figure::ASKED_BYTES_PER_RAY, ratio(self.bytes, self.rays)),
             (
-                "l2-bytes-per-ray/v1",
+                &figure::L2_BYTES_PER_RAY,
                 ratio(self.l2_accesses() * line, self.rays),
             ),
             (
-                "memory-bytes-per-ray/v1",
+                &figure::MEMORY_BYTES_PER_RAY,
                 ratio(self.misses() * line, self.rays),
             ),
-            ("cycles-per-ray/v1", ratio(self.cost(), self.rays)),
+            (&figure::CYCLES_PER_RAY, ratio(self.cost(), self.rays)),
         ]
     }
 }

@@ -6,6 +6,7 @@ use super::document::{Table, TableCell};
 use super::format;
 use super::values::Value;
 use raystone_record::Key;
+use raystone_record::figure::Figure;
 
 /// A part of a key, as a column is called; empty where the figure names it.
 pub type Part<'a> = &'a dyn Fn(&Key) -> String;
@@ -52,22 +53,27 @@ impl<'a> Rows<'a> {
         Self { by, heads, rows }
     }
 
-    /// The table of some figures, by id, in the order of their columns. A figure or part without a value
+    /// The table of some figures, in the order of their columns. A figure or part without a value
     /// has no column, a row may have dashes alone; there is no table without any column.
     pub fn table(
         self,
         values: &[Value],
         caption: impl Into<String>,
-        figures: &[&str],
+        figures: &[&Figure],
         across: Part,
     ) -> Table {
-        let shown = values.iter().filter(|v| figures.contains(&&*v.figure.id));
+        let shown = values
+            .iter()
+            .filter(|v| figures.iter().any(|f| f.id == v.figure.id));
         let shown: Vec<(&Value, String)> = shown.map(|v| (v, across(&v.key))).collect();
         let mut columns: Vec<(&Value, &str)> = Vec::new();
         let mut known = HashSet::new();
-        for id in figures {
-            for (value, part) in shown.iter().filter(|(value, _)| value.figure.id == *id) {
-                if known.insert((id, part)) {
+        for figure in figures {
+            for (value, part) in shown
+                .iter()
+                .filter(|(value, _)| value.figure.id == figure.id)
+            {
+                if known.insert((&figure.id, part)) {
                     columns.push((value, part));
                 }
             }
@@ -105,7 +111,7 @@ impl<'a> Rows<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone_record::{Interval, axis};
+    use raystone_record::{Interval, axis, figure};
 
     #[test]
     fn a_pivot_puts_each_value_where_its_key_says_and_a_dash_where_there_is_none() {
@@ -118,11 +124,11 @@ mod tests {
             high: 3.0,
         };
         let values = [
-            Value::new(&key("a", "x"), "mrays-per-s/v1", known),
-            Value::new(&key("b", "y"), "mrays-per-s/v1", 4.0),
-            Value::new(&key("b", "y"), "nodes-per-ray/v1", 9.0),
+            Value::new(&key("a", "x"), &figure::MRAYS_PER_S, known),
+            Value::new(&key("b", "y"), &figure::MRAYS_PER_S, 4.0),
+            Value::new(&key("b", "y"), &figure::NODES_PER_RAY, 9.0),
         ];
-        let table = |figures: &[&str]| {
+        let table = |figures: &[&Figure]| {
             let rows = Rows::of_labels(&[axis::ACCEL], &["structure"], &values);
             let rays: Part = &|key| key.label(axis::RAYS).into();
             let table = rows.table(&values, "t", figures, rays);
@@ -131,16 +137,16 @@ mod tests {
             let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
             (heads.collect::<Vec<_>>(), rows)
         };
-        let (heads, rows) = table(&["mrays-per-s/v1"]);
+        let (heads, rows) = table(&[&figure::MRAYS_PER_S]);
         assert_eq!(heads, ["structure", "x", "y"]);
         assert_eq!(rows, [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]);
-        let (heads, _) = table(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
+        let (heads, _) = table(&[&figure::MRAYS_PER_S, &figure::NODES_PER_RAY]);
         assert_eq!(heads, ["structure", "x", "speed, y", "nodes/ray, y"]);
-        assert!(table(&["epo/v1"]).1.is_empty());
+        assert!(table(&[&figure::EPO]).1.is_empty());
         // No value has a label on the axis of kernels.
         let by = [axis::KERNELS, axis::ACCEL];
         let rows = Rows::of_labels(&by, &["kernels", "structure"], &values);
-        let table = rows.table(&values, "t", &["nodes-per-ray/v1"], FIGURES_ALONE);
+        let table = rows.table(&values, "t", &[&figure::NODES_PER_RAY], FIGURES_ALONE);
         let heads = table.columns.iter().map(|c| c.title.clone());
         assert_eq!(heads.collect::<Vec<_>>(), ["structure", "nodes/ray"]);
         assert_eq!(

@@ -2,7 +2,7 @@
 
 use super::data::{FULL_CELLS, Measured, View};
 use super::format;
-use raystone_record::figure::figure;
+use raystone_record::figure::{self, Figure};
 use raystone_record::replicates::{Replicates, Without};
 use raystone_record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord, axis};
 use raystone_stats::bias::BiasVerdict;
@@ -51,45 +51,39 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// Its row in the table of figures, that of its slope, how files are named after it, what the recorded
-    /// metric's versioned id starts with, and that of the metric that is left for a reference of one image.
-    const fn words(self) -> [&'static str; 5] {
+    /// How files are named after it, what the recorded metric's versioned id starts with, and that of the metric that is left
+    /// for a reference of one image.
+    const fn words(self) -> [&'static str; 3] {
         match self {
-            Self::RelMse => [
-                "relmse-unbiased/v1",
-                "relmse-slope/v1",
-                "relmse",
-                "relmse-unbiased/",
-                "relmse/",
-            ],
-            Self::Rmse => [
-                "rmse-unbiased/v1",
-                "rmse-slope/v1",
-                "rmse",
-                "mse-unbiased/",
-                "mse/",
-            ],
+            Self::RelMse => ["relmse", "relmse-unbiased/", "relmse/"],
+            Self::Rmse => ["rmse", "mse-unbiased/", "mse/"],
         }
     }
 
     /// Its row in the table of figures.
-    pub fn figure(self) -> &'static str {
-        self.words()[0]
+    pub fn figure(self) -> &'static Figure {
+        match self {
+            Self::RelMse => &figure::RELMSE_UNBIASED,
+            Self::Rmse => &figure::RMSE_UNBIASED,
+        }
     }
 
     /// The row of its slope.
-    pub(crate) fn slope_figure(self) -> &'static str {
-        self.words()[1]
+    pub(crate) fn slope_figure(self) -> &'static Figure {
+        match self {
+            Self::RelMse => &figure::RELMSE_SLOPE,
+            Self::Rmse => &figure::RMSE_SLOPE,
+        }
     }
 
     /// How tables and axes name it.
     pub fn name(self) -> &'static str {
-        &figure(self.figure()).title
+        &self.figure().title
     }
 
     /// How files are named after it.
     pub(crate) fn stem(self) -> &'static str {
-        self.words()[2]
+        self.words()[0]
     }
 
     /// From means of what was recorded. No true error is negative, so intervals end at 0. Negative means
@@ -112,14 +106,17 @@ impl Metric {
 
 /// Metrics beside those that samplers are ranked by: figure and recorded id. They hold the noise of the
 /// reference.
-pub(crate) const FURTHER_METRICS: [(&str, &str); 7] = [
-    ("mae/v1", "mae/v1"),
-    ("relmse-trimmed/v1", "relmse-trimmed/top=0.1%/eps=1e-2/v1"),
-    ("mse-luminance/v1", "mse-luminance/v1"),
-    ("smape/v1", "smape/eps=1e-2/v1"),
-    ("psnr/v1", "psnr/tone-mapped/v1"),
-    ("ssim/v1", "ssim/tone-mapped/v1"),
-    ("flip/v1", "flip/tone-mapped/ppd=67/v1"),
+pub(crate) const FURTHER_METRICS: [(&Figure, &str); 7] = [
+    (&figure::MAE, "mae/v1"),
+    (
+        &figure::RELMSE_TRIMMED,
+        "relmse-trimmed/top=0.1%/eps=1e-2/v1",
+    ),
+    (&figure::MSE_LUMINANCE, "mse-luminance/v1"),
+    (&figure::SMAPE, "smape/eps=1e-2/v1"),
+    (&figure::PSNR, "psnr/tone-mapped/v1"),
+    (&figure::SSIM, "ssim/tone-mapped/v1"),
+    (&figure::FLIP, "flip/tone-mapped/ppd=67/v1"),
 ];
 
 /// Mean error at one number of samples.
@@ -243,7 +240,7 @@ impl<'a> MeasuredSampler<'a> {
     pub(crate) fn further(
         &self,
         spp: u32,
-    ) -> [(&'static str, Option<Interval>); FURTHER_METRICS.len()] {
+    ) -> [(&'static Figure, Option<Interval>); FURTHER_METRICS.len()] {
         let of = |id: &str| -> Vec<f64> {
             let errors = self.replicates.iter().flat_map(|r| &r.errors);
             let errors = errors.filter(|error| error.spp == spp);

@@ -8,7 +8,7 @@ use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
 use raystone_core::text::escape::visible;
-use raystone_record::figure::{Figure, figure};
+use raystone_record::figure::{self, Figure};
 use raystone_record::{
     BiasRecord, ClassCoherence, ClassTiming, CoherenceRecord, FigureAtCount, Interval, Key,
     MeasuredRecord, OrderTime, PrimaryRecord, RayClass, Recorded, SpectrumRecord, StreamRecord,
@@ -66,21 +66,21 @@ impl From<f64> for Reading {
 
 impl Value<'static> {
     /// A figure of this crate.
-    pub fn new(key: &Key, id: &str, reading: impl Into<Reading>) -> Self {
+    pub fn new(key: &Key, figure: &'static Figure, reading: impl Into<Reading>) -> Self {
         Self {
             key: key.clone(),
-            figure: Cow::Borrowed(figure(id)),
+            figure: Cow::Borrowed(figure),
             reading: reading.into(),
         }
     }
 
     /// Those figures of a key that are known.
-    pub fn known<'i, T: Into<Reading>>(
+    pub fn known<T: Into<Reading>>(
         key: &Key,
-        figures: impl IntoIterator<Item = (&'i str, Option<T>)>,
+        figures: impl IntoIterator<Item = (&'static Figure, Option<T>)>,
     ) -> Vec<Self> {
         let known = figures.into_iter();
-        let known = known.filter_map(|(id, value)| Some(Self::new(key, id, value?)));
+        let known = known.filter_map(|(figure, value)| Some(Self::new(key, figure, value?)));
         known.collect()
     }
 }
@@ -215,19 +215,25 @@ fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'stat
     let stats = &s.stats;
     let rate = (s.build_ms > 0.0).then(|| triangles as f64 / s.build_ms * 1e-3);
     let figures = [
-        ("build-ms/v1", Some(s.build_ms)),
-        ("build-rate/v1", rate),
-        ("build-peak-bytes/v1", s.build_peak_bytes.map(|n| n as f64)),
-        ("update-ms/v1", s.update_ms),
-        ("bytes/v1", Some(stats.bytes as f64)),
-        ("bytes-per-triangle/v1", per_triangle(stats.bytes)),
-        ("nodes/v1", Some(stats.nodes as f64)),
-        ("leaves/v1", Some(stats.leaves as f64)),
-        ("references/v1", Some(stats.references as f64)),
-        ("references-per-triangle/v1", per_triangle(stats.references)),
-        ("depth/v1", stats.depth.map(f64::from)),
-        ("sah-cost/v1", stats.sah_cost),
-        ("epo/v1", stats.epo),
+        (&figure::BUILD_MS, Some(s.build_ms)),
+        (&figure::BUILD_RATE, rate),
+        (
+            &figure::BUILD_PEAK_BYTES,
+            s.build_peak_bytes.map(|n| n as f64),
+        ),
+        (&figure::UPDATE_MS, s.update_ms),
+        (&figure::BYTES, Some(stats.bytes as f64)),
+        (&figure::BYTES_PER_TRIANGLE, per_triangle(stats.bytes)),
+        (&figure::NODES, Some(stats.nodes as f64)),
+        (&figure::LEAVES, Some(stats.leaves as f64)),
+        (&figure::REFERENCES, Some(stats.references as f64)),
+        (
+            &figure::REFERENCES_PER_TRIANGLE,
+            per_triangle(stats.references),
+        ),
+        (&figure::DEPTH, stats.depth.map(f64::from)),
+        (&figure::SAH_COST, stats.sah_cost),
+        (&figure::EPO, stats.epo),
     ];
     let all: u64 = stats.leaf_histogram.iter().sum();
     let leaves = LEAF_CLASSES.iter().filter_map(|(title, least, greatest)| {
@@ -236,7 +242,7 @@ fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'stat
         let leaves: u64 = inside.map(|(_, leaves)| leaves).sum();
         let key = key.clone().with(axis::SUBJECT, title);
         let share = leaves as f64 / all as f64;
-        (leaves > 0).then(|| Value::new(&key, "leaf-share/v1", share))
+        (leaves > 0).then(|| Value::new(&key, &figure::LEAF_SHARE, share))
     });
     let mut values = Value::known(key, figures);
     values.extend(leaves);
@@ -249,18 +255,21 @@ fn of_rays(key: &Key, timing: &ClassTiming) -> Vec<Value<'static>> {
     let unlike = timing
         .unlike_shadow
         .map(|rays| 1e6 * rays as f64 / timing.rays.max(1) as f64);
-    let mut values = vec![Value::new(&key, "mrays-per-s/v1", timing.mrays_s)];
+    let mut values = vec![Value::new(&key, &figure::MRAYS_PER_S, timing.mrays_s)];
     values.extend(Value::known(
         &key,
         [
-            ("rays/v1", Some(timing.rays as f64)),
-            ("hit-share/v1", Some(timing.hit_fraction)),
-            ("unlike-shadow/v1", unlike),
-            ("nodes-per-ray/v1", work.map(|w| w.nodes)),
-            ("box-tests-per-ray/v1", work.map(|w| w.box_tests)),
-            ("triangle-tests-per-ray/v1", work.map(|w| w.triangle_tests)),
+            (&figure::RAYS, Some(timing.rays as f64)),
+            (&figure::HIT_SHARE, Some(timing.hit_fraction)),
+            (&figure::UNLIKE_SHADOW, unlike),
+            (&figure::NODES_PER_RAY, work.map(|w| w.nodes)),
+            (&figure::BOX_TESTS_PER_RAY, work.map(|w| w.box_tests)),
             (
-                "deepest-stack/v1",
+                &figure::TRIANGLE_TESTS_PER_RAY,
+                work.map(|w| w.triangle_tests),
+            ),
+            (
+                &figure::DEEPEST_STACK,
                 work.map(|w| f64::from(w.stack_high_water)),
             ),
         ],
@@ -296,10 +305,10 @@ pub(crate) fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     }
     for time in view.valid_times() {
         let figures = [
-            ("ms-per-spp/v1", time.ms_per_spp),
-            ("cell-mrays-per-s/v1", time.mrays_s),
+            (&figure::MS_PER_SPP, time.ms_per_spp),
+            (&figure::CELL_MRAYS_PER_S, time.mrays_s),
             (
-                "ray-query-share/v1",
+                &figure::RAY_QUERY_SHARE,
                 organisations::query_share(time).map(Interval::exact),
             ),
         ];
@@ -323,7 +332,7 @@ fn of_references<'a>(scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
         .iter()
         .filter_map(|view| view.reference.as_ref());
     let references = references.filter(|r| known.insert(r.key.to_string()));
-    let mse = references.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
+    let mse = references.filter_map(|r| Some(Value::new(r.key, &figure::REFERENCE_MSE, r.mse?)));
     mse.collect()
 }
 
@@ -338,10 +347,10 @@ fn of_orders(key: &Key, time: &TimeRecord) -> Vec<Value<'static>> {
             .map(|(ms, one)| ms.value / one.value);
         let passes = at.passes as f64;
         let figures = [
-            ("order-passes/v1", Some(Interval::exact(passes))),
-            ("order-ms/v1", at.ms_per_spp),
-            ("order-ratio/v1", ratio.map(Interval::exact)),
-            ("first-picture-ms/v1", at.first_picture_ms),
+            (&figure::ORDER_PASSES, Some(Interval::exact(passes))),
+            (&figure::ORDER_MS, at.ms_per_spp),
+            (&figure::ORDER_RATIO, ratio.map(Interval::exact)),
+            (&figure::FIRST_PICTURE_MS, at.first_picture_ms),
         ];
         Value::known(&key, figures)
     };
@@ -357,12 +366,21 @@ fn of_primary(key: &Key, primary: &PrimaryRecord) -> Vec<Value<'static>> {
     };
     let exact = |x: f64| Some(Interval::exact(x));
     let figures = [
-        ("primary-other-triangle/v1", share(primary.other_triangle)),
-        ("primary-other-value/v1", share(primary.other_value)),
-        ("primary-mean-difference/v1", exact(primary.mean_difference)),
-        ("primary-rms-difference/v1", exact(primary.rms_difference)),
-        ("raster-ms/v1", primary.raster_ms),
-        ("traced-primary-ms/v1", primary.traced_ms),
+        (
+            &figure::PRIMARY_OTHER_TRIANGLE,
+            share(primary.other_triangle),
+        ),
+        (&figure::PRIMARY_OTHER_VALUE, share(primary.other_value)),
+        (
+            &figure::PRIMARY_MEAN_DIFFERENCE,
+            exact(primary.mean_difference),
+        ),
+        (
+            &figure::PRIMARY_RMS_DIFFERENCE,
+            exact(primary.rms_difference),
+        ),
+        (&figure::RASTER_MS, primary.raster_ms),
+        (&figure::TRACED_PRIMARY_MS, primary.traced_ms),
     ];
     Value::known(key, figures)
 }
@@ -383,7 +401,7 @@ fn of_coherence(key: &Key, record: &CoherenceRecord) -> Vec<Value<'static>> {
             values.extend(Value::known(&key, figures));
         }
         let key = key.with(axis::RAYS, ALL_RAYS);
-        let path = [("cycles-per-path/v1", at.cost_of_path())];
+        let path = [(&figure::CYCLES_PER_PATH, at.cost_of_path())];
         values.extend(Value::known(&key, path));
     }
     values
@@ -392,16 +410,19 @@ fn of_coherence(key: &Key, record: &CoherenceRecord) -> Vec<Value<'static>> {
 fn of_bias(key: &Key, bias: &BiasRecord) -> Vec<Value<'static>> {
     let tested = bias.p.map(|p| {
         [
-            ("bias-tiles/v1", Some(bias.tiles as f64)),
-            ("bias-rejected/v1", Some(bias.rejected as f64)),
-            ("bias-least-p/v1", Some(bias.min_p)),
-            ("bias-z/v1", bias.z),
-            ("bias-p/v1", Some(p)),
-            ("bias-freedom/v1", bias.degrees_of_freedom),
-            ("bias-weighted-p/v1", bias.weighted_p),
-            ("bias-weighted-freedom/v1", bias.weighted_degrees_of_freedom),
+            (&figure::BIAS_TILES, Some(bias.tiles as f64)),
+            (&figure::BIAS_REJECTED, Some(bias.rejected as f64)),
+            (&figure::BIAS_LEAST_P, Some(bias.min_p)),
+            (&figure::BIAS_Z, bias.z),
+            (&figure::BIAS_P, Some(p)),
+            (&figure::BIAS_FREEDOM, bias.degrees_of_freedom),
+            (&figure::BIAS_WEIGHTED_P, bias.weighted_p),
             (
-                "bias-detectable/v1",
+                &figure::BIAS_WEIGHTED_FREEDOM,
+                bias.weighted_degrees_of_freedom,
+            ),
+            (
+                &figure::BIAS_DETECTABLE,
                 bias.detectable.map(|part| 100.0 * part),
             ),
         ]
@@ -421,16 +442,16 @@ fn of_spectrum(key: &Key, spectrum: &SpectrumRecord) -> Vec<Value<'static>> {
     let mut values = Value::known(
         key,
         [
-            ("low-frequency-power/v1", spectrum.low_frequency),
-            ("loudest-wave/v1", spectrum.loudest),
-            ("neighbour-correlation/v1", spectrum.autocorrelation),
-            ("luminance-rmse/v1", before.map(Interval::exact)),
+            (&figure::LOW_FREQUENCY_POWER, spectrum.low_frequency),
+            (&figure::LOUDEST_WAVE, spectrum.loudest),
+            (&figure::NEIGHBOUR_CORRELATION, spectrum.autocorrelation),
+            (&figure::LUMINANCE_RMSE, before.map(Interval::exact)),
         ],
     );
     for at in spectrum.filtered.iter().filter(|at| at.sigma > 0.0) {
         let key = (key.clone()).with(axis::SUBJECT, format!("σ = {} px", at.sigma));
         let share = before.map(|before| at.rmse.value / before);
-        values.extend(Value::known(&key, [("filtered-share/v1", share)]));
+        values.extend(Value::known(&key, [(&figure::FILTERED_SHARE, share)]));
     }
     values
 }
@@ -445,30 +466,31 @@ pub(crate) fn pair_of_dimensions(stream: &StreamRecord) -> String {
 pub(crate) fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
     let key = (stream.key.clone()).with(axis::DIMENSIONS, pair_of_dimensions(stream));
     let figures = &stream.figures;
-    let at = |key: &Key, id: &str, counts: &[FigureAtCount]| -> Vec<Value> {
-        let at =
-            |at: &FigureAtCount| Value::new(&key.clone().with(axis::POINTS, at.n), id, at.value);
+    let at = |key: &Key, figure: &'static Figure, counts: &[FigureAtCount]| -> Vec<Value> {
+        let at = |at: &FigureAtCount| {
+            Value::new(&key.clone().with(axis::POINTS, at.n), figure, at.value)
+        };
         counts.iter().map(at).collect()
     };
-    let mut values = at(&key, "star-discrepancy/v1", &stream.star);
-    values.extend(at(&key, "l2-star/v1", &figures.l2_star));
-    values.extend(at(&key, "centered/v1", &figures.centered));
+    let mut values = at(&key, &figure::STAR_DISCREPANCY, &stream.star);
+    values.extend(at(&key, &figure::L2_STAR, &figures.l2_star));
+    values.extend(at(&key, &figure::CENTERED, &figures.centered));
     let exponents = [
-        ("star-exponent/v1", figures.star_slope),
-        ("l2-star-exponent/v1", figures.l2_star_slope),
+        (&figure::STAR_EXPONENT, figures.star_slope),
+        (&figure::L2_STAR_EXPONENT, figures.l2_star_slope),
     ];
     values.extend(Value::known(&key, exponents));
     for integrand in &figures.integrands {
         let key = key.clone().with(axis::SUBJECT, &integrand.function);
-        values.extend(at(&key, "integral-rmse/v1", &integrand.rmse));
-        let exponent = [("integral-exponent/v1", integrand.slope)];
+        values.extend(at(&key, &figure::INTEGRAL_RMSE, &integrand.rmse));
+        let exponent = [(&figure::INTEGRAL_EXPONENT, integrand.slope)];
         values.extend(Value::known(&key, exponent));
     }
     for pixels in &figures.pixels {
         let key = key.clone().with(axis::POINTS, pixels.n);
         let angle = pixels.neighbour_angle.to_degrees();
-        values.push(Value::new(&key, "neighbour-angle/v1", angle));
-        values.push(Value::new(&key, "coverage/v1", pixels.coverage));
+        values.push(Value::new(&key, &figure::NEIGHBOUR_ANGLE, angle));
+        values.push(Value::new(&key, &figure::COVERAGE, pixels.coverage));
     }
     values
 }
@@ -545,9 +567,9 @@ mod tests {
             high: 3.0,
         };
         let values = [
-            Value::new(&key, "build-ms/v1", known),
-            Value::new(&other, "rmse-unbiased/v1", Reading::Below(0.5)),
-            Value::new(&other, "break-even/v1", Reading::Word("never")),
+            Value::new(&key, &figure::BUILD_MS, known),
+            Value::new(&other, &figure::RMSE_UNBIASED, Reading::Below(0.5)),
+            Value::new(&other, &figure::BREAK_EVEN, Reading::Word("never")),
         ];
         assert_eq!(
             csv(&values),

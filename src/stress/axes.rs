@@ -16,6 +16,7 @@ use raystone_accel::{
 };
 use raystone_core::random::Pcg32;
 use raystone_gpu::Gpu;
+use raystone_record::figure;
 use raystone_record::{Key, axis};
 use raystone_render::offset::{TransformError, position_error};
 use raystone_render::{OffsetRegistry, RayOffset, Stage};
@@ -104,13 +105,13 @@ impl Suite<'_> {
                 ..Intersection::default()
             });
             let found = stage.closest(&traced, &case.rays)?;
-            record.add("rays/v1", case.rays.len() as f64);
+            record.add(&figure::RAYS, case.rays.len() as f64);
             let pairs = found.answers.iter().zip(expected.of(built.space()));
             let lost = pairs
                 .enumerate()
                 .filter(|(_, (hit, truth))| !hit.same_bits(truth));
             for (index, _) in lost {
-                record.add("lost-hits/v1", 1.0);
+                record.add(&figure::LOST_HITS, 1.0);
                 record.worst.get_or_insert_with(|| {
                     let test = Intersection::default().triangle;
                     let replay = self.replay(
@@ -171,13 +172,13 @@ impl Suite<'_> {
         let pairs = all.iter().zip(&some);
         let record = |(all, some): (&Timed, &Timed)| {
             let found = Findings::of([
-                ("test-bytes/v1", f64::from(all.test.bytes())),
+                (&figure::TEST_BYTES, f64::from(all.test.bytes())),
                 (
-                    "ns-per-test/v1",
+                    &figure::NS_PER_TEST,
                     all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
                 ),
-                ("traversal-ratio/v1", some.ms / plain_ms),
-                ("tests-per-ray/v1", some.tests_per_ray),
+                (&figure::TRAVERSAL_RATIO, some.ms / plain_ms),
+                (&figure::TESTS_PER_RAY, some.tests_per_ray),
             ]);
             let key = Key::default().with(axis::TRIANGLE, all.test.name());
             line(key, Record::Cost(found))
@@ -244,16 +245,16 @@ struct Timed {
 fn empty_record(test: BoxTest) -> Findings {
     let pad = f64::from(test.pad_ulps);
     Findings::of([
-        ("pad-ulps/v1", pad),
-        ("rays/v1", 0.0),
-        ("lost-hits/v1", 0.0),
+        (&figure::PAD_ULPS, pad),
+        (&figure::RAYS, 0.0),
+        (&figure::LOST_HITS, 0.0),
     ])
 }
 
 /// The smallest pad that loses no hit, nor does any greater one.
 pub(crate) fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Option<usize> {
     let padded: Vec<[usize; 2]> = tests
-        .map(|t| ["pad-ulps/v1", "lost-hits/v1"].map(|id| t.count(id)))
+        .map(|t| [&figure::PAD_ULPS, &figure::LOST_HITS].map(|id| t.count(id)))
         .collect();
     let lossy = padded.iter().filter(|t| t[1] > 0).map(|t| t[0]).max();
     let sound = padded.iter().map(|t| t[0]);
@@ -316,10 +317,10 @@ fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Find
         }
     }
     Ok(Findings::of([
-        ("rays/v1", traced as f64),
-        ("self-intersections/v1", f64::from(self_intersections)),
-        ("leaks/v1", f64::from(leaks)),
-        ("farthest-begin/v1", farthest),
+        (&figure::RAYS, traced as f64),
+        (&figure::SELF_INTERSECTIONS, f64::from(self_intersections)),
+        (&figure::LEAKS, f64::from(leaks)),
+        (&figure::FARTHEST_BEGIN, farthest),
     ]))
 }
 
@@ -357,7 +358,7 @@ mod tests {
         for (name, mesh) in closed_meshes(&Placement::ORDINARY) {
             let count = |offset: RayOffset| {
                 let found = bounce(&mesh, offset, 1, 3000).unwrap();
-                found.count("self-intersections/v1") + found.count("leaks/v1")
+                found.count(&figure::SELF_INTERSECTIONS) + found.count(&figure::LEAKS)
             };
             let none = count(offset::NONE);
             assert!(none > 30, "{name}: {none:?}");
@@ -367,7 +368,7 @@ mod tests {
 
     #[test]
     fn the_smallest_sound_pad_is_above_every_pad_that_loses_hits() {
-        let test = |pad, lost| Findings::of([("pad-ulps/v1", pad), ("lost-hits/v1", lost)]);
+        let test = |pad, lost| Findings::of([(&figure::PAD_ULPS, pad), (&figure::LOST_HITS, lost)]);
         let mut records = [(0.0, 7.0), (2.0, 0.0), (3.0, 1.0), (4.0, 0.0)]
             .map(|(pad, lost)| test(pad, lost))
             .to_vec();

@@ -4,7 +4,7 @@ use super::numerics::Gauge;
 use super::placement::Placement;
 use super::tally::Errors;
 use raystone_record::Environment;
-use raystone_record::figure::figure;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{
     Key, Ran, RecordError, STRESS_FILE, SkippedRecord, Sound, Verdict, read_lines, text_of,
 };
@@ -145,42 +145,33 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// These figures, by id.
-    pub fn of<'a>(figures: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+    /// These figures.
+    pub fn of<'a>(figures: impl IntoIterator<Item = (&'a Figure, f64)>) -> Self {
         let mut found = Self::default();
-        for (id, value) in figures {
-            found.add(id, value);
+        for (figure, value) in figures {
+            found.add(figure, value);
         }
         found
     }
 
     /// Adds to a figure, which begins at 0.
-    ///
-    /// # Panics
-    /// The table of figures has no such row.
-    pub fn add(&mut self, id: &str, value: f64) {
-        *self.figures.entry(figure(id).id.to_string()).or_default() += value;
+    pub fn add(&mut self, figure: &Figure, value: f64) {
+        *self.figures.entry(figure.id.to_string()).or_default() += value;
     }
 
     /// A figure, if it was asked for.
-    ///
-    /// # Panics
-    /// As [`Findings::add`].
-    pub fn get(&self, id: &str) -> Option<f64> {
-        self.figures.get(&*figure(id).id).copied()
+    pub fn get(&self, figure: &Figure) -> Option<f64> {
+        self.figures.get(&*figure.id).copied()
     }
 
     /// A figure that is a count; 0 where it was not asked for.
-    ///
-    /// # Panics
-    /// As [`Findings::add`].
-    pub fn count(&self, id: &str) -> usize {
-        self.get(id).map_or(0, |count| count as usize)
+    pub fn count(&self, figure: &Figure) -> usize {
+        self.get(figure).map_or(0, |count| count as usize)
     }
 
     /// Answers that differ from brute force, of closest and of any hits.
     pub fn differing(&self) -> usize {
-        self.count("differing/v1") + self.count("any-differing/v1")
+        self.count(&figure::DIFFERING) + self.count(&figure::ANY_DIFFERING)
     }
 }
 

@@ -10,6 +10,7 @@ use super::{StressError, case};
 use raystone_accel::oracle::exact_truths;
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{NO_HIT, Ray, Traced};
+use raystone_record::figure;
 use raystone_record::{Key, axis};
 use raystone_render::Stage;
 use std::sync::Arc;
@@ -136,10 +137,10 @@ impl Suite<'_> {
             replay: self.replay([FAMILY, &target.label()], [accel, triangle], ray),
         });
         let counts = [
-            ("triangles/v1", target.mesh.len()),
-            ("rays/v1", shot),
-            ("misses/v1", misses),
-            ("confirmed-misses/v1", confirmed),
+            (&figure::TRIANGLES, target.mesh.len()),
+            (&figure::RAYS, shot),
+            (&figure::MISSES, misses),
+            (&figure::CONFIRMED_MISSES, confirmed),
         ];
         Ok(Findings {
             failures,

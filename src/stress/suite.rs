@@ -12,6 +12,7 @@ use raystone_accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
 use raystone_gpu::{Gpu, GpuError};
+use raystone_record::figure;
 use raystone_record::{Key, RayClass, axis};
 use raystone_render::Stage;
 use raystone_verify::gate;
@@ -64,7 +65,7 @@ impl OpenCell {
     fn findings(self) -> Findings {
         let mut found = self.tally.findings(self.asked_any);
         if let Some(slowdown) = self.slowdown {
-            found.add("slowdown/v1", slowdown);
+            found.add(&figure::SLOWDOWN, slowdown);
         }
         Findings {
             failures: self.failures,
@@ -305,7 +306,7 @@ impl Trace<'_> {
             errors |= any.errors;
             for (index, (any, hit)) in any.answers.iter().zip(expected).enumerate() {
                 if *any != (hit.triangle != NO_HIT) {
-                    tally.count("any-differing/v1", 1);
+                    tally.count(&figure::ANY_DIFFERING, 1);
                     tally.note(7e9, "any hit differs from brute force", || replay(index));
                 }
             }
@@ -333,7 +334,7 @@ impl Trace<'_> {
         };
         let exact = self.suite.exact;
         let verdict = gate::compare(&set, hits, &found, &self.stage.soup, built.space(), exact);
-        tally.count("differing/v1", verdict.wrong);
-        tally.count("ties/v1", verdict.ties);
+        tally.count(&figure::DIFFERING, verdict.wrong);
+        tally.count(&figure::TIES, verdict.ties);
     }
 }

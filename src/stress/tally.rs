@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use raystone_accel::oracle::{ExactTruth, ExactVerdict, exact_truths};
 use raystone_accel::{Hit, NO_HIT, Ray};
 use raystone_core::geometry::Triangle;
+use raystone_record::figure::{self, Figure};
 use std::collections::BTreeMap;
 
 /// Errors of right hits: of the distance, in ulp and relative, and of the hit point, in ulp of its greatest
@@ -106,24 +107,25 @@ fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
 }
 
 /// What is counted of the rays of a cell.
-const COUNTED: [&str; 12] = [
-    "rays/v1",
-    "false-misses/v1",
-    "unexplained-misses/v1",
-    "cracks/v1",
-    "false-hits/v1",
-    "unexplained-hits/v1",
-    "wrong-triangle/v1",
-    "not-nearest/v1",
-    "borderline/v1",
-    "differing/v1",
-    "any-differing/v1",
-    "ties/v1",
+const COUNTED: [&Figure; 12] = [
+    &figure::RAYS,
+    &figure::FALSE_MISSES,
+    &figure::UNEXPLAINED_MISSES,
+    &figure::CRACKS,
+    &figure::FALSE_HITS,
+    &figure::UNEXPLAINED_HITS,
+    &figure::WRONG_TRIANGLE,
+    &figure::NOT_NEAREST,
+    &figure::BORDERLINE,
+    &figure::DIFFERING,
+    &figure::ANY_DIFFERING,
+    &figure::TIES,
 ];
 
 /// Counts over the rays of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
+    /// By id of the figure.
     counts: BTreeMap<&'static str, usize>,
     /// Errors of right hits.
     errors: Vec<Errors>,
@@ -146,32 +148,32 @@ fn badness(outcome: &Outcome) -> (f64, &'static str) {
 
 impl Tally {
     /// Adds to a count.
-    pub fn count(&mut self, id: &'static str, more: usize) {
-        *self.counts.entry(id).or_default() += more;
+    pub fn count(&mut self, figure: &'static Figure, more: usize) {
+        *self.counts.entry(&*figure.id).or_default() += more;
     }
 
     /// A count so far.
-    fn counted(&self, id: &str) -> usize {
-        self.counts.get(id).copied().unwrap_or(0)
+    fn counted(&self, figure: &Figure) -> usize {
+        self.counts.get(&*figure.id).copied().unwrap_or(0)
     }
 
     /// Adds a ray.
     pub fn add(&mut self, outcome: &Outcome, closed: bool, replay: impl FnOnce() -> String) {
-        self.count("rays/v1", 1);
+        self.count(&figure::RAYS, 1);
         match outcome.verdict {
             ExactVerdict::Miss | ExactVerdict::Hit(_) => {}
-            ExactVerdict::Borderline => self.count("borderline/v1", 1),
+            ExactVerdict::Borderline => self.count(&figure::BORDERLINE, 1),
             ExactVerdict::FalseMiss { explained } => {
-                self.count("false-misses/v1", 1);
-                self.count("unexplained-misses/v1", usize::from(!explained));
-                self.count("cracks/v1", usize::from(closed));
+                self.count(&figure::FALSE_MISSES, 1);
+                self.count(&figure::UNEXPLAINED_MISSES, usize::from(!explained));
+                self.count(&figure::CRACKS, usize::from(closed));
             }
             ExactVerdict::FalseHit { explained } => {
-                self.count("false-hits/v1", 1);
-                self.count("unexplained-hits/v1", usize::from(!explained));
+                self.count(&figure::FALSE_HITS, 1);
+                self.count(&figure::UNEXPLAINED_HITS, usize::from(!explained));
             }
-            ExactVerdict::WrongTriangle => self.count("wrong-triangle/v1", 1),
-            ExactVerdict::NotNearest => self.count("not-nearest/v1", 1),
+            ExactVerdict::WrongTriangle => self.count(&figure::WRONG_TRIANGLE, 1),
+            ExactVerdict::NotNearest => self.count(&figure::NOT_NEAREST, 1),
         }
         self.errors.extend(outcome.errors);
         let (badness, what) = badness(outcome);
@@ -190,7 +192,7 @@ impl Tally {
     /// Adds the sums of another rung.
     pub fn join(&mut self, other: Self) {
         for (id, count) in other.counts {
-            self.count(id, count);
+            *self.counts.entry(id).or_default() += count;
         }
         self.errors.extend(other.errors);
         if other.worst.as_ref().map(|w| w.0) > self.worst.as_ref().map(|w| w.0) {
@@ -216,9 +218,9 @@ impl Tally {
         Rung {
             label: case.label.clone(),
             place: case.place,
-            rays: self.counted("rays/v1"),
-            false_misses: self.counted("false-misses/v1"),
-            differing: self.counted("differing/v1"),
+            rays: self.counted(&figure::RAYS),
+            false_misses: self.counted(&figure::FALSE_MISSES),
+            differing: self.counted(&figure::DIFFERING),
             t_ulp: errors.map(|e| e[0]),
             point_ulp: errors.map(|e| e[2]),
         }
@@ -228,13 +230,13 @@ impl Tally {
     pub fn findings(self, asked_any: bool) -> Findings {
         let counted = COUNTED
             .iter()
-            .filter(|id| asked_any || **id != "any-differing/v1");
-        let mut found = Findings::of(counted.map(|id| (*id, self.counted(id) as f64)));
+            .filter(|figure| asked_any || figure.id != figure::ANY_DIFFERING.id);
+        let mut found = Findings::of(counted.map(|figure| (*figure, self.counted(figure) as f64)));
         found.errors = self.quantiles();
         if let Some([t, _, point, _]) = &found.errors {
             let (t, point) = (t.p99, point.p99);
-            found.add("t-ulp-p99/v1", t);
-            found.add("point-ulp-p99/v1", point);
+            found.add(&figure::T_ULP_P99, t);
+            found.add(&figure::POINT_ULP_P99, point);
         }
         found.worst = self.worst.map(|(_, worst)| worst);
         found
@@ -276,9 +278,10 @@ mod tests {
         tally.join(other);
         assert_eq!(worst(&tally).as_deref(), Some("crack"));
         let found = tally.findings(false);
-        let counts = ["rays/v1", "false-misses/v1", "cracks/v1"].map(|id| found.count(id));
+        let counts =
+            [&figure::RAYS, &figure::FALSE_MISSES, &figure::CRACKS].map(|id| found.count(id));
         assert_eq!(counts, [102, 2, 1]);
-        assert_eq!(found.get("unexplained-misses/v1"), Some(0.0));
-        assert_eq!(found.get("any-differing/v1"), None);
+        assert_eq!(found.get(&figure::UNEXPLAINED_MISSES), Some(0.0));
+        assert_eq!(found.get(&figure::ANY_DIFFERING), None);
     }
 }

@@ -4,6 +4,7 @@ use super::axes::smallest_sound_pad;
 use super::placement::Placement;
 use super::record::{Findings, Line, Record, SuiteRecord, TargetRecord};
 use raystone_accel::BoxTest;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Key, Recorded, Verdict, axis};
 use raystone_render::RayOffset;
 
@@ -43,7 +44,7 @@ pub fn targets(records: &[Line]) -> Vec<TargetRecord> {
     targets.extend(pad_target(records));
     targets.extend(offset_targets(records));
     targets.extend(gauge_target(records));
-    let ratio = cost.and_then(|cost| cost.get("traversal-ratio/v1"));
+    let ratio = cost.and_then(|cost| cost.get(&figure::TRAVERSAL_RATIO));
     targets.extend(ratio.map(|ratio| cost_target(default, ratio)));
     targets
 }
@@ -87,7 +88,7 @@ fn target(
 }
 
 fn shot_targets(shots: &[Recorded<Findings>], wanted: usize) -> Vec<TargetRecord> {
-    let counts = |s: &Findings| ["misses/v1", "rays/v1"].map(|id| s.count(id));
+    let counts = |s: &Findings| [&figure::MISSES, &figure::RAYS].map(|id| s.count(id));
     let name = |s: &Recorded<Findings>| {
         let what = [axis::ACCEL, axis::MESH, axis::PLACE, axis::AIM].map(|axis| s.key.label(axis));
         let [misses, rays] = counts(s);
@@ -120,7 +121,7 @@ fn cell_targets(cells: &[Recorded<Findings>]) -> Vec<TargetRecord> {
     };
     let cracks = cells
         .iter()
-        .map(|c| (c.count("cracks/v1") as f64, name(c, "cracks")));
+        .map(|c| (c.count(&figure::CRACKS) as f64, name(c, "cracks")));
     let differing = cells.iter().map(|c| {
         let replay = c.worst.as_ref().map_or("", |w| w.replay.as_str());
         (c.differing() as f64, name(c, replay))
@@ -133,7 +134,7 @@ fn cell_targets(cells: &[Recorded<Findings>]) -> Vec<TargetRecord> {
     let strange = cells
         .iter()
         .filter(|c| c.key.label(axis::FAMILY) == NO_RAYS);
-    let slowdown = strange.filter_map(|c| Some((c.get("slowdown/v1")?, name(c, "slowdown"))));
+    let slowdown = strange.filter_map(|c| Some((c.get(&figure::SLOWDOWN)?, name(c, "slowdown"))));
     vec![
         target(
             "cracks from inside closed meshes, all families and rungs",
@@ -174,16 +175,18 @@ fn pad_target(records: &[Line]) -> Option<TargetRecord> {
 /// begin from the points they leave, since contact shadows and thin gaps end there.
 fn offset_targets(records: &[Line]) -> Vec<TargetRecord> {
     let default = RayOffset::default().name;
-    let found = |figures: &'static [&'static str]| {
+    let found = |figures: &'static [&'static Figure]| {
         let of_default = all!(records, Offset).filter(|o| o.key.label(axis::OFFSET) == default);
         of_default.map(move |o| {
             let [mesh, place] = [axis::MESH, axis::PLACE].map(|axis| o.key.label(axis));
-            let value = figures.iter().filter_map(|id| o.get(id)).sum();
+            let value = figures.iter().filter_map(|figure| o.get(figure)).sum();
             (value, format!("{mesh}, {place}"))
         })
     };
-    let bad = found(&["self-intersections/v1", "leaks/v1"]);
-    let farthest = found(&["farthest-begin/v1"]);
+    const SELF_HITS: &[&Figure] = &[&figure::SELF_INTERSECTIONS, &figure::LEAKS];
+    let bad = found(SELF_HITS);
+    const FARTHEST_BEGIN: &[&Figure] = &[&figure::FARTHEST_BEGIN];
+    let farthest = found(FARTHEST_BEGIN);
     let name = |what: &str, of: &str| format!("{what} with {default}{of}");
     let targets = [
         target(
@@ -246,7 +249,7 @@ mod tests {
     }
 
     fn shot(misses: usize, place: Placement, aim: &str) -> Line {
-        let found = Findings::of([("rays/v1", 1000.0), ("misses/v1", misses as f64)]);
+        let found = Findings::of([(&figure::RAYS, 1000.0), (&figure::MISSES, misses as f64)]);
         let key = Key::default().with(axis::PLACE, place).with(axis::AIM, aim);
         line(key, Record::Shots(found))
     }

@@ -2,7 +2,7 @@
 
 use super::taken::Evidence;
 use raystone_record::Interval;
-use raystone_record::figure::{Better, Figure, Shown};
+use raystone_record::figure::{self, Better, Figure, Shown};
 use raystone_stats::comparison::{LEVEL, LogFigure};
 use raystone_stats::interval::Spread;
 use raystone_stats::signed_rank::SignedRank;
@@ -150,7 +150,7 @@ pub(crate) fn direction(figure: &Figure, change: f64) -> Verdict {
 }
 
 /// Shares of rays that hit: the one figure that ranks nothing and may not change.
-const HITS: &str = "hit-share/v1";
+const HITS: &Figure = &figure::HIT_SHARE;
 
 fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if a == b {
@@ -163,7 +163,7 @@ fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if part.abs() <= effects.exact {
         return known(Verdict::Same, "within what --exact allows");
     }
-    match figure.id == HITS {
+    match figure.id == HITS.id {
         true => known(Verdict::Worse, "other rays hit"),
         false => known(direction(figure, b - a), "exact"),
     }

@@ -1,13 +1,13 @@
 //! What a side says, figure by figure, with the evidence behind it: raw samples where the records keep them.
 
 use super::Identity;
-use super::facts::{BIAS, fact, facts};
+use super::facts::{BIAS, IMAGE, fact, facts};
 use super::side::Side;
 use crate::data::{RunData, SceneGroup, View};
 use crate::samplers::{FURTHER_METRICS, MeasuredSampler, Metric};
 use crate::values::{Reading, Value, values};
 use crate::{failed_checks, format};
-use raystone_record::figure::{Better, Figure, Spread};
+use raystone_record::figure::{self, Better, Figure, Spread};
 use raystone_record::*;
 use raystone_stats::statistics::{log_log_fit, mean};
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,52 +73,55 @@ impl Taken {
 }
 
 /// Figures that follow from others, or hold times beside what they are of: they are told by reports and decide nothing.
-const DERIVED: [&str; 24] = [
-    "build-rate/v1",
-    "bytes-per-triangle/v1",
-    "references-per-triangle/v1",
-    "cell-mrays-per-s/v1",
-    "against-single-kernel/v1",
-    "order-ratio/v1",
-    "time-to-image/v1",
-    "error-seconds/v1",
-    "error-at-time/v1",
-    "spp-to-error/v1",
-    "seconds-to-error/v1",
-    "break-even/v1",
-    "specialisation/v1",
-    "ray-query-share/v1",
-    "compaction-melements-per-s/v1",
-    "compaction-gb-per-s/v1",
-    "compaction-ratio/v1",
-    "cpu-ns-per-ray/v1",
-    "cpu-over-peer/v1",
-    "peer-mrays-per-s/v1",
-    "frame-time-ratio/v1",
-    "frame-break-even/v1",
-    "loop-ns/v1",
-    "rays/v1",
+const DERIVED: [&Figure; 24] = [
+    &figure::BUILD_RATE,
+    &figure::BYTES_PER_TRIANGLE,
+    &figure::REFERENCES_PER_TRIANGLE,
+    &figure::CELL_MRAYS_PER_S,
+    &figure::AGAINST_SINGLE_KERNEL,
+    &figure::ORDER_RATIO,
+    &figure::TIME_TO_IMAGE,
+    &figure::ERROR_SECONDS,
+    &figure::ERROR_AT_TIME,
+    &figure::SPP_TO_ERROR,
+    &figure::SECONDS_TO_ERROR,
+    &figure::BREAK_EVEN,
+    &figure::SPECIALISATION,
+    &figure::RAY_QUERY_SHARE,
+    &figure::COMPACTION_MELEMENTS_PER_S,
+    &figure::COMPACTION_GB_PER_S,
+    &figure::COMPACTION_RATIO,
+    &figure::CPU_NS_PER_RAY,
+    &figure::CPU_OVER_PEER,
+    &figure::PEER_MRAYS_PER_S,
+    &figure::FRAME_TIME_RATIO,
+    &figure::FRAME_BREAK_EVEN,
+    &figure::LOOP_NS,
+    &figure::RAYS,
 ];
 
 /// Figures of cells that the seed of the run changes, beside those of its rays: what is counted in one picture of that seed, or
 /// timed of it.
-const OF_ONE_SEED: [&str; 12] = [
-    "ms-per-spp/v1",
-    "ray-query-share/v1",
-    "primary-other-triangle/v1",
-    "primary-other-value/v1",
-    "primary-mean-difference/v1",
-    "primary-rms-difference/v1",
-    "compaction-ns/v1",
-    "frame-judged/v1",
-    "frame-nodes-ratio/v1",
-    "neighbour-angle/v1",
-    "coverage/v1",
-    "image/v1",
+const OF_ONE_SEED: [&Figure; 11] = [
+    &figure::MS_PER_SPP,
+    &figure::RAY_QUERY_SHARE,
+    &figure::PRIMARY_OTHER_TRIANGLE,
+    &figure::PRIMARY_OTHER_VALUE,
+    &figure::PRIMARY_MEAN_DIFFERENCE,
+    &figure::PRIMARY_RMS_DIFFERENCE,
+    &figure::COMPACTION_NS,
+    &figure::FRAME_JUDGED,
+    &figure::FRAME_NODES_RATIO,
+    &figure::NEIGHBOUR_ANGLE,
+    &figure::COVERAGE,
 ];
 
 /// Fewer degrees of freedom say too little of the spread of means over seeds to compare those of other seeds.
 const FEWEST_FREE: f64 = 7.0;
+
+fn is_among(figures: &[&Figure], id: &str) -> bool {
+    figures.iter().any(|figure| figure.id == id)
+}
 
 /// Whether a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by seed, and
 /// structures know none.
@@ -133,7 +136,7 @@ fn is_of_one_seed(taken: &Taken) -> bool {
         Evidence::Seeds { .. } | Evidence::Summary(..)
     );
     let of_rays = !taken.key.label(axis::RAYS).is_empty();
-    !of_seeds && (of_rays || OF_ONE_SEED.contains(&&*taken.figure.id))
+    !of_seeds && (of_rays || is_among(&OF_ONE_SEED, &taken.figure.id) || taken.figure.id == IMAGE)
 }
 
 /// A check of the run that failed.
@@ -141,7 +144,7 @@ const CHECK: &str = "check/v1";
 
 /// Whether a figure follows from others; those of the check for bias do, which has a verdict.
 fn is_derived(id: &str) -> bool {
-    DERIVED.contains(&id) || id.starts_with("bias-") || id.starts_with("growth-")
+    is_among(&DERIVED, id) || id.starts_with("bias-") || id.starts_with("growth-")
 }
 
 /// Everything that a side says.
@@ -269,7 +272,7 @@ fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
     };
     let (cell, id) = own.identity();
     // Counters are of the rays that were timed.
-    let of_rays = raw.get(&(cell.clone(), "mrays-per-s/v1".into()));
+    let of_rays = raw.get(&(cell.clone(), figure::MRAYS_PER_S.id.to_string()));
     let sampled = raw.get(&(cell, id));
     // Seeds that have missed the pixel that decides agree with each other by that: with one degree of freedom, what differs is undecided.
     if value.is_heavy_tailed() {
@@ -333,10 +336,10 @@ fn raw(data: &RunData) -> Raw {
     all.into_iter().map(|t| (t.identity(), t)).collect()
 }
 
-fn sample(key: &Key, id: &str, evidence: Evidence, work: String, kernel: &str) -> Taken {
+fn sample(key: &Key, figure: &Figure, evidence: Evidence, work: String, kernel: &str) -> Taken {
     Taken {
         key: key.clone(),
-        figure: raystone_record::figure::figure(id).clone(),
+        figure: figure.clone(),
         shown: String::new(),
         evidence,
         work,
@@ -391,7 +394,7 @@ fn of_structures(scene: &SceneGroup) -> Vec<Taken> {
             let key = s.key.clone().with(axis::RAYS, format::ray_class(t.class));
             let times = times(&t.ms, &t.cpu_ms);
             let work = format!("{} rays", t.rays);
-            sample(&key, "mrays-per-s/v1", times, work, &s.ran.kernel_hash)
+            sample(&key, &figure::MRAYS_PER_S, times, work, &s.ran.kernel_hash)
         };
         s.timings.iter().map(of_class).collect()
     };
@@ -405,7 +408,7 @@ fn of_times(view: &View) -> Vec<Taken> {
         let times = times(&time.ms, &time.cpu_ms);
         sample(
             &time.key,
-            "ms-per-spp/v1",
+            &figure::MS_PER_SPP,
             times,
             work,
             &time.ran.kernel_hash,
@@ -437,9 +440,9 @@ fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Vec<Taken> {
         })
     };
     let mut all = Vec::new();
-    let mut put = |key: &Key, id: &str, values: Vec<f64>| {
+    let mut put = |key: &Key, figure: &Figure, values: Vec<f64>| {
         let evidence = seeds(values);
-        all.extend(evidence.map(|e| sample(key, id, e, work.clone(), "")));
+        all.extend(evidence.map(|e| sample(key, figure, e, work.clone(), "")));
     };
     let at = |spp: u32, id: &str| -> Vec<f64> {
         let errors = sampler.replicates.iter();

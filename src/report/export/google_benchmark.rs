@@ -40,7 +40,7 @@ fn context(source: &Source) -> Json {
 /// A repetition for each round: `real_time` by the clock that the figure is made of (the adapter's, or else the wall clock),
 /// `cpu_time` that of the processors. The format wants one: where none was measured, it is the real time, and the label says so.
 fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
-    let name = name(samples.figure, &samples.key);
+    let name = name(&samples.figure.id, &samples.key);
     let (cpu_ms, label) = match samples.cpu_ms.len() == samples.ms.len() {
         true => (&samples.cpu_ms, "cpu_time: processors, all threads"),
         false => (&samples.ms, "cpu_time: not measured, the same as real_time"),

@@ -20,7 +20,7 @@ fn result(samples: &Samples) -> Json {
     let labels = labels.map(|(axis, label)| (axis.to_owned(), Json::from(label)));
     let parameters: Map<String, Json> = labels.collect();
     json!({
-        "command": name(samples.figure, &samples.key),
+        "command": name(&samples.figure.id, &samples.key),
         "mean": mean(&seconds),
         "stddev": variance(&seconds).map(f64::sqrt),
         "median": median(&seconds),

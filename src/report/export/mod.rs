@@ -50,7 +50,7 @@ impl<'a> Source<'a> {
         let data = RunData::new(lines);
         let values = choice.of(values::values(&data))?;
         let mut samples = samples::samples(&data);
-        samples.retain(|s| choice.keeps(&s.key, s.figure));
+        samples.retain(|s| choice.keeps(&s.key, &s.figure.id));
         Ok(Self {
             dir,
             lines,

@@ -3,6 +3,7 @@
 use crate::data::RunData;
 use crate::format;
 use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Key, TimeRecord, axis};
 
 /// The rounds of one measurement, milliseconds.
@@ -10,8 +11,8 @@ use raystone_record::{Key, TimeRecord, axis};
 pub struct Samples {
     /// What was measured.
     pub key: Key,
-    /// Id of the figure that is made of them.
-    pub figure: &'static str,
+    /// The figure that is made of them.
+    pub figure: &'static Figure,
     /// By the clock of the adapter where it has one: what the figure is made of.
     pub ms: Vec<f64>,
     /// In time of the processors; empty on adapters that work elsewhere.
@@ -27,7 +28,7 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
         let sound = || scene.structures.iter().filter(|s| s.fault().is_none());
         all.extend(sound().map(|s| Samples {
             key: s.key.clone(),
-            figure: "build-ms/v1",
+            figure: &figure::BUILD_MS,
             ms: vec![s.build_ms],
             cpu_ms: Vec::new(),
             rays: None,
@@ -35,7 +36,7 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
         all.extend(sound().flat_map(|s| {
             s.timings.iter().map(|timing| Samples {
                 key: (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class)),
-                figure: "mrays-per-s/v1",
+                figure: &figure::MRAYS_PER_S,
                 ms: timing.ms.clone(),
                 cpu_ms: timing.cpu_ms.clone(),
                 rays: Some(timing.rays as u64),
@@ -44,7 +45,7 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
         let times = scene.views.iter().flat_map(|view| view.valid_times());
         all.extend(times.map(|time| Samples {
             key: time.key.clone(),
-            figure: "ms-per-spp/v1",
+            figure: &figure::MS_PER_SPP,
             ms: time.ms.clone(),
             cpu_ms: time.cpu_ms.clone(),
             rays: Some(traced_rays(time.body)),

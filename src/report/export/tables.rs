@@ -69,5 +69,5 @@ fn table(values: &[Value]) -> Table {
     let parts = [figure.heading(), shared, spread.to_owned()];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     let part = |key: &Key| across.map_or(String::new(), |axis| key.label(axis).to_owned());
-    Rows::of_labels(&by, &heads, values).table(values, parts.join("; "), &[&figure.id], &part)
+    Rows::of_labels(&by, &heads, values).table(values, parts.join("; "), &[figure], &part)
 }

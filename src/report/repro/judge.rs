@@ -185,17 +185,17 @@ mod tests {
 
     #[test]
     fn what_was_measured_once_is_not_taken_for_exact() {
-        use raystone_record::figure::figure;
+        use raystone_record::figure;
         use raystone_stats::comparison::LogFigure;
-        let build = spread(figure("build-ms/v1"), Interval::exact(100.0));
+        let build = spread(&figure::BUILD_MS, Interval::exact(100.0));
         assert_eq!((build.low, build.high), (60.0, 165.0));
         // A build of a millisecond may have taken none: neither is faster than the other.
-        let short = |ms| spread(figure("build-ms/v1"), Interval::exact(ms));
+        let short = |ms| spread(&figure::BUILD_MS, Interval::exact(ms));
         let [slow, fast] =
             [6.0, 0.1].map(|ms| LogFigure::of_interval(short(ms), f64::INFINITY).expect("a time"));
         let faster = Bounds::new(Some(1.0), None).judge(slow.compared_with(&fast).ratio);
         assert_eq!(faster, Verdict::Undecided);
-        let nodes = spread(figure("nodes-per-ray/v1"), Interval::exact(3.0));
+        let nodes = spread(&figure::NODES_PER_RAY, Interval::exact(3.0));
         assert_eq!(nodes, Interval::exact(3.0));
     }
 }

@@ -5,6 +5,7 @@ use crate::data::{FULL_CELLS, RAYS, cells_of, competitor, sitting};
 use crate::export::samples::traced_rays;
 use crate::format;
 use crate::values::{ALL_RAYS, Value};
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Body, CellRecord, ClassCoherence, CoherenceRecord, Key, Line, axis};
 use raystone_stats::comparison::LogFigure;
 use std::collections::BTreeMap;
@@ -58,15 +59,15 @@ impl Rounds {
                 for t in &record.timings {
                     let key = key.clone().with(axis::RAYS, format::ray_class(t.class));
                     let rate = each(&t.ms, &|ms| t.rays as f64 / ms * 1e-3);
-                    put(&key, "mrays-per-s/v1", RAYS, rate);
+                    put(&key, &figure::MRAYS_PER_S.id, RAYS, rate);
                 }
             }
             Body::Time(record) => {
                 let per_spp = each(&record.ms, &|ms| ms / f64::from(record.spp));
-                put(&key, "ms-per-spp/v1", FULL_CELLS, per_spp);
+                put(&key, &figure::MS_PER_SPP.id, FULL_CELLS, per_spp);
                 let rays = traced_rays(record);
                 let rate = each(&record.ms, &|ms| rays as f64 / ms * 1e-3);
-                put(&key, "cell-mrays-per-s/v1", FULL_CELLS, rate);
+                put(&key, &figure::CELL_MRAYS_PER_S.id, FULL_CELLS, rate);
             }
             Body::Measured(record) => {
                 let timed = line.readings.iter().filter(|r| !r.rounds().is_empty());
@@ -85,11 +86,11 @@ impl Rounds {
     }
 
     /// Predicted cycles. They are counted, and so the same in every run.
-    fn put_groups(&mut self, key: &Key, figure: &str, parts: &[[f64; 2]]) {
+    fn put_groups(&mut self, key: &Key, figure: &Figure, parts: &[[f64; 2]]) {
         let world = [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST].map(|axis| key.label(axis));
         // Where sides were followed in different numbers of groups, no group belongs to another.
         let of = format!("{} groups of warps\n{}", parts.len(), world.join("\n"));
-        self.put(key, figure, LogFigure::of_groups(&of, parts));
+        self.put(key, &figure.id, LogFigure::of_groups(&of, parts));
     }
 
     /// Of the paths of a full cell, by class of rays and together.
@@ -128,8 +129,8 @@ impl Rounds {
 }
 
 /// Figures of the coherence model.
-const PER_RAY: &str = "cycles-per-ray/v1";
-const PER_PATH: &str = "cycles-per-path/v1";
+const PER_RAY: &Figure = &figure::CYCLES_PER_RAY;
+const PER_PATH: &Figure = &figure::CYCLES_PER_PATH;
 
 /// Cycles over rays of each group.
 fn parts(groups: &[[u64; 2]]) -> Vec<[f64; 2]> {

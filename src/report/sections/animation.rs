@@ -7,6 +7,7 @@ use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::{Reading, Value};
 use raystone_config::{Animation, Motion};
+use raystone_record::figure;
 use raystone_record::{AnimationRecord, FrameRays, FrameRecord, Interval, Key, RayClass, axis};
 use raystone_stats::statistics::median_interval;
 
@@ -181,27 +182,30 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
             let ms = |cost: &raystone_record::Cost| median_interval(cost.ms(software));
             let on_host = frame.refit_on_host.as_ref();
             let costs = [
-                ("frame-refit-ms/v1", ms(&frame.refit)),
-                ("frame-refit-host-ms/v1", on_host.and_then(ms)),
-                ("frame-rebuild-ms/v1", ms(&frame.rebuild)),
+                (&figure::FRAME_REFIT_MS, ms(&frame.refit)),
+                (&figure::FRAME_REFIT_HOST_MS, on_host.and_then(ms)),
+                (&figure::FRAME_REBUILD_MS, ms(&frame.rebuild)),
             ];
             let trees = [
-                ("frame-sah-refitted/v1", frame.sah[0]),
-                ("frame-sah-rebuilt/v1", frame.sah[1]),
-                ("frame-sah-ratio/v1", sah_ratio(frame)),
+                (&figure::FRAME_SAH_REFITTED, frame.sah[0]),
+                (&figure::FRAME_SAH_REBUILT, frame.sah[1]),
+                (&figure::FRAME_SAH_RATIO, sah_ratio(frame)),
             ];
             values.extend(Value::known(&key, trees));
             values.extend(Value::known(&key, costs));
-            values.push(Value::new(&key, "frame-judged/v1", frame.judged as f64));
+            values.push(Value::new(&key, &figure::FRAME_JUDGED, frame.judged as f64));
             for rays in &frame.classes {
                 let key = key.clone().with(axis::RAYS, format::ray_class(rays.class));
                 let read = [
-                    ("frame-nodes-ratio/v1", nodes_ratio(rays).map(Reading::from)),
                     (
-                        "frame-time-ratio/v1",
+                        &figure::FRAME_NODES_RATIO,
+                        nodes_ratio(rays).map(Reading::from),
+                    ),
+                    (
+                        &figure::FRAME_TIME_RATIO,
                         time_ratio(rays, software).map(Reading::from),
                     ),
-                    ("frame-break-even/v1", break_even(frame, rays, software)),
+                    (&figure::FRAME_BREAK_EVEN, break_even(frame, rays, software)),
                 ];
                 values.extend(Value::known(&key, read));
             }
@@ -236,13 +240,13 @@ pub(crate) fn costs_table(scene: &SceneGroup, values: &[Value]) -> Table {
         "Trees frame by frame: SAH cost, and what refitting and building anew cost (median [95 % interval]); rays of each \
          gate",
         &[
-            "frame-sah-refitted/v1",
-            "frame-sah-rebuilt/v1",
-            "frame-sah-ratio/v1",
-            "frame-refit-ms/v1",
-            "frame-refit-host-ms/v1",
-            "frame-rebuild-ms/v1",
-            "frame-judged/v1",
+            &figure::FRAME_SAH_REFITTED,
+            &figure::FRAME_SAH_REBUILT,
+            &figure::FRAME_SAH_RATIO,
+            &figure::FRAME_REFIT_MS,
+            &figure::FRAME_REFIT_HOST_MS,
+            &figure::FRAME_REBUILD_MS,
+            &figure::FRAME_JUDGED,
         ],
         FIGURES_ALONE,
     )
@@ -256,9 +260,9 @@ fn rays_table(scene: &SceneGroup, values: &[Value]) -> Table {
          many million rays of a class on building anew pays in that frame (none: its rays are slower; unresolved: \
          the interval of the difference holds 0; any: it costs no more)",
         &[
-            "frame-nodes-ratio/v1",
-            "frame-time-ratio/v1",
-            "frame-break-even/v1",
+            &figure::FRAME_NODES_RATIO,
+            &figure::FRAME_TIME_RATIO,
+            &figure::FRAME_BREAK_EVEN,
         ],
         &|key| key.label(axis::RAYS).to_owned(),
     )

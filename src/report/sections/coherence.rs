@@ -7,20 +7,21 @@ use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::{ALL_RAYS, Value};
 use raystone_record::SINGLE_KERNEL;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{CoherenceAt, CoherenceRecord, Interval, Key, axis};
 use raystone_stats::statistics::kendall_tau;
 
 /// Figures of all rays together, in the order of the columns.
-const FIGURES: [&str; 9] = [
-    "simt-efficiency/v1",
-    "lines-per-issue/v1",
-    "l1-hits/v1",
-    "l2-hits/v1",
-    "issues-per-ray/v1",
-    "l2-bytes-per-ray/v1",
-    "memory-bytes-per-ray/v1",
-    "cycles-per-ray/v1",
-    "cycles-per-path/v1",
+const FIGURES: [&Figure; 9] = [
+    &figure::SIMT_EFFICIENCY,
+    &figure::LINES_PER_ISSUE,
+    &figure::L1_HITS,
+    &figure::L2_HITS,
+    &figure::ISSUES_PER_RAY,
+    &figure::L2_BYTES_PER_RAY,
+    &figure::MEMORY_BYTES_PER_RAY,
+    &figure::CYCLES_PER_RAY,
+    &figure::CYCLES_PER_PATH,
 ];
 
 /// What tells cells of a view and their organisations apart.
@@ -125,7 +126,7 @@ fn class_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     let heads = ["structure", ":sampler", "spp"];
     let rows = rows(data, view, &heads, |at, _| is_single_kernel(at));
     let class = |key: &Key| key.label(axis::RAYS).to_owned();
-    rows.table(values, caption, &["simt-efficiency/v1"], &class)
+    rows.table(values, caption, &[&figure::SIMT_EFFICIENCY], &class)
 }
 
 /// The structure that curves of samplers are drawn with: the first.

@@ -7,7 +7,7 @@ use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::{Reading, Value, of_readings};
 use raystone_core::params::ParamValue;
-use raystone_record::figure::COMPACTION_NS;
+use raystone_record::figure::{self, COMPACTION_NS};
 use raystone_record::{Interval, Key, MeasuredRecord, Recorded, axis};
 use raystone_stats::growth::{Growth, growth};
 use raystone_stats::statistics::median_interval;
@@ -208,14 +208,14 @@ pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
 pub(crate) fn derived(data: &RunData) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for cell in data.measured_by(NAME) {
-        let ratio = [("compaction-ratio/v1", over_baseline(data, &cell))];
+        let ratio = [(&figure::COMPACTION_RATIO, over_baseline(data, &cell))];
         values.extend(Value::known(cell.key, ratio));
     }
     for (key, growth) in growths(data) {
         let figures = [
-            ("growth-linear/v1", Reading::from(growth.linear)),
-            ("growth-linearithmic/v1", growth.linearithmic.into()),
-            ("growth-difference/v1", growth.difference.into()),
+            (&figure::GROWTH_LINEAR, Reading::from(growth.linear)),
+            (&figure::GROWTH_LINEARITHMIC, growth.linearithmic.into()),
+            (&figure::GROWTH_DIFFERENCE, growth.difference.into()),
         ];
         values.extend(figures.map(|(id, value)| Value::new(&key, id, value)));
     }
@@ -270,9 +270,9 @@ pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
          difference of Akaike's criteria, each fitted round by round: median [95 % interval]. A model is named where \
          the whole interval is beyond ±2",
         &[
-            "growth-linear/v1",
-            "growth-linearithmic/v1",
-            "growth-difference/v1",
+            &figure::GROWTH_LINEAR,
+            &figure::GROWTH_LINEARITHMIC,
+            &figure::GROWTH_DIFFERENCE,
         ],
         FIGURES_ALONE,
     )
@@ -303,12 +303,12 @@ pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
         values,
         "All compactions: median [95 % interval]. Least traffic: flags once, what stays once from and once to memory",
         &[
-            "compaction-ns/v1",
-            "compaction-melements-per-s/v1",
-            "compaction-gb-per-s/v1",
-            "compaction-ratio/v1",
-            "compaction-passes/v1",
-            "compaction-scratch/v1",
+            &figure::COMPACTION_NS,
+            &figure::COMPACTION_MELEMENTS_PER_S,
+            &figure::COMPACTION_GB_PER_S,
+            &figure::COMPACTION_RATIO,
+            &figure::COMPACTION_PASSES,
+            &figure::COMPACTION_SCRATCH,
         ],
         FIGURES_ALONE,
     )

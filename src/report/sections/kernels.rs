@@ -10,6 +10,7 @@ use crate::document::*;
 use crate::format;
 use crate::pivot::Rows;
 use crate::values::Value;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, Key, Ran, TimeRecord, axis};
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
@@ -245,7 +246,7 @@ pub(crate) fn gains_table(scene: &SceneGroup, values: &[Value]) -> Table {
          the specialised one [95 % interval]",
         scene.name
     );
-    let gains = values.iter().filter(|v| v.figure.id == GAIN).cloned();
+    let gains = values.iter().filter(|v| v.figure.id == GAIN.id).cloned();
     let gains: Vec<Value> = gains.collect();
     let across = |key: &Key| {
         format!(
@@ -264,7 +265,7 @@ pub(crate) fn gains_table(scene: &SceneGroup, values: &[Value]) -> Table {
 }
 
 /// Id of the figure.
-const GAIN: &str = "specialisation/v1";
+const GAIN: &Figure = &figure::SPECIALISATION;
 
 /// What each full cell of a view that carries more than its scene needs takes, over the cell of the specialised
 /// kernel: both timed in the same rounds, often enough for an interval.

@@ -6,6 +6,7 @@ use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::values::{Value, of_readings};
 use raystone_record::axis;
+use raystone_record::figure::Figure;
 
 /// One table for each measurement.
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
@@ -21,10 +22,10 @@ fn table(data: &RunData, name: &str) -> Table {
         .iter()
         .flat_map(|cell| of_readings(data, cell))
         .collect();
-    let mut ids: Vec<&str> = Vec::new();
+    let mut figures: Vec<&Figure> = Vec::new();
     for value in &values {
-        if !ids.contains(&&*value.figure.id) {
-            ids.push(&value.figure.id);
+        if figures.iter().all(|known| known.id != value.figure.id) {
+            figures.push(&value.figure);
         }
     }
     let failed = cells.iter().filter(|cell| cell.failure.is_some()).count();
@@ -32,7 +33,12 @@ fn table(data: &RunData, name: &str) -> Table {
     if failed > 0 {
         caption += &format!("; failed: {failed} of {}", cells.len());
     }
-    Rows::of_labels(&axis::ALL, &axis::ALL, &values).table(&values, caption, &ids, FIGURES_ALONE)
+    Rows::of_labels(&axis::ALL, &axis::ALL, &values).table(
+        &values,
+        caption,
+        &figures,
+        FIGURES_ALONE,
+    )
 }
 
 /// The section; `None` where there is no such measurement.

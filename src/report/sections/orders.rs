@@ -6,6 +6,7 @@ use crate::format;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::values::Value;
 use raystone_record::axis;
+use raystone_record::figure;
 
 /// What tells cells of a view and their orders apart.
 const ROWS: [&str; 5] = [
@@ -33,10 +34,10 @@ pub(super) fn table(view: &View, values: &[Value]) -> Table {
         format::median_bounds(counts),
     );
     let figures = [
-        "order-passes/v1",
-        "order-ms/v1",
-        "order-ratio/v1",
-        "first-picture-ms/v1",
+        &figure::ORDER_PASSES,
+        &figure::ORDER_MS,
+        &figure::ORDER_RATIO,
+        &figure::FIRST_PICTURE_MS,
     ];
     let heads = ["structure", ":sampler", ":order"];
     Rows::new(&ROWS, &heads, rows).table(values, caption, &figures, FIGURES_ALONE)

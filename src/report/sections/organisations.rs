@@ -9,6 +9,7 @@ use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::Value;
 use raystone_core::structure::RAY_QUERIES;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, TimeRecord, axis};
 
 /// What tells the rows apart.
@@ -25,9 +26,9 @@ const ROWS: [&str; 8] = [
 
 /// The organisation that others are compared with.
 const SINGLE: &str = "single-kernel";
-const AGAINST: &str = "against-single-kernel/v1";
+const AGAINST: &Figure = &figure::AGAINST_SINGLE_KERNEL;
 /// Figures of a row.
-const FIGURES: [&str; 3] = ["ms-per-spp/v1", AGAINST, "ray-query-share/v1"];
+const FIGURES: [&Figure; 3] = [&figure::MS_PER_SPP, AGAINST, &figure::RAY_QUERY_SHARE];
 
 /// The share of ray queries in the time of all stages, if stages were timed.
 pub(crate) fn query_share(time: &TimeRecord) -> Option<f64> {

@@ -6,15 +6,16 @@ use crate::document::*;
 use crate::format;
 use crate::pivot::Rows;
 use crate::values::Value;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{ClassTiming, Interval, PeerRecord, PeerTiming, Recorded, axis};
 use raystone_stats::comparison::LogFigure;
 use raystone_stats::statistics::median_interval;
 
-const SPEED: &str = "peer-mrays-per-s/v1";
-const COST: &str = "cpu-ns-per-ray/v1";
-const RATIO: &str = "cpu-over-peer/v1";
-const UNLIKE: &str = "unlike-judge/v1";
-const FARTHEST: &str = "farthest-distance/v1";
+const SPEED: &Figure = &figure::PEER_MRAYS_PER_S;
+const COST: &Figure = &figure::CPU_NS_PER_RAY;
+const RATIO: &Figure = &figure::CPU_OVER_PEER;
+const UNLIKE: &Figure = &figure::UNLIKE_JUDGE;
+const FARTHEST: &Figure = &figure::FARTHEST_DISTANCE;
 
 /// Who casts: a structure or a peer, and against whom.
 const ROWS: [&str; 5] = [
@@ -113,10 +114,10 @@ pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
     ];
     blocks.extend(scene.peers.iter().map(|peer| Block::Paragraph(told(peer))));
     let values = values(scene);
-    let table = |figure: &str, rows: &[&'static str], heads: &[&str], caption: &str| {
+    let table = |figure: &Figure, rows: &[&'static str], heads: &[&str], caption: &str| {
         let own: Vec<Value> = values
             .iter()
-            .filter(|v| v.figure.id == figure)
+            .filter(|v| v.figure.id == figure.id)
             .cloned()
             .collect();
         Rows::of_labels(rows, heads, &own)

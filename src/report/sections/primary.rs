@@ -6,6 +6,7 @@ use crate::format;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::values::Value;
 use raystone_record::axis;
+use raystone_record::figure;
 
 /// What tells cells of a view apart.
 const ROWS: [&str; 5] = [
@@ -32,12 +33,12 @@ pub(super) fn table(view: &View, values: &[Value]) -> Table {
         format::median_bounds(counts),
     );
     let figures = [
-        "primary-other-triangle/v1",
-        "primary-other-value/v1",
-        "primary-mean-difference/v1",
-        "primary-rms-difference/v1",
-        "raster-ms/v1",
-        "traced-primary-ms/v1",
+        &figure::PRIMARY_OTHER_TRIANGLE,
+        &figure::PRIMARY_OTHER_VALUE,
+        &figure::PRIMARY_MEAN_DIFFERENCE,
+        &figure::PRIMARY_RMS_DIFFERENCE,
+        &figure::RASTER_MS,
+        &figure::TRACED_PRIMARY_MS,
     ];
     let heads = ["structure", ":sampler"];
     Rows::new(&ROWS, &heads, rows).table(values, caption, &figures, FIGURES_ALONE)

@@ -8,6 +8,7 @@ use crate::ruling::{Contender, Ruling};
 use crate::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
 use crate::values::{Reading, Value};
 use raystone_record::axis;
+use raystone_record::figure::{self, Figure};
 use raystone_stats::comparison::LogFigure;
 
 /// Samplers at equal time, under the fastest structure.
@@ -146,27 +147,27 @@ impl<'a> Race<'a> {
             let Some(runner) = Runner::new(self.view, &self.structure, sampler) else {
                 continue;
             };
-            let mut add = |what: String, id: &str, figure: Option<LogFigure>| {
+            let mut add = |what: String, row: &'static Figure, figure: Option<LogFigure>| {
                 let key = time.key.clone().with(axis::SUBJECT, what);
                 let figure = figure.map(|f| Reading::of(f.interval(), sampler.is_heavy_tailed()));
-                values.extend(Value::known(&key, [(id, figure)]));
+                values.extend(Value::known(&key, [(row, figure)]));
             };
             let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);
             if let Some(spp) = common.filter(resolved) {
                 let what = format!("{metric} × seconds at {spp} spp");
-                add(what, "error-seconds/v1", runner.error_seconds(spp));
+                add(what, &figure::ERROR_SECONDS, runner.error_seconds(spp));
             }
             let what = format!("{metric} after {} s", format::number(self.seconds));
             let fair = sampler.fault().is_none();
             let end = runner.error_after(self.seconds).filter(|_| fair);
-            add(what, "error-at-time/v1", end);
+            add(what, &figure::ERROR_AT_TIME, end);
             if let Some(target) = target {
                 let to = format!("to {metric} {}", format::significant(target, 2));
                 let spp = sampler.spp_to(Metric::RelMse, target);
-                add(format!("spp {to}"), "spp-to-error/v1", spp);
+                add(format!("spp {to}"), &figure::SPP_TO_ERROR, spp);
                 add(
                     format!("seconds {to}"),
-                    "seconds-to-error/v1",
+                    &figure::SECONDS_TO_ERROR,
                     runner.seconds_to(target),
                 );
             }

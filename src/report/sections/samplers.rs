@@ -16,6 +16,7 @@ use crate::samplers::{FURTHER_METRICS, HEAVY_TAILED, MeasuredSampler, Metric, UN
 use crate::values::{Value, number, of_view};
 use crate::{format, pictures};
 use raystone_image::viridis_css;
+use raystone_record::figure;
 use raystone_record::{Key, axis};
 use raystone_stats::bias::BiasVerdict;
 use std::path::Path;
@@ -108,7 +109,9 @@ pub(crate) fn rows<'a>(
 pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
     let id = view.samplers.iter().find_map(|s| s.metric_id(metric));
     let shown = [metric.figure(), metric.slope_figure()];
-    let of_metric = values.iter().filter(|v| shown.contains(&&*v.figure.id));
+    let of_metric = values
+        .iter()
+        .filter(|v| shown.iter().any(|f| f.id == v.figure.id));
     let mut values: Vec<Value> = of_metric.cloned().collect();
     values.sort_by_key(|value| number(&value.key, axis::SPP));
     let Some(id) = id.filter(|_| !values.is_empty()) else {
@@ -195,15 +198,15 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
         (None, Some(bias)) => bias.verdict.to_string().into(),
     };
     let figures = [
-        "bias-tiles/v1",
-        "bias-rejected/v1",
-        "bias-least-p/v1",
-        "bias-z/v1",
-        "bias-p/v1",
-        "bias-freedom/v1",
-        "bias-weighted-p/v1",
-        "bias-weighted-freedom/v1",
-        "bias-detectable/v1",
+        &figure::BIAS_TILES,
+        &figure::BIAS_REJECTED,
+        &figure::BIAS_LEAST_P,
+        &figure::BIAS_Z,
+        &figure::BIAS_P,
+        &figure::BIAS_FREEDOM,
+        &figure::BIAS_WEIGHTED_P,
+        &figure::BIAS_WEIGHTED_FREEDOM,
+        &figure::BIAS_DETECTABLE,
     ];
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
     let rows = rows(measured, &["sampler", ":verdict"], |s| vec![verdict(s)]);
@@ -221,11 +224,11 @@ pub(crate) fn efficiency_table(view: &View, values: &[Value]) -> Table {
     let timed = |s: &&MeasuredSampler| view.ms_per_spp(&race.structure, &s.name).is_some();
     let rows = rows(view.samplers.iter().filter(timed), &SAMPLER, |_| Vec::new());
     let figures = [
-        "ms-per-spp/v1",
-        "error-seconds/v1",
-        "error-at-time/v1",
-        "spp-to-error/v1",
-        "seconds-to-error/v1",
+        &figure::MS_PER_SPP,
+        &figure::ERROR_SECONDS,
+        &figure::ERROR_AT_TIME,
+        &figure::SPP_TO_ERROR,
+        &figure::SECONDS_TO_ERROR,
     ];
     let part = |key: &Key| key.label(axis::SUBJECT).to_owned();
     rows.table(&values, caption, &figures, &part)
@@ -245,7 +248,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> T
     );
     let rows = structures.iter().enumerate().map(row);
     let rows = Rows::new(&[axis::ACCEL], &["structure"], rows);
-    let mut table = rows.table(values, caption, &["ms-per-spp/v1"], &|key| {
+    let mut table = rows.table(values, caption, &[&figure::MS_PER_SPP], &|key| {
         data.names.sampler(key)
     });
     for time in &view.times {

@@ -5,6 +5,7 @@ use crate::data::{RunData, View};
 use crate::document::*;
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
 use crate::values::{Value, unfiltered};
+use raystone_record::figure;
 use raystone_record::{FilteredError, Interval, Key, PowerAt, SpectrumRecord, axis};
 
 /// Plots and table of a view; nothing without spectra.
@@ -107,11 +108,11 @@ fn table(view: &View, values: &[Value]) -> Table {
         view.name
     );
     let figures = [
-        "low-frequency-power/v1",
-        "loudest-wave/v1",
-        "neighbour-correlation/v1",
-        "luminance-rmse/v1",
-        "filtered-share/v1",
+        &figure::LOW_FREQUENCY_POWER,
+        &figure::LOUDEST_WAVE,
+        &figure::NEIGHBOUR_CORRELATION,
+        &figure::LUMINANCE_RMSE,
+        &figure::FILTERED_SHARE,
     ];
     let sigma = |key: &Key| key.label(axis::SUBJECT).to_owned();
     rows(measured, &SAMPLER, |_| Vec::new()).table(values, caption, &figures, &sigma)

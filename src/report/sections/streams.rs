@@ -7,7 +7,7 @@ use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
 use crate::values::{Value, number, of_readings, of_stream, pair_of_dimensions};
-use raystone_record::figure::figure;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
 
 /// Columns of a table over N at most.
@@ -74,9 +74,9 @@ impl<'a> Pair<'a> {
         let values: Vec<Value> = self.streams.iter().flat_map(|s| of_stream(s)).collect();
         let tables = [
             self.ranking_table(&values),
-            self.count_table(&values, "star-discrepancy/v1"),
-            self.count_table(&values, "l2-star/v1"),
-            self.count_table(&values, "centered/v1"),
+            self.count_table(&values, &figure::STAR_DISCREPANCY),
+            self.count_table(&values, &figure::L2_STAR),
+            self.count_table(&values, &figure::CENTERED),
             self.pixel_table(&values),
         ];
         let mut figures = self.figures();
@@ -164,7 +164,7 @@ impl<'a> Pair<'a> {
         let most = |s: &&Recorded<StreamRecord>| Some(s.star.last()?.n);
         let most = self.streams.iter().filter_map(most).max().unwrap_or(0);
         let is_shown = |v: &&Value| {
-            v.figure.id != "star-discrepancy/v1" || number(&v.key, axis::POINTS) == most
+            v.figure.id != figure::STAR_DISCREPANCY.id || number(&v.key, axis::POINTS) == most
         };
         let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
         let caption = format!(
@@ -175,9 +175,9 @@ impl<'a> Pair<'a> {
             self.what
         );
         let figures = [
-            "star-discrepancy/v1",
-            "star-exponent/v1",
-            "integral-exponent/v1",
+            &figure::STAR_DISCREPANCY,
+            &figure::STAR_EXPONENT,
+            &figure::INTEGRAL_EXPONENT,
         ];
         let function = |key: &Key| key.label(axis::SUBJECT).to_owned();
         self.rows(&["sampler"])
@@ -185,9 +185,9 @@ impl<'a> Pair<'a> {
     }
 
     /// One figure by N: mean over seeds.
-    fn count_table(&self, values: &[Value], id: &str) -> Table {
+    fn count_table(&self, values: &[Value], figure: &Figure) -> Table {
         let n = |value: &Value| number(&value.key, axis::POINTS);
-        let of_figure = values.iter().filter(|value| value.figure.id == id);
+        let of_figure = values.iter().filter(|value| value.figure.id == figure.id);
         let mut values: Vec<Value> = of_figure.cloned().collect();
         values.sort_by_key(n);
         let mut counts: Vec<usize> = values.iter().map(n).collect();
@@ -199,10 +199,10 @@ impl<'a> Pair<'a> {
         if values.is_empty() {
             return Table::default();
         }
-        let title = &figure(id).title;
+        let title = &figure.title;
         let caption = format!("{title} of {}: mean over seeds [95 % interval]", self.what);
         self.rows(&["sampler", "seeds"])
-            .table(&values, caption, &[id], BY_POINTS)
+            .table(&values, caption, &[figure], BY_POINTS)
     }
 
     /// Coherence and coverage.
@@ -212,7 +212,7 @@ impl<'a> Pair<'a> {
              coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
             self.what
         );
-        let figures = ["neighbour-angle/v1", "coverage/v1"];
+        let figures = [&figure::NEIGHBOUR_ANGLE, &figure::COVERAGE];
         self.rows(&["sampler"])
             .table(values, caption, &figures, BY_POINTS)
     }
@@ -253,7 +253,7 @@ fn worst_table(data: &RunData) -> Table {
         &values,
         "The worst pair of dimensions of each sampler, by D* in one pixel among all pairs that the integrators draw: \
          mean D* over seeds [95 % interval]",
-        &["star-discrepancy/v1"],
+        &[&figure::STAR_DISCREPANCY],
         FIGURES_ALONE,
     )
 }
@@ -271,7 +271,7 @@ fn cost_table(data: &RunData) -> Table {
         &values,
         "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], empty loop \
          taken off, all units of the adapter together",
-        &["ns-per-sample/v1", "loop-ns/v1"],
+        &[&figure::NS_PER_SAMPLE, &figure::LOOP_NS],
         FIGURES_ALONE,
     )
 }

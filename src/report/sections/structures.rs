@@ -11,6 +11,7 @@ use crate::values::{Value, of_structures};
 use crate::{format, pictures};
 use raystone_core::structure::{Phase, Space};
 use raystone_image::viridis_css;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{RayClass, StructureRecord, axis};
 use std::path::Path;
 
@@ -135,7 +136,7 @@ pub(crate) fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let bounds = speed_bounds(scene);
     let caption = format!("Speed on {}, Mrays/s: median [{bounds}]", scene.name);
     let rows = rows(scene.structures.iter(), &["structure", ":gate"], gate);
-    rows.table(values, caption, &["mrays-per-s/v1"], BY_RAYS)
+    rows.table(values, caption, &[&figure::MRAYS_PER_S], BY_RAYS)
 }
 
 /// What the build took.
@@ -154,10 +155,10 @@ fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
         values,
         format!("Build (one each){update}"),
         &[
-            "build-ms/v1",
-            "build-rate/v1",
-            "build-peak-bytes/v1",
-            "update-ms/v1",
+            &figure::BUILD_MS,
+            &figure::BUILD_RATE,
+            &figure::BUILD_PEAK_BYTES,
+            &figure::UPDATE_MS,
         ],
         FIGURES_ALONE,
     )
@@ -166,24 +167,24 @@ fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
 /// Size and quality of what was built.
 const SHAPE: &str = "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with \
                      both constants 1)";
-const SHAPE_FIGURES: [&str; 9] = [
-    "bytes/v1",
-    "bytes-per-triangle/v1",
-    "nodes/v1",
-    "leaves/v1",
-    "references/v1",
-    "references-per-triangle/v1",
-    "depth/v1",
-    "sah-cost/v1",
-    "epo/v1",
+const SHAPE_FIGURES: [&Figure; 9] = [
+    &figure::BYTES,
+    &figure::BYTES_PER_TRIANGLE,
+    &figure::NODES,
+    &figure::LEAVES,
+    &figure::REFERENCES,
+    &figure::REFERENCES_PER_TRIANGLE,
+    &figure::DEPTH,
+    &figure::SAH_COST,
+    &figure::EPO,
 ];
 
 /// Figures that this program does not measure itself.
 pub(crate) fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let from_outside = data.run.iter().flat_map(|run| &run.figures);
-    let ids: Vec<&str> = from_outside.map(|figure| &*figure.id).collect();
+    let figures: Vec<&Figure> = from_outside.collect();
     let caption = format!("Further figures on {}", scene.name);
-    built(scene).table(values, caption, &ids, FIGURES_ALONE)
+    built(scene).table(values, caption, &figures, FIGURES_ALONE)
 }
 
 /// Leaves by the references they hold.
@@ -192,7 +193,7 @@ fn leaf_table(scene: &SceneGroup, values: &[Value]) -> Table {
     rows(with_leaves, &["structure"], |_| TableCell::default()).table(
         values,
         "Leaves (or cells) by the number of references they hold, share",
-        &["leaf-share/v1"],
+        &[&figure::LEAF_SHARE],
         &|key| key.label(axis::SUBJECT).to_owned(),
     )
 }
@@ -225,12 +226,12 @@ fn coherence_table(scene: &SceneGroup, values: &[Value]) -> Table {
         s.groups,
     );
     let figures = [
-        "simt-efficiency/v1",
-        "lines-per-issue/v1",
-        "l1-hits/v1",
-        "issues-per-ray/v1",
-        "l2-bytes-per-ray/v1",
-        "cycles-per-ray/v1",
+        &figure::SIMT_EFFICIENCY,
+        &figure::LINES_PER_ISSUE,
+        &figure::L1_HITS,
+        &figure::ISSUES_PER_RAY,
+        &figure::L2_BYTES_PER_RAY,
+        &figure::CYCLES_PER_RAY,
     ];
     class_rows(scene, &by).table(values, caption, &figures, FIGURES_ALONE)
 }
@@ -242,13 +243,13 @@ fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
         values,
         "Counted work per ray (means over a class, from a separate run)",
         &[
-            "rays/v1",
-            "hit-share/v1",
-            "unlike-shadow/v1",
-            "nodes-per-ray/v1",
-            "box-tests-per-ray/v1",
-            "triangle-tests-per-ray/v1",
-            "deepest-stack/v1",
+            &figure::RAYS,
+            &figure::HIT_SHARE,
+            &figure::UNLIKE_SHADOW,
+            &figure::NODES_PER_RAY,
+            &figure::BOX_TESTS_PER_RAY,
+            &figure::TRIANGLE_TESTS_PER_RAY,
+            &figure::DEEPEST_STACK,
         ],
         FIGURES_ALONE,
     )

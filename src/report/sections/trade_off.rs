@@ -7,6 +7,7 @@ use crate::format;
 use crate::pivot::Rows;
 use crate::samplers::MeasuredSampler;
 use crate::values::{Reading, Value};
+use raystone_record::figure;
 use raystone_record::*;
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
@@ -57,7 +58,7 @@ pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
             let (own, other) = (rate(s, timing.class)?, rate(first, timing.class)?);
             let key = (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class));
             let reading = caught_up(extra_ms, own, other);
-            Some(Value::new(&key, "break-even/v1", reading))
+            Some(Value::new(&key, &figure::BREAK_EVEN, reading))
         };
         s.timings.iter().filter_map(in_class).collect::<Vec<_>>()
     };
@@ -75,7 +76,7 @@ pub(crate) fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<T
     );
     let row = |s: &Measured<StructureRecord>| (s.key.clone(), vec![s.structure.clone().into()]);
     let rows = Rows::new(&STRUCTURE_AXES, &["structure"], others.into_iter().map(row));
-    let figures = ["build-ms/v1", "break-even/v1"];
+    let figures = [&figure::BUILD_MS, &figure::BREAK_EVEN];
     Some(rows.table(values, caption, &figures, BY_RAYS))
 }
 
@@ -101,7 +102,7 @@ pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'stat
         let total = |spp: &u32| {
             let total = built.build_ms + ms.value * f64::from(*spp);
             let key = time.key.clone().with(axis::SPP, spp);
-            Value::new(&key, "time-to-image/v1", total)
+            Value::new(&key, &figure::TIME_TO_IMAGE, total)
         };
         Some(counts.iter().map(total).collect::<Vec<_>>())
     };
@@ -132,7 +133,7 @@ pub(crate) fn time_to_image_table(
         "" => "build".to_owned(),
         spp => format!("build + {spp} spp"),
     };
-    let figures = ["build-ms/v1", "time-to-image/v1"];
+    let figures = [&figure::BUILD_MS, &figure::TIME_TO_IMAGE];
     let rows = Rows::new(&STRUCTURE_AXES, &["structure"], rows);
     (!times.is_empty()).then(|| rows.table(&values, caption, &figures, &spp))
 }

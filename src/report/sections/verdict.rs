@@ -8,7 +8,7 @@ use crate::ruling::{Contender, Ruling, judge};
 use crate::samplers::{MeasuredSampler, Metric};
 use crate::values::pair_of_dimensions;
 use crate::{format, pictures, trust};
-use raystone_record::figure::{Better, figure};
+use raystone_record::figure::{self, Better};
 use raystone_record::{
     ClassTiming, FigureAtCount, Interval, RayClass, Recorded, StreamRecord, StructureRecord,
     Verdict, axis,
@@ -489,7 +489,7 @@ pub(crate) fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
         Some(reason) => Ruling::Withheld(reason),
         None => judge(
             scene.structures.iter().filter_map(contender).collect(),
-            figure("mrays-per-s/v1").better,
+            figure::MRAYS_PER_S.better,
         ),
     }
 }
@@ -512,6 +512,6 @@ pub(crate) fn best_per_sample(view: &View, spp: u32) -> Ruling {
 pub(super) fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
     match trust::doubt_of_errors(view) {
         Some(reason) => Ruling::Withheld(reason),
-        None => judge(contenders, figure(Metric::RelMse.figure()).better),
+        None => judge(contenders, Metric::RelMse.figure().better),
     }
 }

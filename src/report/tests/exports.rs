@@ -4,6 +4,7 @@ use super::*;
 use crate::export::select::Selection;
 use crate::export::{ExportError, FORMATS, Source, Writer};
 use raystone_image::{FileFormat, Image, read_linear};
+use raystone_record::figure;
 use serde_json::Value as Json;
 
 fn chosen(only: &[&str]) -> Result<Selection, ExportError> {
@@ -100,14 +101,14 @@ fn google_benchmark_has_the_rays_that_were_traced_and_the_clocks_that_were_read(
             .unwrap()
     };
     let number = |of: &Json, field: &str| of[field].as_f64().unwrap();
-    let cell = named("ms-per-spp/v1");
+    let cell = named(&figure::MS_PER_SPP.id);
     let seconds = 1e-9 * number(cell, "real_time");
     let rays = number(cell, "items_per_second") * seconds;
     assert!((rays - 110_592.0).abs() < 1e-3, "{rays}");
     assert_eq!(number(cell, "cpu_time"), 2.0 * number(cell, "real_time"));
     assert_eq!(cell["label"], "cpu_time: processors, all threads");
     // The wall clock is none of the processors'.
-    let class = named("mrays-per-s/v1");
+    let class = named(&figure::MRAYS_PER_S.id);
     assert_eq!(class["cpu_time"], class["real_time"]);
     assert!(
         class["label"].as_str().unwrap().contains("not measured"),

@@ -3,6 +3,7 @@
 use super::values::of_line;
 use crate::record::{Line, Record};
 use raystone_record::axis;
+use raystone_record::figure::{self, Figure};
 use raystone_report::document::Table;
 use raystone_report::format;
 use raystone_report::pivot::{FIGURES_ALONE, Part, Rows};
@@ -15,7 +16,7 @@ struct Kind {
     /// What tells its rows apart, and how the columns of these labels are called.
     by: &'static [&'static str],
     heads: &'static [&'static str],
-    figures: &'static [&'static str],
+    figures: &'static [&'static Figure],
     across: Part<'static>,
 }
 
@@ -24,7 +25,7 @@ const BOX_TESTS: Kind = Kind {
     caption: "Box tests: answers that differ from brute force",
     by: &[axis::BOX_TEST, axis::ACCEL],
     heads: &["box test", ":structure"],
-    figures: &["pad-ulps/v1", "rays/v1", "lost-hits/v1"],
+    figures: &[&figure::PAD_ULPS, &figure::RAYS, &figure::LOST_HITS],
     across: FIGURES_ALONE,
 };
 
@@ -34,10 +35,10 @@ const OFFSETS: Kind = Kind {
     by: &[axis::OFFSET, axis::TRIANGLE, axis::MESH, axis::PLACE],
     heads: &["offset", ":triangle", ":mesh", ":place"],
     figures: &[
-        "rays/v1",
-        "self-intersections/v1",
-        "leaks/v1",
-        "farthest-begin/v1",
+        &figure::RAYS,
+        &figure::SELF_INTERSECTIONS,
+        &figure::LEAKS,
+        &figure::FARTHEST_BEGIN,
     ],
     across: FIGURES_ALONE,
 };
@@ -48,10 +49,10 @@ const COSTS: Kind = Kind {
     by: &[axis::TRIANGLE],
     heads: &["triangle"],
     figures: &[
-        "test-bytes/v1",
-        "ns-per-test/v1",
-        "traversal-ratio/v1",
-        "tests-per-ray/v1",
+        &figure::TEST_BYTES,
+        &figure::NS_PER_TEST,
+        &figure::TRAVERSAL_RATIO,
+        &figure::TESTS_PER_RAY,
     ],
     across: FIGURES_ALONE,
 };
@@ -61,7 +62,7 @@ const SHOTS: Kind = Kind {
     caption: "Shots at closed meshes from inside, and at a plane: misses",
     by: &[axis::TRIANGLE, axis::ACCEL, axis::MESH, axis::PLACE],
     heads: &["triangle", ":structure", ":mesh", ":place"],
-    figures: &["misses/v1"],
+    figures: &[&figure::MISSES],
     across: &|key| key.label(axis::AIM).to_owned(),
 };
 
@@ -78,7 +79,7 @@ impl Kind {
 pub(super) fn tables(lines: &[Line]) -> Vec<Table> {
     let mut shots = SHOTS.table(lines);
     let rays = lines.iter().find_map(|line| match &line.body {
-        Record::Shots(shots) => Some(shots.count("rays/v1")),
+        Record::Shots(shots) => Some(shots.count(&figure::RAYS)),
         _ => None,
     });
     shots.caption += &format!(" of {} shots each", format::count(rays.unwrap_or(0) as u64));

@@ -6,6 +6,7 @@ use crate::families::FAMILIES;
 use crate::record::{Findings, Line, Quantiles};
 use crate::suite::BRUTE_FORCE;
 use crate::targets::cells;
+use raystone_record::figure;
 use raystone_record::{Recorded, axis};
 use raystone_report::document::{Table, TableCell, Tone};
 use raystone_report::format;
@@ -36,29 +37,29 @@ pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     let judged = |line: &&Line| families.iter().any(|(_, cells)| *cells[0].key == line.key);
     let mut values: Vec<Value> = records.iter().filter(judged).flat_map(of_line).collect();
     // Not brute force's own, which visits all in any case.
-    values.retain(|value| value.figure.id != "slowdown/v1");
+    values.retain(|value| value.figure.id != figure::SLOWDOWN.id);
     for (_, cells) in &families {
         let slowest = cells
             .iter()
-            .filter_map(|c| c.get("slowdown/v1"))
+            .filter_map(|c| c.get(&figure::SLOWDOWN))
             .reduce(f64::max);
-        values.extend(Value::known(cells[0].key, [("slowdown/v1", slowest)]));
+        values.extend(Value::known(cells[0].key, [(&figure::SLOWDOWN, slowest)]));
     }
     let heads = ["family", ":structures that differ"];
     let mut table = Rows::new(&[axis::FAMILY], &heads, families.iter().map(row)).table(
         &values,
         format!("{test}: brute force against the exact oracle; unexplained: not by rounding"),
         &[
-            "rays/v1",
-            "false-misses/v1",
-            "unexplained-misses/v1",
-            "cracks/v1",
-            "false-hits/v1",
-            "unexplained-hits/v1",
-            "wrong-triangle/v1",
-            "not-nearest/v1",
-            "borderline/v1",
-            "slowdown/v1",
+            &figure::RAYS,
+            &figure::FALSE_MISSES,
+            &figure::UNEXPLAINED_MISSES,
+            &figure::CRACKS,
+            &figure::FALSE_HITS,
+            &figure::UNEXPLAINED_HITS,
+            &figure::WRONG_TRIANGLE,
+            &figure::NOT_NEAREST,
+            &figure::BORDERLINE,
+            &figure::SLOWDOWN,
         ],
         FIGURES_ALONE,
     );
@@ -157,7 +158,7 @@ pub(super) fn matrix_table(records: &[Line]) -> Table {
 }
 
 fn mark(cell: &Findings) -> String {
-    let count = match cell.count("false-misses/v1") {
+    let count = match cell.count(&figure::FALSE_MISSES) {
         0 => "·".to_owned(),
         n => n.to_string(),
     };
@@ -172,7 +173,7 @@ pub(super) fn worst_table(records: &[Line]) -> Table {
     let mut table = Table::new(caption, &heads);
     for cell in cells(records) {
         let Some(worst) = &cell.worst else { continue };
-        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.count("differing/v1") > 0 {
+        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.count(&figure::DIFFERING) > 0 {
             let labels =
                 [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
             let row = labels.into_iter().chain([&*worst.what, &worst.replay]);

@@ -6,6 +6,7 @@ use crate::placement::Placement;
 use crate::record::Line;
 use crate::suite::BRUTE_FORCE;
 use raystone_record::Interval;
+use raystone_record::figure;
 use raystone_report::document::Illustration;
 use raystone_report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use raystone_report::plot::heat::HeatMap;
@@ -17,10 +18,10 @@ const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 fn lost_hits(records: &[Line], test: &str, accel: &str, family: &str) -> Option<(f64, bool)> {
     let cell = cell(records, test, accel, family)?;
     let lost = cell
-        .count("cracks/v1")
-        .max(cell.count("unexplained-misses/v1"));
-    let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
-    Some((1e6 * share, cell.count("differing/v1") > 0))
+        .count(&figure::CRACKS)
+        .max(cell.count(&figure::UNEXPLAINED_MISSES));
+    let share = lost as f64 / cell.count(&figure::RAYS).max(1) as f64;
+    Some((1e6 * share, cell.count(&figure::DIFFERING) > 0))
 }
 
 /// The most that any cell loses: where the colours of all maps end.

@@ -2,7 +2,7 @@
 
 use crate::record::{Line, Record};
 use raystone_record::axis;
-use raystone_record::figure::FIGURES;
+use raystone_record::figure::{self, FIGURES};
 use raystone_report::values::Value;
 
 /// Everything that the suite found.
@@ -15,8 +15,8 @@ pub(super) fn of_line(line: &Line) -> Vec<Value<'static>> {
     if let Record::Gauge(gauge) = &line.body {
         let key = line.key.clone().with(axis::SUBJECT, &gauge.name);
         let figures = [
-            ("numerics/v1", Some(gauge.value)),
-            ("alarm/v1", gauge.alarm),
+            (&figure::NUMERICS, Some(gauge.value)),
+            (&figure::ALARM, gauge.alarm),
         ];
         let mut values = Value::known(&key, figures);
         values[0].figure.to_mut().unit = gauge.unit.clone().into();
@@ -27,7 +27,7 @@ pub(super) fn of_line(line: &Line) -> Vec<Value<'static>> {
     };
     // Shots that a kernel's error ended tell nothing of the mesh.
     let ended = matches!(line.body, Record::Shots(_)) && !found.failures.is_empty();
-    let told = FIGURES.iter().filter(|f| !ended || f.id == "rays/v1");
-    let figures = told.map(|f| (&*f.id, found.figures.get(&*f.id).copied()));
+    let told = FIGURES.iter().filter(|f| !ended || f.id == figure::RAYS.id);
+    let figures = told.map(|f| (*f, found.figures.get(&*f.id).copied()));
     Value::known(&line.key, figures)
 }
