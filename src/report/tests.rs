@@ -306,7 +306,8 @@ fn a_slow_sampler_wins_per_second_only_if_its_time_is_known_well_enough() {
             }
         }
     }));
-    assert_eq!(wide.value, sharp.value);
+    // The same but for the rounding of its mean.
+    assert!((wide.value / sharp.value - 1.0).abs() < 1e-12);
     assert!(wide.low < 0.6 * sharp.low && wide.high > 1.8 * sharp.high);
     assert!(answer.starts_with("undecided"), "{answer}");
 }

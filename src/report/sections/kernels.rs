@@ -34,9 +34,8 @@ pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
             .of_kernels(Some([original.as_str(), idea.as_str()]))
             .ok()?;
         let found = compare_sides(&sides[0], &sides[1], &Options::default(), &Confirmed::new());
-        let caption =
-            format!("What the kernels @{idea} change, against {original}: time, lower is better");
-        let heads = ["structure", ":answer", ":change of time [95 % interval]"];
+        let caption = format!("What the kernels @{idea} change, against {original}");
+        let heads = ["structure", ":answer", ":change [95 % interval]"];
         let mut table = Table::new(caption, &heads);
         table.rows = structures(data, &found);
         let mut notes = found.notes.clone();
@@ -49,15 +48,11 @@ pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
 
 /// Names of the sets of kernels that stand against the first one.
 pub(crate) fn ideas(data: &RunData) -> Vec<String> {
-    let labels = data.scenes.iter().flat_map(|scene| {
-        let structures = scene.structures.iter().map(|s| &s.key);
-        structures.chain(
-            scene
-                .views
-                .iter()
-                .flat_map(|v| v.times.iter().map(|t| &t.key)),
-        )
-    });
+    let structures = data.scenes.iter().flat_map(|scene| &scene.structures);
+    let times = data.views().flat_map(|(_, view)| &view.times);
+    let labels = structures
+        .map(|s| &s.key)
+        .chain(times.map(|time| &time.key));
     let labels = labels.map(|key| key.label(axis::KERNELS).to_owned());
     let mut labels = without_repeats(labels.collect());
     let original = labels.iter().position(String::is_empty).unwrap_or(0);
@@ -97,7 +92,10 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<Vec<TableCell>> {
             structure
         };
         let (answer, tone) = answer(&findings);
-        let changed: Vec<String> = findings.iter().map(|f| change_of(f)).collect();
+        // Where some kernels of a structure changed, the times of the others are no part of the answer.
+        let all_are = findings.iter().all(|f| f.is_control);
+        let told = findings.iter().filter(|f| all_are || !f.is_control);
+        let changed: Vec<String> = told.map(|f| change_of(f)).collect();
         let answer = TableCell::from(answer).toned(tone);
         vec![name.into(), answer, changed.join("; ").into()]
     };
@@ -162,8 +160,7 @@ fn change_of(finding: &Finding) -> String {
     } else {
         &change
     };
-    let control = if finding.is_control { " (control)" } else { "" };
-    format!("{of} {change}{control}")
+    format!("{of}: {} {change}", finding.figure.title)
 }
 
 /// What of the figures beside times is not the same.

@@ -50,7 +50,8 @@ impl<'a> Runner<'a> {
     /// A figure with the noise of the time, which it goes with as with this power of it; without it beside an image whose own
     /// noise is not known.
     fn with_time(&self, figure: LogFigure, power: f64) -> LogFigure {
-        if self.sampler.is_ranked() {
+        // An exact 0 stays one.
+        if self.sampler.is_ranked() && figure.log.is_finite() {
             figure.with_noise_of(&self.time, power)
         } else {
             figure

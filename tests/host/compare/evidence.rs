@@ -115,7 +115,7 @@ fn swapping_the_sides_turns_the_difference_and_leaves_its_p() {
         1.0, 1.01, 0.99, 1.02, 0.98, 1.0, 1.01, 0.99, 1.0, 1.03, 0.97, 1.0,
     ];
     let few = [1.04, 1.05];
-    let again = even.map(|x| 1.01 * x + 0.001 * (37.0 * x).sin());
+    let again = even.map(|x| 1.01 * x + 0.001 * f64::sin(37.0 * x));
     let interval = |value, half: f64, freedom| {
         let (low, high) = (value - half, value + half);
         Evidence::Summary(Interval { value, low, high }, freedom)

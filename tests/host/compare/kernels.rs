@@ -56,7 +56,8 @@ fn a_run_of_two_sets_of_kernels_leads_with_what_the_idea_changes() {
         row.unwrap_or_else(|| panic!("{lead:#?}"))
     };
     assert!(
-        row("structure-5 ").contains("slower  ") && row("structure-5 ").contains("primary rays +"),
+        row("structure-5 ").contains("slower  ")
+            && row("structure-5 ").contains("primary rays: Mrays/s −16"),
         "{lead:#?}"
     );
     assert!(!row("structure-6 ").contains("slower") && !row("structure-6 ").contains("control"));

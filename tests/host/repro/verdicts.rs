@@ -405,7 +405,7 @@ fn discrepancies() -> Vec<Value<'static>> {
         let key = key
             .with("dimensions", "path dimensions 0 and 1")
             .with("points", points);
-        Value::new(&key, "star/v1", Interval::exact(0.1))
+        Value::new(&key, "star-discrepancy/v1", Interval::exact(0.1))
     };
     vec![
         of("halton", 16),
@@ -423,7 +423,9 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
         (row.verdict, row.reason)
     };
     let discrepancy = |of: &str| {
-        format!("figure = \"star/v1\"\ncompare = \"bound\"\nof = {{ {of} }}\nmost = 1.0\n")
+        format!(
+            "figure = \"star-discrepancy/v1\"\ncompare = \"bound\"\nof = {{ {of} }}\nmost = 1.0\n"
+        )
     };
     let left_out = absent(&[
         (&[("scene", "box"), ("accel", "grid")], "it was too big"),
@@ -442,7 +444,10 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
     ] {
         let (verdict, reason) = found(&discrepancy(of), &left_out);
         assert_eq!(verdict, Verdict::Faulty, "{of}: {reason}");
-        assert!(reason.contains("no star/v1 was found"), "{of}: {reason}");
+        assert!(
+            reason.contains("no star-discrepancy/v1 was found"),
+            "{of}: {reason}"
+        );
     }
     // Nor is one for a sampler or a number of samples of another cell on the same scene.
     let rmse = |of: &str| {
