@@ -4,6 +4,7 @@
 use crate::support::{gpu, kernels_with, open};
 use raystone::accel::triangle::{MoellerTrumbore, TriangleTest as _};
 use raystone::gpu::{Gpu, probe_arithmetic};
+use raystone::measure::figure;
 use raystone::measure::record::{Key, axis};
 use raystone::report::terminal::Screen;
 use raystone::stress::record::{Line, read, write};
@@ -38,7 +39,7 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
     assert_eq!(cells.len(), 4 * (3 + 2));
     let exact = probe_arithmetic(gpu()).expect("the probe runs").is_exact();
     for cell in &cells {
-        assert!(cell.count("rays/v1") > 0 && !cell.rungs.is_empty());
+        assert!(cell.count(&figure::RAYS) > 0 && !cell.rungs.is_empty());
         if exact && family(cell.key) != "non-finite" {
             assert_eq!(cell.differing(), 0, "{}: {:?}", cell.key, cell.worst);
         }
@@ -85,15 +86,15 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
         ..small()
     };
     let records = run(&[gpu], &settings, &|_| ()).expect("the suite runs");
-    let leaks: usize = shots(&records).map(|s| s.count("misses/v1")).sum();
+    let leaks: usize = shots(&records).map(|s| s.count(&figure::MISSES)).sum();
     assert!(
         leaks > 0,
         "no crack was seen in {} series",
         shots(&records).count()
     );
-    for series in shots(&records).filter(|s| s.count("misses/v1") > 0) {
+    for series in shots(&records).filter(|s| s.count(&figure::MISSES) > 0) {
         assert!(
-            series.count("confirmed-misses/v1") > 0 && series.worst.is_some(),
+            series.count(&figure::CONFIRMED_MISSES) > 0 && series.worst.is_some(),
             "{series:?}"
         );
     }
@@ -101,7 +102,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
         .find(|c| c.key.label(axis::FAMILY) == "edges" && c.key.label(axis::ACCEL) == "bvh")
         .expect("a cell");
     assert!(
-        edges.count("cracks/v1") > 0 && edges.differing() > 0,
+        edges.count(&figure::CRACKS) > 0 && edges.differing() > 0,
         "{edges:?}"
     );
 }

@@ -2,6 +2,7 @@
 
 use raystone::config::Experiment;
 use raystone::config::expect::{Expect, Thesis};
+use raystone::measure::figure::{STAR_DISCREPANCY, figure as figure_of};
 use raystone::measure::record::{Interval, Key};
 use raystone::report::values::{Reading, Value};
 use raystone::repro::claim::{Context, Row, judge};
@@ -15,7 +16,7 @@ fn value(accel: &str, n: u32, figure: &str, low: f64, at: f64, high: f64) -> Val
     let key = key.with("spp", n);
     Value::new(
         &key,
-        figure,
+        figure_of(figure),
         Interval {
             value: at,
             low,
@@ -251,7 +252,7 @@ fn what_a_place_says_goes_before_what_the_expectation_says() {
 fn an_error_that_the_reference_does_not_resolve_leaves_it_open_and_a_word_is_no_number() {
     let key = Key::default().with("accel", "a");
     let of = |reading: Reading, figure: &str| {
-        let values = [Value::new(&key, figure, reading)];
+        let values = [Value::new(&key, figure_of(figure), reading)];
         let body = format!("figure = \"{figure}\"\ncompare = \"bound\"\nmost = 1.0\n");
         judge(&expect(&body), &values, &gpu()).remove(0)
     };
@@ -405,7 +406,7 @@ fn discrepancies() -> Vec<Value<'static>> {
         let key = key
             .with("dimensions", "path dimensions 0 and 1")
             .with("points", points);
-        Value::new(&key, "star-discrepancy/v1", Interval::exact(0.1))
+        Value::new(&key, &STAR_DISCREPANCY, Interval::exact(0.1))
     };
     vec![
         of("halton", 16),
