@@ -201,10 +201,11 @@ fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
         ],
         Light::Other {
             position,
+            direction,
             color,
-            parameters: [a, b, rest @ ..],
+            parameters: [a, b, c],
             ..
-        } => [row(*position, *a), row(*color, *b), rest.map(f32::to_bits)],
+        } => [row(*position, *a), row(*color, *b), row(*direction, *c)],
     }
 }
 

@@ -52,22 +52,24 @@ fn bulb(position: Vec3, color: Vec3, exponent: f32) -> Light {
     Light::Other {
         kind: &BULB,
         position,
+        direction: AXIS,
         color,
-        parameters: [exponent, 0.0, AXIS.x, AXIS.y, AXIS.z, 0.0],
+        parameters: [exponent, 0.0, 0.0],
     }
 }
 
 fn sample(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<LightSample> {
     let Light::Other {
         position,
+        direction,
         color,
-        parameters: [exponent, _, x, y, z, _],
+        parameters: [exponent, ..],
         ..
     } = light
     else {
         return None;
     };
-    let axis = vec3(*x, *y, *z).as_dvec3();
+    let axis = direction.as_dvec3();
     let way = position.as_dvec3() - from;
     let direction = way.normalize();
     let part = (0.5 - 0.5 * direction.dot(axis))

@@ -82,10 +82,12 @@ pub enum Light {
         kind: &'static LightKind,
         /// Place.
         position: Vec3,
+        /// Where it points, in `c.xyz` of the kernel's `Light`.
+        direction: Vec3,
         /// What scales it.
         color: Vec3,
-        /// Numbers that only this kind has: `a.w`, `b.w` and `c` of the kernel's `Light`.
-        parameters: [f32; 6],
+        /// Numbers that only this kind has: `a.w`, `b.w` and `c.w`.
+        parameters: [f32; 3],
     },
 }
 
@@ -137,17 +139,20 @@ impl Light {
         self.place().is_none()
     }
 
-    /// The same light turned about the origin and then moved. Maps turn about one axis alone: they stay as they are, and so do
-    /// the directions of kinds from outside.
+    /// The same light turned about the origin and then moved. Maps turn about one axis alone: they stay as they are.
     #[must_use]
     pub fn moved(mut self, turn: Quat, by: Vec3) -> Self {
         match &mut self {
             Self::Sphere {
                 center: position, ..
             }
-            | Self::Point { position, .. }
-            | Self::Other { position, .. } => *position = turn * *position + by,
+            | Self::Point { position, .. } => *position = turn * *position + by,
             Self::Spot {
+                position,
+                direction,
+                ..
+            }
+            | Self::Other {
                 position,
                 direction,
                 ..
