@@ -61,7 +61,7 @@ pub enum ExportError {
 }
 
 impl ExportError {
-    /// Why the light of this number cannot be written.
+    /// The light of this number cannot be written, for this reason.
     pub fn light(number: usize, light: &Light, reason: &'static str) -> Self {
         let kind = light.kind().name;
         Self::Light {
