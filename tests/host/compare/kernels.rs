@@ -57,7 +57,7 @@ fn a_run_of_two_sets_of_kernels_leads_with_what_the_idea_changes() {
     };
     assert!(
         row("structure-5 ").contains("slower  ")
-            && row("structure-5 ").contains("primary rays: Mrays/s −16"),
+            && row("structure-5 ").contains("primary rays: speed −16"),
         "{lead:#?}"
     );
     assert!(!row("structure-6 ").contains("slower") && !row("structure-6 ").contains("control"));
