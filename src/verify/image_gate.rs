@@ -209,11 +209,13 @@ fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
     }
 }
 
-/// Median difference of the paths that found light.
+/// Median difference of the paths that found light. One that is no number, or infinite, is the greatest: records have no number for it,
+/// and could not be read.
 fn median(truth: &[Path], differences: &[f64], floor: f64) -> f64 {
     let lit = truth.iter().zip(differences);
     let lit = lit.filter(|(path, _)| path.radiance.max_element() > floor);
-    let mut lit: Vec<f64> = lit.map(|(_, d)| *d).collect();
+    let known = |d: f64| if d.is_finite() { d } else { f64::MAX };
+    let mut lit: Vec<f64> = lit.map(|(_, d)| known(*d)).collect();
     lit.sort_by(f64::total_cmp);
     lit.get(lit.len() / 2).copied().unwrap_or_default()
 }

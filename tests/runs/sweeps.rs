@@ -567,7 +567,9 @@ fn an_image_that_is_not_finite_fails_the_check_of_the_run_and_of_joined_ones() {
     fs::create_dir_all(mine.join("integrator")).expect("a folder");
     let library = raystone::gpu::KernelLibrary::default();
     let good = library.text("integrator/primary").expect("a kernel");
-    let (before, nan) = ("* abs(", "* bitcast<f32>(0x7fc00000u | pixel.x) * abs(");
+    // One column, beyond the pixels whose paths are judged before.
+    let nan = "* bitcast<f32>(select(0x3f800000u, 0x7fc00000u, pixel.x == 27u)) * abs(";
+    let before = "* abs(";
     assert_eq!(good.matches(before).count(), 1);
     let file = mine.join("integrator/primary.wesl");
     fs::write(file, good.replace(before, nan)).expect("a kernel");
@@ -576,6 +578,7 @@ fn an_image_that_is_not_finite_fails_the_check_of_the_run_and_of_joined_ones() {
         &kernels,
         "axes.accel = ['bvh']",
         "axes.sequence = ['sobol']",
+        "run.resolution = [32, 32]",
     ]);
     let out = folder.path().join("out");
     let (summary, lines) = resume(&text, &out);

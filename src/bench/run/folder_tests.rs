@@ -200,6 +200,7 @@ fn packed_results_are_kept_and_replaced_as_others_are() {
     let third = Folder::open(out, Existing::Replace, false).unwrap();
     write(&third, "third");
     third.finish().unwrap();
+    drop(third);
     assert_eq!(read(out), "third\n");
     assert!(!packed.exists() && !out.join(IMAGES).exists());
     // What is resumed is not lost.

@@ -161,8 +161,8 @@ fn a_folder_that_was_resumed_is_of_its_last_experiment() {
     let b = put(&dir.path().join("b"), &lines);
     let (merged, lines) = joined(&[b, a], &dir.path().join("out"));
     assert!(!merged.incomplete);
-    let runs = lines.iter().filter_map(|line| RunRecord::of(&line.body));
-    let text = &runs.last().expect("a first line").experiment_text;
+    let mut runs = lines.iter().filter_map(|line| RunRecord::of(&line.body));
+    let text = &runs.next_back().expect("a first line").experiment_text;
     assert_eq!(text, TEXT);
 }
 

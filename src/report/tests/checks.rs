@@ -110,10 +110,10 @@ fn an_image_that_failed_its_cell_fails_the_check_and_is_named() {
     };
     lines.retain(|line| !is_it(line));
     for line in &mut lines {
-        if let (Body::Error(e), "sobol") = (&mut line.body, line.key.label(axis::SEQUENCE)) {
-            if e.replicate == 2 {
-                (e.errors, e.non_finite_pixels) = (Vec::new(), 7);
-            }
+        if let (Body::Error(e), "sobol") = (&mut line.body, line.key.label(axis::SEQUENCE))
+            && e.replicate == 2
+        {
+            (e.errors, e.non_finite_pixels) = (Vec::new(), 7);
         }
     }
     let checks = sections::belief::checks(&RunData::new(&lines));
