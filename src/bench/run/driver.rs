@@ -82,12 +82,15 @@ fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 
     }
 }
 
+/// Samples of each thing that is timed of a cell, or what went wrong.
+type Timed = Result<Vec<Samples>, String>;
+
 /// Samples of each cell, or what went wrong; if the device is gone, the place of the cell that was being timed.
 fn time(
     session: &mut Session,
     measurement: &dyn Measurement,
     ready: &[Ready],
-) -> Result<Vec<Result<Vec<Samples>, String>>, (usize, GpuError)> {
+) -> Result<Vec<Timed>, (usize, GpuError)> {
     let of_cells: Vec<Vec<&dyn Measured>> = ready.iter().map(|one| one.item.timed()).collect();
     let places = of_cells.iter().enumerate();
     let places: Vec<usize> = places
