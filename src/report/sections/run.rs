@@ -4,7 +4,7 @@ use crate::data::{Measured, RunData, SceneGroup, View};
 use crate::document::*;
 use crate::format::{self, count, percent};
 use crate::samplers::MeasuredSampler;
-use raystone_record::{FinishedRecord, StructureRecord, TimeRecord};
+use raystone_record::{FinishedRecord, Key, StructureRecord, TimeRecord};
 
 /// Largest share of the wall time that the harness may take for itself.
 const OVERHEAD_TARGET: f64 = 0.1;
@@ -104,6 +104,13 @@ pub(crate) fn failures(data: &RunData) -> Vec<Failure> {
         data.views()
             .flat_map(|(scene, view)| failed_cells(scene, view)),
     );
+    let failed = |key: &Key, failure: &Option<String>| {
+        let reason = failure.as_ref()?;
+        Some(Failure::new(key.to_string(), FAILED, reason))
+    };
+    let peers = data.scenes.iter().flat_map(|scene| &scene.peers);
+    all.extend(peers.filter_map(|peer| failed(peer.key, &peer.failure)));
+    all.extend((data.measured.iter()).filter_map(|cell| failed(cell.key, &cell.failure)));
     for (records, state) in [
         (&data.failed, FAILED),
         (&data.skipped, LEFT_OUT),
