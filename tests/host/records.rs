@@ -94,6 +94,6 @@ fn an_old_line_that_lost_its_record_is_refused_with_its_place() {
     assert!(
         text_of([&line])
             .expect("JSON")
-            .starts_with("{\"schema\":\"raystone/2\",\"body\"")
+            .starts_with("{\"schema\":\"raystone/3\",\"body\"")
     );
 }

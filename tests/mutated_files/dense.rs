@@ -221,10 +221,10 @@ fn plys() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn records() -> Vec<(&'static str, Vec<u8>)> {
-    let line = |body: &str| format!("{{\"schema\":\"raystone/2\",\"body\":{body}}}\n");
+    let line = |body: &str| format!("{{\"schema\":\"raystone/3\",\"body\":{body}}}\n");
     let skipped = line("{\"kind\":\"skipped\",\"cell\":\"\",\"reason\":\"\"}");
     let open =
-        "{\"schema\":\"raystone/2\",\"body\":{\"kind\":\"skipped\",\"cell\":\"\",\"reason\":\"\",";
+        "{\"schema\":\"raystone/3\",\"body\":{\"kind\":\"skipped\",\"cell\":\"\",\"reason\":\"\",";
     vec![
         ("lines", filled("", &skipped, "")),
         ("zeros", filled(&format!("{open}\"x\":["), "0,", "]}}\n")),

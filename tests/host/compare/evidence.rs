@@ -332,8 +332,10 @@ fn errors_of_another_reference_or_resolution_are_open_and_their_order_is_nothing
         said(&wide, ERROR).count() == 16
             && said(&wide, ERROR).all(|f| f.why.starts_with("other work"))
     );
+    // All but the ends, which say where a run begins and that it came to its end.
     let mut turned = Made::default().lines();
-    turned.reverse();
+    let last = turned.len() - 1;
+    turned[1..last].reverse();
     let found = compared(
         &Made::default().side(),
         &Side::new("made", turned, Vec::new()),

@@ -279,12 +279,12 @@ fn cut_and_mixed_files_are_named() {
     );
     // Cut in the middle of the file, of a version to come, and with a number that is none.
     let (first, rest) = text.split_at(400);
-    let newer = text.replacen("raystone/2", "raystone/3", 1);
+    let newer = text.replacen("raystone/3", "raystone/4", 1);
     let nan = text.replacen("\"sah_cost\":12.5", "\"sah_cost\":NaN", 1);
     let null = text.replacen("\"nodes\":20.0", "\"nodes\":null", 1);
     for (text, said) in [
         (format!("{first}\n{rest}"), "not a record"),
-        (newer, "raystone/3"),
+        (newer, "raystone/4"),
         (nan, "not a record"),
         (null, "not a record"),
     ] {

@@ -293,7 +293,7 @@ fn bad_input_is_named_with_what_to_do() {
     let runs = Runs::new()
         .with("base", &made)
         .with_text("broken", &format!("{first}\n{rest}"))
-        .with_text("later", &text.replacen("raystone/2", "raystone/3", 1))
+        .with_text("later", &text.replacen("raystone/3", "raystone/4", 1))
         .with_text("empty-file", "")
         .with_text("killed/partial", &text);
     std::fs::create_dir(runs.path("empty")).expect("a folder");

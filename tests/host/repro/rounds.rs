@@ -3,8 +3,8 @@
 
 use super::verdicts::expect;
 use raystone::compare::judge::TimeRatio;
-use raystone::measure::figure::figure;
-use raystone::measure::record::{Interval, Key, Line, Ran};
+use raystone::measure::figure::{COMPACTION_NS, figure};
+use raystone::measure::record::{Interval, Key, Line, Ran, Reading, Samples};
 use raystone::report::data::RunData;
 use raystone::report::values::values;
 use raystone::repro::claim::{Context, Row, judge};
@@ -36,8 +36,12 @@ pub const HERE: Sitting = Sitting {
     box_test: "padded",
 };
 
+fn median(samples: &[f64]) -> Interval {
+    raystone::measure::statistics::median_interval(samples).expect("times")
+}
+
 fn interval(ms: &[f64]) -> serde_json::Value {
-    let i = raystone::measure::statistics::median_interval(ms).expect("times");
+    let i = median(ms);
     json!({ "value": i.value, "low": i.low, "high": i.high })
 }
 
@@ -99,11 +103,16 @@ fn traced(accel: &str, at: Sitting, ms: [&[f64]; 2]) -> [Line; 2] {
 
 fn compacted(method: &str, at: Sitting, ms: &[f64], elements: f64) -> [Line; 2] {
     let per_element: Vec<f64> = ms.iter().map(|ms| 1e6 * ms / elements).collect();
-    let body = json!({
-        "kind": "compaction", "elements": elements as u64, "valid": 0.5, "bytes": 8, "kept": 500, "stable": true, "passes": 3,
-        "scratch_bytes": 0, "least_bytes": 1, "ms": ms, "wall_ms": ms, "ns_per_element": interval(&per_element), "failure": null,
+    let body = json!({ "kind": "measured", "measurement": "compaction" });
+    let time = Reading::new(&COMPACTION_NS, median(&per_element));
+    let time = time.with_samples(Samples::Rounds {
+        adapter: per_element,
+        wall: Vec::new(),
+        processors: Vec::new(),
     });
-    lines(Key::default().with("integrator", method), method, at, body)
+    let key = Key::default().with("integrator", method);
+    let [measured, cell] = lines(key, method, at, body);
+    [measured.with_readings(vec![time]), cell]
 }
 
 fn lines(key: Key, unit: &str, at: Sitting, body: serde_json::Value) -> [Line; 2] {

@@ -298,8 +298,8 @@ fn records_that_are_cut_or_of_another_version_are_named() {
     let inside = folder_of(&(lines.join("\n") + "\n"));
     let other =
         whole
-            .replacen("raystone/2", "raystone/9", 4)
-            .replacen("raystone/9", "raystone/2", 3);
+            .replacen("raystone/3", "raystone/9", 4)
+            .replacen("raystone/9", "raystone/3", 3);
     let other = folder_of(&other);
     for (folder, told) in [
         (inside, "jsonl:4: not a record"),
