@@ -209,7 +209,7 @@ fn a_device_lost_at_a_stream_fails_that_stream_alone() {
     let disturbed = outcome(&SCENES, Some(&cell));
     let streams = [[0, 1], [2, 3]].map(|pair| format!("stream {cell}, {pair:?}"));
     assert_eq!(disturbed.failed, BTreeSet::from(streams));
-    let cost = format!("cost of {cell}");
+    let cost = format!("sampler-cost {cell}");
     check_the_rest(&disturbed, &set([&cost]), &BTreeSet::new());
 }
 
