@@ -166,7 +166,9 @@ fn change_of(finding: &Finding) -> String {
 /// What of the figures beside times is not the same.
 fn beside_times(found: &Comparison) -> String {
     let others = || found.findings.iter().filter(|f| !f.is_time);
-    let not_same = others().filter(|f| f.verdict != Verdict::Same).count();
+    // What was measured once is shown, and decides nothing.
+    let is_other = |f: &&Finding| !matches!(f.verdict, Verdict::Same | Verdict::Told);
+    let not_same = others().filter(is_other).count();
     let of = format!(
         "{not_same} of {} beside times are not the same",
         format::plural(others().count(), "figure")

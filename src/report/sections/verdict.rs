@@ -37,7 +37,7 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     blocks.extend(failed(data));
     for (table, notes) in kernels::against_original(data) {
         blocks.extend(table.into_block());
-        blocks.push(Block::Paragraph(notes.join(" ")));
+        blocks.extend(notes.into_iter().map(Block::Paragraph));
     }
     for (index, scene) in data.scenes.iter().enumerate() {
         let answers = of_scene(scene);
