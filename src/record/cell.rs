@@ -30,7 +30,7 @@ pub struct KernelSetRecord {
 /// That a cell ended, and what it depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CellRecord {
-    /// Its name, see [`raystone_config::Unit`].
+    /// Its name, unique in its plan.
     pub unit: String,
     /// How it ended.
     pub outcome: Outcome,
