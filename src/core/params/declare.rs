@@ -71,7 +71,7 @@ pub fn redeclare<S, T: Bounded>(
 /// Declares structs of parameters and enums of choices; see [the module](crate::params).
 ///
 /// A field is `name: type = default;` with its meaning as doc comment; numbers have a range,
-/// `name: type = default, in low..=high;`, which one of [`ParamRange`]'s methods can narrow behind it:
+/// `name: type = default, in low..=high;`, which one of [`ParamRange`](crate::params::ParamRange)'s methods can narrow behind it:
 /// `in 2..=64, where power_of_two();`. Types are those of [`ParameterType`]: numbers, switches, texts, choices, lists and arrays of
 /// them, and `Option`, whose default may be `None`. A default need not be in the range: it then stands for nothing
 /// that could be written, and the meaning says what it does. A field without a default,
