@@ -311,7 +311,7 @@ fn bad_input_is_named_with_what_to_do() {
             "its run did not end: name its folder `partial`",
         ),
         (&["base", "broken"], "records.jsonl:1: not a record"),
-        (&["base", "later"], "records.jsonl:1: schema \"raystone/3\""),
+        (&["base", "later"], "records.jsonl:1: schema \"raystone/4\""),
         (&["base", "empty-file"], "records.jsonl"),
         (&["base"], "give a second run"),
         (&[], "give two runs"),
