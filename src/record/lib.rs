@@ -37,7 +37,7 @@ pub use read::{
 };
 pub use reading::{MeasuredRecord, Reading, Samples};
 pub use run::*;
-pub use sound::Sound;
+pub use sound::{Sound, fault_of};
 pub use stream::*;
 pub use structure::*;
 

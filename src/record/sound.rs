@@ -40,7 +40,7 @@ impl Sound for Body {
 
 /// What in readings cannot be, in words: values that are no numbers, times and rates below zero, rounds that lack one of their
 /// clocks.
-pub(crate) fn fault_of(readings: &[Reading]) -> Option<String> {
+pub fn fault_of(readings: &[Reading]) -> Option<String> {
     let mut faults = Vec::new();
     for reading in readings {
         let Interval { value, low, high } = reading.value;
@@ -125,5 +125,39 @@ fn not_negative<'a>(
 fn share(what: &str, value: f64, faults: &mut Vec<String>) {
     if !(0.0..=1.0).contains(&value) {
         faults.push(format!("{what} is {value}, and no share"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::{BUILD_MS, COMPACTION_NS};
+
+    #[test]
+    fn readings_that_are_no_numbers_or_lack_a_clock_are_faults() {
+        let exact = |value| Reading::exact(&BUILD_MS, value);
+        assert_eq!(fault_of(&[exact(1.0), exact(-0.5)]), None);
+        for value in [f64::NAN, f64::INFINITY] {
+            let fault = fault_of(&[exact(1.0), exact(value)]).expect("a fault");
+            assert!(fault.contains("build-ms/v1"), "{fault}");
+        }
+        let turned = Interval {
+            value: 1.0,
+            low: 2.0,
+            high: 3.0,
+        };
+        assert!(fault_of(&[Reading::new(&BUILD_MS, turned)]).is_some());
+        let rounds = |adapter: &[f64], wall: &[f64]| {
+            let samples = Samples::Rounds {
+                adapter: adapter.to_vec(),
+                wall: wall.to_vec(),
+                processors: Vec::new(),
+            };
+            fault_of(&[Reading::exact(&COMPACTION_NS, 1.0).with_samples(samples)])
+        };
+        assert_eq!(rounds(&[1.0, 2.0], &[1.0, 2.0]), None);
+        assert_eq!(rounds(&[1.0, 2.0], &[]), None);
+        assert!(rounds(&[1.0, 2.0], &[1.0]).is_some());
+        assert!(rounds(&[1.0, -2.0], &[]).is_some());
     }
 }

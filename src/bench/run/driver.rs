@@ -7,7 +7,7 @@ use super::session::{Session, content_hash};
 use crate::timing::{Measured, Samples, interleave};
 use raystone_config::{Axis, Cell};
 use raystone_gpu::GpuError;
-use raystone_record::{Body, Key, Line, MeasuredRecord, Outcome, Ran, Reading};
+use raystone_record::{Body, Key, Line, MeasuredRecord, Outcome, Ran, Reading, fault_of};
 
 /// A cell that is ready.
 struct Ready<'a> {
@@ -66,10 +66,26 @@ pub(super) fn run(
         }
     };
     for (Ready { cell, item }, samples) in ready.iter().zip(samples) {
-        let readings = samples.and_then(|samples| item.readings(samples));
+        let samples = match samples {
+            Err(Absent::Refused(reason)) => {
+                session.write_refused(measurement.unit_name(cell), reason)?;
+                continue;
+            }
+            Err(Absent::Failed(reason)) => Err(reason),
+            Ok(samples) => Ok(samples),
+        };
+        let readings = samples.and_then(|samples| sound(item.readings(samples)?));
         write(session, measurement, at, (cell, readings))?;
     }
     Ok(())
+}
+
+/// The readings, unless a record of them could not be read again.
+fn sound(readings: Vec<Reading>) -> Result<Vec<Reading>, String> {
+    match fault_of(&readings) {
+        Some(fault) => Err(fault),
+        None => Ok(readings),
+    }
 }
 
 /// Seconds of one of the steps of a cell: it is made ready, warmed up, and timed in each round.
@@ -82,8 +98,8 @@ fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 
     }
 }
 
-/// Samples of each thing that is timed of a cell, or what went wrong.
-type Timed = Result<Vec<Samples>, String>;
+/// Samples of each thing that is timed of a cell, or why there are none.
+type Timed = Result<Vec<Samples>, Absent>;
 
 /// Samples of each cell, or what went wrong; if the device is gone, the place of the cell that was being timed.
 fn time(
@@ -113,8 +129,7 @@ fn time(
     let mut samples = samples.into_iter();
     let own = |own: Vec<&dyn Measured>| {
         let own = samples.by_ref().take(own.len());
-        own.map(|one| one.map_err(|error| error.to_string()))
-            .collect()
+        own.map(|one| one.map_err(Absent::from)).collect()
     };
     Ok(of_cells.into_iter().map(own).collect())
 }
