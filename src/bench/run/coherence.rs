@@ -2,7 +2,7 @@
 
 use super::images::Estimator;
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use super::structures::Gated;
 use super::times::Times;
 use super::world::World;
@@ -13,7 +13,7 @@ use crate::coherence::{
 use raystone_accel::{BuildLog, CpuTwin};
 use raystone_config::{Axis, Cell, Coherence, Experiment, Plan};
 use raystone_record::{
-    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, by_group,
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Ran, by_group,
 };
 use raystone_verify::path_oracle::{self, PathOracle};
 use raystone_verify::rays::RaySet;
@@ -83,7 +83,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         return Ok(());
     }
     let mut known = Known {
-        oracle: (session.clock).time("coherence", || PathOracle::new(&world.scene)),
+        oracle: session.clock.time("coherence", || {
+            PathOracle::knowing(&world.scene, &session.registries.kinds)
+        }),
         rays: BTreeMap::new(),
     };
     for structure in gated {
@@ -115,14 +117,15 @@ fn write(
     cell: &Cell,
     record: CoherenceRecord,
 ) -> Result<(), RunError> {
-    let line = Line::new(Key::from(cell), Ran::default(), record);
-    let settings = format!("{:?}", line.body.settings);
-    let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
-    session
-        .recorder
-        .write(&line.hashed(&hash).with_body(Body::Coherence))?;
     session.progress.add(MODEL_SECONDS);
-    session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
+    let settings = format!("{:?}", record.settings);
+    let end = End {
+        scene: &world.scene.hash,
+        of: &[("coherence", &settings)],
+        ..End::default()
+    };
+    let line = Line::new(Key::from(cell), Ran::default(), Body::Coherence(record));
+    session.conclude(&name(cell), line, end)
 }
 
 /// Each cell of a structure, or why there is nothing to say of it.

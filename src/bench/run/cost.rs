@@ -104,8 +104,10 @@ impl Mul<f64> for Work {
 /// The expected work of a plan and of its steps.
 #[derive(Clone)]
 pub struct Cost<'a> {
-    pub(super) experiment: &'a Experiment,
-    pub(super) plan: &'a Plan,
+    /// The experiment.
+    pub experiment: &'a Experiment,
+    /// Its plan.
+    pub plan: &'a Plan,
     /// Rays of a sample by label of the integrator.
     rays_per_sample: BTreeMap<&'a str, f64>,
     /// Size of the model's file by name of the scene.

@@ -9,7 +9,7 @@ use raystone_core::params::{Params, Variant};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_render::{RayOffset, RenderJob, Renderer, Stage, StageError};
 use raystone_sampling::Sampler;
-use raystone_verify::known_images::{KnownImage, SIZE, Seen, known_images, look, most_samples};
+use raystone_verify::known_images::{KnownImage, SIZE, Seen, known_images_of, look, most_samples};
 use std::path::Path;
 
 /// The structure through which rays go, and the pair that draws the numbers.
@@ -38,7 +38,7 @@ pub fn verify_images(
     let loaded = Kernels::load(std::slice::from_ref(&kernels), registries)?;
     let device = Device::open(options, &loaded)?;
     let gpu = device.of(&kernels)?;
-    let images = known_images().map_err(input)?;
+    let images = known_images_of(&registries.kinds).map_err(input)?;
     let images: Vec<_> = images.iter().filter(|image| only(image.name)).collect();
     // A driver compiles on one core.
     let seen = images.par_iter().map(|image| {

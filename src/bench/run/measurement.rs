@@ -111,6 +111,8 @@ pub struct At<'a> {
     pub stage: Option<&'a Stage>,
     pub(super) device: &'a Device,
     pub(super) gated: &'a [Gated],
+    /// Structures that the driver refused, each with the reason.
+    pub(super) refused: Vec<(Cell, String)>,
 }
 
 impl At<'_> {
@@ -126,11 +128,16 @@ impl At<'_> {
     /// The structure of a cell on the device.
     ///
     /// # Errors
-    /// It did not pass its gate.
+    /// The driver refused it, or it did not pass its gate.
     pub fn traced(&self, cell: &Cell) -> Result<&Traced, Absent> {
         let structure = self.gated.iter().find(|gated| cell.is_on(&gated.cell));
-        let failed = || Absent::Failed("its structure did not pass the gate".to_owned());
-        structure.map(|gated| &gated.traced).ok_or_else(failed)
+        let absent = || {
+            let mut refused = self.refused.iter();
+            let refused = refused.find(|(structure, _)| cell.is_on(structure));
+            let failed = || Absent::Failed("its structure did not pass the gate".to_owned());
+            refused.map_or_else(failed, |(_, reason)| Absent::Refused(reason.clone()))
+        };
+        structure.map(|gated| &gated.traced).ok_or_else(absent)
     }
 }
 

@@ -339,6 +339,7 @@ fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
         stage: None,
         device,
         gated: &[],
+        refused: Vec::new(),
     };
     for entry in session.registries.measurements.entries() {
         match entry.run {
@@ -416,6 +417,7 @@ fn run_world(
         stage: Some(&world.stage),
         device,
         gated: &gated,
+        refused: session.ledger.refused_structures(session.plan),
     };
     for entry in session.registries.measurements.entries() {
         session.go_on()?;

@@ -1,7 +1,7 @@
 //! Ray casters of others, traced in the rounds of the structures.
 
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use super::structures::Structures;
 use super::world::World;
 use super::{Cost, RunError, Work};
@@ -9,7 +9,7 @@ use crate::peers::{BuiltPeer, PeerBatch};
 use crate::timing::{Measured, Samples, Watch, millions_per_second};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError};
-use raystone_record::{Body, Key, Line, Outcome, PeerRecord, PeerTiming, Ran};
+use raystone_record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
 use raystone_verify::peer_judge::differences;
 use raystone_verify::rays::RaySet;
 
@@ -186,17 +186,14 @@ pub(super) fn write(
         if record.failure.is_some() || record.absent.is_some() {
             record.timings.clear();
         }
-        let line = Line::new(Key::from(&one.cell), Ran::default(), record);
-        let hash = content_hash(&line, &world.scene.hash, &[]);
-        let failure = line.body.failure.clone();
-        session
-            .recorder
-            .write(&line.hashed(&hash).with_body(Body::Peer))?;
-        let ended = match &failure {
-            Some(reason) => (Outcome::Failed, reason.as_str()),
-            None => (Outcome::Done, ""),
+        let end = End {
+            failure: record.failure.clone(),
+            scene: &world.scene.hash,
+            shared: &["peers"],
+            ..End::default()
         };
-        session.close(&one.cell.to_string(), ended, vec![hash], &["peers"])?;
+        let line = Line::new(Key::from(&one.cell), Ran::default(), Body::Peer(record));
+        session.conclude(&one.cell.to_string(), line, end)?;
     }
     Ok(())
 }

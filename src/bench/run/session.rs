@@ -73,6 +73,21 @@ pub(super) struct Session<'a> {
     pub reference_file: Option<ReferenceFile>,
 }
 
+/// How a unit ends.
+#[derive(Default)]
+pub(super) struct End<'a> {
+    /// Why it failed, if it did.
+    pub failure: Option<String>,
+    /// Hash of its scene; empty if it has none.
+    pub scene: &'a str,
+    /// What else its figures depend on, by name.
+    pub of: &'a [(&'a str, &'a str)],
+    /// Hashes of further lines that belong to it.
+    pub lines: Vec<String>,
+    /// Kernels that were noted for these names count for it, too.
+    pub shared: &'a [&'a str],
+}
+
 /// What was checked once for several cells.
 #[derive(Default)]
 pub(super) struct Checked {
@@ -195,6 +210,19 @@ impl<'a> Session<'a> {
                 self.ledger.finish(unit.name.clone());
             }
         }
+    }
+
+    /// Writes the line of a unit, with the hash of all that its figures depend on, and closes the unit.
+    pub(super) fn conclude(&mut self, unit: &str, line: Line, end: End) -> Result<(), RunError> {
+        let hash = content_hash(&line, end.scene, end.of);
+        self.recorder.write(&line.hashed(&hash))?;
+        self.ledger.failed += usize::from(end.failure.is_some());
+        let outcome = match &end.failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        let lines = [hash].into_iter().chain(end.lines).collect();
+        self.close(unit, outcome, lines, end.shared)
     }
 
     /// A unit ended, and all its lines are written: those of these hashes. What was noted for `shared` counts for it, too.

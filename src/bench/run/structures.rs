@@ -1,7 +1,7 @@
 //! Structures: build, validate, gate; what passes is timed, counted and drawn.
 
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use super::structure_times::{draw_heat_maps, time_all};
 use super::world::World;
 use super::{Cost, RunError, Unit, Work, errors, peers};
@@ -11,7 +11,7 @@ use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Tr
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
-use raystone_record::{Body, GateVerdict, Key, Line, Outcome, Ran, StructureRecord};
+use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
 use std::time::Instant;
 
@@ -292,7 +292,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
                 runtime_checks: !outcome.record.ran.unchecked,
                 traced,
                 speed: 0.0,
-                record: hashed(world, outcome.record),
+                record: outcome.record,
                 cell,
                 costs: Vec::new(),
             }),
@@ -320,11 +320,13 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         }
     }
     for structure in &timed {
-        session
-            .recorder
-            .write(&structure.record.clone().with_body(Body::Structure))?;
-        let lines = vec![structure.record.hash.clone()];
-        session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
+        conclude(
+            session,
+            world,
+            &structure.cell,
+            structure.record.clone(),
+            None,
+        )?;
     }
     usable.append(&mut timed);
     Ok(usable)
@@ -354,9 +356,19 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
     !gated.iter().any(serves) && open.any(needs)
 }
 
-fn hashed(world: &World, record: Line<StructureRecord>) -> Line<StructureRecord> {
-    let hash = content_hash(&record, &world.scene.hash, &[]);
-    record.hashed(hash)
+fn conclude(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    record: Line<StructureRecord>,
+    failure: Option<String>,
+) -> Result<(), RunError> {
+    let end = End {
+        failure,
+        scene: &world.scene.hash,
+        ..End::default()
+    };
+    session.conclude(&cell.to_string(), record.with_body(Body::Structure), end)
 }
 
 pub(super) fn write_failed(
@@ -365,14 +377,9 @@ pub(super) fn write_failed(
     cell: &Cell,
     record: Line<StructureRecord>,
 ) -> Result<(), RunError> {
-    if record.body.refused {
-        return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
-    }
-    session.ledger.failed += 1;
     let reason = record.body.failure.clone().unwrap_or_default();
-    let record = hashed(world, record);
-    let lines = vec![record.hash.clone()];
-    session.recorder.write(&record.with_body(Body::Structure))?;
-    let failed = (Outcome::Failed, &*reason);
-    session.close(&cell.to_string(), failed, lines, &[])
+    if record.body.refused {
+        return session.write_refused(cell.to_string(), reason);
+    }
+    conclude(session, world, cell, record, Some(reason))
 }

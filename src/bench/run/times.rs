@@ -5,14 +5,13 @@ use super::errors::image_hash;
 use super::images::{self, Estimator};
 use super::measurement::Measurement;
 use super::paths;
-use super::session::{Session, content_hash};
+use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
 use super::{Cost, Fault, RunError, Work};
 use crate::timing::{Measured, Samples, Watch, interleave};
 use raystone_accel::Space;
 use raystone_config::{Axis, Cell, Experiment, Plan};
-use raystone_core::text::cell_hash;
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use raystone_record::{Body, Key, Line, Outcome, Ran, TimeRecord};
 use raystone_render::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
@@ -210,26 +209,16 @@ fn write(
     item: &Timed,
     record: Line<TimeRecord>,
 ) -> Result<(), RunError> {
-    let device = format!("{:?}", world.gpu.info);
-    let hash = content_hash(&record, &world.scene.hash, &[("device", &device)]);
-    let failure = record.body.failure.clone();
-    session.ledger.failed += usize::from(failure.is_some());
-    session
-        .recorder
-        .write(&record.hashed(&hash).with_body(Body::Time))?;
-    let ended = match &failure {
-        Some(reason) => (Outcome::Failed, reason.as_str()),
-        None => (Outcome::Done, ""),
+    let checked = &session.checked.integrator_lines;
+    let checked = checked.get(&paths::key(world, &item.cell)).cloned();
+    let end = End {
+        failure: record.body.failure.clone(),
+        scene: &world.scene.hash,
+        of: &[("device", &format!("{:?}", world.gpu.info))],
+        lines: checked.into_iter().collect(),
+        ..End::default()
     };
-    let mut lines = vec![hash];
-    lines.extend(
-        session
-            .checked
-            .integrator_lines
-            .get(&paths::key(world, &item.cell))
-            .cloned(),
-    );
-    session.close(&item.cell.to_string(), ended, lines, &[])
+    session.conclude(&item.cell.to_string(), record.with_body(Body::Time), end)
 }
 
 /// Why the driver cannot run the structure of a cell, if that is so.
@@ -437,7 +426,7 @@ fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunErr
     session.ledger.failed += 1;
     let record = empty_record(session, cell, reason.clone());
     let name = cell.to_string();
-    let hash = cell_hash(&[("failed", &name), ("reason", &reason)]);
+    let hash = failure_hash(&name, &reason);
     session
         .recorder
         .write(&record.hashed(&hash).with_body(Body::Time))?;
