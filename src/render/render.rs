@@ -76,6 +76,7 @@ struct Band {
 }
 
 /// A compiled job on one scene and structure.
+// Many fields: one for each buffer and pass that lives as long as the job.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
     player: Player,

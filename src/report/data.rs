@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Deref;
 
 /// Everything a run recorded.
+// Many fields: one for each kind of line.
 #[derive(Debug, Default)]
 pub struct RunData<'a> {
     /// First line, if it was written.
@@ -226,63 +227,7 @@ impl<'a> RunData<'a> {
             by_line: cells_of(lines),
             ..Self::default()
         };
-        for line in lines {
-            match &line.body {
-                Body::Run(record) => {
-                    // The ends of runs before are none of this one, which went on with them.
-                    (data.run, data.finished, data.interrupted) = (Some(record), None, None);
-                }
-                Body::Finished(record) => data.finished = Some(record),
-                Body::Interrupted(record) => data.interrupted = Some(record),
-                Body::Warning(record) => data.warnings.push(record),
-                Body::Skipped(record) => data.skipped.push(record),
-                Body::Failed(record) => data.failed.push(record),
-                Body::Stream(record) => put(&mut data.streams, line.of(record), |a, b| {
-                    a.key == b.key && a.dimensions == b.dimensions
-                }),
-                Body::Measured(record) => put(&mut data.measured, line.of(record), |a, b| {
-                    a.key == b.key && a.measurement == b.measurement
-                }),
-                Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
-                Body::Bias(record) => data.sampler(&line.key).bias = Some(record.clone()),
-                Body::Scene(record) => {
-                    data.scene(line.key.label(axis::SCENE)).record = Some(record)
-                }
-                Body::Animation(record) => {
-                    let measured = data.of_structure(line, record);
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.animations, measured, |a, b| a.key == b.key)
-                }
-                Body::Structure(record) => {
-                    let measured = data.of_structure(line, record);
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.structures, measured, |a, b| a.key == b.key)
-                }
-                Body::Peer(record) => {
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
-                }
-                Body::Reference(_) | Body::Kernels(_) => {}
-                Body::Cell(record) => {
-                    data.cells.insert(&record.unit, record);
-                }
-                Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
-                Body::Time(record) => {
-                    let measured = data.of_cell(line, record);
-                    let view = data.view(&line.key);
-                    put(&mut view.times, measured, |a, b| a.key == b.key);
-                }
-                Body::Coherence(record) => {
-                    let measured = data.of_cell(line, record);
-                    let view = data.view(&line.key);
-                    put(&mut view.coherence, measured, |a, b| a.key == b.key);
-                }
-                Body::Error(record) => {
-                    let replicates = &mut data.sampler(&line.key).replicates;
-                    put(replicates, record, |a, b| a.replicate == b.replicate);
-                }
-            }
-        }
+        lines.iter().for_each(|line| data.add(line));
         for reference in all_of(lines) {
             data.refer_to(reference);
         }
@@ -290,6 +235,63 @@ impl<'a> RunData<'a> {
         data.name_competitors();
         data.judge_biases_together();
         data
+    }
+
+    /// Puts one line in its place.
+    fn add(&mut self, line: &'a Line) {
+        match &line.body {
+            Body::Run(record) => {
+                // The ends of runs before are none of this one, which went on with them.
+                (self.run, self.finished, self.interrupted) = (Some(record), None, None);
+            }
+            Body::Finished(record) => self.finished = Some(record),
+            Body::Interrupted(record) => self.interrupted = Some(record),
+            Body::Warning(record) => self.warnings.push(record),
+            Body::Skipped(record) => self.skipped.push(record),
+            Body::Failed(record) => self.failed.push(record),
+            Body::Stream(record) => put(&mut self.streams, line.of(record), |a, b| {
+                a.key == b.key && a.dimensions == b.dimensions
+            }),
+            Body::Measured(record) => put(&mut self.measured, line.of(record), |a, b| {
+                a.key == b.key && a.measurement == b.measurement
+            }),
+            Body::Spectrum(record) => self.sampler(&line.key).spectrum = Some(record),
+            Body::Bias(record) => self.sampler(&line.key).bias = Some(record.clone()),
+            Body::Scene(record) => self.scene(line.key.label(axis::SCENE)).record = Some(record),
+            Body::Animation(record) => {
+                let measured = self.of_structure(line, record);
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.animations, measured, |a, b| a.key == b.key)
+            }
+            Body::Structure(record) => {
+                let measured = self.of_structure(line, record);
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.structures, measured, |a, b| a.key == b.key)
+            }
+            Body::Peer(record) => {
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
+            }
+            Body::Reference(_) | Body::Kernels(_) => {}
+            Body::Cell(record) => {
+                self.cells.insert(&record.unit, record);
+            }
+            Body::Paths(record) => put(&mut self.paths, line.of(record), |a, b| a.key == b.key),
+            Body::Time(record) => {
+                let measured = self.of_cell(line, record);
+                let view = self.view(&line.key);
+                put(&mut view.times, measured, |a, b| a.key == b.key);
+            }
+            Body::Coherence(record) => {
+                let measured = self.of_cell(line, record);
+                let view = self.view(&line.key);
+                put(&mut view.coherence, measured, |a, b| a.key == b.key);
+            }
+            Body::Error(record) => {
+                let replicates = &mut self.sampler(&line.key).replicates;
+                put(replicates, record, |a, b| a.replicate == b.replicate);
+            }
+        }
     }
 
     /// What was measured of a structure alone.

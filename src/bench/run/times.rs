@@ -281,28 +281,24 @@ fn finish(
     }
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
-    let (counted, first) = match shared.get(&key) {
-        Some(known) => known.clone(),
-        None => {
-            let structure = structure.ok_or("its structure is gone")?;
-            let (counted, mut image) = count_rays(session, world, structure, item)?;
-            if !world.probe.is_exact() {
-                // Another kernel, and so rounded otherwise.
-                image.clone_from(&hash);
-            }
-            shared.insert(key, (counted.clone(), image.clone()));
-            (counted, image)
-        }
-    };
+    if !shared.contains_key(&key) {
+        let structure = structure.ok_or("its structure is gone")?;
+        let (counted, image) = count_rays(session, world, structure, item)?;
+        // Another kernel: on an adapter that is not exact it rounds otherwise.
+        let image = if world.probe.is_exact() {
+            image
+        } else {
+            hash.clone()
+        };
+        shared.insert(key.clone(), (counted, image));
+    }
+    let (counted, first) = shared[&key].clone();
     let rays = counted.rays;
     let total: u64 = rays[..TRACED_CLASSES].iter().sum();
     let spp = f64::from(item.spp);
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
-    let rates: Vec<f64> = samples
-        .ms
-        .iter()
-        .map(|ms| total as f64 / ms * 1e-3)
-        .collect();
+    let rate = |ms: &f64| total as f64 / ms * 1e-3;
+    let rates: Vec<f64> = samples.ms.iter().map(rate).collect();
     let equal = hash == first;
     let mut faults: Vec<String> = item.watch.fault().into_iter().collect();
     if !equal && world.probe.is_exact() {

@@ -87,6 +87,10 @@ impl Surface<'_> {
     }
 }
 
+fn sign(is_positive: bool) -> f64 {
+    if is_positive { 1.0 } else { -1.0 }
+}
+
 impl PathOracle<'_> {
     pub(super) fn surface(
         &self,
@@ -104,16 +108,10 @@ impl PathOracle<'_> {
         // The rounding of a thin triangle's normal is that of its edges against its height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
-        let front = match self.scene.is_mirrored(hit.triangle as usize) {
-            true => -1.0,
-            false => 1.0,
-        };
+        let front = sign(!self.scene.is_mirrored(hit.triangle as usize));
         let outward = front * outward.normalize();
         let out = -segment.direction;
-        let side = match outward.dot(out) > 0.0 {
-            true => 1.0,
-            false => -1.0,
-        };
+        let side = sign(outward.dot(out) > 0.0);
         let id = self.scene.material_ids[hit.triangle as usize];
         let material = &self.scene.materials[id as usize];
         // The weights of a triangle that is thin, or small where coordinates are large, err by that of the point against its height.
@@ -131,15 +129,11 @@ impl PathOracle<'_> {
         let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
         let geometric = side * outward;
         let mut normal = self.vertex_normal(hit.triangle, weights, outward);
-        let turn = if normal.dot(geometric) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let turn = normal.dot(geometric) < 0.0;
         if let Some(used) = bent.filter(|_| self.textures.are_mapped()) {
             normal = self.textures.bent(used, hit.triangle, uv, normal);
         }
-        normal *= turn;
+        normal *= sign(!turn);
         if normal.dot(out) <= 0.0 {
             normal = geometric;
         }
