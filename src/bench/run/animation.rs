@@ -1,10 +1,11 @@
 //! Structures from frame to frame of a moving scene, where the experiment asks for it.
 
+use super::cost::{Cost, Work};
+use super::error::RunError;
 use super::measurement::Measurement;
 use super::session::{End, Session};
 use super::structures::{Gated, Structures, image_settings};
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::animation::{Actor, Frame, moved, take_over};
 use raystone_config::{Animation, Axis, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;

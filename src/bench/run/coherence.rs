@@ -1,12 +1,13 @@
 //! Coherence of full cells: the rays of some pixels, through the twins of the structures, on the model's machine.
 
+use super::cost::{Cost, Work};
+use super::error::RunError;
 use super::images::Estimator;
 use super::measurement::Measurement;
 use super::session::{End, Session};
 use super::structures::Gated;
 use super::times::Times;
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::coherence::{
     Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run_groups, together,
 };

@@ -1,7 +1,7 @@
 //! Measurements that are carried out cell by cell: what is done already is passed over, the rest is made ready and checked one by
 //! one, timed in the same rounds, and written.
 
-use super::RunError;
+use super::error::RunError;
 use super::measurement::{Absent, At, Measurement, Prepared};
 use super::session::{End, Session};
 use crate::timing::{Measured, Samples, interleave};

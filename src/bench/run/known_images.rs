@@ -1,7 +1,9 @@
 //! Known images through the kernels, for `raystone verify --images`.
 
-use super::kernels::Device;
-use super::{Kernels, Registries, RunError, RunOptions};
+use super::error::RunError;
+use super::kernels::Kernels;
+use super::options::RunOptions;
+use super::registries::Registries;
 use rayon::prelude::*;
 use raystone_accel::Intersection;
 use raystone_config::Axis;
@@ -36,7 +38,7 @@ pub fn verify_images(
         params: Params::default(),
     };
     let loaded = Kernels::load(std::slice::from_ref(&kernels), registries)?;
-    let device = Device::open(options, &loaded)?;
+    let device = loaded.open(options)?;
     let gpu = device.of(&kernels)?;
     let images = known_images_of(&registries.kinds).map_err(input)?;
     let images: Vec<_> = images.iter().filter(|image| only(image.name)).collect();

@@ -1,6 +1,7 @@
 //! The units of a run: which are done, which are left, and how they ended.
 
-use super::measurement::{Measurement, Unit};
+use super::measurement::Measurement;
+use super::units::Unit;
 use raystone_config::{Cell, Plan};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;

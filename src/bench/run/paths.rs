@@ -1,8 +1,8 @@
 //! The gate of integrators: single paths against the oracle for images, before anything is rendered with them.
 
+use super::error::{Fault, RunError};
 use super::session::{Session, content_hash};
 use super::world::World;
-use super::{Fault, RunError};
 use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{Params, Variant};

@@ -1,10 +1,11 @@
 //! Ray casters of others, traced in the rounds of the structures.
 
-use super::measurement::Measurement;
+use super::cost::{Cost, Work};
+use super::error::RunError;
+use super::measurement::{Measurement, Through};
 use super::session::{End, Session};
 use super::structures::Structures;
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::peers::{BuiltPeer, PeerBatch};
 use crate::timing::{Measured, Samples, Watch, millions_per_second};
 use raystone_config::{Axis, Cell, Experiment, Plan};
@@ -13,15 +14,12 @@ use raystone_record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
 use raystone_verify::peer_judge::differences;
 use raystone_verify::rays::RaySet;
 
-/// Name of the measurement in records.
-pub(super) const NAME: &str = "peer";
-
 /// Speed of external tracers.
 pub(super) struct Peers;
 
 impl Measurement for Peers {
     fn name(&self) -> &'static str {
-        NAME
+        "peer"
     }
 
     fn plural(&self) -> &'static str {
@@ -46,6 +44,10 @@ impl Measurement for Peers {
 
     fn cost(&self, _: &Cell, cost: &Cost) -> Work {
         cost.timed(Work::rays(cost.experiment.timing.rays)) * cost.ray_classes()
+    }
+
+    fn through(&self) -> Through {
+        Through::None
     }
 }
 

@@ -1,10 +1,11 @@
 //! What a run writes: lines, the log, images, and of which kernels and inputs each cell was made.
 
+use super::error::RunError;
 use super::folder::Folder;
 use super::inputs::{Current, kernel_set};
-use super::measurement::Unit;
+use super::options::RunOptions;
 use super::resume::Earlier;
-use super::{RunError, RunOptions};
+use super::units::Unit;
 use raystone_config::Axis;
 use raystone_core::params::Variant;
 use raystone_gpu::Gpu;

@@ -4,7 +4,7 @@
 //! adapter with its driver, and the program to the byte), and only those of embedded kernels are. A file that is
 //! damaged or cannot be read is rendered anew.
 
-use super::World;
+use super::world::World;
 use raystone_core::atomic::write_atomic;
 use raystone_core::text::cell_hash;
 use raystone_image::Image;

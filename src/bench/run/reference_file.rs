@@ -1,6 +1,6 @@
 //! A reference that is not rendered: the image of another renderer, or of an earlier run.
 
-use super::RunError;
+use super::error::RunError;
 use raystone_config::Experiment;
 use raystone_image::read_linear;
 use raystone_stats::metrics::Reference;

@@ -1,6 +1,6 @@
 //! All registries together.
 
-use super::measurement::MeasurementRegistry;
+use super::units::MeasurementRegistry;
 use crate::compaction::benches;
 use crate::figure_registry::FigureRegistry;
 use crate::peers::PeerRegistry;

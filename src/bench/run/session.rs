@@ -1,13 +1,18 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
+use super::cost::Cost;
+use super::device::Device;
+use super::error::RunError;
 use super::inputs::{Current, place};
-use super::kernels::{Device, Kernels};
+use super::kernels::Kernels;
 use super::ledger::Ledger;
+use super::options::RunOptions;
 use super::progress::Progress;
 use super::recorder::Recorder;
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
-use super::{Cost, RunError, RunOptions, Unit, shards};
+use super::shard::shards;
+use super::units::Unit;
 use crate::environment::{capture, machine_load};
 use raystone_config::{Cell, Experiment, Plan, Skipped};
 use raystone_core::text::cell_hash;
@@ -279,7 +284,7 @@ impl<'a> Session<'a> {
             options,
             clock: Clock::new(),
             progress: Progress::new(options),
-            cost: Cost::new(experiment, plan, registries),
+            cost: Cost::new(experiment, plan, &registries.integrators),
             ledger: Ledger::new(units),
             recorder: Recorder::default(),
             checked: Checked::default(),

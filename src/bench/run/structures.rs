@@ -1,10 +1,12 @@
 //! Structures: build, validate, gate; what passes is timed, counted and drawn.
 
-use super::measurement::Measurement;
+use super::cost::{Cost, Work};
+use super::error::RunError;
+use super::measurement::{Measurement, Through};
 use super::session::{End, Session};
 use super::structure_times::{draw_heat_maps, time_all};
+use super::units::Unit;
 use super::world::World;
-use super::{Cost, RunError, Unit, Work, errors, peers};
 use crate::memory::peak_bytes;
 use raystone_accel::tracer::kernel_hash;
 use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
@@ -338,9 +340,7 @@ fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
         .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    // Samplers are rendered through any structure, peers through none.
-    let apart = [errors::NAME, peers::NAME];
-    open.any(|unit| !apart.contains(&unit.kind()) && unit.cell.is_on(cell))
+    open.any(|unit| unit.measurement.through() == Through::Own && unit.cell.is_on(cell))
 }
 
 /// Whether a sampler that is not measured yet has nothing else to be rendered through. Hits are equal to the bit in
@@ -352,7 +352,9 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
         .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    let needs = |unit: &Unit| unit.kind() == errors::NAME && unit.cell[Axis::Kernels] == *kernels;
+    let needs = |unit: &Unit| {
+        unit.measurement.through() == Through::Any && unit.cell[Axis::Kernels] == *kernels
+    };
     !gated.iter().any(serves) && open.any(needs)
 }
 

@@ -1,6 +1,8 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
+use super::cost::{Cost, Work};
+use super::error::{Fault, RunError};
 use super::errors::image_hash;
 use super::images::{self, Estimator};
 use super::measurement::Measurement;
@@ -8,7 +10,6 @@ use super::paths;
 use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
-use super::{Cost, Fault, RunError, Work};
 use crate::timing::{Measured, Samples, Watch, interleave};
 use raystone_accel::Space;
 use raystone_config::{Axis, Cell, Experiment, Plan};
