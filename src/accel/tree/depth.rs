@@ -1,8 +1,11 @@
 //! A bound on the depth of trees whose builder knows none.
 
 use super::grow::lay_out;
-use super::parameters::SAH_DEPTH;
 use super::{NodeKind, Tree, TreeNode};
+
+/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
+/// `SAH_DEPTH + log2(references) + 1` whatever the input.
+pub(super) const SAH_DEPTH: u32 = 48;
 
 /// Deepest leaf that a tree of so many references may have.
 pub(super) fn depth_limit(references: usize) -> u32 {

@@ -4,9 +4,6 @@ use super::parallel::{self, Method};
 use super::reference::Box3;
 use raystone_core::parameters;
 
-/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
-/// `SAH_DEPTH + log2(references) + 1` whatever the input.
-pub(super) const SAH_DEPTH: u32 = 48;
 /// Most neighbours on either side that clustering looks at, as in the kernel `nearest`.
 pub(super) const LARGEST_RADIUS: u32 = 32;
 /// Most bins on an axis.

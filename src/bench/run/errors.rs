@@ -6,6 +6,7 @@ use super::error::{Fault, RunError};
 use super::images::{self, Estimator, attributes, sampler_label, write_spread};
 use super::measurement::{Measurement, Through};
 use super::paths;
+use super::recorder::image_hash;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash, failure_hash};
 use super::structures::{Gated, image_settings};
@@ -613,13 +614,6 @@ fn bias_record(
         by_design: cell.randomised && !session.registries.is_unbiased(cell),
         verdict,
     })
-}
-
-/// BLAKE3 of the f32 pixels.
-pub(super) fn image_hash(image: &Image) -> String {
-    blake3::hash(bytemuck::cast_slice(&image.pixels))
-        .to_hex()
-        .to_string()
 }
 
 /// Seconds that a replicate of a sampler is expected to take.

@@ -42,6 +42,7 @@ mod structure_times;
 mod structures;
 mod times;
 mod trial;
+mod twins;
 mod units;
 mod words;
 mod world;

@@ -200,7 +200,7 @@ fn parts(
     for number in wanted {
         let folder = session.options.cache.as_ref();
         let name = format!("{hash}, part {number}");
-        let place = folder.and_then(|folder| Kept::new(folder, world, &name, size));
+        let place = folder.and_then(|folder| Kept::new(folder, world.gpu, &name, size));
         let kept = place.as_ref().and_then(Kept::read);
         let cached = kept.is_some();
         let image = match kept {

@@ -35,7 +35,7 @@ impl ReferenceFile {
                  of the size, or set run.resolution=[{w}, {h}]"
             )));
         }
-        let hash = super::errors::image_hash(&image);
+        let hash = super::recorder::image_hash(&image);
         let reference = Reference::single(image)
             .map_err(|e| RunError::Input(format!("reference {name}: {e}")))?;
         Ok(Some(Self {

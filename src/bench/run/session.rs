@@ -398,6 +398,13 @@ impl<'a> Session<'a> {
         Ok(out.unwrap_or_else(|| self.options.out.clone()))
     }
 
+    /// Timed are the first samples of the set whose error is measured last: how near the rays of
+    /// neighbouring pixels lie may depend on how many there are. So many are in that set.
+    pub(super) fn timed_samples(&self) -> u32 {
+        let experiment = self.experiment;
+        experiment.run.spp.max().max(experiment.timing.spp)
+    }
+
     /// Ends the run here if somebody asked for it.
     pub(super) fn go_on(&self) -> Result<(), RunError> {
         match self.options.interrupt.is_asked() {

@@ -5,6 +5,7 @@ use super::error::RunError;
 use super::measurement::{Measurement, Through};
 use super::session::{End, Session};
 use super::structure_times::{draw_heat_maps, time_all};
+use super::twins::of_recorded_rays;
 use super::units::Unit;
 use super::world::World;
 use crate::memory::peak_bytes;
@@ -316,7 +317,10 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     let mut timed = draw_heat_maps(session, world, timed)?;
     if let Some(settings) = session.experiment.coherence.clone() {
         for structure in &mut timed {
-            let modelled = super::coherence::of_recorded_rays(session, world, structure, &settings);
+            let modelled = {
+                let of = (&structure.cell, structure.traced.space);
+                of_recorded_rays(session, world, of, &settings)
+            };
             // Why there is none is told of its cells.
             structure.record.body.coherence = modelled.ok();
         }

@@ -3,10 +3,10 @@
 
 use super::cost::{Cost, Work};
 use super::error::{Fault, RunError};
-use super::errors::image_hash;
 use super::images::{self, Estimator};
 use super::measurement::Measurement;
 use super::paths;
+use super::recorder::image_hash;
 use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
@@ -229,13 +229,6 @@ fn refusal(session: &Session, cell: &Cell) -> Option<String> {
     session.ledger.refused.get(&structure.to_string()).cloned()
 }
 
-/// Timed are the first samples of the set whose error is measured last: how near the rays of
-/// neighbouring pixels lie may depend on how many there are. So many are in that set.
-pub(super) fn samples(session: &Session) -> u32 {
-    let experiment = &session.experiment;
-    experiment.run.spp.max().max(experiment.timing.spp)
-}
-
 fn renderer<'a>(
     session: &mut Session,
     world: &'a World,
@@ -243,7 +236,7 @@ fn renderer<'a>(
     cell: &Cell,
     checks_and_counts: [bool; 2],
 ) -> Result<Renderer<'a>, String> {
-    let samples = samples(session);
+    let samples = session.timed_samples();
     let seeds = session.experiment.seeds().replicates;
     let estimator = Estimator::new(session, cell, samples)?;
     estimator.renderer(session, world, &structure.traced, &seeds, checks_and_counts)
