@@ -4,7 +4,7 @@ use super::error::Fault;
 use super::errors::{
     Pass, Replicates, add_error, blank_record, check_finite, draw, replicate_s, replicates,
 };
-use super::reference::Yardstick;
+use super::reference::ReferenceImage;
 use super::session::Session;
 use raystone_config::{Cell, StopRule};
 use raystone_image::Image;
@@ -20,7 +20,7 @@ const GROUPS: usize = 2;
 pub(super) fn by_tile(
     session: &mut Session,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
     pass: &Pass,
     line: &impl Fn(Body) -> Line,
     (rule, edge): (StopRule, u32),
@@ -66,7 +66,7 @@ pub(super) fn by_tile(
                 spp: mean,
                 image: image.clone(),
             };
-            add_error(session, cell, yardstick, record, &snapshot, None)?;
+            add_error(session, cell, reference_image, record, &snapshot, None)?;
             check_finite(session, cell, record, line)?;
         }
     }
@@ -77,7 +77,7 @@ pub(super) fn by_tile(
             spp,
             image: image.clone(),
         };
-        draw(session, cell, yardstick, &mut record, &snapshot)?;
+        draw(session, cell, reference_image, &mut record, &snapshot)?;
         session.recorder.write(&line(Body::Error(record)))?;
         session.progress.add(replicate_s(session, cell));
     }

@@ -7,7 +7,7 @@ use super::images::{self, Estimator, attributes, sampler_label, write_spread};
 use super::measurement::{Measurement, Through};
 use super::paths;
 use super::recorder::image_hash;
-use super::reference::{Yardstick, reference, reference_structure};
+use super::reference::{ReferenceImage, reference, reference_structure};
 use super::session::{Session, content_hash, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
@@ -130,7 +130,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Err(reason) => Err(reason.clone().into()),
         };
         match made {
-            Ok(yardstick) => all_errors(session, world, gated, &cells, &yardstick)?,
+            Ok(reference_image) => all_errors(session, world, gated, &cells, &reference_image)?,
             Err(fault) => {
                 let reason = fault.of_cell()?;
                 for cell in cells {
@@ -151,7 +151,7 @@ fn all_errors(
     world: &World,
     gated: &[Gated],
     cells: &[Cell],
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
 ) -> Result<(), RunError> {
     for cell in cells {
         session.go_on()?;
@@ -169,7 +169,7 @@ fn all_errors(
             }
         };
         session.lose_device_on_request(world.gpu, &text);
-        if let Err(fault) = sampler_error(session, world, fastest, cell, yardstick) {
+        if let Err(fault) = sampler_error(session, world, fastest, cell, reference_image) {
             session.write_failure(&text, fault.of_cell()?)?;
         }
         if world.gpu.lost().is_some() {
@@ -237,7 +237,7 @@ fn sampler_error(
     world: &World,
     fastest: &Gated,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
 ) -> Result<(), Fault> {
     session.say(cell.to_string());
     let passes = passes(session, world, fastest, cell)?;
@@ -246,7 +246,7 @@ fn sampler_error(
     kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
-    let reference = image_hash(yardstick.reference.image());
+    let reference = image_hash(reference_image.reference.image());
     let [drawn, camera] = [
         format!(
             "{:?}",
@@ -270,28 +270,33 @@ fn sampler_error(
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
     let by_tile = rule.and_then(|rule| Some((rule, rule.tile?)));
     let replicates = match (rule, by_tile.filter(|_| cell.randomised)) {
-        (_, Some(by_tile)) => {
-            adaptive::by_tile(session, cell, yardstick, single(&passes)?, &line, by_tile)?
-        }
-        (None, _) => all_samples(session, cell, yardstick, &passes, &line)?,
-        (Some(rule), _) => until_met(session, cell, yardstick, &passes, &line, rule)?,
+        (_, Some(by_tile)) => adaptive::by_tile(
+            session,
+            cell,
+            reference_image,
+            single(&passes)?,
+            &line,
+            by_tile,
+        )?,
+        (None, _) => all_samples(session, cell, reference_image, &passes, &line)?,
+        (Some(rule), _) => until_met(session, cell, reference_image, &passes, &line, rule)?,
     };
     let spp = replicates.spp;
     let finals = replicates.images;
     write_spread(session, cell, spp, &finals)?;
-    let bias = bias_record(session, cell, &finals, yardstick)?;
+    let bias = bias_record(session, cell, &finals, reference_image)?;
     session.recorder.write(&line(Body::Bias(bias)))?;
-    let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
+    let spectrum = spectrum_record(session, spp, &finals, reference_image)?;
     session.recorder.write(&line(Body::Spectrum(spectrum)))?;
     let judged = session
         .checked
         .integrator_lines
         .get(&paths::key(world, cell))
         .cloned();
-    let mut lines = vec![hash.clone(), yardstick.line.clone()];
+    let mut lines = vec![hash.clone(), reference_image.line.clone()];
     lines.extend(judged);
     let name = cell.to_string();
-    session.close(&name, (Outcome::Done, ""), lines, &[&yardstick.name])?;
+    session.close(&name, (Outcome::Done, ""), lines, &[&reference_image.name])?;
     Ok(())
 }
 
@@ -323,7 +328,7 @@ pub(super) fn replicates(session: &Session, cell: &Cell) -> Vec<(u32, u32)> {
 fn all_samples(
     session: &mut Session,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
     passes: &[Pass],
     line: &impl Fn(Body) -> Line,
 ) -> Result<Replicates, Fault> {
@@ -339,18 +344,18 @@ fn all_samples(
         let mut record = blank_record(session, cell, (replicate, seed));
         for snapshot in &snapshots {
             let pixels = pixels.entry(snapshot.spp);
-            let pixels = pixels.or_insert_with(|| PixelErrors::new(&yardstick.reference));
+            let pixels = pixels.or_insert_with(|| PixelErrors::new(&reference_image.reference));
             add_error(
                 session,
                 cell,
-                yardstick,
+                reference_image,
                 &mut record,
                 snapshot,
                 Some(pixels),
             )?;
         }
         let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
-        draw(session, cell, yardstick, &mut record, last)?;
+        draw(session, cell, reference_image, &mut record, last)?;
         check_finite(session, cell, &record, line)?;
         session.recorder.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
@@ -367,7 +372,7 @@ fn all_samples(
 fn until_met(
     session: &mut Session,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
     passes: &[Pass],
     line: &impl Fn(Body) -> Line,
     rule: StopRule,
@@ -381,7 +386,7 @@ fn until_met(
     let mut records: Vec<ErrorRecord> = seeds.iter().map(blank).collect();
     let mut last: Vec<Snapshot> = Vec::new();
     for &(pass, spp) in &steps {
-        let mut pixels = PixelErrors::new(&yardstick.reference);
+        let mut pixels = PixelErrors::new(&reference_image.reference);
         for (index, record) in records.iter_mut().enumerate() {
             let before = last.get(index).filter(|_| pass.spps.len() > 1);
             let further = || further_samples(pass, before, spp, record.seed);
@@ -390,7 +395,7 @@ fn until_met(
             add_error(
                 session,
                 cell,
-                yardstick,
+                reference_image,
                 record,
                 &snapshot,
                 Some(&mut pixels),
@@ -408,7 +413,7 @@ fn until_met(
     }
     for (mut record, snapshot) in records.into_iter().zip(&last) {
         record.stop = Some(rule);
-        draw(session, cell, yardstick, &mut record, snapshot)?;
+        draw(session, cell, reference_image, &mut record, snapshot)?;
         session.recorder.write(&line(Body::Error(record)))?;
         session.progress.add(replicate_s(session, cell));
     }
@@ -468,11 +473,11 @@ fn spectrum_record(
     session: &Session,
     spp: u32,
     images: &[Image],
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
 ) -> Result<SpectrumRecord, String> {
     let size = session.experiment.run.resolution.map(|edge| edge as usize);
     let spectrum = |image: &Image| {
-        let error = luminance_error(image, yardstick.reference.image());
+        let error = luminance_error(image, reference_image.reference.image());
         error.map(|error| error_spectrum(&error, size))
     };
     let spectra: Result<Vec<_>, _> = images.iter().map(spectrum).collect();
@@ -517,20 +522,20 @@ pub(super) fn blank_record(
 pub(super) fn add_error(
     session: &Session,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
     record: &mut ErrorRecord,
     snapshot: &Snapshot,
     pixels: Option<&mut PixelErrors>,
 ) -> Result<(), String> {
     let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
     let base_2 = facts.is_ok_and(|facts| facts.base_2);
-    let report = measure(&snapshot.image, &yardstick.reference).map_err(|e| e.to_string())?;
+    let report = measure(&snapshot.image, &reference_image.reference).map_err(|e| e.to_string())?;
     record.non_finite_pixels = record.non_finite_pixels.max(report.non_finite_pixels);
     let tail = match pixels {
         Some(pixels) => {
-            let added = pixels.add(&snapshot.image, &yardstick.reference);
+            let added = pixels.add(&snapshot.image, &reference_image.reference);
             added.map_err(|e| e.to_string())?;
-            pixels.tail(snapshot.spp, yardstick.part_spp)
+            pixels.tail(snapshot.spp, reference_image.part_spp)
         }
         None => None,
     };
@@ -549,7 +554,7 @@ pub(super) fn add_error(
 pub(super) fn draw(
     session: &Session,
     cell: &Cell,
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
     record: &mut ErrorRecord,
     last: &Snapshot,
 ) -> Result<(), Fault> {
@@ -558,7 +563,7 @@ pub(super) fn draw(
     }
     let labels = cell.labels(&IMAGE_AXES);
     let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
-    record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+    record.image = draw("image", &tone_map(&last.image, reference_image.exposure))?;
     let about = attributes(
         &session.options.program,
         cell,
@@ -567,7 +572,7 @@ pub(super) fn draw(
         record.seed,
     );
     session.compared("image", &labels, &last.image, &about)?;
-    let reference = &yardstick.reference;
+    let reference = &reference_image.reference;
     let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
     record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
     Ok(())
@@ -579,17 +584,17 @@ fn bias_record(
     session: &Session,
     cell: &Cell,
     images: &[Image],
-    yardstick: &Yardstick,
+    reference_image: &ReferenceImage,
 ) -> Result<BiasRecord, String> {
     let claims = |s: &Cell| s.randomised && session.registries.is_unbiased(s);
     let tested = session.plan.samplers.iter().filter(|s| claims(s)).count();
     let defaults = BiasOptions::default();
     let options = BiasOptions {
         alpha: defaults.alpha / tested.max(1) as f64,
-        rounding: rounding_bound(session.experiment.run.spp.max()) + yardstick.rounding,
+        rounding: rounding_bound(session.experiment.run.spp.max()) + reference_image.rounding,
         ..defaults
     };
-    let check = check_bias(images, yardstick.reference.parts(), options);
+    let check = check_bias(images, reference_image.reference.parts(), options);
     let check = check.map_err(|e| e.to_string())?;
     let verdict = if cell.randomised {
         check.verdict

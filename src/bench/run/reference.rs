@@ -22,7 +22,7 @@ const REFERENCE_STRUCTURE: &str = "bvh";
 const EVALUATION: f64 = 32.0 * f32::EPSILON as f64;
 
 /// The reference of one integrator and the exposure of all its pictures.
-pub(super) struct Yardstick {
+pub(super) struct ReferenceImage {
     pub reference: Reference,
     /// Samples per pixel of each of its parts; 0 where they are not rendered.
     pub part_spp: u32,
@@ -71,7 +71,7 @@ pub(super) fn reference(
     world: &World,
     traced: &Traced,
     cell: &Cell,
-) -> Result<Yardstick, Fault> {
+) -> Result<ReferenceImage, Fault> {
     session.say(format!("{cell}: reference"));
     let start = Instant::now();
     let cell = at_default_offset(cell);
@@ -242,7 +242,11 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
 }
 
 /// The image of a file: nothing is rendered, and nothing is known of its noise or rounding.
-fn file_reference(session: &mut Session, world: &World, cell: &Cell) -> Result<Yardstick, Fault> {
+fn file_reference(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+) -> Result<ReferenceImage, Fault> {
     let file = session.reference_file.as_ref();
     let file = file.ok_or_else(|| "no reference was read".to_owned())?;
     let part = session.cost.reference_part(cell);
@@ -268,7 +272,7 @@ fn exact_reference(
     world: &World,
     cell: &Cell,
     value: f64,
-) -> Result<Yardstick, Fault> {
+) -> Result<ReferenceImage, Fault> {
     let [width, height] = session.experiment.run.resolution;
     let pixels = vec![[value as f32; 3]; width as usize * height as usize];
     let reference = Image::new(width, height, pixels)
@@ -312,7 +316,7 @@ fn finish_reference(
     mut line: Line<ReferenceRecord>,
     reference: Reference,
     rounding: f64,
-) -> Result<Yardstick, RunError> {
+) -> Result<ReferenceImage, RunError> {
     let exposure = automatic_exposure(reference.image());
     let labels = cell.labels(&[Axis::Scene, Axis::Integrator]);
     let picture = tone_map(reference.image(), exposure);
@@ -337,7 +341,7 @@ fn finish_reference(
             .write(&line.hashed(&hash).with_body(Body::Reference))?;
         session.ledger.finish(done.clone());
     }
-    Ok(Yardstick {
+    Ok(ReferenceImage {
         line: hash,
         name: done,
         part_spp,
