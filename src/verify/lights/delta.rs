@@ -1,4 +1,5 @@
-//! Lights of one direction: points, cones, and light from infinitely far away; of luminaires what they have in common with these.
+//! Delta lights: points, spots and directional lights, and the parts that luminaires share with
+//! them.
 
 use super::ies::candela;
 use super::{LightChecks, LightTwin};
@@ -12,7 +13,7 @@ use raystone_image::Image;
 use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::fmt::Write as _;
 
-/// The row of points.
+/// Point lights.
 pub(super) static POINTS: LightChecks = LightChecks {
     points: || {
         vec![Light::Point {
@@ -23,14 +24,14 @@ pub(super) static POINTS: LightChecks = LightChecks {
     ..LightChecks::new(LIGHT_KINDS[3], LightTwin::Alone(sample), mitsuba)
 };
 
-/// The row of cones.
+/// Spots.
 pub(super) static SPOTS: LightChecks = LightChecks {
     points: spots,
     images,
     ..LightChecks::new(LIGHT_KINDS[4], LightTwin::Alone(sample), spot_in_mitsuba)
 };
 
-/// The row of light from far away.
+/// Directional lights.
 pub(super) static DIRECTIONAL: LightChecks = LightChecks {
     points: || {
         vec![Light::Directional {
@@ -53,10 +54,10 @@ fn spots() -> Vec<Light> {
     vec![spot(0.8, true), spot(-0.9, false)]
 }
 
-/// Distance of what has none.
+/// Distance of lights at infinity.
 pub(super) const FAR: f64 = 1e30;
 
-/// A point of one of these lights, and of luminaires.
+/// A sample of one of these lights or of a luminaire.
 pub(super) fn sample(
     light: &Light,
     from: DVec3,
@@ -128,7 +129,7 @@ pub(super) fn sample(
     })
 }
 
-/// Points and light from far away.
+/// Exports point and directional lights.
 fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
     let (kind, element, place, unit) = match light {
         Light::Directional { direction, .. } => (
@@ -155,10 +156,12 @@ fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), Expor
     Ok(())
 }
 
-/// Width and height of the picture that a spot throws: it fades from the middle to the edge in so many texels.
+/// Width and height of a spot's projected texture; the falloff from centre to edge spans this many
+/// texels.
 const SPOT_EDGE: u32 = 512;
 
-/// Mitsuba's spots fade linearly in the angle; one with a sharp edge throws the picture of how ours do.
+/// Mitsuba's spots fade linearly in the angle, so a sharp-edged one projects a texture of our
+/// falloff.
 fn spot_in_mitsuba(
     export: &mut Export<'_>,
     number: usize,
@@ -218,7 +221,8 @@ fn spot_in_mitsuba(
     Ok(())
 }
 
-/// From a place to a point of the floor: the distance, the cosine there, and that to this axis of a light.
+/// From a position to a floor point: distance, cosine at the floor, and cosine to this axis of a
+/// light.
 fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
     let way = (point - place).as_dvec3();
     let direction = way.normalize();
@@ -226,7 +230,7 @@ fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
     [way.length(), -direction.y, direction.dot(axis)]
 }
 
-/// A point in red, a spot in green, and one without decay in blue.
+/// A point light in red, a spot in green, and one without decay in blue.
 fn images() -> Result<Vec<KnownImage>, SceneError> {
     const POINT: Vec3 = vec3(0.3, 1.5, -0.2);
     const SPOTS: [[Vec3; 2]; 2] = [

@@ -3,7 +3,7 @@
 use super::*;
 use raystone_scene::DIFFUSE;
 
-/// The row.
+/// The checks of diffuse materials.
 pub(crate) static CHECKS: MaterialChecks =
     MaterialChecks::new(&DIFFUSE, |surface| Box::new(Diffuse(surface)), mitsuba);
 

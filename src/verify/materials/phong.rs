@@ -3,7 +3,7 @@
 use super::*;
 use raystone_scene::PHONG;
 
-/// The row.
+/// The checks of Phong materials.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("phong.py"),
     balls,
@@ -58,7 +58,8 @@ impl Bsdf for Phong<'_> {
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
         let towards = rounding.number(direction.dot(self.mirror())).min(1.0);
-        // Behind the plane across the mirror direction there is nothing, also where 0⁰ is 1: exponent 0 is a hemisphere.
+        // Zero behind the plane across the mirror direction, even where 0⁰ is 1: exponent 0 is a
+        // hemisphere.
         let lobe = match towards > 0.0 {
             true => (self.exponent + 1.0) / TAU * towards.powf(self.exponent),
             false => 0.0,
@@ -73,7 +74,7 @@ impl Bsdf for Phong<'_> {
 fn balls() -> Vec<(Option<usize>, Material)> {
     let phong =
         |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
-    // The last is a hemisphere about the mirror direction, which ends at a step.
+    // The last is a hemisphere about the mirror direction, with a hard edge.
     [(0, 3.0), (1, 150.0), (10, 0.0)]
         .map(|(place, exponent)| (Some(place), phong(exponent)))
         .into()
