@@ -155,9 +155,10 @@ impl<'a> EveryTriangle<'a> {
         let masks = self.soup.masks.as_deref();
         // With infinite reciprocals nothing can be said of a slab.
         let bounded = self.soup.intersection.box_test.finite;
-        let line = match bounded {
-            true => Line::new(ray.origin, *inverse, [ray.t_min, hit.t]),
-            false => Line::new([0.0; 3], [0.0; 3], [f32::NEG_INFINITY, f32::INFINITY]),
+        let line = if bounded {
+            Line::new(ray.origin, *inverse, [ray.t_min, hit.t])
+        } else {
+            Line::new([0.0; 3], [0.0; 3], [f32::NEG_INFINITY, f32::INFINITY])
         };
         self.groups.visit(&line, |group| {
             if let Some(block) = self.blocks.get(group) {

@@ -95,9 +95,10 @@ fn enumerate() -> Vec<wgpu::Adapter> {
         Some(asked) => enumerate_among(asked),
         None => {
             let found = enumerate_among(wgpu::Backends::all() - wgpu::Backends::GL);
-            match found.is_empty() {
-                true => enumerate_among(wgpu::Backends::GL),
-                false => found,
+            if found.is_empty() {
+                enumerate_among(wgpu::Backends::GL)
+            } else {
+                found
             }
         }
     }

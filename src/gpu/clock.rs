@@ -33,9 +33,10 @@ impl Elapsed {
     /// # Errors
     /// A clock ran backwards.
     pub fn measured(self) -> Result<Self, GpuError> {
-        match self.backwards {
-            true => Err(GpuError::Clock),
-            false => Ok(self),
+        if self.backwards {
+            Err(GpuError::Clock)
+        } else {
+            Ok(self)
         }
     }
 

@@ -178,9 +178,10 @@ impl KernelLibrary {
 
     /// The name of a module, behind an `@` where it comes from an override folder.
     pub fn marked(&self, name: &str) -> String {
-        match self.overrides(name) {
-            true => format!("@{name}"),
-            false => name.to_owned(),
+        if self.overrides(name) {
+            format!("@{name}")
+        } else {
+            name.to_owned()
         }
     }
 

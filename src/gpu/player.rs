@@ -423,13 +423,14 @@ fn staged_groups(place: usize) -> String {
 
 fn check_groups(gpu: &Gpu, step: &str, groups: [u32; 3]) -> Result<(), GpuError> {
     let limit = gpu.limits.max_compute_workgroups_per_dimension;
-    match groups.iter().any(|n| *n > limit) {
-        true => Err(GpuError::TooManyGroups {
+    if groups.iter().any(|n| *n > limit) {
+        Err(GpuError::TooManyGroups {
             step: step.to_owned(),
             groups,
             limit,
-        }),
-        false => Ok(()),
+        })
+    } else {
+        Ok(())
     }
 }
 

@@ -63,9 +63,10 @@ impl Passes {
             chosen = traced.compose(chosen);
         }
         // A block of a list is a workgroup of its own.
-        let shape = match by_blocks {
-            true => GroupShape::default(),
-            false => traced.workgroup,
+        let shape = if by_blocks {
+            GroupShape::default()
+        } else {
+            traced.workgroup
         };
         let mut chosen = with_sampler(shape.activate(chosen), job.sampler)
             .feature("ray_counts", ray_counts)
@@ -90,9 +91,10 @@ impl Passes {
         bindings
             .buffer("status", status)
             .buffer("sampler_table", &table);
-        let visibility = match job.integrator.facts.is_rasterised {
-            true => Some(Visibility::new(gpu, scene, traced.space, job.size)?),
-            false => None,
+        let visibility = if job.integrator.facts.is_rasterised {
+            Some(Visibility::new(gpu, scene, traced.space, job.size)?)
+        } else {
+            None
         };
         if let Some(visibility) = &visibility {
             visibility.draw(job.camera)?;
@@ -245,17 +247,19 @@ impl<'a> ImageSteps<'a> {
 
     /// Workgroups of 8 × 8 invocations, one for each pixel of the slice.
     pub fn pixels(&self) -> [u32; 3] {
-        match self.by_blocks {
-            true => [self.rows, 1, 1],
-            false => GroupShape::default().over(self.width, self.rows),
+        if self.by_blocks {
+            [self.rows, 1, 1]
+        } else {
+            GroupShape::default().over(self.width, self.rows)
         }
     }
 
     /// The same for kernels with workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT` invocations, which an experiment chooses.
     pub(crate) fn pixel_groups(&self) -> [u32; 3] {
-        match self.by_blocks {
-            true => self.pixels(),
-            false => self.shape().over(self.width, self.rows),
+        if self.by_blocks {
+            self.pixels()
+        } else {
+            self.shape().over(self.width, self.rows)
         }
     }
 

@@ -192,9 +192,10 @@ impl<'a> Renderer<'a> {
             uniform: job_uniform(job, scene),
             passes: Passes::new(gpu, scene, traced, job, &status, [ray_counts, by_blocks])?,
             bands: bands(gpu, job.size)?,
-            chosen: match by_blocks {
-                true => Some(Blocks::all(gpu, job.size)?),
-                false => None,
+            chosen: if by_blocks {
+                Some(Blocks::all(gpu, job.size)?)
+            } else {
+                None
             },
             status,
             done: Cell::new(0),

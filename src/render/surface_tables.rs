@@ -114,9 +114,10 @@ pub(super) fn append(
     // Materials come first: 0 is where neither can begin.
     let place_of = |there: bool, words: &[u32]| if there { words.len() as u32 } else { 0 };
     let first_uv = place_of(features.textures, words);
-    let texels = match features.textures {
-        true => scene.textures.iter().map(|t| t.texels.len()).sum(),
-        false => 0,
+    let texels = if features.textures {
+        scene.textures.iter().map(|t| t.texels.len()).sum()
+    } else {
+        0
     };
     let corners = 6 * scene.uvs.len() + 3 * scene.normals.len() + 6 * scene.colors.len();
     let mirrored = scene.mirrored.len().div_ceil(32);

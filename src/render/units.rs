@@ -15,9 +15,10 @@ pub(super) fn unit_share(units: u32) -> f32 {
 pub(super) fn shared_out(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let alike = vec![1.0; weights.len()];
-    let (weights, total) = match total > 0.0 {
-        true => (weights, total),
-        false => (&alike[..], weights.len() as f64),
+    let (weights, total) = if total > 0.0 {
+        (weights, total)
+    } else {
+        (&alike[..], weights.len() as f64)
     };
     let some = weights.iter().filter(|weight| **weight > 0.0).count() as u32;
     let spare = f64::from(UNITS.saturating_sub(some));

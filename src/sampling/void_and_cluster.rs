@@ -43,9 +43,10 @@ impl Pattern {
             let dx = (i % SIZE + SIZE - x) % SIZE;
             let dy = (i / SIZE + SIZE - y) % SIZE;
             let weight = self.weights[dy * SIZE + dx];
-            *energy = match self.set[pixel] {
-                true => *energy + weight,
-                false => *energy - weight,
+            *energy = if self.set[pixel] {
+                *energy + weight
+            } else {
+                *energy - weight
             };
         }
     }

@@ -215,9 +215,10 @@ fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
     // Without any light the floor is 0 too, and equal values are equal. Unlike `max_element`, this
     // keeps NaN.
     let [r, g, b] = DVec3::select(off.cmpeq(DVec3::ZERO), DVec3::ZERO, relative).to_array();
-    match r.is_nan() || g.is_nan() || b.is_nan() {
-        true => f64::NAN,
-        false => r.max(g).max(b),
+    if r.is_nan() || g.is_nan() || b.is_nan() {
+        f64::NAN
+    } else {
+        r.max(g).max(b)
     }
 }
 

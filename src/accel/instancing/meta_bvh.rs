@@ -201,9 +201,10 @@ impl Upper for Instances {
         let top = &self.top;
         let (nodes, objects) = (base.forest.nodes.len(), base.forest.stack_entries());
         // Nested loops have a stack each, of the same size.
-        let (kernel, stack_entries) = match self.nested {
-            true => ("accel/meta_bvh_nested", objects.max(top.levels())),
-            false => ("accel/meta_bvh", objects + top.levels()),
+        let (kernel, stack_entries) = if self.nested {
+            ("accel/meta_bvh_nested", objects.max(top.levels()))
+        } else {
+            ("accel/meta_bvh", objects + top.levels())
         };
         Layout {
             kernel,
@@ -230,9 +231,10 @@ impl Upper for Instances {
 
     fn trace(&self, base: &Base, walk: Walk) -> Hit {
         let top = &self.top;
-        match self.nested {
-            true => meta_bvh_nested::trace(Levels { base, top }, walk),
-            false => trace(Levels { base, top }, walk),
+        if self.nested {
+            meta_bvh_nested::trace(Levels { base, top }, walk)
+        } else {
+            trace(Levels { base, top }, walk)
         }
     }
 }

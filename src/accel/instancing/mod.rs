@@ -112,9 +112,10 @@ impl<U: Upper> BuiltAccel for TwoLevel<U> {
     }
 
     fn space(&self) -> Space {
-        match self.base.instances.iter().all(Instance::is_identity) {
-            true => Space::World,
-            false => Space::Instances,
+        if self.base.instances.iter().all(Instance::is_identity) {
+            Space::World
+        } else {
+            Space::Instances
         }
     }
 

@@ -94,18 +94,20 @@ impl ExactTruth {
         let own = ExactCrossing::new(triangle, ray);
         let bounded = Crossing::new(triangle, ray);
         if matches!(own.side, Side::Outside | Side::Parallel) {
-            return match self.hits.is_empty() {
-                true => ExactVerdict::FalseHit {
+            return if self.hits.is_empty() {
+                ExactVerdict::FalseHit {
                     explained: bounded.is_possible(ray),
-                },
-                false => ExactVerdict::WrongTriangle,
+                }
+            } else {
+                ExactVerdict::WrongTriangle
             };
         }
         let slack = slack(&bounded);
         if !own.in_interval {
-            return match near_end(own.t, slack, ray) {
-                true => ExactVerdict::Borderline,
-                false => ExactVerdict::FalseHit { explained: false },
+            return if near_end(own.t, slack, ray) {
+                ExactVerdict::Borderline
+            } else {
+                ExactVerdict::FalseHit { explained: false }
             };
         }
         let nearer = |other: &&Crossed| other.t + other.slack < own.t - slack;

@@ -256,9 +256,12 @@ impl<'a> Scene<'a> {
         let behind = |crossing: &Crossing| {
             (crossing.distance()).is_some_and(|other| other.value - other.error > f64::from(t))
         };
-        self.possible.iter().all(|other| match other.id == id {
-            true => other.is_definite,
-            false => behind(&other.crossing),
+        self.possible.iter().all(|other| {
+            if other.id == id {
+                other.is_definite
+            } else {
+                behind(&other.crossing)
+            }
         })
     }
 

@@ -218,9 +218,10 @@ fn triple(a: Vector, b: Vector, c: Vector) -> Bounded {
     let permanent = dot(magnitude(a), minors);
     Bounded {
         value: dot(a, cross(b, c)),
-        error: match permanent > 0.0 {
-            true => ROUNDINGS * EPSILON * permanent + FLUSHED,
-            false => 0.0,
+        error: if permanent > 0.0 {
+            ROUNDINGS * EPSILON * permanent + FLUSHED
+        } else {
+            0.0
         },
     }
 }

@@ -37,14 +37,16 @@ impl TracePasses for OnePass {
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
         let (ask, gpu) = (steps.tracer.ask, &steps.tracer.gpu);
         let refilled = self.0.applies(ask.coherent, gpu.is_software());
-        let lanes = match refilled {
-            true => self.0.lanes(steps.count, steps.lanes()),
-            false => steps.count,
+        let lanes = if refilled {
+            self.0.lanes(steps.count, steps.lanes())
+        } else {
+            steps.count
         };
         let kernel = Composition::new("integrator/trace_rays").feature("refill", refilled);
-        match refilled {
-            true => steps.run_counted("trace", kernel, steps.groups(lanes), &Bindings::new()),
-            false => steps.run_rays("trace", kernel, &Bindings::new()),
+        if refilled {
+            steps.run_counted("trace", kernel, steps.groups(lanes), &Bindings::new())
+        } else {
+            steps.run_rays("trace", kernel, &Bindings::new())
         }
     }
 }
@@ -133,9 +135,10 @@ impl<'a> TraceSteps<'a> {
     /// Workgroups for a kernel of one dimension with so many invocations.
     pub fn groups(&self, items: u32) -> [u32; 3] {
         let [x, y, z] = grid_of(items.div_ceil(self.lanes()));
-        match x > self.row {
-            true => [self.row, y * x.div_ceil(self.row), z],
-            false => [x, y, z],
+        if x > self.row {
+            [self.row, y * x.div_ceil(self.row), z]
+        } else {
+            [x, y, z]
         }
     }
 

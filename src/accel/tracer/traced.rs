@@ -84,9 +84,10 @@ impl Traced {
             Access::Inline => (true, Arc::new(OnePass(built.refill()))),
             Access::Pipeline(passes) => (false, passes),
         };
-        let workgroup = match inline {
-            true => Workgroup::default().shape(gpu),
-            false => GroupShape::default(),
+        let workgroup = if inline {
+            Workgroup::default().shape(gpu)
+        } else {
+            GroupShape::default()
         };
         Ok(Self {
             active,

@@ -78,9 +78,10 @@ const EDGE_ON: f32 = 5.960_464_5e-8;
 pub(super) fn area_of(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
     let area = w[0] + w[1] + w[2];
     let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
-    match area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
-        true => area,
-        false => 0.0,
+    if area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
+        area
+    } else {
+        0.0
     }
 }
 
@@ -125,9 +126,10 @@ fn step_along([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> Step {
     let is_first = first >= second;
     let along = if is_first { ab } else { ac };
     let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
-    let size = match part.abs() > area * NEGLIGIBLE {
-        true => part,
-        false => 0.0,
+    let size = if part.abs() > area * NEGLIGIBLE {
+        part
+    } else {
+        0.0
     };
     Step {
         is_first,
@@ -174,9 +176,10 @@ impl TriangleTest for Watertight {
         // Not past an end, for what is interpolated.
         let from = if step.is_first { w[1] } else { w[2] };
         let back = step.size.min(from).max(-w[0]);
-        let [u, v] = match step.is_first {
-            true => [w[1] - back, w[2]],
-            false => [w[1], w[2] - back],
+        let [u, v] = if step.is_first {
+            [w[1] - back, w[2]]
+        } else {
+            [w[1], w[2] - back]
         };
         Meeting { area, t, u, v }
     }

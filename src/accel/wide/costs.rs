@@ -138,12 +138,13 @@ impl<'a> Costs<'a> {
 
     /// What a subtree that is one child is: a leaf has its binary root in place of the first triangle.
     pub(super) fn kind(&self, root: u32) -> WideKind {
-        match self.is_leaf(root) {
-            false => WideKind::Node(root),
-            true => WideKind::Leaf {
+        if self.is_leaf(root) {
+            WideKind::Leaf {
                 first: root,
                 count: self.triangles[root as usize],
-            },
+            }
+        } else {
+            WideKind::Node(root)
         }
     }
 

@@ -313,9 +313,10 @@ fn occluded() -> Result<KnownImage, SceneError> {
             ..SHADED
         };
         let point = vec3(x, 0.0, 0.1);
-        let irradiance = match end > -0.5 {
-            true => visible.irradiance(point),
-            false => DVec3::ZERO,
+        let irradiance = if end > -0.5 {
+            visible.irradiance(point)
+        } else {
+            DVec3::ZERO
         };
         views.push(View::new(name, point, NEAR, reflected(irradiance)));
     }

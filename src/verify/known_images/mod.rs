@@ -159,9 +159,10 @@ impl Seen {
 
     /// Radiance relative to which differences of a channel are measured.
     fn scale(&self, channel: usize) -> f64 {
-        match self.expected[channel] > 0.0 {
-            true => self.expected[channel],
-            false => self.expected.max_element().max(1.0) * DARK / SYSTEMATIC,
+        if self.expected[channel] > 0.0 {
+            self.expected[channel]
+        } else {
+            self.expected.max_element().max(1.0) * DARK / SYSTEMATIC
         }
     }
 

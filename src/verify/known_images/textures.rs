@@ -166,9 +166,10 @@ fn pictures() -> Result<KnownImage, SceneError> {
         let id = mesh.material(material);
         sheet(&mut mesh, corner, id);
         for ([u, v], texels) in places {
-            let scale = match is_lamp {
-                true => EMITTED.as_dvec3(),
-                false => TINT.as_dvec3() * STRENGTH / PI,
+            let scale = if is_lamp {
+                EMITTED.as_dvec3()
+            } else {
+                TINT.as_dvec3() * STRENGTH / PI
             };
             let name = format!("{name} at {u} {v}");
             let at = point_of(corner, [*u, *v]);

@@ -93,9 +93,10 @@ impl Aliases {
         let place = value % self.size;
         let (own, alias) = self.parts[part];
         let along = |place: u32, of: u32| (f64::from(place) + 0.5) / f64::from(of);
-        match place < own {
-            true => (part, along(place, own)),
-            false => (alias, along(place - own, self.size - own)),
+        if place < own {
+            (part, along(place, own))
+        } else {
+            (alias, along(place - own, self.size - own))
         }
     }
 }
@@ -150,9 +151,10 @@ impl Map {
     fn place(&self, d: DVec3) -> [f64; 2] {
         let [width, height] = self.size();
         // The poles have no azimuth: they map to the first column, however the map is turned.
-        let around = match d.x == 0.0 && d.z == 0.0 {
-            true => 0.0,
-            false => (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU),
+        let around = if d.x == 0.0 && d.z == 0.0 {
+            0.0
+        } else {
+            (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU)
         };
         let down = d.x.hypot(d.z).atan2(d.y);
         [around / TAU * width, down / PI * height]

@@ -60,9 +60,10 @@ pub(super) fn candela(
 
 /// The angle of (x, y); 0 at the origin for either sign of zero.
 fn angle(y: f64, x: f64) -> f64 {
-    match x == 0.0 && y == 0.0 {
-        true => 0.0,
-        false => y.atan2(x),
+    if x == 0.0 && y == 0.0 {
+        0.0
+    } else {
+        y.atan2(x)
     }
 }
 
@@ -76,9 +77,10 @@ fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
     let x = x.clamp(value(0), value(last));
     let low = (0..last).rev().find(|at| value(*at) <= x).unwrap_or(0);
     let high = (low + 1).min(last);
-    let part = match high > low {
-        true => (x - value(low)) / (value(high) - value(low)),
-        false => 0.0,
+    let part = if high > low {
+        (x - value(low)) / (value(high) - value(low))
+    } else {
+        0.0
     };
     Some([(low, 1.0 - part), (high, part)])
 }

@@ -57,18 +57,20 @@ impl<'a> CookTorrance<'a> {
         }
         let one = |cos: f64| {
             let a = cos / (self.roughness * (1.0 - cos * cos).max(0.0).sqrt());
-            match a < 1.6 {
-                true => (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a),
-                false => 1.0,
+            if a < 1.6 {
+                (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
+            } else {
+                1.0
             }
         };
         one(n_o) * one(n_i)
     }
 
     fn reflectance(&self, cos: f64) -> f64 {
-        match self.is_exact {
-            true => fresnel(cos, 1.0, self.index).map_or(1.0, |(r, _)| r),
-            false => schlick(normal_reflectance(self.index), cos),
+        if self.is_exact {
+            fresnel(cos, 1.0, self.index).map_or(1.0, |(r, _)| r)
+        } else {
+            schlick(normal_reflectance(self.index), cos)
         }
     }
 }
@@ -77,16 +79,15 @@ impl Bsdf for CookTorrance<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
         let normal = self.surface.normal;
-        let direction = match is_diffuse {
-            true => cosine_direction(normal, [u, v]),
-            false => {
-                let tan_2 = -self.roughness * self.roughness * (1.0 - u).ln();
-                let cos = 1.0 / (1.0 + tan_2).sqrt();
-                let radius = cos * tan_2.sqrt();
-                let (sin_phi, cos_phi) = (TAU * v).sin_cos();
-                let facet = around(normal, DVec3::new(radius * cos_phi, radius * sin_phi, cos));
-                mirrored(self.surface.out, facet)
-            }
+        let direction = if is_diffuse {
+            cosine_direction(normal, [u, v])
+        } else {
+            let tan_2 = -self.roughness * self.roughness * (1.0 - u).ln();
+            let cos = 1.0 / (1.0 + tan_2).sqrt();
+            let radius = cos * tan_2.sqrt();
+            let (sin_phi, cos_phi) = (TAU * v).sin_cos();
+            let facet = around(normal, DVec3::new(radius * cos_phi, radius * sin_phi, cos));
+            mirrored(self.surface.out, facet)
         };
         bounce(self, direction, rounding)
     }

@@ -48,9 +48,10 @@ impl Bsdf for Dielectric<'_> {
     fn sample(&self, [u, _]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let surface = self.0;
         let (index, is_thin) = (parameter(surface, 0), parameter(surface, 1) > 0.5);
-        let (from, to) = match is_thin || surface.side > 0.0 {
-            true => (1.0, index),
-            false => (index, 1.0),
+        let (from, to) = if is_thin || surface.side > 0.0 {
+            (1.0, index)
+        } else {
+            (index, 1.0)
         };
         let cos = surface.normal.dot(surface.out).min(1.0);
         let delta = |direction, weight, medium| Bounce {
@@ -61,12 +62,13 @@ impl Bsdf for Dielectric<'_> {
         };
         let passed = fresnel(cos, from, to);
         let reflectance = passed.map_or(1.0, |(exact, beyond)| {
-            let r = match parameter(surface, 2) > 0.5 {
-                false => exact,
-                true => schlick(
+            let r = if parameter(surface, 2) > 0.5 {
+                schlick(
                     normal_reflectance(index),
                     if from > to { beyond } else { cos },
-                ),
+                )
+            } else {
+                exact
             };
             if is_thin { 2.0 * r / (1.0 + r) } else { r }
         });
@@ -185,15 +187,12 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
     let [tint, behind, before] = [TINT, behind, before].map(Vec3::as_dvec3);
     let seen = |name, at: Vec3, from: Vec3, is_thin: bool| {
         let r = closed::fresnel(from.as_dvec3().normalize().z, INDEX.into());
-        let radiance = match is_thin {
-            true => {
-                let both = 2.0 * r / (1.0 + r);
-                (1.0 - both) * tint * behind + both * before
-            }
-            false => {
-                let through = (1.0 - r) / (1.0 + r) * tint * tint;
-                through * behind + r * before + through * r * before
-            }
+        let radiance = if is_thin {
+            let both = 2.0 * r / (1.0 + r);
+            (1.0 - both) * tint * behind + both * before
+        } else {
+            let through = (1.0 - r) / (1.0 + r) * tint * tint;
+            through * behind + r * before + through * r * before
         };
         View::new(name, at, from, radiance)
     };

@@ -38,15 +38,14 @@ impl<'a> Phong<'a> {
 impl Bsdf for Phong<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
-        let direction = match is_diffuse {
-            true => cosine_direction(self.surface.normal, [u, v]),
-            false => {
-                let cos = u.powf(1.0 / (self.exponent + 1.0));
-                let radius = (1.0 - cos * cos).max(0.0).sqrt();
-                let (sin_phi, cos_phi) = (TAU * v).sin_cos();
-                let local = DVec3::new(radius * cos_phi, radius * sin_phi, cos);
-                around(self.mirror(), local)
-            }
+        let direction = if is_diffuse {
+            cosine_direction(self.surface.normal, [u, v])
+        } else {
+            let cos = u.powf(1.0 / (self.exponent + 1.0));
+            let radius = (1.0 - cos * cos).max(0.0).sqrt();
+            let (sin_phi, cos_phi) = (TAU * v).sin_cos();
+            let local = DVec3::new(radius * cos_phi, radius * sin_phi, cos);
+            around(self.mirror(), local)
         };
         bounce(self, direction, rounding)
     }
@@ -60,9 +59,10 @@ impl Bsdf for Phong<'_> {
         let towards = rounding.number(direction.dot(self.mirror())).min(1.0);
         // Zero behind the plane across the mirror direction, even where 0⁰ is 1: exponent 0 is a
         // hemisphere.
-        let lobe = match towards > 0.0 {
-            true => (self.exponent + 1.0) / TAU * towards.powf(self.exponent),
-            false => 0.0,
+        let lobe = if towards > 0.0 {
+            (self.exponent + 1.0) / TAU * towards.powf(self.exponent)
+        } else {
+            0.0
         };
         (cosine > 0.0).then(|| Reflected {
             value: self.surface.base * cosine + self.specular * lobe,

@@ -99,9 +99,10 @@ impl<'a> Principled<'a> {
 impl Bsdf for Principled<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
-        let direction = match is_diffuse {
-            true => cosine_direction(self.surface.normal, [u, v]),
-            false => mirrored(self.surface.out, self.visible_normal([u, v])),
+        let direction = if is_diffuse {
+            cosine_direction(self.surface.normal, [u, v])
+        } else {
+            mirrored(self.surface.out, self.visible_normal([u, v]))
         };
         bounce(self, direction, rounding)
     }

@@ -51,9 +51,10 @@ impl Export<'_> {
         let name = format!("id=\"material-{id}\"");
         let opening = self.mask(scene, id, &name)?;
         // The mask carries the name and wraps the material it cuts.
-        let (id, closing) = match opening {
-            true => (String::new(), "    </bsdf>\n"),
-            false => (name, ""),
+        let (id, closing) = if opening {
+            (String::new(), "    </bsdf>\n")
+        } else {
+            (name, "")
         };
         self.xml += &(kind.mitsuba)(material, &color, &id, &mut self.warnings);
         self.xml += closing;
@@ -283,9 +284,10 @@ fn sky_image(daylight: &Daylight, scale: Vec3) -> Result<Image, ExportError> {
 /// A component of an sRGB texel as linear radiance (IEC 61966-2-1).
 fn decoded(encoded: u8) -> f32 {
     let encoded = f32::from(encoded) / 255.0;
-    match encoded <= 0.04045 {
-        true => encoded / 12.92,
-        false => ((encoded + 0.055) / 1.055).powf(2.4),
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
     }
 }
 

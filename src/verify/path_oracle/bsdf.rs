@@ -111,18 +111,20 @@ pub fn colour(surface: &Surface) -> DVec3 {
 /// `u`.
 pub fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
     let u = rounding.share(u).clamp(0.0, 1.0);
-    match u < p {
-        true => (true, u / p),
-        false => (false, (u - p) / (1.0 - p)),
+    if u < p {
+        (true, u / p)
+    } else {
+        (false, (u - p) / (1.0 - p))
     }
 }
 
 /// Probability of the diffuse lobe beside a specular one of this colour.
 pub fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
     let (base, specular) = (luminance(base), luminance(specular));
-    match base + specular > 0.0 {
-        true => base / (base + specular),
-        false => 1.0,
+    if base + specular > 0.0 {
+        base / (base + specular)
+    } else {
+        1.0
     }
 }
 
@@ -143,9 +145,10 @@ fn across(surface: &Surface, direction: DVec3) -> DVec3 {
 /// it on different sides.
 pub fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
     let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
-    match meant == found {
-        true => direction,
-        false => across(surface, direction),
+    if meant == found {
+        direction
+    } else {
+        across(surface, direction)
     }
 }
 

@@ -191,9 +191,10 @@ impl Strategy {
 impl PathRules {
     fn clamped(&self, depth: u32, light: DVec3) -> DVec3 {
         let greatest = light.max_element();
-        match self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
-            true => light * (self.clamp / greatest),
-            false => light,
+        if self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
+            light * (self.clamp / greatest)
+        } else {
+            light
         }
     }
 }
@@ -235,9 +236,10 @@ impl PathOracle<'_> {
             shift: walk.rounding.texel(),
             ..*ray
         };
-        let class = match walk.vertices.is_empty() {
-            true => CountedRays::Primary,
-            false => CountedRays::Bounce,
+        let class = if walk.vertices.is_empty() {
+            CountedRays::Primary
+        } else {
+            CountedRays::Bounce
         };
         walk.note_ray(class, 0, &seen);
         let met = self.hits.nearest(&seen, &mut walk.rounding);

@@ -138,10 +138,12 @@ impl<'a> Hits<'a> {
         // An order independent of the groups.
         found.sort_by_key(|(hit, _)| hit.triangle);
         found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
-        let before = |a: &Hit, b: &Hit| match (a.distance - b.distance).abs() <= EQUAL * b.distance
-        {
-            true => a.triangle < b.triangle,
-            false => a.distance < b.distance,
+        let before = |a: &Hit, b: &Hit| {
+            if (a.distance - b.distance).abs() <= EQUAL * b.distance {
+                a.triangle < b.triangle
+            } else {
+                a.distance < b.distance
+            }
         };
         let first = found
             .iter()
@@ -159,9 +161,10 @@ impl<'a> Hits<'a> {
                 rounding.distance(hit.distance, blur.of_rounding, blur.most),
             )
         });
-        let met = match is_played {
-            true => played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0,
-            false => first.0,
+        let met = if is_played {
+            played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0
+        } else {
+            first.0
         };
         Some(Nearest {
             hit: met,

@@ -245,9 +245,10 @@ impl<'a> PathOracle<'a> {
     /// 2 if surface colours come from textures, 1 if light comes from a map, otherwise 0.
     pub(crate) fn texturing(&self) -> usize {
         let mut materials = self.scene.materials.iter();
-        match materials.any(|m| m.texture_uses().iter().any(Option::is_some)) {
-            true => 2,
-            false => usize::from(self.lights.have_map()),
+        if materials.any(|m| m.texture_uses().iter().any(Option::is_some)) {
+            2
+        } else {
+            usize::from(self.lights.have_map())
         }
     }
 

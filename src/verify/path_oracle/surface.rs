@@ -103,16 +103,14 @@ impl PathOracle<'_> {
         // The error of a thin triangle's normal scales with edge lengths over height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
-        let front = match self.scene.is_mirrored(hit.triangle as usize) {
-            true => -1.0,
-            false => 1.0,
+        let front = if self.scene.is_mirrored(hit.triangle as usize) {
+            -1.0
+        } else {
+            1.0
         };
         let outward = front * outward.normalize();
         let out = -segment.direction;
-        let side = match outward.dot(out) > 0.0 {
-            true => 1.0,
-            false => -1.0,
-        };
+        let side = if outward.dot(out) > 0.0 { 1.0 } else { -1.0 };
         let id = self.scene.material_ids[hit.triangle as usize];
         let material = &self.scene.materials[id as usize];
         // For a triangle that is thin, or small at large coordinates, weights err by the error of
@@ -154,9 +152,10 @@ impl PathOracle<'_> {
             material,
             base,
             varied: [varied.z, varied.y],
-            emission: match material.emits_both_sides || side > 0.0 {
-                true => emission,
-                false => DVec3::ZERO,
+            emission: if material.emits_both_sides || side > 0.0 {
+                emission
+            } else {
+                DVec3::ZERO
             },
             checks: self.materials[id as usize],
             offset: OFFSET * reach,
@@ -179,9 +178,10 @@ impl PathOracle<'_> {
         };
         let [a, b, c] = words.map(|word| decode_normal(word).unwrap_or(outward));
         let sum = a * (1.0 - u - v) + b * u + c * v;
-        match sum.length_squared() > LEAST_SQUARE {
-            true => sum.normalize(),
-            false => outward,
+        if sum.length_squared() > LEAST_SQUARE {
+            sum.normalize()
+        } else {
+            outward
         }
     }
 }

@@ -13,9 +13,10 @@ pub(crate) struct Textures<'a> {
 /// The linear value of an sRGB component (IEC 61966-2-1).
 fn linear(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 

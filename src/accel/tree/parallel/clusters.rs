@@ -76,9 +76,12 @@ pub(super) fn build(sorted: Sorted, radius: u32) -> LinkedTree {
         let around = |cluster: &u32| nodes[*cluster as usize].around();
         let corners = |OrderedBox { low, high }| [low.map(number), high.map(number)];
         let boxes: Vec<Corners> = clusters.par_iter().map(around).map(corners).collect();
-        let choose = |place: u32| match round < FREE_ROUNDS {
-            true => nearest(&boxes, place, radius),
-            false => next_door(place, count),
+        let choose = |place: u32| {
+            if round < FREE_ROUNDS {
+                nearest(&boxes, place, radius)
+            } else {
+                next_door(place, count)
+            }
         };
         let chosen: Vec<u32> = (0..count).into_par_iter().map(choose).collect();
         let mut next = Vec::with_capacity(clusters.len());

@@ -171,9 +171,10 @@ impl PathOracle<'_> {
             Choice::Tree if !lights.tree(self.scene).is_empty() => {
                 let tree = lights.tree(self.scene);
                 let [each, all] = lights.groups(tree);
-                match light < tree.len() {
-                    true => tree.values(light, all, at, rounding) / UNITS,
-                    false => each / UNITS,
+                if light < tree.len() {
+                    tree.values(light, all, at, rounding) / UNITS
+                } else {
+                    each / UNITS
                 }
             }
             Choice::Uniform | Choice::Tree => {

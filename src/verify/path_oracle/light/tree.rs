@@ -236,9 +236,10 @@ impl Tree {
         let (mut node, mut values) = (ROOT, all);
         while let Some(left) = self.children[node] {
             let part = self.values_of_left(left, values, at, rounding)?;
-            (node, value, values) = match value < part {
-                true => (left, value, part),
-                false => (left + 1, value - part, values - part),
+            (node, value, values) = if value < part {
+                (left, value, part)
+            } else {
+                (left + 1, value - part, values - part)
             };
         }
         Some((self.lights[node], values))
