@@ -13,13 +13,12 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The neutral element of [`Bounds::union`].
+    /// Identity of [`Bounds::union`].
     pub const EMPTY: Bounds = Bounds {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
     };
 
-    /// Contains every box.
     pub(crate) const EVERYTHING: Bounds = Bounds {
         min: [f32::NEG_INFINITY; 3],
         max: [f32::INFINITY; 3],
@@ -44,7 +43,7 @@ impl Bounds {
         out
     }
 
-    /// What lies in both; `min > max` on some axis if nothing does.
+    /// The common part; `min > max` on some axis if it is empty.
     pub fn intersection(&self, other: &Bounds) -> Bounds {
         Bounds {
             min: std::array::from_fn(|axis| self.min[axis].max(other.min[axis])),
@@ -52,7 +51,7 @@ impl Bounds {
         }
     }
 
-    /// Whether `other` lies inside.
+    /// True if `other` lies inside.
     pub fn contains(&self, other: &Bounds) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && self.max[axis] >= other.max[axis])
     }
@@ -62,7 +61,7 @@ impl Bounds {
         std::array::from_fn(|axis| self.max[axis] - self.min[axis])
     }
 
-    /// Twice the centre: enough to sort and bin by, without the division.
+    /// Twice the centre: sufficient for sorting and binning, without the division.
     pub fn doubled_centre(&self) -> [f32; 3] {
         std::array::from_fn(|axis| self.min[axis] + self.max[axis])
     }
@@ -74,7 +73,7 @@ impl Bounds {
     }
 }
 
-/// Distances at which the ray's line enters and leaves the slab of each axis.
+/// Distances at which the ray's line enters and exits the slab of each axis.
 pub(crate) fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let low = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
     let high = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
@@ -86,7 +85,7 @@ pub(crate) fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3],
     (near, far)
 }
 
-/// Distances at which the ray's line enters and leaves the box (enter > exit: it misses).
+/// Distances at which the ray's line enters and exits the box (enter > exit: a miss).
 pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
     let (near, far) = slabs(bounds, ray, inverse);
     let enter = near[0].max(near[1]).max(near[2]);
@@ -94,8 +93,8 @@ pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) 
     (enter, exit)
 }
 
-/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the default
-/// pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
+/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the
+/// default pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
 pub(crate) fn enter_box(
     bounds: &Bounds,
     ray: &Ray,

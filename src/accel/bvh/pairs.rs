@@ -1,4 +1,5 @@
-//! Nodes of 64 bytes with the boxes of both children. Twin of `kernels/accel/bvh/pairs.wesl`.
+//! Nodes of 64 bytes with the boxes of both children. CPU version of
+//! `kernels/accel/bvh/pairs.wesl`.
 //!
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
@@ -14,7 +15,7 @@ use super::options::NodeOrder;
 use super::order::InnerNodes;
 use bytemuck::{Pod, Zeroable};
 
-/// Boxes of both children with what they refer to: four `vec4<u32>`.
+/// Boxes and references of both children: four `vec4<u32>`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct Pair {
@@ -29,7 +30,7 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
-    /// What stands for a missing child: a box of no extent with nothing in it.
+    /// A missing child: an empty box without contents.
     pub(crate) const MISSING: (u32, Bounds) = (
         NONE,
         Bounds {
@@ -38,7 +39,7 @@ impl Pair {
         },
     );
 
-    /// A node of these children, reference and box, which has no parent yet.
+    /// A node of these children, reference and box, without a parent yet.
     pub(crate) fn new([(left, left_box), (right, right_box)]: [(u32, Bounds); 2]) -> Self {
         Self {
             left_min: left_box.min,
@@ -61,13 +62,12 @@ impl Pair {
         ]
     }
 
-    /// Box around both children.
     pub(crate) fn bounds(&self) -> Bounds {
         let present = self.children().into_iter().filter(|(r, _)| *r != NONE);
         present.fold(Bounds::EMPTY, |all, (_, bounds)| all.union(&bounds))
     }
 
-    /// The node after what it refers to moved up by this many places.
+    /// The node after its targets moved up by these offsets.
     pub(crate) fn moved_by(self, nodes: u32, triangles: u32) -> Self {
         let moved = |reference| match reference {
             NONE => NONE,
@@ -120,8 +120,8 @@ impl Pairs {
     }
 }
 
-/// Checks reachability, containment, parents and depth of a tree of `nodes`, whose references count the
-/// first one as number `first`; `cover` notes a leaf, given its reference and its box.
+/// Checks reachability, containment, parents and depth of a tree of `nodes`, with references
+/// relative to index `first`; `cover` records a leaf, given its reference and its box.
 ///
 /// # Errors
 /// The first violated invariant, with the node.
@@ -177,7 +177,7 @@ impl Nodes for Pairs {
                 inner.first = near.1;
             }
         }
-        // The far child is looked at again: the near one may have brought a nearer hit.
+        // Test the far child again: the near one may have found a nearer hit.
         let entered = far.0.is_some_and(|e| e <= walk.hit.t * walk.inverse.pad);
         if entered && !walk.is_answered() {
             if far.1 >= LEAF {

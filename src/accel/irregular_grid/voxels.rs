@@ -1,7 +1,7 @@
-//! Voxels and cells while an irregular grid is built: which cell a voxel belongs to, and what a cell
-//! lists.
+//! Voxels and cells while an irregular grid is built: the cell of each voxel, and the triangles of
+//! each cell.
 
-/// Marks an entry as the number of a block.
+/// Marks an entry as a block index.
 const BLOCK: u32 = 1 << 31;
 
 /// A box of voxels with a list of triangles.
@@ -11,7 +11,7 @@ pub(super) struct GridCell {
     pub min: [u16; 3],
     /// One past the highest voxel.
     pub max: [u16; 3],
-    /// Place of its list in the pool.
+    /// Index of its list in the pool.
     pub first: u32,
     /// Length of its list.
     pub count: u32,
@@ -29,20 +29,20 @@ impl GridCell {
 pub(super) struct Block {
     /// Its first entry.
     pub first: u32,
-    /// Binary logarithm of the entries along an axis.
+    /// log2 of the entries along an axis.
     pub log: u32,
 }
 
-/// What an entry leads to.
+/// The target of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entry {
-    /// A cell, by number.
+    /// A cell index.
     GridCell(u32),
-    /// A block, by number.
+    /// A block index.
     Block(u32),
 }
 
-/// Which cell each voxel belongs to: an entry for each top cell, each a cell or a block of entries.
+/// The cell of each voxel: one entry per top cell, each a cell or a block of entries.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Map {
     /// Top cells along each axis.
@@ -51,12 +51,10 @@ pub(super) struct Map {
     pub shift: u32,
     /// Entries of the top cells, then of the blocks.
     pub entries: Vec<u32>,
-    /// Blocks.
     pub blocks: Vec<Block>,
 }
 
 impl Map {
-    /// Word of an entry.
     pub(super) fn encode(entry: Entry) -> u32 {
         match entry {
             Entry::GridCell(cell) => cell,
@@ -64,7 +62,6 @@ impl Map {
         }
     }
 
-    /// Entry of a word.
     pub(super) fn decode(word: u32) -> Entry {
         if word & BLOCK == 0 {
             Entry::GridCell(word)
@@ -73,7 +70,6 @@ impl Map {
         }
     }
 
-    /// Number of top cells.
     pub(super) fn top_cells(&self) -> usize {
         self.top.iter().map(|&n| n as usize).product()
     }
@@ -93,7 +89,7 @@ impl Map {
     }
 }
 
-/// Whether every entry of `part` is in `whole`; both ascend.
+/// True if every entry of `part` is in `whole`; both ascend.
 pub(super) fn is_subset(part: &[u32], whole: &[u32]) -> bool {
     if part.len() > whole.len() {
         return false;
