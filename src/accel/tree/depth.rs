@@ -1,16 +1,16 @@
-//! A bound on the depth of trees whose builder knows none.
+//! A bound on the depth of trees whose builder has none.
 
 use super::grow::lay_out;
 use super::parameters::SAH_DEPTH;
 use super::{NodeKind, Tree, TreeNode};
 
-/// Deepest leaf that a tree of so many references may have.
+/// Maximum leaf depth of a tree with this many references.
 pub(super) fn depth_limit(references: usize) -> u32 {
     SAH_DEPTH + references.max(1).ilog2() + 1
 }
 
-/// `tree`, if it is not too deep; else with everything below [`SAH_DEPTH`] in balanced subtrees over
-/// the same leaves.
+/// `tree` if it is not too deep; otherwise with everything below [`SAH_DEPTH`] in balanced subtrees
+/// over the same leaves.
 pub(super) fn limit_depth(tree: Tree) -> Tree {
     if tree.depth() <= depth_limit(tree.order.len()) {
         return tree;
@@ -43,9 +43,9 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
     })
 }
 
-/// What becomes a subtree.
+/// Source of a subtree.
 enum Part {
-    /// A node of the tree as it was.
+    /// A node of the original tree.
     Below(u32),
     /// A balanced tree over these leaves, at least one.
     Balanced(Vec<TreeNode>),
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
     use crate::bounds::Bounds;
 
-    /// A chain of so many leaves.
+    /// A chain of this many leaves.
     fn chain(leaves: u32) -> Tree {
         let mut nodes = Vec::new();
         let bounds = |from: u32| Bounds {

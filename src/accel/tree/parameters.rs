@@ -4,12 +4,12 @@ use super::parallel::{self, Method};
 use super::reference::Box3;
 use raystone_core::parameters;
 
-/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
-/// `SAH_DEPTH + log2(references) + 1` whatever the input.
+/// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
+/// log2(references) + 1` for any input.
 pub(super) const SAH_DEPTH: u32 = 48;
-/// Most neighbours on either side that clustering looks at, as in the kernel `nearest`.
+/// Maximum neighbours examined on either side in clustering, as in the kernel `nearest`.
 pub(super) const LARGEST_RADIUS: u32 = 32;
-/// Most bins on an axis.
+/// Maximum bins on an axis.
 pub(super) const MAX_BINS: usize = 32;
 
 parameters! {
@@ -96,7 +96,7 @@ parameters! {
 }
 
 impl TreeParameters {
-    /// These, with leaves of one triangle: for structures that merge leaves themselves.
+    /// The same with single-triangle leaves, for structures that merge leaves themselves.
     #[must_use]
     pub(crate) fn with_single_leaves(&self) -> Self {
         Self {
@@ -105,7 +105,7 @@ impl TreeParameters {
         }
     }
 
-    /// What the builders that a device can follow are told.
+    /// Settings of the builders that can run on a device.
     pub(super) fn parallel(&self, method: Method) -> parallel::Settings {
         parallel::Settings {
             method,
@@ -113,14 +113,14 @@ impl TreeParameters {
         }
     }
 
-    /// Clustering with the radius that is set.
+    /// Clustering with the configured radius.
     pub(super) fn clustering(&self) -> Method {
         Method::Ploc {
             radius: self.search_radius,
         }
     }
 
-    /// What the device is told, if it is to build.
+    /// Settings for the device, if it is to build.
     pub(crate) fn on_device(&self) -> Option<parallel::Settings> {
         match self.builder {
             Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
@@ -129,12 +129,12 @@ impl TreeParameters {
         }
     }
 
-    /// Most triangles of a node that becomes a leaf whatever it costs.
+    /// Maximum triangles of a node that becomes a leaf at any cost.
     pub(super) fn least_leaf(&self) -> usize {
         self.min_leaf_size.min(self.leaf_size)
     }
 
-    /// Whether no subtree over these references can be cheaper than a leaf, decided without
+    /// True if no subtree over these references can be cheaper than a leaf, decided without
     /// building one: each reference lies in some leaf at least as large as itself.
     pub(super) fn must_be_leaf(
         &self,
@@ -145,7 +145,7 @@ impl TreeParameters {
         if count <= self.least_leaf().max(1) {
             return true;
         }
-        // Reinsertion wants leaves of one triangle; those that do not pay are merged after it.
+        // Reinsertion wants leaves of one triangle; unprofitable ones are merged after it.
         if count > self.leaf_size || self.reinsertion > 0 {
             return false;
         }

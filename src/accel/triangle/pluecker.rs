@@ -1,6 +1,6 @@
-//! Plücker products with a tolerance. Twin of `kernels/accel/triangle/pluecker.wesl`.
-//! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows
-//! R. Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
+//! Plücker products with a tolerance. CPU version of `kernels/accel/triangle/pluecker.wesl`.
+//! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows R.
+//! Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
 
 use super::plane::plane_error;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
