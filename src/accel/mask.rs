@@ -196,6 +196,7 @@ pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f
     upper * (256 - fy) + lower * fy < image[3]
 }
 
+/// The material of a triangle.
 pub fn material_of(masks: Option<&Masks>, triangle: &TriangleRecord) -> u32 {
     match masks.filter(|_| triangle.material >= MASKED) {
         Some(masks) => masks.row((triangle.material & !MASKED) + 1)[3],

@@ -72,6 +72,7 @@ const ENOUGH: usize = 16;
 pub struct Answer {
     /// The sample.
     pub id: PathId,
+    /// Its radiance.
     pub radiance: DVec3,
 }
 

@@ -26,6 +26,7 @@ const TILE: u32 = 8;
 pub struct RaySet {
     /// The ray class.
     pub class: RayClass,
+    /// The rays.
     pub rays: Vec<Ray>,
     /// The reference hits.
     pub truth: Vec<Hit>,

@@ -18,6 +18,7 @@ pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
 pub struct TrialScene {
     /// The scene, with a camera.
     pub scene: SceneData,
+    /// The integrators.
     pub trials: Vec<Trial>,
 }
 

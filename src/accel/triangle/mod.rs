@@ -200,6 +200,7 @@ pub trait TriangleTest: Send + Sync {
     }
 }
 
+/// A chosen test.
 pub type AnyTriangleTest = &'static dyn TriangleTest;
 
 /// Tests are compared by name.

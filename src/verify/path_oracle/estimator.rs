@@ -26,6 +26,7 @@ pub enum Estimator {
     Path(PathRules),
 }
 
+/// The rules of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathRules {
     max_depth: u32,

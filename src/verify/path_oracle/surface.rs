@@ -30,6 +30,7 @@ pub struct Surface<'a> {
     pub normal: DVec3,
     /// 1 if that is the front of the triangle, otherwise -1.
     pub side: f64,
+    /// The material.
     pub material: &'a Material,
     /// Base colour, with texture and vertex colours.
     pub base: DVec3,

@@ -93,6 +93,7 @@ pub(super) fn build(sorted: Sorted) -> LinkedTree {
 }
 
 impl LinkedTree {
+    /// Computes the boxes of the inner nodes from those of the leaves.
     pub fn fit(&mut self) {
         let mut parents_first = Vec::with_capacity(self.nodes.len());
         let mut open = vec![self.root];

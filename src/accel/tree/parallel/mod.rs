@@ -73,6 +73,7 @@ impl LinkedNode {
         }
     }
 
+    /// Its box.
     pub fn around(&self) -> OrderedBox {
         OrderedBox {
             low: self.low,
