@@ -124,8 +124,7 @@ impl Intersection {
     /// Checks that an adapter supports this choice.
     ///
     /// # Errors
-    /// The reason if it does not: without exact two-products the compensated test is a different
-    /// test.
+    /// The reason if not: without exact two-products the compensated test is a different test.
     pub fn kept_by(self, probe: &ArithmeticProbe) -> Result<(), String> {
         if !self.triangle.needs_exact_products() || probe.exact_products {
             return Ok(());

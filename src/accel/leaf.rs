@@ -107,8 +107,7 @@ impl Leaves {
     }
 }
 
-/// The leaves of a structure with the triangles they were built from, as read by the CPU versions
-/// of kernels.
+/// The leaves of a structure with the triangles they were built from.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafReader<'a> {
     /// The leaves.

@@ -173,8 +173,7 @@ impl TriangleSoup {
         }
     }
 
-    /// The same triangles with these intersection tests. Structures copy records, so choose before
-    /// building.
+    /// The same triangles with these tests. Structures copy records, so choose before building.
     #[must_use]
     pub fn intersecting(mut self, intersection: Intersection) -> Self {
         // The words derived from records and masks follow them, then those of the objects.
@@ -199,8 +198,7 @@ impl TriangleSoup {
         self.masks.as_ref().map_or(&[], |masks| &masks.rows)
     }
 
-    /// The buffer `triangles` of kernels: the records, their masks, and the data precomputed by the
-    /// triangle test.
+    /// The buffer `triangles` of kernels: records, masks, and the test's precomputed data.
     pub fn words(&self) -> Cow<'_, [[u32; 4]]> {
         let records = bytemuck::cast_slice(&self.records);
         let objects = self.placed.iter().flat_map(|p| &p.objects);
@@ -248,8 +246,7 @@ impl<'a> NamedWords<'a> {
 /// The GPU data of a structure.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
-    /// Module of the traversal kernel, relative to the kernel folder; empty for a pipeline that
-    /// needs none.
+    /// Module of the kernel, relative to the kernel folder; empty for a pipeline that needs none.
     pub kernel: &'static str,
     /// Features (`@if(...)` in the kernel) enabled by its parameters.
     pub features: Vec<&'static str>,

@@ -14,8 +14,7 @@ use glam::DVec2;
 use raystone_scene::{AlphaMask, SceneData, Texture, Wrap};
 use std::collections::BTreeMap;
 
-/// Set in the material word of a masked triangle's record, which then holds the index of its mask
-/// words.
+/// Set in a masked triangle's material word, which then holds the index of its mask words.
 pub(crate) const MASKED: u32 = 0x8000_0000;
 const MIRRORED: u32 = 1;
 const CLAMPED: u32 = 2;
@@ -174,8 +173,7 @@ fn alpha_at(masks: &Masks, place: u32, image: [u32; 4], x: i32, y: i32) -> u32 {
     (word >> (8 * (at & 3))) & 255
 }
 
-/// True if there is no surface at the point of a triangle with these weights of its second and
-/// third corners.
+/// True if there is no surface at these weights of a triangle's second and third corners.
 pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f32) -> bool {
     let Some(masks) = masks.filter(|_| triangle.material >= MASKED) else {
         return false;

@@ -38,8 +38,7 @@ impl Polygon {
         0.5 * sum.length()
     }
 
-    /// The part inside a box grown by `margin` (I. Sutherland, G. Hodgman, "Reentrant polygon
-    /// clipping", 1974).
+    /// The part inside a grown box (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
     pub(crate) fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
         let mut polygon = *self;
         for axis in 0..3 {

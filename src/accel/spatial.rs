@@ -82,8 +82,8 @@ pub(super) struct Overlap {
     normal: [f64; 3],
     /// Interval of the triangle on its normal, grown by the half extent of the boxes.
     on_normal: [f64; 2],
-    /// The products of edge `i` with axis `a` at `3 i + a`: both non-zero components, and the grown
-    /// interval on it.
+    /// For edge `i` and axis `a`, at `3 i + a`: the product's non-zero components, the grown
+    /// interval.
     products: [([f64; 2], [f64; 2]); 9],
 }
 
@@ -309,8 +309,7 @@ mod tests {
             };
             cut += usize::from(found != triangle.bounds());
             for (axis, points) in points.iter().enumerate() {
-                // No exact point is outside by more than f64 rounding, and one is within the next
-                // f32.
+                // No exact point is outside beyond f64 rounding, and one is within the next f32.
                 let within =
                     |[low, high]: [f64; 2]| move |p: &Ratio| p.is_above(low) && !p.is_above(high);
                 let around = |x: f32| {

@@ -36,8 +36,7 @@ impl BuildLog {
         }
     }
 
-    /// Maximum words of an array: the adapter's binding limit, or the guaranteed one without an
-    /// adapter.
+    /// Maximum words of an array: the adapter's limit, or the guaranteed one.
     pub(crate) fn most_words(&self) -> u64 {
         let limits = self.gpu().map(|gpu| &gpu.limits);
         let bound = limits.map(|l| l.max_storage_buffer_binding_size.min(l.max_buffer_size));

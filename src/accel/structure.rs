@@ -27,8 +27,7 @@ pub trait Structure: Sync {
     }
 }
 
-/// A structure that is a layout of one binary tree, so it can also be built from a tree refitted to
-/// moved triangles.
+/// A layout of one binary tree, which can also be built from a refitted tree.
 pub trait OverTree: Sync {
     /// Builds the tree.
     ///

@@ -39,8 +39,7 @@ pub enum Event {
     Read(Read),
 }
 
-/// Events beyond this many are counted but not stored: the log of brute force over a large scene is
-/// of no use.
+/// Events beyond this are only counted: a longer log, as of brute force, is of no use.
 const MOST_EVENTS: usize = 1 << 20;
 
 thread_local! {

@@ -136,8 +136,7 @@ impl Walker<'_> {
         best
     }
 
-    /// A random corner, uniform by volume rather than by side so that large boxes are found in many
-    /// dimensions.
+    /// A random corner, uniform by volume, so that large boxes are found in many dimensions.
     fn anywhere(&mut self) -> Vec<u32> {
         let dims = self.grid.ranks.len();
         let power = 1.0 / dims as f64;

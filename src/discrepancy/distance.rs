@@ -26,8 +26,7 @@ impl Metric {
     }
 }
 
-/// Minimum distance between two points of the set; `None` for a single point. A repeated point
-/// gives 0.
+/// Minimum distance between two points of the set; `None` for a single point.
 ///
 /// A sweep over the first coordinate searches only up to the minimum distance so far: about N^(3/2)
 /// steps for even sets in two dimensions.

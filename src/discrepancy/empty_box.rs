@@ -4,13 +4,12 @@ use super::{Budget, DiscrepancyError, PointSet};
 
 const NAME: &str = "dispersion";
 
-/// Area of the largest axis-parallel box in the unit square without a point inside (points on its
-/// border do not count).
+/// Area of the largest axis-parallel box in the unit square without a point in its interior.
 ///
-/// A largest box has a point in the interior of its left or right side, or extends from x = 0 to x
-/// = 1. In the first case the box grows to the right from that point, and each point that it meets
-/// cuts off the part above or below (Naamad, Lee & Hsu 1984, "On the maximum empty rectangle
-/// problem"). Cost: at most N² steps.
+/// A largest box has a point inside its left or right side, or extends from x = 0 to 1. In the
+/// first case it grows to the right from that point, and each point that it meets cuts off the part
+/// above or below (Naamad, Lee & Hsu 1984, "On the maximum empty rectangle problem"). Cost: at most
+/// N² steps.
 ///
 /// # Errors
 /// The budget is spent first; points that are not pairs.

@@ -105,15 +105,13 @@ impl Measure {
     }
 }
 
-/// Limit on the highest frequency of a spectrum, which is otherwise twice that of a square grid of
-/// as many points.
+/// Limit on a spectrum's highest frequency, otherwise twice that of an equal square grid.
 const HIGHEST_FREQUENCY: usize = 256;
 
 /// Measures a set of points within a budget.
 ///
 /// # Errors
-/// The measure is not defined for such a set, or did not finish in time; both messages suggest a
-/// change.
+/// The measure is not defined for such a set, or did not finish; both suggest a change.
 pub fn measure(
     points: &PointSet,
     measure: Measure,

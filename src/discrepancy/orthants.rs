@@ -95,8 +95,7 @@ struct Bound {
 
 struct Search<const D: usize> {
     n: f64,
-    /// Mask of dimensions in which each point varies in the current cell; [`OUT`] if it is in no
-    /// box of the cell.
+    /// Mask of each point's varying dimensions in the current cell; [`OUT`] if in no box of it.
     varying: Vec<u32>,
     /// Sorted points by dimension; cells on the search path are consecutive.
     lists: [Vec<Entry>; D],
@@ -289,8 +288,7 @@ struct Plane<const D: usize> {
 }
 
 impl<const D: usize> Plane<D> {
-    /// A plane below the volume: the mean of the tangents at both corners, each of which is below
-    /// it.
+    /// A plane below the volume: the mean of the tangents at both corners, which are below it.
     fn below(low: &[f64; D], high: &[f64; D], scale: f64) -> Self {
         let (at_low, to_low) = tangent(low);
         let (at_high, to_high) = tangent(high);

@@ -96,8 +96,7 @@ pub fn radial_spectrum(
     Ok(periodogram(points, highest, budget)?.radial())
 }
 
-/// `exp(−2πi k x)` for each k: the angle is reduced first, so that high frequencies are as accurate
-/// as low ones.
+/// `exp(−2πi k x)` for each k, with a reduced angle for equal accuracy at all frequencies.
 fn waves(out: &mut Vec<[f64; 2]>, x: f64, frequencies: std::ops::RangeInclusive<i32>) {
     out.clear();
     out.extend(frequencies.map(|k| {

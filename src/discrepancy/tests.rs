@@ -1,5 +1,4 @@
-//! The two searches behind a star discrepancy that runs out of time; everything else is in
-//! `tests/discrepancy`.
+//! The two searches behind a star discrepancy that runs out of time; see also `tests/discrepancy`.
 
 use super::*;
 

@@ -180,8 +180,7 @@ fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
     }
 }
 
-/// A separate device for features outside this crate's kernels, without players, pipelines and
-/// checks.
+/// A separate device for uses outside this crate, without players, pipelines and checks.
 pub struct RawDevice {
     /// The device.
     pub device: wgpu::Device,
@@ -366,8 +365,7 @@ impl Gpu {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// True if kernels may vote and shuffle within subgroups. Kernels must not assume a subgroup
-    /// size.
+    /// True if kernels may vote and shuffle within subgroups, whose size they must not assume.
     pub(crate) fn has_subgroups(&self) -> bool {
         self.device.features().contains(wgpu::Features::SUBGROUP)
     }

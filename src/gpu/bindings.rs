@@ -118,8 +118,7 @@ impl Bindings {
         self
     }
 
-    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]) to the kernel variables
-    /// `name`, `name_1`, …
+    /// Binds an array in parts (see [`Gpu::storage_parts`]) to the variables `name`, `name_1`, …
     pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
         for (index, buffer) in buffers.iter().enumerate() {
             self.buffer(&part_name(name, index), buffer);

@@ -74,8 +74,7 @@ impl KernelLibrary {
         Ok(self.hashed())
     }
 
-    /// Adds the modules of an externally registered item: their paths (`integrator/mine`) and
-    /// texts.
+    /// Adds the modules of an external item: their paths (`integrator/mine`) and texts.
     #[must_use]
     pub fn with_sources(mut self, sources: &[(&str, &str)]) -> Self {
         for (name, text) in sources {
@@ -171,8 +170,7 @@ impl KernelLibrary {
         self.files.get(name).map(|(_, text)| text.as_str())
     }
 
-    /// The first 16 hexadecimal digits of BLAKE3 of a module's text; of an empty text if there is
-    /// no such module.
+    /// The first 16 hexadecimal digits of BLAKE3 of a module's text, empty if it is missing.
     pub fn text_hash(&self, name: &str) -> String {
         let text = self.text(name).unwrap_or_default();
         blake3::hash(text.as_bytes()).to_hex()[..16].to_owned()
@@ -190,8 +188,7 @@ impl KernelLibrary {
     /// Composes one kernel.
     ///
     /// # Errors
-    /// A module is missing, does not parse, or the result is not valid WGSL; the message names the
-    /// source file and line.
+    /// A module is missing, does not parse, or gives invalid WGSL, with source file and line.
     pub fn compose(&self, composition: &Composition) -> Result<ComposedKernel, GpuError> {
         let composition = &composition.clone().completed();
         let mut resolver = VirtualResolver::new();
@@ -368,8 +365,7 @@ impl Composition {
         self
     }
 
-    /// The module of a path (`package::accel::bvh`), with slashes; `None` for the virtual module of
-    /// constants.
+    /// The module of a path (`package::accel::bvh`); `None` for the module of constants.
     fn module_of(&self, path: &str) -> Option<String> {
         let name = path.strip_prefix("package::")?.replace("::", "/");
         match name.strip_prefix("active/") {

@@ -186,8 +186,7 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// True if driver or adapter cannot run the request, through no fault of its own: the cell is
-    /// then left out.
+    /// True if driver or adapter cannot run the request, without a fault: the cell is left out.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::LoopsCut { .. } | Self::WorkgroupTooLarge { .. })
     }

@@ -15,9 +15,8 @@ const MAX_RUNS: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 /// Maximum cached bind groups; they keep their buffers alive.
 const KEPT_GROUPS: usize = 256;
 
-/// Plays recordings on a device, and caches their resources for the next: scratch and staging
-/// buffers, uniforms, bind groups, timestamps. Replaying with the same buffers allocates nothing on
-/// the device.
+/// Plays recordings on a device, and caches their resources: scratch and staging buffers, uniforms,
+/// bind groups, timestamps. Replaying with the same buffers allocates nothing on the device.
 pub struct Player {
     gpu: Gpu,
     kept: Mutex<Kept>,
@@ -479,8 +478,7 @@ fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f6
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
-/// Milliseconds from the first timestamp to the second; `None` without a clock, or if it ran
-/// backwards.
+/// Milliseconds between two timestamps; `None` without a clock, or if it ran backwards.
 fn span_ms([from, to]: [u64; 2], period_ns: Option<f32>) -> Option<f64> {
     Some(to.checked_sub(from)? as f64 * f64::from(period_ns?) * 1e-6)
 }

@@ -4,8 +4,7 @@ use super::compose::Composition;
 use super::{Bindings, Gpu, GpuError, LOOPS_CUT, Recording, Storage, UniformValues, groups_for};
 use serde::{Deserialize, Serialize};
 
-/// Whether the adapter's arithmetic equals IEEE f32 on the host in the patterns that traversal
-/// uses.
+/// Agreement of the adapter's arithmetic with the host's f32, in the patterns of traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArithmeticProbe {
     /// `a*b + c` is rounded twice, never fused.
@@ -17,8 +16,7 @@ pub struct ArithmeticProbe {
     /// The rounding error of a product can be computed exactly, by splitting the factors.
     #[serde(default)]
     pub exact_products: bool,
-    /// Denormals are preserved instead of flushed to 0. Hits depend on it only for rays and scenes
-    /// of such sizes.
+    /// Denormals are not flushed to 0. Hits depend on it only for rays and scenes of such sizes.
     #[serde(default)]
     pub denormals: bool,
 }

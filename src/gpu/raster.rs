@@ -1,5 +1,4 @@
-//! Rasterisation: a kernel with a vertex and a fragment entry that writes one word per pixel, for
-//! the nearest triangle.
+//! Rasterisation by a vertex and a fragment entry: one word per pixel, for the nearest triangle.
 
 use super::adapter::Gpu;
 use super::bindings::{Bindings, Resource};
@@ -34,7 +33,7 @@ impl Gpu {
     /// triangles wins.
     ///
     /// # Errors
-    /// The kernel does not compose or compile, or the image exceeds a limit of the adapter.
+    /// The kernel does not compose or compile, or the image exceeds the adapter's limits.
     pub fn raster(
         &self,
         composition: &Composition,
@@ -126,8 +125,7 @@ fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
 }
 
 impl Raster {
-    /// One word per pixel, row by row from the top, 2³² − 1 where empty; rows begin at multiples of
-    /// 64 words.
+    /// One word per pixel, row by row, 2³² − 1 where empty; rows begin at multiples of 64 words.
     pub fn words(&self) -> &wgpu::Buffer {
         &self.words
     }

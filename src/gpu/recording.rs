@@ -33,9 +33,8 @@ pub fn groups_for(items: u32) -> [u32; 3] {
     grid_of(items.div_ceil(WORKGROUP_SIZE))
 }
 
-/// At least one workgroup and at least `workgroups`, in one row or, beyond the row limit, in
-/// several, the last of which may have too many. A kernel computes its workgroup index as `x + y *
-/// num_workgroups.x`.
+/// At least one workgroup and at least `workgroups`; beyond the row limit in several rows, the last
+/// of which may have too many. A kernel's workgroup index is `x + y * num_workgroups.x`.
 pub fn grid_of(workgroups: u32) -> [u32; 3] {
     let groups = workgroups.max(1);
     if groups <= MAX_GROUPS {
@@ -204,8 +203,7 @@ impl Recording {
 pub struct Played {
     /// From submission to completion by the host's clocks.
     pub(super) host: Elapsed,
-    /// Names of the runs, each with the milliseconds between its GPU timestamps; `None` without
-    /// timestamps.
+    /// Names of the runs, each with its GPU milliseconds; `None` without timestamps.
     pub runs: Vec<(String, Option<f64>)>,
     pub(super) downloads: BTreeMap<String, Vec<u8>>,
 }

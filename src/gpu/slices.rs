@@ -51,8 +51,7 @@ impl Slices {
         self.longest_ms.get()
     }
 
-    /// Learns from a slice of `items`. A short remainder is inconclusive and never reduces the
-    /// size.
+    /// Learns from a slice of `items`. A short remainder never reduces the size.
     pub fn learn(&self, items: u64, elapsed: Elapsed) {
         let was = self.fitting();
         let ms = elapsed.ms().max(0.1);

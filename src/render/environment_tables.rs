@@ -36,8 +36,7 @@ pub fn environment_aliases(map: &EnvironmentMap) -> Vec<(u32, u32)> {
     entries.iter().map(|e| (e.threshold, e.alias)).collect()
 }
 
-/// Rows of `shading_tables`: size, texels with their probabilities, alias tables of rows and
-/// columns.
+/// Rows of `shading_tables`: size, texels with probabilities, alias tables of rows and columns.
 pub(super) fn environment_rows(map: &EnvironmentMap) -> Vec<[u32; 4]> {
     let shares = Shares::of(map);
     let mut rows = vec![[map.width, map.height, 0, 0]];

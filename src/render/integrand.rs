@@ -42,8 +42,7 @@ pub enum Function {
     Gaussian,
     /// 1 inside the quarter of a disk.
     Disk,
-    /// 1 in a box with one corner at the origin: a box of the kind over which D* takes the worst
-    /// error.
+    /// 1 in a box with one corner at the origin, as in the definition of D*.
     CornerBox,
     /// 1 on one side of an edge: x · cos + y · sin < offset.
     HalfPlane([f32; 3]),
@@ -193,8 +192,7 @@ pub(super) static INTEGRANDS: [Integrand; 6] = [
     },
 ];
 
-/// Every function by its name without `integrand:`, in the order of `raystone list`; parameters at
-/// their defaults.
+/// Every function by its name without `integrand:`, in the order of `raystone list`.
 pub fn functions() -> Vec<(&'static str, Function)> {
     let function = |integrand: &'static Integrand| {
         let function = integrand

@@ -20,8 +20,8 @@ pub enum CountedRays {
     Ao,
     /// From surface to surface.
     Bounce,
-    /// Not traced, because the light cannot contribute: behind the surface, dark on this side,
-    /// outside its cone.
+    /// Not traced, because the light cannot contribute: behind the surface, or not emitted this
+    /// way.
     Skipped,
 }
 
@@ -43,13 +43,11 @@ pub struct IntegratorFacts {
     pub has_stages: bool,
     /// True if light is sampled by several shadow rays from one point.
     pub has_many_shadow_rays: bool,
-    /// True if the mean of its images differs from the integral because of its parameters: such a
-    /// bias is no fault.
+    /// True if its parameters bias the mean of its images: such a bias is no fault.
     pub is_biased: bool,
     /// True if paths begin at rasterised triangles instead of with a ray.
     pub is_rasterised: bool,
-    /// True if its kernels call `closest_hit` or `any_hit` themselves, and so need a structure with
-    /// an inline traversal.
+    /// True if its kernels call `closest_hit` or `any_hit`, and so need an inline traversal.
     pub needs_inline: bool,
 }
 

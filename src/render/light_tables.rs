@@ -32,8 +32,7 @@ pub struct LightTables {
     pub one_sided: bool,
     /// Row of the tree over lights with a position, and row of their leaves.
     tree: [u32; 2],
-    /// Rows of the lights, of the emissive triangles with their light, of profiles and maps, and of
-    /// the tree.
+    /// Rows of lights, emissive triangles with their light, profiles and maps, and the tree.
     rows: Vec<[u32; 4]>,
     /// Start of the rows in `shading_tables`, in `vec4`.
     first: u32,

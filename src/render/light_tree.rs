@@ -56,8 +56,7 @@ impl LightBounds {
         }
     }
 
-    /// Cost of a cluster: power, solid angle of emission, and surface of its box (Conty Estevez &
-    /// Kulla, eq. 1).
+    /// Cost of a cluster: power, solid angle, and box surface (Conty Estevez & Kulla, eq. 1).
     fn cost(&self, extent: DVec3, axis: usize) -> f64 {
         let reach = (self.normals + self.spread).min(PI);
         let (n, w) = (self.normals, reach);
@@ -101,15 +100,13 @@ pub struct TreeNode {
     pub(super) count: u32,
 }
 
-/// Index of the root. Siblings begin at even indices, so the index of the sibling differs in the
-/// last bit.
+/// Index of the root. Siblings begin at even indices and differ in the last bit.
 pub(super) const ROOT: usize = 1;
 /// Number of split candidates along an axis.
 const BUCKETS: usize = 12;
 
 /// The nodes of a tree over lights, index 0 being unused; and the leaf of each light. All nodes
-/// below a left child have lower indices than those below the right one, which kernels use to find
-/// the way to a leaf.
+/// below a left child precede those below the right one, by which kernels find a leaf.
 pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     let Some(first) = lights.first() else {
         return (Vec::new(), Vec::new());
@@ -148,8 +145,7 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     (nodes, leaves)
 }
 
-/// Splits a cluster where the sum of the costs is least; in halves if no split is better than
-/// another.
+/// Splits a cluster where the sum of the costs is least; in halves if all are equal.
 fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
     let center = |light: &u32| lights[*light as usize].center();
     let low = members.iter().map(center).fold(DVec3::INFINITY, DVec3::min);

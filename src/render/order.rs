@@ -46,9 +46,8 @@ impl Part {
     }
 }
 
-/// The position within a tile of the `number`-th of 256 passes: the base-4 digits of the number,
-/// reversed, are a Morton number, so that after 1, 4, 16, 64 passes the pixels at multiples of 16,
-/// 8, 4, 2 are done.
+/// The position of the `number`-th of 256 passes in a tile: its base-4 digits, reversed, are a
+/// Morton number, so passes 1, 4, 16, 64 complete the pixels at multiples of 16, 8, 4, 2.
 pub(crate) fn quad_tree_place(number: u32) -> [u32; 2] {
     let digit = |at: u32| number >> (2 * at) & 3;
     let bit = |axis: u32| (0..4).map(|at| (digit(at) >> axis & 1) << (3 - at)).sum();

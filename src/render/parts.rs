@@ -137,8 +137,7 @@ impl PartRenderer {
         played.download("sums")
     }
 
-    /// The picture so far: gaps get the colour of a coarser pixel, see [`splat`]; `None` while
-    /// others remain.
+    /// The picture so far, with gaps filled by [`splat`]; `None` while some remain.
     ///
     /// # Errors
     /// As [`PartRenderer::sums`].

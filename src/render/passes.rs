@@ -191,8 +191,7 @@ impl Passes {
 /// Recorder of passes that add the samples of a slice, some rows of the image, to the sums.
 ///
 /// Kernels can bind: the scene data for shading, `sampler_table`, `status`, `accumulation` (the
-/// sums of a band of rows), the uniform `frame` (see `kernels/integrator/frame.wesl`), and the
-/// integrator's scratch.
+/// sums of a band of rows), the uniform `frame` (`kernels/integrator/frame.wesl`), and the scratch.
 pub struct ImageSteps<'a> {
     passes: &'a Passes,
     recording: &'a mut Recording,
@@ -255,8 +254,7 @@ impl<'a> ImageSteps<'a> {
         }
     }
 
-    /// The same for kernels with configurable workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT`
-    /// invocations.
+    /// The same for kernels with workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT` invocations.
     pub(crate) fn pixel_groups(&self) -> [u32; 3] {
         if self.by_blocks {
             self.pixels()
@@ -284,8 +282,8 @@ impl<'a> ImageSteps<'a> {
     }
 
     /// Answers the first `count` rays of a buffer (32 bytes each: origin, `t_min`, direction,
-    /// `t_max`), inline or in the structure's own passes. Answers have 16 bytes: a hit, or 1 or 0
-    /// for an any-hit query.
+    /// `t_max`), inline or in the structure's passes. Answers have 16 bytes: a hit, or 1 or 0 for
+    /// any hit.
     ///
     /// # Errors
     /// A kernel does not compose or compile, or there is no such buffer.

@@ -17,8 +17,7 @@ parameters! {
         MisPower = "mis-power",
         /// Emission is found by material sampling only.
         Bsdf = "bsdf",
-        /// Light sampling only; emission that it cannot sample (camera rays, delta lobes) is added
-        /// when hit.
+        /// Light sampling only; other emission (camera rays, delta lobes) is added when hit.
         Light = "light",
     }
 
@@ -38,8 +37,7 @@ parameters! {
         Power = "power",
         /// Uniformly.
         Uniform = "uniform",
-        /// By approximate contribution at the point, with a light hierarchy (Conty Estevez & Kulla
-        /// 2018).
+        /// By approximate contribution, with a light hierarchy (Conty Estevez & Kulla 2018).
         Tree = "tree",
     }
 

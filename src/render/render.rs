@@ -23,8 +23,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Samples of the first slice: few, as each may be a path through brute force over thousands of
-/// triangles.
+/// Samples of the first slice: few, as each may be a path through brute force.
 const FIRST_SLICE: u64 = 512;
 /// Bytes of the error word and the counters after it, see `kernels/common/ray_counts.wesl`.
 const STATUS_BYTES: u64 = 256;
@@ -161,8 +160,8 @@ impl<'a> Renderer<'a> {
         Self::compiled(gpu, scene, traced, job, [ray_counts, false])
     }
 
-    /// The same with a kernel that samples only listed blocks of the image, see [`Renderer::only`];
-    /// initially all.
+    /// The same with a kernel that samples only listed blocks, see [`Renderer::only`]; initially
+    /// all.
     ///
     /// # Errors
     /// As for [`Renderer::new`], or the integrator has its own passes, or the sums do not fit into
@@ -246,8 +245,7 @@ impl<'a> Renderer<'a> {
         self.passes.features()
     }
 
-    /// Features that other scenes need but these kernels omit; empty for integrators that trace
-    /// nothing.
+    /// Features that other scenes need but these kernels omit; empty if nothing is traced.
     pub fn left_out(&self) -> Vec<String> {
         self.passes.left_out()
     }
@@ -297,8 +295,7 @@ impl<'a> Renderer<'a> {
     /// Adds samples `first … first + count - 1` to every pixel, in slices.
     ///
     /// # Errors
-    /// The device is lost, hangs, or the driver complains; a finished block of samples is
-    /// incomplete.
+    /// The device is lost, hangs, or the driver complains; a finished block is incomplete.
     pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
         let mut sample = first;
         let end = first + count;
@@ -478,8 +475,7 @@ impl<'a> Renderer<'a> {
     /// The mean so far.
     ///
     /// # Errors
-    /// A kernel raised its error word, a pixel did not take every sample, or the device is lost or
-    /// hangs.
+    /// A kernel raised its error word, a pixel lacks samples, or the device is lost or hangs.
     pub fn image(&self) -> Result<Image, GpuError> {
         let mut totals = self.blocks.borrow().clone();
         self.add_pending(&mut totals)?;

@@ -13,8 +13,7 @@ pub trait SceneKind: PartialEq + Sized + 'static {
     fn feature(&self) -> Option<&'static str>;
     /// Its own kernel modules.
     fn sources(&self) -> Sources;
-    /// The feature of kernels that use the table of external kinds, its module, and the table with
-    /// these numbers.
+    /// The feature of kernels with external kinds, its module, and their table with these numbers.
     fn table(others: &[(usize, &'static Self)]) -> (&'static str, &'static str, String);
 }
 

@@ -63,8 +63,7 @@ impl Stage {
         })
     }
 
-    /// Builds a structure over the scene, on the device if it requires that, and checks its
-    /// invariants.
+    /// Builds a structure over the scene, on the device if required, and checks its invariants.
     ///
     /// # Errors
     /// It cannot be built, or is invalid.

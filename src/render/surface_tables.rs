@@ -3,8 +3,7 @@
 
 use raystone_scene::{Material, SceneData, TextureUse, Wrap};
 
-/// Words of a material without its parameters; the last four are the indices of its texture
-/// placements.
+/// Words of a material without its parameters; the last four refer to texture placements.
 pub(super) const MATERIAL_WORDS: usize = 12;
 /// Words of a texture placement.
 const USE_WORDS: usize = 12;

@@ -20,8 +20,7 @@ pub struct SceneFeatures {
     pub lights: bool,
     /// Kinds of lights.
     pub light_kinds: SceneKinds<LightKind>,
-    /// Lights must be chosen: there is more than one, or an emissive triangle outside of the only
-    /// one.
+    /// Lights must be chosen: there are several, or an emissive triangle outside of the only one.
     pub many_lights: bool,
     /// A surface emits only from its front.
     pub one_sided_lights: bool,
@@ -99,8 +98,7 @@ impl SceneFeatures {
         self.light_kinds.activate(self.materials.activate(kernel))
     }
 
-    /// Features that a kernel omits that handles only surfaces of this kind, by its number, or only
-    /// misses.
+    /// Features omitted by a kernel for surfaces of only this kind, by its number, or only misses.
     pub(crate) fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
         let own = kind.and_then(|number| self.materials.kind(number).feature());
         let others = self.materials.flags().map(|(name, _)| name);

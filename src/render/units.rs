@@ -11,8 +11,7 @@ pub(super) fn unit_share(units: u32) -> f32 {
 }
 
 /// The number of values of each of these weights, which are finite and not negative: at least one
-/// for each above 0, the rest by rounded cumulative weights. If all are 0, they are treated as
-/// equal.
+/// for each above 0, the rest by rounded cumulative weights. Equal shares if all are 0.
 pub(super) fn shared_out(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let alike = vec![1.0; weights.len()];

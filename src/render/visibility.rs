@@ -13,8 +13,7 @@ use raystone_core::geometry::Camera;
 use raystone_gpu::{Composition, Elapsed, Gpu, GpuError, Raster, UniformValues};
 
 /// Distance of the near plane, as a fraction of the scene's diagonal. Depth is near / distance in
-/// f32, with the same relative precision at all distances, so the plane may be this near; anything
-/// nearer is not seen.
+/// f32, equally precise at all distances, so it may be this near; anything nearer is not seen.
 const NEAR: f64 = 1e-6;
 
 /// The triangles of a scene, for rasterisation.
@@ -71,8 +70,7 @@ impl Visibility {
         self.raster.words()
     }
 
-    /// The triangle of each pixel, row by row from the top; [`NO_HIT`](raystone_accel::NO_HIT) if
-    /// there is none.
+    /// The triangle of each pixel, row by row; [`NO_HIT`](raystone_accel::NO_HIT) for none.
     ///
     /// # Errors
     /// The device is lost or hangs.

@@ -1,5 +1,4 @@
-//! Arithmetic on fractions of 2³². CPU version of `kernels/sampling/fixed_point.wesl`, which has no
-//! 64-bit integers.
+//! Arithmetic on fractions of 2³². Without 64-bit integers in `kernels/sampling/fixed_point.wesl`.
 
 /// The upper word of a product.
 pub(crate) fn mul_high(a: u32, b: u32) -> u32 {

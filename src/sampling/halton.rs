@@ -76,8 +76,7 @@ impl DigitRule {
         words
     }
 
-    /// The radical inverse in the base in word `place`, with the permutation at the start in the
-    /// next word.
+    /// The radical inverse in the base in word `place`, with the permutation in the next word.
     pub(super) fn inverse_at(&self, table: &SamplerTable, n: u32, place: u32) -> u32 {
         let base = table.sequence_word(place);
         if base > 2 && self.digits != Digits::Plain {

@@ -98,8 +98,7 @@ fn extend(vector: &mut [u32], level: u32) {
     }
 }
 
-/// The vector, computed once per process. Its first components do not depend on the number
-/// requested.
+/// The vector, computed once per process; its first components are the same for any length.
 pub(super) fn generating_vector() -> &'static [u32] {
     static VECTOR: OnceLock<Vec<u32>> = OnceLock::new();
     VECTOR.get_or_init(|| {

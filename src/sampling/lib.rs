@@ -109,8 +109,7 @@ impl Sampler {
         self.sequence.facts().random || self.decorrelation.is_random()
     }
 
-    /// True if each number of samples has its own points: the first half of the points for 2N is
-    /// not the set for N.
+    /// True if each number of samples has its own points, rather than a prefix of a longer set.
     pub fn by_count(&self) -> bool {
         self.sequence.facts().by_count || self.decorrelation.by_count()
     }
@@ -145,8 +144,7 @@ impl Sampler {
         out
     }
 
-    /// Spacing of a workgroup's pixels in each direction for which they draw the same: see
-    /// [`paired`].
+    /// Spacing of a workgroup's pixels for which they draw the same: see [`paired`].
     pub fn stride(&self) -> u32 {
         let [sequence, decorrelation] = self.seeding.map(Seeding::stride);
         sequence.max(decorrelation)

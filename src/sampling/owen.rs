@@ -4,8 +4,7 @@
 //! Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020; with the better constants of N.
 //! Vegdahl ("Building a better LK hash", 2021), as in the crate `sobol_burley`.
 
-/// Scrambles a number with bits in reverse order: a bit changes only those above it. `key` must be
-/// well mixed.
+/// Scrambles a bit-reversed number with a well-mixed `key`: a bit changes only those above it.
 pub(crate) fn scramble_reversed(n: u32, key: u32) -> u32 {
     let mut x = n;
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -23,8 +22,7 @@ pub(crate) fn owen_scramble(x: u32, key: u32) -> u32 {
 
 /// Mixes a number into a key.
 ///
-/// Source: C. Wellons, "Prospecting for hash functions", 2018 (lowbias32); zero must not map to
-/// itself.
+/// Source: C. Wellons, "Prospecting for hash functions", 2018 (lowbias32); 0 must not map to 0.
 pub(crate) fn owen_key(x: u32) -> u32 {
     let mut n = x ^ 0xe6fe_3beb;
     n ^= n >> 16;

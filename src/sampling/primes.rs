@@ -35,8 +35,7 @@ pub fn faure_permutation(base: u32) -> Vec<u32> {
     out
 }
 
-/// A fixed random permutation of the digits of `base` (Fisher–Yates); 0 is fixed, so that an
-/// expansion ends.
+/// A fixed random permutation of the digits (Fisher–Yates); 0 is fixed, so an expansion ends.
 pub(super) fn random_permutation(base: u32) -> Vec<u32> {
     let mut out: Vec<u32> = (0..base).collect();
     for i in (2..base).rev() {

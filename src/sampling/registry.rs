@@ -55,8 +55,7 @@ fn pair(sequence: &Variant, decorrelation: &Variant) -> String {
     format!("{sequence} × {decorrelation}")
 }
 
-/// The kind of `registry` named by `variant`, with its parameters, and the variant with all of
-/// them.
+/// The kind of `registry` named by `variant`, with its parameters, and the full variant.
 fn configured<T: ?Sized>(
     registry: &Registry<T>,
     axis: &'static str,

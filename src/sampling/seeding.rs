@@ -92,8 +92,7 @@ mod tests {
     use super::*;
     use std::collections::{BTreeMap, BTreeSet};
 
-    /// Checks a pairing of positions with pixels for an image of whole tiles; returns the fault, if
-    /// any.
+    /// The fault of a pairing of positions with pixels for an image of whole tiles, if any.
     fn fault(seeding: Seeding, paired: impl Fn([u32; 2], u32) -> [u32; 2]) -> Option<String> {
         let edge = 2 * EDGE * STRIDE;
         let places = || (0..edge).flat_map(|y| (0..edge).map(move |x| [x, y]));

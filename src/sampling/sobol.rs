@@ -19,8 +19,7 @@ parameters! {
 }
 
 /// Direction numbers of the first `dimensions` dimensions, as fractions of 2³²: `bits` per
-/// dimension, starting with that of the index's bit 0. The crate packs Joe and Kuo's file in three
-/// lengths.
+/// dimension, from bit 0 of the index on. The crate packs Joe and Kuo's file in three lengths.
 pub(super) fn direction_numbers(dimensions: u32, bits: usize) -> Vec<u32> {
     let parameters = match dimensions {
         ..=100 => JoeKuoD6::minimal(),

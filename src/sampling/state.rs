@@ -24,8 +24,7 @@ const HEADER: u32 = 1;
 pub struct SamplerTable(Vec<u32>);
 
 impl SamplerTable {
-    /// A table of the words of a sequence and of a decorrelation, for images of this width (0 if
-    /// unknown).
+    /// A table of both words, for images of this width (0 if unknown).
     pub fn new(sequence: &[u32], width: u32, decorrelation: &[u32]) -> Self {
         let header = [HEADER + sequence.len() as u32 + 1];
         let mut words = [&header, sequence, &[width], decorrelation].concat();

@@ -41,8 +41,7 @@ pub struct Judge {
     pub oracle: JudgeCheck,
     /// The first ray on which the reference tracer itself is wrong.
     pub first_wrong: Option<String>,
-    /// The reference for structures that trace instances; `None` if no ray of the scene is
-    /// transformed.
+    /// The reference for structures that trace instances; `None` if no ray is transformed.
     pub instances: Option<Box<Judge>>,
 }
 
@@ -253,8 +252,8 @@ pub fn gate(
         closest.trace()?;
         any.trace()?;
         if !set.is_timed() {
-            // Timed batches are checked again after timing; here a second pass exposes state left
-            // by the first.
+            // Timed batches are checked after timing; here a second pass exposes state left by the
+            // first.
             closest.trace_in_rows()?;
             any.trace_in_rows()?;
         }

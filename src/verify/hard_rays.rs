@@ -16,8 +16,7 @@ use raystone_core::random::Pcg32;
 /// Number of hard rays; not a multiple of a workgroup.
 pub const HARD_RAYS: usize = 4100;
 
-/// Origins outside the scene lie up to this many diagonals away, the distance grid margins allow
-/// for.
+/// Origins outside the scene are up to this many diagonals away, as far as grid margins allow.
 const OUTSIDE: f32 = 15.0;
 
 const LENGTHS: [f32; 8] = [1.0, 1e-4, 1e-7, 1e-10, 1e4, 1e7, 1e10, 0.3];
@@ -209,8 +208,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// Along a diagonal of the scene or of one of its faces, in either direction: passes as many
-    /// boxes as possible.
+    /// Along a diagonal of the scene or of one of its faces, either way: passes many boxes.
     fn along_a_diagonal(&mut self) -> (Vec3, Vec3) {
         let pick = [(); 3].map(|()| self.random.below(2) == 0);
         let [mut from, mut to] = [self.low, self.high];

@@ -57,8 +57,7 @@ impl<'a> SceneHoles<'a> {
         self.scene.materials[id as usize].mask
     }
 
-    /// The first corner in texels from the centre of the first texel, and the change per weight of
-    /// the other two.
+    /// The first corner in texels from the first texel's centre, and the differences to the others.
     fn placed(&self, triangle: u32, used: &TextureUse) -> [DVec2; 3] {
         let uvs = self.scene.uvs.get((triangle + self.first) as usize);
         let texture = &self.scene.textures[used.texture as usize];
@@ -143,8 +142,7 @@ impl<'a> Image<'a> {
         row(0.0) * (1.0 - part.y) + row(1.0) * part.y
     }
 
-    /// Minimum and maximum in a rectangle: both lie at corners of its intersections with texel
-    /// cells.
+    /// Minimum and maximum in a rectangle, from the corners of its intersections with cells.
     fn range(&self, low: DVec2, high: DVec2) -> [f64; 2] {
         let stops = |low: f64, high: f64| {
             let mut stops = vec![low, high];

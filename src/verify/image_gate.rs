@@ -35,8 +35,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Relative difference of a channel that counts as agreement.
 pub(crate) const TOLERANCE: f64 = 1e-4;
-/// Radiance below which differences are ignored, as a fraction of the mean radiance of the checked
-/// paths.
+/// Radiance below which differences are ignored, relative to the mean radiance of the paths.
 pub(crate) const FLOOR: f64 = 1e-3;
 /// Simulated f32 roundings, in this order.
 pub(crate) const SCALES: [f64; 3] = [4.0, 16.0, MOST_ROUNDINGS];
@@ -47,18 +46,15 @@ pub(crate) const FLIPS: f64 = 1e-3;
 /// a trial scene (0.03 % of 3,952 of the Cornell box), 1.0 % with maps, and in the last case 0.2 %
 /// of a trial scene but a third of those of a large building with often-repeated textures.
 pub(crate) const ILL_CONDITIONED: [f64; 3] = [0.02, 0.05, 0.6];
-/// Largest median of the relative differences in the same cases; measured: 5 · 10⁻⁷, 4 · 10⁻⁶,
-/// 10⁻⁴.
+/// Largest median of the relative differences; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
 pub(crate) const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
-/// Trials per scale. Twice as many for each surface of a path with another within rounding, and
-/// more as long as trials take new branches (light passed on by many small facets), up to
-/// [`MOST_TRIALS`].
+/// Trials per scale, and per surface with another within rounding twice as many; more while trials
+/// take new branches (light passed on by many small facets), up to [`MOST_TRIALS`].
 const TRIALS: u64 = 24;
 const MOST_TRIALS: u64 = TRIALS << 5;
 /// Factor by which a kernel may differ more than the worst simulated path of its branch.
 const SPREAD: f64 = 3.0;
-/// A difference that the second of [`SCALES`] may excuse too: several offsets add up on long paths
-/// in corners.
+/// A difference that the second of [`SCALES`] may excuse too: offsets add up in corners.
 const SLIGHT: f64 = 1e-3;
 /// Samples summed in one dispatch for comparison with single ones.
 const SUMMED: u32 = 4;
@@ -213,8 +209,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
 fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
     let off = (kernel - oracle).abs();
     let relative = off / oracle.abs().max(DVec3::splat(floor));
-    // Without any light the floor is 0 too, and equal values are equal. Unlike `max_element`, this
-    // keeps NaN.
+    // Without light the floor is 0 too, and equal is equal. This keeps NaN, unlike `max_element`.
     let [r, g, b] = DVec3::select(off.cmpeq(DVec3::ZERO), DVec3::ZERO, relative).to_array();
     if r.is_nan() || g.is_nan() || b.is_nan() {
         f64::NAN
@@ -263,8 +258,8 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
             }
         }
         if is_excused {
-            // A path on a boundary may have no trial of its own branch; the other branches then
-            // give the spread.
+            // A path on a boundary may have no trial of its own branch; others then give the
+            // spread.
             near = TOLERANCE + SPREAD * spread.max(spread_of_branches(&others, floor));
         }
         let explains = |other: &Path| difference(answer.radiance, other.radiance, floor) <= near;
@@ -318,15 +313,13 @@ fn spread_of_branches(paths: &[Path], floor: f64) -> f64 {
     paths.iter().map(from_first).fold(0.0, f64::max)
 }
 
-/// The most of `paths` that may be in a class with this share: six standard deviations above the
-/// mean.
+/// The most of `paths` that may be in a class with this share: mean plus six deviations.
 fn most(paths: usize, share: f64) -> usize {
     let mean = share * paths as f64;
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// Checks the totals of a record against their bounds, where no single path fails; `texturing`
-/// comes from the oracle.
+/// Checks the totals of a record against their bounds; `texturing` comes from the oracle.
 pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {

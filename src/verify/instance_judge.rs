@@ -19,8 +19,7 @@ use raystone_scene::{Instance, SceneData};
 /// Oracle answers held at a time, one per ray and instance.
 const ORACLE_QUESTIONS: usize = 1_000_000;
 
-/// The reference for the same rays in object space, not yet checked; `None` if no ray is
-/// transformed.
+/// The unchecked reference for the same rays in object space; `None` if no ray is transformed.
 ///
 /// # Errors
 /// An object has too many triangles for a BVH.

@@ -91,8 +91,7 @@ impl KeptChecks {
         (content.key == self.key && right).then_some(content)
     }
 
-    /// Stores the checks of a sound reference. A failed write only means that they run again next
-    /// time.
+    /// Stores the checks of a sound reference. After a failed write they merely run again.
     pub(crate) fn keep(&self, judge: &Judge) {
         let instances = judge.instances.as_deref();
         if !judge.is_sound() || instances.is_some_and(|judge| !judge.is_sound()) {

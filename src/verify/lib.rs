@@ -1,5 +1,4 @@
-//! Checks of hits and images against independent references: the gate, the path oracle, closed-form
-//! images, Mitsuba.
+//! Checks of hits and images: the gate, the path oracle, closed-form images, Mitsuba.
 #![warn(missing_docs)]
 
 pub mod gate;

@@ -139,9 +139,8 @@ fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
     .collect()
 }
 
-/// Records all classes with about `settings.rays` rays each. Classes that start on surfaces are
-/// missing if no primary ray hits anything. The hard rays, of which there is a fixed number, come
-/// last.
+/// Records all classes with about `settings.rays` rays each, then a fixed number of hard rays.
+/// Classes that start on surfaces are missing if no primary ray hits anything.
 pub fn record_rays(
     scene: &SceneData,
     soup: &TriangleSoup,
@@ -216,8 +215,7 @@ pub fn record_rays(
     sets
 }
 
-/// A point on a random emissive triangle with its index among them, or on the bounding sphere of a
-/// scene without any.
+/// A point on a random emissive triangle with its index, or without any on the bounding sphere.
 fn light_point(
     scene: &SceneData,
     emitters: &[u32],

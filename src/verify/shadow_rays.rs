@@ -56,8 +56,7 @@ pub(super) fn lights_of(scene: &SceneData, emitters: &[u32]) -> Vec<u32> {
     emitters.iter().map(number).collect()
 }
 
-/// The indices of segments grouped by light; stable within each light, as after a stable
-/// compaction.
+/// The indices of segments, stably grouped by light.
 pub fn by_light(segments: &[Segment]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..segments.len() as u32).collect();
     order.sort_by_key(|place| segments[*place as usize].number);

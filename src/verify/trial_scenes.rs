@@ -203,8 +203,7 @@ fn lamps() -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// Lights without triangles, of every kind except measured ones and maps, over a floor with a block
-/// and a lamp.
+/// All kinds of lights without triangles except measured ones and maps, with a block and a lamp.
 fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
@@ -222,8 +221,7 @@ fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A row of balls of every glossy kind over a glossy floor, between two one-sided lamps and a
-/// sheet.
+/// Balls of every glossy kind over a glossy floor, between two one-sided lamps and a sheet.
 fn glossy(kinds: &MaterialRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
@@ -257,8 +255,7 @@ fn glossy(kinds: &MaterialRegistry) -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// Textures that are not square, repeat, begin below 0 and are tinted, on a floor, a wall, a mirror
-/// and a lamp.
+/// Non-square, repeating, shifted and tinted textures on a floor, a wall, a mirror and a lamp.
 fn textured() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.7, 1.6, 2.4), vec3(0.0, 0.5, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("textured", camera, vec3(0.4, 0.5, 0.6))?;

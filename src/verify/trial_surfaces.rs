@@ -133,8 +133,7 @@ fn mapped() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A room without a lamp, with vertex colours: the sky is seen by escaping rays, and through
-/// distant surfaces.
+/// A room without a lamp, with vertex colours: escaping rays see the sky, also through surfaces.
 fn under_the_sky() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.3, 1.5, 2.2), vec3(0.0, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("under-the-sky", camera, vec3(0.9, 1.1, 0.8))?;
@@ -214,8 +213,7 @@ fn mirrored() -> Result<SceneData, SceneError> {
 /// A few ray offsets above a floor.
 const CLOSE: f32 = 1e-4;
 
-/// A tinted pane so close above a floor that a ray with ten times the correct offset starts above
-/// the pane.
+/// A tinted pane so close above a floor that a ray with ten times the offset starts above it.
 fn close_pane() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.9, 1.9, 1.6), Vec3::ZERO, Vec3::Y);
     let mut mesh = Mesh::new("close-pane", camera, vec3(0.6, 0.5, 0.4))?;

@@ -155,8 +155,7 @@ impl BvhParameters {
         }
     }
 
-    /// When the batch kernel refills its invocations: never for traversals without a resumable
-    /// state.
+    /// When the batch kernel refills its invocations: only for traversals with a resumable state.
     pub(super) fn refill(&self) -> RefillParameters {
         match self.traversal {
             Traversal::Stack => self.refill.clone(),

@@ -8,8 +8,7 @@ use super::super::twin::Walk;
 use super::boxes::{Boxes, CHILD_MASK};
 use super::{NONE, ROOT};
 
-/// The rope of a node from its parent's rope: the first child points to the second, the second to
-/// the parent's target.
+/// The rope of a node: the first child points to the second, the second to the parent's target.
 pub(super) fn rope_of(parent_rope: u32, child: u32) -> u32 {
     if child & 1 == 0 {
         child + 1

@@ -142,8 +142,7 @@ fn sort(cells: usize, shift: u32, runs: &[Pairs]) -> Lists {
     Lists { starts, references }
 }
 
-/// Counting sort of the pairs of one bucket, with first cell `first_cell` and first reference index
-/// `begin`.
+/// Counting sort of one bucket's pairs, with its first cell and first reference index.
 fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
     first_cell: u32,
     begin: u32,
@@ -169,8 +168,7 @@ fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
     }
 }
 
-/// Lists of one part of a grid from a few triangles, on the calling thread; reuses memory between
-/// parts.
+/// Lists of one part of a grid from a few triangles, on one thread; reuses memory.
 #[derive(Debug, Default)]
 pub(crate) struct PartLists {
     raster: Raster,

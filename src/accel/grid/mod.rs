@@ -96,8 +96,7 @@ pub(crate) fn finest(side: f64, margin: f32) -> f64 {
     (side / (4.0 * f64::from(margin))).max(1.0)
 }
 
-/// Cells along each axis of a box with these sides: side · cbrt(λ · triangles / volume) (J. Cleary
-/// et al., 1986).
+/// Cells along each axis: side · cbrt(λ · triangles / volume) (J. Cleary et al., 1986).
 pub(crate) fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
     let volume = side.iter().product::<f64>();
     let density = (lambda * triangles.max(1) as f64 / volume).cbrt();

@@ -83,8 +83,7 @@ pub(super) struct Level {
     high_origin: [f32; 3],
 }
 
-/// The level of boxes tested with a raised ray, grown by `growth` per unit of the origin's largest
-/// coordinate.
+/// A level for boxes grown by `growth` per unit of the raised ray origin's largest coordinate.
 pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
     let [x, y, z] = ray.origin.map(f32::abs);
     let grown = growth * x.max(y).max(z);

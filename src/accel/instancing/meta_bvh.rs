@@ -98,8 +98,7 @@ impl<'a> Levels<'a> {
         &self.top.entries[(reference & FIRST_MASK) as usize]
     }
 
-    /// Upper bound on visits per ray: every upper node once, and below every entry all of its
-    /// object.
+    /// Upper bound on visits per ray: every upper node, and below every entry all of its object.
     fn step_fuse(&self) -> usize {
         let roots = &self.base.forest.roots;
         let below = self.top.entries.iter().map(|entry| {

@@ -56,8 +56,7 @@ fn triangle(rng: &mut Pcg32) -> Triangle {
     Triangle { vertices }
 }
 
-/// A ray towards a vertex, an edge or the inside of the instance's triangle, from nearby or far
-/// off.
+/// A ray from near or far towards a vertex, an edge or the inside of the instance's triangle.
 fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
     let world = triangle.vertices.map(|v| instance.to_world.point(v));
     let mut weights = [rng.uniform(), rng.uniform(), rng.uniform()].map(|w| w as f32);
@@ -79,8 +78,7 @@ fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
     Ray::new(origin, (goal - origin) * scale)
 }
 
-/// Hits of rays on single triangles in instances, and how many of them the world box would cull
-/// with this pad.
+/// Hits on single triangles in instances, and how many of them a world box with this pad culls.
 fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usize) {
     let tests = Intersection::default();
     let one = |seed: u64| {

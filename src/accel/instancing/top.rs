@@ -40,8 +40,7 @@ impl Top {
         self.depth.max(1)
     }
 
-    /// Builds the upper level over the instances, with up to `rebraid` entries per instance on
-    /// average.
+    /// Builds the upper level, with up to `rebraid` entries per instance on average.
     pub(super) fn build(instances: &[Instance], forest: &Forest, rebraid: usize) -> Self {
         let mut builder = Builder {
             forest,
@@ -190,8 +189,7 @@ struct Split {
 }
 
 impl Split {
-    /// The cheapest bin border by SAH; the median if there is none, or below the SAH depth. Needs
-    /// at least two `parts`.
+    /// The cheapest bin border by SAH; the median without one or below the SAH depth.
     fn best(parts: &[Part], depth: u32) -> Self {
         let plane = (depth < SAH_DEPTH).then(|| Plane::best(parts)).flatten();
         let sides: [Vec<Part>; 2] = match plane {

@@ -71,8 +71,7 @@ impl BoxMap {
         }
     }
 
-    /// Growth of top-level boxes per unit of the ray origin's largest coordinate; 0 if rays are not
-    /// transformed.
+    /// Growth of top-level boxes per unit of the ray origin's largest coordinate.
     pub(super) fn growth(&self) -> f32 {
         if self.instance.is_identity() {
             0.0

@@ -48,8 +48,7 @@ fn pack(cell: &GridCell, list: u32) -> [u32; 4] {
     [x | y << 16, z | u << 16, v | w << 16, list]
 }
 
-/// Entries with blocks of at most 2^[`MOST_LOG`] along an axis; a region of a single cell is one
-/// entry.
+/// Entries with blocks of at most 2^[`MOST_LOG`] along an axis; a single cell is one entry.
 fn entries(map: &Map) -> Vec<u32> {
     let tops = map.top_cells();
     let write_run = |words: &[u32]| {

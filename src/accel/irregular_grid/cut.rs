@@ -13,8 +13,7 @@ use rayon::prelude::*;
 const MOST_TOP: u32 = 2048;
 /// Largest log2 of a block's side.
 const MOST_LOG: u32 = 6;
-/// A voxel with at least this many triangles, and more than one in [`BUNCHED`] of those of its
-/// block, is cut again.
+/// A voxel with at least this many triangles, and over 1/[`BUNCHED`] of its block's, is cut again.
 const LEAST_BUNCH: usize = 32;
 const BUNCHED: usize = 4;
 
@@ -80,8 +79,7 @@ fn parts_log(
     } else {
         MOST_LOG
     };
-    // Parts are cubes of voxels: the axis with the fewest possible cuts decides, but a flat cell
-    // may be cut.
+    // Parts are cubes of voxels: the least divisible axis decides, but a flat cell may be cut.
     let longest = side.iter().copied().fold(0.0, f64::max);
     let finest = (0..3)
         .map(|a| finest(side[a].max(longest / 16.0), fine.margin[a]))

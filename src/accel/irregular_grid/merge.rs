@@ -131,9 +131,8 @@ impl<'a> State<'a> {
         (same_section && self.pays(cell, next, axis)).then_some(other)
     }
 
-    /// The cell that begins where this one ends, at the same low corner otherwise. It has the
-    /// number that the map of the first phase gives the voxel there, whatever it was merged with
-    /// since.
+    /// The next cell at the same low corner otherwise. It has the number that the first phase's map
+    /// gives the voxel there, whatever it was merged with since.
     fn neighbour(&self, id: u32, axis: usize) -> u32 {
         let cell = &self.cells[id as usize];
         let mut voxel = cell.min.map(u32::from);

@@ -102,8 +102,7 @@ struct Built {
     /// Four words per cell: coordinates of the lowest voxel and of the one past the highest, 16
     /// bits each, and the index of its list.
     cells: Vec<u32>,
-    /// Entries, each index << [`LOG_BITS`] | log2; then references, the last of a list marked by
-    /// [`LAST`].
+    /// Entries (index << [`LOG_BITS`] | log2), then references, with [`LAST`] at the end of a list.
     words: Vec<u32>,
     first_reference: usize,
 }
@@ -284,8 +283,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: the next cell may hold one at the same
-            // distance.
+            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }

@@ -1,5 +1,4 @@
-//! Voxels and cells while an irregular grid is built: the cell of each voxel, and the triangles of
-//! each cell.
+//! Voxels and cells while an irregular grid is built.
 
 /// Marks an entry as a block index.
 const BLOCK: u32 = 1 << 31;

@@ -208,8 +208,7 @@ impl BuiltAccel for Built {
                 ("tree", tree),
                 limits(self.nodes.len() + 1, self.nodes.len()),
             ],
-            // At most one entry per level; a multiple of 16, so that scenes of similar depth share
-            // a kernel.
+            // At most one entry per level; rounded, so that scenes of similar depth share a kernel.
             constants: vec![("STACK_ENTRIES", depth.max(1).next_multiple_of(16))],
         }
     }

@@ -48,8 +48,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// The given triangles, all of which the cell of node `index` must list, that are missing in
-    /// its leaves.
+    /// Those of `triangles`, which the cell of node `index` must list, that its leaves lack.
     fn lacking(
         &mut self,
         index: usize,

@@ -186,8 +186,8 @@ impl BuiltAccel for Built {
                 ("space", space),
                 limits(self.nodes.len() + 1, self.references.len()),
             ],
-            // One entry per level and one for the root; a multiple of 8, so that scenes of similar
-            // depth share a kernel.
+            // One entry per level plus the root; rounded, so that scenes of similar depth share a
+            // kernel.
             constants: vec![("STACK_ENTRIES", (self.depth + 1).next_multiple_of(8))],
         }
     }
@@ -224,8 +224,7 @@ impl BuiltAccel for Built {
     }
 }
 
-/// A bit per child; bit `i` stands for octant `i ^ flip`, so that lower bits come first along the
-/// ray.
+/// Bit `i` stands for octant `i ^ flip`, so that lower bits come first along the ray.
 fn mirrored(mask: u32, flip: u32) -> u32 {
     let mut out = mask;
     if flip & 1 != 0 {

@@ -15,8 +15,7 @@ pub struct Crossed {
     pub side: Side,
     /// Distance in units of the direction, f64.
     pub t: f64,
-    /// Bound on the rounding error of the distance in an f32 test; infinite where the ray grazes
-    /// the plane.
+    /// Rounding error bound of the distance in f32; infinite where the ray grazes the plane.
     pub slack: f64,
     /// True if every such test must find it.
     pub definite: bool,

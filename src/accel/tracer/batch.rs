@@ -13,8 +13,7 @@ const POISON: u32 = 0xffff_dead;
 /// Workgroups in a row of [`RayBatch::trace_in_rows`].
 const NARROW_ROW: u32 = 3;
 
-/// Rays of the first dispatch through an unknown structure: few, as it may be brute force over a
-/// million triangles.
+/// Rays of the first dispatch: few, as it may be brute force over a million triangles.
 const FIRST_SLICE: u64 = 64;
 
 /// Answers with the error word of the kernels.
@@ -76,8 +75,8 @@ impl RayBatch {
         &self.tracer
     }
 
-    /// Traces all rays, in as many dispatches as needed to limit the time of each. Earlier answers
-    /// are overwritten before the clock starts; the error word persists. Times are sums over all
+    /// Traces all rays, in as many dispatches as needed to limit the time of each. Overwrites
+    /// earlier answers before the clock starts, but not the error word. Times are sums over all
     /// passes.
     ///
     /// # Errors

@@ -83,8 +83,7 @@ impl Tracer {
     /// Compiles the kernels for the query.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, or work is to be counted but the structure does not
-    /// count any.
+    /// A kernel does not compose or compile, or the structure does not count the requested work.
     pub fn new(
         gpu: &Gpu,
         triangles: &TriangleBuffers,

@@ -53,9 +53,8 @@ impl TracePasses for OnePass {
 
 /// Recorder of a structure's passes.
 ///
-/// Kernels can bind: the canonical triangles, the structure's arrays and uniforms, its scratch,
-/// `rays`, `hits` (or `work`), `status`, and the uniform `batch` with the members `first` and
-/// `count`.
+/// Kernels can bind: triangles, the structure's arrays and uniforms, its scratch, `rays`, `hits`
+/// (or `work`), `status`, and the uniform `batch` with the members `first` and `count`.
 pub struct TraceSteps<'a> {
     tracer: &'a Tracer,
     recording: &'a mut Recording,
@@ -77,8 +76,7 @@ pub struct LiveRays {
     pub counts: Storage,
     /// Index of the count among them.
     pub word: u32,
-    /// Workgroups for at least that many rays, with the invocations of the structure's kernels, see
-    /// [`TraceSteps::lanes`].
+    /// Workgroups for at least that many rays, with [`TraceSteps::lanes`] invocations each.
     pub groups: Groups,
 }
 
@@ -173,8 +171,7 @@ impl<'a> TraceSteps<'a> {
         self.run_counted(name, kernel, groups, special)
     }
 
-    /// The same with this many workgroups, for kernels that distribute the rays over their
-    /// invocations.
+    /// The same with this many workgroups, for kernels that share out the rays themselves.
     ///
     /// # Errors
     /// As [`TraceSteps::run`].

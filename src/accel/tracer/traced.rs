@@ -107,8 +107,7 @@ impl Traced {
     /// The same with another workgroup shape.
     ///
     /// # Errors
-    /// A structure with its own passes, unless `workgroup` is the default: it has its own
-    /// workgroups, too.
+    /// A structure with its own passes, and thus workgroups, supports the default only.
     pub fn in_workgroups(mut self, gpu: &Gpu, workgroup: &Workgroup) -> Result<Self, GpuError> {
         if self.inline {
             self.workgroup = workgroup.shape(gpu);

@@ -40,8 +40,7 @@ pub(super) fn build(mut references: Vec<Reference>, settings: &TreeParameters) -
     tree.into()
 }
 
-/// Partitions `references`; returns the start of the second half and the boxes of both. `None`
-/// makes a leaf.
+/// Partitions `references`; returns the start of the second half and both boxes. `None`: a leaf.
 fn split(
     references: &mut [Reference],
     bounds: Box3,
@@ -64,8 +63,7 @@ fn split(
     })
 }
 
-/// Halves, in an order that depends on the input alone: for nodes with coinciding centres, or below
-/// the SAH depth.
+/// Halves in an order given by the input alone: for equal centres, or below the SAH depth.
 pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize, [Box3; 2]) {
     let middle = references.len() / 2;
     references.sort_unstable_by(|a, b| a.compare(b, axis));

@@ -94,8 +94,7 @@ impl<'a> Coverage<'a> {
     /// Records the triangles of a leaf with these bounds; `None` is a range outside the array.
     ///
     /// # Errors
-    /// The range does not exist, or a triangle differs from the scene's, is in the leaf twice, or
-    /// lies outside it.
+    /// The range does not exist, or a triangle is wrong, twice in the leaf, or outside it.
     pub fn leaf(
         &mut self,
         triangles: Option<&[TriangleRecord]>,
@@ -234,8 +233,7 @@ mod tests {
 
     #[test]
     fn leaves_need_not_hold_the_corners_of_the_box_that_the_triangle_misses() {
-        // Below x = 2 the triangle spans y = 0 to 2 and z = 0 to 8, above it starts at y = 1 and
-        // ends at z = 4.
+        // Below x = 2 the triangle spans y = 0 to 2, z = 0 to 8; above, y starts at 1, z ends at 4.
         let low = slab([0.0; 3], [2.0, 2.0, 8.0]);
         let high = |y: f32, z: f32| slab([2.0, y, 0.0], [4.0, 2.0, z]);
         assert_eq!(check(&[low, high(1.0, 4.0)]), Ok(()));

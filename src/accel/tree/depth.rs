@@ -9,8 +9,7 @@ pub(super) fn depth_limit(references: usize) -> u32 {
     SAH_DEPTH + references.max(1).ilog2() + 1
 }
 
-/// `tree` if it is not too deep; otherwise with everything below [`SAH_DEPTH`] in balanced subtrees
-/// over the same leaves.
+/// `tree`, with balanced subtrees over the same leaves below [`SAH_DEPTH`] if it is too deep.
 pub(super) fn limit_depth(tree: Tree) -> Tree {
     if tree.depth() <= depth_limit(tree.order.len()) {
         return tree;

@@ -31,8 +31,7 @@ pub(crate) fn grow<P: Send, N: Send>(
     grown
 }
 
-/// Lays out a tree of known nodes on one thread: `look` returns a node's box and children, or
-/// appends a leaf's list.
+/// Lays out a known tree on one thread: `look` gives box and children, or appends a leaf's list.
 pub(super) fn lay_out<P>(
     root: P,
     look: impl Fn(P, u32, &mut Vec<u32>) -> (Bounds, Option<[P; 2]>),

@@ -56,8 +56,7 @@ pub enum NodeKind {
     },
 }
 
-/// Approximate limit of boxes visited for the end-point overlap of a record: some tenths of a
-/// second.
+/// Limit on boxes visited for a record's end-point overlap: some tenths of a second.
 const EPO_VISITS: u64 = 4_000_000;
 
 /// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.

@@ -7,8 +7,7 @@ use crate::polygon::Polygon;
 use crate::triangle::TriangleRecord;
 use rayon::prelude::*;
 
-/// Triangles per task in the overlap sum: a constant, so that the sum does not depend on the number
-/// of threads.
+/// Triangles per task; constant, so that the sum does not depend on the number of threads.
 const TRIANGLES_PER_TASK: usize = 16;
 /// Triangles between two checks of the budget.
 const TRIANGLES_PER_BATCH: usize = 128;
@@ -137,8 +136,7 @@ struct Overlap {
     visits: u64,
 }
 
-/// All of `0..count`, in an order whose every prefix is spread evenly: steps of about the golden
-/// ratio (Weyl).
+/// `0..count` in an order whose every prefix is spread evenly: golden-ratio steps (Weyl).
 fn spread(count: usize) -> Vec<usize> {
     let golden = (count as f64 * 0.618_033_988_749_895) as usize;
     let step = (golden..).find(|&step| gcd(step, count) == 1).unwrap_or(1);

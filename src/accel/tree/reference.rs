@@ -110,8 +110,7 @@ impl Reference {
         min + max
     }
 
-    /// Sorts by centre along `axis`; ids make the order total, so that it does not depend on the
-    /// input order.
+    /// Orders by centre along `axis`, then id: the result does not depend on the input order.
     pub(super) fn compare(&self, other: &Self, axis: usize) -> std::cmp::Ordering {
         let centre = |r: &Self| r.min[axis] + r.max[axis];
         centre(self)

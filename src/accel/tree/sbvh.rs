@@ -97,8 +97,7 @@ impl Spatial<'_> {
         self.settings.must_be_leaf(side.bounds, areas)
     }
 
-    /// Box of the part of a triangle within `cell`, a part of its box; `None` if it clearly misses
-    /// it.
+    /// Box of a triangle's part within `cell`, a part of its box; `None` if clearly missed.
     fn part(&self, id: u32, cell: Box3) -> Option<Box3> {
         let Some(margin) = &self.margin else {
             return Some(cell);

@@ -187,8 +187,7 @@ pub trait TriangleTest: Send + Sync {
             if is_cut_out(masks, triangle, u, v) {
                 return;
             }
-            // None of the three is negative, but any may be −0, whose sign compilers do not
-            // preserve.
+            // None is negative, but any may be −0, whose sign compilers do not preserve.
             *hit = Hit {
                 t: t.abs(),
                 triangle: triangle.id,

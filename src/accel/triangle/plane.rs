@@ -9,8 +9,7 @@ use crate::ray::Ray;
 /// to numerator or denominator, and the division.
 pub(crate) const DISTANCE_PAD: f32 = 9.536_743e-7;
 
-/// Rounding error bound of a distance to the plane computed from differences of vertices, from
-/// `DISTANCE_PAD`.
+/// Rounding error bound of a plane distance from vertex differences, by `DISTANCE_PAD`.
 pub fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);

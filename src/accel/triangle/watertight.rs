@@ -95,8 +95,7 @@ pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
 
 /// The smallest denominator: squares of shorter edges underflow.
 const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
-/// Smaller steps, as fractions of an edge, are rounding errors of any triangle: a quarter of the
-/// margin in the offset.
+/// Smaller steps, as fractions of an edge, are rounding: a quarter of the offset's margin.
 const NEGLIGIBLE: f32 = 2.384_185_8e-7;
 
 /// A step along an edge, times the area.

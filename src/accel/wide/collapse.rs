@@ -1,5 +1,5 @@
-//! Wide trees from binary ones: of all ways to pull grandchildren up and to merge leaves, the one
-//! of least SAH cost.
+//! Wide trees from binary ones: the least SAH cost over all ways to pull up grandchildren and merge
+//! leaves.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.

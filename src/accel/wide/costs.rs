@@ -20,8 +20,7 @@ const BITS: u32 = 3;
 /// Smallest number of children that needs a choice.
 const FEWEST: u32 = 2;
 
-/// C(n, i) of the paper for all nodes n and i below the width, and the number of triangles of each
-/// node.
+/// C(n, i) of the paper for all nodes n and i below the width, and the triangles per node.
 pub(super) struct Costs<'a> {
     tree: &'a Tree,
     width: u32,

@@ -134,8 +134,7 @@ impl<'a> Passes<'a> {
     }
 }
 
-/// The wide tree, from the index of every binary node. Output of a faulty kernel must not cause a
-/// panic.
+/// The wide tree, from every binary node's index. Faulty kernel output must not cause a panic.
 fn gather(
     tree: &Tree,
     places: &[Place],

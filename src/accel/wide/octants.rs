@@ -19,8 +19,7 @@ fn agreement(offset: [f32; 3], slot: usize) -> f32 {
     along(0) + along(1) + along(2)
 }
 
-/// The children of a node with this box, assigned to slots greedily by best agreement. Empty slots
-/// get an empty leaf.
+/// The children in slots, assigned greedily by best agreement. Empty slots get an empty leaf.
 pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
     let middle = bounds.doubled_centre();
     let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(SLOTS * SLOTS);

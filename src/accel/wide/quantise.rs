@@ -156,8 +156,7 @@ fn exponent(x: f32) -> i32 {
     ((x.to_bits() >> 23 & 255) as i32 - BIAS).max(1 - BIAS)
 }
 
-/// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box, `+
-/// far` where it exits.
+/// Distances along a ray to a node's planes: `q · scale + near` on entry, `+ far` on exit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaneDistances {
     scale: [f32; 3],
@@ -303,8 +302,7 @@ mod tests {
                     let quantum = 2.0_f64.powi(i32::from(grid.exponents[axis]) - BIAS);
                     let exact = f64::from(grid.low[axis]) + f64::from(planes.high[axis]) * quantum;
                     assert_eq!(f64::from(decoded.max[axis]), exact);
-                    // And no looser than a quantum; the difference from a denormal would be
-                    // rounded.
+                    // No looser than a quantum; the difference from a denormal would be rounded.
                     assert!(
                         exact - quantum < f64::from(inner.max[axis]),
                         "{inner:?}: {grid:?}"

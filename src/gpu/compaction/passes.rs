@@ -101,8 +101,7 @@ impl<'a> Passes<'a> {
         self.recording.clear(&self.stream.count);
     }
 
-    /// Runs `compaction/NAME` with the bindings of the stream and `further`, in this many
-    /// workgroups.
+    /// Runs `compaction/NAME` with the bindings of the stream and `further`.
     ///
     /// # Errors
     /// The kernel does not compose or compile.
@@ -135,8 +134,7 @@ impl<'a> Passes<'a> {
         self.run(kernel, further, items.div_ceil(WORKGROUP_SIZE))
     }
 
-    /// Sorts pairs of words by the lowest `bits` of the keys, and returns their new location: see
-    /// [`RadixSort::record`].
+    /// Sorts pairs of words by the lowest `bits` of the keys: see [`RadixSort::record`].
     ///
     /// # Errors
     /// A kernel does not compose or compile.

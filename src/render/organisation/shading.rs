@@ -55,8 +55,7 @@ pub(super) fn by_kind(
 }
 
 impl Kinds<'_> {
-    /// Flags all live paths by the kind they hit, and fills all queues if that is possible in one
-    /// compaction.
+    /// Flags all live paths by the kind they hit, and fills all queues if one compaction can.
     fn fill(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let mut bindings = self.queues.bindings.clone();

@@ -19,9 +19,8 @@ pub fn polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * sum.abs()
 }
 
-/// Irradiance over radiance from a disk parallel to the surface, whose axis passes the point at
-/// `offset` (J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-13, times
-/// π).
+/// Irradiance over radiance from a parallel disk whose axis passes the point at `offset` (J. R.
+/// Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-13, times π).
 pub fn disk(height: f64, radius: f64, offset: f64) -> f64 {
     let (h, r) = (height / offset, radius / offset);
     let z = 1.0 + h * h + r * r;
@@ -42,8 +41,7 @@ pub(crate) fn segment(c: f64) -> f64 {
     (c.acos() - c * (1.0 - c * c).sqrt()) / PI
 }
 
-/// The same for directions with at least `a` along one axis and at least `b` along the other, by
-/// quadrature.
+/// The same with at least `a` along one axis and at least `b` along the other, by quadrature.
 pub(crate) fn corner(a: f64, b: f64) -> f64 {
     let end = (1.0 - b * b).max(0.0).sqrt();
     if a >= end {
@@ -73,8 +71,7 @@ pub fn integral([start, end]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     (0..PARTS).map(part).sum()
 }
 
-/// ∫ f over the directions above the plane z = 0: the midpoints of `2 n · n` cells of equal solid
-/// angle.
+/// ∫ f over the directions above z = 0: the midpoints of `2 n · n` cells of equal solid angle.
 pub(crate) fn over_hemisphere(n: u32, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for row in 0..n {
@@ -89,8 +86,7 @@ pub(crate) fn over_hemisphere(n: u32, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
     sum * PI / f64::from(2 * n * n)
 }
 
-/// Radiance of a map for these angles, written from its description: bilinear between texel
-/// centres.
+/// Radiance of a map for these angles, from its description: bilinear between texel centres.
 pub(crate) fn map_radiance(map: &EnvironmentMap, turn: f64, polar: f64, azimuth: f64) -> DVec3 {
     let (width, height) = (map.width as usize, map.height as usize);
     // A turn by +a about y maps the azimuth φ, measured from −z towards +x, to φ − a.

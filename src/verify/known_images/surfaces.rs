@@ -1,5 +1,4 @@
-//! Surfaces: images of the material kinds, every glossy material, closed boxes with
-//! interreflection.
+//! Surfaces: images of the material kinds, all glossy materials, boxes with interreflection.
 
 use super::closed::over_hemisphere;
 use super::lamps::{FLOOR, on_floor, path};

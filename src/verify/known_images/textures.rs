@@ -1,5 +1,4 @@
-//! Textures with distinguishable texels: wrap modes, transforms, orientation, encodings, normal
-//! maps, vertex normals.
+//! Textures with distinct texels: wrapping, transforms, orientation, encodings, normals.
 
 use super::lamps::{NEAR, path};
 use super::{KnownImage, View};

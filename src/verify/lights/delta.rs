@@ -1,5 +1,4 @@
-//! Delta lights: points, spots and directional lights, and the parts that luminaires share with
-//! them.
+//! Delta lights: points, spots and directional lights, and their shared code with luminaires.
 
 use super::ies::candela;
 use super::{LightChecks, LightTwin};
@@ -156,12 +155,10 @@ fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), Expor
     Ok(())
 }
 
-/// Width and height of a spot's projected texture; the falloff from centre to edge spans this many
-/// texels.
+/// Size of a spot's projected texture; the falloff from centre to edge spans this many texels.
 const SPOT_EDGE: u32 = 512;
 
-/// Mitsuba's spots fade linearly in the angle, so a sharp-edged one projects a texture of our
-/// falloff.
+/// Mitsuba's spots fade linearly in the angle: a sharp-edged one projects our falloff.
 fn spot_in_mitsuba(
     export: &mut Export<'_>,
     number: usize,
@@ -221,8 +218,7 @@ fn spot_in_mitsuba(
     Ok(())
 }
 
-/// From a position to a floor point: distance, cosine at the floor, and cosine to this axis of a
-/// light.
+/// Distance from a position to a floor point, and the cosines at the floor and to the axis.
 fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
     let way = (point - place).as_dvec3();
     let direction = way.normalize();

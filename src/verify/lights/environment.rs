@@ -85,8 +85,7 @@ impl Aliases {
         }
     }
 
-    /// The entry for a number in [0, 1), and the relative position of the number in the range that
-    /// chose it.
+    /// The entry for a number in [0, 1), and the number's relative position in its range.
     fn choose(&self, u: f64) -> (usize, f64) {
         let value = (u * UNITS).clamp(0.0, UNITS - 1.0) as u32;
         let part = (value / self.size) as usize;
@@ -188,8 +187,7 @@ impl Map {
         self.rows.shares[row] * self.columns[row].shares[column] / self.solid_angle(row)
     }
 
-    /// A sampled direction: the second number chooses the row and the position along it, the first
-    /// the column.
+    /// A sampled direction: `v` chooses the row and the position along it, `u` the column.
     pub(crate) fn sample(
         &self,
         [u, v]: [f64; 2],

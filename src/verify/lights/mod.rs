@@ -41,8 +41,7 @@ pub struct LightChecks {
     pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
 }
 
-/// Writes the light with this index for Mitsuba; [`ExportError::Light`] gives the reason if it
-/// cannot.
+/// Writes the light with this index for Mitsuba, or fails with [`ExportError::Light`].
 pub type ToMitsuba = fn(&mut Export<'_>, usize, &Light) -> Result<(), ExportError>;
 
 impl LightChecks {

@@ -126,8 +126,7 @@ fn balls() -> Vec<(Option<usize>, Material)> {
     vec![(Some(7), glass.with_schlick())]
 }
 
-/// Glass balls, one inside another, a pane, a mirror behind, tints, and a lamp seen through all of
-/// them.
+/// Glass balls, nested, a pane, a mirror, tints, and a lamp seen through all of them.
 fn trials() -> Result<Vec<TrialScene>, SceneError> {
     let camera = camera(
         vec3(0.3, 1.3, 4.1),

@@ -35,8 +35,7 @@ pub struct MaterialChecks {
     pub mitsuba: fn(&Material, &Color, &str, &mut Vec<String>) -> String,
     /// Python that defines the kind for Mitsuba, after `mitsuba/opaque.py`; empty if built in.
     pub python: &'static str,
-    /// Materials for the balls of the trial scene `glossy`, with their positions; those without one
-    /// come last.
+    /// Materials for the balls of the trial scene `glossy`, with positions; `None` comes last.
     pub balls: fn() -> Vec<(Option<usize>, Material)>,
     /// Materials for the planes of the known image `materials`.
     pub planes: fn() -> Vec<(&'static str, Material)>,

@@ -57,8 +57,7 @@ impl Bsdf for Phong<'_> {
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
         let towards = rounding.number(direction.dot(self.mirror())).min(1.0);
-        // Zero behind the plane across the mirror direction, even where 0⁰ is 1: exponent 0 is a
-        // hemisphere.
+        // Zero behind the plane across the mirror direction: exponent 0 is a hemisphere.
         let lobe = if towards > 0.0 {
             (self.exponent + 1.0) / TAU * towards.powf(self.exponent)
         } else {

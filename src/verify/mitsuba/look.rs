@@ -19,8 +19,7 @@ const FINER: u32 = 4;
 const SKY_SIZE: [u32; 2] = [1024, 512];
 
 impl Export<'_> {
-    /// The material as a BSDF named by its number. Surfaces look the same from both sides, as in
-    /// our kernels.
+    /// The material as a BSDF named by its number, two-sided as in our kernels.
     pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
         let material = &scene.materials[id];
         let color = self.color(scene, id)?;

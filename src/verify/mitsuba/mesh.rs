@@ -66,8 +66,7 @@ pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<
     Some((bytes, smooth))
 }
 
-/// The normal at a corner, on the front of the triangle; the triangle's normal if the file has
-/// none.
+/// The normal at a corner, on the triangle's front; the triangle's if the file has none.
 fn normal(scene: &SceneData, index: usize, corner: usize) -> Vec3 {
     let face = front(scene, index);
     let own = scene

@@ -59,8 +59,7 @@ pub trait Bsdf {
     }
 }
 
-/// Unit vectors orthogonal to `n`: T. Duff et al., "Building an orthonormal basis, revisited", JCGT
-/// 6(1), 2017.
+/// Orthonormal basis: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
 pub(crate) fn basis(n: DVec3) -> [DVec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
@@ -107,8 +106,7 @@ pub fn colour(surface: &Surface) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|place| parameter(surface, place)))
 }
 
-/// Chooses between two lobes, the first with probability `p`; returns the choice and the rescaled
-/// `u`.
+/// Chooses the first of two lobes with probability `p`; also returns the rescaled `u`.
 pub fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
     let u = rounding.share(u).clamp(0.0, 1.0);
     if u < p {
@@ -141,8 +139,7 @@ fn across(surface: &Surface, direction: DVec3) -> DVec3 {
     direction - surface.geometric * (2.0 * direction.dot(surface.geometric))
 }
 
-/// A delta lobe's direction, mirrored at the surface where the surface and the shading normal see
-/// it on different sides.
+/// A delta direction, mirrored at the surface where shading and geometric normal disagree.
 pub fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
     let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
     if meant == found {

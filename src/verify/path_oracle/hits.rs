@@ -10,8 +10,7 @@ use raystone_scene::SceneData;
 /// Fraction of the distance to its light by which a shadow ray ends early.
 pub(crate) const SHORT: f64 = 1e-7;
 
-/// Hits nearer than this, relative to the largest coordinate of the scene, are the surface that the
-/// ray leaves.
+/// Nearer hits, relative to the scene's largest coordinate, are the surface that the ray leaves.
 const START: f64 = 1e-9;
 
 /// How far a barycentric may be negative, so that no ray slips through between two triangles.
@@ -20,8 +19,7 @@ const EDGE: f64 = 1e-12;
 /// Distances with a smaller relative difference are equal: the lowest triangle index wins.
 const EQUAL: f64 = 1e-12;
 
-/// Surfaces with distances within this many f32 roundings are layers: a kernel may meet either
-/// first.
+/// Surfaces within this many f32 roundings are layers: a kernel may meet either first.
 const LAYERED: f64 = 16.0;
 
 /// Beyond this, f32 distances count as infinite.
@@ -191,8 +189,7 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// The hit seen from the point that the ray leaves; unchanged if the line from there misses the
-    /// triangle.
+    /// The hit seen from the point that the ray leaves, unless the line from there misses.
     pub(crate) fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
         let from_there = Segment {
             origin: segment.start,

@@ -121,8 +121,8 @@ pub struct Path {
     pub vertices: Vec<Vertex>,
     /// All rays traced for it.
     pub rays: Vec<PathRay>,
-    /// All decisions: triangles, lobes, lights, occlusion, termination. Paths of one branch differ
-    /// by rounding only.
+    /// All decisions: triangles, lobes, lights, occlusion, end. One branch differs by rounding
+    /// only.
     pub branch: Vec<Decision>,
     /// Number of its surfaces that have another within rounding.
     pub layers: usize,

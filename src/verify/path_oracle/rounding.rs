@@ -90,8 +90,7 @@ impl Rounding {
     }
 
     /// True if a triangle contains a hit with this smallest weight. Each triangle is perturbed
-    /// independently, so a ray may slip through between two of them, as with tests that are not
-    /// watertight.
+    /// independently, so a ray may slip through between two, as with tests that are not watertight.
     pub(crate) fn holds(&mut self, margin: f64, error: f64) -> bool {
         let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
         margin.max(0.0) + signed * self.scale * error >= 0.0

@@ -69,8 +69,7 @@ pub(crate) fn doubled_centre(around: OrderedBox) -> [f32; 3] {
     std::array::from_fn(|axis| number(around.low[axis]) + number(around.high[axis]))
 }
 
-/// Half the surface area of a box. Two products without a common factor: kernel compilers would
-/// merge others.
+/// Half the surface area. No common factor in the products: kernel compilers would merge them.
 pub(crate) fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| high[axis] - low[axis]);
     x * (y + z) + y * z

@@ -18,8 +18,7 @@ use std::sync::Arc;
 const WORD_BITS: u32 = 30;
 /// Children of a block, as in `blocks.wesl`.
 const BLOCK: u32 = 8;
-/// Words of `boxes.wesl` about the whole scene; the last one identifies a triangle that is too
-/// large.
+/// Words of `boxes.wesl` about the whole scene; the last identifies a too large triangle.
 const SCENE_WORDS: u32 = 7;
 
 pub(crate) fn failed(error: GpuError) -> AccelError {
@@ -40,7 +39,7 @@ pub(crate) fn play(recording: &Recording, log: &mut BuildLog) -> Result<Played, 
 /// exact.
 ///
 /// # Errors
-/// There is no device, or it reported an error; a coordinate is too large or not a number.
+/// There is no device, or it reported an error; a coordinate is too large or NaN.
 pub fn build(
     soup: &TriangleSoup,
     settings: &Settings,
@@ -175,8 +174,7 @@ impl<'a> Passes<'a> {
         self.run(recording, "boxes", &bindings, groups_for(triangles))
     }
 
-    /// Boxes and codes of the triangles, and the leaves in code order; returns the triangle indices
-    /// in that order.
+    /// Boxes and codes, and the leaves in code order; returns the triangle indices in that order.
     fn sort(&self, recording: &mut Recording, long_codes: bool) -> Result<Storage, GpuError> {
         let items = groups_for(self.count);
         let mut pairs = Pairs {
@@ -255,8 +253,7 @@ struct Level {
     count: u32,
 }
 
-/// Levels of blocks over this many leaves, up to the first with a single one; they follow leaves
-/// and nodes.
+/// Levels of blocks over this many leaves, up to a single one; they follow leaves and nodes.
 fn levels([leaves, inner]: [u32; 2]) -> Vec<Level> {
     let mut out = Vec::new();
     let (mut below, mut below_count) = (0, leaves);

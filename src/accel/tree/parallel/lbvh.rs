@@ -14,8 +14,7 @@ const CODE_BITS: i32 = 64;
 struct Codes<'a>(&'a [[u32; 2]]);
 
 impl Codes<'_> {
-    /// Length of the common prefix of the codes at two indices; indices break ties. −1 out of
-    /// range.
+    /// Length of the codes' common prefix; indices break ties. −1 out of range.
     fn common_prefix(&self, i: i32, j: i32) -> i32 {
         let code = |place: i32| self.0.get(usize::try_from(place).ok()?);
         let (Some(a), Some(b)) = (code(i), code(j)) else {

@@ -18,7 +18,7 @@ impl Tree {
     /// in each of its leaves.
     ///
     /// # Errors
-    /// The triangles differ from those in the tree, or a coordinate is too large or not a number.
+    /// The triangles differ from the tree's, or a coordinate is too large or NaN.
     pub fn refit(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
         self.check_triangles(soup)?;
         check_coordinates(soup)?;

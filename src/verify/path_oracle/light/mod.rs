@@ -1,5 +1,4 @@
-//! Choice and weighting of lights, from `docs/shading.md`. The light kinds are in
-//! `src/verify/lights/`.
+//! Choice and weighting of lights, from `docs/shading.md`. Kinds are in `src/verify/lights/`.
 
 mod sky;
 mod tree;
@@ -65,8 +64,7 @@ pub struct LightSample {
     pub distance: f64,
     /// Radiance; for a delta light, irradiance of a surface facing it.
     pub radiance: DVec3,
-    /// Density over solid angle, without the probability of choosing the light; `None` for delta
-    /// lights.
+    /// Density over solid angle, given the light; `None` for delta lights.
     pub density: Option<f64>,
     /// The triangles that the point may lie on.
     pub triangles: Option<[u32; 2]>,
@@ -224,8 +222,7 @@ impl PathOracle<'_> {
         vec![chosen(light.unwrap_or(last))]
     }
 
-    /// A sampled point of a light, and which part of the light it is on, for lights with several
-    /// parts.
+    /// A sampled point of a light, and which part of the light it is on, if it has several.
     pub(super) fn light_sample(
         &self,
         surface: &Surface,
@@ -269,8 +266,7 @@ impl PathOracle<'_> {
         })
     }
 
-    /// The nearest sphere before `end` on a ray: its radiance, and the density of light sampling
-    /// for the direction.
+    /// The nearest sphere before `end` on a ray: its radiance, and its light sampling density.
     pub(super) fn sphere_met(
         &self,
         ray: &Segment,
