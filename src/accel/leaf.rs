@@ -33,7 +33,6 @@ pub(crate) fn leaf_range(reference: u32) -> (usize, usize) {
 /// The triangles of all leaves, leaf by leaf.
 #[derive(Debug, Clone)]
 pub(crate) enum Leaves {
-    /// Copies of the records.
     Gathered(Vec<TriangleRecord>),
     /// Indices of the scene's triangles.
     Indexed(Vec<u32>),
@@ -110,7 +109,6 @@ impl Leaves {
 /// The leaves of a structure with the triangles they were built from.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafReader<'a> {
-    /// The leaves.
     pub leaves: &'a Leaves,
     /// The scene's triangles.
     pub soup: &'a TriangleSoup,
@@ -124,7 +122,6 @@ impl LeafReader<'_> {
         }
     }
 
-    /// Tests the triangles of the leaf `reference`.
     pub(crate) fn test_leaf(self, reference: u32, walk: &mut Walk) {
         let (first, count) = leaf_range(reference);
         for place in first..first + count {

@@ -12,7 +12,6 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// A triangle.
     pub(crate) fn new(triangle: &TriangleRecord) -> Self {
         let mut corners = [[0.0; 3]; 9];
         for (corner, vertex) in corners.iter_mut().zip(triangle.vertices()) {

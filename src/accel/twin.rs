@@ -62,7 +62,6 @@ impl<'a> Walk<'a> {
         watch::read(what)
     }
 
-    /// Records the number of stack entries.
     pub(crate) fn count_stack(&mut self, entries: usize) {
         let highest = &mut self.counters.stack_high_water;
         *highest = (*highest).max(entries as u32);
@@ -81,7 +80,6 @@ impl<'a> Walk<'a> {
         intersect_triangle(triangle, &self.ray, self.inverse, &mut self.hit);
     }
 
-    /// Tests the triangles of a list.
     pub(crate) fn test_list(&mut self, soup: &TriangleSoup, ids: &[u32]) {
         for id in watch::each(ids) {
             self.test(&soup.records[id as usize]);

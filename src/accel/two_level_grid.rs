@@ -251,7 +251,6 @@ impl BuiltAccel for Built {
     }
 }
 
-/// The part of a top cell's grid at `place`, in top cells.
 fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
     std::array::from_fn(|a| clamped((place[a] - top[a] as f32) * parts[a] as f32, parts[a]))
 }

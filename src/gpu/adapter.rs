@@ -77,7 +77,6 @@ fn instance(backends: wgpu::Backends) -> wgpu::Instance {
     })
 }
 
-/// Rank of an adapter, best first.
 fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
     let device = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,

@@ -8,13 +8,11 @@ use std::time::Duration;
 
 /// Work that takes longer is given up: the driver hangs.
 pub(super) const PATIENCE: Duration = Duration::from_secs(120);
-/// Usages of every storage buffer.
 pub(super) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::INDIRECT)
     .union(wgpu::BufferUsages::COPY_SRC)
     .union(wgpu::BufferUsages::COPY_DST);
 
-/// Fails if `needed` bytes exceed `limit`.
 pub(super) fn check(name: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
     if needed > limit {
         return Err(GpuError::TooLarge {

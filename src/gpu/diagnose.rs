@@ -242,7 +242,6 @@ fn after_attributes(text: &str, start: usize) -> usize {
     text.len() - rest.trim_start().len()
 }
 
-/// Spans of a declaration and of the members or statements in it.
 fn spans(declaration: &GlobalDeclarationNode) -> Vec<Range<usize>> {
     let mut out = vec![declaration.span().range()];
     match declaration.node() {

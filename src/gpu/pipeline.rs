@@ -54,7 +54,6 @@ pub struct Pipeline {
     pub(super) first_ms: OnceLock<f64>,
 }
 
-/// The bindings of a kernel's entries.
 pub(super) fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
     let module = &kernel.module;
     let entries = 0..module.entry_points.len();
@@ -156,7 +155,6 @@ impl Gpu {
         Ok(made)
     }
 
-    /// Records the modules of a kernel.
     pub(super) fn note_modules(&self, kernel: &ComposedKernel) {
         let Ok(mut used) = self.used.lock() else {
             return;
@@ -228,7 +226,6 @@ impl Gpu {
         })
     }
 
-    /// Checks that the adapter supports the kernel's workgroup size.
     fn check_workgroup(&self, kernel: &ComposedKernel) -> Result<(), GpuError> {
         let module = &kernel.module;
         let [x, y, z] = module.entry_points[0].workgroup_size;

@@ -44,7 +44,6 @@ pub fn grid_of(workgroups: u32) -> [u32; 3] {
     }
 }
 
-/// A kernel run.
 #[derive(Clone)]
 pub(super) struct Run {
     pub name: String,

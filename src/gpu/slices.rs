@@ -76,7 +76,6 @@ pub fn slow_slice(longest_ms: f64) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// The slices of `total` items at `ms_per_item`.
     fn slices(slices: &Slices, total: u32, ms_per_item: f64) -> Vec<u32> {
         let (mut first, mut out) = (0, Vec::new());
         while first < total {

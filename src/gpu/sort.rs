@@ -12,7 +12,6 @@ use super::recording::Recording;
 use super::{Composition, GpuError, UniformValues};
 use std::sync::Arc;
 
-/// Bits of a digit.
 const DIGIT_BITS: u32 = 8;
 /// Values of a digit, as in `kernels/common/sort/digits.wesl`.
 const BINS: u32 = 1 << DIGIT_BITS;

@@ -16,12 +16,10 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Pixels of a block.
     pub(crate) const PIXELS: u64 = (BLOCK_EDGE * BLOCK_EDGE) as u64;
     /// Maximum workgroups of one dispatch.
     pub(crate) const MOST: u64 = 65_535;
 
-    /// All blocks of an image of this size.
     pub(crate) fn all(gpu: &Gpu, size: [u32; 2]) -> Result<Self, GpuError> {
         let [columns, rows] = size.map(|edge| edge.div_ceil(BLOCK_EDGE));
         let all = (0..rows).flat_map(|y| (0..columns).map(move |x| word([x, y])));

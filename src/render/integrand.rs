@@ -13,7 +13,6 @@ use raystone_sampling::dimensions;
 
 /// Squared radius of the disk, so that its quarter has about the area 1/2.
 const DISK_RADIUS_SQUARED: f32 = std::f32::consts::FRAC_2_PI;
-/// Corner of the box at the origin.
 const BOX_CORNER: [f32; 2] = [std::f32::consts::FRAC_1_SQRT_2, 0.618_034];
 /// `half-plane`: x · cos + y · sin < offset.
 const OBLIQUE_EDGE: [f32; 3] = [-0.6, 0.8, 0.2];
@@ -98,7 +97,6 @@ impl Function {
         }
     }
 
-    /// Constants of the kernel.
     fn constants(&self) -> Vec<(&'static str, u32)> {
         let (function, edge) = match self {
             Self::Exponential => (EXPONENTIAL, [0.0; 3]),

@@ -9,7 +9,6 @@
 use glam::{DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Bounds of one or more lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LightBounds {
     pub min: DVec3,

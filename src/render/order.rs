@@ -23,7 +23,6 @@ parameters! {
 
 /// Edge of a tile of [`Order::QuadTree`], pixels.
 pub(crate) const TILE: u32 = 16;
-/// Blocks of [`Order::Blocks`] in each direction.
 const BLOCKS: u32 = 4;
 
 /// Pixels of one pass: `count` in each direction, starting at `first` and `step` apart.

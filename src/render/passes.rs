@@ -35,7 +35,6 @@ pub(super) struct Passes {
     pub visibility: Option<Visibility>,
     /// Corners of the scene's box.
     bounds: [[f32; 3]; 2],
-    /// The features that the scene requires.
     scene: SceneFeatures,
     /// Features that some scenes need but this kernel omits; empty if nothing is traced.
     left_out: Vec<&'static str>,
@@ -354,7 +353,6 @@ impl<'a> ImageSteps<'a> {
         self.passes.bounds
     }
 
-    /// Kinds of materials of the scene.
     pub(crate) fn material_kinds(&self) -> &SceneKinds<MaterialKind> {
         &self.passes.scene.materials
     }

@@ -33,9 +33,7 @@ parameters! {
 
     /// How the sampled light is chosen.
     pub(crate) enum LightChoice {
-        /// By power.
         Power = "power",
-        /// Uniformly.
         Uniform = "uniform",
         /// By approximate contribution, with a light hierarchy (Conty Estevez & Kulla 2018).
         Tree = "tree",

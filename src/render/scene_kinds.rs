@@ -46,12 +46,10 @@ impl<K: SceneKind> SceneKinds<K> {
         self.0.len()
     }
 
-    /// The kind of a number.
     pub(super) fn kind(&self, number: usize) -> &'static K {
         self.0[number].0
     }
 
-    /// The number of a kind.
     pub(super) fn number(&self, kind: &K) -> u32 {
         let place = self.0.iter().position(|(known, _)| *known == kind);
         place.unwrap_or_default() as u32

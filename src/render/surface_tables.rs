@@ -28,7 +28,6 @@ pub struct SurfaceFeatures {
 }
 
 impl SurfaceFeatures {
-    /// The features of these materials of the scene.
     pub(super) fn of(scene: &SceneData, is_among: impl Fn(&Material) -> bool) -> Self {
         // Without coordinates, materials use their constants.
         let is_mapped = scene.uvs.len() == scene.triangles.len();

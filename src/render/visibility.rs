@@ -65,7 +65,6 @@ impl Visibility {
         self.raster.draw(self.triangles, ("view", view))
     }
 
-    /// The words on the device.
     pub(super) fn words(&self) -> &wgpu::Buffer {
         self.raster.words()
     }

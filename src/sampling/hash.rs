@@ -52,7 +52,6 @@ pub fn dimension_number(at: Coordinate) -> u32 {
     keyed_hash(pixel_number(at), at.dimension)
 }
 
-/// A random number of the pixel, dimension and sample.
 pub(crate) fn sample_number(at: Coordinate) -> u32 {
     keyed_hash(dimension_number(at), at.sample)
 }

@@ -22,7 +22,6 @@ fn weight(j: usize) -> f64 {
     1.0 / (j as f64 + 1.0)
 }
 
-/// ω at the multiples of 2^-level.
 fn kernel(level: u32) -> Vec<f64> {
     let omega = |x: f64| 2.0 * PI * PI * (x * x - x + 1.0 / 6.0);
     (0..1_u32 << level)

@@ -2,7 +2,6 @@
 
 use super::hash::pcg_hash;
 
-/// The first `count` primes.
 pub(super) fn primes(count: usize) -> Vec<u32> {
     let mut primes: Vec<u32> = Vec::with_capacity(count);
     let mut candidate = 2;

@@ -40,7 +40,6 @@ const EDGE: u32 = 8;
 pub(crate) const STRIDE: u32 = 8;
 
 impl Seeding {
-    /// Its number in kernels.
     pub(super) const fn number(self) -> u32 {
         match self {
             Self::PixelSample => PIXEL_SAMPLE,

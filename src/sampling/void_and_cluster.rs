@@ -11,7 +11,6 @@ use std::sync::OnceLock;
 pub(super) const SIZE: usize = 64;
 const PIXELS: usize = SIZE * SIZE;
 const SIGMA: f64 = 1.5;
-/// Pixels of the first pattern.
 const FIRST: usize = PIXELS / 10;
 
 /// The set pixels, and the blurred pattern.

@@ -398,7 +398,6 @@ impl Meeting {
         }
     }
 
-    /// Distance to the triangle's plane in f64.
     fn plane_distance(&self) -> f64 {
         let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
         let [v0, v1, v2] = self.record.vertices().map(v);

@@ -20,7 +20,6 @@ fn tree() -> (&'static str, ParamValue) {
     word("light_choice", "tree")
 }
 
-/// Scenes with maps.
 pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
     Ok(vec![TrialScene {
         scene: sky()?,

@@ -18,6 +18,5 @@ pub(super) trait Nodes {
     fn second_child(&self, node: u32, from: u32, walk: &mut Walk) -> u32;
     /// The parent; [`NONE`] for the root.
     fn parent(&self, node: u32) -> u32;
-    /// Child 0 or 1 of a node.
     fn child(&self, node: u32, side: u32, walk: &mut Walk) -> u32;
 }

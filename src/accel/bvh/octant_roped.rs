@@ -30,7 +30,6 @@ fn near_side(content: u32, octant: u32) -> u32 {
     octant >> (content >> AXIS_SHIFT) & 1
 }
 
-/// Ropes of a child from those of its parent.
 fn ropes_of(parent: &OctantNode, child: u32) -> [u32; 8] {
     std::array::from_fn(|octant| {
         if child & 1 == near_side(parent.node.content, octant as u32) {

@@ -4,7 +4,6 @@ use super::super::tree::{NodeKind, Tree};
 use super::options::NodeOrder;
 use std::collections::VecDeque;
 
-/// Inner nodes of a tree in memory order.
 pub(super) struct InnerNodes {
     /// Tree index of each.
     pub nodes: Vec<u32>,

@@ -87,7 +87,6 @@ impl Pair {
 pub(crate) struct Pairs(pub Vec<Pair>);
 
 impl Pairs {
-    /// Lays out a tree depth first.
     pub(crate) fn depth_first(tree: &Tree) -> Self {
         Self::new(tree, NodeOrder::DepthFirst)
     }

@@ -168,7 +168,6 @@ pub(crate) struct Grid {
     pub resolution: [u32; 3],
     /// Sides of a cell, scene units.
     pub cell: [f32; 3],
-    /// Reciprocals of `cell`.
     pub inverse_cell: [f32; 3],
     /// See [`GridBox::margin`].
     pub margin: [f32; 3],
@@ -280,7 +279,6 @@ pub(crate) fn first_axis(next: [f32; 3], leave: f32) -> usize {
     }
 }
 
-/// True if a cell is outside the grid.
 pub(crate) fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
     (0..3).any(|a| cell[a] >= resolution[a])
 }

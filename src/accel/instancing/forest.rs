@@ -99,7 +99,6 @@ impl Forest {
         }
     }
 
-    /// Maximum stack entries for any object.
     pub(super) fn stack_entries(&self) -> u32 {
         self.roots
             .iter()

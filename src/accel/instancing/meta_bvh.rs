@@ -93,7 +93,6 @@ impl<'a> Levels<'a> {
             .unwrap_or_else(|| &self.top.nodes[index - objects.len()])
     }
 
-    /// The entry of a leaf reference of the upper level.
     pub(super) fn load_entry(&self, reference: u32) -> &'a Entry {
         &self.top.entries[(reference & FIRST_MASK) as usize]
     }

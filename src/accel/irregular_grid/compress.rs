@@ -13,7 +13,6 @@ pub(super) struct Compressed {
     pub cells: Vec<u32>,
     /// Map entries, then references.
     pub words: Vec<u32>,
-    /// Index of the first reference.
     pub first_reference: usize,
 }
 

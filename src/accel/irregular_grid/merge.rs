@@ -162,7 +162,6 @@ impl<'a> State<'a> {
         whole * (count + 1) as f32 <= apart
     }
 
-    /// Splits the chains of wishes into pairs.
     fn pairs(&mut self, wishes: &[[u32; 2]]) -> Vec<[u32; 2]> {
         for &[id, other] in wishes {
             self.next[id as usize] = other;

@@ -26,18 +26,14 @@ impl GridCell {
 /// A cube of entries, 2^`log` along each axis, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Block {
-    /// Its first entry.
     pub first: u32,
     /// log2 of the entries along an axis.
     pub log: u32,
 }
 
-/// The target of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entry {
-    /// A cell index.
     GridCell(u32),
-    /// A block index.
     Block(u32),
 }
 
@@ -73,7 +69,6 @@ impl Map {
         self.top.iter().map(|&n| n as usize).product()
     }
 
-    /// The cell that a voxel belongs to.
     pub(super) fn cell_at(&self, voxel: [u32; 3]) -> u32 {
         let mut shift = self.shift;
         let [x, y, z] = voxel.map(|v| v >> shift);
@@ -98,7 +93,6 @@ pub(super) fn is_subset(part: &[u32], whole: &[u32]) -> bool {
         .all(|id| rest.by_ref().find(|other| *other >= id) == Some(id))
 }
 
-/// Length of the union of two ascending lists.
 pub(super) fn union_length(a: &[u32], b: &[u32]) -> usize {
     let (mut i, mut k, mut common) = (0, 0, 0);
     while i < a.len() && k < b.len() {

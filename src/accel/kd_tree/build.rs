@@ -120,7 +120,6 @@ impl Event {
     }
 }
 
-/// Appends the events of an item on one axis.
 fn push_events(bounds: &Bounds, axis: usize, item: u32, events: &mut Vec<Event>) {
     let (low, high) = (bounds.min[axis], bounds.max[axis]);
     if low == high {
@@ -138,7 +137,6 @@ struct Region {
     events: [Vec<Event>; 3],
 }
 
-/// Position of a split.
 #[derive(Clone, Copy)]
 struct Split {
     axis: usize,

@@ -149,7 +149,6 @@ struct Built {
 }
 
 impl Built {
-    /// Statistics of the tree.
     fn measure(&self) -> StructureStats {
         let mut counts = Vec::new();
         let (mut cost, mut deepest) = (0.0, 0);

@@ -91,7 +91,6 @@ impl RootCell {
         }
     }
 
-    /// Cell size at this depth.
     fn size(&self, depth: u32) -> [f32; 3] {
         self.extent.map(|e| e * 0.5_f32.powi(depth as i32))
     }
@@ -260,7 +259,6 @@ fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
 }
 
 impl Built {
-    /// Tests the triangles of the leaf that begins at `first`.
     fn leaf(&self, first: u32, soup: &TriangleSoup, walk: &mut Walk) {
         for reference in &self.references[first as usize..] {
             walk.read(reference);

@@ -8,7 +8,6 @@
 
 use rayon::prelude::*;
 
-/// Triangles per group.
 pub(crate) const GROUP: usize = 16;
 
 /// Boxes tested at a time.
@@ -23,7 +22,6 @@ const LEAST_DIRECTION: f32 = 1e-37;
 /// Minimum set size for sorting with two threads.
 const PARALLEL: usize = 8192;
 
-/// Three corners.
 type Corners = [[f32; 3]; 3];
 
 /// Triangles in groups.

@@ -55,7 +55,6 @@ pub(super) type Vector = [f64; 3];
 /// A number with an error bound for its f32 counterpart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounded {
-    /// Value, in f64.
     pub value: f64,
     /// Largest difference of the f32 result.
     pub error: f64,

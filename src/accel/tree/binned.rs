@@ -20,7 +20,6 @@ const EXHAUSTIVE: usize = 4;
 /// Nodes with more references are binned by several threads.
 const PARALLEL_BINNING: usize = 1 << 16;
 
-/// The tree over `references`.
 pub(super) fn build(mut references: Vec<Reference>, settings: &TreeParameters) -> Tree {
     let bounds = bounds_of(&references);
     let whole = (&mut references[..], bounds);
@@ -141,7 +140,6 @@ impl BinGrid {
         })
     }
 
-    /// Bins of a centre.
     fn bins(&self, centre: Vec3A) -> [usize; 3] {
         ((centre - self.origin) * self.scale).to_array().map(bin_of)
     }

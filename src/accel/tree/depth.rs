@@ -68,7 +68,6 @@ mod tests {
     use super::*;
     use crate::bounds::Bounds;
 
-    /// A chain of this many leaves.
     fn chain(leaves: u32) -> Tree {
         let mut nodes = Vec::new();
         let bounds = |from: u32| Bounds {

@@ -54,7 +54,6 @@ pub(super) fn optimise(tree: Tree, settings: &TreeParameters) -> Tree {
 
 struct Hierarchy {
     nodes: Vec<Node>,
-    /// Depth limit for moves.
     depth_limit: u32,
     /// Nodes changed by moves of this round.
     touched: Vec<bool>,

@@ -273,7 +273,6 @@ impl Spatial<'_> {
         best
     }
 
-    /// Splits all references at the borders of the bins.
     fn fill_bins(&self, references: &[Reference], slices: &Slices) -> Vec<Bin> {
         let empty = Bin {
             bounds: Box3::EMPTY,

@@ -20,7 +20,6 @@ use super::reference::{Box3, Reference};
 use crate::bounds::Bounds;
 use rayon::prelude::*;
 
-/// The axes to try.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axes {
     All,

@@ -12,7 +12,6 @@ use crate::ray::Ray;
 /// The upper half of a significand.
 const UPPER: u32 = 0xffff_f000;
 
-/// Rounding error of the product `p` of `a` and `b`.
 pub(crate) fn product_error(a: f32, b: f32, p: f32) -> f32 {
     let a1 = f32::from_bits(a.to_bits() & UPPER);
     let b1 = f32::from_bits(b.to_bits() & UPPER);

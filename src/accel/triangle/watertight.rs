@@ -31,7 +31,6 @@ pub(crate) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     }
 }
 
-/// The inverse of [`turned`].
 fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     match axis {
         0 => [z, x, y],

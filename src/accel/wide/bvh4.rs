@@ -233,7 +233,6 @@ fn sorted_keys(node: &Node, walk: &Walk) -> [u32; 4] {
     keys
 }
 
-/// The slots of keys as a list.
 fn list_of(keys: [u32; 4]) -> u32 {
     (0..4).fold(0, |list, i| {
         list | (keys[i] & SLOT_MASK) << (SLOT_BITS * i as u32)

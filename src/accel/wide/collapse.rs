@@ -20,7 +20,6 @@ pub(super) struct Shape {
     pub by_octant: bool,
 }
 
-/// The kind of a wide node's child.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WideKind {
     /// A node, by index.
@@ -44,7 +43,6 @@ pub(crate) struct WideChild {
 }
 
 impl WideChild {
-    /// No child.
     pub(crate) const NOTHING: WideChild = WideChild {
         bounds: Bounds::EMPTY,
         kind: WideKind::Leaf { first: 0, count: 0 },
@@ -158,7 +156,6 @@ impl WideTree {
     }
 }
 
-/// Appends the triangles below a binary node.
 fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
     match tree.nodes[root as usize].kind {
         NodeKind::Leaf { first, count } => {

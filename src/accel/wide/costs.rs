@@ -15,7 +15,6 @@ pub(super) const WORDS: u64 = MAX_WIDTH as u64 - 1;
 const NEVER: f32 = 3.4e38;
 /// Set if a wide node is cheaper than a leaf.
 const IS_NODE: u32 = 0x8000_0000;
-/// Bits of a choice.
 const BITS: u32 = 3;
 /// Smallest number of children that needs a choice.
 const FEWEST: u32 = 2;

@@ -68,12 +68,10 @@ impl Node {
         self.first_child >> MASK_SHIFT
     }
 
-    /// Index of the inner child in `slot`.
     fn child(&self, slot: u32) -> u32 {
         (self.first_child & INDEX_MASK) + (self.inner_mask() & ((1 << slot) - 1)).count_ones()
     }
 
-    /// Indices of the triangles of the leaf in `slot`.
     fn leaf(&self, slot: usize) -> Range<usize> {
         let triangles = u32::from(self.triangles[slot]);
         let first = self.first_triangle as usize + (triangles & PLACE_MASK) as usize;

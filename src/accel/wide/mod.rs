@@ -56,13 +56,11 @@ fn wide_tree(
 
 /// The interface of a wide structure's nodes.
 pub(crate) trait WideNode: Pod + Send + Sync {
-    /// Name of the structure.
     const STRUCTURE: &'static str;
     /// Module of the kernel.
     const KERNEL: &'static str;
     /// Maximum children.
     const WIDTH: usize;
-    /// Maximum nodes.
     const MOST_NODES: u64;
     /// True if children get slots by octant.
     const BY_OCTANT: bool;
@@ -77,7 +75,6 @@ pub(crate) trait WideNode: Pod + Send + Sync {
     fn trace(built: &Wide<Self>, walk: Walk) -> Hit;
 }
 
-/// A built wide structure.
 pub(crate) struct Wide<N> {
     /// Root first.
     pub nodes: Vec<N>,

@@ -162,7 +162,6 @@ pub(crate) struct PlaneDistances {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
-    /// The pad of boxes.
     pad: f32,
 }
 

@@ -7,7 +7,6 @@
 use super::passes::{Passes, bound, kernel};
 use crate::{GpuError, Storage};
 
-/// Words in a block.
 pub(crate) const BLOCK: u32 = 256;
 
 /// Records an in-place exclusive scan of the first `words` of `sums`, modulo 2³².

@@ -2,7 +2,6 @@
 
 use super::RayOffset;
 
-/// By a fixed distance.
 pub(crate) const FIXED: RayOffset = RayOffset {
     name: "fixed",
     description: "1e-4 scene units along the normal, whatever the scale",

@@ -25,7 +25,6 @@ parameters! {
     pub(crate) enum CompactionMethod {
         /// What measured best: `atomic` on software adapters, where a workgroup's barriers are dear, else `workgroup`.
         Auto = "auto",
-        /// An atomic for each path.
         Atomic = "atomic",
         /// A scan and one atomic for each workgroup.
         Workgroup = "workgroup",
@@ -33,11 +32,8 @@ parameters! {
         Subgroup = "subgroup",
         /// Counts, a scan of them, and each path to its place: stable.
         ReduceScanScatter = "reduce-scan-scatter",
-        /// Horn 2005: stable.
         Horn = "horn",
-        /// Blelloch 1990: stable.
         Blelloch = "blelloch",
-        /// Roger 2008: stable.
         Roger = "roger",
     }
 
@@ -285,7 +281,6 @@ impl<'a> Queues<'a> {
     }
 }
 
-/// Maximum rays per path.
 fn rays_of_path(integrator: &dyn Integrator, params: &Params) -> u32 {
     let constants = integrator.constants(params);
     let depth = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");

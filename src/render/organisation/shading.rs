@@ -15,7 +15,6 @@ fn queue_of(kind: Option<usize>) -> u32 {
 /// Queues of path indices, by material kind.
 struct Kinds<'a> {
     queues: &'a Queues<'a>,
-    /// Number of queues.
     number: u32,
     method: Arc<dyn Compaction>,
     /// Indices of all live paths.

@@ -24,7 +24,6 @@ struct Lamp {
 }
 
 impl Lamp {
-    /// Irradiance of the floor.
     fn irradiance(&self, point: Vec3) -> DVec3 {
         let normal = self.along.cross(self.across);
         if normal.dot(point - self.corner) <= 0.0 {
@@ -47,7 +46,6 @@ pub(crate) fn reflected(irradiance: DVec3) -> DVec3 {
     FLOOR.as_dvec3() / PI * irradiance
 }
 
-/// A floor under a sky of this radiance.
 pub(crate) fn on_floor(name: &str, sky: Vec3) -> Result<Mesh, SceneError> {
     on_floor_of(name, sky, 6.0)
 }

@@ -12,7 +12,6 @@ use raystone_image::Image;
 use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::fmt::Write as _;
 
-/// Point lights.
 pub(super) static POINTS: LightChecks = LightChecks {
     points: || {
         vec![Light::Point {
@@ -23,14 +22,12 @@ pub(super) static POINTS: LightChecks = LightChecks {
     ..LightChecks::new(LIGHT_KINDS[3], LightTwin::Alone(sample), mitsuba)
 };
 
-/// Spots.
 pub(super) static SPOTS: LightChecks = LightChecks {
     points: spots,
     images,
     ..LightChecks::new(LIGHT_KINDS[4], LightTwin::Alone(sample), spot_in_mitsuba)
 };
 
-/// Directional lights.
 pub(super) static DIRECTIONAL: LightChecks = LightChecks {
     points: || {
         vec![Light::Directional {
@@ -128,7 +125,6 @@ pub(super) fn sample(
     })
 }
 
-/// Exports point and directional lights.
 fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
     let (kind, element, place, unit) = match light {
         Light::Directional { direction, .. } => (

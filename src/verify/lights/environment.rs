@@ -139,7 +139,6 @@ impl Map {
         [self.map.width.into(), self.map.height.into()]
     }
 
-    /// Solid angle of a texel in a row.
     fn solid_angle(&self, row: usize) -> f64 {
         let [width, height] = self.size();
         let cosine = |row: usize| (PI * row as f64 / height).cos();

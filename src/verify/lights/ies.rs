@@ -12,7 +12,6 @@ use raystone_scene::{IesProfile, LIGHT_KINDS, Light, Photometry, SceneError};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// The checks of luminaires.
 pub(super) static CHECKS: LightChecks = LightChecks {
     trials: trial_lights::luminaires,
     images,

@@ -13,7 +13,6 @@ use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// The checks of spheres.
 pub(super) static CHECKS: LightChecks = LightChecks {
     points,
     images,

@@ -5,7 +5,6 @@ use super::*;
 use raystone_scene as scene;
 use raystone_scene::{COOK_TORRANCE, Fresnel, Masking};
 
-/// The checks of Cook–Torrance materials.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("cook_torrance.py"),
     balls,

@@ -8,7 +8,6 @@ use crate::trial_scenes::{camera, depth};
 use raystone_core::geometry::Camera;
 use raystone_scene::DIELECTRIC;
 
-/// The checks of dielectrics.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     balls,
     trials,

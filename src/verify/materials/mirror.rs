@@ -6,7 +6,6 @@ use crate::known_images::closed::polygon;
 use crate::known_images::lamps::{FLOOR, NEAR, on_floor, path};
 use raystone_scene::MIRROR;
 
-/// The checks of mirrors.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     images,
     ..MaterialChecks::new(&MIRROR, |surface| Box::new(Mirror(surface)), mitsuba)

@@ -3,7 +3,6 @@
 use super::*;
 use raystone_scene::PHONG;
 
-/// The checks of Phong materials.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("phong.py"),
     balls,

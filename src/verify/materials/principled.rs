@@ -4,7 +4,6 @@ use super::dielectric::schlick;
 use super::*;
 use raystone_scene::{PRINCIPLED, reflectance_of_ior};
 
-/// The checks of metallic-roughness materials.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("principled.py"),
     balls,
@@ -78,7 +77,6 @@ impl<'a> Principled<'a> {
         self.surface.base / PI * (energy * side(n_i) * side(self.n_o))
     }
 
-    /// A facet normal from the distribution of visible normals.
     fn visible_normal(&self, [u, v]: [f64; 2]) -> DVec3 {
         let n = self.surface.normal;
         let [x, y] = basis(n);

@@ -134,7 +134,6 @@ pub fn is_above(surface: &Surface, direction: DVec3) -> bool {
     direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
 }
 
-/// The direction mirrored to the other side of the surface.
 fn across(surface: &Surface, direction: DVec3) -> DVec3 {
     direction - surface.geometric * (2.0 * direction.dot(surface.geometric))
 }

@@ -119,7 +119,6 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// The nearest hit of a segment.
     pub(crate) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
         let mut found: Vec<(Hit, Blur)> = Vec::new();
         let mut end = f64::INFINITY;

@@ -192,7 +192,6 @@ pub struct PathOracle<'a> {
     hits: Hits<'a>,
     lights: Lights,
     textures: Textures<'a>,
-    /// The checks of each material's kind.
     materials: Vec<&'static MaterialChecks>,
     /// Diagonal of the scene's box.
     diagonal: f64,
@@ -341,7 +340,6 @@ impl Walk<'_> {
         [self.draw(dimension), self.draw(dimension + 1)]
     }
 
-    /// Records a decision.
     fn decide(&mut self, what: u64) {
         self.branch.push(Decision::Other(what));
     }

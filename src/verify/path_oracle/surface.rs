@@ -38,7 +38,6 @@ pub struct Surface<'a> {
     pub varied: [f64; 2],
     /// Radiance emitted towards `out`.
     pub emission: DVec3,
-    /// The checks of its material's kind.
     pub(super) checks: &'static MaterialChecks,
     /// Ray offset from the surface for one rounding.
     offset: f64,
@@ -69,7 +68,6 @@ impl<'a> Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// The BSDF of its material.
     pub(super) fn bsdf(&self) -> Box<dyn Bsdf + '_> {
         (self.checks.twin)(self)
     }

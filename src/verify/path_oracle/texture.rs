@@ -33,7 +33,6 @@ impl<'a> Textures<'a> {
         self.mapped
     }
 
-    /// Texture coordinates of a point of a triangle.
     pub(crate) fn coordinates(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec2 {
         if !self.mapped {
             return DVec2::ZERO;

@@ -14,7 +14,6 @@ use raystone_gpu::{
 };
 use std::sync::Arc;
 
-/// Bits of each word of a code.
 const WORD_BITS: u32 = 30;
 /// Children of a block, as in `blocks.wesl`.
 const BLOCK: u32 = 8;
@@ -167,7 +166,6 @@ impl<'a> Passes<'a> {
         Ok(nodes)
     }
 
-    /// The boxes of these triangles, and the box around their centres.
     pub(super) fn boxes(&self, recording: &mut Recording, triangles: u32) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         bindings.uniform("size", UniformValues::new().u32("count", triangles));

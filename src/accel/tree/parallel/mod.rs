@@ -207,7 +207,6 @@ fn check_coordinates(soup: &TriangleSoup) -> Result<(), AccelError> {
     }
 }
 
-/// The error for a triangle that cannot be built over.
 fn too_large(soup: &TriangleSoup, triangle: usize) -> AccelError {
     let vertices = soup.records.get(triangle).map(|r| r.vertices());
     AccelError::Invalid(format!(

@@ -19,7 +19,6 @@ pub(crate) fn grid_scale(extent: f32) -> f32 {
     f32::from_bits((SCALE_EXPONENT + AXIS_BITS - exponent).min(LARGEST_EXPONENT) << 23)
 }
 
-/// The cell of a centre, on one axis.
 pub(crate) fn cell_of(centre: f32, low: f32, scale: f32) -> u32 {
     (((centre - low) * scale) as u32).min((1 << AXIS_BITS) - 1)
 }
@@ -33,7 +32,6 @@ fn spread(bits: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// The interleaved bits of three axes.
 fn interleave(bits: [u32; 3]) -> u32 {
     let [x, y, z] = bits.map(spread);
     x << 2 | y << 1 | z

@@ -17,9 +17,7 @@ use std::sync::OnceLock;
 /// How lights are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Choice {
-    /// By power.
     Power,
-    /// Uniformly.
     Uniform,
     /// By their approximate contribution at the point.
     Tree,
@@ -27,10 +25,8 @@ pub(super) enum Choice {
     All,
 }
 
-/// The lights of a scene.
 pub(super) struct Lights {
     list: LightList,
-    /// The checks of each light's kind.
     checks: Vec<&'static LightChecks>,
     /// Cumulative number of values up to each light, when lights are chosen by power.
     ends: Vec<f64>,
@@ -38,7 +34,6 @@ pub(super) struct Lights {
     owners: BTreeMap<u32, usize>,
     /// Lights without triangles that rays can hit.
     spheres: Vec<(usize, sphere::Ball)>,
-    /// The environment map, which is the last light.
     map: Option<environment::Map>,
     tree: OnceLock<tree::Tree>,
 }
@@ -49,7 +44,6 @@ pub(super) type Place = (DVec3, DVec3);
 /// Number of values of a draw: draws are multiples of the reciprocal.
 pub(crate) const UNITS: f64 = (1u32 << 24) as f64;
 
-/// A chosen light.
 pub(super) struct Chosen {
     pub light: usize,
     /// The probability of the choice.

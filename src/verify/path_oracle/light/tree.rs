@@ -142,7 +142,6 @@ pub(super) struct Tree {
     below: Vec<f64>,
     /// Left child of each node; `None` for a leaf.
     children: Vec<Option<usize>>,
-    /// The light of each leaf.
     lights: Vec<usize>,
     /// Node of each light.
     leaves: Vec<usize>,
