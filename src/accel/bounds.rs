@@ -1,4 +1,4 @@
-//! Axis-aligned bounds and the slab test. Twin of `kernels/accel/bounds.wesl`.
+//! Axis-aligned bounds and the slab test. CPU version of `kernels/accel/bounds.wesl`.
 
 use super::intersection::Reciprocal;
 use super::ray::Ray;

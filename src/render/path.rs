@@ -71,7 +71,7 @@ parameters! {
         Lights = "lights",
         /// The choice among lights, and the search for the one that was found.
         Choice = "choice",
-        /// What rays that leave the scene find.
+        /// Radiance of rays that leave the scene.
         Background = "background",
         /// The error that instances add to points, and the mirrored triangles.
         Transforms = "transforms",

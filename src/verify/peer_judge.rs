@@ -22,7 +22,7 @@ const EXPLAINED: f64 = 1e-3;
 pub struct Differences {
     /// Rays with a different triangle.
     pub unlike: usize,
-    /// How many of them the oracle checked.
+    /// The number of them that the oracle checked.
     pub judged: usize,
     /// Largest difference of a distance, for the same triangle, from the reference or the exact
     /// one, whichever is nearer: see `EXPLAINED`.

@@ -148,7 +148,8 @@ fn profile(photometry: Photometry, axial: bool) -> IesProfile {
     let (rows, columns) = (vertical.len(), horizontal.len());
     let value = |at: usize| {
         let (mut column, mut row) = (at / rows, at % rows);
-        // Where all angles of the other kind are one direction, and where the circle closes.
+        // Poles, where all angles of the other kind are one direction, and the closing of the
+        // circle.
         match photometry {
             Photometry::C if row == 0 || row == rows - 1 => column = 0,
             Photometry::C if column == columns - 1 => column = 0,

@@ -75,7 +75,7 @@ parameters! {
 
     /// Bytes of a node.
     pub(crate) enum NodeBytes {
-        /// What the traversal does best.
+        /// The best layout for the traversal.
         Auto = "auto",
         /// Its own box.
         Own = "32",
@@ -83,7 +83,7 @@ parameters! {
         Both = "64",
     }
 
-    /// Where a stack lies.
+    /// Location of a stack.
     pub(crate) enum StackMemory {
         /// In a variable of the function.
         Function = "function",
@@ -93,7 +93,7 @@ parameters! {
         Workgroup = "workgroup",
     }
 
-    /// What leaves hold.
+    /// Contents of leaves.
     pub(crate) enum LeafTriangles {
         /// Copies of the triangles.
         Gathered = "gathered",

@@ -47,7 +47,7 @@ pub enum Side {
 /// The exact relation between a line and a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactCrossing {
-    /// Where the line passes.
+    /// The side on which the line passes.
     pub side: Side,
     /// Distance to the plane in units of the direction, to within 2⁻⁴³ of itself; NaN if parallel.
     pub t: f64,

@@ -23,7 +23,7 @@ parameters! {
     pub(crate) enum Refill {
         /// Never.
         None = "none",
-        /// Where it was measured to pay.
+        /// Where measurements show a gain.
         Auto = "auto",
         /// For all rays, on all adapters.
         Always = "always",

@@ -166,7 +166,7 @@ impl<'a> Costs<'a> {
     }
 }
 
-/// How many of `children` pay off, by the choices of a node. The maximum always does.
+/// The number of `children` that pay off, by the choices of a node. The maximum always does.
 fn used(choices: u32, children: u32) -> u32 {
     let paying = choices & ((1 << (BITS * (children - 1))) - 1);
     paying.checked_ilog2().map_or(1, |bit| bit / BITS + FEWEST)

@@ -21,9 +21,10 @@ const SHADOWS: u32 = 1;
 const COUNTS_BYTES: u64 = 32;
 
 parameters! {
-    /// How the queue of live paths is kept without holes.
+    /// The compaction of the queue of live paths.
     pub(crate) enum CompactionMethod {
-        /// What measured best: `atomic` on software adapters, where a workgroup's barriers are dear, else `workgroup`.
+        /// The best measured: `atomic` on software adapters, with expensive barriers, else
+        /// `workgroup`.
         Auto = "auto",
         Atomic = "atomic",
         /// A scan and one atomic for each workgroup.
@@ -37,21 +38,21 @@ parameters! {
         Roger = "roger",
     }
 
-    /// What is brought side by side.
+    /// What is sorted.
     pub(crate) enum Sorting {
         /// Nothing.
         Never = "none",
-        /// Paths that have met the same material, before they are shaded.
+        /// Paths by the material they hit, before they are shaded.
         Material = "material",
-        /// Rays of one octant of directions, along the Morton code of their origins, before they are traced.
+        /// Rays by octant of the direction and Morton code of the origin, before they are traced.
         RayKey = "ray-key",
     }
 
-    /// How many kernels shade.
+    /// The number of shading kernels.
     pub(crate) enum Shading {
-        /// One, with every kind of material of the scene in it.
+        /// One, with every kind of material of the scene.
         One = "one",
-        /// One for each kind of material, with that alone in it and a queue of its own, and one for what has met nothing.
+        /// One per kind of material, each with its own queue, and one for misses.
         PerMaterial = "per-material",
     }
 

@@ -13,7 +13,7 @@ pub(crate) const SHORT: f64 = 1e-7;
 /// Nearer hits, relative to the scene's largest coordinate, are the surface that the ray leaves.
 const START: f64 = 1e-9;
 
-/// How far a barycentric may be negative, so that no ray slips through between two triangles.
+/// Tolerance for negative barycentrics, so that no ray slips through between two triangles.
 const EDGE: f64 = 1e-12;
 
 /// Distances with a smaller relative difference are equal: the lowest triangle index wins.
@@ -198,7 +198,7 @@ impl<'a> Hits<'a> {
         meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
     }
 
-    /// Whether a segment is occluded, and whether only by a layer of the surface that it leaves.
+    /// The occlusion of a segment, which may be only by a layer of the surface that it leaves.
     pub(crate) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
         let (mut by_layer, mut by_other) = (false, false);
         self.visit(segment, |hit| {

@@ -132,7 +132,7 @@ impl Rounding {
         distance + signed * (self.scale * error).min(most)
     }
 
-    /// How far a ray starts off its surface; at most `offset` per rounding.
+    /// Offset of a ray from its surface; at most `offset` per rounding.
     pub fn offset(&mut self, offset: f64) -> f64 {
         self.signed().abs() * offset
     }
