@@ -1,5 +1,4 @@
-//! CPU versions of the kernels' traversals in scalar Rust, with the same hits and the same work
-//! counters.
+//! Twins: scalar CPU versions of the kernels' traversals, with the same hits and work counters.
 //!
 //! A structure implements [`Traverse::trace`], the CPU version of the kernel's `trace`. Their
 //! common start and end are here. CPU version of `kernels/accel/query.wesl`.

@@ -1,9 +1,9 @@
 //! `two-level-grid`: a coarse grid whose occupied cells are subdivided by grids of their own. CPU
 //! version of `kernels/accel/two_level_grid.wesl`.
 //!
-//! Source: J. Kalojanov, M. Billeter, P. Slusallek, "Two-level grids for ray tracing on
-//! GPUs", 2011. Top cells by Cleary's rule with λ₁; a top cell with n triangles is subdivided by
-//! the same rule with λ₂. One loop walks both levels: it steps through the parts of a top cell until it
+//! Source: J. Kalojanov, M. Billeter, P. Slusallek, "Two-level grids for ray tracing on GPUs",
+//! 2011. Top cells by Cleary's rule with λ₁; a top cell with n triangles is subdivided by the same
+//! rule with λ₂. One loop walks both levels: it steps through the parts of a top cell until it
 //! exits the cell, and then finds its position in the next one.
 
 use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};

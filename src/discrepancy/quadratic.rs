@@ -6,9 +6,9 @@
 //! D² = m^d − 2/N Σ_i Π_k h(x_ik) + 1/N² Σ_i Σ_j Π_k K(x_ik, x_jk),   h = ∫ K dy,   m = ∫ h dx
 //! ```
 //!
-//! Its terms are near 1 and cancel to about N⁻². So N² D² is summed, with integer weights; each product
-//! carries its rounding error, and sums are compensated. With coordinates of at most 24 bits the
-//! factors themselves are exact.
+//! Its terms are near 1 and cancel to about N⁻². So N² D² is summed, with integer weights; each
+//! product carries its rounding error, and sums are compensated. With coordinates of at most 24
+//! bits the factors themselves are exact.
 
 use super::sum::{LANES, Sum};
 use super::{Budget, DiscrepancyError, Measure, PointSet};

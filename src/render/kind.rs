@@ -20,8 +20,7 @@ pub enum CountedRays {
     Ao,
     /// From surface to surface.
     Bounce,
-    /// Not traced, because the light cannot contribute: behind the surface, or not emitted this
-    /// way.
+    /// Not traced: behind the surface, on the dark side of the light, or outside its cone.
     Skipped,
 }
 

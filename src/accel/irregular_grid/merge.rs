@@ -2,7 +2,7 @@
 //!
 //! Passes along x, y and z alternate. In a pass, a cell may join the next one along the axis if
 //! their cross-sections are equal and A(union) · (|union of lists| + 1) ≤ A₁ · (n₁ + 1) +
-//! A₂ · (n₂ + 1). Cells that want the next one form chains, which are split into pairs from their start, so
+//! A₂ · (n₂ + 1). Cells that want the next one form chains, split into pairs from their start, so
 //! that the result does not depend on the order of work. Rounds continue while they leave fewer
 //! than α times the cells.
 

@@ -13,11 +13,11 @@
 //!
 //! Each is first computed in f64 with an error bound. If that leaves the sign open, the
 //! determinants are expanded: they are linear in every row, so det(d, v₁ − o, v₂ − o) is a sum of
-//! determinants of rows that are f32 numbers themselves. A product of two of those is exact in f64, and
-//! that of three is a sum of two f64 numbers (Dekker 1971). The result is a sum of at most a hundred
-//! f64 numbers, whose sign expansions give exactly (Shewchuk 1997, *Adaptive Precision
-//! Floating-Point Arithmetic*, GROW-EXPANSION). Products stay between 2⁻⁴⁴⁷ and 2³⁸⁴: nothing underflows
-//! or overflows for any finite f32 input.
+//! determinants of rows that are f32 numbers themselves. A product of two of those is exact in f64,
+//! and that of three is a sum of two f64 numbers (Dekker 1971). The result is a sum of at most a
+//! hundred f64 numbers, whose sign expansions give exactly (Shewchuk 1997, *Adaptive Precision
+//! Floating-Point Arithmetic*, GROW-EXPANSION). Products stay between 2⁻⁴⁴⁷ and 2³⁸⁴: nothing
+//! underflows or overflows for any finite f32 input.
 
 use super::triangle::{Vector, cross, dot, subtract, widen};
 use raystone_core::geometry::{Ray, Triangle};

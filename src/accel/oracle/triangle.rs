@@ -15,24 +15,25 @@
 //! inside the cross product, the product with the third factor, two additions. So the error is at
 //! most about 8 ε times the sum of the absolute values of the six terms, the *permanent*; fused
 //! multiply-adds only omit roundings. A quotient may add 2.5 ulp (WGSL), one more rounding if it
-//! uses a reciprocal, and w = 1 − u − v two more: 8 ε of the terms again. [`ROUNDINGS`] = 10
-//! leaves room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
+//! uses a reciprocal, and w = 1 − u − v two more: 8 ε of the terms again. [`ROUNDINGS`] = 10 leaves
+//! room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
 //!
 //! Everything is compared in the multiplied form (U against 0, T against t·det), which stays
 //! meaningful where the ray grazes the plane and det is smaller than its own error.
 //!
 //! # Errors of a shear
 //!
-//! A test like that of Woop, Benthin and Wald moves the vertices into a frame in which the ray is the
-//! axis of its longest direction component, say z: with c = v − o, x′ = c.x − (d.x/d.z) c.z and y′
-//! alike. Then U/d.z = x′₀·y′₂ − y′₀·x′₂ and so on, in terms of vertices instead of edges. With
+//! A test like that of Woop, Benthin and Wald moves the vertices into a frame in which the ray is
+//! the axis of its longest direction component, say z: with c = v − o, x′ = c.x − (d.x/d.z) c.z and
+//! y′ alike. Then U/d.z = x′₀·y′₂ − y′₀·x′₂ and so on, in terms of vertices instead of edges. With
 //! X = |c.x| + |d.x/d.z|·|c.z|, x′ errs by at most 9 ε X: a difference, a quotient of 2.5 ulp, two
 //! products, a difference. A product of two errs by 19 ε, their difference by 20 ε of its terms:
-//! [`SHEARED`] = 22 leaves room. The distance is the average of those of the vertices, Σ Uᵢ·tᵢ / Σ Uᵢ, so
-//! an error of Uᵢ is scaled by the difference of tᵢ from it; [`AVERAGED`] = 16 roundings are its own.
+//! [`SHEARED`] = 22 leaves room. The distance is the average of those of the vertices, Σ Uᵢ·tᵢ / Σ
+//! Uᵢ, so an error of Uᵢ is scaled by the difference of tᵢ from it; [`AVERAGED`] = 16 roundings are
+//! its own.
 //!
-//! The bounds here are the wider of both kinds. A test that moves vertices into the triangle's own frame
-//! (Baldwin and Weber) has still wider ones, and is wrong by these.
+//! The bounds here are the wider of both kinds. A test that moves vertices into the triangle's own
+//! frame (Baldwin and Weber) has still wider ones, and is wrong by these.
 
 use super::holes::Weight;
 use raystone_core::geometry::{Ray, Triangle};
