@@ -34,7 +34,6 @@ pub(crate) fn leaf_range(reference: u32) -> (usize, usize) {
 #[derive(Debug, Clone)]
 pub(crate) enum Leaves {
     Gathered(Vec<TriangleRecord>),
-    /// Indices of the scene's triangles.
     Indexed(Vec<u32>),
 }
 
@@ -65,7 +64,6 @@ impl Leaves {
         }
     }
 
-    /// The array for the GPU.
     pub(crate) fn words(&self) -> NamedWords<'_> {
         match self {
             Self::Gathered(records) => NamedWords::new("leaf_triangles", records),
@@ -73,7 +71,6 @@ impl Leaves {
         }
     }
 
-    /// Size of the array in bytes.
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Gathered(records) => size_of_val(&records[..]),
@@ -110,7 +107,6 @@ impl Leaves {
 #[derive(Clone, Copy)]
 pub(crate) struct LeafReader<'a> {
     pub leaves: &'a Leaves,
-    /// The scene's triangles.
     pub soup: &'a TriangleSoup,
 }
 

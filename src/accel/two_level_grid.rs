@@ -28,7 +28,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct TwoLevelGrid;
 
 impl Structure for TwoLevelGrid {

@@ -31,14 +31,12 @@ parameters! {
 
     /// How empty space is left.
     pub(crate) enum Skip {
-        /// Cell by cell.
         None = "none",
         /// By the Chebyshev distance to the nearest list.
         Chebyshev = "chebyshev",
     }
 }
 
-/// The registry entry.
 pub(crate) struct UniformGrid;
 
 impl Structure for UniformGrid {

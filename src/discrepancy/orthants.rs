@@ -15,7 +15,6 @@
 use super::leaf::{self, Work};
 use super::{Budget, PointSet};
 
-/// Maximum dimensions of the search.
 pub(super) const MAX_DIM: usize = 24;
 
 /// Cells with at most this many varying points are solved at once, if each varies in one dimension.
@@ -319,7 +318,6 @@ impl<const D: usize> Plane<D> {
     }
 }
 
-/// Volume and its derivatives.
 fn tangent<const D: usize>(at: &[f64; D]) -> (f64, [f64; D]) {
     let (before, after) = partial_products(at);
     (

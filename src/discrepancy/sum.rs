@@ -31,7 +31,6 @@ impl Sum {
         }
     }
 
-    /// Adds one number.
     pub(crate) fn add_one(&mut self, term: f64) {
         let mut terms = [0.0; LANES];
         terms[0] = term;

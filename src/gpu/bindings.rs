@@ -69,7 +69,6 @@ pub struct Bindings {
     features: BTreeSet<&'static str>,
 }
 
-/// The resource of a kernel binding.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Resource {
     Buffer(wgpu::Buffer),
@@ -194,7 +193,6 @@ fn part_name(name: &str, index: usize) -> String {
     }
 }
 
-/// The texture copy of an array.
 fn texels_of(
     gpu: &Gpu,
     name: &str,

@@ -83,7 +83,6 @@ impl Stopwatch {
     }
 }
 
-/// CPU milliseconds used by this process.
 #[cfg(unix)]
 fn cpu_ms() -> Option<f64> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);

@@ -282,7 +282,6 @@ impl Kept {
         Ok(buffer)
     }
 
-    /// Ensures timestamps for this many runs.
     fn wind_clock(&mut self, gpu: &Gpu, runs: usize) {
         if self.clock.as_ref().is_some_and(|clock| clock.runs >= runs) {
             return;

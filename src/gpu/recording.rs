@@ -129,7 +129,6 @@ impl Recording {
         self
     }
 
-    /// The runs among the steps.
     pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
         self.steps.iter().filter_map(|step| match step {
             Step::Run(run) => Some(&**run),
@@ -165,7 +164,6 @@ impl Recording {
         parts
     }
 
-    /// Every buffer that a step uses.
     pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
         self.steps.iter().flat_map(|step| {
             let mut all: Vec<&Storage> = Vec::new();

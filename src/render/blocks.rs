@@ -17,7 +17,6 @@ pub(super) struct Blocks {
 
 impl Blocks {
     pub(crate) const PIXELS: u64 = (BLOCK_EDGE * BLOCK_EDGE) as u64;
-    /// Maximum workgroups of one dispatch.
     pub(crate) const MOST: u64 = 65_535;
 
     pub(crate) fn all(gpu: &Gpu, size: [u32; 2]) -> Result<Self, GpuError> {

@@ -148,7 +148,6 @@ fn half_plane_area([a, b, offset]: [f64; 3]) -> f64 {
     0.5 * kept.iter().enumerate().map(cross).sum::<f64>()
 }
 
-/// The registry entry of one function.
 pub(super) struct Integrand {
     name: &'static str,
     description: &'static str,

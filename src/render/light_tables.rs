@@ -22,7 +22,6 @@ pub struct LightTables {
     /// Number of lights; the next field counts those at the end that have no position.
     pub lights: u32,
     infinite: u32,
-    /// Number of emissive triangles.
     emitters: u32,
     /// First of the spheres among the lights, and their number.
     spheres: [u32; 2],
@@ -208,7 +207,6 @@ fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
     }
 }
 
-/// Additional data of a light.
 fn extra_rows(light: &Light) -> Vec<[u32; 4]> {
     match light {
         Light::Ies { profile, .. } => ies_rows(profile),

@@ -33,7 +33,6 @@ pub(super) struct Passes {
     runtime_checks: bool,
     /// The rasterised start of paths that trace no first ray.
     pub visibility: Option<Visibility>,
-    /// Corners of the scene's box.
     bounds: [[f32; 3]; 2],
     scene: SceneFeatures,
     /// Features that some scenes need but this kernel omits; empty if nothing is traced.
@@ -152,7 +151,6 @@ impl Passes {
         Ok(tracer)
     }
 
-    /// Feature flags of the kernels.
     pub(crate) fn features(&self) -> Vec<String> {
         let mut all = BTreeSet::new();
         for pipeline in self.pipelines.borrow().values() {

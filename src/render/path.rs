@@ -67,7 +67,6 @@ parameters! {
         Textures = "textures",
         /// Normals of vertices and of textures.
         Normals = "normals",
-        /// Every kind of light.
         Lights = "lights",
         /// The choice among lights, and the search for the one that was found.
         Choice = "choice",
@@ -75,7 +74,6 @@ parameters! {
         Background = "background",
         /// The error that instances add to points, and the mirrored triangles.
         Transforms = "transforms",
-        /// All of these: the full kernel.
         All = "all",
     }
 

@@ -29,7 +29,6 @@ impl<K: SceneKind> Default for SceneKinds<K> {
 }
 
 impl<K: SceneKind> SceneKinds<K> {
-    /// The kinds used by a scene.
     pub(super) fn of(used: impl Iterator<Item = &'static K>) -> Self {
         let mut kinds = Self::default();
         for kind in used {
@@ -41,7 +40,6 @@ impl<K: SceneKind> SceneKinds<K> {
         kinds
     }
 
-    /// Number of known kinds.
     pub(super) fn count(&self) -> usize {
         self.0.len()
     }

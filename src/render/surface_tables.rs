@@ -5,7 +5,6 @@ use raystone_scene::{Material, SceneData, TextureUse, Wrap};
 
 /// Words of a material without its parameters; the last four refer to texture placements.
 pub(super) const MATERIAL_WORDS: usize = 12;
-/// Words of a texture placement.
 const USE_WORDS: usize = 12;
 
 /// Features that the surfaces of a scene require; absent ones are not in the kernel.

@@ -32,7 +32,6 @@ parameters! {
     pub(crate) enum Per {
         /// All samples of a pixel have the same shift (Dufay 2017).
         Pixel = "pixel",
-        /// Every sample.
         Sample = "sample",
     }
 

@@ -7,7 +7,6 @@
 use super::hash::pcg_hash;
 use std::sync::OnceLock;
 
-/// Pixels along a side.
 pub(super) const SIZE: usize = 64;
 const PIXELS: usize = SIZE * SIZE;
 const SIGMA: f64 = 1.5;

@@ -17,7 +17,6 @@ use std::time::SystemTime;
 /// Names a cache folder to use instead of the user's; `off` disables the cache.
 pub(crate) const CACHE_VARIABLE: &str = "RAYSTONE_CACHE";
 
-/// The cached checks of one reference.
 pub(super) struct KeptChecks {
     folder: PathBuf,
     key: String,

@@ -5,7 +5,6 @@ use raystone_core::geometry::{Camera, Triangle};
 use raystone_scene::{self as scene, Material, SceneData, SceneError, Texture};
 use std::f32::consts::{PI, TAU};
 
-/// A scene under construction.
 pub(super) struct Mesh {
     pub scene: SceneData,
 }

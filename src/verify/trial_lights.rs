@@ -74,7 +74,6 @@ pub fn trials_of(
     Ok(scenes)
 }
 
-/// A hash to [0, 1).
 fn mixed(seed: u32) -> f32 {
     let word = (seed + 1)
         .wrapping_mul(0x9e37_79b9)

@@ -125,7 +125,6 @@ impl BuiltBvh {
         Self::of_tree(&tree, soup, params, log)
     }
 
-    /// Lays out a tree.
     fn of_tree(
         tree: &Tree,
         soup: &TriangleSoup,

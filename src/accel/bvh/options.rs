@@ -97,7 +97,6 @@ parameters! {
     pub(crate) enum LeafTriangles {
         /// Copies of the triangles.
         Gathered = "gathered",
-        /// Indices.
         Indexed = "indexed",
     }
 

@@ -53,7 +53,6 @@ impl Pair {
         }
     }
 
-    /// References and boxes of both children.
     pub(crate) fn children(&self) -> [(u32, Bounds); 2] {
         let bounds = |min, max| Bounds { min, max };
         [
@@ -91,7 +90,6 @@ impl Pairs {
         Self::new(tree, NodeOrder::DepthFirst)
     }
 
-    /// Lays out a tree.
     pub(super) fn new(tree: &Tree, order: NodeOrder) -> Self {
         let inner = InnerNodes::new(tree, order, |_, _| false);
         let child = |index: u32| {

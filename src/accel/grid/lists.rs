@@ -19,7 +19,6 @@ const BUCKETS: u32 = 64;
 const ENOUGH: u64 = 16;
 /// References after which a run reports its count to the others.
 const REPORT: u64 = 1 << 16;
-/// Minimum triangles per run.
 const LEAST_RUN: usize = 2048;
 /// Cells that one task cuts.
 const RUN: usize = 64;
@@ -29,7 +28,6 @@ const RUN: usize = 64;
 pub(crate) struct Lists {
     /// Start of each cell, and the end of the last.
     pub starts: Vec<u32>,
-    /// Triangle indices.
     pub references: Vec<u32>,
 }
 

@@ -160,11 +160,9 @@ fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     boxes.iter().fold(Bounds::EMPTY, |b, c| b.union(c))
 }
 
-/// A box subdivided into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Grid {
     pub bounds: Bounds,
-    /// Cells along each axis.
     pub resolution: [u32; 3],
     /// Sides of a cell, scene units.
     pub cell: [f32; 3],
@@ -228,12 +226,10 @@ impl Grid {
         clamped(cells, self.resolution[axis])
     }
 
-    /// The plane below cell `coordinate`.
     pub(crate) fn plane(&self, axis: usize, coordinate: u32) -> f32 {
         self.bounds.min[axis] + coordinate as f32 * self.cell[axis]
     }
 
-    /// The uniform `grid` of the kernels.
     pub(crate) fn uniform(&self) -> (&'static str, UniformValues) {
         (
             "grid",

@@ -10,7 +10,6 @@ use super::super::spatial::cross;
 use super::super::triangle::TriangleRecord;
 use super::Grid;
 
-/// Minimum and maximum coordinates.
 pub(crate) fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
     let pick = |first: fn(f32, f32) -> bool| {
         std::array::from_fn(|a| {

@@ -22,7 +22,6 @@ pub(super) struct Root {
     pub object_size: usize,
     /// Object-space bounds.
     pub bounds: Bounds,
-    /// Depth of the deepest leaf.
     pub depth: u32,
 }
 

@@ -30,7 +30,6 @@ pub(super) struct Entry {
     /// Scene index of the instance's first triangle.
     pub first_id: u32,
     pub z: [f32; 3],
-    /// [`IDENTITY`] or 0.
     pub flags: u32,
     pub offset: [f32; 3],
     /// Index of the instance, for checks.

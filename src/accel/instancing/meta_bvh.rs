@@ -64,7 +64,6 @@ fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     AccelError::check_limit(what, needed, FIRST_MASK)
 }
 
-/// A BVH over the instances.
 struct Instances {
     top: Top,
     rebraid: usize,
@@ -84,7 +83,6 @@ impl<'a> Levels<'a> {
         self.base.forest.nodes.len() as u32
     }
 
-    /// A node of either level.
     pub(super) fn node(&self, index: u32) -> &'a Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;

@@ -48,7 +48,6 @@ trait Upper: Send + Sync + 'static {
     fn layout(&self, base: &Base) -> Layout<'_>;
     /// Statistics of the whole structure, given those of the objects.
     fn figures(&self, objects: &StructureStats) -> StructureStats;
-    /// CPU version of the kernel's `trace`.
     fn trace(&self, base: &Base, walk: Walk) -> Hit;
 }
 

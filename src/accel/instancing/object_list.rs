@@ -57,7 +57,6 @@ impl BoxWords {
 #[derive(Default)]
 struct List {
     entries: Vec<Entry>,
-    /// World box of each entry.
     boxes: Vec<BoxWords>,
     growth: f32,
 }

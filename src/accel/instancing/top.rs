@@ -28,7 +28,6 @@ pub(super) struct Top {
     pub nodes: Vec<Pair>,
     /// The contents of the leaves.
     pub entries: Vec<Entry>,
-    /// Depth of the deepest leaf.
     pub depth: u32,
     /// Growth of boxes, see [`super::world_box`].
     pub growth: f32,

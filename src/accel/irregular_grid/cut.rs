@@ -167,7 +167,6 @@ struct Run<'a> {
     spare: Vec<PartLists>,
 }
 
-/// A block being filled.
 struct Open<'a> {
     block: Block,
     lists: &'a Lists,

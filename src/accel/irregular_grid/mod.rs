@@ -50,7 +50,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct IrregularGrid;
 
 impl Structure for IrregularGrid {
@@ -91,7 +90,6 @@ struct Partition {
     fine: Grid,
     map: Map,
     cells: Vec<GridCell>,
-    /// Lists of cells.
     pool: Vec<u32>,
 }
 

@@ -6,13 +6,11 @@ const BLOCK: u32 = 1 << 31;
 /// A box of voxels with a list of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct GridCell {
-    /// Lowest voxel.
     pub min: [u16; 3],
     /// One past the highest voxel.
     pub max: [u16; 3],
     /// Index of its list in the pool.
     pub first: u32,
-    /// Length of its list.
     pub count: u32,
 }
 

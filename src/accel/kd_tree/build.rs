@@ -82,7 +82,6 @@ struct Settings<'a> {
     references: AtomicU64,
 }
 
-/// A triangle in a cell.
 struct Item {
     /// Bounds of its part within the cell.
     bounds: Bounds,

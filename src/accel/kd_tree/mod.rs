@@ -40,7 +40,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct KdTree;
 
 impl Structure for KdTree {
@@ -81,7 +80,6 @@ struct Node {
     link: u32,
 }
 
-/// A decoded node.
 #[derive(Clone, Copy)]
 enum Content {
     Inner {

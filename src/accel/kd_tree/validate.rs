@@ -40,7 +40,6 @@ pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelEr
     check.nodes.is_complete()
 }
 
-/// State of the descent.
 struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,

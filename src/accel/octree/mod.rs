@@ -40,7 +40,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct Octree;
 
 impl Structure for Octree {

@@ -33,7 +33,6 @@ pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelEr
     check.blocks.is_complete()
 }
 
-/// State of the descent.
 struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,

@@ -217,7 +217,6 @@ impl Tracer {
         entries.map(|(pass, p)| (pass, p.cold_ms())).collect()
     }
 
-    /// BLAKE3 of the kernels.
     fn hash(&self) -> String {
         let hashes: Vec<(String, String)> = self
             .pipelines()

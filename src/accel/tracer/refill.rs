@@ -21,11 +21,9 @@ parameters! {
 
     /// When invocations are refilled.
     pub(crate) enum Refill {
-        /// Never.
         None = "none",
         /// Where measurements show a gain.
         Auto = "auto",
-        /// For all rays, on all adapters.
         Always = "always",
     }
 }

@@ -100,7 +100,6 @@ fn exhaustive_split(references: &mut [Reference]) -> (usize, [Box3; 2]) {
     (middle, [subsets[chosen], subsets[all - chosen]])
 }
 
-/// A border between two bins.
 pub(super) struct BinSplit {
     axis: usize,
     grid: BinGrid,

@@ -42,9 +42,7 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
     })
 }
 
-/// Source of a subtree.
 enum Part {
-    /// A node of the original tree.
     Below(u32),
     /// A balanced tree over these leaves, at least one.
     Balanced(Vec<TreeNode>),

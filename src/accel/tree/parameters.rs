@@ -9,7 +9,6 @@ use raystone_core::parameters;
 pub(super) const SAH_DEPTH: u32 = 48;
 /// Maximum neighbours examined on either side in clustering, as in the kernel `nearest`.
 pub(super) const LARGEST_RADIUS: u32 = 32;
-/// Maximum bins on an axis.
 pub(super) const MAX_BINS: usize = 32;
 
 parameters! {
@@ -80,17 +79,11 @@ parameters! {
 
     /// Presets of the crate obvhs.
     pub(crate) enum Preset {
-        /// `fastest_build`.
         Fastest = "fastest",
-        /// `very_fast_build`.
         VeryFast = "very-fast",
-        /// `fast_build`.
         Fast = "fast",
-        /// `medium_build`.
         Medium = "medium",
-        /// `slow_build`.
         Slow = "slow",
-        /// `very_slow_build`.
         VerySlow = "very-slow",
     }
 }
@@ -113,7 +106,6 @@ impl TreeParameters {
         }
     }
 
-    /// Clustering with the configured radius.
     pub(super) fn clustering(&self) -> Method {
         Method::Ploc {
             radius: self.search_radius,

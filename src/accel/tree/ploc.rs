@@ -71,7 +71,6 @@ pub(super) fn build(
     Ok(limit_depth(take_over(&bvh)))
 }
 
-/// The nodes in depth-first order.
 fn take_over(bvh: &Bvh2) -> Tree {
     lay_out(0, |index: u32, _, order| {
         let node = &bvh.nodes[index as usize];

@@ -47,7 +47,6 @@ impl Box3 {
         e.dot(e.yzx())
     }
 
-    /// The axis of the largest extent.
     pub(super) fn longest_axis(self) -> usize {
         (self.max - self.min).max_position()
     }

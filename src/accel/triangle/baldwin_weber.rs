@@ -32,7 +32,6 @@ const NOWHERE: Transform = Transform {
 };
 
 impl Transform {
-    /// The words that the kernel reads.
     fn words(&self) -> [[u32; 4]; 3] {
         let row = |[x, y, z]: [f32; 3], w| [x.to_bits(), y.to_bits(), z.to_bits(), w];
         [

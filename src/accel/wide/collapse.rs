@@ -26,9 +26,7 @@ pub(crate) enum WideKind {
     Node(u32),
     /// A range of [`WideTree::order`].
     Leaf {
-        /// First entry.
         first: u32,
-        /// Number of entries.
         count: u32,
     },
 }
@@ -48,7 +46,6 @@ impl WideChild {
         kind: WideKind::Leaf { first: 0, count: 0 },
     };
 
-    /// True for [`WideChild::NOTHING`].
     pub(crate) fn is_nothing(&self) -> bool {
         matches!(self.kind, WideKind::Leaf { count: 0, .. })
     }
@@ -93,7 +90,6 @@ impl WideTree {
         }
     }
 
-    /// The triangles in leaf order.
     pub(super) fn records(&self, soup: &TriangleSoup) -> Vec<TriangleRecord> {
         self.order
             .iter()

@@ -61,7 +61,6 @@ pub(super) fn collapse(
     })
 }
 
-/// The passes over one tree.
 struct Passes<'a> {
     gpu: &'a Gpu,
     bindings: Bindings,

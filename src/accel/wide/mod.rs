@@ -57,9 +57,7 @@ fn wide_tree(
 /// The interface of a wide structure's nodes.
 pub(crate) trait WideNode: Pod + Send + Sync {
     const STRUCTURE: &'static str;
-    /// Module of the kernel.
     const KERNEL: &'static str;
-    /// Maximum children.
     const WIDTH: usize;
     const MOST_NODES: u64;
     /// True if children get slots by octant.
@@ -71,12 +69,10 @@ pub(crate) trait WideNode: Pod + Send + Sync {
     fn bounds(&self, slot: usize) -> Bounds;
     /// Node and triangles in a slot; at most one of them, if the structure is valid.
     fn content(&self, slot: usize) -> (Option<usize>, Option<Range<usize>>);
-    /// CPU version of the kernel's `trace`.
     fn trace(built: &Wide<Self>, walk: Walk) -> Hit;
 }
 
 pub(crate) struct Wide<N> {
-    /// Root first.
     pub nodes: Vec<N>,
     /// Triangle records, leaf by leaf.
     pub leaf_triangles: Vec<TriangleRecord>,

@@ -25,7 +25,6 @@ use crate::intersection::Reciprocal;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub(super) const FRAME_PAD: f32 = 9.536_743e-7;
-/// Number of planes on an axis.
 pub(super) const PLANES: f32 = 256.0;
 
 /// Quanta are at least 2⁻⁶⁰: their distances stay far from denormals.
@@ -88,9 +87,7 @@ impl Quantisation {
 /// A box by plane numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Planes {
-    /// Planes at the minimum.
     pub low: [u8; 3],
-    /// Planes at the maximum.
     pub high: [u8; 3],
 }
 

@@ -19,7 +19,6 @@ impl Tile {
         elements.div_ceil(self.lanes * self.per_lane)
     }
 
-    /// The kernel with this tile shape.
     pub(crate) fn kernel(&self, kernel: Composition) -> Composition {
         kernel
             .constant("SCAN_LANES", self.lanes)

@@ -40,7 +40,6 @@ parameters! {
 
     /// What is sorted.
     pub(crate) enum Sorting {
-        /// Nothing.
         Never = "none",
         /// Paths by the material they hit, before they are shaded.
         Material = "material",
@@ -78,7 +77,6 @@ parameters! {
 /// Shared state of a batch's passes.
 pub(super) struct Queues<'a> {
     pub capacity: u32,
-    /// Invocations per workgroup.
     lanes: u32,
     /// `None` if every bounce processes all slots.
     wavefront: Option<&'a Wavefront>,
@@ -184,7 +182,6 @@ impl<'a> Queues<'a> {
         steps.trace_live(query, buffers, range, self.live(word))
     }
 
-    /// The compaction of a wavefront.
     pub(super) fn method(
         &self,
         gpu: &Gpu,

@@ -17,7 +17,6 @@ struct Kinds<'a> {
     queues: &'a Queues<'a>,
     number: u32,
     method: Arc<dyn Compaction>,
-    /// Indices of all live paths.
     places: Storage,
     /// Indices in queue order, and the queue lengths: all queues if the compaction keeps them
     /// apart, otherwise one at a time.

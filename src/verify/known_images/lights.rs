@@ -17,7 +17,6 @@ pub(super) fn images(kinds: &LightRegistry) -> Result<Vec<KnownImage>, SceneErro
     Ok(all)
 }
 
-/// A floor below these lights.
 pub(crate) fn image(
     name: &'static str,
     lights: Vec<Light>,

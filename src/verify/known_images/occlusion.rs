@@ -8,7 +8,6 @@ use raystone_core::params::ParamValue;
 use raystone_scene::{Material, SceneData, SceneError};
 use std::f64::consts::PI;
 
-/// Height of the plate.
 const LOW: f32 = 0.2;
 
 pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {

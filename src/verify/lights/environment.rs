@@ -24,7 +24,6 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// The checks of environment maps.
 pub(super) static CHECKS: LightChecks = LightChecks {
     trials: trial_lights::skies,
     images,

@@ -11,7 +11,6 @@ use raystone_scene::{LIGHT_KINDS, SceneData, Source};
 pub(super) static TRIANGLES: LightChecks =
     LightChecks::new(LIGHT_KINDS[0], LightTwin::Surface, |_, _, _| Ok(()));
 
-/// Pairs that form a parallelogram.
 pub(super) static PARALLELOGRAMS: LightChecks =
     LightChecks::new(LIGHT_KINDS[1], LightTwin::Surface, |_, _, _| Ok(()));
 

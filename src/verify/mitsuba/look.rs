@@ -137,7 +137,6 @@ impl Export<'_> {
         Ok(Color::Texture(name))
     }
 
-    /// Writes the environment of the scene.
     pub(super) fn sky(&mut self, scene: &SceneData) -> Result<(), ExportError> {
         if scene.environment == Vec3::ZERO {
             return Ok(());

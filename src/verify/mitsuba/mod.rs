@@ -148,7 +148,6 @@ pub struct Export<'a> {
 }
 
 impl Export<'_> {
-    /// Writes integrator, sensor and film.
     fn view(&mut self, scene: &SceneData, settings: &MitsubaSettings) {
         let Camera {
             eye,
@@ -193,7 +192,6 @@ impl Export<'_> {
         );
     }
 
-    /// Writes all lights that emit.
     fn lights(&mut self) -> Result<(), ExportError> {
         let all = self.scene.lights.iter().enumerate();
         for (number, light) in all.filter(|(_, light)| light.problem().is_none()) {

@@ -46,9 +46,7 @@ pub struct PathRules {
 enum Strategy {
     /// Both, weighted by densities to this power.
     Both(i32),
-    /// Material sampling only.
     Material,
-    /// Light sampling only.
     Light,
 }
 
@@ -59,7 +57,6 @@ enum Roulette {
     Throughput,
 }
 
-/// Maximum survival probability.
 const SURVIVAL: f64 = 0.95;
 
 /// Reads parameters and notes which were read.
@@ -200,7 +197,6 @@ impl PathRules {
     }
 }
 
-/// The current state of a path.
 struct State {
     ray: Segment,
     throughput: DVec3,
@@ -211,7 +207,6 @@ struct State {
 }
 
 impl PathOracle<'_> {
-    /// The radiance of a sample.
     pub(super) fn estimate(&self, walk: &mut Walk) -> DVec3 {
         let lens = walk.lens();
         let point = match walk.view.estimator {

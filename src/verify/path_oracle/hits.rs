@@ -48,7 +48,6 @@ impl Hit {
     }
 }
 
-/// The occlusion of a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Blocked {
     No,

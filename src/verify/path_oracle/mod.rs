@@ -150,7 +150,6 @@ pub(crate) enum Parting {
     Surfaces,
     /// One passed an edge.
     Edge,
-    /// Anything else.
     Decision,
 }
 
@@ -193,7 +192,6 @@ pub struct PathOracle<'a> {
     lights: Lights,
     textures: Textures<'a>,
     materials: Vec<&'static MaterialChecks>,
-    /// Diagonal of the scene's box.
     diagonal: f64,
 }
 
@@ -344,7 +342,6 @@ impl Walk<'_> {
         self.branch.push(Decision::Other(what));
     }
 
-    /// Records whether a ray is occluded.
     fn decide_blocked(&mut self, blocked: Blocked) {
         self.branch.push(match blocked {
             Blocked::ByLayer => Decision::BlockedByLayer,
@@ -353,7 +350,6 @@ impl Walk<'_> {
         self.layers += usize::from(blocked == Blocked::ByLayer);
     }
 
-    /// Records the hit of a ray.
     fn decide_met(&mut self, met: Option<&Nearest>) {
         let triangle = met.map_or(u64::MAX, |met| met.hit.triangle.into());
         self.branch.push(match met {

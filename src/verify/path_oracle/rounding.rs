@@ -59,7 +59,6 @@ impl Rounding {
         }
     }
 
-    /// True if quantities are perturbed.
     pub(crate) fn is_played(&self) -> bool {
         self.random.is_some()
     }

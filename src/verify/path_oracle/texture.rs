@@ -6,7 +6,6 @@ use raystone_scene::{SceneData, TextureUse};
 
 pub(crate) struct Textures<'a> {
     scene: &'a SceneData,
-    /// True if triangles have texture coordinates.
     mapped: bool,
 }
 

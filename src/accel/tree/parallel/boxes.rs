@@ -57,7 +57,6 @@ pub fn number(key: u32) -> f32 {
     f32::from_bits(if key >= SIGN { key ^ SIGN } else { !key })
 }
 
-/// The smallest box around both.
 pub(crate) fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
     OrderedBox {
         low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),

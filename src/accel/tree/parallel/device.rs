@@ -75,10 +75,8 @@ pub fn build(
     Ok(tree)
 }
 
-/// The passes over one scene.
 pub(super) struct Passes<'a> {
     pub gpu: &'a Gpu,
-    /// Number of leaves.
     pub count: u32,
     /// Number of nodes after them.
     inner: u32,
@@ -112,7 +110,6 @@ impl<'a> Passes<'a> {
         Storage::scratch(name, 4 * u64::from(each) * u64::from(self.count))
     }
 
-    /// Bindings common to all passes.
     pub(super) fn bindings(&self) -> Bindings {
         let mut bindings = self.triangles.bindings.clone();
         bindings

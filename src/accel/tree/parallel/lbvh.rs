@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 const CODE_BITS: i32 = 64;
 
-/// Codes in ascending order.
 struct Codes<'a>(&'a [[u32; 2]]);
 
 impl Codes<'_> {

@@ -137,7 +137,6 @@ impl LinkedTree {
 }
 
 impl From<LinkedTree> for Tree {
-    /// The nodes in depth-first order.
     fn from(tree: LinkedTree) -> Self {
         if tree.nodes.is_empty() {
             return Self::default();
@@ -172,7 +171,6 @@ impl Tree {
     }
 }
 
-/// Triangles in code order.
 struct Sorted {
     leaves: Vec<LinkedNode>,
     codes: Vec<[u32; 2]>,

@@ -21,7 +21,6 @@ const TILE_GROUPS: usize = 8;
 const TILE_GROUPS_BEFORE: usize = 12;
 const STATE_WORDS: usize = 16;
 
-/// State that persists between submissions.
 pub(super) struct Rounds<'a> {
     passes: &'a Passes<'a>,
     radius: u32,

@@ -14,14 +14,12 @@ use raystone_scene::{LightList, SceneData, Source};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-/// How lights are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Choice {
     Power,
     Uniform,
     /// By their approximate contribution at the point.
     Tree,
-    /// All lights are sampled.
     All,
 }
 
@@ -30,7 +28,6 @@ pub(super) struct Lights {
     checks: Vec<&'static LightChecks>,
     /// Cumulative number of values up to each light, when lights are chosen by power.
     ends: Vec<f64>,
-    /// The light of each emissive triangle.
     owners: BTreeMap<u32, usize>,
     /// Lights without triangles that rays can hit.
     spheres: Vec<(usize, sphere::Ball)>,
@@ -46,7 +43,6 @@ pub(crate) const UNITS: f64 = (1u32 << 24) as f64;
 
 pub(super) struct Chosen {
     pub light: usize,
-    /// The probability of the choice.
     pub share: f64,
 }
 
@@ -151,7 +147,6 @@ pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
 }
 
 impl PathOracle<'_> {
-    /// Probability of choosing a light.
     fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
         let lights = &self.lights;
         match choice {
@@ -175,7 +170,6 @@ impl PathOracle<'_> {
         }
     }
 
-    /// The lights to sample.
     pub(super) fn chosen(
         &self,
         choice: Choice,

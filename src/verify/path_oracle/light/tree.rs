@@ -119,7 +119,6 @@ impl Bounds {
     }
 }
 
-/// The smallest cone around two cones.
 fn least_cone(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let between = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
@@ -143,7 +142,6 @@ pub(super) struct Tree {
     /// Left child of each node; `None` for a leaf.
     children: Vec<Option<usize>>,
     lights: Vec<usize>,
-    /// Node of each light.
     leaves: Vec<usize>,
     parents: Vec<usize>,
 }
@@ -192,7 +190,6 @@ impl Tree {
         }
     }
 
-    /// Number of lights.
     pub(super) fn len(&self) -> usize {
         self.leaves.len()
     }
