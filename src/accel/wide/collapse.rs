@@ -25,10 +25,7 @@ pub(crate) enum WideKind {
     /// A node, by index.
     Node(u32),
     /// A range of [`WideTree::order`].
-    Leaf {
-        first: u32,
-        count: u32,
-    },
+    Leaf { first: u32, count: u32 },
 }
 
 /// A child of a wide node with its box.
