@@ -1,5 +1,4 @@
-//! No structure: every ray is tested against every triangle. CPU version of
-//! `kernels/accel/brute_force.wesl`.
+//! Tests every ray against every triangle. CPU version of `kernels/accel/brute_force.wesl`.
 
 use super::intersection::Reciprocal;
 use super::structure::prelude::*;

@@ -105,8 +105,7 @@ impl BoxTest {
         }
     }
 
-    /// The factor on the far side of a box. CPU version of `BOX_PAD` in
-    /// `kernels/accel/bounds.wesl`.
+    /// The factor on the far side of a box, `BOX_PAD` of `kernels/accel/bounds.wesl`.
     pub fn pad(&self) -> f32 {
         1.0 + self.pad_ulps as f32 * f32::EPSILON
     }

@@ -82,8 +82,7 @@ pub(super) struct Overlap {
     normal: [f64; 3],
     /// Interval of the triangle on its normal, grown by the half extent of the boxes.
     on_normal: [f64; 2],
-    /// For edge `i` and axis `a`, at `3 i + a`: the product's non-zero components, the grown
-    /// interval.
+    /// For edge `i` and axis `a`, at `3 i + a`: non-zero components of the product, grown interval.
     products: [([f64; 2], [f64; 2]); 9],
 }
 

@@ -22,8 +22,7 @@ pub enum Quadratic {
     Centered,
     /// Boxes on the torus (Hickernell 1998, "Lattice rules: how well do they measure up?", eq. 4.17).
     WrapAround,
-    /// Between centered and wrap-around (Zhou, Fang & Ning 2013, "Mixture discrepancy for
-    /// quasi-random point sets").
+    /// Mixture (Zhou, Fang & Ning 2013, "Mixture discrepancy for quasi-random point sets").
     Mixture,
     /// Root of the mean square of L2-star over all 2^d reflections of the origin (Clément, Kirk, Owen
     /// & Rusch 2025, "On the optimization of discrepancy measures", arXiv 2508.04926).

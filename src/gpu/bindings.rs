@@ -19,8 +19,7 @@ pub(crate) const MAX_PARTS: usize = 4;
 pub enum Storage {
     /// The caller's.
     Own(wgpu::Buffer),
-    /// One that the [`super::Player`] creates on first use, and reuses under the same name. Its
-    /// initial content is unspecified.
+    /// One that the [`super::Player`] creates on first use and reuses by name, content unspecified.
     Scratch {
         /// Its name, shared by all recordings of a player.
         name: String,

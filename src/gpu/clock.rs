@@ -13,8 +13,7 @@ pub struct Elapsed {
     /// CPU milliseconds of this process, all threads together: on a software adapter the cost of
     /// the work, regardless of other load on the machine. `None` without such a clock.
     pub cpu_ms: Option<f64>,
-    /// True if a clock ran backwards, as happens with some drivers and virtual machines: the
-    /// measurement is invalid.
+    /// True if a clock ran backwards, as some drivers' do: the measurement is invalid.
     pub backwards: bool,
 }
 

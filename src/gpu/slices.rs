@@ -1,5 +1,4 @@
-//! Work in slices: dispatches should take at most a fraction of a second, so that no driver's
-//! watchdog triggers and progress is shown.
+//! Work in slices: short dispatches, so that no watchdog triggers and progress is shown.
 
 use super::Elapsed;
 use std::cell::Cell;

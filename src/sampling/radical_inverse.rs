@@ -1,5 +1,4 @@
-//! Radical inverses: the digits of an index, mirrored at the point. CPU version of
-//! `kernels/sampling/radical_inverse.wesl`.
+//! Radical inverses. CPU version of `kernels/sampling/radical_inverse.wesl`.
 
 /// The weight of an index's first digit: the largest power of `base` that is at most `n`, 1 for 0.
 pub(super) fn first_weight(n: u32, base: u32) -> u32 {

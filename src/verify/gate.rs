@@ -252,7 +252,7 @@ pub fn gate(
         closest.trace()?;
         any.trace()?;
         if !set.is_timed() {
-            // Timed batches are checked after timing; here a second pass exposes state left by the
+            // Timed batches are checked after timing; a second pass exposes state left by the
             // first.
             closest.trace_in_rows()?;
             any.trace_in_rows()?;

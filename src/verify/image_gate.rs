@@ -258,8 +258,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
             }
         }
         if is_excused {
-            // A path on a boundary may have no trial of its own branch; others then give the
-            // spread.
+            // A path on a boundary may have no trial of its own branch; others then give a spread.
             near = TOLERANCE + SPREAD * spread.max(spread_of_branches(&others, floor));
         }
         let explains = |other: &Path| difference(answer.radiance, other.radiance, floor) <= near;

@@ -53,8 +53,7 @@ pub fn differences(
         if !same {
             unlike.push((ray, hit));
         } else if is && set.query() == Query::Closest {
-            // Along a triangle the reference distance is rounded too: the external tracer may be
-            // right.
+            // Along a triangle the reference is rounded too: the external tracer may be right.
             let off = off_by(ray, hit.t, f64::from(truth.t)).min(off_the_plane(soup, ray, hit));
             if !off.is_finite() || off > EXPLAINED {
                 return Err(format!(

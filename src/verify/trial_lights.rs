@@ -147,8 +147,7 @@ fn profile(photometry: Photometry, axial: bool) -> IesProfile {
     let (rows, columns) = (vertical.len(), horizontal.len());
     let value = |at: usize| {
         let (mut column, mut row) = (at / rows, at % rows);
-        // Poles, where all angles of the other kind are one direction, and the closing of the
-        // circle.
+        // Where all angles of the other kind are one direction, and where the circle closes.
         match photometry {
             Photometry::C if row == 0 || row == rows - 1 => column = 0,
             Photometry::C if column == columns - 1 => column = 0,

@@ -163,8 +163,7 @@ pub(super) fn trace_object(forest: &Forest, entry: &Entry, walk: &mut Walk) {
     });
 }
 
-/// The traversal loop used for both levels of the nested version: `visit` gets the references of
-/// leaves.
+/// The traversal loop of each level in the nested version; `visit` gets the references of leaves.
 pub(super) fn descend<'a>(
     node: impl Fn(u32) -> &'a Pair,
     root: u32,

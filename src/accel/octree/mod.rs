@@ -184,8 +184,7 @@ impl BuiltAccel for Built {
                 ("space", space),
                 limits(self.nodes.len() + 1, self.references.len()),
             ],
-            // One entry per level plus the root; rounded, so that scenes of similar depth share a
-            // kernel.
+            // One entry per level plus the root; rounded, so that similar scenes share a kernel.
             constants: vec![("STACK_ENTRIES", (self.depth + 1).next_multiple_of(8))],
         }
     }

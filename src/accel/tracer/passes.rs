@@ -6,11 +6,9 @@ use raystone_gpu::{
 };
 use std::ops::Range;
 
-/// A structure that answers a buffer of rays in its own passes: it may sort, compact, trace by
-/// level, and restore the order.
+/// A structure with its own passes, which may sort, compact, trace by level, and reorder.
 pub trait TracePasses: Send + Sync {
-    /// Additional buffers for this many rays: kernel variable names and bytes. Their initial
-    /// content is unspecified.
+    /// Additional buffers: kernel variable names and bytes, with unspecified initial content.
     fn scratch(&self, _rays: u32) -> Vec<(&'static str, u64)> {
         Vec::new()
     }

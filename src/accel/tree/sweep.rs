@@ -153,8 +153,7 @@ impl Sweep<'_> {
         best
     }
 
-    /// Splits the lists, preserving their order. A reference belongs to the half given by its
-    /// position along the split axis.
+    /// Splits the lists, preserving their order, by the position along the split axis.
     fn divide<'l>(
         &self,
         lists: Lists<'l>,

@@ -144,8 +144,7 @@ pub trait TriangleTest: Send + Sync {
     }
     /// Intersection of a ray's line with a triangle, given the reciprocal of its direction.
     fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting;
-    /// Bound on the rounding error of the distance of `found` relative to the triangle's slab on
-    /// each axis, scene units.
+    /// Rounding error bound of the distance of `found` for each axis' slab, scene units.
     fn allowance(
         &self,
         triangle: &TriangleRecord,
@@ -236,8 +235,7 @@ pub const APART: Meeting = Meeting {
     v: 0.0,
 };
 
-/// A bound moved by a relative pad. Rounding preserves order, so the nearest of padded bounds is
-/// the padded nearest one.
+/// A bound moved by a relative pad. Rounding preserves order, so the minimum may be padded last.
 fn padded(t: f32, share: f32) -> f32 {
     t + t.abs() * share
 }

@@ -196,8 +196,7 @@ fn planes(word: u32, scale: f32, base: f32) -> [f32; 4] {
     bytes(word).map(|q| q * scale + base)
 }
 
-/// The later of two distances, in the kernels' integer comparison: of two negative distances it may
-/// return the earlier one.
+/// The later of two distances by integer comparison; of two negative ones possibly the earlier.
 fn later(a: f32, b: f32) -> f32 {
     f32::from_bits((a.to_bits() as i32).max(b.to_bits() as i32) as u32)
 }

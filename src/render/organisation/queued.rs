@@ -23,8 +23,8 @@ const COUNTS_BYTES: u64 = 32;
 parameters! {
     /// The compaction of the queue of live paths.
     pub(crate) enum CompactionMethod {
-        /// The best measured: `atomic` on software adapters, with expensive barriers, else
-        /// `workgroup`.
+        /// `atomic` on software adapters, with their expensive barriers, else `workgroup`, as
+        /// measured.
         Auto = "auto",
         Atomic = "atomic",
         /// A scan and one atomic for each workgroup.

@@ -6,8 +6,7 @@ use raystone_gpu::compaction::{Compaction, Stays};
 use raystone_gpu::{Bindings, GpuError, Groups, Storage};
 use std::sync::Arc;
 
-/// The queue of a kind by its number, or of misses. Flags are one larger:
-/// `kernels/organisation/kinds.wesl`.
+/// The queue of a kind, or of misses; flags are one larger: `kernels/organisation/kinds.wesl`.
 fn queue_of(kind: Option<usize>) -> u32 {
     kind.map_or(0, |kind| kind as u32 + 1)
 }

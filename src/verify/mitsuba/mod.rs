@@ -218,8 +218,8 @@ impl Export<'_> {
                 let side = ["", "-back"][usize::from(back.is_some())];
                 let name = format!("meshes/{id}{side}.ply");
                 self.write(&name, &bytes)?;
-                // Mitsuba uses vertex normals for emission too, which makes a faceted ball cast 0.3
-                // % less light around its shadows.
+                // Mitsuba emits by vertex normals too: a faceted ball casts 0.3 % less around its
+                // shadows.
                 let by_faces = emits || !smooth;
                 let _ = write!(
                     self.xml,

@@ -121,8 +121,7 @@ pub struct Path {
     pub vertices: Vec<Vertex>,
     /// All rays traced for it.
     pub rays: Vec<PathRay>,
-    /// All decisions: triangles, lobes, lights, occlusion, end. One branch differs by rounding
-    /// only.
+    /// All decisions: triangles, lobes, lights, occlusion, end. Otherwise paths differ by rounding.
     pub branch: Vec<Decision>,
     /// Number of its surfaces that have another within rounding.
     pub layers: usize,

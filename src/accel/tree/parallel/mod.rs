@@ -48,8 +48,7 @@ pub struct Settings {
     pub long_codes: bool,
 }
 
-/// A node: its box, with a child after each corner. A leaf has its triangle as the first and
-/// [`LEAF`] as the second.
+/// A node: a child after each corner of its box. A leaf has its triangle first, then [`LEAF`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct LinkedNode {
