@@ -1,6 +1,5 @@
 //! Axis-aligned bounds and the slab test. CPU version of `kernels/accel/bounds.wesl`.
 
-use super::intersection::Reciprocal;
 use super::ray::Ray;
 
 /// An axis-aligned box, scene units.
@@ -91,17 +90,4 @@ pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) 
     let enter = near[0].max(near[1]).max(near[2]);
     let exit = far[0].min(far[1]).min(far[2]);
     (enter, exit)
-}
-
-/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the
-/// default pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
-pub(crate) fn enter_box(
-    bounds: &Bounds,
-    ray: &Ray,
-    inverse: Reciprocal,
-    t_best: f32,
-) -> Option<f32> {
-    let (enter, exit) = slab(bounds, ray, *inverse);
-    let enter = enter.max(ray.t_min);
-    (enter <= exit.min(t_best) * inverse.pad).then_some(enter)
 }

@@ -4,8 +4,8 @@
 //! common start and end are here. CPU version of `kernels/accel/query.wesl`.
 
 use super::TriangleSoup;
-use super::bounds::{Bounds, enter_box};
-use super::intersection::Reciprocal;
+use super::bounds::Bounds;
+use super::intersection::{Reciprocal, enter_box};
 use super::mask::Masks;
 use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::{TriangleRecord, intersect_triangle};

@@ -93,7 +93,7 @@ impl Run {
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
             let units = registries.measurements.units(&experiment, &plan);
-            let cost = Cost::new(&experiment, &plan, &registries);
+            let cost = Cost::new(&experiment, &plan, &registries.integrators);
             if self.output.json {
                 print_json("run", super::inspect::plan::as_json(&plan, &units, &cost))?;
                 return Ok(ExitCode::SUCCESS);
@@ -101,7 +101,7 @@ impl Run {
             print(&format!(
                 "{}\n{}\n",
                 plan.describe().trim_end(),
-                cost.describe(&units)
+                cost.whole(&units).describe()
             ))?;
             return Ok(ExitCode::SUCCESS);
         }

@@ -9,7 +9,7 @@ use clap::Args;
 use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan, Skipped};
 use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, Key, PathsRecord, Verdict};
 use raystone::report::document::{Table, TableCell};
-use raystone::report::format::{count, ray_class};
+use raystone::report::format::count;
 use raystone::run::{Registries, Verified};
 use raystone::scene::{LoadOptions, load};
 use serde_json::{Value, json};
@@ -340,7 +340,7 @@ fn rows(head: [TableCell; 3], verdict: &GateVerdict) -> Vec<Vec<TableCell>> {
 }
 
 fn counts(class: &ClassVerdict) -> [String; 4] {
-    let name = ray_class(class.class);
+    let name = class.class.name();
     let [rays, wrong, ties] = [class.rays, class.wrong, class.ties].map(|n| count(n as u64));
     [name.to_owned(), rays, wrong, ties]
 }

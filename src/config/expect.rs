@@ -91,6 +91,7 @@ pub enum Speaks {
 pub type Pick = BTreeMap<String, String>;
 
 /// An expectation.
+// Many fields: one for each key of `[[expect]]`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {

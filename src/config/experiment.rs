@@ -15,6 +15,7 @@ use std::fmt;
 use std::path::Path;
 
 /// What is run. Keys, ranges and defaults of settings stand in their structs, and in `docs/experiments.md`.
+// Many fields: one for each section of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Name of the run.

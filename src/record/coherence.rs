@@ -1,6 +1,7 @@
 //! What is recorded of the coherence of rays: counts of a model, see [`crate::coherence`].
 
 use crate::figure::{self, Figure};
+use crate::{Key, Reading, Samples, axis};
 use raystone_config::Coherence;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -8,6 +9,9 @@ use std::ops::AddAssign;
 
 /// The organisation in which a lane keeps its pixel, the baseline of the others.
 pub const SINGLE_KERNEL: &str = "single kernel";
+
+/// What stands on the axis of rays for all of them.
+pub const ALL_RAYS: &str = "all";
 
 /// Coherence of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -47,6 +51,15 @@ pub fn by_group(groups: &[Tallies], class: u32) -> Vec<[u64; 2]> {
 }
 
 impl CoherenceRecord {
+    /// Its figures by samples per pixel, organisation and class of rays.
+    pub fn readings(&self) -> Vec<Reading> {
+        let line_bytes = self.settings.line_bytes;
+        self.at
+            .iter()
+            .flat_map(|at| at.readings(line_bytes))
+            .collect()
+    }
+
     /// What is predicted of what was timed.
     pub fn timed(&self, organisation: &str) -> Option<&CoherenceAt> {
         let is_it = |at: &&CoherenceAt| at.spp == self.timed_spp && at.organisation == organisation;
@@ -64,10 +77,57 @@ impl CoherenceAt {
         all
     }
 
+    /// Its figures; those of each class and of all rays.
+    fn readings(&self, line_bytes: u32) -> Vec<Reading> {
+        let key = Key::default().with(axis::SPP, self.spp);
+        let key = key.with(axis::SUBJECT, &self.organisation);
+        let mut readings = Vec::new();
+        for (place, (class, tally)) in self.classes.iter().enumerate() {
+            let key = key.clone().with(axis::RAYS, class);
+            let groups = self.groups.get(place).map(Vec::as_slice);
+            readings.extend(tally.readings(&key, line_bytes, groups));
+        }
+        let key = key.with(axis::RAYS, ALL_RAYS);
+        let groups = self.groups_of_all();
+        readings.extend(self.all().readings(&key, line_bytes, groups.as_deref()));
+        let per_path = Reading::known([(&figure::CYCLES_PER_PATH, self.cost_of_path())]);
+        // What is traced first are the primary rays: one for each path.
+        let paths = self.groups.first().zip(groups);
+        let parts = paths.map(|(primary, all)| {
+            let of_one = |([paths, _], [_, cycles]): (&[u64; 2], &[u64; 2])| [*paths, *cycles];
+            primary.iter().zip(&all).map(of_one).collect::<Vec<_>>()
+        });
+        readings.extend(per_path.into_iter().map(|reading| {
+            reading
+                .at(key.clone())
+                .with_samples(cycles_over(parts.as_deref()))
+        }));
+        readings
+    }
+
+    /// Rays and predicted cycles of all classes together in each group of warps, where those are known.
+    fn groups_of_all(&self) -> Option<Vec<[u64; 2]>> {
+        let mut all = vec![[0; 2]; self.groups.first()?.len()];
+        for groups in &self.groups {
+            for ([rays, cycles], [more, cost]) in all.iter_mut().zip(groups) {
+                *rays += more;
+                *cycles += cost;
+            }
+        }
+        Some(all)
+    }
+
     /// Predicted cycles of a path: see [`Tally::cost`].
     pub fn cost_of_path(&self) -> Option<f64> {
         ratio(self.all().cost(), self.paths)
     }
+}
+
+/// Predicted cycles over rays or paths, from counts of those and of cycles by group.
+fn cycles_over(groups: Option<&[[u64; 2]]>) -> Samples {
+    let of_one = |[count, cycles]: &[u64; 2]| [*cycles as f64, *count as f64];
+    let groups = groups.map(|groups| groups.iter().map(of_one).collect());
+    groups.map_or(Samples::Once, Samples::Groups)
 }
 
 /// Counts of one class of rays.
@@ -123,6 +183,26 @@ impl Tally {
     /// Share of the lanes that take part in an issue.
     pub fn efficiency(&self) -> Option<f64> {
         ratio(self.active, self.lanes)
+    }
+
+    /// Readings of its figures at `key`, with rays and predicted cycles of each group where those are known.
+    pub(crate) fn readings(
+        &self,
+        key: &Key,
+        line_bytes: u32,
+        groups: Option<&[[u64; 2]]>,
+    ) -> Vec<Reading> {
+        let readings = Reading::known(self.figures(line_bytes)).into_iter();
+        let with_groups = |reading: Reading| {
+            if reading.figure == figure::CYCLES_PER_RAY.id {
+                reading.with_samples(cycles_over(groups))
+            } else {
+                reading
+            }
+        };
+        readings
+            .map(|reading| with_groups(reading).at(key.clone()))
+            .collect()
     }
 
     /// Figures by id, those that there are.

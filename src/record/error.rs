@@ -1,6 +1,7 @@
 //! What is recorded of the errors of samplers and of the references they are measured against.
 
-use super::Interval;
+use super::{Interval, Key, Reading, axis};
+use crate::figure;
 use raystone_config::StopRule;
 use raystone_stats::bias::BiasVerdict;
 pub(crate) use raystone_stats::heavy_tails::Tail;
@@ -153,6 +154,70 @@ pub struct SpectrumRecord {
     pub autocorrelation: Option<Interval>,
     /// What Gaussian filters leave of the error.
     pub filtered: Vec<FilteredError>,
+}
+
+impl ReferenceRecord {
+    /// Its own error.
+    pub fn readings(&self) -> Vec<Reading> {
+        Reading::known([(&figure::REFERENCE_MSE, self.mse)])
+    }
+}
+
+impl BiasRecord {
+    /// Its figures; none where it was not testable.
+    pub fn readings(&self) -> Vec<Reading> {
+        let Some(p) = self.p else {
+            return Vec::new();
+        };
+        Reading::known([
+            (&figure::BIAS_TILES, Some(self.tiles as f64)),
+            (&figure::BIAS_REJECTED, Some(self.rejected as f64)),
+            (&figure::BIAS_LEAST_P, Some(self.min_p)),
+            (&figure::BIAS_Z, self.z),
+            (&figure::BIAS_P, Some(p)),
+            (&figure::BIAS_FREEDOM, self.degrees_of_freedom),
+            (&figure::BIAS_WEIGHTED_P, self.weighted_p),
+            (
+                &figure::BIAS_WEIGHTED_FREEDOM,
+                self.weighted_degrees_of_freedom,
+            ),
+            (
+                &figure::BIAS_DETECTABLE,
+                self.detectable.map(|part| 100.0 * part),
+            ),
+        ])
+    }
+}
+
+impl SpectrumRecord {
+    /// The error that shares of filtered ones are of; `None` if there is none.
+    pub fn unfiltered(&self) -> Option<f64> {
+        let at = self.filtered.iter().find(|at| at.sigma == 0.0)?;
+        (at.rmse.value > 0.0).then_some(at.rmse.value)
+    }
+
+    /// Its figures.
+    pub fn readings(&self) -> Vec<Reading> {
+        let key = Key::default().with(axis::SPP, self.spp);
+        let before = self.unfiltered();
+        let whole = Reading::known([
+            (&figure::LOW_FREQUENCY_POWER, self.low_frequency),
+            (&figure::LOUDEST_WAVE, self.loudest),
+            (&figure::NEIGHBOUR_CORRELATION, self.autocorrelation),
+            (&figure::LUMINANCE_RMSE, before.map(Interval::exact)),
+        ]);
+        let mut readings: Vec<Reading> = whole
+            .into_iter()
+            .map(|reading| reading.at(key.clone()))
+            .collect();
+        for at in self.filtered.iter().filter(|at| at.sigma > 0.0) {
+            let key = (key.clone()).with(axis::SUBJECT, format!("σ = {} px", at.sigma));
+            let share = before.map(|before| at.rmse.value / before);
+            let share = share.map(|share| Reading::exact(&figure::FILTERED_SHARE, share));
+            readings.extend(share.map(|share| share.at(key)));
+        }
+        readings
+    }
 }
 
 /// Quantiles of the spectra of single images: the middle, and outliers.

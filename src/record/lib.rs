@@ -116,6 +116,7 @@ impl<B> Line<B> {
     /// One part of the body beside the key.
     pub fn of<'a, T>(&'a self, body: &'a T) -> Recorded<'a, T> {
         Recorded {
+            hash: &self.hash,
             key: &self.key,
             ran: &self.ran,
             readings: &self.readings,
@@ -127,6 +128,8 @@ impl<B> Line<B> {
 /// A body with the key that it belongs to; reads like the body.
 #[derive(Debug, PartialEq)]
 pub struct Recorded<'a, T> {
+    /// Content hash of the cell that the line belongs to; empty if it belongs to none.
+    pub hash: &'a str,
     /// What was measured.
     pub key: &'a Key,
     /// What it ran with.

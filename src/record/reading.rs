@@ -40,6 +40,9 @@ pub enum Samples {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         processors: Vec<f64>,
     },
+    /// A sum over another for each group of a sample, for instance predicted cycles over rays: the figure is the quotient of the
+    /// totals.
+    Groups(Vec<[f64; 2]>),
 }
 
 impl Samples {
@@ -63,6 +66,15 @@ impl Reading {
     /// A value that is exact or was measured once.
     pub fn exact(figure: &Figure, value: f64) -> Self {
         Self::new(figure, Interval::exact(value))
+    }
+
+    /// Those figures that are known.
+    pub fn known<'f, T: Into<Interval>>(
+        figures: impl IntoIterator<Item = (&'f Figure, Option<T>)>,
+    ) -> Vec<Self> {
+        let known = figures.into_iter();
+        let known = known.filter_map(|(figure, value)| Some(Self::new(figure, value?.into())));
+        known.collect()
     }
 
     /// The same reading of a part of what its line is of.
@@ -90,7 +102,7 @@ impl Reading {
     pub fn rounds(&self) -> &[f64] {
         match &self.samples {
             Samples::Rounds { adapter, .. } => adapter,
-            Samples::Once => &[],
+            Samples::Once | Samples::Groups(_) => &[],
         }
     }
 }

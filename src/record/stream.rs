@@ -1,6 +1,7 @@
 //! What is recorded of the words that samplers draw.
 
-use super::Interval;
+use super::{Interval, Key, Reading, axis};
+use crate::figure::{self, Figure};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use raystone_sampling::to_unit;
@@ -35,6 +36,52 @@ pub struct StreamRecord {
     /// Points for pictures, of one pair of each sampler.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<RecordedPoints>,
+}
+
+impl StreamRecord {
+    /// What the dimensions are used for, with their numbers.
+    pub fn pair(&self) -> String {
+        let [a, b] = self.dimensions;
+        format!("{} (dimensions {a} and {b})", self.purpose)
+    }
+
+    /// Its figures.
+    pub fn readings(&self) -> Vec<Reading> {
+        let key = Key::default().with(axis::DIMENSIONS, self.pair());
+        let figures = &self.figures;
+        let at = |key: &Key, figure: &Figure, counts: &[FigureAtCount]| -> Vec<Reading> {
+            let at = |at: &FigureAtCount| {
+                Reading::new(figure, at.value).at(key.clone().with(axis::POINTS, at.n))
+            };
+            counts.iter().map(at).collect()
+        };
+        let exponents = |key: &Key, figures: &[(&Figure, Option<Interval>)]| -> Vec<Reading> {
+            let known = Reading::known(figures.iter().copied()).into_iter();
+            known.map(|reading| reading.at(key.clone())).collect()
+        };
+        let mut readings = at(&key, &figure::STAR_DISCREPANCY, &self.star);
+        readings.extend(at(&key, &figure::L2_STAR, &figures.l2_star));
+        readings.extend(at(&key, &figure::CENTERED, &figures.centered));
+        let of_points = [
+            (&figure::STAR_EXPONENT, figures.star_slope),
+            (&figure::L2_STAR_EXPONENT, figures.l2_star_slope),
+        ];
+        readings.extend(exponents(&key, &of_points));
+        for integrand in &figures.integrands {
+            let key = key.clone().with(axis::SUBJECT, &integrand.function);
+            readings.extend(at(&key, &figure::INTEGRAL_RMSE, &integrand.rmse));
+            let exponent = [(&figure::INTEGRAL_EXPONENT, integrand.slope)];
+            readings.extend(exponents(&key, &exponent));
+        }
+        for pixels in &figures.pixels {
+            let key = key.clone().with(axis::POINTS, pixels.n);
+            let angle = pixels.neighbour_angle.to_degrees();
+            let angle = Reading::exact(&figure::NEIGHBOUR_ANGLE, angle);
+            let coverage = Reading::exact(&figure::COVERAGE, pixels.coverage);
+            readings.extend([angle, coverage].map(|reading| reading.at(key.clone())));
+        }
+        readings
+    }
 }
 
 fn yes() -> bool {

@@ -1,8 +1,11 @@
 //! What is recorded of a structure on a scene, and of full cells.
 
-use super::{Interval, Tally};
+use super::{Interval, Key, Reading, Samples, Tally, axis};
+use crate::figure;
 use raystone_config::Coherence;
-use raystone_core::structure::{Counters, Phase, Space, StructureStats};
+use raystone_core::structure::{
+    Counters, Phase, RAY_COUNT_CLASSES, RAY_QUERIES, Space, StructureStats, TRACED_CLASSES,
+};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -40,6 +43,28 @@ pub enum RayClass {
     Chord,
     /// Rays that faults hide behind (see `hard_rays`); both queries, never timed.
     Hard,
+}
+
+impl RayClass {
+    /// Its name in keys, tables and plots.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Shadow => "shadow",
+            Self::ShadowReversed => "shadow, reversed",
+            Self::ShadowClustered => "shadow, clustered",
+            Self::ShadowReversedClustered => "shadow, reversed and clustered",
+            Self::Ao => "ambient occlusion",
+            Self::Bounce => "bounce",
+            Self::Chord => "chord",
+            Self::Hard => "hard",
+        }
+    }
+
+    /// What readings of this class are at.
+    pub fn key(self) -> Key {
+        Key::default().with(axis::RAYS, self.name())
+    }
 }
 
 /// Gate result for one ray class.
@@ -149,6 +174,44 @@ pub struct ClassTiming {
     pub counters: Option<CountersPerRay>,
 }
 
+impl ClassTiming {
+    /// Its figures.
+    pub fn readings(&self) -> Vec<Reading> {
+        let rate = |ms: &f64| self.rays as f64 / ms * 1e-3;
+        let rates = |ms: &[f64]| ms.iter().map(rate).collect();
+        let work_done = format!("{} rays", self.rays);
+        let speed = Reading::new(&figure::MRAYS_PER_S, self.mrays_s)
+            .of_work(&work_done)
+            .with_samples(Samples::Rounds {
+                adapter: rates(&self.ms),
+                wall: rates(&self.wall_ms),
+                processors: rates(&self.cpu_ms),
+            });
+        let work = self.counters;
+        let unlike = (self.unlike_shadow).map(|rays| 1e6 * rays as f64 / self.rays.max(1) as f64);
+        let counted = Reading::known([
+            (&figure::RAYS, Some(self.rays as f64)),
+            (&figure::HIT_SHARE, Some(self.hit_fraction)),
+            (&figure::UNLIKE_SHADOW, unlike),
+            (&figure::NODES_PER_RAY, work.map(|w| w.nodes)),
+            (&figure::BOX_TESTS_PER_RAY, work.map(|w| w.box_tests)),
+            (
+                &figure::TRIANGLE_TESTS_PER_RAY,
+                work.map(|w| w.triangle_tests),
+            ),
+            (
+                &figure::DEEPEST_STACK,
+                work.map(|w| f64::from(w.stack_high_water)),
+            ),
+        ]);
+        let counted = counted
+            .into_iter()
+            .map(|reading| reading.of_work(&work_done));
+        let all = [speed].into_iter().chain(counted);
+        all.map(|reading| reading.at(self.class.key())).collect()
+    }
+}
+
 /// Coherence of recorded rays, as they follow each other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassCoherence {
@@ -159,6 +222,22 @@ pub struct ClassCoherence {
     /// For each class, rays and predicted cycles of each group of warps, as in [`super::CoherenceAt::groups`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<Vec<[u64; 2]>>,
+}
+
+impl ClassCoherence {
+    /// Its figures, class by class.
+    pub fn readings(&self) -> Vec<Reading> {
+        let classes = self.classes.iter().enumerate();
+        let of_class = |(place, (class, tally)): (usize, &(RayClass, Tally))| {
+            let groups = self.groups.get(place).map(Vec::as_slice);
+            let readings = tally.readings(&class.key(), self.settings.line_bytes, groups);
+            let rays = format!("{} rays", tally.rays);
+            readings
+                .into_iter()
+                .map(move |reading| reading.of_work(&rays))
+        };
+        classes.flat_map(of_class).collect()
+    }
 }
 
 /// A structure on a scene.
@@ -280,10 +359,170 @@ pub struct TimeRecord {
     pub failure: Option<String>,
 }
 
+/// Classes of leaf sizes: title, least and greatest number of references.
+const LEAF_CLASSES: [(&str, usize, usize); 8] = [
+    ("0", 0, 0),
+    ("1", 1, 1),
+    ("2", 2, 2),
+    ("3", 3, 3),
+    ("4", 4, 4),
+    ("5–8", 5, 8),
+    ("9–16", 9, 16),
+    ("17 or more", 17, usize::MAX),
+];
+
+impl OrderTime {
+    /// Its figures; `one_pass` is the time of the order with one pass.
+    fn readings(&self, one_pass: Option<Interval>) -> Vec<Reading> {
+        let ratio = self.ms_per_spp.zip(one_pass);
+        let ratio = ratio.map(|(ms, one)| Interval::exact(ms.value / one.value));
+        let at = Key::default().with(axis::SUBJECT, &self.order);
+        let readings = Reading::known([
+            (
+                &figure::ORDER_PASSES,
+                Some(Interval::exact(self.passes as f64)),
+            ),
+            (&figure::ORDER_MS, self.ms_per_spp),
+            (&figure::ORDER_RATIO, ratio),
+            (&figure::FIRST_PICTURE_MS, self.first_picture_ms),
+        ]);
+        readings
+            .into_iter()
+            .map(|reading| reading.at(at.clone()))
+            .collect()
+    }
+}
+
+impl PrimaryRecord {
+    /// Its figures.
+    pub fn readings(&self) -> Vec<Reading> {
+        let exact = |x: f64| Some(Interval::exact(x));
+        let share = |pixels: u64| exact(pixels as f64 / self.pixels.max(1) as f64);
+        Reading::known([
+            (&figure::PRIMARY_OTHER_TRIANGLE, share(self.other_triangle)),
+            (&figure::PRIMARY_OTHER_VALUE, share(self.other_value)),
+            (
+                &figure::PRIMARY_MEAN_DIFFERENCE,
+                exact(self.mean_difference),
+            ),
+            (&figure::PRIMARY_RMS_DIFFERENCE, exact(self.rms_difference)),
+            (&figure::RASTER_MS, self.raster_ms),
+            (&figure::TRACED_PRIMARY_MS, self.traced_ms),
+        ])
+    }
+}
+
+impl TimeRecord {
+    /// Whether the time may be used: the cell ran, and its image is the one that all structures give.
+    pub fn is_valid(&self) -> bool {
+        self.failure.is_none() && self.image_equal && self.ms_per_spp.is_some()
+    }
+
+    /// Rays that a render traces: `rays` also count those that were left out because they could change nothing.
+    pub fn traced_rays(&self) -> u64 {
+        let classes = RAY_COUNT_CLASSES[..TRACED_CLASSES].iter();
+        classes.filter_map(|class| self.rays.get(*class)).sum()
+    }
+
+    /// The share of ray queries in the time of all stages, if stages were timed.
+    pub fn query_share(&self) -> Option<f64> {
+        let all: f64 = self.stages.values().sum();
+        let queries = RAY_QUERIES
+            .iter()
+            .filter_map(|stage| self.stages.get(*stage));
+        (all > 0.0).then(|| queries.sum::<f64>() / all)
+    }
+
+    /// Its figures, if it is [valid](Self::is_valid).
+    pub fn readings(&self) -> Vec<Reading> {
+        if !self.is_valid() {
+            return Vec::new();
+        }
+        let [width, height] = self.resolution;
+        let work = format!("{width} × {height} pixels, {} spp", self.spp);
+        let traced = self.traced_rays() as f64;
+        let in_rounds = |of: &dyn Fn(f64) -> f64| {
+            let each = |ms: &[f64]| ms.iter().map(|ms| of(*ms)).collect();
+            Samples::Rounds {
+                adapter: each(&self.ms),
+                wall: each(&self.wall_ms),
+                processors: each(&self.cpu_ms),
+            }
+        };
+        let timed = |figure, value: Option<Interval>, samples| {
+            let reading = Reading::new(figure, value?).of_work(&work);
+            Some(reading.with_samples(samples))
+        };
+        let per_spp = in_rounds(&|ms| ms / f64::from(self.spp));
+        let mut readings: Vec<Reading> = timed(&figure::MS_PER_SPP, self.ms_per_spp, per_spp)
+            .into_iter()
+            .collect();
+        let rate = in_rounds(&|ms| traced / ms * 1e-3);
+        readings.extend(timed(&figure::CELL_MRAYS_PER_S, self.mrays_s, rate));
+        readings.extend(Reading::known([(
+            &figure::RAY_QUERY_SHARE,
+            self.query_share(),
+        )]));
+        let one_pass = self.orders.first().and_then(|order| order.ms_per_spp);
+        readings.extend(
+            self.orders
+                .iter()
+                .flat_map(|order| order.readings(one_pass)),
+        );
+        readings.extend(self.primary.iter().flat_map(PrimaryRecord::readings));
+        readings
+    }
+}
+
 impl StructureRecord {
     /// Whether it was built at all.
     pub fn is_built(&self) -> bool {
         !self.build.is_empty() || self.gate.is_some()
+    }
+
+    /// Its figures: those of the build if it was built, those of rays if it passed the gate.
+    pub fn readings(&self) -> Vec<Reading> {
+        let mut readings = Vec::new();
+        if self.is_built() {
+            readings.extend(self.of_build());
+        }
+        if self.fault().is_none() {
+            readings.extend(self.timings.iter().flat_map(ClassTiming::readings));
+            readings.extend(self.coherence.iter().flat_map(ClassCoherence::readings));
+        }
+        readings.extend(self.figures.iter().map(|(id, value)| Reading {
+            figure: id.clone(),
+            ..Reading::new(&figure::EPO, *value)
+        }));
+        readings
+    }
+
+    fn of_build(&self) -> Vec<Reading> {
+        let stats = &self.stats;
+        let mut readings = Reading::known([
+            (&figure::BUILD_MS, Some(self.build_ms)),
+            (
+                &figure::BUILD_PEAK_BYTES,
+                self.build_peak_bytes.map(|n| n as f64),
+            ),
+            (&figure::UPDATE_MS, self.update_ms),
+            (&figure::BYTES, Some(stats.bytes as f64)),
+            (&figure::NODES, Some(stats.nodes as f64)),
+            (&figure::LEAVES, Some(stats.leaves as f64)),
+            (&figure::REFERENCES, Some(stats.references as f64)),
+            (&figure::DEPTH, stats.depth.map(f64::from)),
+            (&figure::SAH_COST, stats.sah_cost),
+            (&figure::EPO, stats.epo),
+        ]);
+        let all: u64 = stats.leaf_histogram.iter().sum();
+        readings.extend(LEAF_CLASSES.iter().filter_map(|(title, least, greatest)| {
+            let sizes = stats.leaf_histogram.iter().enumerate();
+            let inside = sizes.filter(|(size, _)| least <= size && size <= greatest);
+            let leaves: u64 = inside.map(|(_, leaves)| leaves).sum();
+            let share = Reading::exact(&figure::LEAF_SHARE, leaves as f64 / all as f64);
+            (leaves > 0).then(|| share.at(Key::default().with(axis::SUBJECT, title)))
+        }));
+        readings
     }
 
     /// Why the structure gets no figures; `None` when it passed the gate.

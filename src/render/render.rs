@@ -77,6 +77,7 @@ struct Band {
 }
 
 /// A compiled job for one scene and structure.
+// Many fields: one for each buffer and pass that lives as long as the job.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
     player: Player,

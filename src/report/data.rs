@@ -3,8 +3,9 @@
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
+use super::values::Value;
 use raystone_core::params::Variant;
-use raystone_record::figure::{EPO, FIGURES, Figure};
+use raystone_record::figure::{self, EPO, Figure};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
 use raystone_stats::comparison::LogFigure;
@@ -13,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Deref;
 
 /// Everything a run recorded.
+// Many fields: one for each kind of line.
 #[derive(Debug, Default)]
 pub struct RunData<'a> {
     /// First line, if it was written.
@@ -37,6 +39,8 @@ pub struct RunData<'a> {
     pub lines: &'a [Line],
     /// What failed without a record of its own kind.
     pub failed: Vec<&'a SkippedRecord>,
+    /// The cell that each line belongs to.
+    by_line: Cells<'a>,
     /// The last word on each cell; empty in old records.
     pub cells: BTreeMap<&'a str, &'a CellRecord>,
     /// What competitors are called.
@@ -101,7 +105,20 @@ pub struct Measured<'a, T> {
     pub body: &'a T,
 }
 
-impl<T> Measured<'_, T> {
+impl<'a, T> Measured<'a, T> {
+    /// Its figures, from its readings; all of this kind on its scene take turns in the same rounds.
+    pub(crate) fn values(
+        &self,
+        data: &RunData<'a>,
+        kind: &str,
+        readings: Vec<Reading>,
+    ) -> Vec<Value<'a>> {
+        let value = |reading| {
+            Value::of_reading(data, &self.key, reading).measured(kind, self.ran, self.cell)
+        };
+        readings.into_iter().map(value).collect()
+    }
+
     /// Times of it, round by round; see [`sitting`].
     pub(crate) fn rounds(&self, kind: &str, ms: &[f64]) -> Option<LogFigure> {
         LogFigure::of_rounds(&sitting(kind, &self.key, self.cell), ms)
@@ -119,20 +136,26 @@ pub(crate) fn sitting(kind: &str, key: &Key, cell: Option<&CellRecord>) -> Strin
     let Some(cell) = cell.filter(|cell| cell.run_began_unix_s > 0) else {
         return String::new();
     };
-    let world = [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST].map(|axis| key.label(axis));
     format!(
         "{kind}\n{}\n{}\n{}",
         cell.run_began_unix_s,
         cell.inputs.device,
-        world.join("\n")
+        world(key)
     )
 }
 
+/// What the rays of cells have in common that meet the same triangles.
+pub(crate) fn world(key: &Key) -> String {
+    [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST]
+        .map(|axis| key.label(axis))
+        .join("\n")
+}
+
 /// The cell that each line belongs to, by the line's hash.
-pub(crate) type Cells<'a> = HashMap<&'a str, &'a CellRecord>;
+type Cells<'a> = HashMap<&'a str, &'a CellRecord>;
 
 /// The cells of these lines.
-pub(crate) fn cells_of<'l>(lines: &'l [Line]) -> Cells<'l> {
+fn cells_of<'l>(lines: &'l [Line]) -> Cells<'l> {
     let cells = all_of::<CellRecord>(lines).map(|cell| cell.body);
     let hashes = |cell: &'l CellRecord| cell.lines.iter().map(move |hash| (&**hash, cell));
     cells.flat_map(hashes).collect()
@@ -201,66 +224,10 @@ impl<'a> RunData<'a> {
         let mut data = Self {
             names: Names::new(lines),
             lines,
+            by_line: cells_of(lines),
             ..Self::default()
         };
-        let cells = cells_of(lines);
-        for line in lines {
-            match &line.body {
-                Body::Run(record) => {
-                    // The ends of runs before are none of this one, which went on with them.
-                    (data.run, data.finished, data.interrupted) = (Some(record), None, None);
-                }
-                Body::Finished(record) => data.finished = Some(record),
-                Body::Interrupted(record) => data.interrupted = Some(record),
-                Body::Warning(record) => data.warnings.push(record),
-                Body::Skipped(record) => data.skipped.push(record),
-                Body::Failed(record) => data.failed.push(record),
-                Body::Stream(record) => put(&mut data.streams, line.of(record), |a, b| {
-                    a.key == b.key && a.dimensions == b.dimensions
-                }),
-                Body::Measured(record) => put(&mut data.measured, line.of(record), |a, b| {
-                    a.key == b.key && a.measurement == b.measurement
-                }),
-                Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
-                Body::Bias(record) => data.sampler(&line.key).bias = Some(record.clone()),
-                Body::Scene(record) => {
-                    data.scene(line.key.label(axis::SCENE)).record = Some(record)
-                }
-                Body::Animation(record) => {
-                    let measured = data.of_structure(line, record, &cells);
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.animations, measured, |a, b| a.key == b.key)
-                }
-                Body::Structure(record) => {
-                    let measured = data.of_structure(line, record, &cells);
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.structures, measured, |a, b| a.key == b.key)
-                }
-                Body::Peer(record) => {
-                    let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
-                }
-                Body::Reference(_) | Body::Kernels(_) => {}
-                Body::Cell(record) => {
-                    data.cells.insert(&record.unit, record);
-                }
-                Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
-                Body::Time(record) => {
-                    let measured = data.of_cell(line, record, &cells);
-                    let view = data.view(&line.key);
-                    put(&mut view.times, measured, |a, b| a.key == b.key);
-                }
-                Body::Coherence(record) => {
-                    let measured = data.of_cell(line, record, &cells);
-                    let view = data.view(&line.key);
-                    put(&mut view.coherence, measured, |a, b| a.key == b.key);
-                }
-                Body::Error(record) => {
-                    let replicates = &mut data.sampler(&line.key).replicates;
-                    put(replicates, record, |a, b| a.replicate == b.replicate);
-                }
-            }
-        }
+        lines.iter().for_each(|line| data.add(line));
         for reference in all_of(lines) {
             data.refer_to(reference);
         }
@@ -270,27 +237,84 @@ impl<'a> RunData<'a> {
         data
     }
 
+    /// Puts one line in its place.
+    fn add(&mut self, line: &'a Line) {
+        match &line.body {
+            Body::Run(record) => {
+                // The ends of runs before are none of this one, which went on with them.
+                (self.run, self.finished, self.interrupted) = (Some(record), None, None);
+            }
+            Body::Finished(record) => self.finished = Some(record),
+            Body::Interrupted(record) => self.interrupted = Some(record),
+            Body::Warning(record) => self.warnings.push(record),
+            Body::Skipped(record) => self.skipped.push(record),
+            Body::Failed(record) => self.failed.push(record),
+            Body::Stream(record) => put(&mut self.streams, line.of(record), |a, b| {
+                a.key == b.key && a.dimensions == b.dimensions
+            }),
+            Body::Measured(record) => put(&mut self.measured, line.of(record), |a, b| {
+                a.key == b.key && a.measurement == b.measurement
+            }),
+            Body::Spectrum(record) => self.sampler(&line.key).spectrum = Some(record),
+            Body::Bias(record) => self.sampler(&line.key).bias = Some(record.clone()),
+            Body::Scene(record) => self.scene(line.key.label(axis::SCENE)).record = Some(record),
+            Body::Animation(record) => {
+                let measured = self.of_structure(line, record);
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.animations, measured, |a, b| a.key == b.key)
+            }
+            Body::Structure(record) => {
+                let measured = self.of_structure(line, record);
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.structures, measured, |a, b| a.key == b.key)
+            }
+            Body::Peer(record) => {
+                let scene = self.scene(line.key.label(axis::SCENE));
+                put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
+            }
+            Body::Reference(_) | Body::Kernels(_) => {}
+            Body::Cell(record) => {
+                self.cells.insert(&record.unit, record);
+            }
+            Body::Paths(record) => put(&mut self.paths, line.of(record), |a, b| a.key == b.key),
+            Body::Time(record) => {
+                let measured = self.of_cell(line, record);
+                let view = self.view(&line.key);
+                put(&mut view.times, measured, |a, b| a.key == b.key);
+            }
+            Body::Coherence(record) => {
+                let measured = self.of_cell(line, record);
+                let view = self.view(&line.key);
+                put(&mut view.coherence, measured, |a, b| a.key == b.key);
+            }
+            Body::Error(record) => {
+                let replicates = &mut self.sampler(&line.key).replicates;
+                put(replicates, record, |a, b| a.replicate == b.replicate);
+            }
+        }
+    }
+
     /// What was measured of a structure alone.
-    fn of_structure<T>(&self, line: &'a Line, body: &'a T, cells: &Cells<'a>) -> Measured<'a, T> {
+    fn of_structure<T>(&self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
             structure: self.names.structure(&key),
             sampler: String::new(),
             ran: &line.ran,
-            cell: cells.get(&*line.hash).copied(),
+            cell: self.cell_of(&line.hash),
             key,
             body,
         }
     }
 
     /// What was measured of a full cell.
-    fn of_cell<T>(&mut self, line: &'a Line, body: &'a T, cells: &Cells<'a>) -> Measured<'a, T> {
+    fn of_cell<T>(&mut self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
             structure: key.label(axis::ACCEL).to_owned(),
             sampler: self.sampler(&line.key).name.clone(),
             ran: &line.ran,
-            cell: cells.get(&*line.hash).copied(),
+            cell: self.cell_of(&line.hash),
             key,
             body,
         }
@@ -369,15 +393,19 @@ impl<'a> RunData<'a> {
 
     /// A row of the table of figures; of one that nobody describes only the id is known.
     pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
-        let from_outside = self.run.iter().flat_map(|run| &run.figures);
-        let mut known = FIGURES.iter().copied().chain(from_outside);
+        let from_outside = || self.run.iter().flat_map(|run| &run.figures);
         let unknown = || Figure {
             id: id.to_owned().into(),
             title: id.to_owned().into(),
             ..EPO.clone()
         };
-        let known = known.find(|figure| figure.id == id);
+        let known = figure::find(id).or_else(|| from_outside().find(|figure| figure.id == id));
         known.map_or_else(|| Cow::Owned(unknown()), Cow::Borrowed)
+    }
+
+    /// The cell that a line with this hash belongs to.
+    pub(crate) fn cell_of(&self, hash: &str) -> Option<&'a CellRecord> {
+        self.by_line.get(hash).copied()
     }
 
     /// Look of a structure in plots.
@@ -465,10 +493,10 @@ impl<'a> RunData<'a> {
     }
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
     /// Times that may be used.
-    pub(crate) fn valid_times(&self) -> impl Iterator<Item = &Measured<'_, TimeRecord>> {
-        self.times.iter().filter(|time| is_valid_time(time))
+    pub(crate) fn valid_times(&self) -> impl Iterator<Item = &Measured<'a, TimeRecord>> {
+        self.times.iter().filter(|time| time.is_valid())
     }
 
     /// Names of the structures that were timed, in the order measured.
@@ -504,11 +532,6 @@ impl View<'_> {
             .min_by(|((n, a), _), ((m, b), _)| m.cmp(n).then(a.total_cmp(b)))
             .map(|(_, name)| name)
     }
-}
-
-/// Whether a time may be used: the cell ran, and its image is the one all structures give.
-pub(crate) fn is_valid_time(time: &TimeRecord) -> bool {
-    time.failure.is_none() && time.image_equal && time.ms_per_spp.is_some()
 }
 
 fn place(names: &[String], name: &str) -> usize {

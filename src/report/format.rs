@@ -2,8 +2,8 @@
 
 use raystone_core::text::escape::raised;
 use raystone_record::Environment;
+use raystone_record::Interval;
 use raystone_record::figure::{Figure, Shown};
-use raystone_record::{Interval, RayClass};
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// What stands for an absent value.
@@ -145,21 +145,6 @@ pub(crate) fn plural(n: usize, noun: &str) -> String {
         format!("1 {noun}")
     } else {
         format!("{} {noun}s", count(n as u64))
-    }
-}
-
-/// Name of a ray class in tables and plots.
-pub fn ray_class(class: RayClass) -> &'static str {
-    match class {
-        RayClass::Primary => "primary",
-        RayClass::Shadow => "shadow",
-        RayClass::ShadowReversed => "shadow, reversed",
-        RayClass::ShadowClustered => "shadow, clustered",
-        RayClass::ShadowReversedClustered => "shadow, reversed and clustered",
-        RayClass::Ao => "ambient occlusion",
-        RayClass::Bounce => "bounce",
-        RayClass::Chord => "chord",
-        RayClass::Hard => "hard",
     }
 }
 

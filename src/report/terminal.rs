@@ -127,7 +127,7 @@ fn tables(data: &RunData) -> Vec<Table> {
         tables.push(animation::costs_table(scene, &of_frames));
         let mut of_views = Vec::new();
         for view in &scene.views {
-            let values = of_view(scene, view);
+            let values = of_view(data, scene, view);
             tables.push(samplers::error_table(view, &values, Metric::RelMse));
             tables.push(samplers::efficiency_table(view, &values));
             of_views.extend(values);

@@ -1,19 +1,19 @@
 //! What the records say, figure by figure: each value with its key. Tables and exports read these.
 
-use super::data::{RunData, SceneGroup, View};
+use super::data::{FULL_CELLS, RAYS, RunData, SceneGroup, View, sitting, world};
 use super::document::TableCell;
 use super::format;
-use super::samplers::{HEAVY_TAILED, Metric};
+use super::samplers::{HEAVY_TAILED, MeasuredSampler, Metric};
 use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
 use raystone_core::text::escape::visible;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{
-    BiasRecord, ClassCoherence, ClassTiming, CoherenceRecord, FigureAtCount, Interval, Key,
-    MeasuredRecord, OrderTime, PrimaryRecord, RayClass, Recorded, SpectrumRecord, StreamRecord,
-    StructureRecord, Tally, TimeRecord, axis,
+    BiasRecord, CellRecord, Interval, Key, MeasuredRecord, Ran, Recorded, ReferenceRecord, Samples,
+    StreamRecord, StructureRecord, axis,
 };
+use raystone_stats::comparison::LogFigure;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
@@ -26,6 +26,22 @@ pub struct Value<'a> {
     pub figure: Cow<'a, Figure>,
     /// What was found.
     pub reading: Reading,
+    /// What it was made of.
+    pub source: Source<'a>,
+}
+
+/// What a value was made of.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Source<'a> {
+    /// The samples.
+    pub samples: Samples,
+    /// What the samples of two values have in common if they belong together one by one, see [`sitting`]; empty where that is
+    /// not known.
+    pub sitting: String,
+    /// What must be equal for two values to be of the same work.
+    pub work: String,
+    /// Hash of the kernels that ran; empty where none is recorded.
+    pub kernel: &'a str,
 }
 
 /// What is known of a figure.
@@ -71,6 +87,7 @@ impl Value<'static> {
             key: key.clone(),
             figure: Cow::Borrowed(figure),
             reading: reading.into(),
+            source: Source::default(),
         }
     }
 
@@ -85,7 +102,48 @@ impl Value<'static> {
     }
 }
 
-impl Value<'_> {
+impl<'a> Value<'a> {
+    /// What a line with this key reads.
+    pub(crate) fn of_reading(
+        data: &RunData<'a>,
+        key: &Key,
+        reading: raystone_record::Reading,
+    ) -> Self {
+        Self {
+            key: key.clone().beside(&reading.at),
+            figure: data.figure(&reading.figure),
+            reading: Reading::Known(reading.value),
+            source: Source {
+                samples: reading.samples,
+                work: reading.work,
+                ..Source::default()
+            },
+        }
+    }
+
+    /// The same, measured in the rounds that all of this kind had on its scene.
+    pub(crate) fn measured(mut self, kind: &str, ran: &'a Ran, cell: Option<&CellRecord>) -> Self {
+        self.source.kernel = &ran.kernel_hash;
+        self.source.sitting = match &self.source.samples {
+            Samples::Once => String::new(),
+            Samples::Rounds { .. } => sitting(kind, &self.key, cell),
+            // Where sides were followed in different numbers of groups, no group belongs to another.
+            Samples::Groups(groups) => {
+                format!("{} groups of warps\n{}", groups.len(), world(&self.key))
+            }
+        };
+        self
+    }
+
+    /// Its logarithm with the noise of its parts, round by round or group by group, where these are known.
+    pub fn by_parts(&self) -> Option<LogFigure> {
+        match &self.source.samples {
+            Samples::Once => None,
+            Samples::Rounds { adapter, .. } => LogFigure::of_rounds(&self.source.sitting, adapter),
+            Samples::Groups(groups) => Some(LogFigure::of_groups(&self.source.sitting, groups)),
+        }
+    }
+
     /// Whether what is known is a number, with ends that are numbers.
     fn is_a_number(&self) -> bool {
         match self.reading {
@@ -138,14 +196,14 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
         values.extend(of_structures(data, scene));
         values.extend(animation::values(data, scene));
         values.extend(peers::values(scene));
-        values.extend(scene.views.iter().flat_map(|view| of_view(scene, view)));
-        values.extend(of_references(scene));
+        values.extend((scene.views.iter()).flat_map(|view| of_view(data, scene, view)));
+        values.extend(of_references(data, scene));
     }
-    values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
+    values.extend(data.streams.iter().flat_map(|s| of_stream(data, *s)));
     values.extend(
         data.measured
             .iter()
-            .flat_map(|cell| of_readings(data, cell)),
+            .flat_map(|cell| of_readings(data, *cell)),
     );
     values.extend(compactions::derived(data));
     // What a damaged record makes of a division is no figure.
@@ -156,24 +214,16 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
 /// The readings of a cell that did not fail.
 pub(crate) fn of_readings<'a>(
     data: &RunData<'a>,
-    cell: &Recorded<'a, MeasuredRecord>,
+    cell: Recorded<'a, MeasuredRecord>,
 ) -> Vec<Value<'a>> {
-    let sound = cell.readings.iter().filter(|_| cell.failure.is_none());
-    let value = |reading: &raystone_record::Reading| Value {
-        key: cell.key.clone().beside(&reading.at),
-        figure: data.figure(&reading.figure),
-        reading: Reading::Known(reading.value),
+    if cell.failure.is_some() {
+        return Vec::new();
+    }
+    let at = data.cell_of(cell.hash);
+    let value = |reading: &raystone_record::Reading| {
+        Value::of_reading(data, cell.key, reading.clone()).measured(&cell.measurement, cell.ran, at)
     };
-    sound.map(value).collect()
-}
-
-/// Coherence of recorded rays, class by class.
-fn of_classes(key: &Key, coherence: &ClassCoherence) -> Vec<Value<'static>> {
-    let of_class = |(class, tally): &(RayClass, Tally)| {
-        let key = key.clone().with(axis::RAYS, format::ray_class(*class));
-        Value::known(&key, tally.figures(coherence.settings.line_bytes))
-    };
-    coherence.classes.iter().flat_map(of_class).collect()
+    cell.readings.iter().map(value).collect()
 }
 
 /// Figures of all structures of a scene; those without a fault also have speeds.
@@ -181,318 +231,107 @@ pub(crate) fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> V
     let triangles = scene.record.map_or(0, |record| record.triangles);
     let mut values = Vec::new();
     for s in &scene.structures {
-        if s.is_built() {
-            values.extend(of_build(&s.key, s, triangles));
-        }
-        if s.fault().is_none() {
-            values.extend(s.timings.iter().flat_map(|timing| of_rays(&s.key, timing)));
-            values.extend(s.coherence.iter().flat_map(|c| of_classes(&s.key, c)));
-        }
-        values.extend(s.body.figures.iter().map(|(id, value)| Value {
-            key: s.key.clone(),
-            figure: data.figure(id),
-            reading: Reading::Known(*value),
-        }));
+        let own = s.values(data, RAYS, s.body.readings());
+        values.extend(of_triangles(&s.key, s.body, triangles));
+        values.extend(own);
     }
     values.extend(trade_off::break_even(scene));
     values
 }
 
-/// Classes of leaf sizes: title, least and greatest number of references.
-const LEAF_CLASSES: [(&str, usize, usize); 8] = [
-    ("0", 0, 0),
-    ("1", 1, 1),
-    ("2", 2, 2),
-    ("3", 3, 3),
-    ("4", 4, 4),
-    ("5–8", 5, 8),
-    ("9–16", 9, 16),
-    ("17 or more", 17, usize::MAX),
-];
-
-fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'static>> {
-    let per_triangle = |x: u64| (triangles > 0).then(|| x as f64 / triangles as f64);
-    let stats = &s.stats;
-    let rate = (s.build_ms > 0.0).then(|| triangles as f64 / s.build_ms * 1e-3);
+/// What a build is per triangle of its scene.
+fn of_triangles(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'static>> {
+    let known = s.is_built() && triangles > 0;
+    let per_triangle = |x: u64| known.then(|| x as f64 / triangles as f64);
+    let is_timed = s.is_built() && s.build_ms > 0.0;
+    let rate = is_timed.then(|| triangles as f64 / s.build_ms * 1e-3);
     let figures = [
-        (&figure::BUILD_MS, Some(s.build_ms)),
         (&figure::BUILD_RATE, rate),
-        (
-            &figure::BUILD_PEAK_BYTES,
-            s.build_peak_bytes.map(|n| n as f64),
-        ),
-        (&figure::UPDATE_MS, s.update_ms),
-        (&figure::BYTES, Some(stats.bytes as f64)),
-        (&figure::BYTES_PER_TRIANGLE, per_triangle(stats.bytes)),
-        (&figure::NODES, Some(stats.nodes as f64)),
-        (&figure::LEAVES, Some(stats.leaves as f64)),
-        (&figure::REFERENCES, Some(stats.references as f64)),
+        (&figure::BYTES_PER_TRIANGLE, per_triangle(s.stats.bytes)),
         (
             &figure::REFERENCES_PER_TRIANGLE,
-            per_triangle(stats.references),
+            per_triangle(s.stats.references),
         ),
-        (&figure::DEPTH, stats.depth.map(f64::from)),
-        (&figure::SAH_COST, stats.sah_cost),
-        (&figure::EPO, stats.epo),
     ];
-    let all: u64 = stats.leaf_histogram.iter().sum();
-    let leaves = LEAF_CLASSES.iter().filter_map(|(title, least, greatest)| {
-        let sizes = stats.leaf_histogram.iter().enumerate();
-        let inside = sizes.filter(|(size, _)| least <= size && size <= greatest);
-        let leaves: u64 = inside.map(|(_, leaves)| leaves).sum();
-        let key = key.clone().with(axis::SUBJECT, title);
-        let share = leaves as f64 / all as f64;
-        (leaves > 0).then(|| Value::new(&key, &figure::LEAF_SHARE, share))
-    });
-    let mut values = Value::known(key, figures);
-    values.extend(leaves);
-    values
-}
-
-fn of_rays(key: &Key, timing: &ClassTiming) -> Vec<Value<'static>> {
-    let key = (key.clone()).with(axis::RAYS, format::ray_class(timing.class));
-    let work = timing.counters;
-    let unlike = timing
-        .unlike_shadow
-        .map(|rays| 1e6 * rays as f64 / timing.rays.max(1) as f64);
-    let mut values = vec![Value::new(&key, &figure::MRAYS_PER_S, timing.mrays_s)];
-    values.extend(Value::known(
-        &key,
-        [
-            (&figure::RAYS, Some(timing.rays as f64)),
-            (&figure::HIT_SHARE, Some(timing.hit_fraction)),
-            (&figure::UNLIKE_SHADOW, unlike),
-            (&figure::NODES_PER_RAY, work.map(|w| w.nodes)),
-            (&figure::BOX_TESTS_PER_RAY, work.map(|w| w.box_tests)),
-            (
-                &figure::TRIANGLE_TESTS_PER_RAY,
-                work.map(|w| w.triangle_tests),
-            ),
-            (
-                &figure::DEEPEST_STACK,
-                work.map(|w| f64::from(w.stack_high_water)),
-            ),
-        ],
-    ));
-    values
+    Value::known(key, figures)
 }
 
 /// Errors, times and bias checks of one view.
-pub(crate) fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+pub(crate) fn of_view<'a>(
+    data: &RunData<'a>,
+    scene: &SceneGroup<'a>,
+    view: &View<'a>,
+) -> Vec<Value<'a>> {
     let mut values = Vec::new();
     for sampler in &view.samplers {
-        let key = &sampler.key;
-        for metric in [Metric::RelMse, Metric::Rmse] {
-            for mean in sampler.mean_errors(metric) {
-                let reading = match mean.resolved {
-                    true => Reading::of(mean.error, mean.heavy_tailed),
-                    false => Reading::Below(mean.error.high.max(0.0)),
-                };
-                let key = key.clone().with(axis::SPP, mean.spp);
-                values.push(Value::new(&key, metric.figure(), reading));
-            }
-            let heavy = metric == Metric::RelMse && sampler.is_heavy_tailed();
-            let slope = sampler.slope(metric).map(|slope| Reading::of(slope, heavy));
-            values.extend(Value::known(key, [(metric.slope_figure(), slope)]));
-        }
-        if let Some(spp) = sampler.highest_spp() {
-            let key = key.clone().with(axis::SPP, spp);
-            values.extend(Value::known(&key, sampler.further(spp)));
-        }
-        values.extend(sampler.bias.iter().flat_map(|bias| of_bias(key, bias)));
-        let spectrum = sampler.spectrum.into_iter();
-        values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
+        values.extend(of_sampler(data, sampler));
     }
     for time in view.valid_times() {
-        let figures = [
-            (&figure::MS_PER_SPP, time.ms_per_spp),
-            (&figure::CELL_MRAYS_PER_S, time.mrays_s),
-            (
-                &figure::RAY_QUERY_SHARE,
-                organisations::query_share(time).map(Interval::exact),
-            ),
-        ];
-        values.extend(Value::known(&time.key, figures));
-        values.extend(of_orders(&time.key, time));
-        values.extend(time.primary.iter().flat_map(|p| of_primary(&time.key, p)));
+        values.extend(time.values(data, FULL_CELLS, time.body.readings()));
     }
-    values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
-    values.extend(Race::new(view).iter().flat_map(Race::values));
+    for cell in &view.coherence {
+        values.extend(cell.values(data, FULL_CELLS, cell.body.readings()));
+    }
+    let of_races: Vec<_> = Race::new(view).iter().flat_map(Race::values).collect();
+    values.extend(of_races);
     values.extend(trade_off::times_to_image(scene, view));
     values.extend(kernels::gains(scene, view));
     values.extend(organisations::against_single(scene, view));
     values
 }
 
-/// Errors of references, of which views have some in common.
-fn of_references<'a>(scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
-    let mut known = BTreeSet::new();
-    let references = scene
-        .views
-        .iter()
-        .filter_map(|view| view.reference.as_ref());
-    let references = references.filter(|r| known.insert(r.key.to_string()));
-    let mse = references.filter_map(|r| Some(Value::new(r.key, &figure::REFERENCE_MSE, r.mse?)));
-    mse.collect()
-}
-
-/// Times of a cell in orders of passes.
-fn of_orders(key: &Key, time: &TimeRecord) -> Vec<Value<'static>> {
-    let one_pass = time.orders.first().and_then(|at| at.ms_per_spp);
-    let of_order = |at: &OrderTime| {
-        let key = key.clone().with(axis::SUBJECT, &at.order);
-        let ratio = at
-            .ms_per_spp
-            .zip(one_pass)
-            .map(|(ms, one)| ms.value / one.value);
-        let passes = at.passes as f64;
-        let figures = [
-            (&figure::ORDER_PASSES, Some(Interval::exact(passes))),
-            (&figure::ORDER_MS, at.ms_per_spp),
-            (&figure::ORDER_RATIO, ratio.map(Interval::exact)),
-            (&figure::FIRST_PICTURE_MS, at.first_picture_ms),
-        ];
-        Value::known(&key, figures)
-    };
-    time.orders.iter().flat_map(of_order).collect()
-}
-
-/// Rasterised primary visibility against rays.
-fn of_primary(key: &Key, primary: &PrimaryRecord) -> Vec<Value<'static>> {
-    let share = |pixels: u64| {
-        Some(Interval::exact(
-            pixels as f64 / primary.pixels.max(1) as f64,
-        ))
-    };
-    let exact = |x: f64| Some(Interval::exact(x));
-    let figures = [
-        (
-            &figure::PRIMARY_OTHER_TRIANGLE,
-            share(primary.other_triangle),
-        ),
-        (&figure::PRIMARY_OTHER_VALUE, share(primary.other_value)),
-        (
-            &figure::PRIMARY_MEAN_DIFFERENCE,
-            exact(primary.mean_difference),
-        ),
-        (
-            &figure::PRIMARY_RMS_DIFFERENCE,
-            exact(primary.rms_difference),
-        ),
-        (&figure::RASTER_MS, primary.raster_ms),
-        (&figure::TRACED_PRIMARY_MS, primary.traced_ms),
-    ];
-    Value::known(key, figures)
-}
-
-/// What stands on the axis of rays for all of them.
-pub(crate) const ALL_RAYS: &str = "all";
-
-/// Coherence by class of rays, and of all.
-fn of_coherence(key: &Key, record: &CoherenceRecord) -> Vec<Value<'static>> {
+/// What the replicates of a sampler say together.
+fn of_sampler<'a>(data: &RunData<'a>, sampler: &MeasuredSampler<'a>) -> Vec<Value<'a>> {
+    let key = &sampler.key;
     let mut values = Vec::new();
-    for at in &record.at {
-        let key = key.clone().with(axis::SPP, at.spp);
-        let key = key.with(axis::SUBJECT, &at.organisation);
-        let all = (ALL_RAYS.to_owned(), at.all());
-        for (class, tally) in at.classes.iter().chain([&all]) {
-            let key = key.clone().with(axis::RAYS, class);
-            let figures = tally.figures(record.settings.line_bytes);
-            values.extend(Value::known(&key, figures));
+    for metric in [Metric::RelMse, Metric::Rmse] {
+        for mean in sampler.mean_errors(metric) {
+            let reading = if mean.resolved {
+                Reading::of(mean.error, mean.heavy_tailed)
+            } else {
+                Reading::Below(mean.error.high.max(0.0))
+            };
+            let key = key.clone().with(axis::SPP, mean.spp);
+            values.push(Value::new(&key, metric.figure(), reading));
         }
-        let key = key.with(axis::RAYS, ALL_RAYS);
-        let path = [(&figure::CYCLES_PER_PATH, at.cost_of_path())];
-        values.extend(Value::known(&key, path));
+        let heavy = metric == Metric::RelMse && sampler.is_heavy_tailed();
+        let slope = sampler.slope(metric).map(|slope| Reading::of(slope, heavy));
+        values.extend(Value::known(key, [(metric.slope_figure(), slope)]));
     }
+    if let Some(spp) = sampler.highest_spp() {
+        let key = key.clone().with(axis::SPP, spp);
+        values.extend(Value::known(&key, sampler.further(spp)));
+    }
+    let bias = sampler.bias.iter().flat_map(BiasRecord::readings);
+    let spectrum = sampler.spectrum.iter().flat_map(|s| s.readings());
+    let readings = bias.chain(spectrum);
+    values.extend(readings.map(|reading| Value::of_reading(data, key, reading)));
     values
 }
 
-fn of_bias(key: &Key, bias: &BiasRecord) -> Vec<Value<'static>> {
-    let tested = bias.p.map(|p| {
-        [
-            (&figure::BIAS_TILES, Some(bias.tiles as f64)),
-            (&figure::BIAS_REJECTED, Some(bias.rejected as f64)),
-            (&figure::BIAS_LEAST_P, Some(bias.min_p)),
-            (&figure::BIAS_Z, bias.z),
-            (&figure::BIAS_P, Some(p)),
-            (&figure::BIAS_FREEDOM, bias.degrees_of_freedom),
-            (&figure::BIAS_WEIGHTED_P, bias.weighted_p),
-            (
-                &figure::BIAS_WEIGHTED_FREEDOM,
-                bias.weighted_degrees_of_freedom,
-            ),
-            (
-                &figure::BIAS_DETECTABLE,
-                bias.detectable.map(|part| 100.0 * part),
-            ),
-        ]
-    });
-    Value::known(key, tested.into_iter().flatten())
-}
-
-/// The error that shares of filtered ones are taken of; `None` if there is none.
-pub(crate) fn unfiltered(spectrum: &SpectrumRecord) -> Option<f64> {
-    let at = spectrum.filtered.iter().find(|at| at.sigma == 0.0)?;
-    (at.rmse.value > 0.0).then_some(at.rmse.value)
-}
-
-fn of_spectrum(key: &Key, spectrum: &SpectrumRecord) -> Vec<Value<'static>> {
-    let key = &key.clone().with(axis::SPP, spectrum.spp);
-    let before = unfiltered(spectrum);
-    let mut values = Value::known(
-        key,
-        [
-            (&figure::LOW_FREQUENCY_POWER, spectrum.low_frequency),
-            (&figure::LOUDEST_WAVE, spectrum.loudest),
-            (&figure::NEIGHBOUR_CORRELATION, spectrum.autocorrelation),
-            (&figure::LUMINANCE_RMSE, before.map(Interval::exact)),
-        ],
-    );
-    for at in spectrum.filtered.iter().filter(|at| at.sigma > 0.0) {
-        let key = (key.clone()).with(axis::SUBJECT, format!("σ = {} px", at.sigma));
-        let share = before.map(|before| at.rmse.value / before);
-        values.extend(Value::known(&key, [(&figure::FILTERED_SHARE, share)]));
-    }
-    values
-}
-
-/// What a stream's dimensions are used for, with their numbers.
-pub(crate) fn pair_of_dimensions(stream: &StreamRecord) -> String {
-    let [a, b] = stream.dimensions;
-    format!("{} (dimensions {a} and {b})", stream.purpose)
+/// Errors of references, of which views have some in common.
+fn of_references<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
+    let mut known = BTreeSet::new();
+    let references = scene.views.iter().filter_map(|view| view.reference);
+    let references = references.filter(|r| known.insert(r.key.to_string()));
+    let of_one = |r: Recorded<'a, ReferenceRecord>| {
+        let readings = r.body.readings().into_iter();
+        readings
+            .map(|reading| Value::of_reading(data, r.key, reading))
+            .collect::<Vec<_>>()
+    };
+    references.flat_map(of_one).collect()
 }
 
 /// Figures of a stream's points.
-pub(crate) fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
-    let key = (stream.key.clone()).with(axis::DIMENSIONS, pair_of_dimensions(stream));
-    let figures = &stream.figures;
-    let at = |key: &Key, figure: &'static Figure, counts: &[FigureAtCount]| -> Vec<Value> {
-        let at = |at: &FigureAtCount| {
-            Value::new(&key.clone().with(axis::POINTS, at.n), figure, at.value)
-        };
-        counts.iter().map(at).collect()
-    };
-    let mut values = at(&key, &figure::STAR_DISCREPANCY, &stream.star);
-    values.extend(at(&key, &figure::L2_STAR, &figures.l2_star));
-    values.extend(at(&key, &figure::CENTERED, &figures.centered));
-    let exponents = [
-        (&figure::STAR_EXPONENT, figures.star_slope),
-        (&figure::L2_STAR_EXPONENT, figures.l2_star_slope),
-    ];
-    values.extend(Value::known(&key, exponents));
-    for integrand in &figures.integrands {
-        let key = key.clone().with(axis::SUBJECT, &integrand.function);
-        values.extend(at(&key, &figure::INTEGRAL_RMSE, &integrand.rmse));
-        let exponent = [(&figure::INTEGRAL_EXPONENT, integrand.slope)];
-        values.extend(Value::known(&key, exponent));
-    }
-    for pixels in &figures.pixels {
-        let key = key.clone().with(axis::POINTS, pixels.n);
-        let angle = pixels.neighbour_angle.to_degrees();
-        values.push(Value::new(&key, &figure::NEIGHBOUR_ANGLE, angle));
-        values.push(Value::new(&key, &figure::COVERAGE, pixels.coverage));
-    }
-    values
+pub(crate) fn of_stream<'a>(
+    data: &RunData<'a>,
+    stream: Recorded<'a, StreamRecord>,
+) -> Vec<Value<'a>> {
+    let readings = stream.body.readings().into_iter();
+    readings
+        .map(|reading| Value::of_reading(data, stream.key, reading))
+        .collect()
 }
 
 /// The values as comma-separated text: one line for each key and figure, a column for each axis.
@@ -513,6 +352,7 @@ pub fn csv(values: &[Value]) -> String {
         key,
         figure,
         reading,
+        ..
     } in values
     {
         let numbers = match reading {

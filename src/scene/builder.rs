@@ -236,38 +236,7 @@ impl SceneBuilder {
     /// What `refused` says, [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
     /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
     pub(crate) fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
-        if let Some(error) = self.refused {
-            return Err(error);
-        }
-        if let Some(source) = self.misplaced {
-            return Err(SceneError::Instance {
-                name: name.to_owned(),
-                source,
-            });
-        }
-        if self.triangles.is_empty() {
-            let reason = match self.report.dropped_non_finite {
-                0 => "it lists no faces".to_owned(),
-                n => format!("all {n} have a NaN or infinite vertex"),
-            };
-            return Err(SceneError::NoTriangles {
-                name: name.to_owned(),
-                reason,
-            });
-        }
-        let magnitude = |triangle: &Triangle| {
-            let [a, b, c] = triangle.vertices.map(Vec3::abs);
-            a.max(b).max(c).max_element()
-        };
-        let too_large = |triangle: &Triangle| magnitude(triangle) > MAX_COORDINATE;
-        if let Some(first) = self.triangles.iter().position(too_large) {
-            return Err(SceneError::TooLarge {
-                name: name.to_owned(),
-                triangle: first,
-                magnitude: magnitude(&self.triangles[first]),
-                limit: MAX_COORDINATE,
-            });
-        }
+        self.check(name)?;
         if let Some(camera) = &look.camera {
             crate::check_camera(camera)?;
         }
@@ -311,5 +280,39 @@ impl SceneBuilder {
         }
         scene.hash = scene.content_hash();
         Ok(scene)
+    }
+
+    /// Fails on what was found while building, on a scene without triangles, and on coordinates that are too large.
+    fn check(&mut self, name: &str) -> Result<(), SceneError> {
+        let owned = || name.to_owned();
+        if let Some(error) = self.refused.take() {
+            return Err(error);
+        }
+        if let Some(source) = self.misplaced.take() {
+            let name = owned();
+            return Err(SceneError::Instance { name, source });
+        }
+        if self.triangles.is_empty() {
+            let reason = match self.report.dropped_non_finite {
+                0 => "it lists no faces".to_owned(),
+                n => format!("all {n} have a NaN or infinite vertex"),
+            };
+            let name = owned();
+            return Err(SceneError::NoTriangles { name, reason });
+        }
+        let magnitude = |triangle: &Triangle| {
+            let [a, b, c] = triangle.vertices.map(Vec3::abs);
+            a.max(b).max(c).max_element()
+        };
+        let too_large = |triangle: &Triangle| magnitude(triangle) > MAX_COORDINATE;
+        match self.triangles.iter().position(too_large) {
+            None => Ok(()),
+            Some(first) => Err(SceneError::TooLarge {
+                name: owned(),
+                triangle: first,
+                magnitude: magnitude(&self.triangles[first]),
+                limit: MAX_COORDINATE,
+            }),
+        }
     }
 }

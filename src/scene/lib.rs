@@ -86,6 +86,7 @@ pub struct Texture {
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+// Many fields: parallel arrays are what builders and kernels read.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.

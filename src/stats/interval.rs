@@ -18,6 +18,12 @@ pub struct Interval {
     pub high: f64,
 }
 
+impl From<f64> for Interval {
+    fn from(value: f64) -> Self {
+        Self::exact(value)
+    }
+}
+
 impl Interval {
     /// A figure whose interval has no width: it is exact, or nothing is known of its spread.
     pub fn exact(value: f64) -> Self {

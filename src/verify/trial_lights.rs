@@ -1,6 +1,6 @@
 //! Trial scenes for special lights: environment maps, measured luminaires, many lights in a tree.
 
-use crate::lights::LightRegistry;
+use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
 use crate::trial_scenes::{Trial, TrialScene, camera, depth, word};
 use glam::{Quat, Vec3, vec3};
@@ -54,6 +54,7 @@ pub(super) fn many() -> Result<TrialScene, SceneError> {
 /// # Errors
 /// A built-in scene is missing.
 pub fn trials_of(
+    kinds: &KindChecks,
     scene: &SceneData,
     integrator: &ConfiguredIntegrator,
 ) -> Result<Vec<TrialScene>, SceneError> {
@@ -61,7 +62,7 @@ pub fn trials_of(
     if integrator.kind.name() != "path" {
         return Ok(scenes);
     }
-    for kind in LightRegistry::default().iter() {
+    for kind in kinds.lights.iter() {
         if scene.lights.iter().any(|light| light.kind() == kind.kind) {
             scenes.extend((kind.trials)()?);
         }

@@ -39,35 +39,12 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
 /// # Errors
 /// As [`trial_scenes`].
 pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
-    let mut lamps_trials = vec![("path", vec![depth(8)])];
-    for (strategy, roulette) in [
-        ("mis-power", "albedo"),
-        ("bsdf", "none"),
-        ("light", "albedo"),
-    ] {
-        lamps_trials.push((
-            "path",
-            vec![
-                word("strategy", strategy),
-                word("roulette", roulette),
-                depth(5),
-            ],
-        ));
-    }
-    lamps_trials.push((
-        "path",
-        vec![
-            ("clamp", ParamValue::Number(0.25)),
-            depth(4),
-            ("roulette_depth", ParamValue::Integer(1)),
-        ],
-    ));
     let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
     let primary = || ("primary", vec![]);
     let mut scenes = vec![
         TrialScene {
             scene: lamps()?,
-            trials: lamps_trials,
+            trials: trials_of_lamps(),
         },
         TrialScene {
             scene: points(&kinds.lights)?,
@@ -117,6 +94,23 @@ pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError
     scenes.extend(crate::trial_surfaces::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
     Ok(scenes)
+}
+
+/// Strategies and roulettes of paths among lamps, and a clamp.
+fn trials_of_lamps() -> Vec<Trial> {
+    let with = |strategy, roulette| {
+        let words = [word("strategy", strategy), word("roulette", roulette)];
+        ("path", [&words[..], &[depth(5)]].concat())
+    };
+    let clamp = ("clamp", ParamValue::Number(0.25));
+    let late = ("roulette_depth", ParamValue::Integer(1));
+    vec![
+        ("path", vec![depth(8)]),
+        with("mis-power", "albedo"),
+        with("bsdf", "none"),
+        with("light", "albedo"),
+        ("path", vec![clamp, depth(4), late]),
+    ]
 }
 
 pub(super) fn depth(depth: i64) -> (&'static str, ParamValue) {

@@ -4,7 +4,8 @@
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
 use super::super::AccelError;
-use super::super::bounds::{Bounds, enter_box};
+use super::super::bounds::Bounds;
+use super::super::intersection::enter_box;
 use super::super::leaf::{LEAF, LeafReader, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::twin::Walk;

@@ -1,8 +1,9 @@
 //! The reference for structures that transform rays: every instance is tested, without world boxes.
 
-use super::super::bounds::{Bounds, enter_box};
+use super::super::bounds::Bounds;
 use super::super::brute_force::EveryTriangle;
 use super::super::bvh::BvhParameters;
+use super::super::intersection::enter_box;
 use super::super::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };

@@ -8,8 +8,9 @@
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
 use super::Tree;
+use super::depth::SAH_DEPTH;
 use super::grow::grow;
-use super::parameters::{MAX_BINS, SAH_DEPTH, TreeParameters};
+use super::parameters::{MAX_BINS, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
 use crate::bounds::Bounds;
 use glam::Vec3A;

@@ -1,8 +1,11 @@
 //! A bound on the depth of trees whose builder has none.
 
 use super::grow::lay_out;
-use super::parameters::SAH_DEPTH;
 use super::{NodeKind, Tree, TreeNode};
+
+/// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
+/// log2(references) + 1` for any input.
+pub(super) const SAH_DEPTH: u32 = 48;
 
 /// Maximum leaf depth of a tree with this many references.
 pub(super) fn depth_limit(references: usize) -> u32 {

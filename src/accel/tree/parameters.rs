@@ -4,9 +4,6 @@ use super::parallel::{self, Method};
 use super::reference::Box3;
 use raystone_core::parameters;
 
-/// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
-/// log2(references) + 1` for any input.
-pub(super) const SAH_DEPTH: u32 = 48;
 /// Maximum neighbours examined on either side in clustering, as in the kernel `nearest`.
 pub(super) const LARGEST_RADIUS: u32 = 32;
 pub(super) const MAX_BINS: usize = 32;

@@ -15,8 +15,9 @@
 
 use super::Tree;
 use super::binned::{best_bin_split, median_split};
+use super::depth::SAH_DEPTH;
 use super::grow::grow;
-use super::parameters::{SAH_DEPTH, TreeParameters};
+use super::parameters::TreeParameters;
 use super::reference::{Box3, Reference, bounds_of};
 use crate::TriangleSoup;
 use crate::bounds::Bounds;

@@ -14,8 +14,9 @@
 //! that in O(N log N)", 2006; the longest axis alone: A. Dufay, 2017, chapter 4.
 
 use super::Tree;
+use super::depth::SAH_DEPTH;
 use super::grow::grow;
-use super::parameters::{SAH_DEPTH, TreeParameters};
+use super::parameters::TreeParameters;
 use super::reference::{Box3, Reference};
 use crate::bounds::Bounds;
 use rayon::prelude::*;

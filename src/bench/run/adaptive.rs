@@ -1,10 +1,11 @@
 //! Adaptive sampling by tile: each takes as many samples as the first ones say that it needs.
 
+use super::error::Fault;
 use super::errors::{
     Pass, Replicates, add_error, blank_record, check_finite, draw, replicate_s, replicates,
 };
+use super::reference::Yardstick;
 use super::session::Session;
-use super::{Fault, reference::Yardstick};
 use raystone_config::{Cell, StopRule};
 use raystone_image::Image;
 use raystone_record::{Body, ErrorRecord, Line};

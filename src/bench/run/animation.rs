@@ -1,14 +1,15 @@
 //! Structures from frame to frame of a moving scene, where the experiment asks for it.
 
+use super::cost::{Cost, Work};
+use super::error::RunError;
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use super::structures::{Gated, Structures, image_settings};
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::animation::{Actor, Frame, moved, take_over};
 use raystone_config::{Animation, Axis, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
-use raystone_record::{AnimationRecord, Body, Key, Line, Outcome, Ran};
+use raystone_record::{AnimationRecord, Body, Key, Line, Ran};
 use raystone_render::Stage;
 use raystone_verify::gate::{Checks, Judge};
 
@@ -98,25 +99,26 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     }
     session.recorder.note_kernels("animation");
     for part in parts {
-        session.ledger.failed += usize::from(part.record.failure.is_some());
         let failure = part.record.failure.clone();
         let name = name(part.gated);
         let ran = Ran {
             unchecked: !part.gated.runtime_checks,
             ..Ran::default()
         };
-        let line = Line::new(Key::from(&part.gated.cell), ran, part.record);
-        let settings = format!("{animation:?}");
-        let hash = content_hash(&line, &world.scene.hash, &[("animation", &settings)]);
-        session
-            .recorder
-            .write(&line.hashed(&hash).with_body(Body::Animation))?;
-        let ended = match &failure {
-            Some(reason) => (Outcome::Failed, reason.as_str()),
-            None => (Outcome::Done, ""),
+        let body = Body::Animation(part.record);
+        let end = End {
+            failure,
+            scene: &world.scene.hash,
+            of: &[("animation", &format!("{animation:?}"))],
+            shared: &["animation"],
+            ..End::default()
         };
         session.progress.add(seconds_of(session.experiment));
-        session.close(&name, ended, vec![hash], &["animation"])?;
+        session.conclude(
+            &name,
+            Line::new(Key::from(&part.gated.cell), ran, body),
+            end,
+        )?;
     }
     Ok(())
 }

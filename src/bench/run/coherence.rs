@@ -1,22 +1,21 @@
 //! Coherence of full cells: the rays of some pixels, through the twins of the structures, on the model's machine.
 
+use super::cost::{Cost, Work};
+use super::error::RunError;
 use super::images::Estimator;
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use super::structures::Gated;
 use super::times::Times;
+use super::twins::with_twin;
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::coherence::{
-    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run_groups, together,
+    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, run_groups, together,
 };
-use raystone_accel::{BuildLog, CpuTwin};
-use raystone_config::{Axis, Cell, Coherence, Experiment, Plan};
-use raystone_record::{
-    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, by_group,
-};
+use raystone_accel::CpuTwin;
+use raystone_config::{Cell, Coherence, Experiment, Plan};
+use raystone_record::{Body, CoherenceAt, CoherenceRecord, Key, Line, Ran, by_group};
 use raystone_verify::path_oracle::{self, PathOracle};
-use raystone_verify::rays::RaySet;
 use std::collections::BTreeMap;
 
 /// Seconds to model a cell.
@@ -83,7 +82,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         return Ok(());
     }
     let mut known = Known {
-        oracle: (session.clock).time("coherence", || PathOracle::new(&world.scene)),
+        oracle: session.clock.time("coherence", || {
+            PathOracle::knowing(&world.scene, &session.registries.kinds)
+        }),
         rays: BTreeMap::new(),
     };
     for structure in gated {
@@ -115,14 +116,15 @@ fn write(
     cell: &Cell,
     record: CoherenceRecord,
 ) -> Result<(), RunError> {
-    let line = Line::new(Key::from(cell), Ran::default(), record);
-    let settings = format!("{:?}", line.body.settings);
-    let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
-    session
-        .recorder
-        .write(&line.hashed(&hash).with_body(Body::Coherence))?;
     session.progress.add(MODEL_SECONDS);
-    session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
+    let settings = format!("{:?}", record.settings);
+    let end = End {
+        scene: &world.scene.hash,
+        of: &[("coherence", &settings)],
+        ..End::default()
+    };
+    let line = Line::new(Key::from(cell), Ran::default(), Body::Coherence(record));
+    session.conclude(&name(cell), line, end)
 }
 
 /// Each cell of a structure, or why there is nothing to say of it.
@@ -133,61 +135,12 @@ fn of_structure(
     cells: &[&Cell],
     (settings, known): (&Coherence, &mut Known),
 ) -> Vec<Result<CoherenceRecord, String>> {
-    let records = with_twin(session, world, structure, |session, twin, memory| {
+    let records = with_twin(session, world, &structure.cell, |session, twin, memory| {
         let of_cell =
             |cell: &&Cell| of_cell(session, world, cell, (twin, memory), (settings, known));
         Ok(cells.iter().map(of_cell).collect())
     });
     records.unwrap_or_else(|reason| vec![Err(reason); cells.len()])
-}
-
-/// Something about the twin of a structure, which is built anew, and the memory that it reads.
-fn with_twin<T>(
-    session: &mut Session,
-    world: &World,
-    structure: &Gated,
-    then: impl FnOnce(&mut Session, &dyn CpuTwin, &Memory) -> Result<T, String>,
-) -> Result<T, String> {
-    if !structure.cell[Axis::Kernels].name.is_empty() {
-        return Err("its twin is that of the embedded kernels".to_owned());
-    }
-    let accel = &structure.cell[Axis::Accel];
-    let kind = session.registries.accel.named("structure", &accel.name)?;
-    let mut log = BuildLog::with_gpu(world.gpu);
-    let built = (session.clock).time("build", || kind.build(&world.soup, &accel.params, &mut log));
-    let built = built.map_err(|e| e.to_string())?;
-    let twin = built.cpu_twin(&world.soup);
-    let twin = twin.ok_or("it has no twin on the host")?;
-    let memory = Memory::new(&*built, &world.soup)?;
-    then(session, &*twin, &memory)
-}
-
-/// Coherence of the recorded rays, in the order in which they are traced.
-///
-/// # Errors
-/// The structure has no twin that tells what it reads, in words.
-pub(super) fn of_recorded_rays(
-    session: &mut Session,
-    world: &World,
-    structure: &Gated,
-    settings: &Coherence,
-) -> Result<ClassCoherence, String> {
-    let sets = &world.judge.of(structure.traced.space).sets;
-    with_twin(session, world, structure, |session, twin, memory| {
-        let timed: Vec<&RaySet> = sets.iter().filter(|set| set.is_timed()).collect();
-        let of_set = |set: &&RaySet| of_rays(&set.rays, set.query(), (twin, memory), settings);
-        let all = || timed.iter().map(of_set).collect::<Result<Vec<_>, _>>();
-        let all = session.clock.time("coherence", all)?;
-        let total = |groups: &Vec<_>| together(groups).into_values().next();
-        let classes = timed.iter().zip(&all);
-        Ok(ClassCoherence {
-            settings: settings.clone(),
-            classes: classes
-                .map(|(set, groups)| (set.class, total(groups).unwrap_or_default()))
-                .collect(),
-            groups: all.iter().map(|groups| by_group(groups, 0)).collect(),
-        })
-    })
 }
 
 fn of_cell(
@@ -204,7 +157,7 @@ fn of_cell(
         known.rays.insert(sampler.clone(), rays);
     }
     let rays = &known.rays[&sampler];
-    let timed_spp = super::times::samples(session);
+    let timed_spp = session.timed_samples();
     let modelled = || modelled(rays, twin, memory, settings);
     let at = session.clock.time("coherence", modelled)?;
     Ok(CoherenceRecord {

@@ -1,7 +1,7 @@
 //! Compactions of streams: each is checked word by word, then all are timed in the same rounds.
 
+use super::cost::{Cost, Work};
 use super::measurement::{Absent, At, Measurement, Preparation, Prepared};
-use super::{Cost, Work};
 use crate::compaction::{Bench, Inputs, Load, benched, stream};
 use crate::timing::{Measured, Samples, millions_per_second};
 use raystone_config::{Axis, Cell, Experiment, Plan};

@@ -1,10 +1,10 @@
 //! What a plan is expected to take: the one model behind `--dry-run`, the time that is left, and shards of equal length.
 
-use super::{Registries, Unit};
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_core::params::Variant;
+use raystone_render::IntegratorRegistry;
 use raystone_sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::{Add, AddAssign, Mul};
 
 /// Rays per second of a software adapter with two cores: a round figure for incoherent rays.
@@ -67,6 +67,24 @@ impl Work {
             + self.kernels * SECONDS_PER_KERNEL
             + self.other_s
     }
+
+    /// In words, for `--dry-run`.
+    pub fn describe(&self) -> String {
+        format!(
+            "estimate: about {} on a software adapter with two cores, from {} million rays at \
+             {} million a second, {} million elements to be compacted at {} million a second, \
+             {} kernels that the driver compiles in {SECONDS_PER_KERNEL} s each, and {:.0} s of \
+             loading, building, checks and warm-up. These are round figures, nothing was measured here: a GPU needs a \
+             small part of it. The report comes on top.",
+            duration(self.seconds()),
+            millions(self.rays),
+            RAYS_PER_SECOND / 1e6,
+            millions(self.elements),
+            ELEMENTS_PER_SECOND / 1e6,
+            self.kernels,
+            self.other_s,
+        )
+    }
 }
 
 impl Add for Work {
@@ -104,8 +122,10 @@ impl Mul<f64> for Work {
 /// The expected work of a plan and of its steps.
 #[derive(Clone)]
 pub struct Cost<'a> {
-    pub(super) experiment: &'a Experiment,
-    pub(super) plan: &'a Plan,
+    /// The experiment.
+    pub experiment: &'a Experiment,
+    /// Its plan.
+    pub plan: &'a Plan,
     /// Rays of a sample by label of the integrator.
     rays_per_sample: BTreeMap<&'a str, f64>,
     /// Size of the model's file by name of the scene.
@@ -114,9 +134,9 @@ pub struct Cost<'a> {
 
 impl<'a> Cost<'a> {
     /// Of a plan.
-    pub fn new(experiment: &'a Experiment, plan: &'a Plan, registries: &Registries) -> Self {
+    pub fn new(experiment: &'a Experiment, plan: &'a Plan, known: &IntegratorRegistry) -> Self {
         let integrators = experiment.axes[Axis::Integrator].iter();
-        let rays = |i: &'a Variant| (i.label.as_str(), rays_per_sample(registries, i));
+        let rays = |i: &'a Variant| (i.label.as_str(), rays_per_sample(known, i));
         let megabytes = |scene: &'a Variant| {
             let file = std::fs::metadata(&scene.name);
             (
@@ -130,50 +150,6 @@ impl<'a> Cost<'a> {
             rays_per_sample: integrators.map(rays).collect(),
             megabytes: plan.scenes.iter().map(megabytes).collect(),
         }
-    }
-
-    /// Seconds that a unit takes, without what several share.
-    pub fn seconds_of(&self, unit: &Unit) -> f64 {
-        unit.measurement.cost(&unit.cell, self).seconds()
-    }
-
-    /// The work of these units, with the scenes and references that they need.
-    pub fn whole<'u>(&self, units: impl IntoIterator<Item = &'u Unit>) -> Work {
-        let mut whole = Work::default();
-        let (mut worlds, mut references) = (BTreeSet::new(), BTreeSet::new());
-        for unit in units {
-            let cell = &unit.cell;
-            whole += unit.measurement.cost(cell, self);
-            if cell.get(Axis::Scene).is_some() && worlds.insert(cell.on(&Cell::WORLD).identity()) {
-                whole += self.world(cell);
-            }
-            let part = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
-            if unit.measurement.name() == super::errors::NAME
-                && references.insert(cell.on(&part).identity())
-            {
-                whole += self.reference_part(cell) * f64::from(REFERENCE_PARTS);
-            }
-        }
-        whole
-    }
-
-    /// The whole in words, for `--dry-run`.
-    pub fn describe(&self, units: &[Unit]) -> String {
-        let whole = self.whole(units);
-        format!(
-            "estimate: about {} on a software adapter with two cores, from {} million rays at \
-             {} million a second, {} million elements to be compacted at {} million a second, \
-             {} kernels that the driver compiles in {SECONDS_PER_KERNEL} s each, and {:.0} s of \
-             loading, building, checks and warm-up. These are round figures, nothing was measured here: a GPU needs a \
-             small part of it. The report comes on top.",
-            duration(whole.seconds()),
-            millions(whole.rays),
-            RAYS_PER_SECOND / 1e6,
-            millions(whole.elements),
-            ELEMENTS_PER_SECOND / 1e6,
-            whole.kernels,
-            whole.other_s,
-        )
     }
 
     fn megabytes(&self, cell: &Cell) -> f64 {
@@ -233,8 +209,8 @@ impl<'a> Cost<'a> {
 
 /// Rays that one sample usually takes: one from the camera, and at each bounce one onwards and one
 /// to a light.
-fn rays_per_sample(registries: &Registries, integrator: &Variant) -> f64 {
-    let known = registries.integrators.configured(integrator);
+fn rays_per_sample(known: &IntegratorRegistry, integrator: &Variant) -> f64 {
+    let known = known.configured(integrator);
     let dimensions = known.map_or(FIRST_BOUNCE, |known| known.facts.dimensions);
     let bounces = dimensions.saturating_sub(FIRST_BOUNCE).div_ceil(PER_BOUNCE);
     f64::from(1 + 2 * bounces.min(USUAL_BOUNCES))
@@ -260,6 +236,7 @@ fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::Registries;
 
     fn estimate(overrides: &[&str]) -> Work {
         let text = "[run]\nreplicates = 2\nresolution = [100, 100]\nspp = { pow2 = [0, 3] }\n\
@@ -273,7 +250,7 @@ mod tests {
             Experiment::parse(text, "test", &overrides, &registries.catalogue()).unwrap();
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
         let units = registries.measurements.units(&experiment, &plan);
-        Cost::new(&experiment, &plan, &registries).whole(&units)
+        Cost::new(&experiment, &plan, &registries.integrators).whole(&units)
     }
 
     #[test]

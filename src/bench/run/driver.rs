@@ -1,13 +1,13 @@
 //! Measurements that are carried out cell by cell: what is done already is passed over, the rest is made ready and checked one by
 //! one, timed in the same rounds, and written.
 
-use super::RunError;
+use super::error::RunError;
 use super::measurement::{Absent, At, Measurement, Prepared};
-use super::session::{Session, content_hash};
+use super::session::{End, Session};
 use crate::timing::{Measured, Samples, interleave};
 use raystone_config::{Axis, Cell};
 use raystone_gpu::GpuError;
-use raystone_record::{Body, Key, Line, MeasuredRecord, Outcome, Ran, Reading, fault_of};
+use raystone_record::{Body, Key, Line, MeasuredRecord, Ran, Reading, fault_of};
 
 /// A cell that is ready.
 struct Ready<'a> {
@@ -144,7 +144,6 @@ fn write(
         Ok(readings) => (readings, None),
         Err(reason) => (Vec::new(), Some(reason)),
     };
-    session.ledger.failed += usize::from(failure.is_some());
     let ran = Ran {
         unchecked: at.stage.is_some() && !session.experiment.run.runtime_checks,
         ..Ran::default()
@@ -155,11 +154,11 @@ fn write(
     };
     let line = Line::new(Key::from(cell), ran, Body::Measured(body)).with_readings(readings);
     let scene = at.stage.map_or("", |stage| &stage.scene.hash);
-    let hash = content_hash(&line, scene, &[("what", measurement.name())]);
-    session.recorder.write(&line.hashed(&hash))?;
-    let ended = match &failure {
-        Some(reason) => (Outcome::Failed, reason.as_str()),
-        None => (Outcome::Done, ""),
+    let end = End {
+        failure,
+        scene,
+        of: &[("what", measurement.name())],
+        ..End::default()
     };
-    session.close(&measurement.unit_name(cell), ended, vec![hash], &[])
+    session.conclude(&measurement.unit_name(cell), line, end)
 }

@@ -1,17 +1,19 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::adaptive;
+use super::cost::{Cost, Work};
+use super::error::{Fault, RunError};
 use super::images::{self, Estimator, attributes, sampler_label, write_spread};
-use super::measurement::Measurement;
+use super::measurement::{Measurement, Through};
 use super::paths;
+use super::recorder::image_hash;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
-use super::{Cost, Fault, RunError, Work};
 use crate::spectrum::{ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power};
 use crate::stopping::is_met_by;
-use raystone_config::{Axis, Cell, Experiment, Plan, StopRule};
+use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, StopRule};
 use raystone_gpu::GpuError;
 use raystone_image::{Image, Picture, tone_map, viridis};
 use raystone_record::{
@@ -24,15 +26,12 @@ use raystone_stats::metrics::{error_map, measure};
 use raystone_stats::statistics::mean_interval;
 use std::collections::BTreeMap;
 
-/// Name of the measurement in records.
-pub(super) const NAME: &str = "sampler";
-
 /// Errors of samplers against a reference.
 pub(super) struct Errors;
 
 impl Measurement for Errors {
     fn name(&self) -> &'static str {
-        NAME
+        "sampler"
     }
 
     fn plural(&self) -> &'static str {
@@ -48,7 +47,7 @@ impl Measurement for Errors {
     }
 
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
-        (NAME, cell.clone())
+        (self.name(), cell.clone())
     }
 
     fn is_timed(&self) -> bool {
@@ -73,6 +72,16 @@ impl Measurement for Errors {
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
         let image = cost.image(&cell[Axis::Integrator], cost.experiment.run.spp.max());
         image * f64::from(cost.plan.renders(cell))
+    }
+
+    fn shared_cost(&self, cell: &Cell, cost: &Cost) -> Option<(Cell, Work)> {
+        let of = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
+        let whole = cost.reference_part(cell) * f64::from(REFERENCE_PARTS);
+        Some((cell.on(&of), whole))
+    }
+
+    fn through(&self) -> Through {
+        Through::Any
     }
 }
 
@@ -605,13 +614,6 @@ fn bias_record(
         by_design: cell.randomised && !session.registries.is_unbiased(cell),
         verdict,
     })
-}
-
-/// BLAKE3 of the f32 pixels.
-pub(super) fn image_hash(image: &Image) -> String {
-    blake3::hash(bytemuck::cast_slice(&image.pixels))
-        .to_hex()
-        .to_string()
 }
 
 /// Seconds that a replicate of a sampler is expected to take.

@@ -6,7 +6,7 @@
 //! before it the folder holds the earlier results, after it the new ones. Links in the place of a
 //! file that is written are replaced, never followed.
 
-use super::RunError;
+use super::error::RunError;
 use raystone_core::atomic::write_atomic;
 use raystone_core::text::slug;
 use raystone_record::{

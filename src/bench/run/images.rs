@@ -1,7 +1,7 @@
 //! What the images of a run are made with, their compiled kernels, and what their files say of it.
 
-use super::Fault;
-use super::kernels::Device;
+use super::device::Device;
+use super::error::Fault;
 use super::session::Session;
 use super::words;
 use super::world::World;

@@ -1,7 +1,8 @@
 //! What the figures of a cell depend on, and whether those of an earlier run still hold.
 
 use super::kernels::Kernels;
-use super::{Registries, Unit};
+use super::registries::Registries;
+use super::units::Unit;
 use raystone_config::{Axis, Experiment};
 use raystone_core::text::cell_hash;
 use raystone_record::Environment;

@@ -1,11 +1,16 @@
 //! What the records of a folder hold of the plan that they were made by: which cells are done, which are missing, and whether they still hold.
 
+use super::cost::Cost;
+use super::error::RunError;
 use super::folder::records_in;
 use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
+use super::options::RunOptions;
+use super::registries::Registries;
 use super::resume::Earlier;
+use super::shard::shards;
+use super::units::Unit;
 use super::world::load_options;
-use super::{Cost, Registries, RunError, RunOptions, Unit, shards};
 use raystone_config::{ConfigError, Experiment, Plan, Shard};
 use raystone_record::{
     CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RecordError,
@@ -212,7 +217,7 @@ fn wanted_units(
     let Some(parts) = parts.filter(|parts| !parts.is_empty()) else {
         return units;
     };
-    let cost = Cost::new(experiment, plan, registries);
+    let cost = Cost::new(experiment, plan, &registries.integrators);
     let seconds = |unit: &Unit| cost.seconds_of(unit);
     let mut wanted = vec![false; units.len()];
     for part in parts {

@@ -1,8 +1,11 @@
 //! The kernels of a run: a library for each folder on the axis, and a device that composes from each.
 
-use super::{Registries, RunError, RunOptions};
+use super::device::Device;
+use super::error::RunError;
+use super::options::RunOptions;
+use super::registries::Registries;
 use raystone_core::params::Variant;
-use raystone_gpu::{self as gpu, Gpu, KernelLibrary};
+use raystone_gpu::{self as gpu, KernelLibrary};
 use raystone_record::{KernelFile, KernelFolder, KernelSetRecord};
 use std::path::Path;
 
@@ -40,6 +43,17 @@ impl Kernels {
             embedded: registries.library(),
             folders: folders.map(library).collect::<Result<_, RunError>>()?,
         })
+    }
+
+    /// Opens the adapter of the options, with a device for each library.
+    pub(super) fn open(&self, options: &RunOptions) -> Result<Device, RunError> {
+        let gpu = gpu::open(&options.adapter, self.embedded.clone())?;
+        let gpu = gpu.compiled_apart(options.compilations);
+        let view = |(kernels, library): &(Variant, KernelLibrary)| {
+            (kernels.clone(), gpu.with_kernels(library.clone()))
+        };
+        let views = self.folders.iter().map(view).collect();
+        Ok(Device::new(gpu, views))
     }
 
     /// Why kernels that were made of these modules are others now; `None` if they are not.
@@ -83,37 +97,5 @@ fn file(library: &KernelLibrary, name: &str) -> KernelFile {
         file: format!("{name}.wesl"),
         hash: blake3::hash(text.as_bytes()).to_hex().to_string(),
         replaces: KernelLibrary::is_embedded(name),
-    }
-}
-
-/// An open device, which composes kernels from every library of a run.
-pub(super) struct Device {
-    /// With the embedded kernels.
-    pub gpu: Gpu,
-    views: Vec<(Variant, Gpu)>,
-}
-
-impl Device {
-    /// Opens the adapter of the options.
-    pub(super) fn open(options: &RunOptions, kernels: &Kernels) -> Result<Self, RunError> {
-        let gpu = gpu::open(&options.adapter, kernels.embedded.clone())?;
-        let gpu = gpu.compiled_apart(options.compilations);
-        let views = kernels.folders.iter();
-        let views =
-            views.map(|(kernels, library)| (kernels.clone(), gpu.with_kernels(library.clone())));
-        let views = views.collect();
-        Ok(Self { gpu, views })
-    }
-
-    /// The device with these kernels; an error if the plan was made for others.
-    pub(super) fn of(&self, kernels: &Variant) -> Result<&Gpu, RunError> {
-        if kernels.name.is_empty() {
-            return Ok(&self.gpu);
-        }
-        let view = self.views.iter().find(|(known, _)| known == kernels);
-        let view = view.map(|(_, gpu)| gpu);
-        view.ok_or_else(|| {
-            RunError::Input(format!("the kernels {kernels} are not those of the plan"))
-        })
     }
 }

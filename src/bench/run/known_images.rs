@@ -1,7 +1,9 @@
 //! Known images through the kernels, for `raystone verify --images`.
 
-use super::kernels::Device;
-use super::{Kernels, Registries, RunError, RunOptions};
+use super::error::RunError;
+use super::kernels::Kernels;
+use super::options::RunOptions;
+use super::registries::Registries;
 use rayon::prelude::*;
 use raystone_accel::Intersection;
 use raystone_config::Axis;
@@ -9,7 +11,7 @@ use raystone_core::params::{Params, Variant};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_render::{RayOffset, RenderJob, Renderer, Stage, StageError};
 use raystone_sampling::Sampler;
-use raystone_verify::known_images::{KnownImage, SIZE, Seen, known_images, look, most_samples};
+use raystone_verify::known_images::{KnownImage, SIZE, Seen, known_images_of, look, most_samples};
 use std::path::Path;
 
 /// The structure through which rays go, and the pair that draws the numbers.
@@ -36,9 +38,9 @@ pub fn verify_images(
         params: Params::default(),
     };
     let loaded = Kernels::load(std::slice::from_ref(&kernels), registries)?;
-    let device = Device::open(options, &loaded)?;
+    let device = loaded.open(options)?;
     let gpu = device.of(&kernels)?;
-    let images = known_images().map_err(input)?;
+    let images = known_images_of(&registries.kinds).map_err(input)?;
     let images: Vec<_> = images.iter().filter(|image| only(image.name)).collect();
     // A driver compiles on one core.
     let seen = images.par_iter().map(|image| {

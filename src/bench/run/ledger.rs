@@ -1,7 +1,8 @@
 //! The units of a run: which are done, which are left, and how they ended.
 
-use super::measurement::{Measurement, Unit};
-use raystone_config::Cell;
+use super::measurement::Measurement;
+use super::units::Unit;
+use raystone_config::{Cell, Plan};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -46,6 +47,13 @@ impl Ledger {
         self.places
             .get(name)
             .and_then(|place| self.units.get(*place))
+    }
+
+    /// Structures that the driver refused, each with the reason.
+    pub(super) fn refused_structures(&self, plan: &Plan) -> Vec<(Cell, String)> {
+        let reason =
+            |cell: &Cell| Some((cell.clone(), self.refused.get(&cell.to_string())?.clone()));
+        plan.structures.iter().filter_map(reason).collect()
     }
 
     /// The units that are not measured yet.

@@ -3,10 +3,12 @@
 //! Of a cell that several folders hold one is taken, after it was compared with the others: contradictions are errors. Figures of clocks are
 //! taken from one device alone. What does not depend on the device (errors, discrepancies, models) comes from any.
 
+use super::error::RunError;
 use super::folder::{lock_folder, records_in};
 use super::inputs::{MadeOf, differing};
+use super::registries::Registries;
 use super::resume::Earlier;
-use super::{Registries, RunError, Unit};
+use super::units::Unit;
 use raystone_config::Skipped;
 use raystone_core::atomic::write_atomic;
 use raystone_image::FileFormat;

@@ -5,10 +5,13 @@
 
 mod adaptive;
 mod animation;
+mod built_in;
 mod coherence;
 mod compactions;
 mod cost;
+mod device;
 mod driver;
+mod error;
 mod errors;
 mod folder;
 mod images;
@@ -19,6 +22,7 @@ mod known_images;
 mod ledger;
 mod measurement;
 mod merge;
+mod options;
 mod orders;
 mod paths;
 mod peers;
@@ -38,174 +42,39 @@ mod structure_times;
 mod structures;
 mod times;
 mod trial;
+mod twins;
+mod units;
 mod words;
 mod world;
 
 pub use cost::{Cost, Work};
+pub use error::RunError;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder, records_in};
 pub use inputs::place;
 pub use inventory::{Inventory, State};
 pub use kernels::{Kernels, kernel_library};
 pub use known_images::verify_images;
-pub use measurement::{Absent, At, Measurement, MeasurementRegistry, Preparation, Prepared, Unit};
+pub use measurement::{Absent, At, Measurement, Preparation, Prepared, Through};
 pub use merge::{Merged, merge};
+pub use options::{RunOptions, RunSummary};
 pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
 pub use shard::shards;
+pub use units::{MeasurementRegistry, Unit};
 
 pub use crate::words::dump_stream;
+use built_in::{Run, run_of};
+use device::Device;
 use inputs::Current;
-use kernels::Device;
-use measurement::Run;
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Shard};
 use raystone_core::params::Variant;
-use raystone_core::program::Program;
-use raystone_gpu::{AdapterChoice, ArithmeticProbe, GpuError};
-use raystone_image::FileFormat;
 use raystone_record::{GateVerdict, PathsRecord};
 use raystone_scene as scene;
 use session::Session;
 use std::collections::HashMap;
 use std::path::PathBuf;
-use thiserror::Error;
 use world::{Loaded, NoWorld, World, load_options};
-
-/// What an experiment does not say.
-#[derive(Debug, Clone, Default)]
-pub struct RunOptions {
-    /// The program that measures, as records name it.
-    pub program: Program,
-    /// Folder for records and images; made if missing.
-    pub out: PathBuf,
-    /// What to do where that folder holds results.
-    pub existing: Existing,
-    /// Ends the run early.
-    pub interrupt: Interrupt,
-    /// Is told what went wrong beside the measuring, at once.
-    pub warn: Option<fn(&str)>,
-    /// Is told how the run goes on, line by line.
-    pub tell: Option<fn(&str)>,
-    /// Which adapter.
-    pub adapter: AdapterChoice,
-    /// Whether, and in which format, linear radiance is written beside the pictures of a run.
-    pub images: Option<&'static FileFormat>,
-    /// Folder in which rendered references are kept for later runs; `None`: each run renders its own.
-    pub cache: Option<PathBuf>,
-    /// Whether models may name files outside their folder: see [`raystone_scene::LoadOptions`].
-    pub allow_outside: bool,
-    /// The part of the plan that is run; `None`: all of it.
-    pub shard: Option<Shard>,
-    /// Whether to wait for another run that writes the folder.
-    pub wait: bool,
-    /// Whether the first cell that fails ends the run.
-    pub fail_fast: bool,
-    /// Whether to draw a progress bar on standard error.
-    pub progress: bool,
-    /// Whether the run is to end with exit code 0 whatever fails: recorded, and said in the report.
-    pub lenient: bool,
-    /// Destroys the device when the turn of this cell comes: for tests of the recovery.
-    pub lose_device_at: Option<String>,
-    /// How often every timed kernel is compiled, in turns over the rounds; 0 and 1: once. See [`raystone_gpu::Gpu::compiled_apart`].
-    pub compilations: usize,
-    /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.
-    pub arithmetic: Option<ArithmeticProbe>,
-}
-
-/// How a run ended.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct RunSummary {
-    /// Cells (or gates) that failed.
-    pub failed: usize,
-    /// Cells left out with a reason.
-    pub skipped: usize,
-    /// Cells of an earlier run that still held.
-    pub kept: usize,
-    /// Whether a scene could not be loaded (exit code 2).
-    pub bad_input: bool,
-    /// Folder of the records.
-    pub out: PathBuf,
-}
-
-/// Why a run could not start or go on. A cell that fails is a record, not an error.
-#[derive(Debug, Error)]
-pub enum RunError {
-    /// No usable adapter (exit code 3).
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// Bad usage or input (exit code 2).
-    #[error("{0}")]
-    Input(String),
-    /// Something that ended a run before its end; what was measured is kept.
-    #[error("{source}; what was measured is in {}", folder.display())]
-    EndedEarly {
-        /// The folder of the records.
-        folder: PathBuf,
-        /// What ended it.
-        source: Box<RunError>,
-    },
-    /// [`Interrupt::now`] was called.
-    #[error("the run was interrupted")]
-    Interrupted,
-    /// A result that is known to be wrong (exit code 1).
-    #[error("{0}")]
-    Wrong(String),
-}
-
-impl RunError {
-    /// Whether somebody asked for the end.
-    pub fn is_interruption(&self) -> bool {
-        matches!(self, Self::Interrupted)
-    }
-
-    /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Wrong(_)
-            | Self::Gpu(
-                GpuError::LoopsCut { .. } | GpuError::Kernels(_) | GpuError::Samples { .. },
-            ) => 1,
-            Self::Gpu(
-                GpuError::NoAdapter
-                | GpuError::UnknownAdapter { .. }
-                | GpuError::NoDevice { .. }
-                | GpuError::LoopsUnsound { .. },
-            ) => 3,
-            Self::EndedEarly { source, .. } => source.exit_code(),
-            _ => 2,
-        }
-    }
-}
-
-/// Why something has no figures.
-pub(crate) enum Fault {
-    /// One cell is at fault, which gets a record of it.
-    Cell(String),
-    /// Nothing can go on.
-    Run(RunError),
-}
-
-impl From<String> for Fault {
-    fn from(reason: String) -> Self {
-        Self::Cell(reason)
-    }
-}
-
-impl From<RunError> for Fault {
-    fn from(error: RunError) -> Self {
-        Self::Run(error)
-    }
-}
-
-impl Fault {
-    /// The reason that is one cell's, or what ends the run.
-    fn of_cell(self) -> Result<String, RunError> {
-        match self {
-            Self::Cell(reason) => Ok(reason),
-            Self::Run(error) => Err(error),
-        }
-    }
-}
 
 /// One structure's verdict, for `raystone verify`.
 #[derive(Debug, Clone)]
@@ -237,7 +106,7 @@ pub fn run(
     let kernels = Kernels::load(&plan.kernels, registries)?;
     let is_resumed = options.existing == Existing::Resume;
     // Without an adapter no folder is touched; a run that has nothing to do needs none.
-    let device = (!is_resumed).then(|| Device::open(options, &kernels));
+    let device = (!is_resumed).then(|| kernels.open(options));
     let device = device.transpose()?;
     let mut session = Session::new(experiment, plan, registries, options)?;
     session.keep_shard();
@@ -258,7 +127,9 @@ pub fn run(
     }
     let device = match device {
         Some(device) => device,
-        None => Device::open(options, &kernels).inspect_err(|_| session.recorder.abandon())?,
+        None => kernels
+            .open(options)
+            .inspect_err(|_| session.recorder.abandon())?,
     };
     let kept = session.begin(&device, &kernels, (&earlier, current));
     let out = kept.and_then(|kept| Ok((kept, measure(&mut session, device, &kernels)?)));
@@ -316,7 +187,7 @@ fn measure(
             if device.gpu.lost().is_none() {
                 break;
             }
-            device = Device::open(options, kernels)?;
+            device = kernels.open(options)?;
             session.recorder.use_device(&device.gpu);
         }
     }
@@ -325,7 +196,7 @@ fn measure(
         if device.gpu.lost().is_none() {
             break;
         }
-        device = Device::open(options, kernels)?;
+        device = kernels.open(options)?;
         session.recorder.use_device(&device.gpu);
     }
     session.write_end()
@@ -338,12 +209,13 @@ fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
         registries: session.registries,
         stage: None,
         device,
-        gated: &[],
+        traced: Vec::new(),
+        refused: Vec::new(),
     };
-    for entry in session.registries.measurements.entries() {
-        match entry.run {
+    for measurement in session.registries.measurements.iter() {
+        match run_of(measurement) {
             Run::Alone(run) => run(session, device)?,
-            Run::CellByCell => driver::run(session, entry.measurement, &at, None)?,
+            Run::CellByCell => driver::run(session, measurement, &at, None)?,
             Run::First | Run::OfWorld(_) => {}
         }
         if device.gpu.lost().is_some() {
@@ -415,16 +287,17 @@ fn run_world(
         registries: session.registries,
         stage: Some(&world.stage),
         device,
-        gated: &gated,
+        traced: gated.iter().map(|g| (&g.cell, &g.traced)).collect(),
+        refused: session.ledger.refused_structures(session.plan),
     };
-    for entry in session.registries.measurements.entries() {
+    for measurement in session.registries.measurements.iter() {
         session.go_on()?;
         if device.gpu.lost().is_some() {
             break;
         }
-        match entry.run {
+        match run_of(measurement) {
             Run::OfWorld(run) => run(session, &world, &gated)?,
-            Run::CellByCell => driver::run(session, entry.measurement, &at, Some(cell))?,
+            Run::CellByCell => driver::run(session, measurement, &at, Some(cell))?,
             Run::First | Run::Alone(_) => {}
         }
     }
@@ -447,7 +320,7 @@ pub fn render_references(
             "there is no folder to keep references in: set RAYSTONE_CACHE".to_owned(),
         ));
     }
-    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
+    let device = Kernels::load(&plan.kernels, registries)?.open(options)?;
     let mut session = Session::unrecorded(experiment, plan, registries, options);
     session.reference_file = reference_file::ReferenceFile::load(experiment)?;
     let shard = options.shard.unwrap_or(Shard { number: 1, of: 1 });
@@ -512,7 +385,7 @@ pub fn verify(
     rays: u32,
     trials: bool,
 ) -> Result<Vec<Verified>, RunError> {
-    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
+    let device = Kernels::load(&plan.kernels, registries)?.open(options)?;
     let mut experiment = experiment.clone();
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;

@@ -1,7 +1,7 @@
 //! Full cells whose pixels are taken in orders of passes: how long a sample takes, and how soon a picture is there.
 
-use super::errors::image_hash;
 use super::images::Estimator;
+use super::recorder::image_hash;
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
@@ -30,7 +30,7 @@ pub(super) fn of_cell(
     }
     session.say(format!("{cell}: orders of pixels"));
     let text = |e: GpuError| e.to_string();
-    let estimator = Estimator::new(session, cell, super::times::samples(session))?;
+    let estimator = Estimator::new(session, cell, session.timed_samples())?;
     let gpu = world.device.of(&cell[Axis::Kernels]);
     let gpu = gpu.map_err(|e| e.to_string())?;
     let job = estimator.job(session, world.camera, structure.runtime_checks);

@@ -1,8 +1,8 @@
 //! The gate of integrators: single paths against the oracle for images, before anything is rendered with them.
 
+use super::error::{Fault, RunError};
 use super::session::{Session, content_hash};
 use super::world::World;
-use super::{Fault, RunError};
 use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{Params, Variant};
@@ -12,7 +12,7 @@ use raystone_render::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stag
 use raystone_sampling::Sampler;
 use raystone_verify::image_gate::{Answer, Pixels, answers, judge, sums};
 use raystone_verify::path_oracle::{Estimator, PathOracle, View};
-use raystone_verify::trial_scenes::{TrialScene, trial_scenes, trials_of};
+use raystone_verify::trial_scenes::{TrialScene, trial_scenes_of, trials_of};
 
 /// Of the frame that is judged: no square, and no multiple of a workgroup.
 const SIZE: [u32; 2] = [26, 19];
@@ -174,10 +174,11 @@ fn made(
     let (mut record, ran) = judged(session, &subject, &integrator, extent)?;
     let of = [Axis::Offset, Axis::Organisation, Axis::Kernels];
     let all = format!("trial scenes, {}, {}", cell.on(&of), integrator.kind.name());
+    let kinds = &session.registries.kinds;
     let trials = match session.checked.on_all_trials {
-        true if session.checked.integrators.insert(all, None).is_none() => trial_scenes(),
+        true if session.checked.integrators.insert(all, None).is_none() => trial_scenes_of(kinds),
         true => Ok(Vec::new()),
-        false => trials_of(&world.scene, &integrator),
+        false => trials_of(kinds, &world.scene, &integrator),
     };
     for trial in trials.map_err(|e| e.to_string())? {
         if record.fault.is_none() {
@@ -251,7 +252,9 @@ fn judged(
     extent: Extent,
 ) -> Result<(PathsRecord, Ran), String> {
     let cell = subject.cell;
-    let oracle = (session.clock).time("judge", || PathOracle::new(&subject.stage.scene))?;
+    let kinds = &session.registries.kinds;
+    let oracle = || PathOracle::knowing(&subject.stage.scene, kinds);
+    let oracle = session.clock.time("judge", oracle)?;
     let spp = session.experiment.run.spp.max();
     let demand = integrator.demand(spp, SIZE[0]);
     let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);

@@ -1,27 +1,25 @@
 //! Ray casters of others, traced in the rounds of the structures.
 
-use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::cost::{Cost, Work};
+use super::error::RunError;
+use super::measurement::{Measurement, Through};
+use super::session::{End, Session};
 use super::structures::Structures;
 use super::world::World;
-use super::{Cost, RunError, Work};
 use crate::peers::{BuiltPeer, PeerBatch};
 use crate::timing::{Measured, Samples, Watch, millions_per_second};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError};
-use raystone_record::{Body, Key, Line, Outcome, PeerRecord, PeerTiming, Ran};
+use raystone_record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
 use raystone_verify::peer_judge::differences;
 use raystone_verify::rays::RaySet;
-
-/// Name of the measurement in records.
-pub(super) const NAME: &str = "peer";
 
 /// Speed of external tracers.
 pub(super) struct Peers;
 
 impl Measurement for Peers {
     fn name(&self) -> &'static str {
-        NAME
+        "peer"
     }
 
     fn plural(&self) -> &'static str {
@@ -46,6 +44,10 @@ impl Measurement for Peers {
 
     fn cost(&self, _: &Cell, cost: &Cost) -> Work {
         cost.timed(Work::rays(cost.experiment.timing.rays)) * cost.ray_classes()
+    }
+
+    fn through(&self) -> Through {
+        Through::None
     }
 }
 
@@ -186,17 +188,14 @@ pub(super) fn write(
         if record.failure.is_some() || record.absent.is_some() {
             record.timings.clear();
         }
-        let line = Line::new(Key::from(&one.cell), Ran::default(), record);
-        let hash = content_hash(&line, &world.scene.hash, &[]);
-        let failure = line.body.failure.clone();
-        session
-            .recorder
-            .write(&line.hashed(&hash).with_body(Body::Peer))?;
-        let ended = match &failure {
-            Some(reason) => (Outcome::Failed, reason.as_str()),
-            None => (Outcome::Done, ""),
+        let end = End {
+            failure: record.failure.clone(),
+            scene: &world.scene.hash,
+            shared: &["peers"],
+            ..End::default()
         };
-        session.close(&one.cell.to_string(), ended, vec![hash], &["peers"])?;
+        let line = Line::new(Key::from(&one.cell), Ran::default(), Body::Peer(record));
+        session.conclude(&one.cell.to_string(), line, end)?;
     }
     Ok(())
 }

@@ -110,7 +110,7 @@ fn centred(
     let centre = ParamValue::Name("centre".to_owned());
     integrator.params.0.insert("primary".to_owned(), centre);
     let cell = cell.clone().with(Axis::Integrator, &integrator);
-    let estimator = Estimator::new(session, &cell, super::times::samples(session))?;
+    let estimator = Estimator::new(session, &cell, session.timed_samples())?;
     let seeds = session.experiment.seeds().replicates;
     let of_kernel = [structure.runtime_checks, false];
     let renderer = estimator.renderer(session, world, &structure.traced, &seeds, of_kernel)?;

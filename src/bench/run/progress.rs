@@ -5,7 +5,7 @@
 //! called nearly done that is not. The first steps say little of the pace: a share of the whole counts as done at the pace that was
 //! expected.
 
-use super::RunOptions;
+use super::options::RunOptions;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

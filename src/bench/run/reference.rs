@@ -1,11 +1,11 @@
 //! References: what images are compared with, and the exposure of their pictures.
 
+use super::error::{Fault, RunError};
 use super::images::{Estimator, attributes};
 use super::reference_cache::Kept;
 use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
 use super::world::World;
-use super::{Fault, RunError};
 use raystone_config::{Axis, Cell, REFERENCE_PARTS};
 use raystone_core::params::{Entry, Variant};
 use raystone_image::{Image, automatic_exposure, tone_map};
@@ -200,7 +200,7 @@ fn parts(
     for number in wanted {
         let folder = session.options.cache.as_ref();
         let name = format!("{hash}, part {number}");
-        let place = folder.and_then(|folder| Kept::new(folder, world, &name, size));
+        let place = folder.and_then(|folder| Kept::new(folder, world.gpu, &name, size));
         let kept = place.as_ref().and_then(Kept::read);
         let cached = kept.is_some();
         let image = match kept {

@@ -4,9 +4,9 @@
 //! adapter with its driver, and the program to the byte), and only those of embedded kernels are. A file that is
 //! damaged or cannot be read is rendered anew.
 
-use super::World;
 use raystone_core::atomic::write_atomic;
 use raystone_core::text::cell_hash;
+use raystone_gpu::Gpu;
 use raystone_image::Image;
 use std::fs::{self, File};
 use std::io;
@@ -41,9 +41,9 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// The place of a part that is known by `hash` and rendered in `world`; absent where the program cannot be read.
-    pub(super) fn new(folder: &Path, world: &World, hash: &str, size: [u32; 2]) -> Option<Self> {
-        let about = &world.gpu.info;
+    /// The place of a part that is known by `hash` and rendered on `gpu`; absent where the program cannot be read.
+    pub(super) fn new(folder: &Path, gpu: &Gpu, hash: &str, size: [u32; 2]) -> Option<Self> {
+        let about = &gpu.info;
         let machine = format!("{:?}", (&about.name, &about.driver, &about.driver_info));
         let key = cell_hash(&[
             ("cell", hash),

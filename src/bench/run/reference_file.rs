@@ -1,6 +1,6 @@
 //! A reference that is not rendered: the image of another renderer, or of an earlier run.
 
-use super::RunError;
+use super::error::RunError;
 use raystone_config::Experiment;
 use raystone_image::read_linear;
 use raystone_stats::metrics::Reference;
@@ -35,7 +35,7 @@ impl ReferenceFile {
                  of the size, or set run.resolution=[{w}, {h}]"
             )));
         }
-        let hash = super::errors::image_hash(&image);
+        let hash = super::recorder::image_hash(&image);
         let reference = Reference::single(image)
             .map_err(|e| RunError::Input(format!("reference {name}: {e}")))?;
         Ok(Some(Self {

@@ -1,6 +1,6 @@
 //! All registries together.
 
-use super::measurement::MeasurementRegistry;
+use super::units::MeasurementRegistry;
 use crate::compaction::benches;
 use crate::figure_registry::FigureRegistry;
 use crate::peers::PeerRegistry;
@@ -15,6 +15,7 @@ use raystone_render::{
     ConfiguredIntegrator, IntegratorRegistry, OffsetRegistry, OrganisationRegistry, RayOffset,
 };
 use raystone_sampling::SamplerRegistry;
+use raystone_verify::kinds::KindChecks;
 
 /// Everything that can be named.
 #[derive(Clone, Default)]
@@ -39,6 +40,8 @@ pub struct Registries {
     pub workgroups: WorkgroupRegistry,
     /// Compactions of streams.
     pub compactions: CompactionRegistry,
+    /// What checks know of the kinds of materials and lights.
+    pub kinds: KindChecks,
     /// What is measured.
     pub measurements: MeasurementRegistry,
     /// Figures of structures beside those of the crate.

@@ -1,11 +1,13 @@
 //! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
 //! there at once; the structure is validated on the host.
 
+use super::error::RunError;
 use super::images::{Estimator, attributes};
-use super::kernels::{Device, Kernels};
+use super::kernels::Kernels;
+use super::options::RunOptions;
+use super::registries::Registries;
 use super::session::Session;
 use super::world::{load_options, table_bytes};
-use super::{Registries, RunError, RunOptions};
 use indicatif::ProgressStyle;
 use raystone_accel::{AccelError, TriangleSoup};
 use raystone_config::{Axis, Experiment, Plan};
@@ -87,7 +89,7 @@ pub fn render(
     let session = Session::unrecorded(experiment, plan, registries, options);
     let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
     session.say(format!("{scene}: loading"));
-    let device = Device::open(options, &kernels)?;
+    let device = kernels.open(options)?;
     let load = load_options(options, table_bytes(&device.gpu.limits));
     let scene_data = scene::load(scene, &load).map_err(input)?;
     // That of the experiment, of the scene, or one that frames the scene.

@@ -1,7 +1,7 @@
 //! What an earlier run left in the folder of a run that is resumed: which cells still hold, and their lines.
 
-use super::Unit;
 use super::inputs::Current;
+use super::units::Unit;
 use raystone_record::{Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome};
 use raystone_scene::LEAST_BINDING;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -177,7 +177,7 @@ mod tests {
         let (experiment, plan) = large(100_000);
         let registries = Registries::default();
         let units = registries.measurements.units(&experiment, &plan);
-        let cost = Cost::new(&experiment, &plan, &registries);
+        let cost = Cost::new(&experiment, &plan, &registries.integrators);
         let numbers = shards(&units, 64, |unit| cost.seconds_of(unit));
         let seconds = start.elapsed().as_secs_f64();
         assert!(units.len() >= 100_000 && numbers.len() == units.len());

@@ -1,13 +1,18 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
+use super::cost::Cost;
+use super::device::Device;
+use super::error::RunError;
 use super::inputs::{Current, place};
-use super::kernels::{Device, Kernels};
+use super::kernels::Kernels;
 use super::ledger::Ledger;
+use super::options::RunOptions;
 use super::progress::Progress;
 use super::recorder::Recorder;
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
-use super::{Cost, RunError, RunOptions, Unit, shards};
+use super::shard::shards;
+use super::units::Unit;
 use crate::environment::{capture, machine_load};
 use raystone_config::{Cell, Experiment, Plan, Skipped};
 use raystone_core::text::cell_hash;
@@ -71,6 +76,21 @@ pub(super) struct Session<'a> {
     pub checked: Checked,
     /// What images are compared with, if it is not rendered.
     pub reference_file: Option<ReferenceFile>,
+}
+
+/// How a unit ends.
+#[derive(Default)]
+pub(super) struct End<'a> {
+    /// Why it failed, if it did.
+    pub failure: Option<String>,
+    /// Hash of its scene; empty if it has none.
+    pub scene: &'a str,
+    /// What else its figures depend on, by name.
+    pub of: &'a [(&'a str, &'a str)],
+    /// Hashes of further lines that belong to it.
+    pub lines: Vec<String>,
+    /// Kernels that were noted for these names count for it, too.
+    pub shared: &'a [&'a str],
 }
 
 /// What was checked once for several cells.
@@ -197,6 +217,19 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// Writes the line of a unit, with the hash of all that its figures depend on, and closes the unit.
+    pub(super) fn conclude(&mut self, unit: &str, line: Line, end: End) -> Result<(), RunError> {
+        let hash = content_hash(&line, end.scene, end.of);
+        self.recorder.write(&line.hashed(&hash))?;
+        self.ledger.failed += usize::from(end.failure.is_some());
+        let outcome = match &end.failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        let lines = [hash].into_iter().chain(end.lines).collect();
+        self.close(unit, outcome, lines, end.shared)
+    }
+
     /// A unit ended, and all its lines are written: those of these hashes. What was noted for `shared` counts for it, too.
     pub(super) fn close(
         &mut self,
@@ -251,7 +284,7 @@ impl<'a> Session<'a> {
             options,
             clock: Clock::new(),
             progress: Progress::new(options),
-            cost: Cost::new(experiment, plan, registries),
+            cost: Cost::new(experiment, plan, &registries.integrators),
             ledger: Ledger::new(units),
             recorder: Recorder::default(),
             checked: Checked::default(),
@@ -363,6 +396,13 @@ impl<'a> Session<'a> {
             .write(&Line::about_all(Body::Finished(record)))?;
         let out = self.recorder.finish()?;
         Ok(out.unwrap_or_else(|| self.options.out.clone()))
+    }
+
+    /// Timed are the first samples of the set whose error is measured last: how near the rays of
+    /// neighbouring pixels lie may depend on how many there are. So many are in that set.
+    pub(super) fn timed_samples(&self) -> u32 {
+        let experiment = self.experiment;
+        experiment.run.spp.max().max(experiment.timing.spp)
     }
 
     /// Ends the run here if somebody asked for it.

@@ -1,6 +1,6 @@
 //! Plans in parts.
 
-use super::Unit;
+use super::units::Unit;
 use std::collections::BTreeMap;
 
 /// The number of the shard that each unit belongs to, from 1. What is measured in the same rounds stays together; shards are runs of neighbours

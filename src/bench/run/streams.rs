@@ -1,10 +1,11 @@
 //! Figures of the words that samplers draw, dumped from a kernel that imports the renderer's modules
 //! ([`crate::words`]) and equal to the twin's, and what drawing costs.
 
-use super::kernels::Device;
+use super::cost::{Cost, Work};
+use super::device::Device;
+use super::error::RunError;
 use super::measurement::Measurement;
 use super::session::{Session, content_hash};
-use super::{Cost, RunError, Work};
 use crate::sampler_cost::sampler_cost;
 use crate::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
 use crate::words::{compare, dump_stream, kernel_hash};

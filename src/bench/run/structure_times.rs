@@ -1,9 +1,11 @@
 //! Times, counted work and heat maps of structures that passed their gate.
 
+use super::cost::Work;
+use super::error::{Fault, RunError};
+use super::peers;
 use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
-use super::{Fault, RunError, Work, peers};
 use crate::timing::{
     Measured, Samples, Watch, empty_ms, interleave, millions_per_second, without_overhead,
 };

@@ -1,17 +1,20 @@
 //! Structures: build, validate, gate; what passes is timed, counted and drawn.
 
-use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::cost::{Cost, Work};
+use super::error::RunError;
+use super::measurement::{Measurement, Through};
+use super::session::{End, Session};
 use super::structure_times::{draw_heat_maps, time_all};
+use super::twins::of_recorded_rays;
+use super::units::Unit;
 use super::world::World;
-use super::{Cost, RunError, Unit, Work, errors, peers};
 use crate::memory::peak_bytes;
 use raystone_accel::tracer::kernel_hash;
 use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
-use raystone_record::{Body, GateVerdict, Key, Line, Outcome, Ran, StructureRecord};
+use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
 use std::time::Instant;
 
@@ -292,7 +295,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
                 runtime_checks: !outcome.record.ran.unchecked,
                 traced,
                 speed: 0.0,
-                record: hashed(world, outcome.record),
+                record: outcome.record,
                 cell,
                 costs: Vec::new(),
             }),
@@ -314,17 +317,22 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     let mut timed = draw_heat_maps(session, world, timed)?;
     if let Some(settings) = session.experiment.coherence.clone() {
         for structure in &mut timed {
-            let modelled = super::coherence::of_recorded_rays(session, world, structure, &settings);
+            let modelled = {
+                let of = (&structure.cell, structure.traced.space);
+                of_recorded_rays(session, world, of, &settings)
+            };
             // Why there is none is told of its cells.
             structure.record.body.coherence = modelled.ok();
         }
     }
     for structure in &timed {
-        session
-            .recorder
-            .write(&structure.record.clone().with_body(Body::Structure))?;
-        let lines = vec![structure.record.hash.clone()];
-        session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
+        conclude(
+            session,
+            world,
+            &structure.cell,
+            structure.record.clone(),
+            None,
+        )?;
     }
     usable.append(&mut timed);
     Ok(usable)
@@ -336,9 +344,7 @@ fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
         .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    // Samplers are rendered through any structure, peers through none.
-    let apart = [errors::NAME, peers::NAME];
-    open.any(|unit| !apart.contains(&unit.kind()) && unit.cell.is_on(cell))
+    open.any(|unit| unit.measurement.through() == Through::Own && unit.cell.is_on(cell))
 }
 
 /// Whether a sampler that is not measured yet has nothing else to be rendered through. Hits are equal to the bit in
@@ -350,13 +356,25 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
         .ledger
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    let needs = |unit: &Unit| unit.kind() == errors::NAME && unit.cell[Axis::Kernels] == *kernels;
+    let needs = |unit: &Unit| {
+        unit.measurement.through() == Through::Any && unit.cell[Axis::Kernels] == *kernels
+    };
     !gated.iter().any(serves) && open.any(needs)
 }
 
-fn hashed(world: &World, record: Line<StructureRecord>) -> Line<StructureRecord> {
-    let hash = content_hash(&record, &world.scene.hash, &[]);
-    record.hashed(hash)
+fn conclude(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    record: Line<StructureRecord>,
+    failure: Option<String>,
+) -> Result<(), RunError> {
+    let end = End {
+        failure,
+        scene: &world.scene.hash,
+        ..End::default()
+    };
+    session.conclude(&cell.to_string(), record.with_body(Body::Structure), end)
 }
 
 pub(super) fn write_failed(
@@ -365,14 +383,9 @@ pub(super) fn write_failed(
     cell: &Cell,
     record: Line<StructureRecord>,
 ) -> Result<(), RunError> {
-    if record.body.refused {
-        return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
-    }
-    session.ledger.failed += 1;
     let reason = record.body.failure.clone().unwrap_or_default();
-    let record = hashed(world, record);
-    let lines = vec![record.hash.clone()];
-    session.recorder.write(&record.with_body(Body::Structure))?;
-    let failed = (Outcome::Failed, &*reason);
-    session.close(&cell.to_string(), failed, lines, &[])
+    if record.body.refused {
+        return session.write_refused(cell.to_string(), reason);
+    }
+    conclude(session, world, cell, record, Some(reason))
 }

@@ -1,18 +1,18 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::errors::image_hash;
+use super::cost::{Cost, Work};
+use super::error::{Fault, RunError};
 use super::images::{self, Estimator};
 use super::measurement::Measurement;
 use super::paths;
-use super::session::{Session, content_hash};
+use super::recorder::image_hash;
+use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
-use super::{Cost, Fault, RunError, Work};
 use crate::timing::{Measured, Samples, Watch, interleave};
 use raystone_accel::Space;
 use raystone_config::{Axis, Cell, Experiment, Plan};
-use raystone_core::text::cell_hash;
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use raystone_record::{Body, Key, Line, Outcome, Ran, TimeRecord};
 use raystone_render::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
@@ -210,26 +210,16 @@ fn write(
     item: &Timed,
     record: Line<TimeRecord>,
 ) -> Result<(), RunError> {
-    let device = format!("{:?}", world.gpu.info);
-    let hash = content_hash(&record, &world.scene.hash, &[("device", &device)]);
-    let failure = record.body.failure.clone();
-    session.ledger.failed += usize::from(failure.is_some());
-    session
-        .recorder
-        .write(&record.hashed(&hash).with_body(Body::Time))?;
-    let ended = match &failure {
-        Some(reason) => (Outcome::Failed, reason.as_str()),
-        None => (Outcome::Done, ""),
+    let checked = &session.checked.integrator_lines;
+    let checked = checked.get(&paths::key(world, &item.cell)).cloned();
+    let end = End {
+        failure: record.body.failure.clone(),
+        scene: &world.scene.hash,
+        of: &[("device", &format!("{:?}", world.gpu.info))],
+        lines: checked.into_iter().collect(),
+        ..End::default()
     };
-    let mut lines = vec![hash];
-    lines.extend(
-        session
-            .checked
-            .integrator_lines
-            .get(&paths::key(world, &item.cell))
-            .cloned(),
-    );
-    session.close(&item.cell.to_string(), ended, lines, &[])
+    session.conclude(&item.cell.to_string(), record.with_body(Body::Time), end)
 }
 
 /// Why the driver cannot run the structure of a cell, if that is so.
@@ -239,13 +229,6 @@ fn refusal(session: &Session, cell: &Cell) -> Option<String> {
     session.ledger.refused.get(&structure.to_string()).cloned()
 }
 
-/// Timed are the first samples of the set whose error is measured last: how near the rays of
-/// neighbouring pixels lie may depend on how many there are. So many are in that set.
-pub(super) fn samples(session: &Session) -> u32 {
-    let experiment = &session.experiment;
-    experiment.run.spp.max().max(experiment.timing.spp)
-}
-
 fn renderer<'a>(
     session: &mut Session,
     world: &'a World,
@@ -253,7 +236,7 @@ fn renderer<'a>(
     cell: &Cell,
     checks_and_counts: [bool; 2],
 ) -> Result<Renderer<'a>, String> {
-    let samples = samples(session);
+    let samples = session.timed_samples();
     let seeds = session.experiment.seeds().replicates;
     let estimator = Estimator::new(session, cell, samples)?;
     estimator.renderer(session, world, &structure.traced, &seeds, checks_and_counts)
@@ -292,28 +275,24 @@ fn finish(
     }
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
-    let (counted, first) = match shared.get(&key) {
-        Some(known) => known.clone(),
-        None => {
-            let structure = structure.ok_or("its structure is gone")?;
-            let (counted, mut image) = count_rays(session, world, structure, item)?;
-            if !world.probe.is_exact() {
-                // Another kernel, and so rounded otherwise.
-                image.clone_from(&hash);
-            }
-            shared.insert(key, (counted.clone(), image.clone()));
-            (counted, image)
-        }
-    };
+    if !shared.contains_key(&key) {
+        let structure = structure.ok_or("its structure is gone")?;
+        let (counted, image) = count_rays(session, world, structure, item)?;
+        // Another kernel: on an adapter that is not exact it rounds otherwise.
+        let image = if world.probe.is_exact() {
+            image
+        } else {
+            hash.clone()
+        };
+        shared.insert(key.clone(), (counted, image));
+    }
+    let (counted, first) = shared[&key].clone();
     let rays = counted.rays;
     let total: u64 = rays[..TRACED_CLASSES].iter().sum();
     let spp = f64::from(item.spp);
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
-    let rates: Vec<f64> = samples
-        .ms
-        .iter()
-        .map(|ms| total as f64 / ms * 1e-3)
-        .collect();
+    let rate = |ms: &f64| total as f64 / ms * 1e-3;
+    let rates: Vec<f64> = samples.ms.iter().map(rate).collect();
     let equal = hash == first;
     let mut faults: Vec<String> = item.watch.fault().into_iter().collect();
     if !equal && world.probe.is_exact() {
@@ -437,7 +416,7 @@ fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunErr
     session.ledger.failed += 1;
     let record = empty_record(session, cell, reason.clone());
     let name = cell.to_string();
-    let hash = cell_hash(&[("failed", &name), ("reason", &reason)]);
+    let hash = failure_hash(&name, &reason);
     session
         .recorder
         .write(&record.hashed(&hash).with_body(Body::Time))?;

@@ -1,8 +1,9 @@
 //! A scene made ready: loaded, uploaded, judged.
 
-use super::kernels::Device;
+use super::device::Device;
+use super::error::{Fault, RunError};
+use super::options::RunOptions;
 use super::session::Session;
-use super::{Fault, RunError, RunOptions};
 use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;

@@ -18,7 +18,7 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
     let experiment = Experiment::load(&command.path, overrides, &registries.catalogue())?;
     let cells = plan(&experiment, &command.experiment.only, &registries)?;
     let units = registries.measurements.units(&experiment, &cells);
-    let cost = Cost::new(&experiment, &cells, &registries);
+    let cost = Cost::new(&experiment, &cells, &registries.integrators);
     let of = usize::from(command.shards.unwrap_or(1));
     let numbers = shards(&units, of, |unit| cost.seconds_of(unit));
     if command.output.json {

@@ -1,31 +1,31 @@
-//! What the machine makes of what did not change: the movement of control cells, whose kernels, scene, parameters and
-//! counted work are equal on both sides.
+//! Machine drift, measured by the movement of control cells, whose kernels, scene, parameters and counted work are equal
+//! on both sides.
 //!
-//! The model: the logarithm of a cell's ratio is what the change did, plus a deviation of the cell in this pair of runs,
-//! plus the noise of its rounds. Controls show the last two alone. The variance of both together is the mean of the squares
-//! of their logarithms *about zero*: a whole run that went slower counts as much as cells that moved apart, so that drift
-//! widens intervals and shifts none. A cell whose own rounds are noisier than those of controls has that much more.
+//! The model: the logarithm of a cell's ratio is the effect of the change, plus a deviation of the cell in this pair of
+//! runs, plus the noise of its rounds. Controls show the last two alone. The variance of both together is the mean of the
+//! squares of their logarithms *about zero*: a whole run that was slower counts as much as cells that moved apart, so that
+//! drift widens intervals and shifts none. A cell whose own rounds are noisier than those of controls gets that much more.
 
 use crate::format::plural;
 use raystone_stats::interval::Spread;
 
-/// Fewer controls show no drift.
+/// Least number of controls that show drift.
 pub(crate) const LEAST_CONTROLS: usize = 3;
 
-/// So many degrees of freedom at most: deviations have heavier tails than the normal distribution.
+/// Greatest number of degrees of freedom: deviations have heavier tails than the normal distribution.
 const MOST_FREEDOM: f64 = 8.0;
 
-/// The same where both sides were measured in the same rounds, which share what is heaviest.
+/// The same where both sides were measured in the same rounds, which share the heaviest deviations.
 const MOST_FREEDOM_IN_ROUNDS: f64 = 20.0;
 
-/// Where a time belongs to.
+/// The group of a time, within which controls are comparable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// Times of one figure are taken by the same clock of the same kind of work.
+    /// The figure: its times are of the same clock and kind of work.
     pub figure: String,
-    /// Times of one scene are taken in the same rounds.
+    /// The scene: its times are measured in the same rounds.
     pub scene: String,
-    /// By which clock: what one clock makes of noise, another does not.
+    /// The clock: clocks differ in their noise.
     pub clock: &'static str,
 }
 
@@ -33,22 +33,22 @@ pub struct Place {
 #[derive(Debug, Clone, PartialEq)]
 struct Control {
     place: Place,
-    /// Logarithm of the ratio of its times.
+    /// Logarithm of the ratio of the times.
     log: f64,
-    /// What the noise of its rounds makes of the square of that.
+    /// Contribution of the noise of its rounds to the square of `log`.
     rounds: f64,
 }
 
-/// How far controls moved.
+/// The movement of controls.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drift {
     controls: Vec<Control>,
-    /// Whether both sides were measured in the same rounds of one process.
+    /// `true` if both sides were measured in the same rounds of one process.
     in_rounds: bool,
 }
 
 impl Drift {
-    /// Of two sides that were measured in the same rounds of one process, or apart.
+    /// Returns an empty drift of two sides that were measured in the same rounds of one process, or separately.
     pub fn new(in_rounds: bool) -> Self {
         Self {
             controls: Vec::new(),
@@ -56,13 +56,13 @@ impl Drift {
         }
     }
 
-    /// One more control: the logarithm of its ratio, and the variance that its rounds say it has.
+    /// Adds a control: the logarithm of its ratio, and its variance estimated from its rounds.
     pub fn add(&mut self, place: Place, log: f64, rounds: f64) {
         self.controls.push(Control { place, log, rounds });
     }
 
-    /// All noise of a cell whose own rounds have this variance: from the controls of its figure in its rounds, or in all
-    /// rounds, whichever moved more. `None` where there are too few. A control leaves itself out.
+    /// Returns the total noise of a cell whose own rounds have this variance: from the controls of its figure in its rounds,
+    /// or in all rounds, whichever moved more. `None` if there are too few. A control leaves itself out.
     pub fn of(&self, place: &Place, rounds: f64, itself: Option<f64>) -> Option<Spread> {
         let alike = self.controls.iter();
         let of_it = |c: &&Control| (&c.place.figure, c.place.clock) == (&place.figure, place.clock);
@@ -74,19 +74,21 @@ impl Drift {
         }
         let near = alike.iter().copied();
         let near: Vec<&Control> = near.filter(|c| c.place.scene == place.scene).collect();
-        let most = match self.in_rounds {
-            true => MOST_FREEDOM_IN_ROUNDS,
-            false => MOST_FREEDOM,
+        let most = if self.in_rounds {
+            MOST_FREEDOM_IN_ROUNDS
+        } else {
+            MOST_FREEDOM
         };
         let (near, all) = (spread(&near, rounds, most), spread(&alike, rounds, most));
         let variance = |s: &Option<Spread>| s.map_or(-1.0, |s| s.variance);
-        match variance(&near) >= variance(&all) {
-            true => near,
-            false => all,
+        if variance(&near) >= variance(&all) {
+            near
+        } else {
+            all
         }
     }
 
-    /// In words, figure by figure: how far they moved.
+    /// Describes the movement of the controls in words, figure by figure.
     pub fn words(&self) -> Vec<String> {
         let places = self.controls.iter().map(|c| &c.place);
         let places: std::collections::BTreeSet<(&str, &str)> =
@@ -115,7 +117,7 @@ impl Drift {
     }
 }
 
-/// The mean square of the logarithms, and what these rounds have beyond those of controls.
+/// Returns the mean square of the logarithms plus the excess noise of these rounds over those of controls.
 fn spread(controls: &[&Control], own_rounds: f64, most_freedom: f64) -> Option<Spread> {
     let count = controls.len() as f64;
     let square = controls.iter().map(|c| c.log * c.log).sum::<f64>() / count;

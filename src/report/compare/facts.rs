@@ -7,7 +7,7 @@ use raystone_record::figure::{Better, Figure, Shown, Spread};
 use raystone_record::*;
 use raystone_stats::bias::BiasVerdict;
 
-/// Verdicts and hashes.
+/// Returns verdicts and hashes of a run.
 pub(super) fn facts(data: &RunData) -> Vec<Taken> {
     let mut all = Vec::new();
     for scene in &data.scenes {
@@ -63,7 +63,7 @@ fn of_cell(time: &Measured<TimeRecord>) -> Vec<Taken> {
 /// Id of the verdict on bias.
 pub(super) const BIAS: &str = "bias/v1";
 
-/// Id of the fact that an image is: a hash, which may be meant to change.
+/// Id of the fact of an image: a hash, which may change intentionally.
 pub(super) const IMAGE: &str = "image/v1";
 
 fn of_images(sampler: &MeasuredSampler) -> Vec<Taken> {
@@ -105,7 +105,7 @@ fn of_images(sampler: &MeasuredSampler) -> Vec<Taken> {
     all
 }
 
-/// A figure that is a verdict or a hash.
+/// Returns a figure that is a verdict or a hash.
 pub(super) fn fact(
     key: &Key,
     id: &'static str,

@@ -1,4 +1,4 @@
-//! From two pieces of evidence to what can be said of their difference.
+//! Compares two pieces of evidence.
 
 use super::taken::Evidence;
 use raystone_record::Interval;
@@ -8,7 +8,7 @@ use raystone_stats::interval::Spread;
 use raystone_stats::signed_rank::SignedRank;
 use raystone_stats::statistics::{mean, median};
 
-/// What a comparison says of a figure.
+/// The verdict of a comparison on a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -16,20 +16,20 @@ pub enum Verdict {
     Worse,
     /// The noise leaves it open, or there is no comparable figure on the other side.
     Undecided,
-    /// Another value of something that is neither good nor bad.
+    /// A different value of a figure that is neither good nor bad.
     Changed,
     /// Better by more than the effect that counts.
     Better,
     /// Only the candidate has it.
     New,
-    /// Measured once: told and not judged.
+    /// Measured once: shown without a verdict.
     Told,
-    /// Equal, or known to lie within the effect that counts.
+    /// Equal, or within the effect that counts.
     Same,
 }
 
 impl Verdict {
-    /// How it is written.
+    /// Returns the verdict as text.
     pub fn word(self) -> &'static str {
         match self {
             Self::Worse => "worse",
@@ -43,23 +43,23 @@ impl Verdict {
     }
 }
 
-/// Which differences count.
+/// Thresholds of differences that count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effects {
-    /// Part of a time.
+    /// Fraction of a time.
     pub time: f64,
-    /// Part of an error or a discrepancy.
+    /// Fraction of an error or a discrepancy.
     pub error: f64,
-    /// Of exponents, absolute.
+    /// Absolute difference of exponents.
     pub exponent: f64,
-    /// Part of an exact figure; 0: any difference counts.
+    /// Fraction of an exact figure; 0: any difference counts.
     pub exact: f64,
-    /// Whether images may be other ones.
+    /// `true` if images may change.
     pub images: bool,
 }
 
 impl Default for Effects {
-    /// 2 % of times, 0.5 % of errors, 0.02 of exponents, nothing of exact figures and images.
+    /// Returns 2 % of times, 0.5 % of errors, 0.02 of exponents, no tolerance of exact figures and images.
     fn default() -> Self {
         Self {
             time: 0.02,
@@ -71,26 +71,25 @@ impl Default for Effects {
     }
 }
 
-/// A difference that is known with some noise. It is positive where the figure's value grew: relative for all
-/// but exponents.
+/// A noisy difference, positive where the figure's value grew; relative for all figures but exponents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// The difference with its 95 % interval.
     pub change: Interval,
-    /// Two-sided p-value of the hypothesis that there is none.
+    /// Two-sided p-value of the hypothesis of no difference.
     pub p: f64,
     /// The effect that counts.
     pub margin: f64,
-    /// What the interval follows from.
+    /// The method of the interval.
     pub how: &'static str,
 }
 
-/// What two pieces of evidence say.
+/// The result of comparing two pieces of evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// A verdict that needs no statistics, with the reason.
     Known(Verdict, String),
-    /// A verdict that needs the p-values of all others first.
+    /// A difference whose verdict needs the p-values of all others first.
     Tested(Measured),
 }
 
@@ -98,7 +97,7 @@ fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
     Outcome::Known(verdict, why.into())
 }
 
-/// Compares everything but times: what they need beside the samples is in [`TimeRatio`].
+/// Compares all figures but times, which need more than the samples: see [`TimeRatio`].
 pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -> Outcome {
     match (a, b) {
         (Evidence::Exact(a), Evidence::Exact(b)) => exact(figure, *a, *b, effects),
@@ -131,7 +130,7 @@ pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -
     }
 }
 
-/// Whether more of a figure is worse (1), better (−1), or neither (0).
+/// Returns 1 if more of a figure is worse, −1 if it is better, 0 if neither.
 fn badness(figure: &Figure) -> f64 {
     match figure.better {
         Better::Lower => 1.0,
@@ -140,7 +139,7 @@ fn badness(figure: &Figure) -> f64 {
     }
 }
 
-/// Worse, better or changed, for a difference of this sign.
+/// Returns worse, better or changed, for a difference of this sign.
 pub(crate) fn direction(figure: &Figure, change: f64) -> Verdict {
     match badness(figure) * change {
         x if x > 0.0 => Verdict::Worse,
@@ -149,7 +148,7 @@ pub(crate) fn direction(figure: &Figure, change: f64) -> Verdict {
     }
 }
 
-/// Shares of rays that hit: the one figure that ranks nothing and may not change.
+/// Shares of rays that hit: the only figure that ranks nothing and may not change.
 const HITS: &Figure = &figure::HIT_SHARE;
 
 fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
@@ -163,9 +162,10 @@ fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if part.abs() <= effects.exact {
         return known(Verdict::Same, "within what --exact allows");
     }
-    match figure.id == HITS.id {
-        true => known(Verdict::Worse, "other rays hit"),
-        false => known(direction(figure, b - a), "exact"),
+    if figure.id == HITS.id {
+        known(Verdict::Worse, "other rays hit")
+    } else {
+        known(direction(figure, b - a), "exact")
     }
 }
 
@@ -178,7 +178,7 @@ fn facts(a: &str, b: &str, fails: [bool; 2]) -> Outcome {
     }
 }
 
-/// The effect that counts, and whether differences of the figure are relative.
+/// Returns the effect that counts, and `true` if differences of the figure are relative.
 fn margin_of(figure: &Figure, effects: &Effects) -> (f64, bool) {
     match figure.shown {
         Shown::Exponent => (effects.exponent, false),
@@ -186,7 +186,7 @@ fn margin_of(figure: &Figure, effects: &Effects) -> (f64, bool) {
     }
 }
 
-/// Values by seed. With the same seeds and the same reference pairs are tested, else two samples.
+/// Compares values by seed: as pairs if seeds and reference are the same, otherwise as two samples.
 fn seeds(
     figure: &Figure,
     a: &[(u32, f64)],
@@ -259,7 +259,7 @@ fn two_samples(old: &[f64], new: &[f64], unit: f64, margin: f64, same_reference:
     ))
 }
 
-/// Intervals whose samples are not kept, of about Student's distribution.
+/// Compares intervals recorded without samples, as approximately Student's distribution.
 fn summaries(
     figure: &Figure,
     a: (Interval, f64),
@@ -282,7 +282,7 @@ fn summaries(
     Outcome::Tested(student(gap, together, margin, "two intervals"))
 }
 
-/// Student's test and interval.
+/// Returns Student's test and interval.
 fn student(gap: f64, spread: Spread, margin: f64, how: &'static str) -> Measured {
     Measured {
         change: spread.interval(gap),
@@ -292,7 +292,7 @@ fn student(gap: f64, spread: Spread, margin: f64, how: &'static str) -> Measured
     }
 }
 
-/// What stands for a clock where two programs were run in turns.
+/// The name used instead of a clock where two programs alternated.
 pub const IN_TURNS: &str = "processes in turns";
 
 /// Logarithm of the ratio of two times, with the noise of their rounds.
@@ -300,17 +300,17 @@ pub const IN_TURNS: &str = "processes in turns";
 pub struct TimeRatio {
     /// Natural logarithm of candidate over base.
     pub log: f64,
-    /// What the rounds say of its noise.
+    /// Its noise, estimated from the rounds.
     pub rounds: Spread,
-    /// Logarithm for each round, where both were measured in the same ones.
+    /// Logarithm for each round, if both were measured in the same rounds.
     pub by_round: Vec<f64>,
-    /// By which clock, in words.
+    /// The clock, in words.
     pub clock: &'static str,
 }
 
 impl TimeRatio {
-    /// Of the times of two cells. Rounds are paired if both were measured in the same ones, in which so many compilations of each
-    /// side took turns.
+    /// Returns the ratio of the times of two cells. Rounds are paired if both were measured in the same ones, over which
+    /// `compilations` compilations of each side alternated.
     pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool, compilations: usize) -> Option<Self> {
         let (
             Evidence::Times {
@@ -325,13 +325,14 @@ impl TimeRatio {
         else {
             return None;
         };
-        let (a, b, clock) = match c.is_empty() || d.is_empty() {
-            true => (a, b, "adapter time"),
-            false => (
+        let (a, b, clock) = if c.is_empty() || d.is_empty() {
+            (a, b, "adapter time")
+        } else {
+            (
                 c,
                 d,
                 "processor time (the values are by the adapter's clock)",
-            ),
+            )
         };
         if in_rounds && a.len() == b.len() {
             let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
@@ -348,7 +349,7 @@ impl TimeRatio {
         })
     }
 
-    /// Of the ratios of both in the same rounds.
+    /// Returns the ratio from the ratios of each round.
     pub fn of_rounds(ratios: &[f64], clock: &'static str) -> Option<Self> {
         let figure = LogFigure::of_times(ratios)?;
         Some(Self {
@@ -359,8 +360,8 @@ impl TimeRatio {
         })
     }
 
-    /// Where each side was compiled so often, and round r is of compilation r modulo that: rounds of one compilation share what its
-    /// code has by chance, so that as many compilations, not rounds, may be all that is known of the noise.
+    /// Accounts for `count` compilations of each side, where round r uses compilation r modulo `count`: rounds of one
+    /// compilation share the random properties of its code, so that the compilations, not the rounds, may be the observations.
     fn of_compilations(mut self, count: usize) -> Self {
         let of = |k: usize| {
             let rounds = self.by_round.iter().skip(k).step_by(count.max(1));
@@ -374,8 +375,8 @@ impl TimeRatio {
         self
     }
 
-    /// The difference of a figure, given the noise of what did not change; without it that of the rounds. Rounds of both
-    /// together also have to pass the permutation test.
+    /// Returns the difference of a figure, given the noise of controls, or that of the rounds without it. Paired rounds also
+    /// have to pass the permutation test.
     pub fn measured(&self, figure: &Figure, noise: Option<Spread>, margin: f64) -> Measured {
         let spread = noise.unwrap_or(self.rounds);
         let how = match (self.by_round.is_empty(), noise.is_some()) {
@@ -389,7 +390,7 @@ impl TimeRatio {
             let p = test.map_or(1.0, |test| test.p());
             measured.p = measured.p.max(p);
         }
-        // Of a rate it is the inverse.
+        // A rate changes by the inverse.
         let Interval { value, low, high } = measured.change;
         let [value, low, high] = match figure.better {
             Better::Higher => [-value, -high, -low],

@@ -1,8 +1,8 @@
-//! The honest comparison of two sets of records: per cell and figure whether the candidate is better, worse or the same,
-//! or whether the noise leaves it open. `docs/compare.md` has the rules.
+//! Compares two sets of records: per cell and figure the candidate is better, worse, the same, or undecided because of
+//! noise. `docs/compare.md` has the rules.
 //!
 //! Data flows one way: [`side`] reads, [`taken`] finds the evidence behind each figure, [`judge`] compares two pieces of it,
-//! [`drift`] knows what the machine makes of what did not change, this module corrects for the number of tests and gives
+//! [`drift`] estimates the machine's drift from unchanged cells, this module corrects for the number of tests and gives
 //! verdicts, and [`show`] writes them.
 
 pub mod drift;
@@ -21,15 +21,15 @@ use side::Side;
 use std::collections::BTreeMap;
 use work::Work;
 
-/// How to compare.
+/// Options of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Bound on the share of false alarms among the alarms (Benjamini and Hochberg), and so on the chance of any where
+    /// Bound on the share of false alarms among the alarms (Benjamini and Hochberg), and so on the chance of any alarm where
     /// nothing differs.
     pub alpha: f64,
-    /// Which differences count.
+    /// Thresholds of differences that count.
     pub effects: Effects,
-    /// Whether times decide; else they are told.
+    /// `true` if times decide; otherwise they are only shown.
     pub judge_times: bool,
 }
 
@@ -43,48 +43,48 @@ impl Default for Options {
     }
 }
 
-/// What was found of one figure of one cell.
+/// The finding on one figure of one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// What it is of.
+    /// The cell.
     pub key: Key,
     /// The figure.
     pub figure: Figure,
-    /// What base and candidate say; `None` where one has no such figure.
+    /// Values of base and candidate as text; `None` where one lacks the figure.
     pub shown: [Option<String>; 2],
-    /// The difference with its 95 % interval, where it has one.
+    /// The difference with its 95 % interval, if it has one.
     pub measured: Option<Measured>,
-    /// The part by which an exact figure changed.
+    /// The fraction by which an exact figure changed.
     pub exact_change: Option<f64>,
-    /// What is said of it.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Why, in words; empty where that is plain.
+    /// The reason in words; empty if it is obvious.
     pub why: String,
-    /// Whether it is a time.
+    /// `true` for a time.
     pub is_time: bool,
-    /// Whether kernels and work are equal on both sides, so that it shows what the machine does.
+    /// `true` if kernels and work are equal on both sides, so that it shows the machine's drift.
     pub is_control: bool,
-    /// Whether it is a time of two runs that grew by more than the effect that counts, however uncertain.
+    /// `true` for a time of two runs that grew by more than the effect that counts, however uncertain.
     pub looks_worse: bool,
 }
 
-/// Everything that a comparison found.
+/// The result of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// What base and candidate are called.
+    /// Names of base and candidate.
     pub names: [String; 2],
     /// Figure by figure, the worst verdicts first.
     pub findings: Vec<Finding>,
-    /// What a reader must know first: refused times, cut lines, drift.
+    /// Notes to read first: refused times, cut lines, drift.
     pub notes: Vec<String>,
-    /// How many differences were tested together.
+    /// Number of differences tested together.
     pub tests: usize,
-    /// What is said with: see [`Options::alpha`].
+    /// The level: see [`Options::alpha`].
     pub alpha: f64,
 }
 
 impl Comparison {
-    /// How many findings have this verdict.
+    /// Returns the number of findings with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.findings
             .iter()
@@ -92,13 +92,13 @@ impl Comparison {
             .count()
     }
 
-    /// Times of two runs that look worse and are not known to be the same.
+    /// Returns times of two runs that look worse and are not known to be the same.
     pub fn suspects(&self) -> impl Iterator<Item = &Finding> {
         let open = |f: &&Finding| matches!(f.verdict, Verdict::Worse | Verdict::Undecided);
         self.findings.iter().filter(|f| f.looks_worse).filter(open)
     }
 
-    /// Says of times that look worse why nothing confirms them.
+    /// Adds the reason why times that look worse were not confirmed.
     pub fn not_confirmed(&mut self, why: &str) {
         for finding in self
             .findings
@@ -113,7 +113,7 @@ impl Comparison {
         }
     }
 
-    /// What all findings say together: worse, undecided, better or same.
+    /// Returns the verdict of all findings together: worse, undecided, better or same.
     pub fn verdict(&self) -> Verdict {
         let decisive = [Verdict::Worse, Verdict::Undecided, Verdict::Better];
         let found = decisive.into_iter().find(|v| self.count(*v) > 0);
@@ -121,7 +121,7 @@ impl Comparison {
     }
 }
 
-/// What tells a figure of a cell from all others: labels of the cell, id of the figure.
+/// Identifies a figure of a cell: labels of the cell, id of the figure.
 pub type Identity = (String, String);
 
 /// Times measured again, side by side.

@@ -1,4 +1,4 @@
-//! A comparison as text: for a terminal of some width, as Markdown for a pull request, as JSON.
+//! A comparison as text: for a terminal, as Markdown for a pull request, as JSON.
 
 use super::judge::Verdict;
 use super::{Comparison, Finding};
@@ -11,20 +11,20 @@ use raystone_record::{Interval, axis};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
-/// Rows of the short table of a comment.
+/// Greatest number of rows in the short table of a comment.
 const MOST_ROWS: usize = 20;
-/// Findings that stay open for the same reason are listed up to this many.
+/// Greatest number of listed findings that are undecided for the same reason.
 const MOST_ALIKE: usize = 4;
-/// A comment of GitHub has 65,536 characters at most.
+/// GitHub's limit of 65,536 characters per comment.
 const MOST_OF_COMMENT: usize = 65_536;
-/// What of it the verdict and each note may take.
+/// Greatest length of the verdict and of each note in a comment.
 const MOST_OF_LINE: usize = 2_000;
-/// What is kept for lines that say how much was cut, and for the mark by which continuous integration finds its comment.
+/// Reserve for lines that count what was cut, and for the mark by which continuous integration finds its comment.
 const RESERVE: usize = 1_000;
-/// Texts of facts are cut to so many characters; the records have them whole.
+/// Greatest number of characters of a fact's text; the records have it whole.
 const MOST_CHARACTERS: usize = 40;
 
-/// Verdicts that a reader looks at first, in this order.
+/// Verdicts listed first, in this order.
 const NOTABLE: [Verdict; 5] = [
     Verdict::Worse,
     Verdict::Undecided,
@@ -33,7 +33,7 @@ const NOTABLE: [Verdict; 5] = [
     Verdict::New,
 ];
 
-/// One sentence: what it comes to.
+/// Returns the overall verdict as one sentence.
 pub fn verdict_line(comparison: &Comparison) -> String {
     let word = match comparison.verdict() {
         Verdict::Worse => "WORSE",
@@ -56,7 +56,7 @@ pub fn verdict_line(comparison: &Comparison) -> String {
     format!("{word}: {candidate} against {base}: {}", counts.join(", "))
 }
 
-/// Axes on which the findings differ: what all share need not be named each time.
+/// Returns the axes on which the findings differ: shared labels need not be named each time.
 fn varied(comparison: &Comparison) -> BTreeSet<String> {
     let mut first = std::collections::BTreeMap::new();
     let mut varied = BTreeSet::new();
@@ -65,12 +65,12 @@ fn varied(comparison: &Comparison) -> BTreeSet<String> {
             varied.insert(axis.to_owned());
         }
     }
-    // What is measured of several things is named by one of them even if it is the only one.
+    // These axes are named even if they have only one label.
     varied.extend([axis::ACCEL, axis::SEQUENCE, axis::RAYS, axis::SUBJECT].map(str::to_owned));
     varied
 }
 
-/// The cell in words.
+/// Returns the cell in words.
 fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
     let known = finding
         .key
@@ -89,7 +89,7 @@ fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
     words.collect::<Vec<_>>().join(", ")
 }
 
-/// The difference with its interval, in the figure's own direction.
+/// Returns the difference with its interval, in the figure's own direction.
 pub(crate) fn change(finding: &Finding) -> String {
     let Some(measured) = finding.measured else {
         return exact_change(finding).unwrap_or_default();
@@ -116,7 +116,7 @@ pub(crate) fn change(finding: &Finding) -> String {
     )
 }
 
-/// The part by which an exact figure changed, where both are plain numbers.
+/// Returns the fraction by which an exact figure changed, where both are plain numbers.
 fn exact_change(finding: &Finding) -> Option<String> {
     let change = finding.exact_change?;
     let text = match change.abs() {
@@ -134,7 +134,7 @@ fn values(finding: &Finding) -> String {
     format!("{old} → {new}")
 }
 
-/// Those of a verdict, and how many others were left out because they stay open for the same reason.
+/// Returns the findings of a verdict, and the numbers of those left out because they are undecided for the same reason.
 fn listed(comparison: &Comparison, verdict: Verdict) -> (Vec<&Finding>, Vec<(String, usize)>) {
     let mut seen = std::collections::BTreeMap::<&str, usize>::new();
     let mut kept = Vec::new();
@@ -165,7 +165,7 @@ fn listed(comparison: &Comparison, verdict: Verdict) -> (Vec<&Finding>, Vec<(Str
     )
 }
 
-/// What changed first, as a table; the verdict comes last, where a terminal ends.
+/// Returns the text for a terminal: a table of changes first, the verdict last, where it stays visible.
 pub fn terminal(comparison: &Comparison, screen: Screen) -> String {
     let (table, reasons, more) = changes(comparison);
     let notes = comparison.notes.iter().map(|note| format!("note: {note}"));
@@ -183,7 +183,7 @@ pub fn terminal(comparison: &Comparison, screen: Screen) -> String {
     out + &screen.lines(&verdict_line(comparison))
 }
 
-/// What is not the same, the numbered reasons that its last column names, and what was left out as alike.
+/// Returns the table of findings that are not the same, the numbered reasons of its last column, and notes on omissions.
 fn changes(comparison: &Comparison) -> (Table, Vec<&str>, Vec<String>) {
     let varied = varied(comparison);
     let mut table = Table::new(
@@ -233,7 +233,7 @@ fn tone(verdict: Verdict) -> Tone {
     }
 }
 
-/// How many differences were tested, and what the verdicts are worth.
+/// Describes the number of tests and the error rate of the verdicts.
 fn of_tests(comparison: &Comparison) -> String {
     format!(
         "{} tested together; of those called better or worse at most {} is expected to be false.",
@@ -242,19 +242,18 @@ fn of_tests(comparison: &Comparison) -> String {
     )
 }
 
-/// A text of at most [`MOST_CHARACTERS`].
+/// Shortens a text to [`MOST_CHARACTERS`].
 fn shortened(text: &str) -> String {
-    match text.chars().count() > MOST_CHARACTERS {
-        true => {
-            let kept = text.chars().take(MOST_CHARACTERS - 1);
-            kept.chain(['…']).collect()
-        }
-        false => text.to_owned(),
+    if text.chars().count() > MOST_CHARACTERS {
+        let kept = text.chars().take(MOST_CHARACTERS - 1);
+        kept.chain(['…']).collect()
+    } else {
+        text.to_owned()
     }
 }
 
-/// As a comment: a line of verdict, a short table, everything else folded. Where that is more than a comment may hold, the rows at the
-/// end go, those that are the same first, and then notes; what went is counted.
+/// Returns a comment: a line with the verdict, a short table, everything else folded. Beyond the limit of a comment, rows
+/// at the end are cut, those that are the same first, and then notes; the text counts what was cut.
 pub fn markdown(comparison: &Comparison) -> String {
     let sign = match comparison.verdict() {
         Verdict::Worse => "❌",
@@ -275,7 +274,7 @@ pub fn markdown(comparison: &Comparison) -> String {
         )
     };
     let mut first: Vec<&Finding> = comparison.findings.iter().filter(decisive).collect();
-    // What is worse comes before what else was decided, in the order of the findings.
+    // Worse findings come before the others, in the order of the findings.
     first.sort_by_key(|f| f.verdict != Verdict::Worse);
     let table = comment.rows(&first[..first.len().min(MOST_ROWS)]);
     comment.notes(&comparison.notes);
@@ -302,13 +301,13 @@ pub fn markdown(comparison: &Comparison) -> String {
     comment.text + &end
 }
 
-/// A text in one line, no longer than that may be.
+/// Returns a text in one line, shortened to the limit of a line.
 fn line(text: &str) -> String {
     let whole = escaped(text);
     if whole.len() <= MOST_OF_LINE {
         return whole;
     }
-    // No character takes more bytes than its number.
+    // The longest escape of a character.
     let longest = escaped("\u{202e}").len();
     let kept: String = text.chars().take(MOST_OF_LINE / longest).collect();
     escaped(&kept) + "…"
@@ -318,21 +317,21 @@ fn line(text: &str) -> String {
 struct Comment {
     varied: BTreeSet<String>,
     text: String,
-    /// Bytes that it may still take.
+    /// Remaining bytes.
     left: usize,
 }
 
 const HEAD: &str = "\n| verdict | cell | figure | base → candidate | change [95 %] | why |\n|:---|:---|:---|:---|:---|:---|\n";
 
 impl Comment {
-    /// Takes the room of a text, if there is so much.
+    /// Reserves room for a text; `false` if there is too little.
     fn takes(&mut self, text: &str) -> bool {
         let left = self.left.checked_sub(text.len());
         self.left = left.unwrap_or(self.left);
         left.is_some()
     }
 
-    /// The first of these notes for which there is room.
+    /// Adds as many of these notes as there is room for.
     fn notes(&mut self, notes: &[String]) {
         for (index, note) in notes.iter().enumerate() {
             let text = format!("\n> {}\n", line(note));
@@ -344,7 +343,7 @@ impl Comment {
         }
     }
 
-    /// The rows of the first of these findings, as many as there is room for.
+    /// Returns rows of as many of these findings as there is room for.
     fn rows(&mut self, findings: &[&Finding]) -> Vec<String> {
         if findings.is_empty() || !self.takes(HEAD) {
             return Vec::new();
@@ -364,7 +363,7 @@ impl Comment {
         rows.into_iter().take_while(|row| self.takes(row)).collect()
     }
 
-    /// Writes rows below their head: how many.
+    /// Writes rows below their head and returns their number.
     fn table(&mut self, rows: Vec<String>) -> usize {
         if !rows.is_empty() {
             self.text += HEAD;
@@ -380,9 +379,10 @@ impl Comment {
         if findings.is_empty() {
             return;
         }
-        let rows = match self.takes(&open) && self.takes(close) {
-            true => self.rows(findings),
-            false => Vec::new(),
+        let rows = if self.takes(&open) && self.takes(close) {
+            self.rows(findings)
+        } else {
+            Vec::new()
         };
         let more = match count - rows.len() {
             0 => String::new(),
@@ -398,7 +398,7 @@ impl Comment {
     }
 }
 
-/// For other programs.
+/// Returns the comparison as JSON for other programs.
 pub fn json(comparison: &Comparison) -> Value {
     let finding = |f: &Finding| {
         let key: serde_json::Map<String, Value> = f
@@ -406,7 +406,7 @@ pub fn json(comparison: &Comparison) -> Value {
             .labels()
             .map(|(axis, label)| (axis.to_owned(), label.into()))
             .collect();
-        // Without bounds there is no number in JSON.
+        // JSON has no infinite numbers.
         let finite = |x: f64| x.is_finite().then_some(x);
         json!({
             "key": key,

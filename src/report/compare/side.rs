@@ -1,10 +1,10 @@
-//! The two sides of a comparison: where their records come from, and what must be known of them before.
+//! The two sides of a comparison: their records and the notes on them.
 
 use raystone_record::Environment;
 use raystone_record::*;
 use std::path::{Path, PathBuf};
 
-/// Why there is nothing to compare. Each is bad input.
+/// Input that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum SideError {
     /// The records cannot be read.
@@ -16,51 +16,52 @@ pub enum SideError {
         path.display(), if *unfinished { "; its run did not end: name its folder `partial` to compare what it had measured" } else { "" }
     )]
     NoRecords {
-        /// What was given.
+        /// The path given.
         path: PathBuf,
-        /// Whether a run was killed there.
+        /// `true` if a run was killed there.
         unfinished: bool,
     },
-    /// One run was given, which has not two sets of kernels to compare.
+    /// A single run was given that lacks two sets of kernels to compare.
     #[error("{name} holds the kernels {}: {wanted}", listed(found))]
     Kernels {
         /// The run.
         name: String,
         /// Labels of its kernels.
         found: Vec<String>,
-        /// What is missing.
+        /// The missing part.
         wanted: String,
     },
 }
 
 fn listed(labels: &[String]) -> String {
-    match labels.is_empty() {
-        true => "of no cell".into(),
-        false => labels.join(", "),
+    if labels.is_empty() {
+        "of no cell".into()
+    } else {
+        labels.join(", ")
     }
 }
 
-/// What the kernels of the program are called beside folders of them.
+/// The name of the program's own kernels, as opposed to folders.
 pub const EMBEDDED: &str = "embedded";
 
 /// One side: the records of a run, or of one set of kernels in it.
 #[derive(Debug, Clone)]
 pub struct Side {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its records.
     pub lines: Vec<Line>,
-    /// What a reader must know of them: lines cut off, other versions.
+    /// Notes on the records: lines cut off, other versions.
     pub notes: Vec<String>,
-    /// Whether the other side was measured in the same rounds, so that times of one round belong together.
+    /// `true` if the other side was measured in the same rounds, so that times of one round belong together.
     pub in_rounds: bool,
 }
 
 impl Side {
-    /// Reads a file of records, or that of a folder.
+    /// Reads a file of records, or the one in a folder.
     ///
     /// # Errors
-    /// There is none, or it holds something else than records.
+    /// If there is none, or it is not a file of records.
     pub fn read(path: &Path) -> Result<Self, SideError> {
         let file = if path.is_dir() {
             records_file(path)
@@ -84,7 +85,7 @@ impl Side {
         Ok(Self::new(path.display(), records.lines, notes))
     }
 
-    /// Records that are at hand.
+    /// Returns a side of the given records.
     pub fn new(name: impl ToString, lines: Vec<Line>, mut notes: Vec<String>) -> Self {
         let ended = |line: &Line| matches!(line.body, Body::Finished(_));
         if !lines.iter().any(ended) {
@@ -98,18 +99,18 @@ impl Side {
         }
     }
 
-    /// How often every timed kernel was compiled.
+    /// Returns the number of compilations of every timed kernel.
     pub fn compilations(&self) -> usize {
         let runs = all_of::<RunRecord>(&self.lines).map(|run| run.body.compilations);
         runs.min().unwrap_or(1)
     }
 
-    /// Where it was measured; several where runs were merged.
+    /// Returns the environments of the measurements; several if runs were merged.
     pub(crate) fn environments(&self) -> impl Iterator<Item = &Environment> {
         all_of::<RunRecord>(&self.lines).map(|run| &run.body.environment)
     }
 
-    /// Labels of the kernels of its cells, in the order in which they first appear.
+    /// Returns the labels of the kernels of its cells, in order of first appearance.
     pub fn kernels(&self) -> Vec<String> {
         let mut labels: Vec<String> = Vec::new();
         let of_cells = self.lines.iter().filter(|line| is_of_kernels(&line.body));
@@ -122,10 +123,10 @@ impl Side {
         labels
     }
 
-    /// The two sides that one run holds: by these labels of kernels, or by the only two that there are.
+    /// Returns the two sides of one run: by these labels of kernels, or by the only two present.
     ///
     /// # Errors
-    /// It does not hold these, or not two.
+    /// If it does not hold these labels, or not exactly two.
     pub fn of_kernels(&self, labels: Option<[&str; 2]>) -> Result<[Self; 2], SideError> {
         let found = self.kernels();
         let error = |wanted: String| SideError::Kernels {
@@ -156,8 +157,8 @@ impl Side {
         Ok(labels.map(|label| self.part(&label)))
     }
 
-    /// The side without the axis of kernels, if all its cells have the same: two runs with other kernels each are compared
-    /// cell by cell.
+    /// Returns the side without the axis of kernels if all its cells have the same kernels, so that two runs with different
+    /// kernels can be compared cell by cell.
     #[must_use]
     pub fn alone(self) -> Self {
         match &self.kernels()[..] {
@@ -170,7 +171,7 @@ impl Side {
         }
     }
 
-    /// The records of these kernels and those that all kernels share, as if there were no such axis.
+    /// Returns the records of these kernels and those that all kernels share, without the axis of kernels.
     fn part(&self, wanted: &str) -> Self {
         let kept = self.lines.iter().filter_map(|line| {
             let mut line = line.clone();
@@ -193,7 +194,7 @@ impl Side {
     }
 }
 
-/// A cell in words (`box, bvh, @idea`) without these kernels; `None` if it is of others.
+/// Returns a cell in words (`box, bvh, @idea`) without these kernels; `None` if it belongs to others.
 fn without_kernels(cell: &str, kernels: &str) -> Option<String> {
     let mark = format!("@{kernels}");
     let mut parts: Vec<&str> = cell.split(", ").collect();
@@ -210,7 +211,7 @@ fn label(key: &Key) -> &str {
     }
 }
 
-/// Whether a record is of some kernels, and not of the run, a scene or a cell in words.
+/// Returns `true` if a record belongs to a set of kernels, and not to the run, a scene or a cell in words.
 fn is_of_kernels(body: &Body) -> bool {
     !matches!(
         body,
@@ -228,15 +229,16 @@ fn is_of_kernels(body: &Body) -> bool {
     )
 }
 
-/// By which clock the times of a run were taken.
+/// Returns the name of the clock of a run's times.
 fn clock(environment: &Environment) -> &'static str {
-    match environment.timestamps {
-        true => "timestamps of the device",
-        false => "the wall",
+    if environment.timestamps {
+        "timestamps of the device"
+    } else {
+        "the wall"
     }
 }
 
-/// What of two environments makes their times no measure of a change: name, and both values.
+/// Returns the differences of two environments that make their times incomparable: name, and both values.
 pub fn differences(a: &Environment, b: &Environment) -> Vec<(&'static str, String, String)> {
     let texts = |e: &Environment| {
         [

@@ -3,10 +3,10 @@
 use super::Identity;
 use super::facts::{BIAS, IMAGE, fact, facts};
 use super::side::Side;
-use crate::data::{RunData, SceneGroup, View};
+use crate::data::{RunData, View};
+use crate::failed_checks;
 use crate::samplers::{FURTHER_METRICS, MeasuredSampler, Metric};
 use crate::values::{Reading, Value, values};
-use crate::{failed_checks, format};
 use raystone_record::figure::{self, Better, Figure, Spread};
 use raystone_record::*;
 use raystone_stats::statistics::{log_log_fit, mean};
@@ -67,9 +67,13 @@ pub struct Taken {
 impl Taken {
     /// What tells it from all others: labels, since programs of different versions may know different parameters.
     pub fn identity(&self) -> Identity {
-        let labels: Vec<String> = self.key.labels().map(|(a, l)| format!("{a}={l}")).collect();
-        (labels.join("\u{1}"), self.figure.id.to_string())
+        identity(&self.key, &self.figure)
     }
+}
+
+fn identity(key: &Key, figure: &Figure) -> Identity {
+    let labels: Vec<String> = key.labels().map(|(a, l)| format!("{a}={l}")).collect();
+    (labels.join("\u{1}"), figure.id.to_string())
 }
 
 /// Figures that follow from others, or hold times beside what they are of: they are told by reports and decide nothing.
@@ -220,11 +224,11 @@ fn is_a_chance(taken: &Taken) -> bool {
 
 fn of_lines(lines: &[Line]) -> Vec<Taken> {
     let data = RunData::new(lines);
-    let raw = raw(&data);
+    let of_seeds = of_samplers(&data);
     let mut all: Vec<Taken> = values(&data)
         .into_iter()
         .filter(|value| !is_derived(&value.figure.id))
-        .filter_map(|value| of_value(&data, &raw, &value))
+        .filter_map(|value| of_value(&data, &of_seeds, &value))
         .collect();
     all.extend(facts(&data));
     let failed = failed_checks(lines).into_iter();
@@ -243,9 +247,10 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
     all
 }
 
-type Raw = BTreeMap<Identity, Taken>;
+/// Values seed by seed, and the work that they are of.
+type Seeds = BTreeMap<Identity, (Evidence, String)>;
 
-fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
+fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
     let number = match value.reading {
         Reading::Known(interval) | Reading::HeavyTailed(interval) => interval,
         Reading::Below(bound) => Interval {
@@ -259,32 +264,48 @@ fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
         key: value.key.clone(),
         figure: value.figure.clone().into_owned(),
         shown: value.cell().text,
-        evidence: match value.figure.spread {
-            Spread::Exact => Evidence::Exact(number.value),
-            Spread::Single => Evidence::Once(number.value),
-            // Times whose rounds are not kept.
-            Spread::Median => Evidence::Once(number.value),
-            Spread::Mean | Spread::Jackknife => of_means(data, value, number),
-        },
-        work: scene_hash(data, &value.key),
+        evidence: evidence(data, value, number),
+        work: scene_hash(data, &value.key) + &value.source.work,
         seed: None,
-        kernel: String::new(),
+        kernel: value.source.kernel.to_owned(),
     };
-    let (cell, id) = own.identity();
-    // Counters are of the rays that were timed.
-    let of_rays = raw.get(&(cell.clone(), figure::MRAYS_PER_S.id.to_string()));
-    let sampled = raw.get(&(cell, id));
     // Seeds that have missed the pixel that decides agree with each other by that: with one degree of freedom, what differs is undecided.
     if value.is_heavy_tailed() {
         own.evidence = Evidence::Summary(number, 1.0);
-    } else if let Some(sampled) = sampled {
-        own.evidence = sampled.evidence.clone();
     }
-    if let Some(sampled) = sampled.or(of_rays) {
-        own.work += &sampled.work;
-        own.kernel.clone_from(&sampled.kernel);
+    if let Some((evidence, work)) = of_seeds.get(&own.identity()) {
+        if !value.is_heavy_tailed() {
+            own.evidence = evidence.clone();
+        }
+        own.work += work;
     }
     Some(own)
+}
+
+/// What a value rests on by itself.
+fn evidence(data: &RunData, value: &Value, number: Interval) -> Evidence {
+    if let Samples::Rounds {
+        adapter,
+        processors,
+        ..
+    } = &value.source.samples
+    {
+        // A rate is compared by the time that each round took.
+        let times = |values: &[f64]| match value.figure.better {
+            Better::Higher => values.iter().map(|rate| rate.recip()).collect(),
+            _ => values.to_vec(),
+        };
+        return Evidence::Times {
+            adapter: times(adapter),
+            processors: times(processors),
+        };
+    }
+    match value.figure.spread {
+        Spread::Exact => Evidence::Exact(number.value),
+        // Of a median the rounds are not kept.
+        Spread::Single | Spread::Median => Evidence::Once(number.value),
+        Spread::Mean | Spread::Jackknife => of_means(data, value, number),
+    }
 }
 
 /// Means over seeds whose values are not kept. What no seed changes is exact.
@@ -318,106 +339,15 @@ fn scene_hash(data: &RunData, key: &Key) -> String {
     record.map_or(String::new(), |r| format!("scene {}; ", r.scene_hash))
 }
 
-/// Raw samples by identity.
-fn raw(data: &RunData) -> Raw {
-    let mut all = Vec::new();
-    for scene in &data.scenes {
-        all.extend(of_structures(scene));
-        for view in &scene.views {
-            all.extend(of_times(view));
-            all.extend(view.samplers.iter().flat_map(|s| of_sampler(view, s)));
-        }
-    }
-    all.extend(
-        data.measured
-            .iter()
-            .flat_map(|cell| of_readings(data, cell)),
-    );
-    all.into_iter().map(|t| (t.identity(), t)).collect()
+/// Errors of all samplers, seed by seed.
+fn of_samplers(data: &RunData) -> Seeds {
+    let views = data.views();
+    views
+        .flat_map(|(_, view)| view.samplers.iter().flat_map(move |s| of_sampler(view, s)))
+        .collect()
 }
 
-fn sample(key: &Key, figure: &Figure, evidence: Evidence, work: String, kernel: &str) -> Taken {
-    Taken {
-        key: key.clone(),
-        figure: figure.clone(),
-        shown: String::new(),
-        evidence,
-        work,
-        seed: None,
-        kernel: kernel.to_owned(),
-    }
-}
-
-/// Readings that were timed in rounds.
-fn of_readings(data: &RunData, cell: &Recorded<MeasuredRecord>) -> Vec<Taken> {
-    let of_one = |reading: &raystone_record::Reading| {
-        let Samples::Rounds {
-            adapter,
-            processors,
-            ..
-        } = &reading.samples
-        else {
-            return None;
-        };
-        let figure = data.figure(&reading.figure).into_owned();
-        // A rate is compared by the time that each round took.
-        let times = |values: &[f64]| match figure.better {
-            Better::Higher => values.iter().map(|rate| rate.recip()).collect(),
-            _ => values.to_vec(),
-        };
-        Some(Taken {
-            key: cell.key.clone().beside(&reading.at),
-            evidence: Evidence::Times {
-                adapter: times(adapter),
-                processors: times(processors),
-            },
-            figure,
-            shown: String::new(),
-            work: reading.work.clone(),
-            seed: None,
-            kernel: cell.ran.kernel_hash.clone(),
-        })
-    };
-    cell.readings.iter().filter_map(of_one).collect()
-}
-
-fn times(ms: &[f64], cpu_ms: &[f64]) -> Evidence {
-    Evidence::Times {
-        adapter: ms.to_vec(),
-        processors: cpu_ms.to_vec(),
-    }
-}
-
-fn of_structures(scene: &SceneGroup) -> Vec<Taken> {
-    let of = |s: &crate::data::Measured<StructureRecord>| -> Vec<Taken> {
-        let of_class = |t: &ClassTiming| {
-            let key = s.key.clone().with(axis::RAYS, format::ray_class(t.class));
-            let times = times(&t.ms, &t.cpu_ms);
-            let work = format!("{} rays", t.rays);
-            sample(&key, &figure::MRAYS_PER_S, times, work, &s.ran.kernel_hash)
-        };
-        s.timings.iter().map(of_class).collect()
-    };
-    scene.structures.iter().flat_map(of).collect()
-}
-
-fn of_times(view: &View) -> Vec<Taken> {
-    let of = |time: &crate::data::Measured<TimeRecord>| {
-        let [width, height] = time.resolution;
-        let work = format!("{width} × {height} pixels, {} spp", time.spp);
-        let times = times(&time.ms, &time.cpu_ms);
-        sample(
-            &time.key,
-            &figure::MS_PER_SPP,
-            times,
-            work,
-            &time.ran.kernel_hash,
-        )
-    };
-    view.valid_times().map(of).collect()
-}
-
-fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Vec<Taken> {
+fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Seeds {
     let reference = match view.reference {
         None => "none".into(),
         Some(r) => format!(
@@ -439,10 +369,10 @@ fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Vec<Taken> {
             reference: reference.clone(),
         })
     };
-    let mut all = Vec::new();
+    let mut all = Seeds::new();
     let mut put = |key: &Key, figure: &Figure, values: Vec<f64>| {
-        let evidence = seeds(values);
-        all.extend(evidence.map(|e| sample(key, figure, e, work.clone(), "")));
+        let evidence = seeds(values).map(|evidence| (evidence, work.clone()));
+        all.extend(evidence.map(|known| (identity(key, figure), known)));
     };
     let at = |spp: u32, id: &str| -> Vec<f64> {
         let errors = sampler.replicates.iter();

@@ -1,4 +1,4 @@
-//! The way from two lists of figures to findings: pairs, drift, correction for the number of tests.
+//! From two lists of figures to findings: pairs, drift, correction for the number of tests.
 
 use super::drift::{Drift, Place};
 use super::facts::IMAGE;
@@ -12,11 +12,11 @@ use raystone_record::{FinishedRecord, RunRecord, all_of, axis};
 use raystone_stats::hypothesis::benjamini_hochberg;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Measured with the shipped `ci.toml` (docs/compare.md): compilations take turns in the rounds, the data of a cell does not.
+/// Measured with the shipped `ci.toml` (docs/compare.md): compilations alternate over the rounds, the data of a cell does not.
 const PLACES: &str = "a cell may be some percent slower than its twin in all rounds of a process, perhaps by where its data lies (one of some 500 \
                       cells of equal work: 4 %), and lines in another order may compile to other code (9 % and more): another process tells the first";
 
-/// Said of a run that was not made to compare its kernels.
+/// Note on a run that was not made to compare its kernels.
 const COMPILED_ONCE: &str = "each kernel was compiled once, and those of equal text together: what one compilation has over another by \
                              chance looks like a change of time, and controls do not show it; raystone compare --kernels compiles \
                              several times";
@@ -31,12 +31,12 @@ pub(super) struct Open {
 pub(super) struct Work<'a> {
     options: &'a Options,
     in_rounds: bool,
-    /// How often each side was compiled.
+    /// Number of compilations of each side.
     compilations: usize,
-    /// Why times are not compared.
+    /// The reason why times are not compared.
     refused: Option<String>,
     same_place: bool,
-    /// Whether the runs say that their seeds are others.
+    /// `true` if the runs have different seeds.
     other_seeds: bool,
     pub findings: Vec<Open>,
     pub notes: Vec<String>,
@@ -75,7 +75,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Pairs what both sides say, and judges all but times.
+    /// Pairs the figures of both sides, and compares all but times.
     pub(super) fn find(&mut self, base: &Side, candidate: &Side) {
         let mut theirs: BTreeMap<_, Taken> = BTreeMap::new();
         let mut order = Vec::new();
@@ -108,7 +108,7 @@ impl<'a> Work<'a> {
     fn pair(&self, old: &Taken, new: &Taken) -> Open {
         let identity = old.identity();
         let is_time = matches!(old.evidence, Evidence::Times { .. });
-        // Equal to the bit, round by round: one was copied, as resumed runs do. It tells no drift either.
+        // Bit-identical round by round: one was copied, as resumed runs do. It shows no drift either.
         let is_copy = is_time && self.refused.is_none() && old.evidence == new.evidence;
         let outcome = if self.contradicted.contains(&identity) {
             Outcome::Known(
@@ -131,7 +131,7 @@ impl<'a> Work<'a> {
                 &self.options.effects,
             )
         };
-        // Two lines of times contradict nothing: `contradictions` passes them over.
+        // Two lines of times do not contradict each other: `contradictions` ignores them.
         let other = other_work(old, new).or_else(|| other_seeds(old, new));
         let comparable = is_time && !is_copy && other.is_none();
         let ratio = TimeRatio::new(
@@ -164,7 +164,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// What only one side has. A test that failed with other seeds says nothing of the change.
+    /// Returns the finding on a figure of one side alone. A test that failed with other seeds says nothing about the change.
     fn alone(&self, taken: &Taken, side: usize) -> Open {
         let mut open = alone(taken, side);
         let decided = matches!(open.finding.verdict, Verdict::Worse | Verdict::Better);
@@ -189,7 +189,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Says what times of changed kernels hold that rounds and controls do not show.
+    /// Adds notes on effects in times of changed kernels that rounds and controls do not show.
     pub(super) fn warn_of_compilations(&mut self) {
         let is_alarm = |f: &Finding| {
             f.is_time && !f.is_control && matches!(f.verdict, Verdict::Worse | Verdict::Better)
@@ -219,7 +219,7 @@ impl<'a> Work<'a> {
                 continue;
             };
             let finding = &mut open.finding;
-            // Equal kernels say nothing of two programs that were run in turns.
+            // Equal kernels are no control of two alternating programs.
             finding.is_control &= ratio.clock != IN_TURNS;
             if refused && again.is_none() {
                 finding.why = "times of different devices or machines are not compared".into();
@@ -251,7 +251,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// How far the controls moved that this is known of.
+    /// Collects the movement of the controls.
     fn drift<'o>(
         &'o self,
         in_rounds: bool,
@@ -270,7 +270,7 @@ impl<'a> Work<'a> {
         drift
     }
 
-    /// Equal kernels are no control where an exact figure of the same structure differs: then the data did change.
+    /// Drops controls where an exact figure of the same structure differs: then the data did change.
     fn controls_did_the_same_work(&mut self) {
         let of = |f: &Finding| [axis::SCENE, axis::ACCEL].map(|axis| f.key.label(axis).to_owned());
         let differs = |f: &&Open| {
@@ -289,7 +289,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Gives verdicts to what was tested: controls among themselves, all else together. How many tests there were.
+    /// Gives verdicts to the tested differences, controls among themselves, all others together. Returns the number of tests.
     pub(super) fn decide(&mut self) -> usize {
         let mut tests = 0;
         for is_control in [true, false] {
@@ -330,17 +330,18 @@ fn decide(finding: &mut Finding, rejected: bool) {
         (true, true) => Verdict::Undecided,
     };
     if finding.is_control {
-        finding.why = match counts {
-            true => format!(
+        finding.why = if counts {
+            format!(
                 "kernels and work are equal, but it moved unlike all others ({})",
                 finding.why
-            ),
-            false => "equal kernels and work: a control".into(),
+            )
+        } else {
+            "equal kernels and work: a control".into()
         };
     }
 }
 
-/// The values as they are read; exact ones that differ in digits that tables leave out, with all of them.
+/// Returns the values as shown; exact ones that differ only in digits that tables omit have all digits.
 fn shown(old: &Taken, new: &Taken) -> [String; 2] {
     match (&old.evidence, &new.evidence) {
         (Evidence::Exact(a), Evidence::Exact(b)) if a != b && old.shown == new.shown => {
@@ -368,7 +369,7 @@ fn place(finding: &Finding, clock: &'static str) -> Place {
     }
 }
 
-/// What only one side has.
+/// Returns the finding on a figure of one side alone.
 fn alone(taken: &Taken, side: usize) -> Open {
     let fails = matches!(taken.evidence, Evidence::Fact { fails: true, .. });
     let (verdict, why) = match (side, fails) {
@@ -397,7 +398,7 @@ fn alone(taken: &Taken, side: usize) -> Open {
     }
 }
 
-/// Why two figures are not of the same work.
+/// Returns the reason why two figures are not of the same work.
 fn other_work(old: &Taken, new: &Taken) -> Option<String> {
     if old.work != new.work {
         return Some(format!("other work: {} before, {} now", old.work, new.work));
@@ -421,14 +422,14 @@ fn other_work(old: &Taken, new: &Taken) -> Option<String> {
     new.iter().find_map(changed)
 }
 
-/// Why two figures that differ are samples of different seeds, of whose spread one of each says nothing.
+/// Returns the reason why two differing figures cannot be compared: single samples of different seeds show no spread.
 fn other_seeds(old: &Taken, new: &Taken) -> Option<String> {
     let (a, b) = (old.seed?, new.seed?);
     let differ = a != b && old.evidence != new.evidence;
     differ.then(|| format!("other seeds: run.seed was {a} and is {b}, so that it is of other rays"))
 }
 
-/// A word where the candidate is older than the base, as where the two are given in the wrong order.
+/// Returns a note if the candidate is older than the base, as when both are given in the wrong order.
 fn turned_round(base: &Side, candidate: &Side) -> Option<String> {
     let start = |side: &Side| {
         all_of::<RunRecord>(&side.lines)
@@ -445,7 +446,7 @@ fn turned_round(base: &Side, candidate: &Side) -> Option<String> {
     })
 }
 
-/// What to say of two runs with different seeds.
+/// Returns a note on two runs with different seeds.
 fn seeds_differ(base: &Side, candidate: &Side) -> Option<String> {
     let seed = |side: &Side| all_of::<RunRecord>(&side.lines).next()?.body.seed();
     let (a, b) = (seed(base)?, seed(candidate)?);
@@ -457,7 +458,7 @@ fn seeds_differ(base: &Side, candidate: &Side) -> Option<String> {
     })
 }
 
-/// Why the times of two sides cannot be compared, if so.
+/// Returns the reason why the times of two sides cannot be compared, if any.
 fn refusal(base: &Side, candidate: &Side) -> Option<String> {
     let all: Vec<_> = base
         .environments()

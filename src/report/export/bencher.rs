@@ -1,5 +1,5 @@
 //! Bencher Metric Format (<https://bencher.dev/docs/reference/bencher-metric-format>): benchmark → measure →
-//! value and bounds. A measure is the id of a figure as a slug; which direction is better is set in Bencher.
+//! value and bounds. A measure is the id of a figure as a slug; the better direction is set in Bencher.
 
 use super::{Exported, Source, numbers, pretty};
 use raystone_record::figure::Better::{Higher, Lower, Neither};

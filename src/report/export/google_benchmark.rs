@@ -1,4 +1,4 @@
-//! JSON as Google Benchmark's `--benchmark_format=json` writes it
+//! JSON in the format of Google Benchmark's `--benchmark_format=json`
 //! (<https://github.com/google/benchmark/blob/main/docs/user_guide.md>): every round is a repetition, which
 //! `compare.py` tests with Mann and Whitney's U.
 
@@ -7,7 +7,7 @@ use super::{Exported, Source, name, pretty};
 use crate::format;
 use serde_json::{Value as Json, json};
 
-/// Nanoseconds of a millisecond: `compare.py` prints whole numbers.
+/// Nanoseconds per millisecond: `compare.py` prints whole numbers.
 const NS: f64 = 1e6;
 
 pub(super) fn write(source: &Source) -> Exported {
@@ -37,13 +37,15 @@ fn context(source: &Source) -> Json {
     context
 }
 
-/// A repetition for each round: `real_time` by the clock that the figure is made of (the adapter's, or else the wall clock),
-/// `cpu_time` that of the processors. The format wants one: where none was measured, it is the real time, and the label says so.
+/// Returns a repetition for each round: `real_time` by the clock of the figure (the adapter's, or else the wall clock),
+/// `cpu_time` by the CPU clock. The format requires the latter: if it was not measured, it is the real time, as the label
+/// says.
 fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
     let name = name(&samples.figure.id, &samples.key);
-    let (cpu_ms, label) = match samples.cpu_ms.len() == samples.ms.len() {
-        true => (&samples.cpu_ms, "cpu_time: processors, all threads"),
-        false => (&samples.ms, "cpu_time: not measured, the same as real_time"),
+    let (cpu_ms, label) = if samples.cpu_ms.len() == samples.ms.len() {
+        (&samples.cpu_ms, "cpu_time: processors, all threads")
+    } else {
+        (&samples.ms, "cpu_time: not measured, the same as real_time")
     };
     let rounds = samples.ms.iter().zip(cpu_ms).enumerate();
     let repetition = |(index, (ms, cpu_ms)): (usize, (&f64, &f64))| {

@@ -1,5 +1,5 @@
-//! JSON as `hyperfine --export-json` writes it (<https://github.com/sharkdp/hyperfine>): every round is a run of a
-//! command. User and system time and exit codes are not known: null.
+//! JSON in the format of `hyperfine --export-json` (<https://github.com/sharkdp/hyperfine>): every round is a run of a
+//! command. User and system time and exit codes are unknown: null.
 
 use super::samples::Samples;
 use super::{Exported, Source, name, pretty};

@@ -1,4 +1,4 @@
-//! Figures and checks as JSON, as `--json` prints them.
+//! Figures and checks as printed by `--json`.
 
 use super::{Exported, Source, pretty};
 use crate::document::Check;
@@ -6,7 +6,7 @@ use crate::samplers::HEAVY_TAILED;
 use crate::values::{Reading, Value};
 use serde_json::{Map, Value as Json, json};
 
-/// Version of everything that `--json` prints; bumped with any change of a field's meaning.
+/// Version of the output of `--json`, incremented with any change of a field's meaning.
 pub const OUTPUT_SCHEMA: &str = "raystone-output/1";
 
 pub(super) fn write(source: &Source) -> Exported {
@@ -17,8 +17,8 @@ pub(super) fn write(source: &Source) -> Exported {
     }
 }
 
-/// One object for each value: its key, its row of the table of figures, and what is known: `value` with
-/// `low` and `high`, `below`, or `word`.
+/// Returns one object for each value: its key, its row of the table of figures, and the reading: `value` with `low` and
+/// `high`, `below`, or `word`.
 pub fn values_json(values: &[Value]) -> Json {
     values.iter().map(value_json).collect()
 }
@@ -53,7 +53,7 @@ fn value_json(value: &Value) -> Json {
     object
 }
 
-/// One object for each check: verdict, what is claimed, and the evidence.
+/// Returns one object for each check: verdict, claim and evidence.
 pub fn checks_json(checks: &[Check]) -> Json {
     let object = |check: &Check| json!({ "verdict": check.verdict, "title": check.title, "detail": check.detail });
     checks.iter().map(object).collect()

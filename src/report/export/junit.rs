@@ -73,7 +73,7 @@ fn gates(scene: &SceneGroup) -> Suite {
             return vec![Case { name, outcome }];
         };
         let of_class = gate.classes.iter().map(|class| {
-            let rays = crate::format::ray_class(class.class);
+            let rays = class.class.name();
             let first = class.first_wrong.clone().unwrap_or_default();
             let detail = format!(
                 "{} of {} rays differ; first: {first}",

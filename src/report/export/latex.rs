@@ -1,5 +1,5 @@
-//! LaTeX tables with booktabs. Texts are escaped, so that a name is shown and never run; pdfTeX, XeTeX and LuaTeX
-//! take the result alike.
+//! LaTeX tables with booktabs. Texts are escaped, so that a name is shown and never executed; the result works with
+//! pdfTeX, XeTeX and LuaTeX.
 
 use super::{Exported, Source, tables::tables};
 use crate::document::Table;

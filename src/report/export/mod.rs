@@ -1,5 +1,5 @@
 //! Figures, times, checks and images of a run for other tools: a file and a line of [`FORMATS`] for each format.
-//! All numbers are those of the one table of figures ([`crate::values`]) or raw times ([`samples`]).
+//! All numbers come from the one table of figures ([`crate::values`]) or are raw times ([`samples`]).
 
 mod bencher;
 mod github;
@@ -27,13 +27,13 @@ use raystone_record::{Line, RunRecord};
 use select::Selection;
 use std::path::{Path, PathBuf};
 
-/// What is exported: the records of one run, and the figures and times that were asked for.
+/// The source of an export: the records of one run, and the chosen figures and times.
 pub struct Source<'a> {
     /// The run's folder.
     pub dir: &'a Path,
     /// The records.
     pub lines: &'a [Line],
-    /// The same, sorted.
+    /// The records, sorted.
     pub data: RunData<'a>,
     /// The chosen figures.
     pub values: Vec<Value<'a>>,
@@ -42,10 +42,10 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// The records of the run in `dir`, and what is chosen of them.
+    /// Returns the records of the run in `dir`, and the choice of them.
     ///
     /// # Errors
-    /// A choice that nothing fits.
+    /// If nothing matches the choice.
     pub fn new(dir: &'a Path, lines: &'a [Line], choice: &Selection) -> Result<Self, ExportError> {
         let data = RunData::new(lines);
         let values = choice.of(values::values(&data))?;
@@ -60,49 +60,49 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// First line of the run, if it was written.
+    /// Returns the first line of the run, if it was written.
     fn run(&self) -> Option<&'a RunRecord> {
         self.data.run
     }
 }
 
-/// What a format of text made of a run.
+/// The export of a run as one text.
 #[derive(Debug, Default, PartialEq)]
 pub struct Exported {
-    /// The file.
+    /// The text of the file.
     pub text: String,
-    /// What the format has no place for, in words.
+    /// Parts that the format cannot represent, in words.
     pub left_out: Vec<String>,
 }
 
-/// What a format of files made of a run.
+/// The export of a run as files.
 #[derive(Debug, Default, PartialEq)]
 pub struct Files {
-    /// How many there are.
+    /// Number of files.
     pub count: usize,
-    /// What is missing, in words.
+    /// Missing parts, in words.
     pub left_out: Vec<String>,
 }
 
-/// How a format is written.
+/// The writer of a format.
 pub enum Writer {
-    /// As one text.
+    /// Writes one text.
     Text(fn(&Source) -> Exported),
-    /// As files in a folder.
+    /// Writes files into a folder.
     Folder(fn(&Source, &Path) -> Result<Files, ExportError>),
 }
 
-/// A format.
+/// An export format.
 pub struct Format {
-    /// What it is called on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// One line: what it holds, and who reads it.
+    /// One line: its contents and its readers.
     pub description: &'static str,
-    /// Ending of its files, without the dot.
+    /// Extension of its files, without the dot.
     pub ending: &'static str,
-    /// Whether it holds what `--figure` and `--only` choose among.
+    /// `true` if `--figure` and `--only` apply to its contents.
     pub selective: bool,
-    /// What writes it.
+    /// The writer.
     pub write: Writer,
 }
 
@@ -144,21 +144,21 @@ pub static FORMATS: [Format; 11] = [
     Format { name: "npy", description: "linear images of a run made with --images, as NumPy arrays [height, width, 3] of f32", ending: "npy", selective: false, write: Writer::Folder(npy::write) },
 ];
 
-/// Why a run cannot be exported.
+/// The reason why a run cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// A choice fits nothing.
+    /// A choice matches nothing.
     #[error("{0}")]
     Choice(String),
-    /// `--only` cannot be read, or fits nothing.
+    /// `--only` cannot be read, or matches nothing.
     #[error(transparent)]
     Only(#[from] ConfigError),
-    /// The run kept no linear images.
+    /// The run stored no linear images.
     #[error("{} holds none of the {named} linear images that its records name; `raystone run --images npy` keeps them", dir.display())]
     NoImages {
         /// The folder of the run.
         dir: PathBuf,
-        /// How many images the records name.
+        /// Number of images that the records name.
         named: usize,
     },
     /// A folder cannot be read or made.
@@ -166,7 +166,7 @@ pub enum ExportError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// An image cannot be read or written.
@@ -181,14 +181,14 @@ fn tidy_csv(source: &Source) -> Exported {
     }
 }
 
-/// A name that tells a figure or time from all others, in the way of Google Benchmark's named arguments:
+/// Returns a unique name of a figure or time, in the style of Google Benchmark's named arguments:
 /// `mrays-per-s/v1/scene:cornell-box/accel:bvh/rays:primary`.
 fn name(figure: &str, key: &raystone_record::Key) -> String {
     let part = |(axis, label): (&str, &str)| format!("/{axis}:{label}");
     figure.to_owned() + &key.labels().map(part).collect::<String>()
 }
 
-/// A value that is a number.
+/// A numeric value.
 struct Number<'v, 'a> {
     value: &'v Value<'a>,
     at: f64,
@@ -196,7 +196,7 @@ struct Number<'v, 'a> {
     bounds: Option<[f64; 2]>,
 }
 
-/// The values that are numbers and rank in one of these directions, and what they leave out, in words.
+/// Returns the numeric values that rank in one of these directions, and a description of the omissions.
 fn numbers<'v, 'a>(
     values: &'v [Value<'a>],
     directions: &[Better],
@@ -214,7 +214,7 @@ fn numbers<'v, 'a>(
                     bounds: has_width.then_some(bounds),
                 });
             }
-            // A point without the bounds that are not to be trusted.
+            // A point estimate alone, since its bounds are unreliable.
             Reading::HeavyTailed(i) if i.value.is_finite() => numbers.push(Number {
                 value,
                 at: i.value,
@@ -234,7 +234,7 @@ fn numbers<'v, 'a>(
     (numbers, left_out.collect())
 }
 
-/// JSON as it stands in a file.
+/// Returns JSON text as written to a file.
 fn pretty(value: &serde_json::Value) -> String {
     format!("{value:#}\n")
 }

@@ -1,4 +1,4 @@
-//! Linear images as NumPy arrays: those that the records name, wherever a run that was resumed, replaced or joined put them.
+//! Linear images as NumPy arrays: all that the records name, including those of resumed, replaced or merged runs.
 
 use super::{ExportError, Files, Source};
 use crate::pictures::inside;
@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 /// Writes every linear image of the run into `out` as `.npy`, one at a time.
 ///
 /// # Errors
-/// No images, a folder that cannot be made, an image that cannot be read or written.
+/// If there are no images, a folder cannot be made, or an image cannot be read or written.
 pub(super) fn write(source: &Source, out: &Path) -> Result<Files, ExportError> {
     let (mut named, mut spread) = (BTreeMap::new(), BTreeMap::new());
     for line in source.lines {
         let of_line = Pictures::of(line);
-        // Of two lines on the same image the later one holds.
+        // Of two lines on the same image the later one wins.
         for (all, stems) in [(&mut named, of_line.linear), (&mut spread, of_line.spread)] {
             all.extend(stems.into_iter().map(|stem| {
                 let file = stem.rsplit('/').next().unwrap_or(&stem).to_owned();
@@ -23,7 +23,7 @@ pub(super) fn write(source: &Source, out: &Path) -> Result<Files, ExportError> {
             }));
         }
     }
-    // Means and variances are kept by runs that were asked for images: where there is none, none is missing.
+    // Means and variances are stored only on request: if there are none, none is missing.
     if spread.values().any(Option::is_some) {
         named.append(&mut spread);
     }
@@ -61,7 +61,7 @@ pub(super) fn write(source: &Source, out: &Path) -> Result<Files, ExportError> {
     })
 }
 
-/// The file of a linear image of this name.
+/// Returns the file of a linear image of this name.
 pub(crate) fn linear(dir: &Path, stem: &str) -> Option<PathBuf> {
     let place = |format: &FileFormat| inside(dir, &format!("{stem}.{}", format.ending));
     FileFormat::linear()

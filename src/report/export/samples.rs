@@ -1,10 +1,8 @@
 //! Raw times: every kept round, by the clock that the figure is made of and by others.
 
 use crate::data::RunData;
-use crate::format;
-use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use raystone_record::figure::{self, Figure};
-use raystone_record::{Key, TimeRecord, axis};
+use raystone_record::{Key, axis};
 
 /// The rounds of one measurement, milliseconds.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +33,7 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
         }));
         all.extend(sound().flat_map(|s| {
             s.timings.iter().map(|timing| Samples {
-                key: (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class)),
+                key: (s.key.clone()).with(axis::RAYS, timing.class.name()),
                 figure: &figure::MRAYS_PER_S,
                 ms: timing.ms.clone(),
                 cpu_ms: timing.cpu_ms.clone(),
@@ -48,15 +46,9 @@ pub fn samples(data: &RunData) -> Vec<Samples> {
             figure: &figure::MS_PER_SPP,
             ms: time.ms.clone(),
             cpu_ms: time.cpu_ms.clone(),
-            rays: Some(traced_rays(time.body)),
+            rays: Some(time.traced_rays()),
         }));
     }
     all.retain(|samples| !samples.ms.is_empty());
     all
-}
-
-/// Rays of a render of a full cell: records also count those that were left out for they could change nothing.
-pub(crate) fn traced_rays(time: &TimeRecord) -> u64 {
-    let classes = RAY_COUNT_CLASSES[..TRACED_CLASSES].iter();
-    classes.filter_map(|class| time.rays.get(*class)).sum()
 }

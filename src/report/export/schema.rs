@@ -4,7 +4,7 @@ use raystone_record::{Line, SCHEMA};
 use schemars::schema_for;
 use serde_json::{Value, json};
 
-/// JSON Schema (draft 2020-12) of a line of `records.jsonl`. Texts are those of the fields' documentation.
+/// Returns the JSON Schema (draft 2020-12) of a line of `records.jsonl`. Descriptions come from the fields' documentation.
 pub fn record_schema() -> Value {
     let mut schema = schema_for!(Line).to_value();
     schema["title"] = json!(format!("a line of records.jsonl, {SCHEMA}"));

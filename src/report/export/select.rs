@@ -1,4 +1,4 @@
-//! Which figures, and of what.
+//! The choice of figures to export.
 
 use super::ExportError;
 use crate::values::Value;
@@ -7,7 +7,7 @@ use raystone_core::params::{Params, Variant};
 use raystone_record::{Key, axis};
 use std::collections::BTreeSet;
 
-/// Patterns of figures, and of labels by axis; none of a sort chooses everything.
+/// Patterns of figures, and of labels by axis; without patterns everything is chosen.
 #[derive(Debug, Clone, Default)]
 pub struct Selection {
     figures: Vec<Pattern>,
@@ -15,10 +15,10 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// `figures` are ids, with or without their version, or patterns of them; `only` are texts as [`Selector`] reads them.
+    /// Parses a choice: `figures` are ids, with or without version, or patterns of them; `only` are texts for [`Selector`].
     ///
     /// # Errors
-    /// A text that is no `axis=pattern`, or of an axis that there is not.
+    /// If a text is not `axis=pattern`, or names an unknown axis.
     pub fn new(figures: &[String], only: &[String]) -> Result<Self, ExportError> {
         Ok(Self {
             figures: figures.iter().map(Pattern::new).collect(),
@@ -26,22 +26,22 @@ impl Selection {
         })
     }
 
-    /// Whether all figures are chosen.
+    /// Returns `true` if all figures are chosen.
     pub(crate) fn is_of_all_figures(&self) -> bool {
         self.figures.is_empty()
     }
 
-    /// Whether a figure of this key is chosen: it has all axes that are asked for.
+    /// Returns `true` if a figure of this key is chosen: it has all requested axes.
     pub fn keeps(&self, key: &Key, figure: &str) -> bool {
         let is_chosen = |pattern: &Pattern| pattern.matches(&id_variant(figure));
         (self.figures.is_empty() || self.figures.iter().any(is_chosen))
             && self.only.fits(|axis, fits| key.get(axis).is_some_and(fits))
     }
 
-    /// The chosen values.
+    /// Returns the chosen values.
     ///
     /// # Errors
-    /// A pattern that no figure or no label fits, or no value is left.
+    /// If no figure or label matches a pattern, or no value is left.
     pub fn of<'a>(&self, values: Vec<Value<'a>>) -> Result<Vec<Value<'a>>, ExportError> {
         for pattern in &self.figures {
             let fits = |value: &Value| pattern.matches(&id_variant(&value.figure.id));
@@ -63,16 +63,17 @@ impl Selection {
         let had_any = !values.is_empty();
         let mut values = values;
         values.retain(|value| self.keeps(&value.key, &value.figure.id));
-        match values.is_empty() && had_any {
-            true => Err(ExportError::Choice(
+        if values.is_empty() && had_any {
+            Err(ExportError::Choice(
                 "no figure of the run fits --figure and --only together".into(),
-            )),
-            false => Ok(values),
+            ))
+        } else {
+            Ok(values)
         }
     }
 }
 
-/// A figure's id as patterns see it: its name is that without the version.
+/// Returns a figure's id as patterns see it: its name is the id without the version.
 fn id_variant(id: &str) -> Variant {
     Variant {
         name: id.rsplit_once("/v").map_or(id, |(name, _)| name).to_owned(),

@@ -1,4 +1,4 @@
-//! A table for each figure: rows by the axes in which its keys differ, columns by the last of these that counts.
+//! A table for each figure: rows by the axes in which its keys differ, columns by the last suitable one of these.
 
 use super::{Exported, Source};
 use crate::document::Table;
@@ -7,9 +7,9 @@ use crate::pivot::Rows;
 use crate::values::{Reading, Value};
 use raystone_record::{Key, axis};
 
-/// Axes that make good columns, the best first.
+/// Axes suitable as columns, the best first.
 const ACROSS: [&str; 4] = [axis::RAYS, axis::SPP, axis::POINTS, axis::SUBJECT];
-/// More columns than this do not fit a page.
+/// Greatest number of columns that fit on a page.
 const MOST_COLUMNS: usize = 9;
 
 pub(super) fn markdown(source: &Source) -> Exported {
@@ -21,7 +21,7 @@ pub(super) fn markdown(source: &Source) -> Exported {
     }
 }
 
-/// A table for each figure, in the order in which they come.
+/// Returns a table for each figure, in the given order.
 pub(super) fn tables(values: &[Value]) -> Vec<Table> {
     let mut figures: Vec<Vec<Value>> = Vec::new();
     for value in values {
@@ -36,7 +36,7 @@ pub(super) fn tables(values: &[Value]) -> Vec<Table> {
     figures.iter().map(|values| table(values)).collect()
 }
 
-/// The table of one figure; what all its keys share stands in the caption.
+/// Returns the table of one figure; labels that all its keys share are in the caption.
 fn table(values: &[Value]) -> Table {
     let labels = |axis: &str| {
         let mut labels: Vec<&str> = values.iter().map(|v| v.key.label(axis)).collect();

@@ -1,20 +1,20 @@
 //! Change points of a series: the hierarchical divisive method of Matteson and James (2014), "A Nonparametric
 //! Approach for Multiple Change Point Analysis of Multivariate Data", Journal of the American Statistical Association
-//! 109(505). It assumes nothing of the distribution but independence from run to run.
+//! 109(505). It assumes only that runs are independent.
 
 use raystone_core::random::Pcg32;
 
-/// Runs of a level: one run alone is an outlier, no level.
+/// Least number of runs of a level: a single run is an outlier, not a level.
 const LEAST_LEVEL: usize = 3;
-/// Permutations of a test.
+/// Number of permutations of a test.
 const PERMUTATIONS: usize = 499;
 
-/// Of fewer runs even the clearest change has a p-value above 0.05: of seven the three lowest lie at either end in 2 of
-/// 35 orders; of eight the four lowest in 2 of 70.
+/// With fewer runs even the clearest change has a p-value above 0.05: of seven the three lowest lie at either end in
+/// 2 of 35 orders; of eight the four lowest in 2 of 70.
 pub(crate) const LEAST_RUNS: usize = 8;
 
-/// Where levels begin after the first one, by place, each with the p-value of its permutation test: again and again
-/// the best split of all parts, until one is not significant at `level`.
+/// Returns the starts of all levels after the first, each with the p-value of its permutation test. The best split of
+/// all parts is repeated until one is not significant at `level`.
 pub(crate) fn e_divisive(values: &[f64], level: f64) -> Vec<(usize, f64)> {
     let mut random = Pcg32::new(0x5eed);
     let mut found: Vec<(usize, f64)> = Vec::new();
@@ -48,7 +48,7 @@ pub(crate) fn e_divisive(values: &[f64], level: f64) -> Vec<(usize, f64)> {
     }
 }
 
-/// Statistic and place of the best split of any part; `None` if all are too short.
+/// Returns statistic and place of the best split of any part; `None` if all are too short.
 fn best_of_parts(values: &[f64], bounds: &[usize]) -> Option<(f64, usize)> {
     let parts = bounds.windows(2).filter_map(|part| {
         let (statistic, at) = best_split(&values[part[0]..part[1]])?;
@@ -57,8 +57,8 @@ fn best_of_parts(values: &[f64], bounds: &[usize]) -> Option<(f64, usize)> {
     parts.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// The split with the greatest energy distance: nm/(n+m) times twice the mean distance between the sides less the
-/// mean distances within them (equations 5 and 6, exponent 1).
+/// Returns the split with the greatest energy distance: nm/(n+m) times twice the mean distance between the sides less
+/// the mean distances within them (equations 5 and 6, exponent 1).
 fn best_split(values: &[f64]) -> Option<(f64, usize)> {
     let sum_to = |k: usize, others: &[f64]| -> f64 {
         others.iter().map(|other| (values[k] - other).abs()).sum()
@@ -87,7 +87,7 @@ fn best_split(values: &[f64]) -> Option<(f64, usize)> {
     best.filter(|(statistic, _)| *statistic > 0.0)
 }
 
-/// Fisher and Yates.
+/// Shuffles by Fisher and Yates.
 fn shuffle(values: &mut [f64], random: &mut Pcg32) {
     for i in (1..values.len()).rev() {
         values.swap(i, random.below(i + 1));
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn steps_are_found_where_they_are() {
-        // Beside the steps, one level in twenty is split for nothing.
+        // Apart from the steps, one level in twenty is split by chance.
         let (mut exact, mut both) = (0, 0);
         for seed in 0..40 {
             let mut random = Pcg32::new(seed);
@@ -145,9 +145,9 @@ mod tests {
             exact += usize::from(found == [10, 20]);
             both += usize::from(found.contains(&10) && found.contains(&20));
         }
-        // Of 40, a step is missed or moved by chance now and then; 8 or more splits for nothing have a chance of 0.1 %.
+        // Of 40, chance may miss or move a step; 8 or more false splits have a chance of 0.1 %.
         assert!(both >= 38 && exact >= 32, "{both}, {exact}");
-        // One far run is no level.
+        // One outlier is not a level.
         let alarms = (0..40).filter(|seed| {
             let mut outlier = noise(&mut Pcg32::new(*seed), 20, 0.0);
             outlier[12] = 50.0;

@@ -1,6 +1,5 @@
 //! Figures over runs of several commits: one series for each figure, key and device, with the runs at which its level
-//! changes. Counts and other exact figures change where they differ; of the others the levels are parted by
-//! `e_divisive`.
+//! changes. Exact figures such as counts change where they differ; `e_divisive` separates the levels of the others.
 
 pub mod change;
 pub mod page;
@@ -16,19 +15,19 @@ use raystone_stats::statistics::median;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Chance that a series without a change is said to have one.
+/// Chance of reporting a change in a series without one.
 pub(crate) const LEVEL: f64 = 0.05;
 
-/// A run, in the order of time.
+/// A run of the history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// Its folder.
+    /// Folder of the run.
     pub folder: PathBuf,
     /// The commit of the program, with `+` if the sources had changes; `unknown` where it was not recorded.
     pub commit: String,
     /// Seconds since 1970-01-01 UTC.
     pub started_unix_s: u64,
-    /// Adapter, driver and processor: figures of different ones are never in one series.
+    /// Adapter, driver and processor; a series never mixes figures of different ones.
     pub device: String,
 }
 
@@ -41,43 +40,43 @@ pub struct Change {
     pub before: f64,
     /// Median of the new level.
     pub after: f64,
-    /// p-value of the permutation test; absent for exact figures, which need none.
+    /// p-value of the permutation test; `None` for exact figures, which need no test.
     pub p: Option<f64>,
 }
 
 /// A figure of one key on one device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series<'a> {
-    /// What it is of.
+    /// The key that the figure belongs to.
     pub key: Key,
-    /// Its row in the table of figures.
+    /// Row of the table of figures.
     pub figure: Cow<'a, Figure>,
     /// The device.
     pub device: String,
-    /// Run and value, in the order of time.
+    /// Run and value, in order of time.
     pub points: Vec<(usize, Interval)>,
-    /// Where its level changes.
+    /// Changes of the level.
     pub changes: Vec<Change>,
-    /// Whether it has enough values for a change to be found; exact ones need two.
+    /// `true` if there are enough values to find a change; exact figures need two.
     pub tested: bool,
 }
 
-/// All series of some runs.
+/// All series of a set of runs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History<'a> {
-    /// The runs by time.
+    /// The runs in order of time.
     pub runs: Vec<Run>,
-    /// The series, in the order in which runs hold them.
+    /// The series, in the order of the records.
     pub series: Vec<Series<'a>>,
-    /// Values that are no numbers.
+    /// Number of values that are not finite numbers.
     pub left_out: usize,
 }
 
 impl<'a> History<'a> {
-    /// The chosen figures of runs; of all figures, if none is chosen, those that rank.
+    /// Builds the history of the chosen figures; without a choice, of all figures that rank.
     ///
     /// # Errors
-    /// A run without its first line, or a choice that nothing fits.
+    /// If a run lacks its first line, or nothing matches the choice.
     pub fn new(all: &'a [(PathBuf, Vec<Line>)], choice: &Selection) -> Result<Self, ExportError> {
         let mut data: Vec<(Run, RunData<'a>)> = Vec::new();
         for (folder, lines) in all {
@@ -87,7 +86,7 @@ impl<'a> History<'a> {
         data.sort_by_key(|(run, _)| run.started_unix_s);
         let found = data.iter().map(|(_, data)| values(data));
         let found: Vec<Vec<Value>> = found.collect();
-        // A figure that one of the runs lacks is no fault: the choice is held against all together.
+        // A single run may lack a figure: the choice is checked against all runs together.
         choice.of(found.concat())?;
         let mut history = Self::default();
         for (number, (run, values)) in data.iter().map(|(run, _)| run).zip(found).enumerate() {
@@ -132,7 +131,7 @@ impl<'a> History<'a> {
         }
     }
 
-    /// How many series without a change would be said to have one, by chance.
+    /// Returns the expected number of false alarms: series reported as changed by chance.
     pub(crate) fn false_alarms(&self) -> f64 {
         let tested = |s: &&Series| s.tested && s.figure.spread != Spread::Exact;
         LEVEL * self.series.iter().filter(tested).count() as f64

@@ -1,4 +1,4 @@
-//! A history as tables and as a page with plots.
+//! A history as tables, JSON and a page with plots.
 
 use super::{Change, History, LEVEL, Series};
 use crate::document::{Block, Document, Section, Table, TableCell};
@@ -8,13 +8,13 @@ use raystone_record::figure::Spread;
 use raystone_record::{Interval, Key};
 use serde_json::{Value as Json, json};
 
-/// Series of a plot: more cannot be told apart.
+/// Greatest number of series in a plot: more cannot be distinguished.
 const IN_PLOT: usize = 6;
-/// Of more series than this, those that change are drawn alone.
+/// Above this number of series only those that change are drawn.
 const MOST_DRAWN: usize = 200;
 
 impl History<'_> {
-    /// The runs by number.
+    /// Returns the table of runs by number.
     pub fn runs_table(&self) -> Table {
         let mut table = Table::new(
             "Runs",
@@ -32,7 +32,7 @@ impl History<'_> {
         table
     }
 
-    /// Every change of a level, a row each.
+    /// Returns the table of level changes, a row each.
     pub fn changes_table(&self) -> Table {
         let heads = [
             "figure", ":of", ":commit", "run", "before", "after", "ratio", "p",
@@ -68,7 +68,7 @@ impl History<'_> {
         ]
     }
 
-    /// What was looked at, what was not, and how far to believe it.
+    /// Summarises the tested and untested series and the expected false alarms.
     pub fn summary(&self) -> String {
         let count = |what: &dyn Fn(&&Series) -> bool| self.series.iter().filter(what).count();
         let changed = count(&|s| !s.changes.is_empty());
@@ -104,7 +104,7 @@ impl History<'_> {
         self.series.len() <= MOST_DRAWN
     }
 
-    /// The page: runs, changes, and plots of each figure over the runs.
+    /// Returns the page: runs, changes, and plots of each figure over the runs.
     pub fn document(&self) -> Document {
         let mut runs = Section::new("runs", "Runs");
         runs.blocks.extend(self.runs_table().into_block());
@@ -153,7 +153,7 @@ impl History<'_> {
             .collect()
     }
 
-    /// Runs and series as JSON.
+    /// Returns runs and series as JSON.
     pub fn json(&self) -> Json {
         let runs = self.runs.iter().map(|run| {
             json!({
@@ -202,9 +202,10 @@ fn plot(series: &[&Series]) -> CurvePlot {
             .filter(|(axis, _)| shared.get(axis).is_none());
         let mut own: Vec<&str> = own.map(|(_, label)| label).collect();
         own.extend(several.then_some(series.device.as_str()));
-        let label = match own.is_empty() {
-            true => series.key.to_string(),
-            false => own.join(", "),
+        let label = if own.is_empty() {
+            series.key.to_string()
+        } else {
+            own.join(", ")
         };
         let points = series.points.iter();
         let points = points.map(|(run, value)| CurvePoint::new(*run as f64, value));
@@ -232,7 +233,7 @@ fn plot(series: &[&Series]) -> CurvePlot {
     }
 }
 
-/// What the keys of all series have in common.
+/// Returns the labels that the keys of all series share.
 fn shared(series: &[&Series]) -> Key {
     let first = &series[0].key;
     let same = |axis: &&str| series.iter().all(|s| s.key.agrees(first, &[*axis]));
@@ -240,7 +241,7 @@ fn shared(series: &[&Series]) -> Key {
     first.only(&axes)
 }
 
-/// Steps from level to level, each half a run before the first of a new level.
+/// Returns steps from level to level, each half a run before the first run of a new level.
 fn levels(series: &Series) -> Vec<CurvePoint> {
     let point = |x: f64, y: f64| CurvePoint::new(x, &Interval::exact(y));
     let ends = [series.points.first(), series.points.last()];
@@ -259,7 +260,7 @@ fn levels(series: &Series) -> Vec<CurvePoint> {
     points
 }
 
-/// The first characters of a commit, with its mark.
+/// Returns the first characters of a commit, with its mark of local changes.
 fn short(commit: &str) -> &str {
     match commit.char_indices().nth(12) {
         Some((end, _)) if !commit.ends_with('+') => &commit[..end],

@@ -1,18 +1,18 @@
-//! Axes: where a value lies, which ticks are drawn, how they read.
+//! Axes: positions of values, ticks and their labels.
 
 use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point};
 use super::paint::text_width;
 use crate::format;
 use raystone_core::text::escape::raised;
 
-/// A tick: a gridline, with a label unless that is empty.
+/// A tick: a gridline with an optional label (empty for none).
 #[derive(Debug, Clone, PartialEq)]
 struct Tick {
     value: f64,
     label: String,
 }
 
-/// One axis.
+/// One axis, linear or logarithmic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     is_log: bool,
@@ -23,7 +23,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// From 0 to a little over `max`, ticks at 1, 2 or 5 × 10ⁿ.
+    /// Returns a linear axis from 0 to a little over `max`, with ticks at 1, 2 or 5 × 10ⁿ.
     pub fn linear(max: f64, title: &str) -> Self {
         let max = if max > 0.0 { max } else { 1.0 };
         let rough = max / 6.0;
@@ -46,7 +46,7 @@ impl Axis {
         }
     }
 
-    /// From 0 to `max`, ticks at whole numbers.
+    /// Returns a linear axis from 0 to `max`, with ticks at whole numbers.
     pub fn whole(max: f64, title: &str) -> Self {
         let step = (max / 10.0).ceil().max(1.0) as usize;
         let tick = |value: usize| Tick {
@@ -69,8 +69,8 @@ impl Axis {
         }
     }
 
-    /// Logarithmic over the values, ticks at powers of two, at most nine of them labelled; `None`
-    /// without a positive value.
+    /// Returns a logarithmic axis over the values with ticks at powers of two, at most nine of them
+    /// labelled; `None` without a positive value.
     pub fn log2(values: impl Iterator<Item = f64>, title: &str) -> Option<Self> {
         let (low, high) = positive_range(values)?;
         let (first, last) = (low.log2().floor() as i32, high.log2().ceil() as i32);
@@ -85,16 +85,16 @@ impl Axis {
         Some(Self::logarithmic(range, ticks, title))
     }
 
-    /// Logarithmic over the values, ticks at powers of ten, with 2 and 5 between them where there is
-    /// room; `None` without a positive value.
+    /// Returns a logarithmic axis over the values with ticks at powers of ten, and at 2 and 5 between
+    /// them where there is room; `None` without a positive value.
     pub fn log10(values: impl Iterator<Item = f64>, title: &str) -> Option<Self> {
         let (low, high) = positive_range(values)?;
-        // Some air, and at least a factor of three so that there are ticks.
+        // A margin, and at least a factor of three so that there are ticks.
         let air = (high / low).powf(0.05).max(1.1);
         let air = air.max((3.0 * low / high).sqrt());
         let (min, max) = (low / air, high * air);
         let decades = (max / min).log10();
-        // In tenths of a power of ten.
+        // Tenths of a power of ten.
         let labelled: &[u32] = match decades {
             _ if decades < 0.7 => &[10, 12, 15, 20, 25, 30, 40, 50, 60, 80],
             _ if decades < 1.2 => &[10, 20, 30, 40, 50, 60, 80],
@@ -128,11 +128,12 @@ impl Axis {
         self.min
     }
 
-    /// Position of a value as a share of the axis, 0 to 1; clamped.
+    /// Returns the position of a value along the axis, clamped to [0, 1].
     pub fn share(&self, value: f64) -> f64 {
-        let share = match self.is_log {
-            false => (value - self.min) / (self.max - self.min),
-            true => (value / self.min).ln() / (self.max / self.min).ln(),
+        let share = if self.is_log {
+            (value / self.min).ln() / (self.max / self.min).ln()
+        } else {
+            (value - self.min) / (self.max - self.min)
         };
         if share.is_nan() {
             0.0
@@ -145,7 +146,7 @@ impl Axis {
         self.ticks.iter().filter(|tick| !tick.label.is_empty())
     }
 
-    /// Draws it from left to right: gridlines from `top` to `bottom`, labels and title below.
+    /// Draws a horizontal axis: gridlines from `top` to `bottom`, labels and title below.
     pub(crate) fn draw_across(
         &self,
         drawing: &mut Drawing,
@@ -173,7 +174,7 @@ impl Axis {
         drawing.text(middle, &self.title, INK, Anchor::Middle);
     }
 
-    /// Draws it from bottom to top: gridlines from `left` to `right`, labels and title on the left.
+    /// Draws a vertical axis: gridlines from `left` to `right`, labels and title on the left.
     fn draw_up(&self, drawing: &mut Drawing, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
         let at = |tick: &Tick| bottom - self.share(tick.value) * (bottom - top);
         for tick in &self.ticks {
@@ -201,7 +202,7 @@ impl Axis {
 }
 
 impl Tick {
-    /// Width of its gridline, pixels.
+    /// Width of the gridline in pixels.
     fn width(&self) -> f64 {
         if self.label.is_empty() { 0.5 } else { 1.0 }
     }
@@ -213,13 +214,13 @@ fn positive_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     ends.reduce(|(low, high), (v, _)| (low.min(v), high.max(v)))
 }
 
-/// Decades that a plot may span before lone points at its ends are cut off.
+/// Number of decades that a plot may span before lone points at its ends are cut off.
 const MOST_DECADES: f64 = 6.0;
-/// Decades of nothing between lone points and the others.
+/// Number of empty decades that separate lone points from the others.
 const LONE: f64 = 2.0;
 
-/// The least and the greatest of some positive values, without lone ones that would flatten all others: at most a tenth
-/// of them at either end, with two decades of nothing beside them. `None` without a positive value.
+/// Returns the least and the greatest positive value, without lone ones that would flatten all others: at most a
+/// tenth of the values at either end, two empty decades from the rest. `None` without a positive value.
 pub(crate) fn without_lone_points(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let positive = values.filter(|v| v.is_finite() && *v > 0.0);
     let mut logs: Vec<f64> = positive.map(f64::log10).collect();
@@ -238,13 +239,14 @@ pub(crate) fn without_lone_points(values: impl Iterator<Item = f64>) -> Option<(
 }
 
 fn plain(value: f64) -> String {
-    match value >= 1.0 {
-        true => format!("{value}"),
-        false => format::significant(value, 2),
+    if value >= 1.0 {
+        format!("{value}")
+    } else {
+        format::significant(value, 2)
     }
 }
 
-/// So many tenths of a power of ten: `0.02`, `1.5`, `1000`, or `2·10⁻⁵` where that is shorter.
+/// Formats `tenths` tenths of a power of ten: `0.02`, `1.5`, `1000`, or `2·10⁻⁵` where that is shorter.
 fn decimal_or_power(tenths: u32, exponent: i32) -> String {
     let mantissa = f64::from(tenths) / 10.0;
     if (-3..=4).contains(&exponent) {
@@ -266,9 +268,9 @@ fn decimal_or_power(tenths: u32, exponent: i32) -> String {
 /// Two axes and the rectangle that they span.
 #[derive(Debug, Clone)]
 pub struct Axes {
-    /// Axis from left to right.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Axis from bottom to top.
+    /// Vertical axis.
     pub y: Axis,
     /// Left and right edge.
     across: (f64, f64),
@@ -277,7 +279,7 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// Axes in the upper `height` pixels of a drawing `width` pixels wide; room is left for labels.
+    /// Places axes, with room for labels, in the upper `height` pixels of a drawing `width` pixels wide.
     pub fn new(x: Axis, y: Axis, width: f64, height: f64) -> Self {
         let left = (y.label_width() + 44.0).max(60.0);
         Self {
@@ -288,7 +290,7 @@ impl Axes {
         }
     }
 
-    /// Pixel of a point.
+    /// Returns the pixel of a point.
     pub fn at(&self, x: f64, y: f64) -> Point {
         let ((left, right), (top, bottom)) = (self.across, self.up);
         let x = left + self.x.share(x) * (right - left);

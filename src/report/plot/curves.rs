@@ -23,7 +23,7 @@ pub struct CurvePoint {
 }
 
 impl CurvePoint {
-    /// A figure at `x`.
+    /// Returns the point of a figure at `x`.
     pub fn new(x: f64, y: &Interval) -> Self {
         Self {
             x,
@@ -41,9 +41,9 @@ pub struct Curve {
     pub label: String,
     /// Category: the same index looks the same in every plot of a report.
     pub look: usize,
-    /// Whether it is one exact curve without spread: drawn dashed.
+    /// `true` for an exact curve without spread, which is drawn dashed.
     pub exact: bool,
-    /// Points by growing x.
+    /// Points by increasing x.
     pub points: Vec<CurvePoint>,
 }
 
@@ -54,12 +54,12 @@ pub struct Guide {
     pub label: String,
     /// `y = factor · x^exponent`.
     pub factor: f64,
-    /// See `factor`.
+    /// The exponent of `y = factor · x^exponent`.
     pub exponent: f64,
 }
 
 impl Guide {
-    /// `y = factor · x^exponent`.
+    /// Returns the line `y = factor · x^exponent`.
     pub fn new(label: impl Into<String>, factor: f64, exponent: f64) -> Self {
         Self {
             label: label.into(),
@@ -80,7 +80,7 @@ pub enum Ticks {
     Whole,
 }
 
-/// A plot whose y axis is logarithmic, and the x axis, too, unless its ticks say otherwise.
+/// A plot with a logarithmic y axis, and a logarithmic x axis unless its ticks are whole numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurvePlot {
     /// Title of the x axis, with unit.
@@ -91,7 +91,7 @@ pub struct CurvePlot {
     pub y_title: String,
     /// The curves.
     pub curves: Vec<Curve>,
-    /// Lines for comparison.
+    /// Comparison lines.
     pub guides: Vec<Guide>,
 }
 
@@ -99,12 +99,12 @@ const WIDTH: f64 = 580.0;
 const PLOT_HEIGHT: f64 = 400.0;
 
 impl CurvePlot {
-    /// The plot in a document, if there is anything to draw.
+    /// Returns the plot as an illustration of a document, if there is anything to draw.
     pub fn figure(&self, name: String, caption: impl Into<String>) -> Option<Illustration> {
         Some(Illustration::new(name, caption, self.draw()?))
     }
 
-    /// The picture; `None` of fewer than two points with positive coordinates: one is told by the tables.
+    /// Draws the plot; `None` for fewer than two points with positive coordinates, since the tables show a single one.
     pub fn draw(&self) -> Option<Drawing> {
         let points = || {
             let points = self.curves.iter().flat_map(|curve| &curve.points);
@@ -156,7 +156,7 @@ impl CurvePlot {
         Some(drawing)
     }
 
-    /// Tells the values of a curve to who points at them.
+    /// Adds the values of a curve as tooltips.
     fn tell(&self, curve: &Curve, axes: &Axes, drawing: &mut Drawing) {
         for p in curve.points.iter().filter(|p| drawable(p, self.x_ticks)) {
             let of = Interval {
@@ -173,7 +173,7 @@ impl CurvePlot {
         }
     }
 
-    /// What is to be seen: where each curve begins and ends.
+    /// Describes the plot in words: where each curve begins and ends.
     fn says(&self) -> String {
         let curve = |curve: &Curve| {
             let mut points = curve.points.iter().filter(|p| drawable(p, self.x_ticks));
@@ -234,13 +234,13 @@ fn curve_line(drawing: &mut Drawing, points: &[(f64, f64)], ink: Ink, exact: boo
     }
 }
 
-/// Thin; each guide with dashes of its own length.
+/// Draws a thin line, with a dash length that depends on the guide.
 fn guide_line(drawing: &mut Drawing, points: &[(f64, f64)], index: usize) {
     let dash = 2.0 + 6.0 * index as f64;
     drawing.dashed_line(points, DIM, 1.1, dash, 3.0);
 }
 
-/// How far down an axis has to reach for a point: not to an end that happens to lie close to 0.
+/// Returns the least value that an axis has to reach for a point: not an end that happens to lie close to 0.
 fn shown_low(point: &CurvePoint) -> f64 {
     point.low.max(point.y / 30.0)
 }
@@ -276,7 +276,7 @@ mod tests {
         for text in ["samples per pixel", "relMSE", "sobol", "2.5/√N", "1", "2"] {
             assert!(drawing.texts().contains(&text), "{text}");
         }
-        // One point is no plot, be it of one curve; two of different curves are.
+        // One point is not a plot; two points of different curves are.
         assert!(plot(vec![at(4.0, 0.5), at(8.0, 0.0)]).draw().is_none());
         let mut two = plot(vec![at(4.0, 0.5)]);
         assert!(two.draw().is_none());

@@ -1,10 +1,10 @@
 //! A drawing as a list of shapes.
 //!
-//! Plots are laid out once, in pixels of the size shown; `paint` paints them.
+//! Plots are laid out once, in pixels at display size; `paint` paints them.
 
 use super::raster::Raster;
 
-/// Colour with opacity.
+/// A colour with opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ink {
     /// sRGB.
@@ -14,12 +14,12 @@ pub struct Ink {
 }
 
 impl Ink {
-    /// Opaque.
+    /// Returns the opaque colour.
     pub const fn solid(rgb: [u8; 3]) -> Self {
         Self { rgb, alpha: 1.0 }
     }
 
-    /// The same colour with this opacity.
+    /// Returns the same colour with this opacity.
     pub(crate) const fn with_alpha(self, alpha: f64) -> Self {
         Self {
             rgb: self.rgb,
@@ -28,21 +28,21 @@ impl Ink {
     }
 }
 
-/// Text and axes.
+/// Colour of text and axes.
 pub(crate) const INK: Ink = Ink::solid([0x1f, 0x29, 0x33]);
-/// Secondary text.
+/// Colour of secondary text.
 pub(crate) const DIM: Ink = Ink::solid([0x5b, 0x67, 0x73]);
-/// Gridlines.
+/// Colour of gridlines.
 pub(crate) const GRID: Ink = Ink::solid([0xe3, 0xe7, 0xeb]);
-/// What failed.
+/// Colour of failures.
 pub const FAILED: Ink = Ink::solid([0xb4, 0x23, 0x18]);
 /// Font size of plots, pixels per em.
 pub(crate) const FONT_PX: f64 = 14.0;
 
-/// Point in pixels from the top left.
+/// A point in pixels from the top left.
 pub type Point = (f64, f64);
 
-/// Which point of a text its position names.
+/// The point of a text that its position refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// Left end.
@@ -80,9 +80,9 @@ pub enum Shape {
         text: String,
         /// Colour.
         ink: Ink,
-        /// Which end `at` is.
+        /// The point of the text at `at`.
         anchor: Anchor,
-        /// Whether it reads upwards.
+        /// `true` if the text reads upwards.
         upwards: bool,
     },
 }
@@ -94,27 +94,27 @@ pub struct Drawing {
     pub width: f64,
     /// Height in pixels.
     pub height: f64,
-    /// Pixels behind all shapes.
+    /// Rasters behind all shapes.
     pub rasters: Vec<Raster>,
-    /// From back to front.
+    /// Shapes from back to front.
     pub shapes: Vec<Shape>,
-    /// Places whose values are told to who points at them.
+    /// Tooltips.
     pub spots: Vec<Spot>,
-    /// What is to be seen, for those who do not see it.
+    /// Text alternative of the picture.
     pub says: String,
 }
 
-/// A place of a drawing and what is there.
+/// A tooltip: a place of a drawing and its text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spot {
-    /// Its middle.
+    /// Centre of the place.
     pub at: Point,
     /// Name and values.
     pub text: String,
 }
 
 impl Drawing {
-    /// An empty picture.
+    /// Returns an empty picture.
     pub fn new(width: f64, height: f64) -> Self {
         Self {
             width,
@@ -126,7 +126,7 @@ impl Drawing {
         }
     }
 
-    /// Tells who points at a place what is there.
+    /// Adds a tooltip.
     pub fn spot(&mut self, at: Point, text: impl Into<String>) {
         let text = text.into();
         self.spots.push(Spot { at, text });
@@ -137,7 +137,7 @@ impl Drawing {
         self.shapes.push(Shape::Line { points, ink, width });
     }
 
-    /// Adds a polyline of dashes; both lengths in pixels.
+    /// Adds a dashed polyline; both lengths in pixels.
     pub(crate) fn dashed_line(
         &mut self,
         points: &[Point],
@@ -181,7 +181,7 @@ impl Drawing {
         });
     }
 
-    /// Every text in it, for tests.
+    /// Returns all texts of the drawing, for tests.
     #[cfg(test)]
     pub fn texts(&self) -> Vec<&str> {
         let texts = self.shapes.iter().filter_map(|shape| match shape {

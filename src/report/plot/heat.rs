@@ -9,23 +9,23 @@ use raystone_image::viridis;
 const HEIGHT: f64 = 28.0;
 /// Least width of a cell, pixels.
 const LEAST: f64 = 54.0;
-/// White between cells, pixels.
+/// Gap between cells, pixels.
 const GAP: f64 = 2.0;
-/// White around all, and between names and cells, pixels.
+/// Margin around the drawing, and between names and cells, pixels.
 const MARGIN: f64 = 8.0;
 /// Least width of the drawing, pixels: a page stretches narrow ones.
 const LEAST_WIDTH: f64 = 500.0;
-/// A cell without a colour of its own.
+/// Colour of a cell without a value on the scale.
 const NOTHING: Ink = Ink::solid([0xee, 0xf1, 0xf4]);
 
-/// A cell.
+/// A cell of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
-    /// Its number.
+    /// Its number as text.
     pub text: String,
-    /// Place on the scale of colours, 0 to 1; absent for nothing at all.
+    /// Place on the colour scale, 0 to 1; `None` for an empty count.
     pub share: Option<f64>,
-    /// Whether it is marked.
+    /// `true` if the cell is marked.
     pub marked: bool,
 }
 
@@ -36,22 +36,22 @@ pub struct HeatMap {
     pub rows: Vec<String>,
     /// Names of columns.
     pub columns: Vec<String>,
-    /// Row by row; nothing where there is no value.
+    /// Cells row by row; `None` where there is no value.
     pub tiles: Vec<Vec<Option<Tile>>>,
-    /// What the ends of the colours stand for.
+    /// Labels of the ends of the colour scale.
     ends: [String; 2],
-    /// What is between them: quantity, unit, and how it is spread.
+    /// Label of the scale: quantity, unit and mapping.
     between: String,
 }
 
-/// Width and height of the scale of colours below the cells, and height of all that belongs to it, pixels.
+/// Width and height of the colour scale below the cells, and total height of the scale with its labels, pixels.
 const SCALE: [f64; 3] = [180.0, 12.0, 44.0];
-/// Steps of the scale.
+/// Number of steps of the scale.
 const STEPS: usize = 60;
 
 impl HeatMap {
-    /// Counts of something in a unit, coloured by their logarithm up to `greatest`, which maps that stand side by side have in
-    /// common; some are marked.
+    /// Returns a table of counts in a unit, coloured by their logarithm up to `greatest`, which adjacent maps share;
+    /// some are marked.
     pub fn of_counts(
         what: &str,
         rows: Vec<String>,
@@ -63,7 +63,7 @@ impl HeatMap {
         let tile = |(value, marked): (f64, bool)| Tile {
             text: match value {
                 0.0 => "0".to_owned(),
-                // Wider than a cell otherwise.
+                // Other formats are wider than a cell.
                 value if value >= 1e5 => format!("{value:.1e}"),
                 value => format::significant(value, 2),
             },
@@ -80,8 +80,8 @@ impl HeatMap {
         }
     }
 
-    /// What is the same of a pair with its ends exchanged, so that half a table says all: `(i, j, value)`
-    /// with `i < j`, coloured from the least value to the greatest.
+    /// Returns half a table of values that are symmetric in their pair: `(i, j, value)` with `i < j`, coloured from the
+    /// least value to the greatest.
     pub(crate) fn of_pairs(names: &[String], values: &[(usize, usize, f64)]) -> Self {
         let size = names.len().saturating_sub(1);
         let all = || values.iter().map(|(.., value)| *value);
@@ -109,7 +109,7 @@ impl HeatMap {
         }
     }
 
-    /// The picture; `None` without a value.
+    /// Draws the table; `None` without a value.
     pub fn draw(&self) -> Option<Drawing> {
         let tiles = || self.tiles.iter().flatten().flatten();
         let widest = tiles().map(|t| text_width(&t.text)).reduce(f64::max)?;
@@ -124,9 +124,10 @@ impl HeatMap {
         let mut drawing = Drawing::new(width.max(LEAST_WIDTH), height);
         for (column, name) in self.columns.iter().enumerate() {
             let x = left + (column as f64 + 0.5) * cell;
-            match upright {
-                true => drawing.text((x, top - 14.0), name, INK, Anchor::Middle),
-                false => drawing.upward_text((x, top - 8.0 - 0.5 * text_width(name)), name, INK),
+            if upright {
+                drawing.text((x, top - 14.0), name, INK, Anchor::Middle);
+            } else {
+                drawing.upward_text((x, top - 8.0 - 0.5 * text_width(name)), name, INK);
             }
         }
         for (row, name) in self.rows.iter().enumerate() {
@@ -167,7 +168,7 @@ impl HeatMap {
         );
     }
 
-    /// What is to be seen: the cells with the greatest numbers.
+    /// Describes the table in words: the cells with the greatest numbers.
     fn says(&self) -> String {
         let mut shares: Vec<(f64, String)> = Vec::new();
         for (name, row) in self.rows.iter().zip(&self.tiles) {
@@ -181,12 +182,13 @@ impl HeatMap {
         shares.sort_by(|a, b| b.0.total_cmp(&a.0));
         let greatest: Vec<String> = shares.into_iter().take(5).map(|(_, text)| text).collect();
         let (rows, columns) = (self.rows.len(), self.columns.len());
-        match greatest.is_empty() {
-            true => format!("Table of {rows} by {columns} cells, all 0."),
-            false => format!(
+        if greatest.is_empty() {
+            format!("Table of {rows} by {columns} cells, all 0.")
+        } else {
+            format!(
                 "Table of {rows} by {columns} coloured numbers; the greatest: {}.",
                 greatest.join("; ")
-            ),
+            )
         }
     }
 }
@@ -207,10 +209,10 @@ impl Tile {
     }
 }
 
-/// Text on bright cells; not the ink of pages, which dark ones make bright.
+/// Colour of text on bright cells; not the ink of pages, which is bright in dark mode.
 const NEAR_BLACK: [u8; 3] = [1; 3];
 
-/// Black or white, whichever contrasts more with the colour (WCAG 2.1: equal at a luminance of 0.179).
+/// Returns black or white, whichever contrasts more with the colour (WCAG 2.1: equal at a luminance of 0.179).
 fn legible_on(rgb: [u8; 3]) -> Ink {
     let linear = rgb.map(|c| (f64::from(c) / 255.0).powf(2.2));
     let luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];

@@ -8,15 +8,15 @@ use super::panels::{Area, Content};
 pub(crate) struct Histogram {
     /// Counts in equal bins over [0, 1].
     pub counts: Vec<usize>,
-    /// Whether the check found a bias.
+    /// `true` if the check found a bias.
     pub biased: bool,
 }
 
-/// χ² with nine degrees of freedom that chance passes once in a hundred times.
+/// χ² with nine degrees of freedom that is exceeded by chance once in a hundred times.
 const CHANCE: f64 = 21.67;
 
 impl Histogram {
-    /// Whether chance explains how far the bars are from equal.
+    /// Returns `true` if chance explains the differences between the bars.
     pub(crate) fn is_flat(&self) -> bool {
         let total: usize = self.counts.iter().sum();
         let mean = total as f64 / self.counts.len().max(1) as f64;
@@ -34,9 +34,10 @@ impl Content for Histogram {
         let most = self.counts.iter().copied().max().unwrap_or(0) as f64;
         let top = most.max(flat * 1.5).max(1.0);
         let step = 1.0 / self.counts.len() as f64;
-        let fill = match self.biased {
-            true => FAILED.with_alpha(0.75),
-            false => FILL,
+        let fill = if self.biased {
+            FAILED.with_alpha(0.75)
+        } else {
+            FILL
         };
         for (bin, &count) in self.counts.iter().enumerate() {
             let (left, right) = (bin as f64 * step, (bin + 1) as f64 * step);

@@ -6,28 +6,28 @@ use super::paint::fit_text;
 /// Height of a row, pixels.
 pub(crate) const ROW: f64 = 21.0;
 
-/// Height of so many rows, with white below.
+/// Returns the height of `rows` rows, with the margin below.
 pub(crate) fn height(rows: usize) -> f64 {
     rows as f64 * ROW + 8.0
 }
 
-/// Rows from the top down, in one column of a drawing.
+/// Rows from top to bottom in one column of a drawing.
 pub(crate) struct Rows {
     /// Middle of the next row.
     pub y: f64,
-    /// Where samples begin and texts end.
+    /// Left edge, where samples begin; texts end at `right`.
     left: f64,
     right: f64,
 }
 
 impl Rows {
-    /// Rows from `top` on, between `left` and `right`.
+    /// Starts rows at `top`, between `left` and `right`.
     pub(crate) fn new(top: f64, (left, right): (f64, f64)) -> Self {
         let y = top + ROW / 2.0;
         Self { y, left, right }
     }
 
-    /// Adds a row: what `sample` draws at its height, and the text behind it, shortened to its place.
+    /// Adds a row: the drawing of `sample` at its height, and the text after it, shortened to fit.
     pub(crate) fn add(
         &mut self,
         drawing: &mut Drawing,

@@ -1,4 +1,4 @@
-//! What tells categories apart: colour and marker shape, and dashes for what is exact.
+//! Appearance of categories: colour and marker shape, and dashes for exact curves.
 
 use super::drawing::{Drawing, Ink, Point};
 use raystone_image::categorical;
@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 /// Number of different marker shapes.
 const SHAPES: usize = 7;
 
-/// Looks from here on are of structures, those below of samplers and all else: no colour stands for both.
+/// Looks from this index on belong to structures, those below to samplers and all else: no colour is used for both.
 pub(crate) const STRUCTURES: usize = 56;
 
 /// Muted colours for structures.
@@ -22,7 +22,7 @@ const MUTED: [[u8; 3]; 8] = [
     [0xb5, 0x93, 0x6b],
 ];
 
-/// Colour of the category.
+/// Returns the colour of the category.
 pub(crate) fn ink(index: usize) -> Ink {
     Ink::solid(match index.checked_sub(STRUCTURES) {
         Some(structure) => MUTED[structure % MUTED.len()],
@@ -30,8 +30,7 @@ pub(crate) fn ink(index: usize) -> Ink {
     })
 }
 
-/// Draws the marker of a category at a point; seven shapes, so that with eight colours 56
-/// categories differ.
+/// Draws the marker of a category at a point; with eight colours, seven shapes distinguish 56 categories.
 pub fn draw(drawing: &mut Drawing, shape: usize, (x, y): Point, radius: f64, ink: Ink) {
     let ring = |corners: usize, turn: f64, radius: f64| -> Vec<Point> {
         (0..corners)
@@ -47,7 +46,7 @@ pub fn draw(drawing: &mut Drawing, shape: usize, (x, y): Point, radius: f64, ink
         3 => drawing.area(ring(4, 0.0, radius * 1.4), ink),
         4 => drawing.area(ring(3, PI, radius * 1.35), ink),
         kind => {
-            // A plus, or the same turned to a cross.
+            // A plus, or a plus rotated to a cross.
             let turn = if kind == 5 { PI / 4.0 } else { 0.0 };
             for angle in [turn, turn + PI / 2.0] {
                 let (dx, dy) = (radius * 1.3 * angle.sin(), radius * 1.3 * angle.cos());

@@ -1,6 +1,6 @@
 //! Drawings as SVG and PNG, through any `plotters` backend.
 //!
-//! The only font is the embedded one, so that a machine without fonts draws the same picture.
+//! Only the embedded font is used, so that a machine without fonts draws the same picture.
 
 use super::drawing::{Anchor, Drawing, FONT_PX, Ink, Point, Shape, Spot};
 use crate::ReportError;
@@ -12,16 +12,16 @@ use plotters::style::{FontTransform, register_font};
 use raystone_core::text::escape::xml;
 use std::sync::Once;
 
-/// Width of a text in pixels with the embedded font at [`FONT_PX`].
+/// Returns the width of a text in pixels with the embedded font at [`FONT_PX`].
 pub(crate) fn text_width(text: &str) -> f64 {
     register_fonts();
-    // Measured large, because plotters answers in whole pixels.
+    // Measured at a large size, because plotters returns whole pixels.
     font(8.0)
         .box_size(text)
         .map_or(0.0, |(width, _)| f64::from(width) / 8.0)
 }
 
-/// The text, shortened with `…` to fit into `width` pixels.
+/// Returns the text, shortened with `…` to fit into `width` pixels.
 pub(crate) fn fit_text(text: &str, width: f64) -> String {
     if text_width(text) <= width {
         return text.to_owned();
@@ -33,7 +33,7 @@ pub(crate) fn fit_text(text: &str, width: f64) -> String {
     kept + "…"
 }
 
-/// The embedded sans-serif font; plotters' sizes are 1.24 × the em.
+/// Returns the embedded sans-serif font; plotters' sizes are 1.24 × the em.
 fn font(scale: f64) -> FontDesc<'static> {
     FontDesc::new(
         FontFamily::SansSerif,
@@ -51,9 +51,9 @@ fn register_fonts() {
     });
 }
 
-/// The drawing as an SVG document of its own size.
+/// Returns the drawing as an SVG document of its own size.
 pub(crate) fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
-    // Backends round to whole pixels: laid out eight times as large, shown at its size.
+    // Backends round to whole pixels: lay out eight times as large, and show at the original size.
     const SCALE: f64 = 8.0;
     let (width, height) = scaled_size(drawing, SCALE);
     let mut svg = String::new();
@@ -63,7 +63,7 @@ pub(crate) fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
         .draw_rect((0, 0), corner, &WHITE, true)
         .map_err(|error| ReportError::Draw(error.to_string()))?;
     paint(drawing, backend, SCALE, 0.5)?;
-    // Between the paper and the first shape.
+    // Rasters go between the paper and the first shape.
     let paper = svg
         .find("<rect")
         .and_then(|at| Some(at + svg[at..].find("/>")? + 2));
@@ -81,7 +81,7 @@ pub(crate) fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
     ))
 }
 
-/// Transparent discs whose titles a browser shows where the pointer rests.
+/// Returns transparent discs whose titles a browser shows as tooltips.
 fn spots(drawing: &Drawing, scale: f64) -> String {
     let disc = |Spot { at, text }: &Spot| {
         let [x, y, r] = [at.0, at.1, 9.0].map(|v| v * scale);
@@ -91,23 +91,24 @@ fn spots(drawing: &Drawing, scale: f64) -> String {
         )
     };
     let discs: String = drawing.spots.iter().map(disc).collect();
-    match discs.is_empty() {
-        true => discs,
-        false => format!("<g class=\"spots\">\n{discs}</g>\n"),
+    if discs.is_empty() {
+        discs
+    } else {
+        format!("<g class=\"spots\">\n{discs}</g>\n")
     }
 }
 
-/// Above this height, in CSS pixels, a drawing is mostly legend: its PNG file has its own size, not twice that. Dozens
-/// of them would cost a report more time than everything else; the SVG file stays as sharp as it is.
+/// Above this height, in CSS pixels, a drawing is mostly legend, and its PNG file has its own size, not twice that.
+/// Dozens of them would cost a report more time than everything else; the SVG file stays sharp.
 const TALL: f64 = 1000.0;
 
-/// The drawing as a PNG file, smoothed by 2×2 samples per pixel: of twice its size `for_print` (its own above `TALL`),
-/// else of its own.
+/// Returns the drawing as a PNG file, smoothed by 2×2 samples per pixel: of twice its size `for_print` (its own above
+/// `TALL`), otherwise of its own.
 pub(crate) fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, ReportError> {
     let is_fine = for_print && drawing.height <= TALL;
     let scale = if is_fine { 4.0 } else { 2.0 };
     let (width, height) = scaled_size(drawing, scale);
-    // White already: painting it pixel by pixel would take longer than the plot.
+    // Starts white: painting the paper pixel by pixel would take longer than the plot.
     let mut pixels = vec![255u8; width as usize * height as usize * 3];
     for raster in &drawing.rasters {
         raster.blit(&mut pixels, width as usize, scale);
@@ -127,8 +128,7 @@ pub(crate) fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, Repo
     Ok(png)
 }
 
-/// An RGB picture of half the size: means of 2×2 pixels. `width` pixels a row, even in both
-/// directions.
+/// Returns an RGB picture of half the size, by means of 2×2 pixels. Rows have `width` pixels; both sizes are even.
 fn halve(pixels: &[u8], width: usize) -> Vec<u8> {
     let mut half = vec![0; pixels.len() / (width * 6) * (width / 2) * 3];
     for (row, rows) in (half.chunks_exact_mut(width / 2 * 3)).zip(pixels.chunks_exact(width * 6)) {
@@ -150,8 +150,8 @@ fn scaled_size(drawing: &Drawing, scale: f64) -> (u32, u32) {
     (even(drawing.width), even(drawing.height))
 }
 
-/// Paints every shape, `scale` backend pixels to a pixel. Backends disagree on where the middle of a
-/// text is: `drop` is how many pixels below its position it must be put to look centred.
+/// Paints every shape, `scale` backend pixels to a pixel. Backends disagree on the vertical middle of a text: it
+/// looks centred `drop` pixels below its position.
 fn paint<B: DrawingBackend>(
     drawing: &Drawing,
     backend: B,

@@ -9,7 +9,7 @@ const TITLE: f64 = 26.0;
 const NOTE: f64 = 24.0;
 /// Distance between panels, pixels.
 const GAP: f64 = 20.0;
-/// White around all panels, pixels.
+/// Margin around all panels, pixels.
 const MARGIN: f64 = 10.0;
 
 /// The rectangle that a panel is drawn in.
@@ -24,7 +24,7 @@ pub(crate) struct Area {
 }
 
 impl Area {
-    /// Pixel of a point of the unit square, whose origin is the lower left corner.
+    /// Returns the pixel of a point of the unit square, whose origin is the lower left corner.
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> Point {
         let (width, height) = self.size;
         (self.left + x * width, self.top + (1.0 - y) * height)
@@ -37,9 +37,9 @@ impl Area {
     }
 }
 
-/// What a panel shows.
+/// The content of a panel.
 pub(crate) trait Content {
-    /// Draws it into the rectangle.
+    /// Draws the content into the rectangle.
     fn draw(&self, drawing: &mut Drawing, area: Area);
 }
 
@@ -49,12 +49,12 @@ pub(crate) struct Panel {
     pub title: String,
     /// Line below.
     pub note: String,
-    /// What it shows.
+    /// The content.
     pub content: Box<dyn Content>,
 }
 
 impl Panel {
-    /// A panel with a line above and a line below.
+    /// Returns a panel with a line above and a line below.
     pub(crate) fn new(
         title: impl Into<String>,
         note: impl Into<String>,
@@ -68,15 +68,14 @@ impl Panel {
     }
 }
 
-/// Size of square panels of which `columns` fill a drawing of `width` pixels.
+/// Returns the size of square panels of which `columns` fill a drawing of `width` pixels.
 pub(crate) fn square(width: f64, columns: usize) -> (f64, f64) {
     let columns = columns.max(1) as f64;
     let side = ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor();
     (side, side)
 }
 
-/// The panels row by row, `columns` in a row; without panels an empty drawing of the height of one
-/// margin.
+/// Draws the panels row by row, `columns` in a row; without panels an empty drawing one margin high.
 pub(crate) fn draw(panels: &[Panel], columns: usize, (width, height): (f64, f64)) -> Drawing {
     let columns = columns.clamp(1, panels.len().max(1));
     let rows = panels.len().div_ceil(columns) as f64;

@@ -1,4 +1,4 @@
-//! Run time against error: one point per cell, the Pareto front drawn and named.
+//! Run time against error: one point per cell, with the Pareto front drawn and labelled.
 
 use super::axis::{Axes, Axis};
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
@@ -20,7 +20,7 @@ pub(crate) struct CellPoint {
     pub seconds: Interval,
     /// Error of the image, positive.
     pub error: Interval,
-    /// Whether it is on the Pareto front, by a test.
+    /// Position relative to the Pareto front, by a test.
     pub place: Place,
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct ParetoPlot {
 const WIDTH: f64 = 900.0;
 const PLOT_HEIGHT: f64 = 480.0;
 
-/// Letter of a structure: a, b, …, z, then a number.
+/// Returns the letter of a structure: a, b, …, z, then a number.
 pub(crate) fn letter(index: usize) -> String {
     match u8::try_from(index) {
         Ok(i) if i < 26 => char::from(b'a' + i).to_string(),
@@ -51,14 +51,14 @@ pub(crate) fn letter(index: usize) -> String {
 }
 
 impl ParetoPlot {
-    /// Indices of the points of the front as measured, by growing time: each is on it for certain, or that is open.
+    /// Returns the indices of the points of the measured front by increasing time: each is on it for certain, or undecided.
     pub(crate) fn front(&self) -> Vec<usize> {
         let points = self.points.iter();
         let points = points.map(|p| (p.seconds.value, p.error.value));
         pareto_front(&points.collect::<Vec<_>>())
     }
 
-    /// Name of a point: structure · sampler.
+    /// Returns the name of a point: structure · sampler.
     pub(crate) fn name(&self, point: &CellPoint) -> String {
         format!(
             "{} · {}",
@@ -66,7 +66,7 @@ impl ParetoPlot {
         )
     }
 
-    /// Label of a point of the front.
+    /// Returns the label of a point of the front.
     fn rank(&self, rank: usize, point: usize) -> String {
         let open = match self.points[point].place {
             Place::Front => "",
@@ -75,12 +75,12 @@ impl ParetoPlot {
         format!("{}{open}", rank + 1)
     }
 
-    /// The picture; `None` without a point with positive time and error.
+    /// Draws the plot; `None` without a point with positive time and error.
     pub(crate) fn draw(&self) -> Option<Drawing> {
         let ends = |i: Interval| [i.value, i.low, i.high];
         let times = self.points.iter().flat_map(|p| ends(p.seconds));
         let errors = self.points.iter().flat_map(|p| {
-            // Not down to an end that happens to lie close to 0.
+            // An interval end that happens to lie close to 0 must not stretch the axis.
             let low = p.error.low.max(p.error.value / 30.0);
             ends(Interval { low, ..p.error })
         });
@@ -107,7 +107,7 @@ impl ParetoPlot {
         Some(drawing)
     }
 
-    /// Between the front that all lower ends of the intervals would make and that of all upper ends.
+    /// Fills the area between the front of all lower ends of the intervals and that of all upper ends.
     fn draw_uncertainty(&self, axes: &Axes, drawing: &mut Drawing) {
         let stairs = |end: fn(&Interval) -> f64| {
             let corners = self.points.iter().map(|p| (end(&p.seconds), end(&p.error)));
@@ -120,7 +120,7 @@ impl ParetoPlot {
         drawing.area(band, DIM.with_alpha(0.16));
     }
 
-    /// What is above and right of it is beaten.
+    /// Draws the front: points above and to the right of it are beaten.
     fn draw_front(&self, axes: &Axes, front: &[usize], drawing: &mut Drawing) {
         let corners = front.iter().map(|&i| &self.points[i]);
         let stairs = staircase(axes, corners.map(|p| (p.seconds.value, p.error.value)));
@@ -155,8 +155,8 @@ impl ParetoPlot {
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
     }
 
-    /// Ranks of the front and letters of the structures, each where it covers no marker and no other
-    /// label; in a crowd a letter is left out rather than made unreadable.
+    /// Draws ranks of the front and letters of the structures where they cover no marker and no other label; where
+    /// there is no room a letter is left out.
     fn draw_labels(&self, axes: &Axes, front: &[usize], drawing: &mut Drawing) {
         const CLEAR: f64 = 12.0;
         let at = |i: usize| {
@@ -180,7 +180,7 @@ impl ParetoPlot {
                 taken.iter().all(far)
             };
             let free = places.iter().find(is_free).copied();
-            // The front must be named even in a crowd.
+            // The front is labelled even where there is no room.
             if let Some(place) = free.or(is_rank.then_some(places[0])) {
                 drawing.text(place, text, ink, Anchor::Middle);
                 taken.push(place);
@@ -219,7 +219,7 @@ impl ParetoPlot {
     }
 }
 
-/// The steps through some corners by growing time, from the upper edge to the right one.
+/// Returns the steps through some corners by increasing time, from the upper edge to the right one.
 fn staircase(axes: &Axes, corners: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut stairs: Vec<Point> = Vec::new();
     for (seconds, error) in corners {

@@ -1,4 +1,4 @@
-//! Point sets: in the square, on the disc and on the hemisphere.
+//! Point sets in the square, on the disc and on the hemisphere.
 
 use super::drawing::{DIM, Drawing, GRID, Ink, Point};
 use super::marker;
@@ -7,36 +7,36 @@ use super::raster::Canvas;
 use raystone_sampling::hash::pcg_hash;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
-/// Points that are drawn at most.
+/// Greatest number of points drawn.
 pub const MOST_DRAWN: usize = 1 << 16;
-/// Points that are drawn as shapes; more of them are painted as pixels.
+/// Greatest number of points drawn as shapes; more are painted as pixels.
 const MOST_SHAPES: usize = 1024;
-/// Corners of a dot.
+/// Number of corners of a dot.
 const CORNERS: usize = 10;
-/// Elevation of the eye that looks at the hemisphere.
+/// Elevation of the viewer of the hemisphere.
 const TILT: f64 = PI / 5.0;
-/// Colour of intervals without a point, and of the points of the first pixel among others.
+/// Colour of intervals without a point, and of the first pixel's points among others.
 const ACCENT: usize = 1;
 
 /// A point of the unit square.
 pub type Pair = [f64; 2];
 
-/// Where the points of the square go.
+/// The domain that the points of the square are mapped to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Domain {
-    /// They stay.
+    /// The square itself.
     Square,
-    /// `radius = √x`, `angle = 2π y`: what the path tracer maps directions with
+    /// `radius = √x`, `angle = 2π y`: the path tracer's mapping of directions
     /// (`kernels/shading/hemisphere.wesl`), seen from above.
     PolarDisc,
     /// Squares to rings (Shirley and Chiu 1997), for comparison: no kernel uses it.
     ConcentricDisc,
-    /// As [`Domain::PolarDisc`], lifted to `z = √(1 − x)` and seen from the side.
+    /// Like [`Domain::PolarDisc`], lifted to `z = √(1 − x)` and seen from the side.
     Hemisphere,
 }
 
 impl Domain {
-    /// Place of a point in a square of side 1 that holds the domain.
+    /// Returns the place of a point in a square of side 1 that contains the domain.
     pub(crate) fn place(self, [x, y]: Pair) -> Pair {
         let on_disc = |radius: f64, angle: f64| [radius * angle.cos(), radius * angle.sin()];
         let [a, b] = match self {
@@ -54,7 +54,7 @@ impl Domain {
         [0.5 + 0.5 * a, 0.5 + 0.5 * b]
     }
 
-    /// Whether the point lies behind the dome, as seen from the side.
+    /// Returns `true` if the point lies behind the dome, as seen from the side.
     fn is_behind(self, [x, y]: Pair) -> bool {
         // Seen along the direction (0, cos, −sin) of the tilt.
         let normal =
@@ -91,7 +91,7 @@ impl Domain {
     }
 }
 
-/// Radius and angle of the concentric map (P. Shirley and K. Chiu, "A low distortion map between disk and
+/// Returns radius and angle of the concentric map (P. Shirley and K. Chiu, "A low distortion map between disk and
 /// square", JGT 2(3), 1997).
 fn concentric(point: Pair) -> (f64, f64) {
     let [a, b] = point.map(|c| 2.0 * c - 1.0);
@@ -104,13 +104,13 @@ fn concentric(point: Pair) -> (f64, f64) {
     }
 }
 
-/// Parallel projection of the unit hemisphere along a direction that falls by [`TILT`].
+/// Projects the unit hemisphere along a direction that falls by [`TILT`].
 fn seen_from_the_side([x, y, z]: [f64; 3]) -> Pair {
     [0.5 + 0.5 * x, 0.4 + 0.5 * (y * TILT.sin() + z * TILT.cos())]
 }
 
-/// Indices of at most `most` of `n` points, in order: all of them, or a choice that does not depend on where
-/// they lie (the least hashes), since every prefix or stride of a sequence has a structure of its own.
+/// Returns the indices of at most `most` of `n` points, in order: all of them, or a choice that does not depend on
+/// their places (the least hashes), since every prefix or stride of a sequence has its own structure.
 pub fn thinned(n: usize, most: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = (0..n).collect();
     if n > most {
@@ -121,7 +121,7 @@ pub fn thinned(n: usize, most: usize) -> Vec<usize> {
     chosen
 }
 
-/// How many of `n` points are drawn, in words.
+/// Returns in words how many of `n` points are drawn.
 pub(crate) fn drawn_in_words(n: usize) -> String {
     match n {
         1 => "1 point".into(),
@@ -130,7 +130,7 @@ pub(crate) fn drawn_in_words(n: usize) -> String {
     }
 }
 
-/// Counts of the elementary intervals of `2^a × 2^b` cells, row by row from below: points on the upper
+/// Counts the points in each of the `2^a × 2^b` elementary intervals, row by row from below; points on the upper
 /// border count for the last cell.
 pub(crate) fn interval_counts(points: &[Pair], [a, b]: [u32; 2]) -> Vec<u32> {
     let cell = |c: f64, bits: u32| {
@@ -147,19 +147,18 @@ pub(crate) fn interval_counts(points: &[Pair], [a, b]: [u32; 2]) -> Vec<u32> {
 /// Points in a domain.
 #[derive(Debug, Clone)]
 pub(crate) struct Cloud {
-    /// Where they go.
+    /// The domain.
     pub domain: Domain,
-    /// Points of the unit square; drawn [thinned](MOST_DRAWN).
+    /// Points of the unit square, [thinned](MOST_DRAWN) when drawn.
     pub points: Vec<Pair>,
     /// Points on top, in another colour.
     pub highlighted: Vec<Pair>,
-    /// Exponents of the elementary intervals that are drawn below the points, `2^a × 2^b` of them; those
-    /// without a point are tinted.
+    /// Exponents of the `2^a × 2^b` elementary intervals drawn below the points; those without a point are tinted.
     pub intervals: Option<[u32; 2]>,
 }
 
 impl Cloud {
-    /// Points and nothing else.
+    /// Returns a plot of points alone.
     pub(crate) fn new(domain: Domain, points: Vec<Pair>) -> Self {
         Self {
             domain,
@@ -169,7 +168,7 @@ impl Cloud {
         }
     }
 
-    /// Radius of a dot, pixels: a share of the mean distance between points, within limits.
+    /// Returns the radius of a dot in pixels: a fraction of the mean distance between points, within limits.
     fn radius(&self, drawn: usize, area: Area) -> f64 {
         (0.16 * area.size.0 / (drawn.max(1) as f64).sqrt()).clamp(0.5, 3.2)
     }
@@ -202,7 +201,7 @@ impl Content for Cloud {
         self.domain.outline(drawing, area);
         let chosen = thinned(self.points.len(), MOST_DRAWN);
         let radius = self.radius(chosen.len(), area);
-        // Dots that lie upon each other add up to a full colour.
+        // Overlapping dots add up to a full colour.
         let alpha = if chosen.len() > MOST_SHAPES { 0.6 } else { 0.9 };
         let ink = marker::ink(0);
         let dots = chosen.iter().map(|&i| {
@@ -228,7 +227,7 @@ impl Content for Cloud {
     }
 }
 
-/// A disc of few corners.
+/// Draws a disc as a polygon of few corners.
 fn dot(drawing: &mut Drawing, (x, y): Point, radius: f64, ink: Ink) {
     let corner = |i: usize| {
         let (sin, cos) = (TAU * i as f64 / CORNERS as f64).sin_cos();
@@ -292,7 +291,7 @@ mod tests {
         let chosen = thinned(points.len(), MOST_DRAWN);
         assert_eq!(chosen.len(), MOST_DRAWN);
         assert!(chosen.windows(2).all(|pair| pair[0] < pair[1]));
-        // A fair choice: every tenth of the set keeps its share.
+        // A fair choice: each tenth of the set keeps its share.
         let first = chosen.iter().filter(|&&i| i < 10_000).count();
         assert!((6_300..6_800).contains(&first), "{first}");
         assert_eq!(drawn_in_words(100_000), "65536 of 100000 points");
@@ -317,7 +316,7 @@ mod tests {
         let [x, y] = Domain::ConcentricDisc.place([1.0, 0.3]);
         assert!(((x - 0.5).hypot(y - 0.5) - 0.5).abs() < 1e-12);
         assert_eq!(Domain::ConcentricDisc.place([0.5, 0.5]), [0.5, 0.5]);
-        // The pole is the highest place of the dome's axis and in front.
+        // The pole is the highest point of the dome and in front.
         assert!(!Domain::Hemisphere.is_behind([0.0, 0.0]));
         assert!(Domain::Hemisphere.is_behind([1.0, 0.25]));
         assert!(!Domain::Hemisphere.is_behind([1.0, 0.75]));

@@ -1,4 +1,4 @@
-//! Pixels within a drawing, for what would be too many shapes.
+//! Pixels within a drawing, where there would be too many shapes.
 
 use super::drawing::{Ink, Point};
 use crate::ReportError;
@@ -6,9 +6,9 @@ use base64::Engine;
 use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 
-/// Pixels of a [`Canvas`] to a pixel of the drawing: those of the PNG file.
+/// Pixels of a [`Canvas`] per pixel of the drawing, as in the PNG file.
 const CANVAS_SCALE: f64 = 2.0;
-/// Shades between paper and ink on a [`Canvas`]: few, so that files stay small.
+/// Number of shades between paper and ink on a [`Canvas`]: few, so that files stay small.
 const SHADES: f32 = 16.0;
 
 /// A rectangle of pixels behind all shapes of a drawing.
@@ -18,9 +18,9 @@ pub struct Raster {
     pub at: Point,
     /// Width and height, pixels of the drawing.
     pub size: (f64, f64),
-    /// Pixels of its own in a row.
+    /// Number of its own pixels in a row.
     pub columns: usize,
-    /// sRGB, row by row from the top.
+    /// sRGB pixels, row by row from the top.
     pub rgb: Vec<[u8; 3]>,
 }
 
@@ -30,8 +30,8 @@ impl Raster {
         self.rgb.len() / self.columns.max(1)
     }
 
-    /// Paints it on an RGB picture of `width` pixels a row that shows the drawing `scale` times as
-    /// large; every pixel takes the colour that lies under its middle.
+    /// Paints it on an RGB picture of `width` pixels a row that shows the drawing `scale` times as large; every pixel
+    /// gets the colour at its centre.
     pub(crate) fn blit(&self, picture: &mut [u8], width: usize, scale: f64) {
         let height = picture.len() / 3 / width.max(1);
         let range = |from: f64, length: f64, end: usize| {
@@ -52,7 +52,7 @@ impl Raster {
         }
     }
 
-    /// The raster as an `<image>` of an SVG document that shows the drawing `scale` times as large.
+    /// Returns the raster as an `<image>` of an SVG document that shows the drawing `scale` times as large.
     ///
     /// # Errors
     /// If the pixels cannot be encoded.
@@ -70,7 +70,7 @@ impl Raster {
         let data = base64::engine::general_purpose::STANDARD.encode(png);
         let [x, y, width, height] =
             [self.at.0, self.at.1, self.size.0, self.size.1].map(|length| length * scale);
-        // Few pixels are cells of a table and keep their edges.
+        // Few pixels are cells of a table and need sharp edges.
         let style = if (self.columns as f64) < self.size.0 {
             r#" style="image-rendering: pixelated""#
         } else {
@@ -88,12 +88,12 @@ pub(crate) struct Canvas {
     side: f64,
     columns: usize,
     ink: Ink,
-    /// How much of each pixel is covered, 0 to 1.
+    /// Coverage of each pixel, 0 to 1.
     cover: Vec<f32>,
 }
 
 impl Canvas {
-    /// A square of `side` pixels with this upper left corner.
+    /// Returns an empty square of `side` pixels with this upper left corner.
     pub(crate) fn new(at: Point, side: f64, ink: Ink) -> Self {
         let columns = (side * CANVAS_SCALE).round().max(1.0) as usize;
         Self {
@@ -105,8 +105,8 @@ impl Canvas {
         }
     }
 
-    /// Paints a disc with a smooth edge; place and radius in pixels of the drawing, opacity in [0, 1].
-    /// What lies outside the square is cut off.
+    /// Paints a disc with a smooth edge, clipped to the square; place and radius in pixels of the drawing, opacity in
+    /// [0, 1].
     pub(crate) fn dot(&mut self, (x, y): Point, radius: f64, alpha: f64) {
         let (x, y) = (
             (x - self.at.0) * CANVAS_SCALE,
@@ -127,7 +127,7 @@ impl Canvas {
         }
     }
 
-    /// What was painted.
+    /// Returns the painted raster.
     pub(crate) fn into_raster(self) -> Raster {
         let color = |cover: &f32| {
             let share = (cover * SHADES).round() / SHADES;

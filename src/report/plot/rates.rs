@@ -7,14 +7,14 @@ use super::paint::{fit_text, text_width};
 use crate::format;
 use raystone_record::Interval;
 
-/// One bar, or what stands in its place.
+/// One bar, or the text in its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bar {
     /// Name of the structure.
     pub label: String,
     /// Category: the same structure looks the same in every plot.
     pub look: usize,
-    /// Mrays/s; absent when the structure has no right to a figure.
+    /// Mrays/s; `None` for a structure without a valid figure.
     pub rate: Option<Interval>,
     /// Text in place of the bar, for instance `FAILED`.
     pub instead: String,
@@ -23,7 +23,7 @@ pub(crate) struct Bar {
 /// Horizontal bars in groups.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RatePlot {
-    /// Which clock the times come from.
+    /// The clock of the times.
     pub clock: &'static str,
     /// `(ray class, one bar per structure)`.
     pub groups: Vec<(String, Vec<Bar>)>,
@@ -34,7 +34,7 @@ const ROW: f64 = 24.0;
 const HEADER: f64 = 30.0;
 
 impl RatePlot {
-    /// The picture; `None` without a bar.
+    /// Draws the bars; `None` without a bar.
     pub(crate) fn draw(&self) -> Option<Drawing> {
         let bars = || self.groups.iter().flat_map(|(_, bars)| bars);
         let widest = bars().map(|bar| text_width(&bar.label)).reduce(f64::max)?;
@@ -82,7 +82,7 @@ impl RatePlot {
         Some(drawing)
     }
 
-    /// What is to be seen: the longest bar of each group and what has none.
+    /// Describes the bars in words: the longest of each group, and structures without a bar.
     fn says(&self) -> String {
         let group = |(class, bars): &(String, Vec<Bar>)| {
             let rated = bars.iter().filter_map(|bar| Some((bar, bar.rate?.value)));
@@ -93,9 +93,10 @@ impl RatePlot {
             let without: Vec<&str> = (bars.iter().filter(|bar| bar.rate.is_none()))
                 .map(|bar| bar.label.as_str())
                 .collect();
-            let without = match without.is_empty() {
-                true => String::new(),
-                false => format!(", without a bar: {}", without.join(", ")),
+            let without = if without.is_empty() {
+                String::new()
+            } else {
+                format!(", without a bar: {}", without.join(", "))
             };
             format!("{class}: {}{without}", best.unwrap_or("no bar".into()))
         };

@@ -7,33 +7,32 @@ use super::raster::Raster;
 use raystone_discrepancy::Periodogram;
 use raystone_image::viridis;
 
-/// Ends of the scale of powers, as powers of ten.
+/// Ends of the power scale, as powers of ten.
 const DECADES: [f64; 2] = [-2.0, 2.0];
 
 /// Width of the labels of a curve, pixels.
 const LABELS: f64 = 42.0;
 
-/// The highest frequency shown for this many points: twice their mean number per unit of length, within
-/// limits.
+/// Returns the highest frequency shown for this many points: twice their mean number per unit of length, within limits.
 pub(crate) fn highest_frequency(points: usize) -> usize {
     (2.0 * (points as f64).sqrt()).round().clamp(16.0, 96.0) as usize
 }
 
-/// Place of a power on the scale, 0 to 1; clamped.
+/// Returns the place of a power on the scale, clamped to [0, 1].
 fn share(power: f64) -> f64 {
     let [low, high] = DECADES;
-    // Rounding leaves 10⁻³⁰ where a power is 0; the floor keeps the logarithm finite.
+    // Rounding leaves 10⁻³⁰ where a power is 0; the floor makes the logarithm finite.
     ((power.max(1e-30).log10() - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-/// Mean power against the length of the frequency, element 0 for frequency 1; logarithmic from 0.01 to
-/// 100, and what lies outside lies on the edge.
+/// Mean power against the length of the frequency, element 0 for frequency 1; logarithmic from 0.01 to 100, clamped
+/// to the edges.
 #[derive(Debug, Clone)]
 pub(crate) struct RadialCurve(pub Vec<f64>);
 
 impl Content for RadialCurve {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
-        // Labels stand inside the frame, so that panels may stand close together.
+        // Labels are inside the frame, so that panels may be close together.
         let left = LABELS / area.size.0;
         let across = |power| [[left, share(power)], [1.0, share(power)]].map(|end| area.at(end));
         for power in [0.1, 1.0, 10.0] {
@@ -61,8 +60,7 @@ impl Content for RadialCurve {
     }
 }
 
-/// Power at every frequency, frequency 0 in the middle (left white), on a logarithmic scale of colours
-/// from 0.01 to 100.
+/// Power at every frequency, frequency 0 in the middle (left white), on a logarithmic colour scale from 0.01 to 100.
 pub(crate) struct PeriodogramMap(pub Periodogram);
 
 impl Content for PeriodogramMap {
@@ -84,7 +82,7 @@ impl Content for PeriodogramMap {
     }
 }
 
-/// The scale of colours of [`PeriodogramMap`], upright in the middle of the square.
+/// The colour scale of [`PeriodogramMap`], upright in the middle of the square.
 pub(crate) struct ColorBar;
 
 impl Content for ColorBar {

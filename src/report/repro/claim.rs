@@ -1,7 +1,6 @@
 //! An expectation against what a run found: a row for each place where it speaks.
 
 use super::judge::{Bounds, Verdict, factor, spread};
-use super::rounds::Rounds;
 use super::select::{fits, merged, partner, select, words};
 use crate::format;
 use crate::samplers::HEAVY_TAILED;
@@ -22,8 +21,6 @@ pub struct Context {
     pub scenes: Vec<(String, Result<String, String>)>,
     /// What was left out or failed: the cell in words, and why.
     pub absent: Vec<(Key, String)>,
-    /// What is known round by round.
-    pub rounds: Rounds,
 }
 
 /// One place of a claim.
@@ -326,7 +323,7 @@ impl<'e> Place<'e> {
 
     /// What a value is compared by: what is known of it part by part (times round by round), else its interval.
     fn figure(&self, value: &Value) -> Option<LogFigure> {
-        let by_parts = self.context.rounds.of(value).cloned();
+        let by_parts = value.by_parts();
         by_parts.or_else(|| LogFigure::of_interval(known(value)?, f64::INFINITY))
     }
 

@@ -1,14 +1,14 @@
-//! Verdicts: an interval against bounds. Ratios and exponents have theirs from [`raystone_stats::comparison`].
+//! Verdicts: an interval against bounds. Intervals of ratios and exponents come from [`raystone_stats::comparison`].
 
 use raystone_record::Interval;
 use raystone_record::figure::{Figure, Spread};
 use serde::{Deserialize, Serialize};
 
-/// What is found of a claim.
+/// The verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Shown without a judgement.
+    /// Shown without a verdict.
     Shown,
     /// It cannot be tested where this ran.
     NotTestable,
@@ -23,7 +23,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// What a reader is told.
+    /// Returns the verdict as text.
     pub fn word(self) -> &'static str {
         match self {
             Self::Shown => "shown",
@@ -35,14 +35,14 @@ impl Verdict {
         }
     }
 
-    /// The verdict on a claim about all places, from those on each: one that contradicts it is enough, and it is
-    /// supported where every place that can be tested supports it.
+    /// Combines the verdicts on all places of a claim: one contradiction is enough, and the claim is supported if every
+    /// testable place supports it.
     pub(crate) fn of_all(verdicts: impl IntoIterator<Item = Self>) -> Self {
         verdicts.into_iter().max().unwrap_or(Self::NotTestable)
     }
 }
 
-/// What agrees.
+/// The range of values that agree with a claim.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// Least value.
@@ -52,7 +52,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Both ends; an end that is not given is no bound.
+    /// Returns the range between both ends; a missing end is no bound.
     pub fn new(least: Option<f64>, most: Option<f64>) -> Self {
         Self {
             least: least.unwrap_or(f64::NEG_INFINITY),
@@ -60,7 +60,7 @@ impl Bounds {
         }
     }
 
-    /// Where both agree.
+    /// Returns the intersection of both.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Bounds {
         }
     }
 
-    /// An interval against the bounds.
+    /// Compares an interval with the bounds.
     pub fn judge(self, i: Interval) -> Verdict {
         if ![i.low, i.value, i.high].into_iter().all(|x| !x.is_nan()) {
             return Verdict::Undecided;
@@ -83,7 +83,7 @@ impl Bounds {
         }
     }
 
-    /// In words, for instance `≥ 1` or `0.975 … 1.025`.
+    /// Returns the bounds as text, for instance `≥ 1` or `0.975 … 1.025`.
     pub fn words(self) -> String {
         let text = |x: f64| format!("{}", (x * 1e4).round() / 1e4);
         match (self.least.is_finite(), self.most.is_finite()) {
@@ -95,26 +95,27 @@ impl Bounds {
     }
 }
 
-/// How far a figure that was measured once may be off: nothing is known of its spread, and this is assumed.
+/// Assumed factor by which a figure measured once may be off, since its spread is unknown.
 pub(crate) const ONCE: f64 = 1.5;
-/// What may be missing from a time that was measured once, or too much, milliseconds: a turn of the scheduler, the start
-/// of threads. Two runs of a build of 0.1 ms differed by 6 ms.
+/// Assumed absolute error of a time measured once, in milliseconds: a turn of the scheduler, the start of threads. Two
+/// runs of a build of 0.1 ms differed by 6 ms.
 pub(crate) const ONCE_MS: f64 = 10.0;
 
-/// A reading with the spread that is assumed of figures measured once.
+/// Returns a reading with the spread assumed for figures measured once.
 pub(crate) fn spread(figure: &Figure, i: Interval) -> Interval {
     let off = if figure.unit == "ms" { ONCE_MS } else { 0.0 };
-    match figure.spread == Spread::Single && i.low == i.high && i.value > 0.0 {
-        true => Interval {
+    if figure.spread == Spread::Single && i.low == i.high && i.value > 0.0 {
+        Interval {
             value: i.value,
             low: (i.value - off).max(0.0) / ONCE,
             high: (i.value + off) * ONCE,
-        },
-        false => i,
+        }
+    } else {
+        i
     }
 }
 
-/// Factor from one unit into another; `None` where they measure different things.
+/// Returns the factor from one unit to another; `None` if they measure different things.
 pub(crate) fn factor(from: &str, to: &str) -> Option<f64> {
     const UNITS: [(&str, &str, f64); 9] = [
         ("s", "time", 1.0),
@@ -189,7 +190,7 @@ mod tests {
         use raystone_stats::comparison::LogFigure;
         let build = spread(&figure::BUILD_MS, Interval::exact(100.0));
         assert_eq!((build.low, build.high), (60.0, 165.0));
-        // A build of a millisecond may have taken none: neither is faster than the other.
+        // A build of a millisecond may have taken no time at all: neither is faster than the other.
         let short = |ms| spread(&figure::BUILD_MS, Interval::exact(ms));
         let [slow, fast] =
             [6.0, 0.1].map(|ms| LogFigure::of_interval(short(ms), f64::INFINITY).expect("a time"));

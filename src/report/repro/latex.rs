@@ -4,7 +4,7 @@ use super::page::{Grid, optional, printed};
 use super::table::Reproduced;
 use raystone_core::text::escape::latex as escape;
 
-/// Every table that has columns.
+/// Returns every table that has columns.
 pub fn tables(tables: &[Reproduced]) -> String {
     let mut text =
         String::from("% Needs \\usepackage{booktabs}. In each cell pair: the thesis, then ours.\n");

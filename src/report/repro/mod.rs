@@ -9,7 +9,6 @@ pub mod judge;
 pub mod latex;
 pub mod page;
 mod plots;
-pub mod rounds;
 pub mod scenes;
 pub mod select;
 pub mod table;

@@ -10,10 +10,10 @@ use raystone_config::expect::Expect;
 use raystone_record::Interval;
 use raystone_record::figure::FIGURES;
 
-/// Tables that could not be run: name and reason.
+/// Tables that failed to run: name and reason.
 pub type Failures = [(String, String)];
 
-/// The whole page.
+/// Returns the whole page.
 pub fn document(tables: &[Reproduced], failed: &Failures, not_covered: &NotCovered) -> Document {
     let mut document = Document {
         title: "What holds of four theses".to_owned(),
@@ -43,7 +43,7 @@ fn subtitle(tables: &[Reproduced]) -> String {
     first.map_or_else(String::new, |(e, at)| format::where_and_when(e, at))
 }
 
-/// How many of all claims got each verdict, in words.
+/// Returns the number of claims with each verdict, in words.
 pub fn tally(tables: &[Reproduced]) -> String {
     let verdicts = || {
         let of = |t: &Reproduced| {
@@ -104,11 +104,12 @@ fn summary(tables: &[Reproduced]) -> Section {
     section
 }
 
-/// Hypotheses of the digest, or the expectation's own name.
+/// Returns the hypotheses of the digest, or the expectation's own name.
 pub fn claim_name(expect: &Expect) -> String {
-    match expect.claims.is_empty() {
-        true => expect.id.clone(),
-        false => expect.claims.join(", "),
+    if expect.claims.is_empty() {
+        expect.id.clone()
+    } else {
+        expect.claims.join(", ")
     }
 }
 
@@ -122,7 +123,7 @@ fn verdict_cell(verdict: Verdict) -> TableCell {
     TableCell::from(verdict.word()).toned(tone)
 }
 
-/// Verdicts place by place, in short.
+/// Summarises the verdicts of all places.
 fn places(rows: &[Row]) -> String {
     match rows {
         [row] => match row.ours {
@@ -140,30 +141,32 @@ fn places(rows: &[Row]) -> String {
             ];
             let said = all.into_iter().filter(|v| count(*v) > 0);
             let said: Vec<String> = said.map(|v| format!("{} {}", count(v), v.word())).collect();
-            // Where nothing could be tested, the reason of most places.
+            // Where nothing could be tested, give the most frequent reason.
             let reasons = rows.iter().map(|row| row.reason.as_str());
             let times = |reason: &str| rows.iter().filter(|row| row.reason == reason).count();
             let reason = reasons
                 .max_by_key(|reason| times(reason))
                 .unwrap_or_default();
-            match count(Verdict::NotTestable) == rows.len() {
-                true => format!("{} places: {reason}", rows.len()),
-                false => said.join(", "),
+            if count(Verdict::NotTestable) == rows.len() {
+                format!("{} places: {reason}", rows.len())
+            } else {
+                said.join(", ")
             }
         }
     }
 }
 
-/// A figure with its interval.
+/// Formats a figure with its interval.
 pub fn interval(i: Interval) -> String {
-    match i.low < i.high {
-        true => format!(
+    if i.low < i.high {
+        format!(
             "{} [{}, {}]",
             format::number(i.value),
             format::number(i.low),
             format::number(i.high)
-        ),
-        false => format::number(i.value),
+        )
+    } else {
+        format::number(i.value)
     }
 }
 
@@ -227,7 +230,7 @@ pub struct Grid<'t> {
 }
 
 impl<'t> Grid<'t> {
-    /// Every place that has a column; `None` if none has.
+    /// Returns all places with a column; `None` if there are none.
     pub fn new(table: &'t Reproduced) -> Option<Self> {
         let placed = || {
             let rows = table.claims.iter().flatten();
@@ -253,15 +256,15 @@ impl<'t> Grid<'t> {
     }
 }
 
-/// A number of ours, or a dash.
+/// Formats a measured number, or a dash.
 pub fn optional(value: Option<f64>) -> String {
     value.map_or(format::ABSENT.to_owned(), format::number)
 }
 
-/// What a thesis prints, to its last digit, or a dash.
+/// Formats a thesis's number to its last digit, or a dash.
 pub fn printed(value: Option<f64>) -> String {
     let text = |x: f64| match x.to_string() {
-        // What came of another unit may have digits that nobody printed.
+        // A converted number may have digits that the thesis did not print.
         long if long.len() > 9 => format::number(x),
         text => text.replace('-', "−"),
     };
@@ -290,7 +293,7 @@ fn original(table: &Reproduced) -> Option<Table> {
     Some(shown)
 }
 
-/// A claim with its places.
+/// Returns the blocks of a claim with its places.
 fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
     let verdict = table.verdict(index);
     if verdict == Verdict::Shown && expect.explain.is_empty() {
@@ -325,7 +328,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
     blocks
 }
 
-/// What is compared, with the unit where it has one.
+/// Describes the comparison, with the unit if it has one.
 fn how(expect: &Expect) -> String {
     use raystone_config::expect::Compare;
     let figure = FIGURES.iter().find(|figure| figure.id == expect.figure);

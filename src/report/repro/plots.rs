@@ -9,7 +9,7 @@ use raystone_config::expect::Expect;
 use raystone_record::Interval;
 use raystone_record::figure::FIGURES;
 
-/// All plots of a table.
+/// Returns all plots of a table.
 pub(super) fn of(table: &Reproduced) -> Option<Block> {
     let pairs = || table.thesis.expects.iter().zip(&table.claims);
     let mut figures: Vec<&str> = Vec::new();
@@ -30,7 +30,7 @@ fn is_ratio(expect: &Expect) -> bool {
     !matches!(expect.compare, Bound | Shown)
 }
 
-/// Every series of a figure over samples or points; those of the thesis are dashed.
+/// Plots every series of a figure over samples or points; those of the thesis are dashed.
 fn curves(table: &Reproduced, figure: &str) -> Option<Illustration> {
     let stem = figure.split('/').next().unwrap_or(figure);
     curve_plot(table, figure).figure(
@@ -122,7 +122,7 @@ fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustra
     ))
 }
 
-/// Bars of ours, by what stands before the dot of a row.
+/// Returns the measured bars, grouped by the text before the dot of a row.
 fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
     let mut groups: Vec<(String, Vec<Bar>)> = Vec::new();
     // A colour stands for one label, whichever bars a group lacks.
@@ -203,7 +203,7 @@ mod tests {
         let thesis = ("Halton, thesis", true, vec![(8.0, 0.75), (16.0, 0.25)]);
         assert_eq!(found.collect::<Vec<_>>(), [ours, thesis]);
         assert!(of(&one).is_some());
-        // What is a ratio is no curve.
+        // A ratio is not a curve.
         let ratio = TEXT.replace(
             "\"shown\"",
             "\"ratio\"\nleast = 1.0\nof = { spp = \"1\" }\nover = { spp = \"2\" }",

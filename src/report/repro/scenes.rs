@@ -1,21 +1,21 @@
-//! Models that stand for the theses' scenes: which there are, whose they are, and where a person can get them.
+//! Models that stand for the theses' scenes, with licences and sources.
 
 use std::path::{Path, PathBuf};
 
-/// A model that experiments of theses use.
+/// A model used by the experiments of theses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Model {
     /// Path below the scene directory.
     pub path: &'static str,
     /// Number of triangles.
     pub triangles: u64,
-    /// Licence and whose it is.
+    /// Licence and author.
     pub licence: &'static str,
-    /// Where a person can get it.
+    /// Where to get it.
     pub from: &'static str,
 }
 
-/// Every model that an experiment of `experiments/thesis` names.
+/// All models named by experiments in `experiments/thesis`.
 pub static MODELS: [Model; 7] = [
     Model {
         path: "sponza-crytek/sponza.obj",
@@ -61,10 +61,10 @@ pub static MODELS: [Model; 7] = [
     },
 ];
 
-/// The folder that experiments name models by.
+/// The folder of models as written in experiments.
 pub(crate) const IN_FILES: &str = "../shared/scenes";
 
-/// The scene directory: the one asked for, `../shared/scenes` if it is there, else that of the user's data.
+/// Returns the scene directory: the one asked for, `../shared/scenes` if it exists, otherwise that of the user's data.
 pub fn directory(asked: Option<&Path>) -> PathBuf {
     if let Some(asked) = asked {
         return asked.to_owned();
@@ -79,17 +79,17 @@ pub fn directory(asked: Option<&Path>) -> PathBuf {
     data.map_or(shared, |data| data.join("raystone").join("scenes"))
 }
 
-/// The scene of a substitute that names one of its variants by a pattern, as `instances(*count=8*`.
+/// Returns the scene of a substitute that selects a variant by a pattern, such as `instances(*count=8*`.
 pub(crate) fn name_of(scene: &str) -> &str {
     scene.split_once('(').map_or(scene, |(name, _)| name)
 }
 
-/// Whether a substitute is a path, and not a built-in scene.
+/// Returns `true` if a substitute is a path, and not a built-in scene.
 pub fn is_model(scene: &str) -> bool {
     name_of(scene).contains('.')
 }
 
-/// What to get where a model is missing.
+/// Returns instructions for getting a missing model.
 pub fn what_to_get(scene: &str, directory: &Path) -> String {
     let place = directory.join(scene);
     let model = MODELS.iter().find(|model| model.path == scene);

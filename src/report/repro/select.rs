@@ -1,26 +1,26 @@
-//! Which values an expectation speaks of.
+//! Selection of the values that an expectation is about.
 
 use crate::values::Value;
 use raystone_config::Pattern;
 use raystone_config::expect::Pick;
 use raystone_record::Key;
 
-/// Whether a key has, on every axis of the pick, a label that fits; the label of an axis that a figure has not is empty.
+/// Returns `true` if a key has a matching label on every axis of the pick; axes that a figure lacks have an empty label.
 pub(crate) fn fits(key: &Key, pick: &Pick) -> bool {
     pick.iter()
         .all(|(axis, pattern)| Pattern::new(pattern.as_str()).fits_text(key.label(axis)))
 }
 
-/// Values of a figure that a pick chooses.
+/// Returns the values of a figure that match a pick.
 pub fn select<'v, 'a>(values: &'v [Value<'a>], figure: &str, pick: &Pick) -> Vec<&'v Value<'a>> {
     let of_figure = values.iter().filter(|value| value.figure.id == figure);
     of_figure.filter(|v| fits(&v.key, pick)).collect()
 }
 
-/// The one value of `others` that differs from `value` on the axes alone that the picks name.
+/// Returns the one value of `others` that differs from `value` only on axes that the picks name.
 ///
 /// # Errors
-/// There is none, or more than one.
+/// If there is none, or more than one.
 pub(crate) fn partner<'v, 'a>(
     value: &Value,
     others: &[&'v Value<'a>],
@@ -44,18 +44,19 @@ pub(crate) fn partner<'v, 'a>(
     }
 }
 
-/// A pick with more laid over it.
+/// Returns `base` with the entries of `over` replacing its own.
 pub(crate) fn merged(base: &Pick, over: &Pick) -> Pick {
     let mut pick = base.clone();
     pick.extend(over.iter().map(|(a, p)| (a.clone(), p.clone())));
     pick
 }
 
-/// A pick in words.
+/// Returns a pick in words.
 pub fn words(pick: &Pick) -> String {
     let parts: Vec<String> = pick.iter().map(|(a, p)| format!("{a} = {p}")).collect();
-    match parts.is_empty() {
-        true => "everything".to_owned(),
-        false => parts.join(", "),
+    if parts.is_empty() {
+        "everything".to_owned()
+    } else {
+        parts.join(", ")
     }
 }

@@ -3,7 +3,6 @@
 use super::Source;
 use super::claim::{Context, Row, judge, unused};
 use super::judge::Verdict;
-use super::rounds::Rounds;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::data::RunData;
 use crate::values::values;
@@ -212,7 +211,6 @@ pub fn judged(
             .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
             .collect(),
         absent: lines.iter().filter_map(absent).collect(),
-        rounds: Rounds::new(&lines),
     };
     let values = values(&data);
     let claims = prepared.thesis.expects.iter();

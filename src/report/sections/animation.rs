@@ -195,7 +195,7 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
             values.extend(Value::known(&key, costs));
             values.push(Value::new(&key, &figure::FRAME_JUDGED, frame.judged as f64));
             for rays in &frame.classes {
-                let key = key.clone().with(axis::RAYS, format::ray_class(rays.class));
+                let key = key.clone().with(axis::RAYS, rays.class.name());
                 let read = [
                     (
                         &figure::FRAME_NODES_RATIO,

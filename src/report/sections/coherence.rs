@@ -5,10 +5,10 @@ use crate::document::*;
 use crate::format;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::values::{ALL_RAYS, Value};
+use crate::values::Value;
 use raystone_record::SINGLE_KERNEL;
 use raystone_record::figure::{self, Figure};
-use raystone_record::{CoherenceAt, CoherenceRecord, Interval, Key, axis};
+use raystone_record::{ALL_RAYS, CoherenceAt, CoherenceRecord, Interval, Key, axis};
 use raystone_stats::statistics::kendall_tau;
 
 /// Figures of all rays together, in the order of the columns.

@@ -198,7 +198,7 @@ pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let cells = data.measured_by(NAME);
     let mut values: Vec<Value> = cells
         .iter()
-        .flat_map(|cell| of_readings(data, cell))
+        .flat_map(|cell| of_readings(data, *cell))
         .collect();
     values.extend(derived(data));
     values

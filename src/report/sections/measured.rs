@@ -20,7 +20,7 @@ fn table(data: &RunData, name: &str) -> Table {
     let cells = data.measured_by(name);
     let values: Vec<Value> = cells
         .iter()
-        .flat_map(|cell| of_readings(data, cell))
+        .flat_map(|cell| of_readings(data, *cell))
         .collect();
     let mut figures: Vec<&Figure> = Vec::new();
     for value in &values {

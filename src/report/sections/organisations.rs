@@ -8,7 +8,6 @@ use crate::format;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::Value;
-use raystone_core::structure::RAY_QUERIES;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, TimeRecord, axis};
 
@@ -29,15 +28,6 @@ const SINGLE: &str = "single-kernel";
 const AGAINST: &Figure = &figure::AGAINST_SINGLE_KERNEL;
 /// Figures of a row.
 const FIGURES: [&Figure; 3] = [&figure::MS_PER_SPP, AGAINST, &figure::RAY_QUERY_SHARE];
-
-/// The share of ray queries in the time of all stages, if stages were timed.
-pub(crate) fn query_share(time: &TimeRecord) -> Option<f64> {
-    let all: f64 = time.stages.values().sum();
-    let queries = RAY_QUERIES
-        .iter()
-        .filter_map(|stage| time.stages.get(*stage));
-    (all > 0.0).then(|| queries.sum::<f64>() / all)
-}
 
 fn is_single(time: &Measured<TimeRecord>) -> bool {
     matches!(time.key.label(axis::ORGANISATION), "" | SINGLE)
@@ -91,7 +81,7 @@ pub(crate) fn blocks(scene: &SceneGroup) -> Vec<Block> {
     let views = scene.views.iter();
     let mut values: Vec<Value> = views.flat_map(|view| against_single(scene, view)).collect();
     for time in &times {
-        let share = query_share(time).map(Interval::exact);
+        let share = time.query_share().map(Interval::exact);
         let figures = [(FIGURES[0], time.ms_per_spp), (FIGURES[2], share)];
         values.extend(Value::known(&time.key, figures));
     }

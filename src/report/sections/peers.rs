@@ -32,7 +32,7 @@ fn ns_per_ray(cpu_ms: &[f64], rays: usize) -> Option<Interval> {
 }
 
 fn of_peer(peer: &Recorded<PeerRecord>, timing: &PeerTiming) -> Vec<Value<'static>> {
-    let key = (peer.key.clone()).with(axis::RAYS, format::ray_class(timing.class));
+    let key = (peer.key.clone()).with(axis::RAYS, timing.class.name());
     let figures = [
         (SPEED, Some(timing.mrays_s)),
         (COST, ns_per_ray(&timing.cpu_ms, timing.rays)),
@@ -65,7 +65,7 @@ pub fn values(scene: &SceneGroup) -> Vec<Value<'static>> {
     }
     for structure in scene.structures.iter().filter(|s| s.fault().is_none()) {
         for ours in &structure.timings {
-            let key = (structure.key.clone()).with(axis::RAYS, format::ray_class(ours.class));
+            let key = (structure.key.clone()).with(axis::RAYS, ours.class.name());
             let cost = ns_per_ray(&ours.cpu_ms, ours.rays);
             values.extend(Value::known(&key, [(COST, cost)]));
             for peer in &scene.peers {

@@ -126,7 +126,7 @@ fn disagreements_of(scene: &SceneGroup, view: &View) -> Vec<String> {
                     scene.name,
                     view.name,
                     ranked[best].name,
-                    format::ray_class(class),
+                    class.name(),
                     ranked[other].name,
                     format::number(faster.log_ratio.exp()),
                     format::number(times_as_long.exp()),

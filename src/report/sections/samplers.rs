@@ -8,7 +8,7 @@ use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
 use super::spectrum;
 use super::verdict::Race;
-use crate::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time};
+use crate::data::{RunData, SAMPLER_ROW, SceneGroup, View};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::pareto::letter;
@@ -29,7 +29,7 @@ pub fn blocks(
     stem: &str,
     (scene, view): (&SceneGroup, &View),
 ) -> Vec<Block> {
-    let values = of_view(scene, view);
+    let values = of_view(data, scene, view);
     let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.name))];
     blocks.extend(Block::figures(error_figures(
         data,
@@ -256,7 +256,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> T
         let column = table.columns.iter().position(|c| c.title == time.sampler);
         if let (Some(row), Some(column)) = (row, column) {
             let cell = &mut table.rows[row][column];
-            if !is_valid_time(time) {
+            if !time.is_valid() {
                 let reason = match time.failure {
                     None => "image differs",
                     Some(_) => "FAILED",

@@ -4,7 +4,7 @@ use super::samplers::{SAMPLER, rows};
 use crate::data::{RunData, View};
 use crate::document::*;
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::values::{Value, unfiltered};
+use crate::values::Value;
 use raystone_record::figure;
 use raystone_record::{FilteredError, Interval, Key, PowerAt, SpectrumRecord, axis};
 
@@ -51,7 +51,7 @@ pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<
                 };
                 wide.map(at).collect()
             };
-            unfiltered(record).map_or(Vec::new(), share)
+            record.unfiltered().map_or(Vec::new(), share)
         }),
         guides: vec![Guide::new("white noise, 1 / (2σ√π)", white, -1.0)],
     };

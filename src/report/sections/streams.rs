@@ -6,7 +6,7 @@ use crate::data::{RunData, SAMPLER_ROW};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::values::{Value, number, of_readings, of_stream, pair_of_dimensions};
+use crate::values::{Value, number, of_readings, of_stream};
 use raystone_record::figure::{self, Figure};
 use raystone_record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
 
@@ -32,7 +32,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
     let mut section = Section::new("discrepancy", "Point streams");
     let mut pairs: Vec<Pair> = Vec::new();
     for stream in data.streams.iter().filter(|s| s.named) {
-        let what = pair_of_dimensions(stream);
+        let what = stream.pair();
         match pairs.iter_mut().find(|pair| pair.what == what) {
             Some(pair) => pair.streams.push(stream),
             None => pairs.push(Pair::new(data, what, stream)),
@@ -71,7 +71,11 @@ impl<'a> Pair<'a> {
     }
 
     fn blocks(&self) -> Vec<Block> {
-        let values: Vec<Value> = self.streams.iter().flat_map(|s| of_stream(s)).collect();
+        let values: Vec<Value> = self
+            .streams
+            .iter()
+            .flat_map(|s| of_stream(self.data, **s))
+            .collect();
         let tables = [
             self.ranking_table(&values),
             self.count_table(&values, &figure::STAR_DISCREPANCY),
@@ -229,21 +233,15 @@ fn worst_table(data: &RunData) -> Table {
     };
     let row = |(s, of, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
         let name = data.names.sampler(s.key);
-        let cells = [
-            name,
-            pair_of_dimensions(s),
-            of.to_string(),
-            last.n.to_string(),
-        ];
-        let key = s.key.clone().with(axis::DIMENSIONS, pair_of_dimensions(s));
+        let cells = [name, s.pair(), of.to_string(), last.n.to_string()];
+        let key = s.key.clone().with(axis::DIMENSIONS, s.pair());
         (key, cells.map(TableCell::from).into())
     };
-    let last = |(s, _, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
-        let values = of_stream(s).into_iter();
-        let is_last = |v: &Value| number(&v.key, axis::POINTS) == last.n;
-        values.filter(is_last).collect::<Vec<_>>()
-    };
-    let values: Vec<Value> = worst().flat_map(last).collect();
+    let mut values = Vec::new();
+    for (s, _, last) in worst() {
+        let of_stream = of_stream(data, *s).into_iter();
+        values.extend(of_stream.filter(|v| number(&v.key, axis::POINTS) == last.n));
+    }
     if values.is_empty() {
         return Table::default();
     }
@@ -263,7 +261,7 @@ fn cost_table(data: &RunData) -> Table {
     let costs = data.measured_by(COST);
     let values: Vec<Value> = costs
         .iter()
-        .flat_map(|cost| of_readings(data, cost))
+        .flat_map(|cost| of_readings(data, *cost))
         .collect();
     let row = |key: &Key| (key.clone(), vec![data.names.sampler(key).into()]);
     let rows = costs.iter().map(|cost| row(cost.key));

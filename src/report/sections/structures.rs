@@ -86,7 +86,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
     };
     let group = |class| {
         let bars = scene.structures.iter().map(|s| bar(s, class)).collect();
-        (format::ray_class(class).to_owned(), bars)
+        (class.name().to_owned(), bars)
     };
     let stamped = data.run.is_none_or(|run| run.environment.timestamps);
     RatePlot {
@@ -204,7 +204,7 @@ fn class_rows<'a>(scene: &'a SceneGroup, by: &'a [&'a str]) -> Rows<'a> {
     let rows = ray_classes(scene).into_iter().flat_map(|class| {
         let timed = passed().filter(move |s| s.timings.iter().any(|t| t.class == class));
         timed.map(move |s| {
-            let class = format::ray_class(class);
+            let class = class.name();
             let key = s.key.clone().with(axis::RAYS, class);
             (key, vec![class.into(), s.structure.clone().into()])
         })

@@ -56,7 +56,7 @@ pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
         let extra_ms = s.build_ms - first.build_ms;
         let in_class = |timing: &ClassTiming| {
             let (own, other) = (rate(s, timing.class)?, rate(first, timing.class)?);
-            let key = (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class));
+            let key = (s.key.clone()).with(axis::RAYS, timing.class.name());
             let reading = caught_up(extra_ms, own, other);
             Some(Value::new(&key, &figure::BREAK_EVEN, reading))
         };

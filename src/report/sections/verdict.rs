@@ -6,7 +6,6 @@ use crate::data::{Measured, RAYS, RunData, SceneGroup, View, without_repeats};
 use crate::document::*;
 use crate::ruling::{Contender, Ruling, judge};
 use crate::samplers::{MeasuredSampler, Metric};
-use crate::values::pair_of_dimensions;
 use crate::{format, pictures, trust};
 use raystone_record::figure::{self, Better};
 use raystone_record::{
@@ -310,7 +309,7 @@ fn rule(data: &RunData) -> String {
 pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     let mut rulings = Vec::new();
     for class in ray_classes(scene) {
-        let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
+        let question = format!("fastest, {} rays (Mrays/s)", class.name());
         rulings.push((question, fastest(scene, class)));
     }
     for view in scene
@@ -390,10 +389,10 @@ fn row(question: TableCell, ruling: &Ruling) -> Vec<TableCell> {
 /// Which sampler has the lowest D*, pair of dimensions by pair.
 fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
     let named: Vec<_> = data.streams.iter().filter(|s| s.named).collect();
-    let pairs = named.iter().map(|s| pair_of_dimensions(s));
+    let pairs = named.iter().map(|s| s.pair());
     let pairs = without_repeats(pairs.collect()).into_iter();
     let rule_on = |pair: String| {
-        let of_pair = named.iter().filter(|s| pair_of_dimensions(s) == pair);
+        let of_pair = named.iter().filter(|s| s.pair() == pair);
         let of_pair: Vec<&&Recorded<StreamRecord>> = of_pair.collect();
         let has = |n: usize| of_pair.iter().all(|s| s.star.iter().any(|at| at.n == n));
         let counts = of_pair.first()?.star.iter().rev().map(|at| at.n);

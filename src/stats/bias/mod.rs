@@ -186,22 +186,26 @@ pub fn check_bias(
     let biased = of_image.iter().any(|p| *p <= level) || !check.rejected.is_empty();
     let least = of_image.into_iter().fold(least_rate(&p_values), f64::min);
     check.p = (least / SHARE).min(1.0);
-    let needed = replicates_needed(options.alpha);
-    if !noisy || replicates.len() as u64 >= u64::from(needed) {
-        if biased {
-            check.verdict = BiasVerdict::Biased;
-        }
-    } else {
+    let too_few = too_few(replicates.len(), options.alpha).filter(|_| noisy);
+    if let Some(reason) = too_few {
         (check.rejected, check.p) = (Vec::new(), 1.0);
-        check.verdict = BiasVerdict::NotTestable(format!(
-            "{} replicates, {needed} are needed to find a bias of {EFFECT} standard errors in {:.0} % \
-             of all cases at this level ({:.1e})",
-            replicates.len(),
-            100.0 * POWER,
-            options.alpha
-        ));
+        check.verdict = BiasVerdict::NotTestable(reason);
+    } else if biased {
+        check.verdict = BiasVerdict::Biased;
     }
     Ok(check)
+}
+
+/// Why so many replicates of a sampler with noise tell nothing at this level; `None` where they are enough.
+fn too_few(replicates: usize, alpha: f64) -> Option<String> {
+    let needed = replicates_needed(alpha);
+    ((replicates as u64) < u64::from(needed)).then(|| {
+        format!(
+            "{replicates} replicates, {needed} are needed to find a bias of {EFFECT} standard errors in {:.0} % of all \
+             cases at this level ({alpha:.1e})",
+            100.0 * POWER
+        )
+    })
 }
 
 /// The part of `size` that a bias must be for this test to find it with probability [`POWER`].

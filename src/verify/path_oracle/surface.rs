@@ -85,6 +85,10 @@ impl Surface<'_> {
     }
 }
 
+fn sign(is_positive: bool) -> f64 {
+    if is_positive { 1.0 } else { -1.0 }
+}
+
 impl PathOracle<'_> {
     pub(super) fn surface(
         &self,
@@ -102,14 +106,10 @@ impl PathOracle<'_> {
         // The error of a thin triangle's normal scales with edge lengths over height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
-        let front = if self.scene.is_mirrored(hit.triangle as usize) {
-            -1.0
-        } else {
-            1.0
-        };
+        let front = sign(!self.scene.is_mirrored(hit.triangle as usize));
         let outward = front * outward.normalize();
         let out = -segment.direction;
-        let side = if outward.dot(out) > 0.0 { 1.0 } else { -1.0 };
+        let side = sign(outward.dot(out) > 0.0);
         let id = self.scene.material_ids[hit.triangle as usize];
         let material = &self.scene.materials[id as usize];
         // For a triangle that is thin, or small at large coordinates, weights err by the error of
@@ -128,15 +128,11 @@ impl PathOracle<'_> {
         let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
         let geometric = side * outward;
         let mut normal = self.vertex_normal(hit.triangle, weights, outward);
-        let turn = if normal.dot(geometric) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let turn = normal.dot(geometric) < 0.0;
         if let Some(used) = bent.filter(|_| self.textures.are_mapped()) {
             normal = self.textures.bent(used, hit.triangle, uv, normal);
         }
-        normal *= turn;
+        normal *= sign(!turn);
         if normal.dot(out) <= 0.0 {
             normal = geometric;
         }

@@ -6,7 +6,6 @@ use raystone::report::data::RunData;
 use raystone::report::values::values;
 use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
-use raystone::repro::rounds::Rounds;
 use serde_json::json;
 
 /// Rays of six groups, and how much harder each is than the mean.
@@ -58,12 +57,8 @@ fn at_16(decorrelation: &str, groups: Vec<[u64; 2]>) -> Line {
 }
 
 fn found(lines: &[Line], body: &str) -> Row {
-    let context = Context {
-        rounds: Rounds::new(lines),
-        ..Context::default()
-    };
     let data = RunData::new(lines);
-    let rows = judge(&expect(body), &values(&data), &context);
+    let rows = judge(&expect(body), &values(&data), &Context::default());
     assert_eq!(rows.len(), 1, "{rows:?}");
     rows.into_iter().next().expect("a row")
 }

@@ -9,7 +9,6 @@ use raystone::report::data::RunData;
 use raystone::report::values::values;
 use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
-use raystone::repro::rounds::Rounds;
 use serde_json::json;
 
 /// The machine at each of eight rounds: three of them half as fast.
@@ -131,12 +130,8 @@ fn lines(key: Key, unit: &str, at: Sitting, body: serde_json::Value) -> [Line; 2
 }
 
 fn found(lines: &[Line], body: &str) -> Row {
-    let context = Context {
-        rounds: Rounds::new(lines),
-        ..Context::default()
-    };
     let data = RunData::new(lines);
-    let mut rows = judge(&expect(body), &values(&data), &context);
+    let mut rows = judge(&expect(body), &values(&data), &Context::default());
     assert_eq!(rows.len(), 1, "{rows:?}");
     rows.remove(0)
 }

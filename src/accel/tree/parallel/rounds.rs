@@ -1,7 +1,7 @@
 //! The rounds of clustering on the device: several per submission, until one cluster is left.
 
 use super::device::{Passes, failed, play};
-use crate::tree::parameters::SAH_DEPTH;
+use crate::tree::depth::SAH_DEPTH;
 use crate::{AccelError, BuildLog};
 use raystone_gpu::{
     Bindings, GpuError, Groups, Recording, Storage, UniformValues, grid_of, groups_for,
