@@ -1,4 +1,4 @@
-//! Axis-aligned bounds and the slab test. Twin of `kernels/accel/bounds.wesl`.
+//! Axis-aligned bounds and the slab test. CPU version of `kernels/accel/bounds.wesl`.
 
 use super::ray::Ray;
 
@@ -12,13 +12,12 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The neutral element of [`Bounds::union`].
+    /// Identity of [`Bounds::union`].
     pub const EMPTY: Bounds = Bounds {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
     };
 
-    /// Contains every box.
     pub(crate) const EVERYTHING: Bounds = Bounds {
         min: [f32::NEG_INFINITY; 3],
         max: [f32::INFINITY; 3],
@@ -43,7 +42,7 @@ impl Bounds {
         out
     }
 
-    /// What lies in both; `min > max` on some axis if nothing does.
+    /// The common part; `min > max` on some axis if it is empty.
     pub fn intersection(&self, other: &Bounds) -> Bounds {
         Bounds {
             min: std::array::from_fn(|axis| self.min[axis].max(other.min[axis])),
@@ -51,7 +50,7 @@ impl Bounds {
         }
     }
 
-    /// Whether `other` lies inside.
+    /// True if `other` lies inside.
     pub fn contains(&self, other: &Bounds) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && self.max[axis] >= other.max[axis])
     }
@@ -61,7 +60,7 @@ impl Bounds {
         std::array::from_fn(|axis| self.max[axis] - self.min[axis])
     }
 
-    /// Twice the centre: enough to sort and bin by, without the division.
+    /// Twice the centre: sufficient for sorting and binning, without the division.
     pub fn doubled_centre(&self) -> [f32; 3] {
         std::array::from_fn(|axis| self.min[axis] + self.max[axis])
     }
@@ -73,7 +72,7 @@ impl Bounds {
     }
 }
 
-/// Distances at which the ray's line enters and leaves the slab of each axis.
+/// Distances at which the ray's line enters and exits the slab of each axis.
 pub(crate) fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let low = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
     let high = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
@@ -85,7 +84,7 @@ pub(crate) fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3],
     (near, far)
 }
 
-/// Distances at which the ray's line enters and leaves the box (enter > exit: it misses).
+/// Distances at which the ray's line enters and exits the box (enter > exit: a miss).
 pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
     let (near, far) = slabs(bounds, ray, inverse);
     let enter = near[0].max(near[1]).max(near[2]);

@@ -1,5 +1,4 @@
-//! No structure: every ray is tested against every triangle. Twin of
-//! `kernels/accel/brute_force.wesl`.
+//! Tests every ray against every triangle. CPU version of `kernels/accel/brute_force.wesl`.
 
 use super::intersection::Reciprocal;
 use super::structure::prelude::*;
@@ -73,12 +72,12 @@ impl Traverse for Built {
     }
 }
 
-/// Triangles side by side, so that the compiler tests several at once: a group of neighbours.
+/// Number of neighbouring triangles stored together, so that the compiler tests several at once.
 const LANES: usize = GROUP;
-/// From so many rays on it pays to bring neighbours together.
+/// Minimum number of rays for which sorting triangles into groups pays off.
 const MANY: usize = 256;
 
-/// `LANES` triangles, vertex by vertex and component by component; missing ones are degenerate.
+/// `LANES` triangles, by vertex and component; unused lanes are degenerate.
 struct Block {
     vertices: [[[f32; LANES]; 3]; 3],
 }
@@ -96,8 +95,8 @@ impl Block {
         }
     }
 
-    /// Lanes that may meet the ray: those that pass the sign tests of its triangle test, by the same
-    /// products in the same order, or all of them where signs are not cheaper than the test itself.
+    /// Lanes that may hit the ray: those that pass the sign tests of its triangle test, with the
+    /// same products in the same order, or all lanes if signs are not cheaper than the test itself.
     fn candidates(&self, ray: &Ray, inverse: &Reciprocal) -> u32 {
         if !inverse.triangle.follows_watertight_signs() {
             return (1 << LANES) - 1;
@@ -118,17 +117,17 @@ impl Block {
     }
 }
 
-/// One bit a lane.
+/// One bit per lane.
 fn mask(inside: [u32; LANES]) -> u32 {
     let lanes = inside.iter().enumerate();
     lanes.fold(0, |mask, (lane, bit)| mask | bit << lane)
 }
 
-/// Every triangle of a soup, ready to be tested: what judges are judged by.
+/// All triangles of a soup, ready for brute force; the reference for the reference tracers.
 ///
-/// A triangle is passed over only if its test cannot accept it. Hits are clamped into the slabs of the
-/// triangle's box, so the slabs of a wider box around its group, widened further, hold every hit; what is
-/// left has to pass the sign tests by the same products as the test; and the test itself decides.
+/// A triangle is skipped only if its test cannot accept it. Hits are clamped into the slabs of the
+/// triangle's box, so the further widened slabs of the box around its group contain every hit; the
+/// rest must pass the sign tests with the same products as the test; and the test itself decides.
 pub(crate) struct EveryTriangle<'a> {
     soup: &'a TriangleSoup,
     groups: Groups,
@@ -136,7 +135,7 @@ pub(crate) struct EveryTriangle<'a> {
 }
 
 impl<'a> EveryTriangle<'a> {
-    /// `many` rays are worth the time that it takes to put triangles in order.
+    /// With `many` rays, sorting the triangles is worth its cost.
     pub(crate) fn new(soup: &'a TriangleSoup, many: bool) -> Self {
         let records = &soup.records;
         let groups = Groups::new(records.len(), many, |id| records[id].vertices());
@@ -148,16 +147,17 @@ impl<'a> EveryTriangle<'a> {
         }
     }
 
-    /// Tests all triangles, whose indices count from `first`; a nearer hit replaces `hit`.
+    /// Tests all triangles, with indices starting at `first`; a nearer hit replaces `hit`.
     pub(crate) fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
         let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let masks = self.soup.masks.as_deref();
-        // With infinite reciprocals nothing can be said of a slab.
+        // With infinite reciprocals slabs are inconclusive.
         let bounded = self.soup.intersection.box_test.finite;
-        let line = match bounded {
-            true => Line::new(ray.origin, *inverse, [ray.t_min, hit.t]),
-            false => Line::new([0.0; 3], [0.0; 3], [f32::NEG_INFINITY, f32::INFINITY]),
+        let line = if bounded {
+            Line::new(ray.origin, *inverse, [ray.t_min, hit.t])
+        } else {
+            Line::new([0.0; 3], [0.0; 3], [f32::NEG_INFINITY, f32::INFINITY])
         };
         self.groups.visit(&line, |group| {
             if let Some(block) = self.blocks.get(group) {

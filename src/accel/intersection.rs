@@ -1,5 +1,5 @@
-//! How rays meet triangles and boxes: the choice that every structure follows, on the device by
-//! composition and on the host through [`Reciprocal`].
+//! How rays intersect triangles and boxes: the choice of tests that every structure follows, on the
+//! device by composition and on the host through [`Reciprocal`].
 
 use super::bounds::{Bounds, slab};
 use super::ray::{Ray, raised};
@@ -8,8 +8,8 @@ use raystone_core::params::Named;
 use raystone_gpu::{ArithmeticProbe, Composition};
 use std::ops::Deref;
 
-/// The tests of one run. Hits of every structure equal those of brute force with the same choice to
-/// the bit, if [`BoxTest`] is padded by `PROVEN_ULPS` or more; less is there to be measured.
+/// The tests of one run. Hits of every structure are bit-identical to brute force with the same
+/// choice if [`BoxTest`] is padded by at least `PROVEN_ULPS`; smaller pads exist for measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// The ray–triangle test.
@@ -27,15 +27,15 @@ impl Default for Intersection {
     }
 }
 
-/// A slab test: which reciprocal of the direction it uses, and how far it is padded.
+/// A slab test: its reciprocal of the direction, and its pad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoxTest {
-    /// Name as a user types it.
+    /// Name used in configurations.
     pub name: &'static str,
-    /// One line: what it is and its source.
+    /// One-line description with source.
     pub description: &'static str,
-    /// Whether components near 0 are raised ([`super::ray::raised`]), so that 1/d is finite: infinity and 0 · ∞ WGSL
-    /// does not define.
+    /// True if components near 0 are raised ([`super::ray::raised`]), so that 1/d is finite: WGSL
+    /// does not define infinity or 0 · ∞.
     pub finite: bool,
     /// A box is entered if `enter <= exit * (1 + pad_ulps · 2⁻²³)`.
     pub pad_ulps: u32,
@@ -62,12 +62,11 @@ impl Named for BoxTest {
 }
 
 impl BoxTest {
-    /// The least pad for which the theorem of [`super::triangle`] holds: (1 + p) / (1 − p) for the pad p
-    /// of triangles, and their roundings.
+    /// The smallest pad for which the theorem of [`super::triangle`] holds: (1 + p) / (1 − p) for
+    /// the pad p of triangles, and their roundings.
     pub(crate) const PROVEN_ULPS: u32 = 9;
 
-    /// Every box test of the program. The first one is the default: 2⁻¹⁹ is more than twice
-    /// `TRIANGLE_PAD`.
+    /// All box tests. The first one is the default: 2⁻¹⁹ is more than twice `TRIANGLE_PAD`.
     pub const ALL: [BoxTest; 6] = [
         Self::padded(
             16,
@@ -107,25 +106,25 @@ impl BoxTest {
         }
     }
 
-    /// The factor on the far side of a box. Twin of `BOX_PAD` in `kernels/accel/bounds.wesl`.
+    /// The factor on the far side of a box, `BOX_PAD` of `kernels/accel/bounds.wesl`.
     pub fn pad(&self) -> f32 {
         1.0 + self.pad_ulps as f32 * f32::EPSILON
     }
 }
 
 impl Intersection {
-    /// Whether the gate asks hard rays: with triangle tests that are not watertight the oracle's bounds and
-    /// the cells of grids say nothing of rays in planes of triangles, and with boxes padded by less than the
-    /// proof needs hits are lost by intention.
+    /// True if hard rays are checked. With triangle tests that are not watertight, the oracle's
+    /// bounds and grid cells are inconclusive for rays in triangle planes, and boxes padded by less
+    /// than the proof needs lose hits by design.
     pub fn bears_hard_rays(&self) -> bool {
         let padded = self.box_test.finite && self.box_test.pad_ulps >= BoxTest::PROVEN_ULPS;
         padded && self.triangle.is_watertight()
     }
 
-    /// Whether an adapter keeps this choice.
+    /// Checks that an adapter supports this choice.
     ///
     /// # Errors
-    /// Why it does not: without exact two-products the compensated test is another one.
+    /// The reason if not: without exact two-products the compensated test is a different test.
     pub fn kept_by(self, probe: &ArithmeticProbe) -> Result<(), String> {
         if !self.triangle.needs_exact_products() || probe.exact_products {
             return Ok(());
@@ -137,7 +136,7 @@ impl Intersection {
         ))
     }
 
-    /// `composition` with these tests, unless it chose others before.
+    /// `composition` with these tests, unless it already selects others.
     #[must_use]
     pub fn activate(&self, mut composition: Composition) -> Composition {
         if !composition.active.contains_key(TRIANGLE) {
@@ -151,7 +150,7 @@ impl Intersection {
         composition
     }
 
-    /// The ray as it is traced. Twin: `raised` in `kernels/accel/ray.wesl`.
+    /// The ray as traced. CPU version of `raised` in `kernels/accel/ray.wesl`.
     pub fn raised(&self, ray: &Ray) -> Ray {
         if self.box_test.finite {
             raised(ray)
@@ -160,7 +159,7 @@ impl Intersection {
         }
     }
 
-    /// What the tests need of a raised ray's direction, computed once per ray.
+    /// Data of a raised ray's direction for the tests, computed once per ray.
     pub fn inverse(&self, direction: [f32; 3]) -> Reciprocal {
         Reciprocal {
             inverse: direction.map(|d| 1.0 / d),
@@ -170,11 +169,11 @@ impl Intersection {
     }
 }
 
-/// Role of the triangle test in a composition, and the constant of the pad.
+/// Role of the triangle test in a composition.
 const TRIANGLE: &str = "triangle";
 const PAD_CONSTANT: &str = "BOX_PAD_ULPS";
 
-/// The reciprocal of a ray's direction, which it dereferences to, and how to test with it.
+/// The reciprocal of a ray's direction, which it dereferences to, and the tests to use with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reciprocal {
     inverse: [f32; 3],

@@ -1,5 +1,6 @@
-//! Leaves: runs of triangles, as copies of their records in leaf order (one run of memory a leaf) or
-//! as indices into the canonical buffer (less memory). Twin of `kernels/accel/leaf.wesl`.
+//! Leaves: runs of triangles, either as copies of their records in leaf order (one memory access
+//! range per leaf) or as indices into the canonical buffer (less memory). CPU version of
+//! `kernels/accel/leaf.wesl`.
 
 use super::bounds::Bounds;
 use super::tree::Coverage;
@@ -8,21 +9,20 @@ use super::twin::Walk;
 use super::watch;
 use super::{AccelError, NamedWords, TriangleSoup};
 
-/// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
+/// Marks a leaf reference; bits 26–30 hold its count, bits 0–25 its first index.
 pub(crate) const LEAF: u32 = 0x8000_0000;
-/// Where the count of a leaf stands in its reference.
+/// Bit position of the count in a leaf reference.
 pub(crate) const COUNT_SHIFT: u32 = 26;
-/// Most triangles in a leaf.
+/// Maximum triangles in a leaf.
 pub(crate) const COUNT_MASK: u32 = 31;
-/// Greatest first place.
+/// Largest first index.
 pub(crate) const FIRST_MASK: u32 = 0x03ff_ffff;
 
-/// The reference to a leaf.
 pub(crate) fn leaf_reference(first: u32, count: u32) -> u32 {
     LEAF | count << COUNT_SHIFT | first
 }
 
-/// First place and number of triangles of a leaf.
+/// First index and number of triangles of a leaf.
 pub(crate) fn leaf_range(reference: u32) -> (usize, usize) {
     (
         (reference & FIRST_MASK) as usize,
@@ -33,14 +33,12 @@ pub(crate) fn leaf_range(reference: u32) -> (usize, usize) {
 /// The triangles of all leaves, leaf by leaf.
 #[derive(Debug, Clone)]
 pub(crate) enum Leaves {
-    /// Copies of the records.
     Gathered(Vec<TriangleRecord>),
-    /// Indices of the scene's triangles.
     Indexed(Vec<u32>),
 }
 
 impl Leaves {
-    /// Lays out the triangles that `order` lists.
+    /// Lays out the triangles listed in `order`.
     ///
     /// # Errors
     /// More entries than a reference can address, with both numbers.
@@ -66,7 +64,6 @@ impl Leaves {
         }
     }
 
-    /// The array for the GPU.
     pub(crate) fn words(&self) -> NamedWords<'_> {
         match self {
             Self::Gathered(records) => NamedWords::new("leaf_triangles", records),
@@ -74,7 +71,6 @@ impl Leaves {
         }
     }
 
-    /// Bytes of the array.
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Gathered(records) => size_of_val(&records[..]),
@@ -82,10 +78,10 @@ impl Leaves {
         }
     }
 
-    /// Notes the triangles of the leaf that `reference` names, which must lie in `bounds`.
+    /// Records the triangles of the leaf `reference`, which must lie in `bounds`.
     ///
     /// # Errors
-    /// The leaf lies outside the array, or what [`Coverage::leaf`] finds.
+    /// The leaf is outside the array, or the error of [`Coverage::leaf`].
     pub(crate) fn cover(
         &self,
         coverage: &mut Coverage,
@@ -107,17 +103,14 @@ impl Leaves {
     }
 }
 
-/// The leaves of a structure with the triangles they were built over, as twins read them.
+/// The leaves of a structure with the triangles they were built from.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafReader<'a> {
-    /// The leaves.
     pub leaves: &'a Leaves,
-    /// The scene's triangles.
     pub soup: &'a TriangleSoup,
 }
 
 impl LeafReader<'_> {
-    /// The triangle at a place.
     pub(crate) fn load_leaf_triangle(&self, place: usize) -> &TriangleRecord {
         match self.leaves {
             Leaves::Gathered(records) => &records[place],
@@ -125,7 +118,6 @@ impl LeafReader<'_> {
         }
     }
 
-    /// Tests the triangles of the leaf that `reference` names.
     pub(crate) fn test_leaf(self, reference: u32, walk: &mut Walk) {
         let (first, count) = leaf_range(reference);
         for place in first..first + count {

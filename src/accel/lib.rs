@@ -3,7 +3,7 @@
 //! To add one, see `docs/adding-a-structure.md`.
 #![warn(missing_docs)]
 
-/// Returns [`AccelError::Invalid`] with this text unless something holds.
+/// Returns [`AccelError::Invalid`] with this text unless the condition holds.
 macro_rules! ensure {
     ($holds:expr, $($what:tt)+) => {
         let holds: bool = $holds;
@@ -75,26 +75,26 @@ use std::sync::Arc;
 use thiserror::Error;
 use triangle::TriangleRecord;
 
-/// Why a structure cannot be built.
+/// The reason why a structure cannot be built.
 #[derive(Debug, Clone, Error, PartialEq)]
 pub enum AccelError {
     /// A hard limit of the structure, with both numbers.
     #[error("{what}: needs {needed}, the limit is {limit}")]
     Limit {
-        /// Which limit.
+        /// The limit.
         what: String,
-        /// What the scene needs.
+        /// The value the scene needs.
         needed: u64,
-        /// What the structure allows.
+        /// The value the structure allows.
         limit: u64,
     },
-    /// A parameter that the structure does not have, or a value that it does not allow.
+    /// An unknown parameter, or a value that is not allowed.
     #[error(transparent)]
     Parameter(#[from] ParamError),
-    /// Parameters that contradict each other, with the reason.
+    /// Contradicting parameters, with the reason.
     #[error("{0}")]
     Contradiction(String),
-    /// What a build on the device met with.
+    /// An error of a build on the device.
     #[error("{0}")]
     Device(String),
     /// A structural invariant is violated.
@@ -103,10 +103,10 @@ pub enum AccelError {
 }
 
 impl AccelError {
-    /// [`AccelError::Limit`] if `needed` is more than `limit`.
+    /// Checks `needed` against `limit`.
     ///
     /// # Errors
-    /// It is, with both numbers.
+    /// [`AccelError::Limit`] with both numbers.
     pub(crate) fn check_limit(
         what: impl Into<String>,
         needed: impl Into<u64>,
@@ -124,21 +124,21 @@ impl AccelError {
     }
 }
 
-/// The triangles of a scene as structures see them: the canonical records.
+/// The triangles of a scene for structures: the canonical records.
 #[derive(Debug, Clone, Default)]
 pub struct TriangleSoup {
     /// Record `i` is triangle `i` of the scene.
     pub records: Vec<TriangleRecord>,
-    /// What they are copies of, if the scene consists of instances.
+    /// The objects they are copies of, if the scene consists of instances.
     pub placed: Option<Placed>,
-    /// How rays meet them: see [`TriangleSoup::intersecting`].
+    /// How rays intersect them: see [`TriangleSoup::intersecting`].
     pub intersection: Intersection,
-    /// What is cut out of them; the words of records lead there.
+    /// Masks that cut holes into them; the words of records refer to these.
     pub masks: Option<Arc<Masks>>,
 }
 
 impl From<Vec<TriangleRecord>> for TriangleSoup {
-    /// Triangles that are no copies.
+    /// Triangles that are not copies.
     fn from(records: Vec<TriangleRecord>) -> Self {
         Self {
             records,
@@ -173,10 +173,10 @@ impl TriangleSoup {
         }
     }
 
-    /// The same triangles, met by these tests. Structures take copies of records: choose before building.
+    /// The same triangles with these tests. Structures copy records, so choose before building.
     #[must_use]
     pub fn intersecting(mut self, intersection: Intersection) -> Self {
-        // Behind the records and masks lie the words made of them, then those of the objects.
+        // The words derived from records and masks follow them, then those of the objects.
         let mut place = 3 * self.records.len() as u32 + self.mask_rows().len() as u32;
         let objects = self.placed.iter_mut().flat_map(|p| &mut p.objects);
         let objects = objects.map(|object| {
@@ -198,7 +198,7 @@ impl TriangleSoup {
         self.masks.as_ref().map_or(&[], |masks| &masks.rows)
     }
 
-    /// The buffer `triangles` of kernels: the records, their masks, and what the triangle test made of them.
+    /// The buffer `triangles` of kernels: records, masks, and the test's precomputed data.
     pub fn words(&self) -> Cow<'_, [[u32; 4]]> {
         let records = bytemuck::cast_slice(&self.records);
         let objects = self.placed.iter().flat_map(|p| &p.objects);
@@ -224,16 +224,16 @@ impl TriangleSoup {
 /// One array of words for the GPU.
 #[derive(Debug, Clone)]
 pub struct NamedWords<'a> {
-    /// Name of the variable in the kernel that binds it.
+    /// Name of the kernel variable that binds it.
     pub name: &'static str,
-    /// Content, borrowed from the structure where its memory is laid out like the GPU's.
+    /// Content, borrowed from the structure if its memory layout matches the GPU's.
     pub words: Cow<'a, [u32]>,
-    /// Bytes of one element, for the record.
+    /// Bytes per element, for the record.
     pub element_bytes: u32,
 }
 
 impl<'a> NamedWords<'a> {
-    /// An array whose memory is laid out like the GPU's; a record names the size of its elements.
+    /// An array with the GPU's memory layout; the element size is recorded.
     pub fn new<T: NoUninit>(name: &'static str, elements: &'a [T]) -> Self {
         Self {
             name,
@@ -243,25 +243,24 @@ impl<'a> NamedWords<'a> {
     }
 }
 
-/// What a structure hands to the GPU.
+/// The GPU data of a structure.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
-    /// Module of the kernel that traces it, relative to the kernel folder; empty for a pipeline that
-    /// needs none.
+    /// Module of the kernel, relative to the kernel folder; empty for a pipeline that needs none.
     pub kernel: &'static str,
-    /// Features (`@if(...)` in the kernel) that its parameters switch on.
+    /// Features (`@if(...)` in the kernel) enabled by its parameters.
     pub features: Vec<&'static str>,
-    /// Storage arrays, at most two (a path-tracing kernel has eight in all).
+    /// Storage arrays, at most two (a path-tracing kernel has eight in total).
     pub arrays: Vec<NamedWords<'a>>,
     /// Uniform structs by variable name.
     pub uniforms: Vec<(&'static str, UniformValues)>,
-    /// Constants of `package::active::constants`: kernels with other constants are other kernels, so
-    /// numbers that differ from scene to scene belong into a uniform.
+    /// Constants of `package::active::constants`. Each set of constants is a separate kernel, so
+    /// numbers that differ between scenes belong in a uniform.
     pub constants: Vec<(&'static str, u32)>,
 }
 
-/// The uniform `limits` of `kernels/common/limits.wesl`: the greatest number of steps that a
-/// traversal can take, and the number of nodes or triangles where it ends at the last one.
+/// The uniform `limits` of `kernels/common/limits.wesl`: the maximum number of steps of a
+/// traversal, and the number of nodes or triangles, whose last one bounds indices.
 pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues) {
     (
         "limits",
@@ -288,26 +287,26 @@ impl GpuBuffers<'_> {
             .fold(active, |c, (name, value)| c.constant(name, *value))
     }
 
-    /// Bytes of all arrays.
+    /// Total bytes of all arrays.
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
     }
 }
 
-/// A kind of structure: one static per structure, one line in the registry. [`Structure`] is the shorter way to
-/// declare one whose name is known at compile time.
+/// A kind of structure: one static per structure, one line in the registry. [`Structure`] is a
+/// shorthand for structures with names known at compile time.
 pub trait AccelKind: Sync {
-    /// Name as a user types it.
+    /// Name used in configurations.
     fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
+    /// One-line description with source.
     fn description(&self) -> &'static str;
     /// Parameters.
     fn parameters(&self) -> ParameterSchema;
-    /// Modules that a folder of kernels may bring for it, beside those of the program.
+    /// Modules that a kernel folder may supply for it, in addition to the built-in ones.
     fn kernels(&self) -> Vec<String> {
         vec![format!("accel/{}", self.name().replace('-', "_"))]
     }
-    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    /// Paths and texts of its own kernel modules, for structures that are not built in.
     fn sources(&self) -> Sources {
         &[]
     }
@@ -322,7 +321,7 @@ pub trait AccelKind: Sync {
     }
 }
 
-/// A built structure, or why there is none.
+/// A built structure, or the reason for failure.
 pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
 
 /// How a built structure is traced.
@@ -330,8 +329,8 @@ pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
 pub enum Access {
     /// Its kernel module exports `trace(ray, any)`, which other kernels call through `accel/query`.
     Inline,
-    /// It answers buffers of rays in passes of its own; kernels with a structure in them (those of
-    /// integrators that trace) cannot use it.
+    /// It answers buffers of rays in its own passes; kernels that embed a structure (those of
+    /// tracing integrators) cannot use it.
     Pipeline(Arc<dyn TracePasses>),
 }
 
@@ -344,8 +343,8 @@ pub trait BuiltAccel: Sync {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
-    /// Arrays that a build on the device left there, by the variables that bind them: they are storage
-    /// arrays beside those of [`BuiltAccel::buffers`].
+    /// Arrays that a device build left on the device, by the variables that bind them: storage
+    /// arrays in addition to those of [`BuiltAccel::buffers`].
     fn on_device(&self) -> Vec<(&'static str, wgpu::Buffer)> {
         Vec::new()
     }
@@ -353,32 +352,32 @@ pub trait BuiltAccel: Sync {
     fn access(&self) -> Access {
         Access::Inline
     }
-    /// When the batch kernel refills its invocations: for inline structures whose kernel exports
+    /// When the batch kernel refills its invocations, for inline structures whose kernel exports
     /// `Traversal`, `begin` and `advance`.
     fn refill(&self) -> RefillParameters {
         RefillParameters::NONE
     }
-    /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
+    /// Arrays that the kernel can read in several parts if the adapter's binding limit is smaller:
     /// see [`raystone_gpu::Bindings::parts`].
     fn divisible(&self) -> &'static [&'static str] {
         &[]
     }
-    /// Static figures.
+    /// Static statistics.
     fn stats(&self) -> StructureStats;
-    /// Where triangles are met.
+    /// The space in which triangles are intersected.
     fn space(&self) -> Space {
         Space::World
     }
-    /// Takes over the transforms of the same instances from `soup`, rebuilding only what depends on
-    /// them; `None` if a full build is needed.
+    /// Applies the transforms of the same instances from `soup`, rebuilding only dependent data;
+    /// `None` if a full build is needed.
     ///
     /// # Errors
     /// `soup` has other instances or objects.
     fn update(&mut self, _soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
         None
     }
-    /// The arrays of [`BuiltAccel::buffers`] as its twin reads them, which is in place: an array made of several,
-    /// part by part.
+    /// The arrays of [`BuiltAccel::buffers`] in the memory that the CPU version reads, part by part
+    /// if an array has several.
     fn twin_arrays(&self) -> Vec<(&'static str, Vec<&[u32]>)> {
         let arrays = self.buffers().arrays.into_iter();
         let in_place = arrays.filter_map(|array| match array.words {
@@ -387,7 +386,7 @@ pub trait BuiltAccel: Sync {
         });
         in_place.collect()
     }
-    /// The traversal on the host, if it has one.
+    /// The CPU version of the traversal, if there is one.
     fn cpu_twin<'a>(&'a self, _soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
         None
     }

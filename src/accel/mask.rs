@@ -1,44 +1,47 @@
-//! Alpha masks: rays pass where a surface is cut out. Twin of `kernels/accel/mask.wesl`.
+//! Alpha masks: rays pass through holes in a surface. CPU version of `kernels/accel/mask.wesl`.
 //!
-//! A triangle test first says whether it accepts a hit, its weights u and v included; then the mask says whether there is a surface
-//! at these weights. It depends on ray and triangle alone, as the test does, so what is proved of boxes in
-//! `docs/design.md` holds, and a hit that is cut out never shortens the ray.
+//! A triangle test first accepts a hit, including its weights u and v; then the mask decides
+//! whether there is a surface at these weights. Like the test, this depends on ray and triangle
+//! alone, so the proofs about boxes in `docs/design.md` hold, and a hit in a hole never shortens
+//! the ray.
 //!
-//! u and v become integers (24 bits), and all that follows is integer arithmetic: coordinates in units of 1/256 texel, bilinear weights
-//! of 8 bits, the comparison with the threshold. Kernels and twins cannot differ where weights do not.
+//! u and v become integers (24 bits), and the rest is integer arithmetic: coordinates in units of
+//! 1/256 texel, bilinear weights of 8 bits, the comparison with the threshold. Kernels and CPU
+//! versions agree wherever the weights do.
 
 use super::triangle::TriangleRecord;
 use glam::DVec2;
 use raystone_scene::{AlphaMask, SceneData, Texture, Wrap};
 use std::collections::BTreeMap;
 
-/// Set in the word of the material where a record's triangle has a mask: the place of its words then.
+/// Set in a masked triangle's material word, which then holds the index of its mask words.
 pub(crate) const MASKED: u32 = 0x8000_0000;
 const MIRRORED: u32 = 1;
 const CLAMPED: u32 = 2;
-/// The weight of a corner in its own point.
+/// A corner's weight at the corner itself.
 const WHOLE: u32 = 1 << 24;
-/// Units of coordinates in a texel.
+/// Coordinate units per texel.
 const UNITS: f64 = 256.0;
-/// Greatest coordinate of a corner, in units: sums of three changes stay within 32 bits.
+/// Largest coordinate of a corner, in units: sums of three changes fit in 32 bits.
 const GREATEST: f64 = 268_435_456.0;
 
-/// Words of the masks of a scene's triangles: they lie behind the records in the buffer `triangles`.
+/// Words of the masks of a scene's triangles, stored after the records in the buffer `triangles`.
 ///
-/// First the images: a row with width, height, how it wraps (in v times 4, in u) and threshold, then alphas, sixteen a row. Then
-/// two rows a triangle: coordinates of the first corner, and what the second and the third add to them, in 1/256 texel from the
-/// centre of the first texel; place of the image; the material.
+/// First the images: a row with width, height, wrap modes (u plus 4 times v) and threshold, then
+/// alphas, sixteen per row. Then two rows per triangle: coordinates of the first corner, and the
+/// differences to the second and third, in 1/256 texel from the centre of the first texel; index of
+/// the image; the material.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Masks {
-    /// Where they begin in the buffer, in `vec4`.
+    /// Start in the buffer, in `vec4`.
     pub first: u32,
-    /// Four words a row.
+    /// Four words per row.
     pub rows: Vec<[u32; 4]>,
 }
 
 impl Masks {
-    /// The masks of a scene, to lie behind `first` rows, and the word that takes the place of the material's in each record; `None`
-    /// if nothing is cut out.
+    /// The masks of a scene, to follow `first` rows, and the word that replaces the material's in
+    /// each record; `None` if nothing is cut out.
     pub fn of(scene: &SceneData, first: u32) -> Option<(Self, Vec<u32>)> {
         let mut masks = Self {
             first,
@@ -66,7 +69,7 @@ impl Masks {
         Some((masks, words))
     }
 
-    /// The place behind the last row.
+    /// Index after the last row.
     pub fn end(&self) -> u32 {
         self.first + self.rows.len() as u32
     }
@@ -114,7 +117,7 @@ impl Masks {
         });
         let axis = |axis: usize, wrap: u32| {
             let [a, b, c] = corners.map(|corner| corner[axis]);
-            // Whole periods change nothing: numbers stay small where coordinates are large.
+            // Whole periods change nothing: subtracting them keeps large coordinates small.
             let period = size[axis] * UNITS * if wrap == MIRRORED { 2.0 } else { 1.0 };
             let moved = match wrap {
                 CLAMPED => 0.0,
@@ -129,7 +132,7 @@ impl Masks {
             .extend([[x, y, x1, y1], [x2, y2, image, material]]);
     }
 
-    /// Whether two triangles, given by the words of their materials, have the same parts cut out.
+    /// True if two triangles, given by their material words, have the same holes.
     pub(crate) fn cut_alike(&self, one: u32, other: u32) -> bool {
         let cut = |word: u32| {
             let own = (word >= MASKED).then_some(word & !MASKED)?;
@@ -144,7 +147,7 @@ impl Masks {
     }
 }
 
-/// The part of a change of coordinates that belongs to a weight, rounded.
+/// The share of a coordinate difference for a weight, rounded.
 fn part_of(change: i32, weight: u32) -> i32 {
     let (high, low) = (weight >> 8, (weight & 255) as i32);
     let fraction = change as u32 & 0xffff;
@@ -170,7 +173,7 @@ fn alpha_at(masks: &Masks, place: u32, image: [u32; 4], x: i32, y: i32) -> u32 {
     (word >> (8 * (at & 3))) & 255
 }
 
-/// Whether there is no surface at the point of a triangle with these weights of its second and third corner.
+/// True if there is no surface at these weights of a triangle's second and third corners.
 pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f32) -> bool {
     let Some(masks) = masks.filter(|_| triangle.material >= MASKED) else {
         return false;

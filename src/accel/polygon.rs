@@ -1,4 +1,4 @@
-//! Triangles cut by boxes.
+//! Triangles clipped by boxes.
 
 use super::bounds::Bounds;
 use super::triangle::TriangleRecord;
@@ -12,7 +12,6 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// A triangle.
     pub(crate) fn new(triangle: &TriangleRecord) -> Self {
         let mut corners = [[0.0; 3]; 9];
         for (corner, vertex) in corners.iter_mut().zip(triangle.vertices()) {
@@ -26,7 +25,6 @@ impl Polygon {
         &self.corners[..self.count]
     }
 
-    /// Its area.
     pub(crate) fn area(&self) -> f64 {
         let [origin, rest @ ..] = self.corners() else {
             return 0.0;
@@ -39,8 +37,7 @@ impl Polygon {
         0.5 * sum.length()
     }
 
-    /// The part inside a box that is grown by `margin` (I. Sutherland, G. Hodgman, "Reentrant polygon
-    /// clipping", 1974).
+    /// The part inside a grown box (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
     pub(crate) fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
         let mut polygon = *self;
         for axis in 0..3 {
@@ -57,7 +54,7 @@ impl Polygon {
         polygon
     }
 
-    /// Leaves the part where `sign · (x − border)` is not negative.
+    /// Keeps the part where `sign · (x − border)` is not negative.
     pub(crate) fn cut(&mut self, axis: usize, border: f64, sign: f64) {
         let before = *self;
         self.count = 0;
@@ -79,7 +76,7 @@ impl Polygon {
             }
             if (from < 0.0) != (to < 0.0) {
                 let along = from / (from - to);
-                // Between both ends, whatever the rounding: what was cut before stays cut.
+                // Between both ends despite rounding: earlier cuts stay valid.
                 let mut crossing: [f64; 3] = std::array::from_fn(|i| {
                     let place = a[i] + (b[i] - a[i]) * along;
                     place.max(a[i].min(b[i])).min(a[i].max(b[i]))

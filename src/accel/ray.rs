@@ -1,4 +1,4 @@
-//! Rays and hits as kernels see them. Twin of `kernels/accel/ray.wesl`.
+//! Rays and hits in kernel layout. CPU version of `kernels/accel/ray.wesl`.
 
 use bytemuck::{Pod, Zeroable};
 pub use raystone_core::geometry::{Ray, SMALLEST_DIRECTION};
@@ -7,16 +7,16 @@ use std::fmt;
 /// Triangle index of a miss.
 pub const NO_HIT: u32 = u32::MAX;
 
-/// The least component of a raised direction, 2⁻⁸⁴, so that the reciprocal is finite: WGSL promises no
-/// infinity. With coordinates up to 1e12 (checked when a scene is loaded), twice that for a cell around
-/// them, `(bounds - origin) / SMALLEST_COMPONENT` stays below the largest f32.
+/// The smallest component of a raised direction, 2⁻⁸⁴, so that the reciprocal is finite: WGSL does
+/// not guarantee infinities. With coordinates up to 1e12 (checked on scene load), and twice that
+/// for a cell around them, `(bounds - origin) / SMALLEST_COMPONENT` stays below the largest f32.
 pub(crate) const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
 
-/// The least component of a raised direction against its longest, 2⁻⁶⁰: far less than rounding, and its
-/// square is not yet denormal.
+/// The smallest component of a raised direction relative to its longest, 2⁻⁶⁰: far below rounding,
+/// but with a square that is not denormal.
 pub(crate) const SMALLEST_SLOPE: f32 = 8.673_617_4e-19;
 
-/// The nearest hit, 16 bytes, the layout of the hit buffers.
+/// The nearest hit, 16 bytes, in the layout of the hit buffers.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Hit {
@@ -31,7 +31,7 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// The answer before anything was hit.
+    /// The initial value, without a hit.
     pub fn miss(ray: &Ray) -> Self {
         Self {
             t: ray.t_max,
@@ -41,7 +41,7 @@ impl Hit {
         }
     }
 
-    /// Equality to the bit.
+    /// Bitwise equality.
     pub fn same_bits(&self, other: &Hit) -> bool {
         bytemuck::bytes_of(self) == bytemuck::bytes_of(other)
     }
@@ -57,8 +57,8 @@ impl fmt::Display for Hit {
     }
 }
 
-/// The direction with components that are too short raised to the shortest, sign kept: to
-/// [`SMALLEST_SLOPE`] of the longest, and at least to [`SMALLEST_COMPONENT`].
+/// The direction with too small components raised, sign kept: to [`SMALLEST_SLOPE`] of the longest,
+/// and at least to [`SMALLEST_COMPONENT`].
 fn raised_direction(d: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = d.map(f32::abs);
     let shortest = (x.max(y).max(z) * SMALLEST_SLOPE).max(SMALLEST_COMPONENT);
@@ -71,13 +71,13 @@ fn raised_direction(d: [f32; 3]) -> [f32; 3] {
     })
 }
 
-/// The ray as it is traced: no component of its direction is 0, or next to the longest as good as 0.
+/// The ray as traced: no component of its direction is 0, or negligible relative to the longest.
 ///
-/// Boxes and triangles have to be tested with the *same* direction. Were a component 0 for a triangle's
-/// edges and a finite stand-in for its slabs, a vertex could lie on one side of the ray for the edges and
-/// on the other for the slabs, if it is as near to the ray's plane as the stand-in leads the ray away
-/// from it: both neighbours along an edge would then drop the hit, and a closed surface would have a
-/// crack. Raising changes nothing that is raised already.
+/// Boxes and triangles must be tested with the *same* direction. If a component were 0 for a
+/// triangle's edges but replaced by a finite value for its slabs, a vertex as near to the ray's
+/// plane as that value diverts the ray could lie on one side of the ray for the edges and on the
+/// other for the slabs: both neighbours along an edge would then reject the hit, and a closed
+/// surface would have a crack. Raising is idempotent.
 pub fn raised(ray: &Ray) -> Ray {
     Ray {
         direction: raised_direction(ray.direction),

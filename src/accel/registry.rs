@@ -1,4 +1,4 @@
-//! The registries of structures and of the tests that all of them share: one line each.
+//! The registries of structures and of their shared tests: one line each.
 
 use super::intersection::BoxTest;
 use super::triangle::{
@@ -7,11 +7,11 @@ use super::triangle::{
 use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
 use raystone_core::params::{Kinds, Named, ParameterSchema, Sources};
 
-/// Everything that can be named on the `accel` axis.
+/// The values of the `accel` axis.
 pub type AccelRegistry = Kinds<dyn AccelKind>;
-/// Everything that can be named on the `triangle` axis.
+/// The values of the `triangle` axis.
 pub type TriangleRegistry = Kinds<dyn TriangleTest>;
-/// Everything that can be named on the `box_test` axis.
+/// The values of the `box_test` axis.
 pub type BoxRegistry = Kinds<BoxTest>;
 
 impl Named for dyn AccelKind {

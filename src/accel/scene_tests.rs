@@ -1,4 +1,4 @@
-//! What structures make of built-in scenes.
+//! Structures on built-in scenes.
 
 use crate::{AccelRegistry, BuildLog, TriangleSoup};
 use raystone_core::params::ParamValue;

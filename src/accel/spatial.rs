@@ -1,21 +1,22 @@
-//! What structures that divide space (`octree`, `kd-tree`) share: which cells list a triangle.
+//! Shared parts of the structures that divide space (`octree`, `kd-tree`): the cells that list a
+//! triangle.
 //!
-//! A triangle may be listed *by its box* or *clipped*. By its box: a plane sends it to every side that
-//! its box reaches, to one side only if the box ends in the plane. Then the theorem of
+//! A triangle may be listed *by its box* or *clipped*. By its box: it goes to every side of a plane
+//! that its box overlaps, to one side only if the box ends in the plane. Then the theorem of
 //! [`super::triangle`] holds for cells as it does for boxes of a BVH. Proof: `N` and `F` are the
-//! computed slab distances of the triangle's box, `t` its clamped hit, `s` the computed distance of a
-//! split plane. Going down from the root, if the box lies on one side, follow it: `s ≥ F` on the near
-//! side and `s ≤ N` on the far one, because computed distances are monotone in the plane. If it is
-//! listed on both, follow the near side if `t ≤ s`, else the far one. So the interval `[n, f]` of every
-//! cell on the way satisfies `n ≤ max(N, t)` and `f ≥ min(F, t)`, which is all that the four
-//! inequalities of that proof use: each cell passes `max(n, t_min) ≤ min(f, t_best) · BOX_PAD`, and the
-//! leaf at the end lists the triangle. ∎
+//! computed slab distances of the triangle's box, `t` its clamped hit, `s` the computed distance of
+//! a split plane. Going down from the root, if the box lies on one side, follow it: `s ≥ F` on the
+//! near side and `s ≤ N` on the far one, because computed distances are monotone in the plane. If
+//! it is listed on both, follow the near side if `t ≤ s`, else the far one. So the interval `[n,
+//! f]` of every cell on the way satisfies `n ≤ max(N, t)` and `f ≥ min(F, t)`, which is all that
+//! the four inequalities of that proof use: each cell passes `max(n, t_min) ≤ min(f, t_best) ·
+//! BOX_PAD`, and the leaf at the end lists the triangle. ∎
 //!
 //! Clipped: a cell that the triangle itself misses by more than its [`Margin`] does not list it,
-//! although its box may reach in. That makes shorter lists, but assumes that the computed hit lies
-//! within the margin of the triangle. It does unless the ray grazes the plane of the triangle at less
-//! than [`LEAST_COSINE`]; and then only a hit, or an end of the ray, between the computed distance and
-//! the exact one can make a difference.
+//! although its box may overlap the cell. Lists become shorter, but this assumes that the computed
+//! hit lies within the margin of the triangle. It does unless the ray grazes the triangle's plane
+//! at a cosine below [`LEAST_COSINE`]; and then only a hit, or an end of the ray, between the
+//! computed distance and the exact one can make a difference.
 
 use super::bounds::Bounds;
 use super::polygon::Polygon;
@@ -24,14 +25,14 @@ use super::triangle::{DISTANCE_PAD, TriangleRecord};
 /// Cosine between ray and normal down to which margins cover the error of a hit, 2⁻⁵.
 const LEAST_COSINE: f64 = 0.03125;
 
-/// By how much cells are grown before a clipped triangle counts as missing them.
+/// Growth of cells before a clipped triangle counts as missing them.
 ///
-/// The distance of a hit errs by less than [`DISTANCE_PAD`] times the terms that it is made of, over
-/// the determinant (see [`super::triangle`]). With edges `e1` and `e2`, normal `n`, `m` the sum of the
-/// magnitudes of both products in each component of `n`, and a ray no longer than the scene, that is
-/// `2 · DISTANCE_PAD · diagonal · |m| / (|n| · cosine)`, a point along the ray.
+/// The distance of a hit errs by less than [`DISTANCE_PAD`] times the terms that it is made of,
+/// over the determinant (see [`super::triangle`]). With edges `e1` and `e2`, normal `n`, `m` the
+/// sum of the magnitudes of both products in each component of `n`, and a ray no longer than the
+/// scene, that is `2 · DISTANCE_PAD · diagonal · |m| / (|n| · cosine)`, a point along the ray.
 pub(super) struct Margin {
-    /// The margin of a triangle whose |m| and |n| are equal, scene units.
+    /// The margin of a triangle with |m| = |n|, scene units.
     least: f64,
 }
 
@@ -50,7 +51,7 @@ impl Margin {
         }
     }
 
-    /// The margin of one triangle, scene units; beyond everything if it has no area.
+    /// The margin of one triangle, scene units; effectively infinite if it has no area.
     pub(crate) fn of(&self, record: &TriangleRecord) -> f64 {
         let [e1, e2] = record.edges();
         let (mut products, mut normal) = (0.0, 0.0);
@@ -59,7 +60,7 @@ impl Margin {
             products += ((e1[b] * e2[c]).abs() + (e1[c] * e2[b]).abs()).powi(2);
             normal += (e1[b] * e2[c] - e1[c] * e2[b]).powi(2);
         }
-        // Finite, so that its product with a zero is no NaN.
+        // Finite, so that its product with zero is not NaN.
         let beyond = f64::from(f32::MAX);
         if normal > 0.0 {
             (self.least * (products / normal).sqrt()).min(beyond)
@@ -69,22 +70,19 @@ impl Margin {
     }
 }
 
-/// The corners of a triangle.
 pub(super) type Corners = [[f64; 3]; 3];
 
-/// Corners of `record`.
 pub(super) fn corners(record: &TriangleRecord) -> Corners {
     record.vertices().map(|v| v.map(f64::from))
 }
 
-/// Separating-axis test of one triangle against boxes of one size whose boxes meet that of the
-/// triangle (T. Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001).
+/// Separating-axis test of one triangle against boxes of one size that overlap the triangle's box
+/// (T. Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001).
 pub(super) struct Overlap {
     normal: [f64; 3],
     /// Interval of the triangle on its normal, grown by the half extent of the boxes.
     on_normal: [f64; 2],
-    /// The products of edge `i` with axis `a` at `3 i + a`: both components that are not 0, and the
-    /// grown interval on it.
+    /// For edge `i` and axis `a`, at `3 i + a`: non-zero components of the product, grown interval.
     products: [([f64; 2], [f64; 2]); 9],
 }
 
@@ -100,7 +98,7 @@ impl Overlap {
         let products = std::array::from_fn(|k| {
             let (i, [b, c]) = (k / 3, others(k % 3));
             let axis = [edges[i][c], -edges[i][b]];
-            // Both ends of the edge lie at the same place.
+            // Both ends of the edge project to the same value.
             let on_axis = |corner: &[f64; 3]| axis[0] * corner[b] + axis[1] * corner[c];
             let (p, q) = (on_axis(&corners[i]), on_axis(&corners[(i + 2) % 3]));
             let reach = half[b] * axis[0].abs() + half[c] * axis[1].abs();
@@ -116,7 +114,7 @@ impl Overlap {
         }
     }
 
-    /// Whether the triangle touches the box around `centre`.
+    /// True if the triangle touches the box around `centre`.
     pub(crate) fn touches(&self, centre: [f64; 3]) -> bool {
         let within = |[low, high]: [f64; 2], x: f64| low <= x && x <= high;
         within(self.on_normal, dot(centre, self.normal))
@@ -131,12 +129,11 @@ impl Overlap {
     }
 }
 
-/// The axes that are not `axis`.
 fn others(axis: usize) -> [usize; 2] {
     [(axis + 1) % 3, (axis + 2) % 3]
 }
 
-/// Whether the triangle touches the closed box.
+/// True if the triangle touches the closed box.
 pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
     let side = |a: usize| (f64::from(cell.min[a]), f64::from(cell.max[a]));
     let meets = (0..3).all(|a| {
@@ -148,12 +145,10 @@ pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
     meets && Overlap::new(corners, half).touches(centre)
 }
 
-/// Scalar product.
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Vector product.
 pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
@@ -162,8 +157,8 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin` and rounded
-/// outwards; `None` if there is no such part.
+/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin` and
+/// rounded outwards; `None` if there is no such part.
 pub(super) fn clip(record: &TriangleRecord, cell: &Bounds, margin: f64) -> Option<Bounds> {
     let part = Polygon::new(record).clipped(cell, margin);
     let around = |all: Bounds, corner: &[f64; 3]| {
@@ -176,7 +171,7 @@ pub(super) fn clip(record: &TriangleRecord, cell: &Bounds, margin: f64) -> Optio
     (!part.corners().is_empty()).then_some(bounds)
 }
 
-/// The greatest f32 that is not above `x`.
+/// The largest f32 that is at most `x`.
 fn rounded_down(x: f64) -> f32 {
     let nearest = x as f32;
     if f64::from(nearest) > x {
@@ -220,7 +215,7 @@ mod tests {
         assert_eq!(grown, Some(cell([1.125, 1.0, -0.5], [3.0, 2.875, 0.5])));
     }
 
-    /// A fraction, its denominator positive.
+    /// A fraction with a positive denominator.
     #[derive(Clone, Copy)]
     struct Ratio(i128, i128);
 
@@ -235,8 +230,9 @@ mod tests {
         }
     }
 
-    /// Least and greatest coordinate on `axis` of what a triangle and a box share, exactly: those of the corners
-    /// of the triangle in the box, of its edges in faces of the box, and of edges of the box in the triangle.
+    /// Extreme coordinates on `axis` of the intersection of a triangle and a box, exactly: those of
+    /// the corners of the triangle in the box, of its edges in faces of the box, and of edges of
+    /// the box in the triangle.
     fn shared(corners: [[i128; 3]; 3], cell: [[i128; 3]; 2], axis: usize) -> Vec<Ratio> {
         let mut found = Vec::new();
         // Points over a common denominator.
@@ -312,7 +308,7 @@ mod tests {
             };
             cut += usize::from(found != triangle.bounds());
             for (axis, points) in points.iter().enumerate() {
-                // No exact point outside by more than the rounding of f64, and one within the next f32.
+                // No exact point is outside beyond f64 rounding, and one is within the next f32.
                 let within =
                     |[low, high]: [f64; 2]| move |p: &Ratio| p.is_above(low) && !p.is_above(high);
                 let around = |x: f32| {
@@ -341,7 +337,7 @@ mod tests {
 
     #[test]
     fn bounds_are_rounded_outwards() {
-        // A third and two thirds of 1, between f32s.
+        // A third and two thirds of 1, which are not f32 numbers.
         let thin = record(0, [[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, 1.0, 1.0]]);
         let part = clip(&thin, &cell([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]), 0.0).expect("a part");
         for (found, exact, is_min) in [

@@ -1,4 +1,4 @@
-//! What building a structure took, and static figures of what was built.
+//! Build times and static statistics of structures.
 
 use super::AccelError;
 use raystone_core::clock::Instant;
@@ -10,10 +10,10 @@ use std::sync::Arc;
 /// Timed phases of a build, and the device for those that use it.
 #[derive(Clone, Default)]
 pub struct BuildLog {
-    /// What was timed so far.
+    /// The phases timed so far.
     pub phases: Vec<Phase>,
     player: Option<Arc<Player>>,
-    /// Bytes of the largest array, if others than the device says.
+    /// Bytes of the largest array, if not the device's limit.
     binding: Option<u64>,
 }
 
@@ -27,7 +27,7 @@ impl BuildLog {
         }
     }
 
-    /// The log of a build for an adapter that binds arrays of so many bytes at most.
+    /// The log of a build for an adapter with this binding limit in bytes.
     #[must_use]
     pub fn binding(self, bytes: u64) -> Self {
         Self {
@@ -36,14 +36,14 @@ impl BuildLog {
         }
     }
 
-    /// Words that an array may have: what the adapter binds, or every adapter where there is none.
+    /// Maximum words of an array: the adapter's limit, or the guaranteed one.
     pub(crate) fn most_words(&self) -> u64 {
         let limits = self.gpu().map(|gpu| &gpu.limits);
         let bound = limits.map(|l| l.max_storage_buffer_binding_size.min(l.max_buffer_size));
         self.binding.or(bound).unwrap_or(LEAST_BINDING) / 4
     }
 
-    /// A log without phases for parts that are built side by side, on the same device.
+    /// An empty log on the same device, for parts that are built concurrently.
     #[must_use]
     pub(crate) fn of_a_part(&self) -> Self {
         Self {
@@ -58,11 +58,11 @@ impl BuildLog {
         self.player.as_deref().map(Player::gpu)
     }
 
-    /// Plays what builds on the device; its runs become phases, those of one name together, by GPU timestamps where
-    /// there are any. Where not, all of it is one phase of wall time.
+    /// Plays the commands of a device build. Its runs become phases, merged by name, timed by GPU
+    /// timestamps if available, otherwise by wall time as one phase.
     ///
     /// # Errors
-    /// There is no device, or what it met with.
+    /// There is no device, or it reported an error.
     pub fn play(&mut self, recording: &Recording) -> Result<Played, AccelError> {
         let player = self.player.as_ref();
         let player = player.ok_or_else(|| {
@@ -87,7 +87,7 @@ impl BuildLog {
         Ok(played)
     }
 
-    /// Adds milliseconds to the phase of this name, which may be a new one.
+    /// Adds milliseconds to the phase of this name, creating it if needed.
     pub fn note(&mut self, name: &str, ms: f64) {
         match self.phases.iter_mut().find(|phase| phase.name == name) {
             Some(phase) => phase.ms += ms,
@@ -98,7 +98,7 @@ impl BuildLog {
         }
     }
 
-    /// Runs `work` and notes how long it took.
+    /// Runs `work` and records its time.
     pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
@@ -111,7 +111,7 @@ impl BuildLog {
 
     /// Sum of all phases, milliseconds.
     pub fn total_ms(&self) -> f64 {
-        // Not sum(): that of nothing is −0.
+        // Not sum(): the sum of nothing is −0.
         self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
     }
 }

@@ -1,18 +1,18 @@
-//! What the file of a structure begins with: the declaration of its registry entry, and the vocabulary.
+//! The declaration of a structure's registry entry, and the common imports of structure files.
 
 use super::tree::Tree;
 use super::{AccelError, AccelKind, BuildLog, BuildResult, TriangleSoup};
 use raystone_core::params::{ParameterSchema, Parameters, Params, Sources};
 
-/// A registry entry whose name and parameters are known at compile time. Every one is an [`AccelKind`].
+/// A registry entry with name and parameters known at compile time. Every one is an [`AccelKind`].
 pub trait Structure: Sync {
-    /// Name as a user types it.
+    /// Name used in configurations.
     const NAME: &'static str;
-    /// One line: what it is and where it comes from.
+    /// One-line description with source.
     const DESCRIPTION: &'static str;
     /// See [`AccelKind::sources`].
     const SOURCES: Sources = &[];
-    /// What it can be set to, declared by [`parameters!`](raystone_core::parameters).
+    /// Its parameters, declared by [`parameters!`](raystone_core::parameters).
     type Parameters: Parameters;
 
     /// Builds the structure; phases are timed in `log`.
@@ -27,13 +27,12 @@ pub trait Structure: Sync {
     }
 }
 
-/// A structure that is a layout of one binary tree, so that a tree whose boxes were fitted to triangles that moved makes
-/// one, too.
+/// A layout of one binary tree, which can also be built from a refitted tree.
 pub trait OverTree: Sync {
-    /// The tree that is laid out.
+    /// Builds the tree.
     ///
     /// # Errors
-    /// Parameters that the structure does not have, or a limit of the builder is exceeded.
+    /// Unknown parameters, or a limit of the builder is exceeded.
     fn tree(
         &self,
         soup: &TriangleSoup,
@@ -41,7 +40,7 @@ pub trait OverTree: Sync {
         log: &mut BuildLog,
     ) -> Result<Tree, AccelError>;
 
-    /// Lays out a tree of [`OverTree::tree`], whatever its boxes have become.
+    /// Lays out a tree of [`OverTree::tree`], whose boxes may have changed since.
     ///
     /// # Errors
     /// The tree exceeds a limit of the layout.
@@ -80,7 +79,7 @@ impl<S: Structure> AccelKind for S {
     }
 }
 
-/// What the files of structures name, whatever they build.
+/// Common imports of structure files.
 pub(super) mod prelude {
     pub(crate) use super::super::bounds::Bounds;
     pub(crate) use super::super::ray::{Hit, Ray};

@@ -1,7 +1,7 @@
-//! Twins: the traversals of kernels in scalar Rust, with the same hits and the same counted work.
+//! Twins: scalar CPU versions of the kernels' traversals, with the same hits and work counters.
 //!
-//! A structure writes [`Traverse::trace`], the twin of the kernel's `trace`. What all of them begin
-//! and end with stands here. Twin of `kernels/accel/query.wesl`.
+//! A structure implements [`Traverse::trace`], the CPU version of the kernel's `trace`. Their
+//! common start and end are here. CPU version of `kernels/accel/query.wesl`.
 
 use super::TriangleSoup;
 use super::bounds::Bounds;
@@ -12,15 +12,15 @@ use super::triangle::{TriangleRecord, intersect_triangle};
 use super::watch;
 use raystone_core::structure::Counters;
 
-/// One ray on its way through a structure, with what is asked and what was found so far.
+/// The state of one ray in a traversal: the query and the result so far.
 pub struct Walk<'a> {
-    /// The ray as it is traced: see [`super::ray::raised`].
+    /// The ray as traced: see [`super::ray::raised`].
     pub ray: Ray,
-    /// What tests need of its direction.
+    /// Reciprocal of its direction, for the tests.
     pub inverse: Reciprocal,
-    /// What is cut out of triangles.
+    /// Masks that cut holes into triangles.
     pub masks: Option<&'a Masks>,
-    /// Whether any hit is enough.
+    /// True if any hit is enough.
     pub any: bool,
     /// The nearest hit so far.
     pub hit: Hit,
@@ -29,7 +29,7 @@ pub struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The way of `ray` through triangles that are met by the tests of `soup`.
+    /// The traversal of `ray` through triangles with the tests of `soup`.
     pub fn new(ray: &Ray, any: bool, soup: &'a TriangleSoup, counters: &'a mut Counters) -> Self {
         let tests = soup.intersection;
         let ray = tests.raised(ray);
@@ -43,12 +43,12 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Whether any hit is enough and there is one.
+    /// True if any hit is enough and there is one.
     pub fn is_answered(&self) -> bool {
         self.any && self.hit.triangle != NO_HIT
     }
 
-    /// Counts the visit of a node or cell, given its place among the structure's own, and reads it.
+    /// Counts the visit of a node or cell, given its index in the structure, and reads it.
     pub fn visit<'n, N: ?Sized>(&mut self, place: usize, node: &'n N) -> &'n N {
         watch::read(node);
         self.counters.nodes += 1;
@@ -56,12 +56,11 @@ impl<'a> Walk<'a> {
         node
     }
 
-    /// Notes that something else is read of what a kernel reads, for the visit or the test that comes next.
+    /// Records an additional read of kernel data, for the next visit or test.
     pub fn read<'n, N: ?Sized>(&mut self, what: &'n N) -> &'n N {
         watch::read(what)
     }
 
-    /// Notes how many entries the stack has.
     pub(crate) fn count_stack(&mut self, entries: usize) {
         let highest = &mut self.counters.stack_high_water;
         *highest = (*highest).max(entries as u32);
@@ -80,7 +79,6 @@ impl<'a> Walk<'a> {
         intersect_triangle(triangle, &self.ray, self.inverse, &mut self.hit);
     }
 
-    /// Tests the triangles of a list.
     pub(crate) fn test_list(&mut self, soup: &TriangleSoup, ids: &[u32]) {
         for id in watch::each(ids) {
             self.test(&soup.records[id as usize]);
@@ -90,19 +88,19 @@ impl<'a> Walk<'a> {
 
 /// A structure that can be traversed on the host.
 pub trait Traverse: Sync {
-    /// Twin of the kernel's `trace`; `soup` is what the structure was built over.
+    /// CPU version of the kernel's `trace`; `soup` holds the triangles of the build.
     fn trace(&self, soup: &TriangleSoup, walk: Walk) -> Hit;
 }
 
-/// What answers rays on the host.
+/// Answers rays on the host.
 pub trait CpuTwin: Sync {
-    /// Nearest hit, ties decided for the lowest triangle index.
+    /// Nearest hit; ties go to the lowest triangle index.
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit;
-    /// Whether anything is hit.
+    /// True if anything is hit.
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool;
 }
 
-/// A structure with the triangles that it was built over.
+/// A structure with the triangles it was built from.
 pub struct Twin<'a, T>(pub &'a T, pub &'a TriangleSoup);
 
 impl<T: Traverse> CpuTwin for Twin<'_, T> {

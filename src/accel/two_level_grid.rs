@@ -1,10 +1,10 @@
-//! `two-level-grid`: a coarse grid whose occupied cells are cut into grids of their own. Twin of
-//! `kernels/accel/two_level_grid.wesl`.
+//! `two-level-grid`: a coarse grid whose occupied cells are subdivided by grids of their own. CPU
+//! version of `kernels/accel/two_level_grid.wesl`.
 //!
-//! Source: J. Kalojanov, M. Billeter, P. Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
-//! Top cells by Cleary's rule with λ₁; a top cell with n triangles is cut by the same rule with λ₂.
-//! One loop walks both levels: it steps through the parts of a top cell until it leaves the cell, and
-//! then finds its place in the next one.
+//! Source: J. Kalojanov, M. Billeter, P. Slusallek, "Two-level grids for ray tracing on GPUs",
+//! 2011. Top cells by Cleary's rule with λ₁; a top cell with n triangles is subdivided by the same
+//! rule with λ₂. One loop walks both levels: it steps through the parts of a top cell until it
+//! exits the cell, and then finds its position in the next one.
 
 use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};
 use super::grid::{Cut, Grid, GridBox, areas, clamped, finest, first_axis, most_words, outside};
@@ -12,7 +12,7 @@ use super::structure::prelude::*;
 use super::watch;
 use rayon::prelude::*;
 
-/// Most parts of a top cell along an axis: its resolution takes ten bits per axis.
+/// Maximum parts of a top cell along an axis: its resolution takes ten bits per axis.
 const MOST_PARTS: u32 = 1023;
 /// Bits of a top cell's resolution for each axis.
 const PART_BITS: u32 = 10;
@@ -28,7 +28,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct TwoLevelGrid;
 
 impl Structure for TwoLevelGrid {
@@ -60,8 +59,8 @@ fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) ->
     })
 }
 
-/// Top cells of one task, cut: words of each top cell with places relative to the run, the begins of
-/// the lists of all parts, and the lists.
+/// Subdivided top cells of one task: words of each top cell with indices relative to the run, the
+/// list starts of all parts, and the lists.
 #[derive(Default)]
 struct Run {
     top: Vec<[u32; 2]>,
@@ -127,8 +126,8 @@ fn cut(
 
 struct Built {
     grid: Grid,
-    /// Two words a top cell: the place of its first part, and its resolution (0: empty). Then a word
-    /// for each part: the begin of its list; the next word is its end.
+    /// Two words per top cell: the index of its first part, and its resolution (0: empty). Then a
+    /// word per part: the start of its list; the next word is its end.
     cells: Vec<u32>,
     references: Vec<u32>,
 }
@@ -164,7 +163,7 @@ impl Built {
         2 * self.grid.cells() as usize
     }
 
-    /// Place of the first part of a top cell, and its resolution: 0 if it is empty.
+    /// Index of the first part of a top cell, and its resolution: 0 if it is empty.
     fn top(&self, cell: [u32; 3]) -> (u32, [u32; 3]) {
         let index = 2 * self.grid.index(cell) as usize;
         let words = watch::read(&self.cells[index..index + 2]);
@@ -177,7 +176,7 @@ impl Built {
         &self.references[self.cells[place] as usize..self.cells[place + 1] as usize]
     }
 
-    /// Begins of the lists of all parts, and the end of the last.
+    /// List starts of all parts, and the end of the last.
     fn starts(&self) -> &[u32] {
         &self.cells[self.first_part()..]
     }
@@ -216,8 +215,8 @@ impl BuiltAccel for Built {
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        // Along an axis a ray passes every part of a column once, and finds its part again whenever
-        // it enters another top cell.
+        // Along an axis a ray passes every part of a column once, and locates its part again
+        // whenever it enters another top cell.
         let column = |a: usize| {
             let tops = 0..self.grid.cells() as u32;
             let parts = tops.map(|cell| self.top(self.grid.coordinates(cell)).1[a].max(1));
@@ -251,7 +250,6 @@ impl BuiltAccel for Built {
     }
 }
 
-/// Cell of a top cell's grid at `place`, in top cells.
 fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
     std::array::from_fn(|a| clamped((place[a] - top[a] as f32) * parts[a] as f32, parts[a]))
 }
@@ -271,7 +269,7 @@ impl Traverse for Built {
         let mut parts = resolution.map(|r| r.max(1));
         let mut part = find_part(entry, top, parts);
         loop {
-            // The place of the cell's first part.
+            // Index relative to the cell's first part.
             let place = (first + (part[2] * parts[1] + part[1]) * parts[0] + part[0]) as usize;
             let is_occupied = resolution[0] != 0;
             let ends = if is_occupied { place..place + 2 } else { 0..0 };
@@ -287,7 +285,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: an equally near one may wait next door.
+            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }

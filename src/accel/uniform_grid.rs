@@ -1,20 +1,20 @@
-//! `uniform-grid`: equal cells with lists of triangles, walked by a 3D-DDA. Twin of
+//! `uniform-grid`: equal cells with lists of triangles, traversed by a 3D-DDA. CPU version of
 //! `kernels/accel/uniform_grid.wesl`.
 //!
-//! Sources: J. Cleary et al., "Multiprocessor ray tracing", 1986 (resolution); J. Amanatides,
-//! A. Woo, "A fast voxel traversal algorithm", 1987; K. Zuiderveld et al., "Acceleration of ray
+//! Sources: J. Cleary et al., "Multiprocessor ray tracing", 1986 (resolution); J. Amanatides, A.
+//! Woo, "A fast voxel traversal algorithm", 1987; K. Zuiderveld et al., "Acceleration of ray
 //! casting using 3D distance transforms", 1992 (skipping empty space).
 //!
-//! A hit beyond the present cell is kept and the walk goes on until the cell's exit lies behind the
-//! nearest hit. With `skip = chebyshev` an empty cell knows how far the nearest list is, and the walk
-//! leaves the whole empty cube around it at once.
+//! A hit beyond the current cell is stored and the traversal continues until the cell's exit lies
+//! behind the nearest hit. With `skip = chebyshev` an empty cell stores the distance to the nearest
+//! list, and the traversal skips the whole empty cube around it at once.
 
 use super::grid::lists::{Lists, check_lists, check_starts};
 use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, outside};
 use super::structure::prelude::*;
 use rayon::prelude::*;
 
-/// Bits of a cell's word that hold the begin of its list where the others hold the distance.
+/// Bits of a cell's word for the start of its list when the others hold the distance.
 const START_BITS: u32 = 25;
 const START_MASK: u32 = 0x01ff_ffff;
 
@@ -31,14 +31,12 @@ parameters! {
 
     /// How empty space is left.
     pub(crate) enum Skip {
-        /// Cell by cell.
         None = "none",
         /// By the Chebyshev distance to the nearest list.
         Chebyshev = "chebyshev",
     }
 }
 
-/// The registry entry.
 pub(crate) struct UniformGrid;
 
 impl Structure for UniformGrid {
@@ -95,7 +93,7 @@ impl Built {
         (self.cells[cell] & mask) as usize
     }
 
-    /// Steps to the nearest list where distances are kept, at least 1.
+    /// Steps to the nearest list if distances are stored, at least 1.
     fn reach(&self, cell: usize) -> i32 {
         if self.skip {
             (self.cells[cell] >> START_BITS).max(1) as i32
@@ -163,7 +161,7 @@ impl BuiltAccel for Built {
     }
 }
 
-/// Where the ray leaves the cube of empty cells around `cell`, which reaches `reach` cells far.
+/// The ray's exit from the cube of empty cells around `cell`, which extends `reach` cells.
 fn jump(
     grid: &Grid,
     ray: &Ray,
@@ -201,7 +199,7 @@ impl Traverse for Built {
             if walk.is_answered() {
                 return walk.hit;
             }
-            // Cells that can be left at once: the cube of empty ones, or this cell alone.
+            // Cells that can be skipped at once: the cube of empty ones, or this cell alone.
             let reach = self.reach(index);
             let planes: [f32; 3] = std::array::from_fn(|a| {
                 let plane = if forward[a] { reach } else { 1 - reach };
@@ -209,7 +207,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: an equally near one may wait next door.
+            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }

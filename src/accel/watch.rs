@@ -1,23 +1,23 @@
-//! What a twin looks at: every node it visits and every triangle it tests, with the memory that it reads for
+//! A log of CPU traversals: every node visited and every triangle tested, with the memory read for
 //! them, for one ray at a time.
 //!
-//! The log belongs to the thread, so that twins need not carry it. While nobody watches, an event costs
-//! the look at one flag.
+//! The log is thread-local, so that traversals need not pass it along. When logging is off, an
+//! event only costs the check of one flag.
 
 use super::ray::Hit;
 use std::cell::{Cell, RefCell};
 
-/// Memory of the host that a twin reads where a kernel reads the array that is laid out like it.
+/// Host memory read by a CPU version where a kernel reads the array with the same layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Read {
-    /// Of the first byte.
+    /// Address of the first byte.
     pub address: usize,
-    /// How many.
+    /// Number of bytes.
     pub bytes: u32,
 }
 
 impl Read {
-    /// All of this.
+    /// The memory of this value.
     pub fn of<T: ?Sized>(what: &T) -> Self {
         Self {
             address: std::ptr::from_ref(what).cast::<u8>() as usize,
@@ -26,21 +26,20 @@ impl Read {
     }
 }
 
-/// Something that a twin did.
+/// An event of a traversal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
-    /// It visited a node or cell; its place among the structure's own.
+    /// Visit of a node or cell, with its index in the structure.
     Node(u32),
-    /// It tested the triangle with this index.
+    /// Test of the triangle with this index.
     Triangle(u32),
     /// The triangle tested last is the nearest so far.
     Nearest(Hit),
-    /// It read this for the visit or the test that comes next.
+    /// A read for the next visit or test.
     Read(Read),
 }
 
-/// Events beyond this many are counted and not kept: the log of brute force over a large scene is of no
-/// use.
+/// Events beyond this are only counted: a longer log, as of brute force, is of no use.
 const MOST_EVENTS: usize = 1 << 20;
 
 thread_local! {
@@ -48,7 +47,7 @@ thread_local! {
     static EVENTS: RefCell<Vec<Event>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Runs `work` on this thread and returns what it looked at, in order.
+/// Runs `work` on this thread and returns its log, in order.
 pub fn watch<T>(work: impl FnOnce() -> T) -> (T, Vec<Event>) {
     EVENTS.take();
     IS_WATCHED.set(true);
@@ -57,7 +56,7 @@ pub fn watch<T>(work: impl FnOnce() -> T) -> (T, Vec<Event>) {
     (result, EVENTS.take())
 }
 
-/// Notes that something is read, if anybody watches, and hands it on.
+/// Records a read, if logging is on, and returns its argument.
 #[inline(always)]
 pub(super) fn read<T: ?Sized>(what: &T) -> &T {
     if IS_WATCHED.get() && size_of_val(what) > 0 {
@@ -66,12 +65,12 @@ pub(super) fn read<T: ?Sized>(what: &T) -> &T {
     what
 }
 
-/// The words of a list, each read when its turn comes.
+/// The words of a list, each recorded when it is read.
 pub(super) fn each(list: &[u32]) -> impl Iterator<Item = u32> {
     list.iter().map(|word| *read(word))
 }
 
-/// Notes an event, if anybody watches.
+/// Records an event, if logging is on.
 #[inline(always)]
 pub(super) fn note(event: Event) {
     if IS_WATCHED.get() {

@@ -1,22 +1,22 @@
-//! Star discrepancy from below: threshold accepting.
+//! Lower bounds of the star discrepancy: threshold accepting.
 //!
 //! After Gnewuch, Wahlström & Winzen (2012, "A new randomized algorithm to approximate the star
 //! discrepancy based on threshold accepting"): a walk over the grid of coordinates that accepts a
-//! loss up to a threshold, which rises to 0; too many and too few points are sought apart; and each
-//! corner visited is snapped to one that is no worse: shrunk onto the points inside for boxes with too
-//! many, grown up to the points outside for boxes with too few.
+//! loss up to a threshold, which rises to 0. Boxes with too many and too few points are searched
+//! separately, and each visited corner is snapped to one that is no worse: shrunk onto the points
+//! inside for too many, grown up to the points outside for too few.
 
 use super::{Budget, PointSet};
 use crate::random::SplitMix64;
 
-/// Work of one search at most, in coordinates looked at.
+/// Maximum work of one search, in coordinates examined.
 const WORK: usize = 20_000_000;
-/// Steps of a search at most, for each coordinate of the set.
+/// Maximum steps of a search, per coordinate of the set.
 const STEPS: usize = 20;
 /// Walks that share the steps of a search.
 const WALKS: usize = 10;
 
-/// The best of searches with one seed after the other until the budget is spent; as [`ascend`].
+/// The best of repeated searches with consecutive seeds until the budget is spent; as [`ascend`].
 pub(super) fn ascend_on(
     points: &PointSet,
     seeds: impl Iterator<Item = u64>,
@@ -28,7 +28,7 @@ pub(super) fn ascend_on(
         .fold(0.0, f64::max)
 }
 
-/// A difference that a box really has: a lower bound of the star discrepancy, at least 0.
+/// The difference of an actual box: a lower bound of the star discrepancy, at least 0.
 pub(super) fn ascend(points: &PointSet, seed: u64, budget: &Budget) -> f64 {
     let grid = Lattice::new(points);
     let size = points.len() * points.dim();
@@ -84,13 +84,13 @@ impl Lattice {
         }
     }
 
-    /// Index of the last corner of a dimension: boxes up to it hold all points.
+    /// Index of the last corner of a dimension: boxes up to it contain all points.
     fn last(&self, dim: usize) -> usize {
         self.coordinates[dim].len() - 2
     }
 
     /// Volume of the closed box of a corner, or of the open box that ends at the next coordinates;
-    /// both hold the points whose ranks are at most those of the corner.
+    /// both contain the points whose ranks are at most those of the corner.
     fn volume(&self, corner: &[u32], side: Side) -> f64 {
         let next = usize::from(side == Side::Few);
         let sides = self.coordinates.iter().zip(corner);
@@ -102,17 +102,17 @@ struct Walker<'a> {
     grid: &'a Lattice,
     side: Side,
     random: SplitMix64,
-    /// By point: dimensions in which it is outside the present box.
+    /// Per point: number of dimensions in which it is outside the current box.
     outside: Vec<u32>,
 }
 
 impl Walker<'_> {
-    /// The worst difference met on a walk.
+    /// The worst difference found on a walk.
     fn walk(&mut self, steps: usize, budget: &Budget) -> f64 {
         let mut corner = self.anywhere();
         let mut value = self.snap(&mut corner);
         let mut best = value;
-        // Thresholds are losses that random steps really make, largest first.
+        // Thresholds are losses of actual random steps, largest first.
         let trials = (steps as f64).sqrt().ceil() as usize;
         let mut thresholds = Vec::with_capacity(trials);
         for _ in 0..trials {
@@ -136,8 +136,7 @@ impl Walker<'_> {
         best
     }
 
-    /// A random corner, uniform by volume rather than by side so that large boxes are met in many
-    /// dimensions.
+    /// A random corner, uniform by volume, so that large boxes are found in many dimensions.
     fn anywhere(&mut self) -> Vec<u32> {
         let dims = self.grid.ranks.len();
         let power = 1.0 / dims as f64;
@@ -149,7 +148,7 @@ impl Walker<'_> {
         corner.enumerate().map(last).collect()
     }
 
-    /// A snapped corner near another: fewer and smaller changes the further the walk is (0 to 1).
+    /// A snapped corner near another, with fewer and smaller changes at higher `progress` (0 to 1).
     fn neighbour(&mut self, corner: &[u32], progress: f64) -> (Vec<u32>, f64) {
         let dims = corner.len();
         let mut next = corner.to_vec();
@@ -167,7 +166,7 @@ impl Walker<'_> {
         (next, value)
     }
 
-    /// Moves a corner to one that is no worse, and gives its difference.
+    /// Moves a corner to one that is no worse, and returns its difference.
     fn snap(&mut self, corner: &mut [u32]) -> f64 {
         self.outside.fill(0);
         for (ranks, &i) in self.grid.ranks.iter().zip(corner.iter()) {
@@ -188,7 +187,7 @@ impl Walker<'_> {
         }
     }
 
-    /// Down to the greatest coordinates of the points inside.
+    /// Down to the largest coordinates of the points inside.
     fn shrink(&mut self, corner: &mut [u32]) {
         for (ranks, i) in self.grid.ranks.iter().zip(corner) {
             let inside = self.outside.iter().zip(ranks).filter(|(o, _)| **o == 0);
@@ -196,7 +195,7 @@ impl Walker<'_> {
         }
     }
 
-    /// Up to the least coordinates of the points outside in one dimension only, dimension by
+    /// Up to the smallest coordinates of the points outside in only one dimension, dimension by
     /// dimension from a random one.
     fn grow(&mut self, corner: &mut [u32]) {
         let dims = corner.len();

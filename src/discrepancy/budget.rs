@@ -1,9 +1,9 @@
-//! Time that a measure may take.
+//! The time budget of a measure.
 
 use super::DiscrepancyError;
 use std::time::{Duration, Instant};
 
-/// A span of time that began when it was made.
+/// A time span that starts at its creation.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
     begin: Instant,
@@ -11,7 +11,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of this span that begins now.
+    /// A budget of this span, starting now.
     pub fn new(span: Duration) -> Self {
         Self {
             begin: Instant::now(),
@@ -19,7 +19,7 @@ impl Budget {
         }
     }
 
-    /// A budget of so many seconds that begins now; negative and NaN count as 0.
+    /// A budget of this many seconds, starting now; negative and NaN count as 0.
     pub fn seconds(seconds: f64) -> Self {
         let limit = Duration::from_secs(u64::MAX / 4);
         let span = Duration::try_from_secs_f64(seconds);
@@ -27,22 +27,22 @@ impl Budget {
         Self::new(span.unwrap_or(otherwise).min(limit))
     }
 
-    /// The budget that ends when this fraction (0 to 1) of what is left now is over.
+    /// A budget of this fraction (0 to 1) of the time left now.
     pub(super) fn part(&self, fraction: f64) -> Self {
         Self::new(self.left().mul_f64(fraction))
     }
 
-    /// Time not yet spent.
+    /// Remaining time.
     pub fn left(&self) -> Duration {
         self.span.saturating_sub(self.begin.elapsed())
     }
 
-    /// Whether all of it is spent.
+    /// True if the time is spent.
     pub fn is_spent(&self) -> bool {
         self.left().is_zero()
     }
 
-    /// `OverBudget` once it is spent.
+    /// Fails with `OverBudget` once the time is spent.
     pub(super) fn check(&self, measure: &'static str) -> Result<(), DiscrepancyError> {
         if self.is_spent() {
             let seconds = self.span.as_secs_f64();

@@ -2,7 +2,7 @@
 
 use super::PointSet;
 
-/// How far apart two points are.
+/// The distance between two points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Metric {
     /// Euclidean distance.
@@ -26,17 +26,16 @@ impl Metric {
     }
 }
 
-/// Least distance between two points of the set; `None` for a single point. The same point twice
-/// gives 0.
+/// Minimum distance between two points of the set; `None` for a single point.
 ///
-/// A sweep over the first coordinate looks no further than the least distance so far: about N^(3/2)
+/// A sweep over the first coordinate searches only up to the minimum distance so far: about N^(3/2)
 /// steps for even sets in two dimensions.
 pub(crate) fn minimum_distance(points: &PointSet, metric: Metric) -> Option<f64> {
     let mut sorted: Vec<&[f64]> = points.points().collect();
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     let mut least: Option<f64> = None;
     for (i, a) in sorted.iter().enumerate() {
-        // On the torus the first points come again after the last ones.
+        // On the torus the first points are repeated after the last ones.
         let again = match metric {
             Metric::Plain => &[],
             Metric::Torus => &sorted[..i],

@@ -4,16 +4,15 @@ use super::{Budget, DiscrepancyError, PointSet};
 
 const NAME: &str = "dispersion";
 
-/// Area of the largest axis-parallel box in the unit square that has no point inside (points on its
-/// border do not count).
+/// Area of the largest axis-parallel box in the unit square without a point in its interior.
 ///
-/// A largest box has a point in the middle of its left side, or one in the middle of its right side,
-/// or reaches from x = 0 to x = 1. In the first case the box grows to the right from that point, and each
-/// point that it meets cuts off the part above or below (Naamad, Lee & Hsu 1984, "On the maximum empty
-/// rectangle problem"). Cost: at most N² steps.
+/// A largest box has a point inside its left or right side, or extends from x = 0 to 1. In the
+/// first case it grows to the right from that point, and each point that it meets cuts off the part
+/// above or below (Naamad, Lee & Hsu 1984, "On the maximum empty rectangle problem"). Cost: at most
+/// N² steps.
 ///
 /// # Errors
-/// The time of the budget is spent first; points that are not pairs.
+/// The budget is spent first; points that are not pairs.
 pub(crate) fn largest_empty_box(
     points: &PointSet,
     budget: &Budget,
@@ -42,7 +41,7 @@ fn grow_all(by_x: &[[f64; 2]], budget: &Budget, largest: &mut f64) -> Result<(),
     Ok(())
 }
 
-/// Largest box with `seed` on its left side, if it is larger than what is known; points sorted by x.
+/// Area of the largest box with `seed` on its left side, at least `known`; points sorted by x.
 fn grow(seed: [f64; 2], right: &[[f64; 2]], known: f64) -> f64 {
     let [left, middle] = seed;
     let (mut bottom, mut top) = (0.0, 1.0);

@@ -1,8 +1,8 @@
-//! Why a point set, or one of its measures, is refused.
+//! Errors of point sets and measures.
 
 use thiserror::Error;
 
-/// Why a point set has no such measure.
+/// The reason why a point set is invalid or lacks a measure.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum DiscrepancyError {
     /// There is nothing to measure.
@@ -19,36 +19,36 @@ pub enum DiscrepancyError {
         /// Its coordinates.
         point: Vec<f64>,
     },
-    /// The coordinates do not make whole points.
+    /// The number of coordinates is not a multiple of the dimension.
     #[error("{count} coordinates do not make points of {dim} dimensions")]
     Ragged {
-        /// Coordinates there are.
+        /// Number of coordinates.
         count: usize,
-        /// Coordinates of a point; 0 is refused.
+        /// Coordinates per point; must not be 0.
         dim: usize,
     },
     /// A line of a file is not a point.
     #[error("line {line}: {reason}")]
     Line {
-        /// Number of the line, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong, and what to do.
+        /// The fault, and how to fix it.
         reason: String,
     },
     /// A prefix is longer than the set.
     #[error("prefix of {count} points asked for, but the set has only {available}")]
     PrefixTooLong {
-        /// Points asked for.
+        /// Requested points.
         count: usize,
-        /// Points there are.
+        /// Available points.
         available: usize,
     },
-    /// More dimensions are asked for than there are.
+    /// A dimension that the points do not have.
     #[error("dimension {dim} is asked for, but the points have {available}")]
     NoSuchDimension {
         /// Dimension, from 1.
         dim: usize,
-        /// Dimensions there are.
+        /// Available dimensions.
         available: usize,
     },
     /// The measure is not defined for such a set.
@@ -56,10 +56,10 @@ pub enum DiscrepancyError {
     NotDefined {
         /// Name of the measure.
         measure: &'static str,
-        /// What it needs and what the set is.
+        /// The requirement and the actual set.
         reason: String,
     },
-    /// The time was spent before there was a result.
+    /// The budget was spent before there was a result.
     #[error("{measure} was not finished within {seconds} s: allow more time or give fewer points")]
     OverBudget {
         /// Name of the measure.

@@ -2,15 +2,15 @@
 
 use super::{Budget, DiscrepancyError, PointSet};
 
-/// Largest difference between area and fraction of points over *all* axis-parallel boxes `[a, b)` in
-/// the unit square (Niederreiter 1992, definition 2.2).
+/// Largest difference between area and fraction of points over *all* axis-parallel boxes `[a, b)`
+/// in the unit square (Niederreiter 1992, definition 2.2).
 ///
-/// For each left side the right side sweeps over the points, whose y are kept in order; the best
-/// lower and upper sides for a given pair are found in one pass, as the greatest sum of consecutive
-/// terms is. Cost: N³/6 steps; 2,048 points take seconds.
+/// For each left side the right side sweeps over the points, whose y are kept sorted; the best
+/// lower and upper sides for a given pair are found in one pass, as a maximum sum of consecutive
+/// terms. Cost: N³/6 steps; 2,048 points take seconds.
 ///
 /// # Errors
-/// The time of the budget is spent first; points that are not pairs.
+/// The budget is spent first; points that are not pairs.
 pub fn extreme_2d(points: &PointSet, budget: &Budget) -> Result<f64, DiscrepancyError> {
     let pairs = points.pairs_for("extreme")?;
     let n = pairs.len() as f64;
@@ -55,7 +55,7 @@ fn most(by_x: &[[f64; 2]], left: f64, n: f64) -> f64 {
     worst
 }
 
-/// Largest `N·area - count` of open boxes with this left side: points beyond it only.
+/// Largest `N·area - count` of open boxes with this left side: only points beyond it count.
 fn fewest(by_x: &[[f64; 2]], left: f64, n: f64) -> f64 {
     let mut ys: Vec<f64> = Vec::with_capacity(by_x.len());
     let mut worst = 0.0f64;
@@ -71,7 +71,7 @@ fn fewest(by_x: &[[f64; 2]], left: f64, n: f64) -> f64 {
             } else {
                 rise
             };
-            // As a lower side it leaves out its own point too.
+            // As a lower side it excludes its own point too.
             let lower = upper - 1.0;
             least = if lower < least { lower } else { least };
         }

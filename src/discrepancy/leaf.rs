@@ -3,15 +3,14 @@
 //! In such a cell the count of a box is a sum over dimensions, and the volume is a product. So the
 //! extreme volume for every count is found dimension by dimension, as in a knapsack.
 
-/// Largest `count - scale·volume` of closed boxes in a cell, where the count is that of the cell's own
-/// points.
+/// Largest `count - scale·volume` of closed boxes in a cell, counting the cell's own points only.
 ///
-/// `low` has the lower corner; `values`, for each dimension, the sorted coordinates of the points
-/// that vary in it.
+/// `low` is the lower corner; `values` contains, for each dimension, the sorted coordinates of the
+/// points that vary in it.
 pub(super) fn most_points(low: &[f64], values: &[Vec<f64>], scale: f64, work: &mut Work) -> f64 {
     work.start(scale, f64::INFINITY);
     for (&low, values) in low.iter().zip(values) {
-        // With r points of this dimension the box reaches the r-th of them.
+        // With r points of this dimension the box extends to the r-th of them.
         work.extend(
             std::iter::once(low).chain(values.iter().copied()),
             values.len(),
@@ -26,7 +25,7 @@ pub(super) fn most_points(low: &[f64], values: &[Vec<f64>], scale: f64, work: &m
     differences.fold(f64::MIN, f64::max)
 }
 
-/// Largest `scale·volume - count` of open boxes in a cell; `high` has the upper corner.
+/// Largest `scale·volume - count` of open boxes in a cell; `high` is the upper corner.
 pub(super) fn fewest_points(high: &[f64], values: &[Vec<f64>], scale: f64, work: &mut Work) -> f64 {
     work.start(scale, f64::MIN);
     for (&high, values) in high.iter().zip(values) {
@@ -56,7 +55,7 @@ impl Work {
         self.none = none;
     }
 
-    /// One more dimension with `points` points: `sides` has the side for each count of them.
+    /// Adds a dimension with `points` points; `sides` contains the side for each count of them.
     fn extend(
         &mut self,
         sides: impl Iterator<Item = f64>,

@@ -1,5 +1,5 @@
-//! How evenly point sets fill the unit cube: exact star discrepancy and its companions. Usable on its
-//! own: it takes nothing of the other crates.
+//! How evenly point sets fill the unit cube: exact star discrepancy and related measures. Independent
+//! of the other crates.
 //!
 //! The star discrepancy of N points is the largest difference, over all boxes with one corner at
 //! the origin, between the volume of the box and the fraction of the points in it (Niederreiter
@@ -7,15 +7,15 @@
 //! coordinates and 1, where both counts matter: the *open* box `[0, y)` for boxes with too few
 //! points and the *closed* box `[0, y]` for boxes with too many.
 //!
-//! | what | how | cost |
+//! | measure | method | cost |
 //! |---|---|---|
 //! | star, 1-D | sorted points | N log N |
-//! | star, 2-D | `planar`: a tournament over y, its winners followed over the sweep in x | ~ N log N |
-//! | star, 3-D and up | `orthants`: orthants decomposed until counts are sums, cells that cannot win dropped | between N and N^(1+d/2) cells in practice |
+//! | star, 2-D | `planar`: a tournament over y, with the history of its winners over x | ~ N log N |
+//! | star, 3-D and up | `orthants`: orthants decomposed until counts are sums, hopeless cells dropped | between N and N^(1+d/2) cells in practice |
 //! | star, over budget | the same with a tolerance, `ascent` from below | the budget |
 //! | square means | [`quadratic`]: L2-star, centered, wrap-around, mixture, average | N² d |
 //!
-//! [`measure()`] does any of them by [`Measure`], under a [`Budget`] of time.
+//! [`measure()`] computes any [`Measure`] within a time [`Budget`].
 #![warn(missing_docs)]
 
 mod ascent;

@@ -5,7 +5,7 @@ use super::{
     largest_empty_box, minimum_distance, net_quality, quadratic, radial_spectrum, star,
 };
 
-/// What can be measured of a point set.
+/// A measure of a point set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
     /// Star discrepancy.
@@ -14,7 +14,7 @@ pub enum Measure {
     Extreme,
     /// A discrepancy in the mean square.
     Quadratic(Quadratic),
-    /// Least distance between two points.
+    /// Minimum distance between two points.
     Distance(Metric),
     /// Largest empty box in two dimensions.
     Dispersion,
@@ -28,10 +28,10 @@ pub enum Measure {
     Pairs,
 }
 
-/// What was measured.
+/// The result of a measure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// A value between two bounds that are equal if it is exact.
+    /// Two bounds, equal if the value is exact.
     Bracket(super::Bracket),
     /// One number.
     Number(f64),
@@ -39,21 +39,21 @@ pub enum Value {
     Square(f64),
     /// Quality of a net.
     Net(super::Net),
-    /// Shapes of intervals of volume 1/N, and those with one point in each interval.
+    /// Shapes of intervals of volume 1/N.
     Shapes {
-        /// All shapes.
+        /// Number of shapes.
         all: u64,
-        /// Shapes in which each interval has one point.
+        /// Number of shapes in which each interval has one point.
         even: u64,
     },
     /// Mean power at frequencies 1, 2, ….
     Spectrum(Vec<f64>),
-    /// Symmetric matrix by two dimensions; the diagonal has no value.
+    /// Symmetric matrix over pairs of dimensions; the diagonal is empty.
     Matrix(Vec<Vec<Option<f64>>>),
 }
 
-/// Every measure with its name on the command line and in results, and one line that says what it is; in the
-/// order of the documentation.
+/// Every measure with its name on the command line and in results, and a one-line description; in
+/// the order of the documentation.
 #[rustfmt::skip]
 const TABLE: [(Measure, &str, &str); 14] = [
     (Measure::Star, "star", "star discrepancy: largest error of a box at the origin; exact or bounds"),
@@ -84,7 +84,7 @@ impl Measure {
         all
     };
 
-    /// The measure of a name.
+    /// The measure of this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
     }
@@ -99,19 +99,19 @@ impl Measure {
         self.row().0
     }
 
-    /// One line that says what it is.
+    /// One-line description.
     pub fn description(self) -> &'static str {
         self.row().1
     }
 }
 
-/// Highest frequency of a spectrum: twice that of a square grid of as many points, at most this.
+/// Limit on a spectrum's highest frequency, otherwise twice that of an equal square grid.
 const HIGHEST_FREQUENCY: usize = 256;
 
 /// Measures a set of points within a budget.
 ///
 /// # Errors
-/// The measure is not defined for such a set, or was not finished in time; both say what to change.
+/// The measure is not defined for such a set, or did not finish; both suggest a change.
 pub fn measure(
     points: &PointSet,
     measure: Measure,

@@ -13,15 +13,16 @@ pub struct Net {
     pub m: u32,
 }
 
-/// The least t for which the points are a (t, m, d)-net in base 2 (Niederreiter 1992, definition 4.1).
+/// The smallest t for which the points are a (t, m, d)-net in base 2 (Niederreiter 1992, definition
+/// 4.1).
 ///
-/// An elementary interval is a box `Π [a_k 2^-e_k, (a_k + 1) 2^-e_k)`; the sets that hold for small
-/// volumes hold for larger ones, so the sums of exponents are tried from 1 on. Cost: N times the
-/// number of shapes.
+/// An elementary interval is a box `Π [a_k 2^-e_k, (a_k + 1) 2^-e_k)`; sets that are even for small
+/// volumes are even for larger ones, so the sums of exponents are tried from 1 on. Cost: N times
+/// the number of shapes.
 ///
 /// # Errors
-/// The number of points is no power of two; a coordinate is 1, which no interval has; the time
-/// of the budget is spent first.
+/// The number of points is no power of two; a coordinate is 1, which no interval contains; the
+/// budget is spent first.
 pub fn net_quality(points: &PointSet, budget: &Budget) -> Result<Net, DiscrepancyError> {
     let m = size_of_net(points, NAME)?;
     let mut counts = Vec::new();
@@ -39,8 +40,8 @@ pub fn net_quality(points: &PointSet, budget: &Budget) -> Result<Net, Discrepanc
     Ok(Net { t: 0, m })
 }
 
-/// Of all shapes of elementary intervals of volume 1/N: how many there are, and in how many every interval
-/// has exactly one point.
+/// The number of shapes of elementary intervals of volume 1/N, and the number of those in which
+/// every interval has exactly one point.
 ///
 /// # Errors
 /// As [`net_quality`].
@@ -75,13 +76,13 @@ fn size_of_net(points: &PointSet, measure: &'static str) -> Result<u32, Discrepa
     Ok(n.trailing_zeros())
 }
 
-/// Calls `visit` with all lists of `dim` exponents of a given sum until it gives false.
+/// Calls `visit` with all lists of `dim` exponents of a given sum until it returns false.
 fn each_shape(
     dim: usize,
     sum: u32,
     visit: &mut impl FnMut(&[u32]) -> Result<bool, DiscrepancyError>,
 ) -> Result<(), DiscrepancyError> {
-    // As digits of a counter, the first dimension fastest; the last takes what is left.
+    // As digits of a counter, the first dimension fastest; the last takes the remainder.
     let mut shape = vec![0; dim];
     shape[dim - 1] = sum;
     loop {
@@ -102,7 +103,7 @@ fn each_shape(
     }
 }
 
-/// Whether all intervals of a shape have the same number of the 2^m points.
+/// True if all intervals of a shape have the same number of the 2^m points.
 fn is_even(points: &PointSet, shape: &[u32], m: u32, counts: &mut Vec<u32>) -> bool {
     let sum: u32 = shape.iter().sum();
     counts.clear();
@@ -111,7 +112,7 @@ fn is_even(points: &PointSet, shape: &[u32], m: u32, counts: &mut Vec<u32>) -> b
         let cell = point.iter().zip(shape).fold(0, |cell, (&x, &e)| {
             cell << e | (x * f64::from(1u32 << e)) as usize
         });
-        // The number is right everywhere if no interval has too many.
+        // If no interval has too many, all have the right number.
         let left = &mut counts[cell];
         let free = *left > 0;
         *left = left.wrapping_sub(1);

@@ -1,28 +1,27 @@
-//! Exact star discrepancy in three dimensions and more: the space of orthants, decomposed.
+//! Exact star discrepancy in three and more dimensions: decomposition of the space of orthants.
 //!
-//! A box at the origin is its upper corner, and a point is the orthant of the corners whose boxes
-//! hold it. Dobkin, Eppstein & Mitchell (1996, "Computing the discrepancy with applications to
-//! supersampling patterns") cut the space of corners into cells so small that inside a cell every
-//! orthant is bounded in one dimension only; there the count is a sum over dimensions, and the
-//! greatest difference is found by dynamic programming ([`super::leaf`]).
+//! A box at the origin is identified with its upper corner, and a point with the orthant of the
+//! corners whose boxes contain it. Dobkin, Eppstein & Mitchell (1996, "Computing the discrepancy
+//! with applications to supersampling patterns") split the space of corners into cells so small
+//! that inside a cell every orthant is bounded in one dimension only; there the count is a sum over
+//! dimensions, and the largest difference is found by dynamic programming ([`super::leaf`]).
 //!
 //! Here the cells are made by halving, and each is bounded first. In a cell, a point that varies in
-//! several dimensions is counted at most when one of them allows it, and at least not at all; the
-//! volume lies between two sums of functions of one coordinate. So the bound is a sum of independent
-//! maxima, and off by terms of second order in the size of the cell: nearly all cells are dropped
+//! several dimensions counts at most if one of them allows it, and at least not at all; the volume
+//! lies between two sums of functions of one coordinate. So the bound is a sum of independent
+//! maxima, with an error of second order in the size of the cell: nearly all cells are dropped
 //! before they are small enough for dynamic programming.
 
 use super::leaf::{self, Work};
 use super::{Budget, PointSet};
 
-/// Most dimensions that the search takes.
 pub(super) const MAX_DIM: usize = 24;
 
-/// Cells of at most so many varying points, if each varies in one dimension, are solved at once.
+/// Cells with at most this many varying points are solved at once, if each varies in one dimension.
 const LEAF_POINTS: usize = 64;
 
-/// Raises `lower`, a lower bound of the star discrepancy, until the truth is at most `tolerance` above
-/// it; `None` if the budget is spent first or there are too many dimensions.
+/// Raises `lower`, a lower bound of the star discrepancy, until the true value is at most
+/// `tolerance` above it; `None` if the budget is spent first or there are too many dimensions.
 pub(super) fn search(
     points: &PointSet,
     lower: &mut f64,
@@ -76,29 +75,28 @@ struct Entry {
 struct Orthant<const D: usize> {
     low: [f64; D],
     high: [f64; D],
-    /// Parts of the search's lists: points that vary in a dimension, sorted by that coordinate.
+    /// Ranges of the search's lists: points that vary in a dimension, sorted by that coordinate.
     lists: [[usize; 2]; D],
     /// Points in the box of every corner of the cell.
     inside: f64,
-    /// Whether a box with too many or too few points can still be the worst.
+    /// True if a box with too many points, or one with too few, can still be the worst.
     many: bool,
     few: bool,
 }
 
-/// What a cell can reach at most, N times.
+/// Upper bounds for a cell, times N.
 struct Bound {
     many: f64,
     few: f64,
-    /// Whether each point varies in one dimension.
+    /// True if each point varies in one dimension.
     apart: bool,
 }
 
 struct Search<const D: usize> {
     n: f64,
-    /// Dimensions in which each point varies in the present cell, a bit each; [`OUT`] if it is in
-    /// no box of the cell.
+    /// Mask of each point's varying dimensions in the current cell; [`OUT`] if in no box of it.
     varying: Vec<u32>,
-    /// Sorted points by dimension; cells on the path of the search lie one after the other.
+    /// Sorted points by dimension; cells on the search path are consecutive.
     lists: [Vec<Entry>; D],
     best: f64,
     tolerance: f64,
@@ -133,14 +131,14 @@ impl<const D: usize> Search<D> {
         }
     }
 
-    /// Looks for worse boxes in a cell; `None` if the time is over.
+    /// Searches a cell for worse boxes; `None` if the time is spent.
     fn explore(&mut self, mut cell: Orthant<D>) -> Option<()> {
         self.cells += 1;
         if self.cells.is_multiple_of(256) && self.budget.is_spent() {
             return None;
         }
         let bound = self.bound(&cell);
-        // Bounds are sums of rounded terms; what they hide is a few units in the last place.
+        // Bounds are sums of rounded terms, with errors of a few units in the last place.
         let limit = self.best + self.tolerance + self.n * 4.0 * f64::EPSILON;
         cell.many &= bound.many > limit;
         cell.few &= bound.few > limit;
@@ -289,7 +287,7 @@ struct Plane<const D: usize> {
 }
 
 impl<const D: usize> Plane<D> {
-    /// A plane below the volume: the mean of the tangents at both corners, each of which is below it.
+    /// A plane below the volume: the mean of the tangents at both corners, which are below it.
     fn below(low: &[f64; D], high: &[f64; D], scale: f64) -> Self {
         let (at_low, to_low) = tangent(low);
         let (at_high, to_high) = tangent(high);
@@ -304,9 +302,9 @@ impl<const D: usize> Plane<D> {
         }
     }
 
-    /// A plane above the volume: the mean of two planes through both corners, one for the path along
-    /// the edges in the order of dimensions and one for that in the opposite order. The volume is
-    /// supermodular, so that every such plane is above it (Lovász 1983).
+    /// A plane above the volume: the mean of two planes through both corners, one for the path
+    /// along the edges in the order of dimensions and one for the opposite order. The volume is
+    /// supermodular, so every such plane is above it (Lovász 1983).
     fn above(low: &[f64; D], high: &[f64; D], scale: f64) -> Self {
         let (low_before, low_after) = partial_products(low);
         let (high_before, high_after) = partial_products(high);
@@ -320,7 +318,6 @@ impl<const D: usize> Plane<D> {
     }
 }
 
-/// Volume and its derivatives.
 fn tangent<const D: usize>(at: &[f64; D]) -> (f64, [f64; D]) {
     let (before, after) = partial_products(at);
     (
@@ -329,7 +326,7 @@ fn tangent<const D: usize>(at: &[f64; D]) -> (f64, [f64; D]) {
     )
 }
 
-/// Products of what comes before and after each factor.
+/// Products of the factors before and after each factor.
 fn partial_products<const D: usize>(factors: &[f64; D]) -> ([f64; D], [f64; D]) {
     let (mut before, mut after) = ([1.0; D], [1.0; D]);
     for d in 1..D {

@@ -1,15 +1,15 @@
-//! Exact star discrepancy in two dimensions: a kinetic tournament over y, run as a whole.
+//! Exact star discrepancy in two dimensions: a kinetic tournament over y, computed as a whole.
 //!
 //! Let a vertical line sweep over x. Of all closed boxes that end at it, the box of height y has
 //! `count(y) - N·x·y` points too many: a line in x, moved up by 1 whenever the sweep passes a point
-//! at or below y. A balanced tree over y plays a tournament for the highest line: a node knows
-//! its winner at every x, and a point passed in the left half of a node lifts all lines of its right
-//! half by the same 1. Where a kinetic segment tree would advance all nodes together with x, here each
-//! node makes the whole *history* of its winner from those of its halves, by one merge. All memory
-//! is read and written in order, and there are about N stretches in all nodes of one level.
+//! at or below y. A balanced tree over y plays a tournament for the highest line: a node knows its
+//! winner at every x, and a point passed in the left half of a node lifts all lines of its right
+//! half by the same 1. A kinetic segment tree would advance all nodes together with x; here each
+//! node computes the whole *history* of its winner from those of its halves, by one merge. All
+//! memory is read and written in order, and the nodes of one level have about N stretches in total.
 //!
-//! Boxes with too few points are the same tournament with the sweep run backwards: the line of the
-//! open box of height y is `N·x·y - count(y)`, and a point that the sweep leaves lifts it by 1.
+//! Boxes with too few points are the same tournament with a reversed sweep: the line of the open
+//! box of height y is `N·x·y - count(y)`, and a point that the sweep leaves lifts it by 1.
 
 /// A stretch of the sweep on which one line wins: from `start` to that of the next stretch.
 #[derive(Clone, Copy)]
@@ -18,7 +18,7 @@ struct Stretch {
     /// The line is `count - slope·x`.
     slope: f64,
     count: i32,
-    /// What the points of this half add to the lines of later halves.
+    /// Lift of the lines in later halves by the points of this half.
     lift: i32,
 }
 
@@ -31,14 +31,14 @@ impl Stretch {
 
 /// Largest difference between area and fraction of points over all boxes at the origin.
 ///
-/// Takes a non-empty set of points in the unit square; ties, duplicates, 0 and 1 are allowed.
+/// Needs a non-empty set of points in the unit square; ties, duplicates, 0 and 1 are allowed.
 pub(super) fn star(points: &[[f64; 2]]) -> f64 {
     let n = points.len() as f64;
     let mut by_y = points.to_vec();
     by_y.sort_unstable_by(|p, q| p[1].total_cmp(&q[1]));
 
-    // Of equal y, the last line has the right closed count and the first the right open count; the
-    // others stay below the truth.
+    // For equal y, the last line has the correct closed count and the first the correct open count;
+    // the others stay below the true value.
     let mut lines: Vec<Line> = by_y.iter().map(|&[x, y]| Line::new(x, n * y)).collect();
     let forwards = Tournament {
         sweep: [0.0, 1.0],
@@ -58,7 +58,7 @@ pub(super) fn star(points: &[[f64; 2]]) -> f64 {
     many.max(few) / n
 }
 
-/// A line and the place where the sweep meets its point.
+/// A line and the position where the sweep meets its point.
 struct Line {
     event: f64,
     slope: f64,
@@ -71,7 +71,7 @@ impl Line {
 }
 
 struct Tournament {
-    /// First and last place of the sweep.
+    /// First and last position of the sweep.
     sweep: [f64; 2],
     /// 1 if a point lifts its own line, 0 if only those after it.
     own: i32,
@@ -82,13 +82,13 @@ impl Tournament {
     fn height(&self, lines: &[Line]) -> f64 {
         let (mut history, mut other) = (Vec::new(), Vec::new());
         self.run(lines, &mut history, &mut other);
-        // All lines fall between two events, so that every stretch is highest where it starts.
+        // All lines fall between two events, so every stretch is highest at its start.
         history
             .iter()
             .fold(f64::MIN, |top, s| larger(top, s.at(s.start)))
     }
 
-    /// Appends the history of these lines to `out`; `other` has memory to use.
+    /// Appends the history of these lines to `out`; `other` is scratch memory.
     fn run(&self, lines: &[Line], out: &mut Vec<Stretch>, other: &mut Vec<Stretch>) {
         if let [line] = lines {
             let begin = out.len();
@@ -105,8 +105,8 @@ impl Tournament {
         other.truncate(begin);
     }
 
-    /// Plays the winners of a lower and an upper half against each other. Lower lines fall more
-    /// slowly: where neither half has an event, the lower winner can only overtake.
+    /// Merges the winners of a lower and an upper half. Lower lines fall more slowly: without an
+    /// event in either half, only the lower winner can overtake.
     fn merge(&self, lower: &[Stretch], upper: &[Stretch], out: &mut Vec<Stretch>) {
         let begin = out.len();
         let (mut i, mut j) = (0, 0);
@@ -175,8 +175,8 @@ impl Line {
     }
 }
 
-/// Adds a stretch to the history that begins at index `begin`: one of no length is replaced, one
-/// that goes on is not repeated.
+/// Adds a stretch to the history that begins at index `begin`: it replaces a stretch of zero
+/// length, and is dropped if it continues the last one.
 #[inline]
 fn push(history: &mut Vec<Stretch>, begin: usize, next: Stretch) {
     if let Some(last) = history[begin..].last_mut() {

@@ -1,8 +1,8 @@
-//! A set of points in the unit cube, and how it is read from text.
+//! Point sets in the unit cube, and their text format.
 
 use super::DiscrepancyError;
 
-/// N points in `[0, 1]^d`, N ≥ 1, d ≥ 1. Repeated points count as often as they are there.
+/// N points in `[0, 1]^d`, N ≥ 1, d ≥ 1. Repeated points count repeatedly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointSet {
     dim: usize,
@@ -10,10 +10,10 @@ pub struct PointSet {
 }
 
 impl PointSet {
-    /// Points of `dim` coordinates, one after the other.
+    /// Points of `dim` coordinates, stored consecutively.
     ///
     /// # Errors
-    /// No point, a part of a point, or a coordinate that is NaN or outside `[0, 1]`.
+    /// No point, an incomplete point, or a coordinate that is NaN or outside `[0, 1]`.
     pub fn new(dim: usize, coordinates: Vec<f64>) -> Result<Self, DiscrepancyError> {
         if dim == 0 || !coordinates.len().is_multiple_of(dim) {
             let count = coordinates.len();
@@ -40,14 +40,14 @@ impl PointSet {
         Self::new(D, points.as_flattened().to_vec())
     }
 
-    /// Reads a point a line, coordinates parted by blanks, commas or tabs. Empty lines are passed
-    /// over, and so is the rest of a line after `#`.
+    /// Parses one point per line, with coordinates separated by blanks, commas or tabs. Empty lines
+    /// are skipped, and so is the rest of a line after `#`.
     ///
     /// # Errors
-    /// [`DiscrepancyError::Line`] names the first line that is not a point of as many coordinates as
+    /// [`DiscrepancyError::Line`] for the first line that is not a point of as many coordinates as
     /// those before it, all in `[0, 1]`; [`DiscrepancyError::Empty`] if there is no point.
     pub fn parse(text: &str) -> Result<Self, DiscrepancyError> {
-        // Lines end as on any machine, and some editors write a byte order mark.
+        // Accepts all line endings, and the byte order mark of some editors.
         let text = text.trim_start_matches('\u{feff}');
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
         let mut dim = 0;
@@ -95,12 +95,12 @@ impl PointSet {
         self.coordinates.chunks_exact(self.dim)
     }
 
-    /// One coordinate of all points, dimensions counted from 0.
+    /// One coordinate of all points; dimensions count from 0.
     pub(super) fn column(&self, dim: usize) -> Vec<f64> {
         self.points().map(|p| p[dim]).collect()
     }
 
-    /// The set of the given coordinates of all points, dimensions counted from 0.
+    /// The projection of all points to these dimensions, which count from 0.
     ///
     /// # Errors
     /// A dimension that the points do not have.
@@ -128,7 +128,8 @@ impl PointSet {
     }
 }
 
-/// Other white space may be meant as the end of a line, and joined lines are points of more coordinates: such a word is no number.
+/// Other white space may be meant as a line end, and joining lines would change the dimension: such
+/// a word is not a number.
 fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split([' ', '\t', ',']).filter(|word| !word.is_empty())
 }
@@ -161,7 +162,7 @@ mod tests {
             let other = format!("\u{feff}{}", text.replace('\n', end));
             assert_eq!(PointSet::parse(&other), expected, "{end:?}");
         }
-        // What is neither a gap nor the end of a line must not join two points.
+        // A character that is neither a gap nor a line end must not join two points.
         for odd in ["\u{b}", "\u{c}", "\u{85}", "\u{2028}", "\u{2029}", ";"] {
             let joined = format!("0.25 0.5{odd}1 0\n");
             let found = PointSet::parse(&joined);

@@ -6,9 +6,9 @@
 //! D² = m^d − 2/N Σ_i Π_k h(x_ik) + 1/N² Σ_i Σ_j Π_k K(x_ik, x_jk),   h = ∫ K dy,   m = ∫ h dx
 //! ```
 //!
-//! Its terms are near 1 and cancel to about N⁻². So N² D² is summed, whose weights are whole numbers; each product
-//! comes with its rounding error, and sums are compensated. With coordinates of 24 bits or fewer the factors
-//! themselves are exact.
+//! Its terms are near 1 and cancel to about N⁻². So N² D² is summed, with integer weights; each
+//! product carries its rounding error, and sums are compensated. With coordinates of at most 24
+//! bits the factors themselves are exact.
 
 use super::sum::{LANES, Sum};
 use super::{Budget, DiscrepancyError, Measure, PointSet};
@@ -18,24 +18,23 @@ use super::{Budget, DiscrepancyError, Measure, PointSet};
 pub enum Quadratic {
     /// Boxes `[0, y)`: the star discrepancy's mean square (Warnock 1972).
     L2Star,
-    /// Boxes that reach from y to the nearest corner of the cube (Hickernell 1998, eq. 4.7).
+    /// Boxes from y to the nearest corner of the cube (Hickernell 1998, eq. 4.7).
     Centered,
     /// Boxes on the torus (Hickernell 1998, "Lattice rules: how well do they measure up?", eq. 4.17).
     WrapAround,
-    /// Between centered and wrap-around (Zhou, Fang & Ning 2013, "Mixture discrepancy for
-    /// quasi-random point sets").
+    /// Mixture (Zhou, Fang & Ning 2013, "Mixture discrepancy for quasi-random point sets").
     Mixture,
     /// Root of the mean square of L2-star over all 2^d reflections of the origin (Clément, Kirk, Owen
     /// & Rusch 2025, "On the optimization of discrepancy measures", arXiv 2508.04926).
     Average,
 }
 
-/// Squared discrepancy of a set of points, at least 0; the root has its unit.
+/// Squared discrepancy of a set of points, at least 0.
 ///
 /// Cost: N² d / 2 kernels.
 ///
 /// # Errors
-/// The time of the budget is spent first.
+/// The budget is spent first.
 pub fn quadratic(
     points: &PointSet,
     kind: Quadratic,
@@ -50,8 +49,8 @@ pub fn quadratic(
     }
 }
 
-/// One factor of a kernel, scaled so that all its constants are short binary fractions: a rounded 4/3
-/// would be wrong in the same direction in every term. `z` is `|x - 1/2|`, given so that it is
+/// One factor of a kernel, scaled so that all its constants are short binary fractions: a rounded
+/// 4/3 would be wrong in the same direction in every term. `z` is `|x - 1/2|`, passed so that it is
 /// computed once.
 trait Kernel {
     const KIND: Quadratic;
@@ -188,8 +187,8 @@ fn square<K: Kernel>(
     Ok(square.max(0.0))
 }
 
-/// A product of factors and its rounding error. The errors of coordinates that are multiples of the same power of
-/// two have a common sign, and would add up.
+/// A product of factors and its rounding error. The errors of coordinates that are multiples of the
+/// same power of two have a common sign, and would add up.
 fn accurate_product(factors: impl Iterator<Item = f64>) -> [f64; 2] {
     factors.fold([1.0, 0.0], |[product, error], factor| {
         let [next, lost] = exact_product(product, factor);
@@ -197,8 +196,8 @@ fn accurate_product(factors: impl Iterator<Item = f64>) -> [f64; 2] {
     })
 }
 
-/// A product and its rounding error (Dekker 1971, with Veltkamp's halves): what a fused multiplication gives too, but
-/// most processors that this is compiled for are not known to have one, and then it is a call.
+/// A product and its rounding error (Dekker 1971, with Veltkamp's splitting). A fused multiply-add
+/// gives the same, but is a slow function call on the baseline targets of most builds.
 #[inline]
 fn exact_product(a: f64, b: f64) -> [f64; 2] {
     let product = a * b;
@@ -215,7 +214,7 @@ fn halves(x: f64) -> [f64; 2] {
     [high, x - high]
 }
 
-/// One coordinate of all points and its distance from 1/2.
+/// One coordinate of all points, and its distance from 1/2.
 struct Column {
     x: Vec<f64>,
     z: Vec<f64>,

@@ -15,7 +15,7 @@ pub struct Periodogram {
 }
 
 impl Periodogram {
-    /// Power `|Σ_i exp(−2πi k·x_i)|² / N` at frequency k; N at 0, where there is nothing to see.
+    /// Power `|Σ_i exp(−2πi k·x_i)|² / N` at frequency k; N at 0, which is meaningless.
     ///
     /// # Panics
     /// A component beyond the highest.
@@ -36,7 +36,7 @@ impl Periodogram {
             let (u, v) = (index / columns, index % columns);
             let radius = (u as f64).hypot(v as f64 - self.highest as f64).round() as usize;
             if radius <= self.highest {
-                // Those with u = 0 are in the table with their opposites.
+                // Frequencies with u = 0 are in the table with their opposites.
                 let times = if u == 0 { 0.5 } else { 1.0 };
                 power[radius] += times * value;
                 weight[radius] += times;
@@ -47,12 +47,12 @@ impl Periodogram {
     }
 }
 
-/// Power at all integer frequencies whose components are at most `highest`.
+/// Power at all integer frequencies with components up to `highest`.
 ///
-/// Cost: 2·highest²·N multiplications of complex numbers.
+/// Cost: 2·highest²·N complex multiplications.
 ///
 /// # Errors
-/// The time of the budget is spent first; points that are not pairs.
+/// The budget is spent first; points that are not pairs.
 pub fn periodogram(
     points: &PointSet,
     highest: usize,
@@ -96,8 +96,7 @@ pub fn radial_spectrum(
     Ok(periodogram(points, highest, budget)?.radial())
 }
 
-/// `exp(−2πi k x)` for each k: the angle is reduced first, so that high frequencies are as accurate
-/// as low ones.
+/// `exp(−2πi k x)` for each k, with a reduced angle for equal accuracy at all frequencies.
 fn waves(out: &mut Vec<[f64; 2]>, x: f64, frequencies: std::ops::RangeInclusive<i32>) {
     out.clear();
     out.extend(frequencies.map(|k| {

@@ -1,18 +1,18 @@
-//! Star discrepancy: which method for which dimension, and what is certain if time runs out.
+//! Star discrepancy: the method for each dimension, and bounds if time runs out.
 
 use super::{Budget, DiscrepancyError, PointSet, ascent, orthants, planar};
 
-/// A star discrepancy, or an interval that it is certain to lie in.
+/// A star discrepancy, or proven bounds of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bracket {
-    /// A difference that a box really has.
+    /// The difference of an actual box.
     pub lower: f64,
-    /// No box has a larger one.
+    /// Bound of the differences of all boxes.
     pub upper: f64,
 }
 
 impl Bracket {
-    /// The value, if it is known: both ends are equal.
+    /// The value, if known: both bounds are equal.
     pub fn value(&self) -> Option<f64> {
         (self.lower == self.upper).then_some(self.lower)
     }
@@ -27,7 +27,7 @@ impl Bracket {
 
 /// Star discrepancy D* of a set of points of any dimension.
 ///
-/// Exact in one and two dimensions, whatever the budget. From three on it is exact if the search ends
+/// Exact in one and two dimensions, for any budget. From three on it is exact if the search ends
 /// within the budget; if not, the ends of the bracket are proven bounds. Exact means: up to a few
 /// units in the last place of 1, as counts are integers and volumes are products of coordinates.
 pub fn star(points: &PointSet, budget: &Budget) -> Bracket {
@@ -47,7 +47,7 @@ pub fn star(points: &PointSet, budget: &Budget) -> Bracket {
 ///
 /// ```
 /// # use raystone_discrepancy::star_2d;
-/// // One point in the middle: the closed box up to it holds everything on a quarter of the area.
+/// // One point in the middle: the closed box up to it contains everything in a quarter of the area.
 /// assert_eq!(star_2d(&[[0.5, 0.5]])?, 0.75);
 /// # Ok::<(), raystone_discrepancy::DiscrepancyError>(())
 /// ```
@@ -77,8 +77,8 @@ pub fn star_2d_prefixes(
     counts.iter().map(prefix).collect()
 }
 
-/// One dimension: `1/(2N) + max |x_i - (2i - 1)/(2N)|` over sorted points (Niederreiter 1992, theorem
-/// 2.6), as two differences without the halves.
+/// One dimension: `1/(2N) + max |x_i - (2i - 1)/(2N)|` over sorted points (Niederreiter 1992,
+/// theorem 2.6), as two differences without the halves.
 fn linear(mut points: Vec<f64>) -> f64 {
     points.sort_unstable_by(f64::total_cmp);
     let n = points.len() as f64;
@@ -86,14 +86,14 @@ fn linear(mut points: Vec<f64>) -> f64 {
     points.iter().enumerate().map(worst).fold(0.0, f64::max)
 }
 
-/// Tolerance of the first search and factor from one to the next.
+/// Tolerance of the first search, and factor from one to the next.
 const FIRST_TOLERANCE: f64 = 0.25;
 const TIGHTER: f64 = 0.5;
 
-/// Searches that leave no box unseen which is worse than the best known by more than a tolerance, with
-/// less and less tolerance, until none is left or the time is spent. Each costs several times the one
-/// before, so that the last dominates; one that takes little of the budget is followed by the
-/// exact one.
+/// Searches with decreasing tolerance, each of which misses no box that is worse than the best
+/// known one by more than its tolerance, until the tolerance is 0 or the time is spent. Each costs
+/// several times the one before, so the last dominates; a search that takes little of the budget is
+/// followed by the exact one.
 fn spatial(points: &PointSet, budget: &Budget) -> Bracket {
     let mut lower = ascent::ascend(points, 1, &budget.part(0.1));
     let mut upper = 1.0f64;

@@ -1,10 +1,10 @@
-//! Sums that keep what plain ones lose.
+//! Compensated sums.
 
-/// Additions that go on at a time.
+/// Number of independent additions.
 pub(super) const LANES: usize = 8;
 
-/// A sum with the rounding errors of its additions in a second number (Neumaier's variant of Kahan's
-/// sum, with Knuth's error-free addition), in independent lanes.
+/// A sum with the rounding errors of its additions in a second number (Neumaier's variant of
+/// Kahan's sum, with Knuth's error-free addition), in independent lanes.
 #[derive(Clone, Copy)]
 pub(super) struct Sum {
     total: [f64; LANES],
@@ -31,14 +31,13 @@ impl Sum {
         }
     }
 
-    /// Adds one number.
     pub(crate) fn add_one(&mut self, term: f64) {
         let mut terms = [0.0; LANES];
         terms[0] = term;
         self.add(&terms);
     }
 
-    /// The sum of all lanes in two parts: rounded, and what rounding left out.
+    /// The sum of all lanes in two parts: the rounded sum, and the rounding error.
     pub(crate) fn parts(&self) -> [f64; 2] {
         let mut all = Self::new();
         for part in self.total.iter().chain(&self.error) {

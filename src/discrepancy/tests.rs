@@ -1,8 +1,7 @@
-//! The two searches behind a star discrepancy whose time is over; all else is in `tests/discrepancy`.
+//! The two searches behind a star discrepancy that runs out of time; see also `tests/discrepancy`.
 
 use super::*;
 
-/// Time enough for any small set.
 fn ample() -> Budget {
     Budget::seconds(600.0)
 }

@@ -7,15 +7,16 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Which adapter to use.
+/// The adapter to use.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// Discrete before integrated before virtual before software; Vulkan before GL.
+    /// The best: discrete before integrated before virtual before software; Vulkan before GL.
     #[default]
     Best,
-    /// Position in the list of `raystone list`.
+    /// Index in the list of `raystone list`.
     Index(usize),
-    /// Part of the adapter's name, upper or lower case, or its place on the PCI bus, as `0000:65:00.0` or a part of it with a colon.
+    /// Part of the adapter's name, case-insensitive, or its PCI bus address, as `0000:65:00.0` or a
+    /// part of it with a colon.
     Name(String),
 }
 
@@ -32,17 +33,17 @@ impl std::str::FromStr for AdapterChoice {
 /// One adapter, for lists.
 #[derive(Debug, Clone)]
 pub struct AdapterSummary {
-    /// Position in the list.
+    /// Index in the list.
     pub index: usize,
-    /// What wgpu says of it.
+    /// Adapter information from wgpu.
     pub info: wgpu::AdapterInfo,
-    /// What it can do at most.
+    /// Maximum limits.
     pub limits: wgpu::Limits,
-    /// Whether it has GPU timestamps.
+    /// True if it has GPU timestamps.
     pub timestamps: bool,
 }
 
-/// An open device with everything kernels need; a clone is the same device.
+/// An open device and its properties; a clone refers to the same device.
 #[derive(Clone)]
 pub struct Gpu {
     /// The device.
@@ -55,8 +56,8 @@ pub struct Gpu {
     pub limits: wgpu::Limits,
     /// Nanoseconds per timestamp tick; `None` where there are no timestamps.
     pub timestamp_period: Option<f32>,
-    /// Turns that the loops of an invocation may take in all: on a driver that ends them in silence
-    /// beyond that. Kernels then check that it did not happen.
+    /// Total loop iterations per invocation after which the driver silently ends loops, if it does.
+    /// Kernels then check that it did not happen.
     pub loop_limit: Option<u32>,
     /// Kernel sources.
     pub kernels: KernelLibrary,
@@ -76,7 +77,6 @@ fn instance(backends: wgpu::Backends) -> wgpu::Instance {
     })
 }
 
-/// Rank of an adapter, best first.
 fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
     let device = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -88,16 +88,17 @@ fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
     (device, u8::from(info.backend == wgpu::Backend::Gl))
 }
 
-/// Every adapter with compute shaders, best first. OpenGL is looked for only where nothing else
-/// answers, or `WGPU_BACKEND` asks for it: merely loading it makes some drivers print.
+/// Every adapter with compute shaders, best first. OpenGL is tried only if nothing else answers, or
+/// `WGPU_BACKEND` asks for it: merely loading it makes some drivers print.
 fn enumerate() -> Vec<wgpu::Adapter> {
     match wgpu::Backends::from_env() {
         Some(asked) => enumerate_among(asked),
         None => {
             let found = enumerate_among(wgpu::Backends::all() - wgpu::Backends::GL);
-            match found.is_empty() {
-                true => enumerate_among(wgpu::Backends::GL),
-                false => found,
+            if found.is_empty() {
+                enumerate_among(wgpu::Backends::GL)
+            } else {
+                found
             }
         }
     }
@@ -114,7 +115,7 @@ fn enumerate_among(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     found
 }
 
-/// Every adapter with compute shaders, best first; those of OpenGL only where there are no others.
+/// Every adapter with compute shaders, best first; OpenGL only if there are no others.
 /// `WGPU_BACKEND` narrows the search.
 pub fn adapters() -> Vec<AdapterSummary> {
     enumerate()
@@ -166,8 +167,8 @@ fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Ada
     }
 }
 
-/// WebGPU's defaults, and of the adapter's offer only larger buffers, more of them (for arrays in several
-/// parts) and more storage textures (for arrays that are read as such): kernels stay portable.
+/// WebGPU's defaults, with the adapter's offer only for larger buffers, more of them (for arrays in
+/// several parts) and more storage textures (for arrays read as such): kernels stay portable.
 fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
     wgpu::Limits {
         max_buffer_size: offer.max_buffer_size,
@@ -178,7 +179,7 @@ fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
     }
 }
 
-/// A device of its own, for what kernels of this crate cannot do: without players, pipelines and checks.
+/// A separate device for uses outside this crate, without players, pipelines and checks.
 pub struct RawDevice {
     /// The device.
     pub device: wgpu::Device,
@@ -190,7 +191,7 @@ pub struct RawDevice {
 }
 
 impl RawDevice {
-    /// Waits for all that was submitted.
+    /// Waits for all submitted work.
     ///
     /// # Errors
     /// The driver has complained, or does not finish.
@@ -208,7 +209,7 @@ impl RawDevice {
     }
 }
 
-/// Whether the chosen adapter is a software rasteriser; it is not opened.
+/// True if the chosen adapter is a software rasteriser; it is not opened.
 ///
 /// # Errors
 /// No adapter, or no such adapter.
@@ -244,7 +245,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
             *slot = Some(format!("{reason:?}: {text}"));
         }
     });
-    // Validation errors outside a scope are ours to report at the next wait, not to panic on.
+    // Validation errors outside a scope are reported at the next wait, instead of panicking.
     let flag = Arc::clone(&lost);
     device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
         if let Ok(mut slot) = flag.lock() {
@@ -273,8 +274,8 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
 }
 
 impl Gpu {
-    /// The same device with other kernels: buffers may be bound by both, and what composes to the same
-    /// text is compiled once.
+    /// The same device with other kernels: both can bind the same buffers, and kernels that compose
+    /// to the same text are compiled once.
     #[must_use]
     pub fn with_kernels(&self, kernels: KernelLibrary) -> Self {
         Self {
@@ -283,8 +284,9 @@ impl Gpu {
         }
     }
 
-    /// The same device that compiles every kernel so many times, and each library of kernels for itself also where texts are equal:
-    /// what one compilation of a text has by chance over another is then part of what is measured.
+    /// The same device, but it compiles every kernel this many times, and each kernel library
+    /// separately even for equal texts: measurements then include the random differences between
+    /// compilations of the same text.
     #[must_use]
     pub fn compiled_apart(&self, compilations: usize) -> Self {
         Self {
@@ -293,22 +295,22 @@ impl Gpu {
         }
     }
 
-    /// How often it compiles every kernel.
+    /// Number of compilations of every kernel.
     pub fn compilations(&self) -> usize {
         self.compilations
     }
 
-    /// Takes the compilation whose turn it is in this round, for all that is played on this device from now on.
+    /// Selects the compilation for this round, for everything played on this device from now on.
     pub fn take_turn(&self, round: usize) {
         self.turn.store(round, Ordering::Relaxed);
     }
 
-    /// Which compilation is played, from 0.
+    /// Index of the selected compilation, from 0.
     pub(super) fn turn(&self) -> usize {
         self.turn.load(Ordering::Relaxed) % self.compilations
     }
 
-    /// Another device on the same adapter with these features of wgpu, which may be experimental.
+    /// Another device on the same adapter with these wgpu features, which may be experimental.
     ///
     /// # Errors
     /// The adapter lacks them, or gives no second device.
@@ -325,7 +327,7 @@ impl Gpu {
             return Err(refused(format!("it lacks {features:?}")));
         }
         let limits = adapter.limits();
-        // SAFETY: what is experimental is asked for by name, and used as wgpu says.
+        // SAFETY: experimental features are requested by name, and used as wgpu documents.
         let experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("raystone, beside"),
@@ -352,24 +354,24 @@ impl Gpu {
         })
     }
 
-    /// Whether there are GPU timestamps.
+    /// True if there are GPU timestamps.
     pub fn has_clock(&self) -> bool {
         self.timestamp_period.is_some()
     }
 
-    /// Whether the adapter is a software rasteriser.
+    /// True if the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether kernels may vote and shuffle within subgroups. How large those are is not for kernels to assume.
+    /// True if kernels may vote and shuffle within subgroups, whose size they must not assume.
     pub(crate) fn has_subgroups(&self) -> bool {
         self.device.features().contains(wgpu::Features::SUBGROUP)
     }
 
     /// The error that made the device unusable, if any.
     pub fn lost(&self) -> Option<String> {
-        // The driver tells of a loss only when it is polled; what else it says is told elsewhere.
+        // The driver reports a loss only when polled; its other messages are reported elsewhere.
         let _ = self.device.poll(wgpu::PollType::Poll);
         self.lost.lock().ok().and_then(|slot| slot.clone())
     }

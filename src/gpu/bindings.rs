@@ -1,4 +1,4 @@
-//! What kernels bind: buffers and uniform values by the names that kernels give them.
+//! Kernel bindings: buffers and uniform values by their kernel variable names.
 
 use super::GpuError;
 use super::adapter::Gpu;
@@ -11,26 +11,25 @@ use std::sync::{Arc, OnceLock};
 
 const TEXEL_BYTES: u64 = 16;
 
-/// Parts that an array may have at most; kernels declare as many.
+/// Maximum parts of an array; kernels declare as many.
 pub(crate) const MAX_PARTS: usize = 4;
 
-/// A storage buffer: one that the caller keeps, or one of the player's own.
+/// A storage buffer: the caller's, or the player's own.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Storage {
     /// The caller's.
     Own(wgpu::Buffer),
-    /// One that the [`super::Player`] makes when it is first asked for, and lends out again under the same
-    /// name. What it holds at first is unspecified.
+    /// One that the [`super::Player`] creates on first use and reuses by name, content unspecified.
     Scratch {
-        /// Its name, which all recordings of a player share.
+        /// Its name, shared by all recordings of a player.
         name: String,
-        /// Bytes that are needed; it may have more.
+        /// Required bytes; it may be larger.
         bytes: u64,
     },
 }
 
 impl Storage {
-    /// A buffer of the player's.
+    /// A scratch buffer of the player.
     pub fn scratch(name: &str, bytes: u64) -> Self {
         Self::Scratch {
             name: name.to_owned(),
@@ -51,25 +50,24 @@ impl From<&Storage> for Storage {
     }
 }
 
-/// A storage buffer, and its copy in a texture once a kernel asked for that.
+/// A storage buffer, and its texture copy once a kernel has requested one.
 #[derive(Clone)]
 struct Array {
     storage: Storage,
     texels: Arc<OnceLock<wgpu::TextureView>>,
 }
 
-/// Buffers and uniform values by the names that kernels give them.
+/// Buffers and uniform values by their kernel variable names.
 #[derive(Default, Clone)]
 pub struct Bindings {
     buffers: BTreeMap<String, Array>,
     pub(super) uniforms: BTreeMap<String, UniformValues>,
-    /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
+    /// Arrays in several parts: number of parts, and `vec4`s in all but the last.
     parts: BTreeMap<String, (usize, u32)>,
-    /// Features of kernels that what is bound is there for.
+    /// Kernel features required by the bound resources.
     features: BTreeSet<&'static str>,
 }
 
-/// What a binding of a kernel is bound to.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Resource {
     Buffer(wgpu::Buffer),
@@ -86,14 +84,14 @@ impl Resource {
 }
 
 impl Bindings {
-    /// Nothing bound.
+    /// Creates empty bindings.
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Binds a storage buffer to the kernel variable `name`. A kernel that declares the variable as
-    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when it
-    /// is first bound: the buffer must have its content by then, and must keep it.
+    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when
+    /// it is first bound: the buffer must have its content by then, and must not change afterwards.
     pub fn buffer(&mut self, name: &str, storage: impl Into<Storage>) -> &mut Self {
         let array = Array {
             storage: storage.into(),
@@ -103,12 +101,11 @@ impl Bindings {
         self
     }
 
-    /// What is bound to the kernel variable `name`.
+    /// The buffer bound to the kernel variable `name`.
     pub fn storage(&self, name: &str) -> Option<&Storage> {
         self.buffers.get(name).map(|array| &array.storage)
     }
 
-    /// Every buffer.
     pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
         self.buffers.values().map(|array| &array.storage)
     }
@@ -119,8 +116,7 @@ impl Bindings {
         self
     }
 
-    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]): the kernel variables `name`,
-    /// `name_1`, …
+    /// Binds an array in parts (see [`Gpu::storage_parts`]) to the variables `name`, `name_1`, …
     pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
         for (index, buffer) in buffers.iter().enumerate() {
             self.buffer(&part_name(name, index), buffer);
@@ -131,14 +127,14 @@ impl Bindings {
         self
     }
 
-    /// Says that kernels which bind this have a feature.
+    /// Adds a feature to kernels that use these bindings.
     pub fn feature(&mut self, name: &'static str) -> &mut Self {
         self.features.insert(name);
         self
     }
 
-    /// `composition` with the features of what is bound, and with what arrays in several parts ask of kernels: the features
-    /// `name_1`, … and the constant `NAME_PART`.
+    /// `composition` with the features of the bound resources, and those of arrays in several
+    /// parts: the features `name_1`, … and the constant `NAME_PART`.
     #[must_use]
     pub fn compose(&self, mut composition: Composition) -> Composition {
         for name in &self.features {
@@ -153,7 +149,7 @@ impl Bindings {
         composition
     }
 
-    /// Everything of `other` on top of this.
+    /// These bindings, overridden by those of `other`.
     #[must_use]
     pub fn merged(&self, other: &Bindings) -> Bindings {
         let (mut out, other) = (self.clone(), other.clone());
@@ -164,7 +160,7 @@ impl Bindings {
         out
     }
 
-    /// What a storage binding of a kernel is bound to; `lend` finds scratch buffers.
+    /// The resource of a kernel's storage binding; `lend` finds scratch buffers.
     pub(super) fn resource<'a>(
         &self,
         gpu: &Gpu,
@@ -196,7 +192,6 @@ fn part_name(name: &str, index: usize) -> String {
     }
 }
 
-/// The copy of an array in a texture.
 fn texels_of(
     gpu: &Gpu,
     name: &str,

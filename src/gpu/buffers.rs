@@ -1,4 +1,4 @@
-//! Buffers with their content, and waiting.
+//! Buffers with content, and waiting.
 
 use super::GpuError;
 use super::adapter::Gpu;
@@ -6,15 +6,13 @@ use super::bindings::MAX_PARTS;
 use bytemuck::Pod;
 use std::time::Duration;
 
-/// Work that takes longer than this is given up: the driver hangs.
+/// Work that takes longer is given up: the driver hangs.
 pub(super) const PATIENCE: Duration = Duration::from_secs(120);
-/// How every storage buffer may be used.
 pub(super) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::INDIRECT)
     .union(wgpu::BufferUsages::COPY_SRC)
     .union(wgpu::BufferUsages::COPY_DST);
 
-/// Refuses what needs more bytes than `limit`.
 pub(super) fn check(name: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
     if needed > limit {
         return Err(GpuError::TooLarge {
@@ -30,14 +28,14 @@ impl Gpu {
     /// A storage buffer with this content, at least 16 bytes long.
     ///
     /// # Errors
-    /// It is larger than the adapter can bind, or the device is lost or out of memory.
+    /// It exceeds the adapter's binding limit, or the device is lost or out of memory.
     pub fn storage<T: Pod>(&self, name: &str, content: &[T]) -> Result<wgpu::Buffer, GpuError> {
         self.check_size(name, size_of_val(content) as u64)?;
         self.array(name, content)
     }
 
-    /// The same, but only as a kernel binds it decides whether it is too large: as a texture
-    /// ([`super::Bindings::buffer`]) it may be larger than a storage buffer.
+    /// The same without a check of the binding limit, which depends on the kernel: as a texture
+    /// ([`super::Bindings::buffer`]) an array may be larger than a storage buffer.
     ///
     /// # Errors
     /// It is larger than any buffer, or the device is lost or out of memory.
@@ -54,8 +52,9 @@ impl Gpu {
         self.filled(name, contents, STORAGE)
     }
 
-    /// Storage buffers that together hold an array of `vec4`, each as large as the adapter can bind,
-    /// and the number of `vec4`s in each but the last. Parts end between elements of 16 to 64 bytes.
+    /// Storage buffers that together hold an array of `vec4`, each as large as the adapter can
+    /// bind, and the number of `vec4`s in each but the last. Parts end between elements of 16 to 64
+    /// bytes.
     ///
     /// # Errors
     /// It needs more than `MAX_PARTS` parts, or the device is lost or out of memory.
@@ -64,7 +63,7 @@ impl Gpu {
         name: &str,
         words: &[u32],
     ) -> Result<(Vec<wgpu::Buffer>, u32), GpuError> {
-        // Three and four vec4s an element: triangles and nodes.
+        // Elements have three or four vec4s: triangles and nodes.
         const ALIGNMENT: u64 = 12;
         let limit = self.limits.max_storage_buffer_binding_size / 16;
         let vec4s = (limit / ALIGNMENT * ALIGNMENT).clamp(ALIGNMENT, 1 << 28);
@@ -85,7 +84,7 @@ impl Gpu {
         Ok((buffers?, vec4s as u32))
     }
 
-    /// A buffer with this content; wgpu's `create_buffer_init` panics where this fails.
+    /// A buffer with this content; wgpu's `create_buffer_init` panics on failure.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -117,7 +116,7 @@ impl Gpu {
     /// A zeroed storage buffer of `bytes` (rounded up to 16).
     ///
     /// # Errors
-    /// It is larger than the adapter can bind.
+    /// It exceeds the adapter's binding limit.
     pub fn zeroed(&self, name: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
         self.check_size(name, bytes)?;
         Ok(self.device.create_buffer(&wgpu::BufferDescriptor {

@@ -1,24 +1,24 @@
-//! What a piece of work took, by three clocks.
+//! The duration of work, by three clocks.
 
 use super::GpuError;
 use raystone_core::clock::Instant;
 
-/// How long something took.
+/// A duration.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Elapsed {
-    /// Milliseconds between the GPU timestamps around it; `None` where there are none.
+    /// Milliseconds between the GPU timestamps; `None` without timestamps.
     pub gpu_ms: Option<f64>,
-    /// Milliseconds by the wall clock from submission to completion.
+    /// Wall-clock milliseconds from submission to completion.
     pub wall_ms: f64,
-    /// Milliseconds that the processors spent on this process meanwhile, all threads together: on a software adapter what the
-    /// work costs, whatever else the machine does. `None` where there is no such clock.
+    /// CPU milliseconds of this process, all threads together: on a software adapter the cost of
+    /// the work, regardless of other load on the machine. `None` without such a clock.
     pub cpu_ms: Option<f64>,
-    /// Whether a clock ran backwards meanwhile, as those of some drivers and virtual machines do: then this is no measurement.
+    /// True if a clock ran backwards, as some drivers' do: the measurement is invalid.
     pub backwards: bool,
 }
 
 impl Elapsed {
-    /// What a sum begins with; `gpu`: there are timestamps.
+    /// The zero of a sum; `gpu` is true if there are timestamps.
     pub fn nothing(gpu: bool) -> Self {
         Self {
             gpu_ms: gpu.then_some(0.0),
@@ -28,18 +28,19 @@ impl Elapsed {
         }
     }
 
-    /// The same, if it is a measurement. A time by another clock would stand among those of this one.
+    /// Returns the duration if valid; falling back to another clock would mix incomparable times.
     ///
     /// # Errors
     /// A clock ran backwards.
     pub fn measured(self) -> Result<Self, GpuError> {
-        match self.backwards {
-            true => Err(GpuError::Clock),
-            false => Ok(self),
+        if self.backwards {
+            Err(GpuError::Clock)
+        } else {
+            Ok(self)
         }
     }
 
-    /// GPU time where there is one, wall time elsewhere.
+    /// GPU time if available, otherwise wall time.
     pub fn ms(&self) -> f64 {
         self.gpu_ms.unwrap_or(self.wall_ms)
     }
@@ -55,21 +56,21 @@ impl std::ops::AddAssign for Elapsed {
     }
 }
 
-/// The clocks of the host, from when it is made on.
+/// The clocks of the host, from its creation on.
 pub struct Stopwatch {
     start: Instant,
     cpu_ms: Option<f64>,
 }
 
 impl Stopwatch {
-    /// Begins now.
+    /// Starts now.
     pub fn start() -> Self {
         let cpu_ms = cpu_ms();
         let start = Instant::now();
         Self { start, cpu_ms }
     }
 
-    /// What has passed since.
+    /// The time since the start.
     pub fn elapsed(&self) -> Elapsed {
         let cpu_ms = cpu_ms().zip(self.cpu_ms).map(|(now, then)| now - then);
         Elapsed {
@@ -81,14 +82,12 @@ impl Stopwatch {
     }
 }
 
-/// Milliseconds of all processors that this process has used.
 #[cfg(unix)]
 fn cpu_ms() -> Option<f64> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Some(time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6)
 }
 
-/// There is none.
 #[cfg(not(unix))]
 fn cpu_ms() -> Option<f64> {
     None
@@ -105,7 +104,7 @@ mod tests {
         let slept = watch.elapsed();
         assert!(slept.wall_ms >= 30.0);
         let watch = Stopwatch::start();
-        // However long it takes a busy machine to get so far; other tests of this process only help.
+        // Independent of how long a busy machine takes; other tests of this process only help.
         let is_idle = || watch.elapsed().cpu_ms.is_some_and(|ms| ms <= 20.0);
         while is_idle() && watch.start.elapsed().as_secs() < 600 {}
         let worked = watch.elapsed();
@@ -114,7 +113,7 @@ mod tests {
         sum += worked;
         assert_eq!(sum, worked);
         assert_eq!(sum.measured().ok(), Some(worked));
-        // A part without a time leaves none of the sum.
+        // A part without a time leaves the sum without one.
         sum += Elapsed {
             backwards: true,
             ..worked

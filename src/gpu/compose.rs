@@ -1,7 +1,7 @@
 //! Kernel composition: WESL modules from `kernels/` joined into one WGSL text.
 //!
-//! A structure or sampler is swapped by mapping a *virtual module* (`package::active::accel`) to the
-//! chosen file; features switch `@if(...)` parts on; numbers that the structure decides become
+//! A structure or sampler is selected by mapping a *virtual module* (`package::active::accel`) to
+//! the chosen file; features enable `@if(...)` parts; numbers chosen by the structure become
 //! constants of the virtual module `package::active::constants`.
 
 use super::GpuError;
@@ -15,14 +15,14 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
 
-/// Kernel sources: those embedded in the program, with files of override folders on top.
+/// Kernel sources: the embedded ones, with the files of override folders on top.
 #[derive(Debug, Clone)]
 pub struct KernelLibrary {
-    /// Module path with slashes (`accel/bvh`) → where it came from and its text.
+    /// Module path with slashes (`accel/bvh`) → source file and text.
     files: BTreeMap<String, (PathBuf, String)>,
     /// Modules of override folders.
     overridden: BTreeSet<String>,
-    /// Modules of what was registered from outside.
+    /// Modules registered by other crates.
     registered: BTreeSet<String>,
     hash: String,
 }
@@ -43,12 +43,12 @@ impl Default for KernelLibrary {
     }
 }
 
-/// Deepest folder below an override folder, which ends circles of links.
+/// Maximum depth below an override folder, which ends link cycles.
 const DEEPEST_FOLDER: usize = 8;
 
 impl KernelLibrary {
     /// Adds every `*.wesl` file below `folder`, replacing embedded files of the same relative path.
-    /// Files and folders whose names begin with a dot are passed over.
+    /// Files and folders with names that begin with a dot are skipped.
     ///
     /// # Errors
     /// The folder or a file in it cannot be read, or it holds no kernel.
@@ -74,8 +74,7 @@ impl KernelLibrary {
         Ok(self.hashed())
     }
 
-    /// Adds modules that something registered from outside the program brings: their paths
-    /// (`integrator/mine`) and texts.
+    /// Adds the modules of an external item: their paths (`integrator/mine`) and texts.
     #[must_use]
     pub fn with_sources(mut self, sources: &[(&str, &str)]) -> Self {
         for (name, text) in sources {
@@ -96,31 +95,32 @@ impl KernelLibrary {
         self
     }
 
-    /// Modules that came from override folders, in alphabetical order.
+    /// Modules from override folders, in alphabetical order.
     pub fn overridden(&self) -> Vec<&str> {
         self.overridden.iter().map(String::as_str).collect()
     }
 
-    /// Whether a module of this name came from an override folder.
+    /// True if a module of this name comes from an override folder.
     pub fn overrides(&self, name: &str) -> bool {
         self.overridden.contains(name)
     }
 
-    /// Whether a module of this name is in the program.
+    /// True if a module of this name is embedded in the program.
     pub fn is_embedded(name: &str) -> bool {
         EMBEDDED.iter().any(|(known, _)| *known == name)
     }
 
-    /// BLAKE3 of the names and texts of all modules that are not the program's; empty without any.
+    /// BLAKE3 of the names and texts of all modules that are not embedded; empty without any.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// Checks what can be checked of override folders before a kernel is composed.
+    /// Checks override folders as far as possible before a kernel is composed.
     ///
     /// # Errors
-    /// A file that is no WESL, with its line, and a file that no kernel can be made with: it neither
-    /// replaces an embedded one, nor is it among `wanted`, nor does another file of the folders import it.
+    /// A file that is not valid WESL, with its line, or a file that no kernel can use: it neither
+    /// replaces an embedded one, nor is it among `wanted`, nor does another file of the folders
+    /// import it.
     pub fn check(&self, wanted: &[String]) -> Result<(), GpuError> {
         let mut imports = BTreeMap::new();
         for name in &self.overridden {
@@ -170,25 +170,25 @@ impl KernelLibrary {
         self.files.get(name).map(|(_, text)| text.as_str())
     }
 
-    /// The first 16 hexadecimal digits of BLAKE3 of a module's text; of nothing where there is no such module.
+    /// The first 16 hexadecimal digits of BLAKE3 of a module's text, empty if it is missing.
     pub fn text_hash(&self, name: &str) -> String {
         let text = self.text(name).unwrap_or_default();
         blake3::hash(text.as_bytes()).to_hex()[..16].to_owned()
     }
 
-    /// The name of a module, behind an `@` where it comes from an override folder.
+    /// The name of a module, prefixed with `@` if it comes from an override folder.
     pub fn marked(&self, name: &str) -> String {
-        match self.overrides(name) {
-            true => format!("@{name}"),
-            false => name.to_owned(),
+        if self.overrides(name) {
+            format!("@{name}")
+        } else {
+            name.to_owned()
         }
     }
 
     /// Composes one kernel.
     ///
     /// # Errors
-    /// A module is missing, does not parse, or the result is not valid WGSL; the message names the
-    /// source file and line.
+    /// A module is missing, does not parse, or gives invalid WGSL, with source file and line.
     pub fn compose(&self, composition: &Composition) -> Result<ComposedKernel, GpuError> {
         let composition = &composition.clone().completed();
         let mut resolver = VirtualResolver::new();
@@ -258,7 +258,7 @@ impl KernelLibrary {
     }
 }
 
-/// Finds the kernels below a folder, with their texts.
+/// Collects the kernels below a folder, with their texts.
 fn collect(
     folder: &Path,
     levels: usize,
@@ -290,7 +290,7 @@ fn collect(
     Ok(())
 }
 
-/// Whether the path of an import leads to this module or to something in it.
+/// True if an import path refers to this module or to an item in it.
 fn imports_it(path: &[String], module: &str) -> bool {
     let mut parts = path.iter();
     module
@@ -308,8 +308,8 @@ fn module_path(name: &str) -> Result<ModulePath, GpuError> {
         })
 }
 
-/// What takes the place of virtual modules that nobody chose, and constants that nobody set: the defaults
-/// of the registries above, whose tests compare.
+/// Defaults for virtual modules and constants that were not chosen: those of the registries of
+/// dependent crates, whose tests compare them.
 const DEFAULT_MODULES: [(&str, &str); 2] = [
     ("triangle", "accel/triangle/watertight"),
     ("offset", "integrator/offset/error_bound"),
@@ -320,23 +320,24 @@ const DEFAULT_CONSTANTS: [(&str, u32); 3] = [
     ("GROUP_HEIGHT", WORKGROUP_EDGE),
 ];
 
-/// What goes into one kernel.
+/// The contents of one kernel.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Composition {
-    /// Module that holds the entry point, for instance `integrator/trace_rays`.
+    /// Module with the entry point, for instance `integrator/trace_rays`.
     pub entry: String,
-    /// Virtual module name (`accel`, `sequence`, `decorrelation`) → module that takes its place.
+    /// Virtual module name (`accel`, `sequence`, `decorrelation`) → module that replaces it.
     pub active: BTreeMap<String, String>,
-    /// Features that are on.
+    /// Enabled features.
     pub features: BTreeSet<String>,
     /// Constants of `package::active::constants`.
     pub constants: BTreeMap<String, u32>,
-    /// Texts of modules that come with what is rendered: by path (`shading/bsdf/mine`). A module of the library goes before.
+    /// Texts of modules that belong to the rendered scene, by path (`shading/bsdf/mine`). Modules
+    /// of the library take precedence.
     pub brought: BTreeMap<String, String>,
 }
 
 impl Composition {
-    /// A kernel with this entry module and nothing else chosen.
+    /// A kernel with this entry module and no other choices.
     pub fn new(entry: &str) -> Self {
         Self {
             entry: entry.to_owned(),
@@ -344,14 +345,14 @@ impl Composition {
         }
     }
 
-    /// Puts `module` in the place of `package::active::<role>`.
+    /// Selects `module` for `package::active::<role>`.
     #[must_use]
     pub fn with(mut self, role: &str, module: &str) -> Self {
         self.active.insert(role.to_owned(), module.to_owned());
         self
     }
 
-    /// With the defaults where nobody chose how rays meet triangles and boxes, and leave surfaces.
+    /// Adds defaults for ray–triangle tests, ray–box tests and ray offsets that were not chosen.
     #[must_use]
     pub fn completed(mut self) -> Self {
         for (role, module) in DEFAULT_MODULES {
@@ -364,7 +365,7 @@ impl Composition {
         self
     }
 
-    /// The module behind a path (`package::accel::bvh`), with slashes; none for the virtual module of constants.
+    /// The module of a path (`package::accel::bvh`); `None` for the module of constants.
     fn module_of(&self, path: &str) -> Option<String> {
         let name = path.strip_prefix("package::")?.replace("::", "/");
         match name.strip_prefix("active/") {
@@ -374,7 +375,7 @@ impl Composition {
         }
     }
 
-    /// Switches a feature on.
+    /// Enables or disables a feature.
     #[must_use]
     pub fn feature(mut self, name: &str, on: bool) -> Self {
         if on {
@@ -383,7 +384,7 @@ impl Composition {
         self
     }
 
-    /// Brings a module along.
+    /// Adds a module.
     #[must_use]
     pub fn bringing(mut self, module: &str, text: impl Into<String>) -> Self {
         self.brought.insert(module.to_owned(), text.into());
@@ -400,14 +401,14 @@ impl Composition {
 
 /// A composed, validated kernel.
 pub struct ComposedKernel {
-    /// What it was made of.
+    /// Its composition.
     pub composition: Composition,
     /// Plain WGSL.
     pub wgsl: String,
     pub(super) module: naga::Module,
     pub(super) info: naga::valid::ModuleInfo,
     map: BasicSourceMap,
-    /// Names of the modules that it was made of, with slashes.
+    /// Names of its modules, with slashes.
     pub modules: Vec<String>,
 }
 
@@ -417,7 +418,7 @@ impl ComposedKernel {
         blake3::hash(self.wgsl.as_bytes()).to_hex().to_string()
     }
 
-    /// The name that the author gave to a global, without the composition's mangling.
+    /// The source name of a global, without the composition's mangling.
     pub(super) fn author_name<'a>(&'a self, mangled: &'a str) -> &'a str {
         self.map.get_decl(mangled).map_or(mangled, |(_, item)| item)
     }

@@ -1,9 +1,9 @@
-//! Kernel errors in terms of the author's file and line.
+//! Kernel errors with source file and line.
 //!
-//! naga reports positions in the composed text. Composition drops comments, cuts out features and
-//! renames, but moves the nodes of the syntax tree with the spans that they have in their files. The
-//! composed text is therefore parsed once more: what stands at the position there is the node of the
-//! same number in the composed tree, whose span leads to the source.
+//! naga reports positions in the composed text. Composition drops comments, removes disabled
+//! features and renames, but its syntax tree nodes have the spans of their source files. The
+//! composed text is therefore parsed again: the node at the reported position has the same number
+//! in the composed tree, whose span leads to the source.
 
 use super::GpuError;
 use std::collections::BTreeMap;
@@ -18,8 +18,8 @@ use wesl::{BasicSourceMap, CompileResult, ModulePath, SourceMap};
 
 type Paths = BTreeMap<String, PathBuf>;
 
-/// A WESL error as `file:line: message` and the excerpt that WESL shows; module paths become file
-/// names. `sources` are all files with their texts.
+/// A WESL error as `file:line: message` with WESL's excerpt; module paths become file names.
+/// `sources` are all files with their texts.
 pub(super) fn wesl_error<'a>(
     text: &str,
     paths: &Paths,
@@ -27,7 +27,7 @@ pub(super) fn wesl_error<'a>(
 ) -> String {
     let mut out = without_colours(text);
     let place = import_of_missing_module(&out, paths, sources);
-    // Longest first, so that `package::accel::bvh` does not eat part of `package::accel::bvh4`.
+    // Longest first, so that `package::accel::bvh` does not match part of `package::accel::bvh4`.
     let mut known: Vec<_> = paths.iter().collect();
     known.sort_by_key(|(module, _)| std::cmp::Reverse(module.len()));
     for (module, path) in known {
@@ -46,7 +46,7 @@ pub(super) fn wesl_error<'a>(
     }
 }
 
-/// `file:line` of the import that names a module which does not exist; WESL tells the file alone.
+/// `file:line` of the import of a missing module; WESL reports the file only.
 fn import_of_missing_module<'a>(
     text: &str,
     paths: &Paths,
@@ -65,15 +65,15 @@ fn import_of_missing_module<'a>(
     Some(format!("{}:{}", path.display(), line + 1))
 }
 
-/// The paths that a file's imports name, from the root of the package; what is imported stands last.
+/// The paths in a file's imports, from the root of the package, with the imported item last.
 ///
 /// # Errors
-/// The text is no WESL: file, line and what stands there.
+/// The text is not valid WESL: file, line and the text there.
 pub(super) fn imports(file: &Path, text: &str, module: &str) -> Result<Vec<Vec<String>>, String> {
     let unit = text.parse::<TranslationUnit>().map_err(|error| {
         let (line, offending) = line_at(text, error.span.range().start);
         let what = error.error.to_string();
-        // The parser lists every token that it would have taken.
+        // The parser lists every token it would have accepted.
         let what = what.split(", expected").next().unwrap_or_default();
         format!("{}:{line}: {what}\n    {offending}", file.display())
     })?;
@@ -108,7 +108,7 @@ fn leaves(base: Vec<String>, content: &ImportContent, paths: &mut Vec<Vec<String
     }
 }
 
-/// Text without terminal escape sequences, since it goes into records too.
+/// Text without terminal escape sequences, since it is also stored in records.
 fn without_colours(text: &str) -> String {
     let mut parts = text.split('\u{1b}');
     let first = parts.next().unwrap_or_default().to_owned();
@@ -117,20 +117,18 @@ fn without_colours(text: &str) -> String {
     })
 }
 
-/// A composed kernel and what leads from it to its sources.
+/// A composed kernel and the map back to its sources.
 pub(super) struct Composed<'a> {
-    /// The text.
     pub wgsl: &'a str,
-    /// The tree behind the text.
+    /// The syntax tree of the text.
     pub result: &'a CompileResult,
-    /// The module whose declarations keep their names.
+    /// The module whose declarations are not renamed.
     pub entry: &'a ModulePath,
-    /// Files of modules.
     pub paths: &'a Paths,
 }
 
-/// Parses and validates composed WGSL with the capabilities of plain WebGPU, and subgroups: a device without them
-/// refuses such a kernel.
+/// Parses and validates composed WGSL with the capabilities of plain WebGPU plus subgroups: a
+/// device without these rejects such a kernel.
 pub(super) fn parse_and_validate(
     kernel: &Composed,
 ) -> Result<(naga::Module, naga::valid::ModuleInfo), GpuError> {
@@ -228,13 +226,13 @@ fn name(declaration: &GlobalDeclaration) -> String {
     ident.name().to_string()
 }
 
-/// Skips attributes, on whose line the fault is not.
+/// Skips attributes, which may be on a line before the fault.
 fn after_attributes(text: &str, start: usize) -> usize {
     let mut rest = &text[start..];
     while let Some(attribute) = rest.trim_start().strip_prefix('@') {
         let name = attribute.trim_start_matches(is_of_word);
         let mut depth = 0;
-        // Of no brackets, nothing; of brackets, all up to the one that closes the first.
+        // Without brackets, nothing; with brackets, everything up to the one that closes the first.
         let end = name.find(|c| {
             depth += i32::from(c == '(') - i32::from(c == ')');
             depth == 0
@@ -244,7 +242,6 @@ fn after_attributes(text: &str, start: usize) -> usize {
     text.len() - rest.trim_start().len()
 }
 
-/// Spans of a declaration and of the members or statements in it.
 fn spans(declaration: &GlobalDeclarationNode) -> Vec<Range<usize>> {
     let mut out = vec![declaration.span().range()];
     match declaration.node() {
@@ -259,7 +256,7 @@ fn statements(block: &CompoundStatement, out: &mut Vec<Range<usize>>) {
     let mut rest = vec![block];
     while let Some(block) = rest.pop() {
         for statement in &block.statements {
-            // Left by features that are off, and not printed.
+            // Left by disabled features, and not printed.
             if !matches!(statement.node(), Statement::Void) {
                 out.push(statement.span().range());
             }
@@ -294,7 +291,7 @@ fn is_of_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// A message with the author's names in the place of mangled ones.
+/// The message with source names instead of mangled ones.
 fn readable(message: &str, map: &BasicSourceMap) -> String {
     let pieces = message.split_inclusive(|c| !is_of_word(c));
     let written = |piece: &str| {

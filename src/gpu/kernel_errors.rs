@@ -1,8 +1,8 @@
-//! The kernels' error word in words.
+//! Descriptions of the kernels' error word.
 
 use super::{Gpu, GpuError};
 
-/// Bit that is set where the driver ended the loops of an invocation early: [`super::Gpu::loop_limit`].
+/// Bit for loops that the driver ended early: [`super::Gpu::loop_limit`].
 pub(crate) const LOOPS_CUT: u32 = 4;
 
 /// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
@@ -17,7 +17,7 @@ pub const KERNEL_ERRORS: [(u32, &str); 5] = [
     (16, "a path was in no queue for shading, or in two"),
 ];
 
-/// What the bits of an error word mean; nothing for 0.
+/// The meanings of the set bits; empty for 0.
 pub fn kernel_errors(word: u32) -> Vec<String> {
     let known = KERNEL_ERRORS.iter().filter(|(bit, _)| word & bit != 0);
     let mut texts: Vec<String> = known.map(|(_, text)| (*text).to_owned()).collect();
@@ -31,10 +31,10 @@ pub fn kernel_errors(word: u32) -> Vec<String> {
 }
 
 impl Gpu {
-    /// An error if kernels raised their error word.
+    /// Fails if kernels raised their error word.
     ///
     /// # Errors
-    /// [`GpuError::LoopsCut`] where the driver ended loops, whatever else it led to;
+    /// [`GpuError::LoopsCut`] if the driver ended loops, regardless of the consequences;
     /// [`GpuError::Kernels`] for any other bit.
     pub fn check_error_word(&self, word: u32) -> Result<(), GpuError> {
         match self.loop_limit {

@@ -1,7 +1,7 @@
 //! The GPU: adapter choice, device, kernel composition, pipelines, buffers, timestamps.
 //!
-//! Everything is bound *by name*: the composed kernel is reflected by naga, and a buffer is attached
-//! to the variable of the same name, so that no binding number, struct offset or size is typed twice.
+//! Everything is bound *by name*: naga reflects the composed kernel, and each buffer is bound to
+//! the variable of the same name, so no binding number, struct offset or size is written twice.
 #![warn(missing_docs)]
 
 mod adapter;
@@ -40,34 +40,34 @@ pub use uniform::UniformValues;
 
 use thiserror::Error;
 
-/// What can go wrong between a kernel's text and a result on the host.
+/// Errors between a kernel's text and its results on the host.
 #[derive(Debug, Error)]
 pub enum GpuError {
-    /// No adapter answers at all.
+    /// No adapter answers.
     #[error(
         "no GPU adapter answers on this machine. Install a driver (Debian: `scripts/install-driver`) or set WGPU_BACKEND=gl; `raystone doctor` tells what was tried"
     )]
     NoAdapter,
-    /// The adapter asked for does not exist.
+    /// The requested adapter does not exist.
     #[error("no adapter matches `{asked}`; there are: {known}")]
     UnknownAdapter {
-        /// What the user typed.
+        /// The requested name.
         asked: String,
-        /// What exists.
+        /// The available adapters.
         known: String,
     },
-    /// The adapter would not give a device with the limits asked for.
+    /// The adapter refuses a device with the required limits.
     #[error("adapter `{adapter}` gives no device: {cause}")]
     NoDevice {
         /// Adapter name.
         adapter: String,
-        /// The driver's words.
+        /// The driver's message.
         cause: String,
     },
     /// A kernel does not compose, parse or validate; the text names file and line.
     #[error("{0}")]
     Kernel(String),
-    /// A kernel wants a buffer that the caller did not give.
+    /// A kernel needs a buffer that was not provided.
     #[error(
         "kernel `{kernel}` binds `{binding}`, but no buffer of that name was given; there are: {known}"
     )]
@@ -76,7 +76,7 @@ pub enum GpuError {
         kernel: String,
         /// Variable name in the kernel.
         binding: String,
-        /// Names that were given.
+        /// Names of the provided buffers.
         known: String,
     },
     /// A buffer is larger than the adapter can bind.
@@ -89,7 +89,7 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u64,
     },
-    /// A kernel binds more buffers than the adapter allows, because arrays came in several parts.
+    /// A kernel binds more buffers than the adapter allows, because arrays have several parts.
     #[error(
         "kernel `{kernel}` needs {needed} storage buffers for a scene of this size, but this adapter binds at most {limit}"
     )]
@@ -101,7 +101,7 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u64,
     },
-    /// A step of a recording asks for more workgroups than the adapter runs.
+    /// A step of a recording needs more workgroups than the adapter supports.
     #[error(
         "step `{step}` asks for {groups:?} workgroups, but this adapter runs at most {limit} in each direction"
     )]
@@ -113,21 +113,21 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u32,
     },
-    /// A workgroup of a kernel is larger than the adapter runs.
+    /// A workgroup of a kernel is larger than the adapter supports.
     #[error(
         "kernel `{kernel}` has workgroups with {needed} {what}, but this adapter runs at most {limit}: choose a smaller one on the axis `workgroup`"
     )]
     WorkgroupTooLarge {
         /// Entry module.
         kernel: String,
-        /// Of what there are too many.
+        /// The exceeded quantity.
         what: &'static str,
-        /// How many.
+        /// The required number.
         needed: u64,
         /// The adapter's limit.
         limit: u64,
     },
-    /// The driver ended loops early, and what was computed is wrong.
+    /// The driver ended loops early, so results are wrong.
     #[error(
         "this driver ends loops in silence once an invocation's loops together took {limit} turns, and here they need more: fewer triangles, another structure or a newer driver help (`raystone doctor`)"
     )]
@@ -135,59 +135,58 @@ pub enum GpuError {
         /// [`Gpu::loop_limit`].
         limit: u32,
     },
-    /// The driver ends loops early, and no kernel can see it.
+    /// The driver ends loops early, undetected by kernels.
     #[error(
         "adapter `{adapter}` ends loops early ({turns} of {wanted} turns) in a way that kernels cannot notice: nothing it computes can be trusted; install another driver"
     )]
     LoopsUnsound {
         /// Adapter name.
         adapter: String,
-        /// Turns it took.
+        /// Iterations done.
         turns: u32,
-        /// Turns asked for.
+        /// Iterations requested.
         wanted: u32,
     },
     /// Kernels raised the error word.
     #[error("wrong on the device: {0}")]
     Kernels(String),
-    /// A picture whose pixels did not take the samples that they were to take.
+    /// An image with pixels that did not take all their samples.
     #[error(
         "{wrong} pixels did not take the {wanted} samples of this block; the first is ({x}, {y}), which took {taken}"
     )]
     Samples {
-        /// Pixels concerned.
+        /// Number of such pixels.
         wrong: usize,
-        /// Samples asked for since the last sum that was taken over to the host.
+        /// Samples requested since the last sum was added on the host.
         wanted: u32,
         /// Column of the first such pixel.
         x: u32,
         /// Its row.
         y: u32,
-        /// Samples it took.
+        /// Its samples.
         taken: f32,
     },
     /// Validation or out-of-memory error from the driver.
     #[error("the driver refused: {0}")]
     Driver(String),
-    /// A clock went back while something was measured.
+    /// A clock ran backwards during a measurement.
     #[error(
         "a clock of the device or of the processors ran backwards in every try, so that there is no time: update the driver, or measure on another machine"
     )]
     Clock,
-    /// The device is gone.
+    /// The device is lost.
     #[error("the device was lost: {0}")]
     Lost(String),
-    /// Work did not end in time.
+    /// Work did not finish in time.
     #[error("the device did not finish within {seconds} s")]
     Timeout {
-        /// How long was waited.
+        /// Time waited.
         seconds: u64,
     },
 }
 
 impl GpuError {
-    /// Whether driver or adapter cannot run what was asked for, through no fault of it: such a cell is left
-    /// out.
+    /// True if driver or adapter cannot run the request, without a fault: the cell is left out.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Self::LoopsCut { .. } | Self::WorkgroupTooLarge { .. })
     }

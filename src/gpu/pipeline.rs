@@ -7,12 +7,12 @@ use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Edge of a workgroup of pixels where no other shape was chosen, invocations.
+/// Default edge of a workgroup of pixels, invocations.
 pub const WORKGROUP_EDGE: u32 = 8;
-/// Invocations per workgroup of every one-dimensional kernel for which no other number was chosen.
+/// Default invocations per workgroup of one-dimensional kernels.
 pub const WORKGROUP_SIZE: u32 = WORKGROUP_EDGE * WORKGROUP_EDGE;
 
-/// Texels in a row of an array that is read as a texture; twin of `kernels/common/texels.wesl`.
+/// Texels in a row of an array that is read as a texture; same as in `kernels/common/texels.wesl`.
 pub const TEXELS_PER_ROW: u32 = 8192;
 pub(super) const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
@@ -38,7 +38,7 @@ pub(super) struct Binding {
     pub kind: BindingKind,
 }
 
-/// A compute pipeline with what it binds.
+/// A compute pipeline and its bindings.
 pub struct Pipeline {
     /// The kernel.
     pub kernel: Arc<ComposedKernel>,
@@ -54,7 +54,6 @@ pub struct Pipeline {
     pub(super) first_ms: OnceLock<f64>,
 }
 
-/// What the entries of a kernel bind.
 pub(super) fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
     let module = &kernel.module;
     let entries = 0..module.entry_points.len();
@@ -140,7 +139,7 @@ impl Gpu {
         Ok(pipeline)
     }
 
-    /// The compilation of a kernel whose turn it is. Drivers give each a place in memory of its own.
+    /// The selected compilation of a kernel. Drivers give each its own place in memory.
     pub(super) fn in_turn(&self, first: &Arc<Pipeline>) -> Result<Arc<Pipeline>, GpuError> {
         let turn = self.turn();
         if turn == 0 {
@@ -156,7 +155,6 @@ impl Gpu {
         Ok(made)
     }
 
-    /// Notes what a kernel was made of.
     pub(super) fn note_modules(&self, kernel: &ComposedKernel) {
         let Ok(mut used) = self.used.lock() else {
             return;
@@ -167,8 +165,9 @@ impl Gpu {
         }
     }
 
-    /// The modules of all kernels that were asked for since the last call, on this device and on those that share it:
-    /// [marked](super::KernelLibrary::marked) names and [hashes of texts](super::KernelLibrary::text_hash).
+    /// The modules of all kernels requested since the last call, on this device and its clones:
+    /// [marked](super::KernelLibrary::marked) names and [hashes of
+    /// texts](super::KernelLibrary::text_hash).
     pub fn take_modules(&self) -> BTreeMap<String, String> {
         let used = self.used.lock();
         used.map(|mut used| std::mem::take(&mut *used))
@@ -227,7 +226,6 @@ impl Gpu {
         })
     }
 
-    /// Whether the adapter runs workgroups as large as a kernel's.
     fn check_workgroup(&self, kernel: &ComposedKernel) -> Result<(), GpuError> {
         let module = &kernel.module;
         let [x, y, z] = module.entry_points[0].workgroup_size;
@@ -279,20 +277,20 @@ impl Gpu {
             return self.device.create_shader_module(descriptor);
         }
         let checks = wgpu::ShaderRuntimeChecks::unchecked();
-        // SAFETY: reached only for kernels whose checked module passed the gate on this scene and
-        // adapter: no access out of bounds was needed and every loop has a fuse.
+        // SAFETY: reached only for kernels whose checked module passed the correctness check on
+        // this scene and adapter: no access out of bounds occurred and every loop has a fuse.
         unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
     }
 }
 
 impl Pipeline {
-    /// How often it was compiled so far: see [`Gpu::compiled_apart`].
+    /// Number of compilations so far: see [`Gpu::compiled_apart`].
     pub fn compilations(&self) -> usize {
         1 + self.again.lock().map_or(0, |again| again.len())
     }
 
-    /// Milliseconds that the first use of this kernel cost: composition, the driver's front end, and a
-    /// dispatch of no workgroups, in which Mesa's `llvmpipe` does all its compiling (for a path tracer a
+    /// Milliseconds of this kernel's first use: composition, the driver's front end, and a dispatch
+    /// of no workgroups, in which Mesa's `llvmpipe` does all its compiling (for a path tracer a
     /// second there, a tenth of one before). `None` until then; no other time contains it.
     pub fn cold_ms(&self) -> Option<f64> {
         Some(self.made_ms + self.first_ms.get()?)

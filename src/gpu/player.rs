@@ -1,4 +1,4 @@
-//! Plays recordings: binds, compiles what was not run before, submits once, and reads clocks and downloads.
+//! Plays recordings: binds, compiles new kernels, submits once, and reads clocks and downloads.
 
 use super::GpuError;
 use super::adapter::Gpu;
@@ -10,14 +10,13 @@ use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Runs of one submission at most: as many as a set of timestamps has pairs.
+/// Maximum runs per submission: as many as a set of timestamps has pairs.
 const MAX_RUNS: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
-/// Bind groups that are kept at most; they keep their buffers alive.
+/// Maximum cached bind groups; they keep their buffers alive.
 const KEPT_GROUPS: usize = 256;
 
-/// Plays recordings on a device, and keeps for the next what this one needed: scratch and staging
-/// buffers, uniforms, bind groups, timestamps. What is played again with the same buffers allocates
-/// nothing on the device.
+/// Plays recordings on a device, and caches their resources: scratch and staging buffers, uniforms,
+/// bind groups, timestamps. Replaying with the same buffers allocates nothing on the device.
 pub struct Player {
     gpu: Gpu,
     kept: Mutex<Kept>,
@@ -27,19 +26,19 @@ pub struct Player {
 struct Kept {
     scratch: BTreeMap<String, wgpu::Buffer>,
     staging: BTreeMap<String, wgpu::Buffer>,
-    /// By the place of the run in the recording, group and binding: the buffer with what it holds.
+    /// By index of the run in the recording, group and binding: the buffer with its content.
     uniforms: HashMap<(usize, u32, u32), (wgpu::Buffer, Vec<u8>)>,
     groups: HashMap<GroupKey, KeptGroups>,
     clock: Option<Clock>,
     made: usize,
 }
 
-/// The address of a pipeline and what it binds.
+/// The address of a pipeline and its resources.
 type GroupKey = (usize, Vec<Resource>);
-/// Bind groups with their pipeline, whose address is no other's while it is kept.
+/// Bind groups with their pipeline, which keeps its address from being reused.
 type KeptGroups = (Arc<Pipeline>, Vec<wgpu::BindGroup>);
 
-/// A query set with two timestamps for each run.
+/// A query set with two timestamps per run.
 struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -48,7 +47,7 @@ struct Clock {
 }
 
 impl Player {
-    /// A player that keeps nothing yet.
+    /// A player with empty caches.
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             gpu: gpu.clone(),
@@ -61,18 +60,19 @@ impl Player {
         &self.gpu
     }
 
-    /// Buffers, query sets and bind groups that it made so far.
+    /// Number of buffers, query sets and bind groups created so far.
     pub fn made(&self) -> usize {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.made
     }
 
-    /// Plays a recording to its end, in one submission (in several, one after the other, if it has thousands of runs), and measures it. Kernels that never ran on this
-    /// device are compiled first, outside what is measured: [`Pipeline::cold_ms`].
+    /// Plays a recording to its end, in one submission (or several in sequence, for thousands of
+    /// runs), and measures it. Kernels new to this device are compiled first, outside the
+    /// measurement: [`Pipeline::cold_ms`].
     ///
     /// # Errors
-    /// A binding is missing, a buffer or the number of workgroups exceeds a limit of the adapter, the
-    /// driver complains, the device is lost or does not finish.
+    /// A binding is missing, a buffer or the number of workgroups exceeds a limit of the adapter,
+    /// the driver complains, the device is lost or does not finish.
     pub fn play(&self, recording: &Recording) -> Result<Played, GpuError> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let scope = self
@@ -92,7 +92,7 @@ impl Player {
             (played, None) => played,
         };
         if played.is_err() {
-            // Buffers may be mapped still.
+            // Buffers may still be mapped.
             *kept = Kept::default();
         }
         played
@@ -104,7 +104,7 @@ impl Kept {
         if recording.runs().count() <= MAX_RUNS {
             return self.play_part(gpu, recording);
         }
-        // As large as any part asks for: one that grew later would lose what it holds.
+        // Size for the largest part: growing later would lose the content.
         self.lend_scratch(gpu, recording)?;
         let mut whole = Played {
             host: Elapsed::nothing(false),
@@ -157,7 +157,7 @@ impl Kept {
         }
         let ticks = clock_buffer.map(|buffer| take(&buffer)).transpose()?;
         let ticks: Option<Vec<u64>> = ticks.map(|bytes| bytemuck::pod_collect_to_vec(&bytes));
-        // Two timestamps for each run.
+        // Two timestamps per run.
         let (spans, _) = ticks.as_deref().unwrap_or_default().as_chunks();
         let spans = spans.iter().take(runs.len());
         let spans: Vec<Option<f64>> = spans.map(|span| span_ms(*span, clock)).collect();
@@ -180,7 +180,7 @@ impl Kept {
         })
     }
 
-    /// Makes the scratch buffers that a recording asks for and that are not there, or not as large.
+    /// Creates the scratch buffers of a recording that are missing or too small.
     fn lend_scratch(&mut self, gpu: &Gpu, recording: &Recording) -> Result<(), GpuError> {
         for storage in recording.storages() {
             let Storage::Scratch { name, bytes } = storage else {
@@ -190,14 +190,14 @@ impl Kept {
             if known.is_none_or(|buffer| buffer.size() < *bytes) {
                 self.scratch.insert(name.clone(), gpu.zeroed(name, *bytes)?);
                 self.made += 1;
-                // What bound the smaller one need not live on.
+                // Bind groups of the smaller buffer are obsolete.
                 self.groups.clear();
             }
         }
         Ok(())
     }
 
-    /// The buffer behind a storage; scratch was lent before.
+    /// The buffer of a storage; scratch was created before.
     fn buffer<'a>(&'a self, storage: &'a Storage) -> Option<&'a wgpu::Buffer> {
         match storage {
             Storage::Own(buffer) => Some(buffer),
@@ -205,7 +205,7 @@ impl Kept {
         }
     }
 
-    /// Bind groups of a run, and its uniforms filled.
+    /// Bind groups of a run, with its uniforms filled.
     fn bind(
         &mut self,
         gpu: &Gpu,
@@ -258,7 +258,7 @@ impl Kept {
         Ok(groups)
     }
 
-    /// The buffer of a uniform, filled: written only if it holds something else.
+    /// The buffer of a uniform; written only if its content changes.
     fn uniform(
         &mut self,
         gpu: &Gpu,
@@ -282,7 +282,6 @@ impl Kept {
         Ok(buffer)
     }
 
-    /// Makes sure that there are timestamps for so many runs.
     fn wind_clock(&mut self, gpu: &Gpu, runs: usize) {
         if self.clock.as_ref().is_some_and(|clock| clock.runs >= runs) {
             return;
@@ -303,7 +302,7 @@ impl Kept {
         });
     }
 
-    /// The commands, and the buffers that are to be read once they are done, by name.
+    /// The commands, and the buffers to read after completion, by name.
     fn encode(
         &mut self,
         gpu: &Gpu,
@@ -416,20 +415,21 @@ impl Kept {
     }
 }
 
-/// Name under which the number of workgroups of an indirect run is staged.
+/// Name for staging the workgroup count of an indirect run.
 fn staged_groups(place: usize) -> String {
     format!("workgroups of run {place}")
 }
 
 fn check_groups(gpu: &Gpu, step: &str, groups: [u32; 3]) -> Result<(), GpuError> {
     let limit = gpu.limits.max_compute_workgroups_per_dimension;
-    match groups.iter().any(|n| *n > limit) {
-        true => Err(GpuError::TooManyGroups {
+    if groups.iter().any(|n| *n > limit) {
+        Err(GpuError::TooManyGroups {
             step: step.to_owned(),
             groups,
             limit,
-        }),
-        false => Ok(()),
+        })
+    } else {
+        Ok(())
     }
 }
 
@@ -477,12 +477,12 @@ fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f6
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
-/// Milliseconds from the first timestamp to the second; `None` where there is no clock, or where it ran backwards.
+/// Milliseconds between two timestamps; `None` without a clock, or if it ran backwards.
 fn span_ms([from, to]: [u64; 2], period_ns: Option<f32>) -> Option<f64> {
     Some(to.checked_sub(from)? as f64 * f64::from(period_ns?) * 1e-6)
 }
 
-/// What a mapped buffer holds; it is unmapped after that.
+/// The content of a mapped buffer, which is unmapped.
 fn take(buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
     let view = buffer.get_mapped_range(..);
     let view = view.map_err(|e| GpuError::Driver(e.to_string()))?;

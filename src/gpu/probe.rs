@@ -1,10 +1,10 @@
-//! What the adapter's arithmetic and loops do, found out at start.
+//! Probes of the adapter's arithmetic and loops at start-up.
 
 use super::compose::Composition;
 use super::{Bindings, Gpu, GpuError, LOOPS_CUT, Recording, Storage, UniformValues, groups_for};
 use serde::{Deserialize, Serialize};
 
-/// Whether the adapter computes like IEEE f32 on the host in the patterns that traversal uses.
+/// Agreement of the adapter's arithmetic with the host's f32, in the patterns of traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArithmeticProbe {
     /// `a*b + c` is rounded twice, never fused.
@@ -13,17 +13,16 @@ pub struct ArithmeticProbe {
     pub exact_division: bool,
     /// `sqrt(a)` is correctly rounded.
     pub exact_sqrt: bool,
-    /// What rounding takes off a product can be computed exactly, by splitting the factors.
+    /// The rounding error of a product can be computed exactly, by splitting the factors.
     #[serde(default)]
     pub exact_products: bool,
-    /// Denormal numbers are kept, not taken for 0. Hits do not depend on it but for rays and scenes
-    /// of such sizes.
+    /// Denormals are not flushed to 0. Hits depend on it only for rays and scenes of such sizes.
     #[serde(default)]
     pub denormals: bool,
 }
 
 impl ArithmeticProbe {
-    /// Whether hits can be expected to equal the host's to the bit.
+    /// True if hits should be bit-identical to the host's.
     pub fn is_exact(&self) -> bool {
         self.unfused && self.exact_division
     }
@@ -44,7 +43,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
             ((state >> 28) + 119) << 23 | (state & 0x007f_ffff) | (state << 4 & 0x8000_0000),
         )
     };
-    // The fourth number is denormal or just not: halves of it are denormal.
+    // The fourth number is denormal or just not: half of it is denormal.
     let input: Vec<[f32; 4]> = (0..COUNT)
         .map(|_| {
             [
@@ -82,7 +81,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     })
 }
 
-/// What rounding took off the product `p` of `a` and `b`, by splitting the factors; twin of the function in
+/// Rounding error of the product `p` of `a` and `b`, by splitting the factors; as in
 /// `kernels/accel/triangle/compensated.wesl`.
 fn product_error(a: f32, b: f32, p: f32) -> f32 {
     // The upper half of a significand.
@@ -93,18 +92,18 @@ fn product_error(a: f32, b: f32, p: f32) -> f32 {
     a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
 }
 
-/// Turns of the loops that [`probe_loops`] runs: outer and inner.
+/// Iterations of the loops that [`probe_loops`] runs: outer and inner.
 const LOOPS: [[u32; 2]; 2] = [[1, 1_000_000], [1000, 1000]];
 
-/// Turns that the loops of an invocation may take in all before the driver ends them in silence;
-/// `None` where a million turns are taken, in one loop and in two nested ones.
+/// Total loop iterations per invocation after which the driver silently ends loops; `None` if a
+/// million iterations complete, in one loop and in two nested ones.
 ///
-/// Mesa's software driver up to 22.3 has such a limit: 65,536 turns over all loops of a vector of
-/// invocations together (`LP_MAX_TGSI_LOOP_ITERATIONS` in its source). After that every loop ends
-/// with its first turn, which `check_loops` of `kernels/common/errors.wesl` notices.
+/// Mesa's software driver up to 22.3 has such a limit: 65,536 iterations over all loops of a vector
+/// of invocations together (`LP_MAX_TGSI_LOOP_ITERATIONS` in its source). After that every loop
+/// ends with its first iteration, which `check_loops` of `kernels/common/errors.wesl` detects.
 ///
 /// # Errors
-/// The kernel does not run, or loops end early without the kernel's notice.
+/// The kernel does not run, or loops end early undetected by the kernel.
 pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
     let kernel = Composition::new("common/loops").feature("loops_cut", true);
     let pipeline = gpu.pipeline(&kernel, true)?;

@@ -1,4 +1,4 @@
-//! Rasterisation: a kernel of a vertex and a fragment entry that leaves one word a pixel, that of the nearest triangle there.
+//! Rasterisation by a vertex and a fragment entry: one word per pixel, for the nearest triangle.
 
 use super::adapter::Gpu;
 use super::bindings::{Bindings, Resource};
@@ -8,14 +8,14 @@ use super::compose::Composition;
 use super::pipeline::{Binding, BindingKind, reflect};
 use super::{GpuError, UniformValues};
 
-/// Words to which rows are padded, as copies of textures ask for.
+/// Row padding in words, as required for texture copies.
 const ROW_WORDS: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4;
-/// What a pixel holds that no triangle covers, 2³² − 1, as a clear colour says it.
+/// Word of a pixel without a triangle, 2³² − 1, as a clear colour.
 const NOTHING: f64 = u32::MAX as f64;
 const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// A compiled rasterisation of images of one size.
+/// A compiled rasterisation for images of one size.
 pub struct Raster {
     gpu: Gpu,
     size: [u32; 2],
@@ -28,11 +28,12 @@ pub struct Raster {
 }
 
 impl Gpu {
-    /// Compiles the entries of a kernel, one for corners of triangles and one for pixels, for images of this size.
-    /// Depth is greatest nearby; both faces are drawn; the first of equally near triangles stays.
+    /// Compiles the entries of a kernel, one for triangle corners and one for pixels, for images of
+    /// this size. Depth is largest nearby; both faces are drawn; the first of equally near
+    /// triangles wins.
     ///
     /// # Errors
-    /// The kernel does not compose or compile, or the image exceeds a limit of the adapter.
+    /// The kernel does not compose or compile, or the image exceeds the adapter's limits.
     pub fn raster(
         &self,
         composition: &Composition,
@@ -124,7 +125,7 @@ fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
 }
 
 impl Raster {
-    /// One word a pixel, row by row from the top, 2³² − 1 where nothing is; rows begin at multiples of 64 words.
+    /// One word per pixel, row by row, 2³² − 1 where empty; rows begin at multiples of 64 words.
     pub fn words(&self) -> &wgpu::Buffer {
         &self.words
     }
@@ -133,7 +134,7 @@ impl Raster {
         self.size[0].next_multiple_of(ROW_WORDS)
     }
 
-    /// Draws so many triangles with these values of a uniform, and tells the wall time of it.
+    /// Draws this many triangles with these uniform values, and returns the wall time.
     ///
     /// # Errors
     /// A binding is missing, the driver complains, or the device is lost or hangs.

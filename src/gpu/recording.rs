@@ -1,4 +1,4 @@
-//! What the device is to do, step by step, written down before anything is done; a [`Player`] plays it.
+//! Recordings: lists of device commands; a [`Player`] plays them.
 
 use super::adapter::Gpu;
 use super::bindings::{Bindings, Storage};
@@ -12,12 +12,12 @@ use std::sync::Arc;
 /// WebGPU's limit on workgroups per dimension.
 const MAX_GROUPS: u32 = 65535;
 
-/// How many workgroups a kernel runs in.
+/// The number of workgroups of a kernel.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Groups {
-    /// So many in x, y, z.
+    /// A fixed number in x, y, z.
     Direct([u32; 3]),
-    /// As many as three words of this buffer say when the step's turn has come, from this byte on.
+    /// Read from three words of this buffer, from this byte offset, when the step runs.
     Indirect(Storage, u64),
 }
 
@@ -27,14 +27,14 @@ impl From<[u32; 3]> for Groups {
     }
 }
 
-/// Workgroups of [`WORKGROUP_SIZE`] for `items` invocations of a one-dimensional kernel; kernels compute their index as
-/// `x + y * WORKGROUP_SIZE * num_workgroups.x`.
+/// Workgroups of [`WORKGROUP_SIZE`] for `items` invocations of a one-dimensional kernel; kernels
+/// compute their index as `x + y * WORKGROUP_SIZE * num_workgroups.x`.
 pub fn groups_for(items: u32) -> [u32; 3] {
     grid_of(items.div_ceil(WORKGROUP_SIZE))
 }
 
-/// So many workgroups, at least one: in a row, or in rows where one would be too long, the last of which may have
-/// too many. A kernel computes the index of its own as `x + y * num_workgroups.x`.
+/// At least one workgroup and at least `workgroups`; beyond the row limit in several rows, the last
+/// of which may have too many. A kernel's workgroup index is `x + y * num_workgroups.x`.
 pub fn grid_of(workgroups: u32) -> [u32; 3] {
     let groups = workgroups.max(1);
     if groups <= MAX_GROUPS {
@@ -44,7 +44,6 @@ pub fn grid_of(workgroups: u32) -> [u32; 3] {
     }
 }
 
-/// A kernel that runs.
 #[derive(Clone)]
 pub(super) struct Run {
     pub name: String,
@@ -61,29 +60,29 @@ pub(super) enum Step {
     Download { name: String, from: Storage },
 }
 
-/// A list of steps for the device. Nothing happens before it is played: [`Player::play`].
+/// A list of steps for the device. Nothing runs before it is played: [`Player::play`].
 #[derive(Clone, Default)]
 pub struct Recording {
     pub(super) steps: Vec<Step>,
 }
 
 impl Recording {
-    /// No steps yet.
+    /// Creates an empty recording.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Whether there are no steps.
+    /// True if there are no steps.
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }
 
-    /// Steps so far: a place for [`Recording::name_since`].
+    /// Number of steps, for [`Recording::name_since`].
     pub fn len(&self) -> usize {
         self.steps.len()
     }
 
-    /// Tells the times of all runs from this place on under one name.
+    /// Reports the times of all runs from this step on under one name.
     pub fn name_since(&mut self, place: usize, name: &str) -> &mut Self {
         for step in self.steps.iter_mut().skip(place) {
             if let Step::Run(run) = step {
@@ -99,14 +98,14 @@ impl Recording {
         self
     }
 
-    /// Copies the whole of one buffer over the beginning of another.
+    /// Copies one buffer entirely over the start of another.
     pub fn copy(&mut self, from: impl Into<Storage>, to: impl Into<Storage>) -> &mut Self {
         let (from, to) = (from.into(), to.into());
         self.steps.push(Step::Copy { from, to });
         self
     }
 
-    /// Runs a kernel. Its time is told under `name`.
+    /// Runs a kernel, with its time reported under `name`.
     pub fn run(
         &mut self,
         name: &str,
@@ -123,14 +122,13 @@ impl Recording {
         self
     }
 
-    /// Brings what a buffer holds by then to the host, under `name`.
+    /// Downloads the content of a buffer at this step, under `name`.
     pub fn download(&mut self, name: &str, from: impl Into<Storage>) -> &mut Self {
         let (name, from) = (name.to_owned(), from.into());
         self.steps.push(Step::Download { name, from });
         self
     }
 
-    /// The runs among the steps.
     pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
         self.steps.iter().filter_map(|step| match step {
             Step::Run(run) => Some(&**run),
@@ -138,7 +136,7 @@ impl Recording {
         })
     }
 
-    /// The same steps with the compilations of their kernels whose turn it is.
+    /// The same steps with the selected compilations of their kernels.
     pub(super) fn in_turn(&self, gpu: &Gpu) -> Result<Self, GpuError> {
         let mut recording = self.clone();
         for step in &mut recording.steps {
@@ -149,7 +147,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The same steps in recordings of at most so many runs.
+    /// The same steps in recordings of at most `most` runs.
     pub(super) fn parts(&self, most: usize) -> Vec<Self> {
         let (mut parts, mut part, mut runs) = (Vec::new(), Self::new(), 0);
         for step in &self.steps {
@@ -166,7 +164,6 @@ impl Recording {
         parts
     }
 
-    /// Every buffer that a step names.
     pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
         self.steps.iter().flat_map(|step| {
             let mut all: Vec<&Storage> = Vec::new();
@@ -184,8 +181,8 @@ impl Recording {
         })
     }
 
-    /// The kernels that it runs, each once, in order: milliseconds that the first use of each cost, in
-    /// composition and in the driver, once it was played. See [`Pipeline::cold_ms`].
+    /// The kernels it runs, each once, in order, with the milliseconds of their first use
+    /// (composition and driver) once played. See [`Pipeline::cold_ms`].
     pub fn cold_ms(&self) -> Vec<(String, Option<f64>)> {
         let mut seen: Vec<&Arc<Pipeline>> = Vec::new();
         for run in self.runs() {
@@ -198,24 +195,23 @@ impl Recording {
     }
 }
 
-/// What a recording took and brought back.
+/// Times and downloads of a played recording.
 #[derive(Debug, Clone, Default)]
 pub struct Played {
-    /// From submission to completion by the clocks of the host.
+    /// From submission to completion by the host's clocks.
     pub(super) host: Elapsed,
-    /// Names of the runs, each with the milliseconds between the GPU timestamps around it; `None` where
-    /// there are none.
+    /// Names of the runs, each with its GPU milliseconds; `None` without timestamps.
     pub runs: Vec<(String, Option<f64>)>,
     pub(super) downloads: BTreeMap<String, Vec<u8>>,
 }
 
 impl Played {
-    /// Milliseconds by the wall clock from submission to completion.
+    /// Wall-clock milliseconds from submission to completion.
     pub fn wall_ms(&self) -> f64 {
         self.host.wall_ms
     }
 
-    /// The sum over all runs, and the clocks of the host.
+    /// The sum over all runs, and the host's clocks.
     pub fn elapsed(&self) -> Elapsed {
         let add = |sum: Option<f64>, (_, ms): &(String, Option<f64>)| Some(sum? + (*ms)?);
         Elapsed {
@@ -224,10 +220,10 @@ impl Played {
         }
     }
 
-    /// What was downloaded under `name`.
+    /// The download named `name`.
     ///
     /// # Errors
-    /// Nothing was.
+    /// There is none.
     pub fn download<T: Pod>(&self, name: &str) -> Result<Vec<T>, GpuError> {
         let bytes = self.downloads.get(name);
         let bytes = bytes.ok_or_else(|| {
@@ -238,7 +234,7 @@ impl Played {
 }
 
 impl Gpu {
-    /// Plays a recording that is played once: [`Player::play`] of a player of its own.
+    /// Plays a recording once, with its own player: see [`Player::play`].
     ///
     /// # Errors
     /// As [`Player::play`].
@@ -246,7 +242,7 @@ impl Gpu {
         Player::new(self).play(recording)
     }
 
-    /// Runs a kernel once, with one uniform, and brings back what it writes to the outputs, each so many bytes.
+    /// Runs a kernel once with one uniform, and downloads its outputs, given their sizes in bytes.
     ///
     /// # Errors
     /// As [`Player::play`].

@@ -1,17 +1,16 @@
-//! Work in slices: no dispatch should run for longer than a fraction of a second, so that no driver's
-//! watchdog strikes and progress moves.
+//! Work in slices: short dispatches, so that no watchdog triggers and progress is shown.
 
 use super::Elapsed;
 use std::cell::Cell;
 
-/// A slice should take about so long, milliseconds.
+/// Target milliseconds of a slice.
 const SLICE_MS: f64 = 250.0;
-/// A slice must not take longer, milliseconds: some drivers take the device away from who does not answer for two seconds.
+/// Maximum milliseconds of a slice: some drivers reset the device after two seconds.
 pub const MOST_SLICE_MS: f64 = 1000.0;
-/// A slice is at most so many times as large as the one before.
+/// Maximum growth factor from one slice to the next.
 const GROWTH: u64 = 8;
 
-/// How many items (rays, samples of pixels) fit into a slice, learnt from the slices before.
+/// The number of items (rays, samples of pixels) per slice, learnt from earlier slices.
 #[derive(Debug)]
 pub struct Slices {
     fitting: Cell<u64>,
@@ -20,7 +19,7 @@ pub struct Slices {
 }
 
 impl Slices {
-    /// Begins with `first` items, which should be few: what a slice takes is as yet unknown.
+    /// Begins with `first` items, which should be few: the time of a slice is not yet known.
     pub fn starting_with(first: u64) -> Self {
         Self {
             fitting: Cell::new(first.max(1)),
@@ -36,12 +35,12 @@ impl Slices {
         self
     }
 
-    /// Items that fit into a slice.
+    /// Items per slice.
     pub fn fitting(&self) -> u64 {
         self.fitting.get().max(self.least)
     }
 
-    /// The slice that begins at `first`, of what ends at `end`.
+    /// The size of the slice that begins at `first`, up to `end`.
     pub fn next(&self, first: u32, end: u32) -> u32 {
         self.fitting().min(u64::from(end.saturating_sub(first))) as u32
     }
@@ -51,7 +50,7 @@ impl Slices {
         self.longest_ms.get()
     }
 
-    /// Learns from a slice of `items`. A short remainder says little and makes no slice smaller.
+    /// Learns from a slice of `items`. A short remainder never reduces the size.
     pub fn learn(&self, items: u64, elapsed: Elapsed) {
         let was = self.fitting();
         let ms = elapsed.ms().max(0.1);
@@ -63,7 +62,7 @@ impl Slices {
     }
 }
 
-/// What to say of a slice of so many milliseconds, if it was too long.
+/// A warning about a slice of this many milliseconds, if it was too long.
 pub fn slow_slice(longest_ms: f64) -> Option<String> {
     (longest_ms > MOST_SLICE_MS).then(|| {
         format!(
@@ -76,7 +75,6 @@ pub fn slow_slice(longest_ms: f64) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// The slices of `total` items of which one takes `ms_per_item`.
     fn slices(slices: &Slices, total: u32, ms_per_item: f64) -> Vec<u32> {
         let (mut first, mut out) = (0, Vec::new());
         while first < total {
@@ -101,7 +99,7 @@ mod tests {
         assert_eq!(first[..4], [64, 512, 2500, 2500]);
         assert_eq!(first.iter().sum::<u32>(), 100_000);
         assert!(first.iter().all(|n| f64::from(*n) * 0.1 <= SLICE_MS));
-        // The remainder of the turn before made no slice smaller.
+        // The last remainder did not reduce the size.
         assert_eq!(slices(&known, 2_600, 0.1), [2500, 100]);
         assert_eq!(known.fitting(), 2500);
     }

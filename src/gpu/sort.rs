@@ -1,9 +1,9 @@
-//! A stable radix sort of pairs of words, recorded: the passes are in `kernels/common/sort/`.
+//! A stable radix sort of pairs of words; the passes are in `kernels/common/sort/`.
 //!
-//! Each digit of eight bits takes three passes: count the keys of each tile by digit, add the counts up over the
-//! tiles, scatter. One pass that looks back at its neighbours' sums ("decoupled look-back", Merrill & Garland
-//! 2016) would read the keys once instead of twice, but waits for workgroups that WebGPU does not promise to run:
-//! nothing there says that a workgroup which was started makes progress while another spins.
+//! Each digit of eight bits takes three passes: count the keys of each tile by digit, scan the
+//! counts over the tiles, scatter. A single pass with decoupled look-back (Merrill & Garland 2016)
+//! would read the keys once instead of twice, but waits for workgroups that WebGPU does not
+//! guarantee to run: a started workgroup may make no progress while another spins.
 
 use super::adapter::Gpu;
 use super::bindings::{Bindings, Storage};
@@ -12,11 +12,10 @@ use super::recording::Recording;
 use super::{Composition, GpuError, UniformValues};
 use std::sync::Arc;
 
-/// Bits of a digit.
 const DIGIT_BITS: u32 = 8;
 /// Values of a digit, as in `kernels/common/sort/digits.wesl`.
 const BINS: u32 = 1 << DIGIT_BITS;
-/// Keys of a tile, as there.
+/// Keys of a tile, as in that file.
 const TILE: u32 = 2048;
 
 /// The compiled passes of a radix sort.
@@ -29,11 +28,11 @@ pub struct RadixSort {
 /// Keys and their values, a word each.
 #[derive(Clone)]
 pub struct Pairs {
-    /// What is sorted by.
+    /// The sort keys.
     pub keys: Storage,
-    /// What moves along.
+    /// The values that move with the keys.
     pub values: Storage,
-    /// How many there are.
+    /// Number of pairs.
     pub count: u32,
 }
 
@@ -54,20 +53,20 @@ impl RadixSort {
         })
     }
 
-    /// Kernels that [`RadixSort::record`] runs.
+    /// Number of kernels that [`RadixSort::record`] runs.
     pub fn passes(bits: u32) -> u32 {
         3 * bits.div_ceil(DIGIT_BITS)
     }
 
-    /// Bytes of scratch that it takes for so many pairs.
+    /// Bytes of scratch for this many pairs.
     pub fn scratch_bytes(count: u32) -> u64 {
         let counts = BINS * count.div_ceil(TILE);
         4 * (2 * u64::from(count) + u64::from(counts) + u64::from(BINS))
     }
 
-    /// Sorts by the lowest `bits` of the keys, in whole digits of eight, ascending; what is equal stays in order. Tells where the sorted
-    /// pairs are then: in the buffers given, or in scratch. Times are told under `sort count`, `sort offsets` and
-    /// `sort scatter`.
+    /// Stable ascending sort by the lowest `bits` of the keys, in whole digits of eight bits.
+    /// Returns the location of the sorted pairs: the given buffers, or scratch. Times are reported
+    /// as `sort count`, `sort offsets` and `sort scatter`.
     pub fn record(&self, recording: &mut Recording, pairs: &Pairs, bits: u32) -> Pairs {
         let count = pairs.count;
         let tiles = count.div_ceil(TILE);

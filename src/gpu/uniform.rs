@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 pub struct UniformValues(BTreeMap<String, Vec<u32>>);
 
 impl UniformValues {
-    /// No values yet.
+    /// Creates an empty set of values.
     pub fn new() -> Self {
         Self::default()
     }
@@ -46,7 +46,7 @@ impl UniformValues {
         self.0.get(name).map(Vec::as_slice)
     }
 
-    /// Bytes of a struct whose members lie at these offsets. `Err` names members without a value.
+    /// Bytes of a struct with members at these offsets. `Err` contains members without a value.
     pub(super) fn pack(&self, size: u32, members: &[(String, u32)]) -> Result<Vec<u8>, String> {
         let mut bytes = vec![0u8; size as usize];
         for (name, offset) in members {

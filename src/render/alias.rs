@@ -1,22 +1,23 @@
-//! Alias tables: a number chooses one of n in constant time (A. Walker 1977; M. Vose, "A linear algorithm for generating
-//! random numbers with a given distribution", 1991), here in whole numbers: as many parts as a power of two, so that the
-//! upper bits of a value are the part and the lower ones the place in it.
+//! Alias tables: one number chooses one of n in constant time (A. Walker 1977; M. Vose, "A linear
+//! algorithm for generating random numbers with a given distribution", 1991), here in integers: the
+//! number of parts is a power of two, so the upper bits of a value are the part and the lower ones
+//! the position in it.
 
 use super::units::UNITS;
 
-/// The first `threshold` values of a part choose its own number, the others `alias`.
+/// The first `threshold` values of a part choose its own index, the others `alias`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct AliasEntry {
     pub threshold: u32,
     pub alias: u32,
 }
 
-/// Parts of a table of so many choices.
+/// Parts of a table with this many choices.
 pub(super) fn alias_parts(count: usize) -> usize {
     count.next_power_of_two()
 }
 
-/// A table in which each choice has as many of the values as `units` says, which are [`UNITS`] in all.
+/// A table in which each choice has `units` values, which sum to [`UNITS`].
 pub(super) fn alias_table(units: &[u32]) -> Vec<AliasEntry> {
     let parts = alias_parts(units.len());
     let size = UNITS / parts as u32;

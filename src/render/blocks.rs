@@ -1,4 +1,4 @@
-//! The blocks of an image that take samples, where only some do: one workgroup each.
+//! The blocks of an image that take samples if not all do: one workgroup each.
 
 use raystone_gpu::{Gpu, GpuError};
 use std::cell::RefCell;
@@ -11,17 +11,14 @@ pub(super) struct Blocks {
     list: wgpu::Buffer,
     /// Blocks in a row of the image.
     columns: u32,
-    /// Which are on the list, and how many these are.
+    /// Flags of the listed blocks, and their number.
     state: RefCell<(Vec<bool>, u32)>,
 }
 
 impl Blocks {
-    /// Pixels of a block.
     pub(crate) const PIXELS: u64 = (BLOCK_EDGE * BLOCK_EDGE) as u64;
-    /// Most workgroups of one dispatch.
     pub(crate) const MOST: u64 = 65_535;
 
-    /// All blocks of an image of this size.
     pub(crate) fn all(gpu: &Gpu, size: [u32; 2]) -> Result<Self, GpuError> {
         let [columns, rows] = size.map(|edge| edge.div_ceil(BLOCK_EDGE));
         let all = (0..rows).flat_map(|y| (0..columns).map(move |x| word([x, y])));
@@ -33,7 +30,7 @@ impl Blocks {
         })
     }
 
-    /// Puts these on the list, each once, and no others.
+    /// Sets the list to these blocks, without repetition.
     pub(crate) fn set(&self, gpu: &Gpu, blocks: &[[u32; 2]]) {
         let mut state = self.state.borrow_mut();
         state.0.fill(false);
@@ -53,17 +50,16 @@ impl Blocks {
         &self.list
     }
 
-    /// How many there are.
     pub(crate) fn len(&self) -> u32 {
         self.state.borrow().1
     }
 
-    /// Their pixels, those beyond the edges of the image included.
+    /// Number of their pixels, including those beyond the image edges.
     pub(crate) fn pixels(&self) -> u64 {
         u64::from(self.len()) * Self::PIXELS
     }
 
-    /// Whether a pixel, by its number in an image of this width, lies in one.
+    /// True if a pixel, by its index in an image of this width, is in a listed block.
     pub(crate) fn has(&self, pixel: usize, width: usize) -> bool {
         let [x, y] = [pixel % width, pixel / width].map(|at| at / BLOCK_EDGE as usize);
         let state = self.state.borrow();
@@ -74,7 +70,7 @@ impl Blocks {
     }
 }
 
-/// As kernels read it: the column, and the row above it.
+/// Kernel layout: the column, with the row in the upper half.
 fn word([x, y]: [u32; 2]) -> u32 {
     x | y << 16
 }

@@ -1,4 +1,4 @@
-//! The integrators of the program that trace.
+//! The built-in integrators that trace.
 
 use super::kind::CountedRays::{Ao, Primary as Camera};
 use super::{Integrator, IntegratorFacts};

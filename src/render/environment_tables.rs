@@ -1,10 +1,10 @@
-//! An environment map as `kernels/shading/light/environment.wesl` reads it.
+//! An environment map in the layout of `kernels/shading/light/environment.wesl`.
 
 use super::alias::{AliasEntry, alias_table};
 use super::units::{shared_out, unit_share};
 use raystone_scene::EnvironmentMap;
 
-/// How the texels of a map are chosen: values of rows, and of the columns of each.
+/// Texel selection in a map: values of rows, and of the columns of each.
 struct Shares {
     rows: Vec<u32>,
     columns: Vec<Vec<u32>>,
@@ -21,7 +21,7 @@ impl Shares {
         }
     }
 
-    /// One table that chooses the row, then one for each row.
+    /// One table that chooses the row, then one per row.
     fn aliases(&self) -> Vec<AliasEntry> {
         let mut entries = alias_table(&self.rows);
         entries.extend(self.columns.iter().flat_map(|row| alias_table(row)));
@@ -29,14 +29,14 @@ impl Shares {
     }
 }
 
-/// The alias tables of a map, threshold and alias of each part: one that chooses the row, then one for each row. A table has as
-/// many parts as the next power of two.
+/// The alias tables of a map, threshold and alias of each part: one that chooses the row, then one
+/// per row. The number of parts of a table is the next power of two.
 pub fn environment_aliases(map: &EnvironmentMap) -> Vec<(u32, u32)> {
     let entries = Shares::of(map).aliases();
     entries.iter().map(|e| (e.threshold, e.alias)).collect()
 }
 
-/// Rows of `shading_tables`: size, texels with their probabilities, alias tables of rows and columns.
+/// Rows of `shading_tables`: size, texels with probabilities, alias tables of rows and columns.
 pub(super) fn environment_rows(map: &EnvironmentMap) -> Vec<[u32; 4]> {
     let shares = Shares::of(map);
     let mut rows = vec![[map.width, map.height, 0, 0]];

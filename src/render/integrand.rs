@@ -1,19 +1,18 @@
-//! `integrand:*`: functions on the unit square with known integrals, in place of light. They trace
-//! nothing, so that errors and slopes of samplers are measured in seconds. Twin of
+//! `integrand:*`: functions on the unit square with known integrals, instead of light. They trace
+//! nothing, so errors and slopes of samplers are measured in seconds. CPU version of
 //! `kernels/integrator/integrand.wesl`.
 //!
-//! A smooth function shows what a sampler can do at best (slope −1.5 of the RMSE for Owen
-//! scrambling), a discontinuous one what an edge leaves of it (about −0.75 for all low-discrepancy
-//! points, Owen's lectures "Monte Carlo theory, methods and examples", ch. 17).
+//! A smooth function shows the best case of a sampler (slope −1.5 of the RMSE for Owen scrambling),
+//! a discontinuous one the effect of an edge (about −0.75 for all low-discrepancy points, Owen's
+//! lectures "Monte Carlo theory, methods and examples", ch. 17).
 
 use super::{Integrator, IntegratorFacts};
 use raystone_core::parameters;
 use raystone_core::params::{ParameterSchema, Parameters as _, Params};
 use raystone_sampling::dimensions;
 
-/// Square of the radius of the disk, so that its quarter has about the area 1/2.
+/// Squared radius of the disk, so that its quarter has about the area 1/2.
 const DISK_RADIUS_SQUARED: f32 = std::f32::consts::FRAC_2_PI;
-/// Corner of the box at the origin.
 const BOX_CORNER: [f32; 2] = [std::f32::consts::FRAC_1_SQRT_2, 0.618_034];
 /// `half-plane`: x · cos + y · sin < offset.
 const OBLIQUE_EDGE: [f32; 3] = [-0.6, 0.8, 0.2];
@@ -26,7 +25,7 @@ parameters! {
     }
 }
 
-// Numbers of the functions in the kernel.
+// Function numbers in the kernel.
 const EXPONENTIAL: u32 = 0;
 const GAUSSIAN: u32 = 1;
 const DISK: u32 = 2;
@@ -42,21 +41,21 @@ pub enum Function {
     Gaussian,
     /// 1 inside the quarter of a disk.
     Disk,
-    /// 1 in a box with one corner at the origin: the error is one of those that D* is the worst of.
+    /// 1 in a box with one corner at the origin, as in the definition of D*.
     CornerBox,
     /// 1 on one side of an edge: x · cos + y · sin < offset.
     HalfPlane([f32; 3]),
 }
 
 impl Function {
-    /// An edge through the centre, its normal at `degrees` from the x axis.
+    /// An edge through the centre, with its normal at `degrees` from the x axis.
     pub(crate) fn heaviside(degrees: f64) -> Self {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let [cos, sin] = [cos as f32, sin as f32];
         Self::HalfPlane([cos, sin, 0.5 * (cos + sin)])
     }
 
-    /// Twin of the kernel's `evaluate`.
+    /// CPU version of the kernel's `evaluate`.
     pub fn evaluate(&self, [x, y]: [f32; 2]) -> f32 {
         let indicator = |inside: bool| f32::from(u8::from(inside));
         match self {
@@ -68,7 +67,7 @@ impl Function {
         }
     }
 
-    /// The function itself, in double precision.
+    /// The exact function, in double precision.
     pub fn value(&self, [x, y]: [f64; 2]) -> f64 {
         let indicator = |inside: bool| f64::from(u8::from(inside));
         match self {
@@ -98,7 +97,6 @@ impl Function {
         }
     }
 
-    /// Constants of the kernel.
     fn constants(&self) -> Vec<(&'static str, u32)> {
         let (function, edge) = match self {
             Self::Exponential => (EXPONENTIAL, [0.0; 3]),
@@ -116,7 +114,7 @@ impl Function {
     }
 }
 
-/// Twin of the kernel's `exponential`.
+/// CPU version of the kernel's `exponential`.
 fn exponential(x: f32) -> f32 {
     let h = x * 0.25;
     let mut sum = 1.0_f32;
@@ -150,11 +148,10 @@ fn half_plane_area([a, b, offset]: [f64; 3]) -> f64 {
     0.5 * kept.iter().enumerate().map(cross).sum::<f64>()
 }
 
-/// The registry entry of one function.
 pub(super) struct Integrand {
     name: &'static str,
     description: &'static str,
-    /// The function; `None` is the edge at the angle of the parameter.
+    /// The function; `None` for the edge at the angle of the parameter.
     function: Option<Function>,
 }
 
@@ -192,8 +189,7 @@ pub(super) static INTEGRANDS: [Integrand; 6] = [
     },
 ];
 
-/// Every function by its name without `integrand:`, in the order of `raystone list`; parameters at
-/// their defaults.
+/// Every function by its name without `integrand:`, in the order of `raystone list`.
 pub fn functions() -> Vec<(&'static str, Function)> {
     let function = |integrand: &'static Integrand| {
         let function = integrand

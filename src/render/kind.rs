@@ -1,4 +1,4 @@
-//! What an integrator is, and what the others have to know of it.
+//! The interface of integrators, and their properties.
 
 use super::organisation::SingleKernel;
 use super::visibility;
@@ -14,50 +14,49 @@ use thiserror::Error;
 pub enum CountedRays {
     /// From the camera.
     Primary,
-    /// To a point of a light.
+    /// To a sampled point of a light.
     Shadow,
     /// Of limited length, for ambient occlusion.
     Ao,
     /// From surface to surface.
     Bounce,
-    /// Not traced, because the light cannot contribute: behind the surface, dark on this side, outside of its cone.
+    /// Not traced: behind the surface, on the dark side of the light, or outside its cone.
     Skipped,
 }
 
-/// What others have to know of an integrator with its parameters.
+/// Properties of an integrator with its parameters.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct IntegratorFacts {
-    /// Sampler dimensions that it draws at most: 0 … this, excluded.
+    /// Upper bound (exclusive) of the sampler dimensions that it draws.
     pub dimensions: u32,
-    /// Those among them that no sample draws.
+    /// Dimensions below it that no sample draws.
     pub undrawn: Vec<u32>,
-    /// Classes of rays that it may trace, and counts; none if it traces nothing.
+    /// Classes of rays that it may trace, and counts; empty if it traces nothing.
     pub rays: Vec<CountedRays>,
-    /// The value of every pixel, where it is known: it is then the reference.
+    /// The value of every pixel, if known: it is then the reference.
     pub exact: Option<f64>,
     /// Length of AO rays as a fraction of the scene's diagonal, if it traces any.
     pub ao_radius: Option<f64>,
-    /// Whether its kernel takes paths apart (`begin_path`, `visit` of `kernels/integrator/path.wesl`), so that it can be organised
-    /// in several ways.
+    /// True if its kernel splits paths into stages (`begin_path`, `visit` of
+    /// `kernels/integrator/path.wesl`), so that it can be organised in several ways.
     pub has_stages: bool,
-    /// Whether light is sampled by several shadow rays from one point.
+    /// True if light is sampled by several shadow rays from one point.
     pub has_many_shadow_rays: bool,
-    /// Whether the mean of its images is not the integral, by its parameters: a bias is no fault then.
+    /// True if its parameters bias the mean of its images: such a bias is no fault.
     pub is_biased: bool,
-    /// Whether paths begin at triangles that were rasterised, and not with a ray.
+    /// True if paths begin at rasterised triangles instead of with a ray.
     pub is_rasterised: bool,
-    /// Whether its kernels call `closest_hit` or `any_hit` themselves, and so need a structure whose
-    /// traversal is a function.
+    /// True if its kernels call `closest_hit` or `any_hit`, and so need an inline traversal.
     pub needs_inline: bool,
 }
 
 impl IntegratorFacts {
-    /// Whether it traces anything.
+    /// True if it traces rays.
     pub fn traces(&self) -> bool {
         !self.rays.is_empty()
     }
 
-    /// Pairs of dimensions that one sample draws both of: among these is a sampler's worst pair looked for.
+    /// Pairs of dimensions that one sample draws: the candidates for a sampler's worst pair.
     pub fn dimension_pairs(&self) -> Vec<[u32; 2]> {
         let mut drawn: Vec<u32> = (0..self.dimensions).collect();
         drawn.retain(|dimension| !self.undrawn.contains(dimension));
@@ -69,18 +68,18 @@ impl IntegratorFacts {
     }
 }
 
-/// An integrator: the struct of its parameters, one line in the registry.
+/// An integrator: its parameter struct, with one line in the registry.
 pub trait Integrator: Send + Sync {
-    /// Name as a user types it.
+    /// Name used in configurations.
     fn name(&self) -> &'static str;
-    /// One line: what it computes.
+    /// One-line description.
     fn description(&self) -> &'static str;
-    /// Module of the kernel that exports `radiance`, relative to the kernel folder: what an integrator of one
-    /// kernel is. One that records passes of its own needs none.
+    /// Kernel module that exports `radiance`, relative to the kernel folder, for a single-kernel
+    /// integrator. One with its own passes needs none.
     fn kernel(&self) -> &'static str {
         ""
     }
-    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    /// Paths and texts of its own kernel modules, for integrators that are not built in.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[]
     }
@@ -92,20 +91,20 @@ pub trait Integrator: Send + Sync {
     fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
         Vec::new()
     }
-    /// Features that its kernels are composed with, and whether they are on.
+    /// Features of its kernels, and whether they are enabled.
     fn features(&self, _params: &Params) -> Vec<(&'static str, bool)> {
         Vec::new()
     }
-    /// What others have to know of it.
+    /// Its properties.
     fn facts(&self, params: &Params) -> IntegratorFacts;
-    /// Buffers between its passes: names of kernel variables, and bytes for each sample of a slice of the
-    /// image. What they hold at first is unspecified.
+    /// Buffers between its passes: names of kernel variables, and bytes per sample of a slice of
+    /// the image. Their initial content is unspecified.
     fn scratch(&self) -> &'static [(&'static str, u64)] {
         &[]
     }
-    /// Records the passes that add the samples of a slice to the sums, sample after sample within a pixel,
-    /// so that the image does not depend on slices. With no rows they are recorded, too, to be compiled, and not
-    /// played.
+    /// Records the passes that add the samples of a slice to the sums, in sample order within a
+    /// pixel, so that the image does not depend on slices. With zero rows, passes are recorded for
+    /// compilation only, and not played.
     ///
     /// # Errors
     /// A kernel does not compose or compile.
@@ -115,23 +114,23 @@ pub trait Integrator: Send + Sync {
     }
 }
 
-/// Why there is no such integrator.
+/// The reason why an integrator cannot be configured.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum IntegratorError {
     /// A name that is not registered.
     #[error("no integrator is called `{name}`{}", .nearest.map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// The most similar name.
         nearest: Option<&'static str>,
     },
-    /// A parameter that it does not have, or a value that it does not allow.
+    /// An unknown parameter, or a value that is not allowed.
     #[error("{name}: {error}")]
     Parameter {
         /// The integrator.
         name: String,
-        /// What is wrong.
+        /// The error.
         error: ParamError,
     },
 }
@@ -143,17 +142,17 @@ pub struct ConfiguredIntegrator {
     pub kind: &'static dyn Integrator,
     /// Its parameters, none missing.
     pub params: Params,
-    /// What is to be known of it with these.
+    /// Its properties with these.
     pub facts: IntegratorFacts,
-    /// How it is organised on the device.
+    /// Its organisation on the device.
     pub organisation: Arc<dyn Organisation>,
 }
 
 impl ConfiguredIntegrator {
-    /// `kind` with the parameters of `variant`, and its defaults for those that it lacks.
+    /// `kind` with the parameters of `variant`, and defaults for the rest.
     ///
     /// # Errors
-    /// A parameter that it does not have, or a value that it does not allow.
+    /// An unknown parameter, or a value that is not allowed.
     pub fn new(kind: &'static dyn Integrator, variant: &Variant) -> Result<Self, IntegratorError> {
         let params = variant.params.completed(&kind.parameters());
         let params = params.map_err(|error| IntegratorError::Parameter {
@@ -168,10 +167,10 @@ impl ConfiguredIntegrator {
         })
     }
 
-    /// The same, organised in another way.
+    /// The same with another organisation.
     ///
     /// # Errors
-    /// The integrator cannot be; why, in words.
+    /// The reason why the integrator does not support it.
     pub fn organised(mut self, by: Arc<dyn Organisation>) -> Result<Self, String> {
         let name = self.kind.name();
         if !by.takes_any() && !self.facts.has_stages {
@@ -202,7 +201,7 @@ impl ConfiguredIntegrator {
         (self.organisation).record(steps, self.kind, &self.params)
     }
 
-    /// Why it cannot render through this structure, if so.
+    /// The reason why it cannot render through this structure, if any.
     pub fn refusal(&self, traced: &Traced) -> Option<String> {
         if self.facts.is_rasterised {
             let reason = visibility::refusal(traced.space);
@@ -218,7 +217,7 @@ impl ConfiguredIntegrator {
         })
     }
 
-    /// What a sampler must offer for images of this width.
+    /// The demand on a sampler for images of this width.
     pub fn demand(&self, samples: u32, width: u32) -> Demand {
         Demand {
             samples: Some(samples),

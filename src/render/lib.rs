@@ -1,4 +1,4 @@
-//! Integrators: what is traced per sample, and the renderer that runs them.
+//! Integrators: the work per sample, and the renderer that runs them.
 #![warn(missing_docs)]
 
 mod alias;

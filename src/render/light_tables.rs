@@ -1,5 +1,5 @@
-//! The lights of a scene as kernels read them: the part of `shading_tables` that
-//! `kernels/shading/light/table.wesl` takes apart.
+//! The lights of a scene for kernels: the part of `shading_tables` that
+//! `kernels/shading/light/table.wesl` reads.
 
 use super::environment_tables::environment_rows;
 use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
@@ -13,29 +13,27 @@ use raystone_scene::{
 };
 use std::f64::consts::FRAC_PI_2;
 
-/// `vec4` a light: its head and three of its kind.
+/// `vec4`s per light: its head and three specific to its kind.
 const LIGHT_ROWS: usize = 4;
 
-/// Words for the lights of a scene, and where they stand.
+/// Words for the lights of a scene, and their offsets.
 #[derive(Debug, Clone, Default)]
 pub struct LightTables {
-    /// Number of lights, and how many of them, the last ones, have no place.
+    /// Number of lights; the next field counts those at the end that have no position.
     pub lights: u32,
     infinite: u32,
-    /// Number of emissive triangles.
     emitters: u32,
-    /// First of the spheres among the lights, and how many they are.
+    /// First of the spheres among the lights, and their number.
     spheres: [u32; 2],
     /// Kinds.
     pub kinds: SceneKinds<LightKind>,
-    /// Whether some surface emits from its front alone.
+    /// True if some surface emits only from its front.
     pub one_sided: bool,
-    /// Where the tree over lights with a place begins among the rows, and the leaves of the lights in it.
+    /// Row of the tree over lights with a position, and row of their leaves.
     tree: [u32; 2],
-    /// Rows of the lights, then of the emissive triangles, each of which knows its light, of profiles and maps, and
-    /// of the tree.
+    /// Rows of lights, emissive triangles with their light, profiles and maps, and the tree.
     rows: Vec<[u32; 4]>,
-    /// Where the rows begin in `shading_tables`, in `vec4`.
+    /// Start of the rows in `shading_tables`, in `vec4`.
     first: u32,
 }
 
@@ -97,27 +95,27 @@ impl LightTables {
         tables
     }
 
-    /// Appends the rows to `shading_tables`, which is whole in `vec4`.
+    /// Appends the rows to `shading_tables`, whose length must be whole `vec4`s.
     pub fn append(&mut self, words: &mut Vec<u32>) {
         self.first = words.len() as u32 / 4;
         words.extend_from_slice(self.rows.as_flattened());
         self.rows = Vec::new();
     }
 
-    /// Whether one of them is a map of the environment.
+    /// True if a light is an environment map.
     pub(super) fn has_map(&self) -> bool {
         let mut there = self.kinds.present();
         there.any(|number| self.kinds.kind(number).name == "environment")
     }
 
-    /// Whether there is more than one light, or some triangle emits that is not of the one.
+    /// True if there is more than one light, or an emissive triangle outside of the only one.
     pub(super) fn are_chosen(&self, scene: &SceneData) -> bool {
         let emits = |of: &&u32| scene.materials[**of as usize].emission != Vec3::ZERO;
         let emissive = scene.material_ids.iter().filter(emits).count();
         self.lights > 1 || emissive != self.emitters as usize
     }
 
-    /// What `kernels/integrator/frame.wesl` is told.
+    /// Values for the uniform of `kernels/integrator/frame.wesl`.
     pub fn uniform(&self, values: UniformValues) -> UniformValues {
         let [first_sphere, spheres] = self.spheres;
         values
@@ -136,7 +134,7 @@ impl LightTables {
     }
 }
 
-/// The rows of a light behind its head.
+/// The rows of a light after its head.
 fn own_rows(scene: &SceneData, listed: &ListedLight) -> [[u32; 4]; LIGHT_ROWS - 1] {
     let none = [0; 4];
     let sides = |triangle: u32| {
@@ -209,7 +207,6 @@ fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
     }
 }
 
-/// What a light has beyond its rows.
 fn extra_rows(light: &Light) -> Vec<[u32; 4]> {
     match light {
         Light::Ies { profile, .. } => ies_rows(profile),
@@ -237,14 +234,14 @@ fn ies_rows(profile: &IesProfile) -> Vec<[u32; 4]> {
     rows
 }
 
-/// The nodes of the tree over the lights of a scene that have a place: see `light_tree`.
+/// The nodes of the tree over the lights of a scene with a position: see `light_tree`.
 pub fn light_branches(scene: &SceneData, list: &LightList) -> Vec<TreeNode> {
     let lights = list.lights.iter();
     let bounds: Vec<LightBounds> = lights.filter_map(|l| light_bounds(scene, l)).collect();
     light_tree(&bounds).0
 }
 
-/// Where a light is and shines, if it has a place.
+/// Position and emission bounds of a light, if it has a position.
 fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> {
     let power = listed.power;
     let flat = |corners: &[Vec3], normal: Vec3, triangle: u32| {

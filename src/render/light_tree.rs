@@ -1,31 +1,31 @@
-//! A bounding volume hierarchy of lights: each node bounds where its lights are, where they point and how much they
-//! emit, so that a light can be chosen by about what it contributes at a point.
+//! A bounding volume hierarchy of lights: each node bounds the position, direction and power of its
+//! lights, so that a light can be chosen by its approximate contribution at a point.
 //!
-//! Source: A. Conty Estevez, C. Kulla, "Importance sampling of many lights with adaptive tree splitting", 2018 (without the
-//! splitting); cones and the bound of the cosine as in M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th
-//! edition, 12.6.3. The twin of `importance` is in `kernels/shading/light/tree.wesl`.
+//! Source: A. Conty Estevez, C. Kulla, "Importance sampling of many lights with adaptive tree
+//! splitting", 2018 (without the splitting); cones and the bound of the cosine as in M. Pharr, W.
+//! Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 12.6.3. `importance` is in
+//! `kernels/shading/light/tree.wesl`.
 
 use glam::{DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// What is known of one or more lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LightBounds {
     pub min: DVec3,
     pub max: DVec3,
     pub power: f64,
-    /// Axis of the cone of the normals, of length 1.
+    /// Unit axis of the normal cone.
     pub axis: DVec3,
     /// Largest angle between axis and normals, radians.
     pub normals: f64,
-    /// How far from a normal light is emitted, radians.
+    /// Emission angle around a normal, radians.
     pub spread: f64,
-    /// Whether light goes along both directions of the normals.
+    /// True if light is emitted on both sides of the surface.
     pub both_sides: bool,
 }
 
 impl LightBounds {
-    /// Light from this box into all directions.
+    /// Omnidirectional light from this box.
     pub(crate) fn everywhere(min: DVec3, max: DVec3, power: f64) -> Self {
         Self {
             min,
@@ -42,7 +42,6 @@ impl LightBounds {
         0.5 * (self.min + self.max)
     }
 
-    /// Of both.
     fn union(&self, other: &Self) -> Self {
         let (axis, normals) = cone_union((self.axis, self.normals), (other.axis, other.normals));
         Self {
@@ -56,8 +55,7 @@ impl LightBounds {
         }
     }
 
-    /// Cost of a cluster: power, solid angle of where it shines, and surface of its box (Conty Estevez & Kulla,
-    /// eq. 1).
+    /// Cost of a cluster: power, solid angle, and box surface (Conty Estevez & Kulla, eq. 1).
     fn cost(&self, extent: DVec3, axis: usize) -> f64 {
         let reach = (self.normals + self.spread).min(PI);
         let (n, w) = (self.normals, reach);
@@ -65,13 +63,13 @@ impl LightBounds {
             + FRAC_PI_2 * (2.0 * w * n.sin() - (n - 2.0 * w).cos() - 2.0 * n * n.sin() + n.cos());
         let size = self.max - self.min;
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-        // Thin boxes are no better for being thin along the axis that is cut.
+        // Thin boxes are no better for being thin along the split axis.
         let regular = extent.max_element() / extent[axis].max(f64::MIN_POSITIVE);
         self.power * angle.max(1e-6) * area.max(1e-12 * extent.length_squared()) * regular
     }
 }
 
-/// The least cone around two.
+/// The smallest cone around two cones.
 fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let between = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
@@ -87,28 +85,27 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     ((turn * wide.0).normalize(), angle)
 }
 
-/// A node; its number is its place.
+/// A node, identified by its index.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeNode {
     pub(super) bounds: LightBounds,
-    /// First of its two children, which follow each other, or 0.
+    /// First of its two consecutive children, or 0.
     pub child: u32,
-    /// The node above; 0 above the root.
+    /// The parent; 0 for the root.
     pub parent: u32,
     /// The light of a leaf.
     pub light: u32,
-    /// How many lights it holds.
+    /// Number of its lights.
     pub(super) count: u32,
 }
 
-/// Number of the root: children begin at even numbers, and the other child of a node is its number with the last bit
-/// flipped.
+/// Index of the root. Siblings begin at even indices and differ in the last bit.
 pub(super) const ROOT: usize = 1;
-/// Places at which a cluster may be cut along an axis.
+/// Number of split candidates along an axis.
 const BUCKETS: usize = 12;
 
-/// The nodes of a tree over lights, number 0 being none; and the leaf of each light. All nodes below a left child have lower numbers
-/// than those below the right one, which kernels find the way to a leaf by.
+/// The nodes of a tree over lights, index 0 being unused; and the leaf of each light. All nodes
+/// below a left child precede those below the right one, by which kernels find a leaf.
 pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     let Some(first) = lights.first() else {
         return (Vec::new(), Vec::new());
@@ -147,7 +144,7 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     (nodes, leaves)
 }
 
-/// Cuts a cluster where the sum of the costs is least; by halves where no place is better than another.
+/// Splits a cluster where the sum of the costs is least; in halves if all are equal.
 fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
     let center = |light: &u32| lights[*light as usize].center();
     let low = members.iter().map(center).fold(DVec3::INFINITY, DVec3::min);
@@ -191,11 +188,11 @@ fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
     [members, right]
 }
 
-/// Added to the angle of emission, so that rounding in kernels leaves no light out, radians.
+/// Added to the emission angle, so that rounding in kernels excludes no light, radians.
 const SLACK: f64 = 0.01;
 
-/// Rows of `shading_tables`: four `vec4` a node, the last of which holds child, leaf's light, number of lights and whether some
-/// shine to both sides; then for each light its leaf. Boxes are rounded outwards.
+/// Rows of `shading_tables`: four `vec4` per node, the last of which holds child, leaf's light,
+/// number of lights and a two-sided flag; then the leaf of each light. Boxes are rounded outwards.
 pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
     let (nodes, leaves) = light_tree(lights);
     let vector =
@@ -251,7 +248,7 @@ mod tests {
         for count in [1, 2, 3, 50, 300] {
             let mut lights = random_lights(count);
             if count == 50 {
-                // All at one place: nothing to cut by.
+                // All at one position: no basis for a split.
                 let first = lights[0];
                 lights
                     .iter_mut()
@@ -273,7 +270,7 @@ mod tests {
                     assert!(node == ROOT || nodes[parent].child as usize == node & !1);
                     let right = (node | 1).min(nodes.len() - 1);
                     let after = nodes[right].child as usize;
-                    // Where kernels look for the leaf of a light.
+                    // Search for the leaf of a light as in kernels.
                     let found_left = *leaf as usize == node & !1
                         || (*leaf as usize != right && (after == 0 || (*leaf as usize) < after));
                     assert!(node == ROOT || found_left == (node & 1 == 0));

@@ -1,37 +1,38 @@
-//! In which order the pixels of a sample are taken, so that something can be shown before all of them have it.
+//! The order in which the pixels of a sample are rendered, so that something can be shown before
+//! all of them are done.
 //!
-//! A. Dufay (thesis, Bordeaux 2017, section 2.2.4) takes one pixel of every tile of 16 × 16 at a time, the corners of coarse squares
-//! before those of finer ones (Fig. 2.13), and fills the gaps for display from the corner of the finest square that has a sample
-//! (Alg. 2.1). He compares that with one pass and with sixteen (Table 2.2).
+//! A. Dufay (thesis, Bordeaux 2017, section 2.2.4) renders one pixel of every 16 × 16 tile at a
+//! time, the corners of coarse squares before those of finer ones (Fig. 2.13), and fills the gaps
+//! for display from the corner of the finest square that has a sample (Alg. 2.1). He compares that
+//! with one pass and with sixteen (Table 2.2).
 
 use raystone_core::parameters;
 use raystone_image::Image;
 
 parameters! {
-    /// How the pixels of an image are dealt out to passes.
+    /// The assignment of an image's pixels to passes.
     pub enum Order {
         /// All at once.
         OnePass = "one-pass",
         /// Sixteen blocks, four by four.
         Blocks = "blocks",
-        /// One pixel of each tile of 16 × 16 at a time, coarse squares first: 256 passes.
+        /// One pixel of each 16 × 16 tile at a time, coarse squares first: 256 passes.
         QuadTree = "quad-tree",
     }
 }
 
 /// Edge of a tile of [`Order::QuadTree`], pixels.
 pub(crate) const TILE: u32 = 16;
-/// Blocks of [`Order::Blocks`] in each direction.
 const BLOCKS: u32 = 4;
 
-/// Pixels of one pass: `count` of them in each direction from `first` on, each `step` from the next.
+/// Pixels of one pass: `count` in each direction, starting at `first` and `step` apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     /// Column and row of the first.
     pub first: [u32; 2],
-    /// How many in each direction.
+    /// Number in each direction.
     pub count: [u32; 2],
-    /// How far they lie apart, pixels.
+    /// Spacing, pixels.
     pub step: u32,
 }
 
@@ -44,8 +45,8 @@ impl Part {
     }
 }
 
-/// The place within a tile of the `number`-th of 256 passes: the digits of the number to base 4, turned around, are a Morton
-/// number, so that after 1, 4, 16, 64 passes those pixels are done whose places are multiples of 16, 8, 4, 2.
+/// The position of the `number`-th of 256 passes in a tile: its base-4 digits, reversed, are a
+/// Morton number, so passes 1, 4, 16, 64 complete the pixels at multiples of 16, 8, 4, 2.
 pub(crate) fn quad_tree_place(number: u32) -> [u32; 2] {
     let digit = |at: u32| number >> (2 * at) & 3;
     let bit = |axis: u32| (0..4).map(|at| (digit(at) >> axis & 1) << (3 - at)).sum();
@@ -53,7 +54,7 @@ pub(crate) fn quad_tree_place(number: u32) -> [u32; 2] {
 }
 
 impl Order {
-    /// The passes of a sample of an image of this size, those without a pixel left out: each pixel stands in one of them.
+    /// The non-empty passes of a sample of an image of this size; each pixel is in one of them.
     pub fn parts(self, size: [u32; 2]) -> Vec<Part> {
         let parts: Vec<Part> = match self {
             Self::OnePass => vec![Part {
@@ -107,12 +108,13 @@ impl Order {
     }
 }
 
-/// The image of sums (radiance, and samples that were taken) of which not all pixels have a sample: those without take the mean of
-/// the first corner that has one, of the squares of 2, 4, 8, 16 pixels that they lie in (Dufay 2017, Alg. 2.1, whose comment
-/// says four turns where his code takes five). `None` while a pixel finds none.
+/// The image of partial sums (radiance, and number of samples). A pixel without samples gets the
+/// mean of the first sampled corner of the squares of 2, 4, 8, 16 pixels around it (Dufay 2017,
+/// Alg. 2.1, whose comment says four iterations where his code takes five). `None` while a pixel
+/// finds none.
 ///
 /// # Panics
-/// There are not as many sums as pixels.
+/// The number of sums is not the number of pixels.
 pub fn splat(sums: &[[f32; 4]], [width, height]: [u32; 2]) -> Option<Image> {
     assert_eq!(sums.len(), width as usize * height as usize);
     let colour = |x: u32, y: u32| {
@@ -136,7 +138,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// Whether these parts hold every pixel once.
+    /// True if these parts contain every pixel once.
     fn is_bijection(parts: &[Part], size: [u32; 2]) -> bool {
         let pixels: Vec<_> = parts.iter().flat_map(Part::pixels).collect();
         let distinct: BTreeSet<_> = pixels.iter().copied().collect();
@@ -150,7 +152,7 @@ mod tests {
             for order in [Order::OnePass, Order::Blocks, Order::QuadTree] {
                 let parts = order.parts(size);
                 assert!(is_bijection(&parts, size), "{order:?} of {size:?}");
-                // Faults: a part that is left out, one that stands twice, one that is moved by a pixel.
+                // Faults: a missing part, a repeated one, one moved by a pixel.
                 let without: Vec<_> = parts[1..].to_vec();
                 let twice = [&parts[..], &parts[..1]].concat();
                 let mut moved = parts.clone();
@@ -218,7 +220,7 @@ mod tests {
             assert_eq!(complete_after(order), passes);
             assert_eq!(order.passes_to_first_picture(size), passes);
         }
-        // Two samples in a pixel are their mean.
+        // Two samples of a pixel are averaged.
         let sums = [[2.0, 4.0, 6.0, 2.0]];
         assert_eq!(
             splat(&sums, [1, 1]).map(|i| i.pixels),

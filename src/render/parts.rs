@@ -1,4 +1,4 @@
-//! Renders an image part by part, each part a dispatch of its own: what [`Order`] deals out.
+//! Renders an image part by part, each part in its own dispatch, as assigned by [`Order`].
 
 use super::order::{Order, Part, splat};
 use super::passes::{ImageSteps, Passes};
@@ -11,7 +11,7 @@ use raystone_gpu::{
 };
 use raystone_image::Image;
 
-/// A compiled job whose samples are taken part by part.
+/// A compiled job whose samples are rendered part by part.
 pub struct PartRenderer {
     gpu: Gpu,
     player: Player,
@@ -24,10 +24,10 @@ pub struct PartRenderer {
     status: wgpu::Buffer,
 }
 
-/// How long an image took in an order.
+/// The time of an image in an order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InOrder {
-    /// Passes of a sample of all pixels.
+    /// Passes for one sample of all pixels.
     pub passes: usize,
     /// All samples.
     pub total: Elapsed,
@@ -36,11 +36,11 @@ pub struct InOrder {
 }
 
 impl PartRenderer {
-    /// Compiles the job's kernel and makes its buffers.
+    /// Compiles the job's kernel and allocates its buffers.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, the integrator needs another kind of structure or has passes of its own, or the
-    /// image is too large for a buffer.
+    /// A kernel does not compose or compile, the integrator needs another kind of structure or has
+    /// its own passes, or the image is too large for a buffer.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -97,7 +97,7 @@ impl PartRenderer {
         Ok(recording)
     }
 
-    /// Forgets all samples.
+    /// Discards all samples.
     ///
     /// # Errors
     /// The device is lost or hangs.
@@ -107,7 +107,7 @@ impl PartRenderer {
         self.player.play(&recording).map(|_| ())
     }
 
-    /// Takes one sample in each pixel of a part.
+    /// Renders one sample in each pixel of a part.
     ///
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
@@ -137,7 +137,7 @@ impl PartRenderer {
         played.download("sums")
     }
 
-    /// The picture so far: gaps take the colour of a coarser pixel, see [`splat`]; `None` while there are others.
+    /// The picture so far, with gaps filled by [`splat`]; `None` while some remain.
     ///
     /// # Errors
     /// As [`PartRenderer::sums`].
@@ -145,11 +145,12 @@ impl PartRenderer {
         Ok(splat(&self.sums()?, self.size))
     }
 
-    /// Renders from nothing in an order, each part a submission that is waited for. What is shown on the way is not
-    /// measured: `show` is called when the first picture without a gap is there.
+    /// Renders from scratch in an order, waiting for each part's submission. Display time is
+    /// excluded: `show` is called when the first picture without a gap is ready.
     ///
     /// # Errors
-    /// There are more than [`BLOCK_SAMPLES`] samples, the device is lost or hangs, the driver complains, or showing fails.
+    /// There are more than [`BLOCK_SAMPLES`] samples, the device is lost or hangs, the driver
+    /// complains, or showing fails.
     pub fn render<E: From<GpuError>>(
         &self,
         order: Order,
@@ -183,7 +184,7 @@ impl PartRenderer {
         Ok(spent)
     }
 
-    /// The image of so many samples in each pixel.
+    /// The image of `spp` samples in each pixel.
     ///
     /// # Errors
     /// A pixel has another number of samples, or as [`PartRenderer::sums`].

@@ -18,29 +18,27 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Arrays that a kernel of images reads as textures, which software drivers load from in half the time:
+/// Arrays that an image kernel reads as textures, which software drivers load in half the time:
 /// nodes and triangles of a structure, sampler words, triangles and shading tables of the scene.
 const STORAGE_TEXTURES: u32 = 5;
 
-/// What the passes of a job are composed with and bind, and those that were compiled.
+/// Composition and bindings of a job's passes, and the compiled ones.
 pub(super) struct Passes {
     gpu: Gpu,
-    /// Everything that is chosen but the entry.
+    /// All choices except the entry.
     chosen: Composition,
     bindings: Bindings,
     triangles: TriangleBuffers,
     traced: Traced,
     runtime_checks: bool,
-    /// What paths begin at that trace no first ray.
+    /// The rasterised start of paths that trace no first ray.
     pub visibility: Option<Visibility>,
-    /// Corners of the scene's box.
     bounds: [[f32; 3]; 2],
-    /// What the scene makes kernels carry.
     scene: SceneFeatures,
-    /// Features that some scenes need and this kernel is without; none where nothing is traced.
+    /// Features that some scenes need but this kernel omits; empty if nothing is traced.
     left_out: Vec<&'static str>,
     pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
-    /// What answers buffers of rays, by the name of the query.
+    /// Tracers for buffers of rays, by query name.
     tracers: RefCell<BTreeMap<String, Arc<Tracer>>>,
 }
 
@@ -62,10 +60,11 @@ impl Passes {
             bindings = bindings.merged(&traced.bindings);
             chosen = traced.compose(chosen);
         }
-        // A block of a list is a workgroup of its own.
-        let shape = match by_blocks {
-            true => GroupShape::default(),
-            false => traced.workgroup,
+        // A listed block is one workgroup.
+        let shape = if by_blocks {
+            GroupShape::default()
+        } else {
+            traced.workgroup
         };
         let mut chosen = with_sampler(shape.activate(chosen), job.sampler)
             .feature("ray_counts", ray_counts)
@@ -90,9 +89,10 @@ impl Passes {
         bindings
             .buffer("status", status)
             .buffer("sampler_table", &table);
-        let visibility = match job.integrator.facts.is_rasterised {
-            true => Some(Visibility::new(gpu, scene, traced.space, job.size)?),
-            false => None,
+        let visibility = if job.integrator.facts.is_rasterised {
+            Some(Visibility::new(gpu, scene, traced.space, job.size)?)
+        } else {
+            None
         };
         if let Some(visibility) = &visibility {
             visibility.draw(job.camera)?;
@@ -114,7 +114,7 @@ impl Passes {
         })
     }
 
-    /// The kernel of a pass, composed with what is chosen but for these features.
+    /// The kernel of a pass, composed with all choices except these features.
     fn pipeline(
         &self,
         pass: &str,
@@ -151,7 +151,6 @@ impl Passes {
         Ok(tracer)
     }
 
-    /// Feature flags of the kernels.
     pub(crate) fn features(&self) -> Vec<String> {
         let mut all = BTreeSet::new();
         for pipeline in self.pipelines.borrow().values() {
@@ -163,7 +162,7 @@ impl Passes {
         all.into_iter().collect()
     }
 
-    /// Features that other scenes need and these kernels are without.
+    /// Features that other scenes need but these kernels omit.
     pub(crate) fn left_out(&self) -> Vec<String> {
         self.left_out
             .iter()
@@ -171,7 +170,7 @@ impl Passes {
             .collect()
     }
 
-    /// Text of every composed kernel, by the name of its pass.
+    /// Text of every composed kernel, by pass name.
     pub(crate) fn texts(&self) -> Vec<(String, String)> {
         let pipelines = self.pipelines.borrow();
         let mut texts: Vec<_> = pipelines
@@ -186,10 +185,10 @@ impl Passes {
     }
 }
 
-/// What passes are recorded with: they add the samples of a slice of the image, some rows of it, to the sums.
+/// Recorder of passes that add the samples of a slice, some rows of the image, to the sums.
 ///
-/// Kernels find bound: what shading reads of the scene, `sampler_table`, `status`, `accumulation` (the sums
-/// of a band of rows), the uniform `frame` (see `kernels/integrator/frame.wesl`), and the integrator's scratch.
+/// Kernels can bind: the scene data for shading, `sampler_table`, `status`, `accumulation` (the
+/// sums of a band of rows), the uniform `frame` (`kernels/integrator/frame.wesl`), and the scratch.
 pub struct ImageSteps<'a> {
     passes: &'a Passes,
     recording: &'a mut Recording,
@@ -198,14 +197,14 @@ pub struct ImageSteps<'a> {
     pub width: u32,
     /// Rows of the slice.
     pub rows: u32,
-    /// Samples that each of their pixels takes.
+    /// Samples per pixel of the slice.
     pub samples: u32,
-    /// Whether the slice is so many blocks of a list, and not rows.
+    /// True if the slice consists of listed blocks instead of rows.
     by_blocks: bool,
 }
 
 impl<'a> ImageSteps<'a> {
-    /// Steps for a slice of a job, whose sums and scratch are these.
+    /// Steps for a slice of a job with these sums and scratch.
     pub(super) fn new(
         passes: &'a Passes,
         recording: &'a mut Recording,
@@ -238,24 +237,26 @@ impl<'a> ImageSteps<'a> {
         }
     }
 
-    /// All samples of the slice.
+    /// Number of samples in the slice.
     pub fn count(&self) -> u32 {
         self.width * self.rows * self.samples
     }
 
-    /// Workgroups of 8 × 8 invocations, one for each pixel of the slice.
+    /// Workgroups of 8 × 8 invocations, one per pixel of the slice.
     pub fn pixels(&self) -> [u32; 3] {
-        match self.by_blocks {
-            true => [self.rows, 1, 1],
-            false => GroupShape::default().over(self.width, self.rows),
+        if self.by_blocks {
+            [self.rows, 1, 1]
+        } else {
+            GroupShape::default().over(self.width, self.rows)
         }
     }
 
-    /// The same for kernels with workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT` invocations, which an experiment chooses.
+    /// The same for kernels with workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT` invocations.
     pub(crate) fn pixel_groups(&self) -> [u32; 3] {
-        match self.by_blocks {
-            true => self.pixels(),
-            false => self.shape().over(self.width, self.rows),
+        if self.by_blocks {
+            self.pixels()
+        } else {
+            self.shape().over(self.width, self.rows)
         }
     }
 
@@ -277,8 +278,9 @@ impl<'a> ImageSteps<'a> {
         })
     }
 
-    /// Answers the first `count` rays of a buffer (32 bytes each: origin, `t_min`, direction, `t_max`), inline
-    /// or in the structure's own passes. Answers have 16 bytes: a hit, or 1 or 0 where any hit is asked for.
+    /// Answers the first `count` rays of a buffer (32 bytes each: origin, `t_min`, direction,
+    /// `t_max`), inline or in the structure's passes. Answers have 16 bytes: a hit, or 1 or 0 for
+    /// any hit.
     ///
     /// # Errors
     /// A kernel does not compose or compile, or there is no such buffer.
@@ -296,7 +298,7 @@ impl<'a> ImageSteps<'a> {
         self.trace_buffers(query, &buffers, 0..count, None)
     }
 
-    /// The same for these rays of a buffer, of which the device may know how many there are.
+    /// The same for a range of rays, whose number may be stored on the device.
     ///
     /// # Errors
     /// As [`ImageSteps::trace`].
@@ -315,7 +317,7 @@ impl<'a> ImageSteps<'a> {
         self.trace_buffers(query, &buffers, range, live)
     }
 
-    /// Times of whatever passes these are told under [`RAY_QUERIES`].
+    /// All passes are timed under [`RAY_QUERIES`].
     fn trace_buffers(
         &mut self,
         query: Query,
@@ -339,7 +341,7 @@ impl<'a> ImageSteps<'a> {
         &self.passes.gpu
     }
 
-    /// Where passes of other makers are written down.
+    /// The recording, for passes from elsewhere.
     pub fn recording(&mut self) -> &mut Recording {
         self.recording
     }
@@ -349,14 +351,13 @@ impl<'a> ImageSteps<'a> {
         self.passes.bounds
     }
 
-    /// Kinds of materials of the scene.
     pub(crate) fn material_kinds(&self) -> &SceneKinds<MaterialKind> {
         &self.passes.scene.materials
     }
 
-    /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it
-    /// inline, structure. What `special` binds goes before the buffers and values of those names. A pass has
-    /// one kernel: `name` decides.
+    /// Runs a kernel, composed with the job's sampler, scene, constants and, if the integrator
+    /// needs it inline, structure. Bindings in `special` override those of the same name. A pass
+    /// has one kernel: `name` decides.
     ///
     /// # Errors
     /// The kernel does not compose or compile.
@@ -370,8 +371,8 @@ impl<'a> ImageSteps<'a> {
         self.run_without(&[], name, kernel, groups.into(), special)
     }
 
-    /// The same with a kernel that meets surfaces of one kind of materials alone, by its number, or none at all: it is composed without
-    /// what others need.
+    /// The same with a kernel for surfaces of one kind of material, by its number, or for misses
+    /// only: it is composed without the features of others.
     ///
     /// # Errors
     /// As [`ImageSteps::run`].

@@ -1,4 +1,4 @@
-//! The path tracer, and how it joins what finds light: its estimator. Formulas: `docs/shading.md`; kernel:
+//! The path tracer, and the strategies of its estimator. Formulas: `docs/shading.md`; kernel:
 //! `kernels/integrator/path.wesl`.
 
 use super::kind::CountedRays;
@@ -9,41 +9,39 @@ use raystone_core::params::{Choice as _, ParameterSchema, Parameters as _, Param
 use raystone_sampling::dimensions::{self, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE};
 
 parameters! {
-    /// How directions of the material and samples of lights are joined.
+    /// How material and light sampling are combined.
     pub enum Strategy {
         /// Both, weighted by the balance heuristic (Veach & Guibas 1995).
         MisBalance = "mis-balance",
         /// Both, weighted by the power heuristic with exponent 2.
         MisPower = "mis-power",
-        /// Emission is found by directions of the material alone.
+        /// Emission is found by material sampling only.
         Bsdf = "bsdf",
-        /// Light samples alone; what they cannot find (the camera's own ray, delta lobes) is found.
+        /// Light sampling only; other emission (camera rays, delta lobes) is added when hit.
         Light = "light",
     }
 
-    /// What decides whether a path goes on.
+    /// The survival criterion of a path.
     pub enum Roulette {
         /// The brightest component of its throughput.
         Throughput = "throughput",
         /// The brightest component of the weight of its last bounce (Dufay 2017, 2.2.3).
         Albedo = "albedo",
-        /// Nothing: it goes on to the greatest depth.
+        /// No roulette: paths continue to the maximum depth.
         Never = "none",
     }
 
-    /// What decides which light is sampled.
+    /// How the sampled light is chosen.
     pub(crate) enum LightChoice {
-        /// Its power.
         Power = "power",
-        /// Nothing: all are alike.
         Uniform = "uniform",
-        /// What it contributes at the point, about, by a hierarchy of lights (Conty Estevez & Kulla 2018).
+        /// By approximate contribution, with a light hierarchy (Conty Estevez & Kulla 2018).
         Tree = "tree",
     }
 
-    /// Where the first hit of a path comes from.
+    /// Source of a path's first hit.
     pub enum Primary {
-        /// A ray through the point of the pixel that the sample draws.
+        /// A ray through the sampled point of the pixel.
         Traced = "traced",
         /// A ray through the centre of the pixel.
         Centre = "centre",
@@ -51,7 +49,7 @@ parameters! {
         Raster = "raster",
     }
 
-    /// How many lights are sampled at each vertex.
+    /// Number of lights sampled at each vertex.
     pub enum Lights {
         /// One.
         One = "one",
@@ -59,7 +57,7 @@ parameters! {
         All = "all",
     }
 
-    /// What a kernel carries though the scene does not need it: groups of features.
+    /// Groups of features that a kernel includes although the scene does not need them.
     pub(crate) enum Carry {
         /// Nothing.
         Nothing = "none",
@@ -69,15 +67,13 @@ parameters! {
         Textures = "textures",
         /// Normals of vertices and of textures.
         Normals = "normals",
-        /// Every kind of light.
         Lights = "lights",
         /// The choice among lights, and the search for the one that was found.
         Choice = "choice",
-        /// What rays that leave the scene find.
+        /// Radiance of rays that leave the scene.
         Background = "background",
-        /// The error that instances add to points, and which triangles are mirrored.
+        /// The error that instances add to points, and the mirrored triangles.
         Transforms = "transforms",
-        /// All of these: the full kernel.
         All = "all",
     }
 
@@ -109,7 +105,7 @@ parameters! {
 }
 
 impl PathParameters {
-    /// Features of the kernel, with whether they are on.
+    /// Features of the kernel, and whether they are enabled.
     fn features(&self) -> Vec<(&'static str, bool)> {
         let mut features = vec![
             ("next_event", self.strategy != Strategy::Bsdf),
@@ -155,7 +151,7 @@ impl PathParameters {
 }
 
 impl Carry {
-    /// Features that are on whatever the scene.
+    /// Features that are enabled for any scene.
     fn features(self) -> impl Iterator<Item = &'static str> {
         let is_carried = move |group: &str| self == Self::All || group == self.name();
         let carried = grouped_features().filter(move |(group, _)| is_carried(group));

@@ -8,7 +8,7 @@ use raystone_core::params::{Kinds, Named, ParameterSchema, Sources, Variant};
 use raystone_core::text::nearest;
 use std::ops::{Deref, DerefMut};
 
-/// Everything that can be named on the `integrator` axis.
+/// The values of the `integrator` axis.
 #[derive(Clone, Default)]
 pub struct IntegratorRegistry(Kinds<dyn Integrator>);
 
@@ -54,7 +54,7 @@ impl IntegratorRegistry {
     /// The integrator of a variant, with its parameters.
     ///
     /// # Errors
-    /// A name that is not registered, or parameters that the integrator does not have.
+    /// An unknown name, or an unknown parameter of the integrator.
     pub fn configured(&self, variant: &Variant) -> Result<ConfiguredIntegrator, IntegratorError> {
         let unknown = || IntegratorError::Unknown {
             name: variant.name.clone(),

@@ -1,8 +1,9 @@
-//! The renderer: plays the passes of an integrator in slices of about a quarter of a second and keeps the
-//! sum at every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
+//! The renderer: plays the passes of an integrator in slices of about a quarter of a second and
+//! stores the sum at every power of two of samples, so that one run gives the error at spp = 1, 2,
+//! 4, ….
 //!
-//! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
-//! exactly the samples asked for.
+//! Every returned image was checked: no kernel raised its error word, and every pixel took exactly
+//! the requested samples.
 
 use super::blocks::Blocks;
 use super::kind::ConfiguredIntegrator;
@@ -22,21 +23,21 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Samples of the first slice: few, each may be a path through brute force over thousands of triangles.
+/// Samples of the first slice: few, as each may be a path through brute force.
 const FIRST_SLICE: u64 = 512;
-/// Bytes of the error word and of what is counted behind it, see `kernels/common/ray_counts.wesl`.
+/// Bytes of the error word and the counters after it, see `kernels/common/ray_counts.wesl`.
 const STATUS_BYTES: u64 = 256;
-/// Bytes that a buffer between passes may take at most, below the adapter's limit.
+/// Maximum bytes of a buffer between passes, below the adapter's limit.
 const SCRATCH_BYTES: u64 = 1 << 28;
 
-/// Samples of a pixel that are summed in f32 on the device before the host adds the sum in f64. Blocks
-/// begin at multiples of it, so that an image does not depend on slices.
+/// Samples of a pixel that are summed in f32 on the device before the host adds the sum in f64.
+/// Blocks begin at multiples of it, so that an image does not depend on slices.
 pub const BLOCK_SAMPLES: u32 = 256;
 
-/// How far rounding alone may move a pixel of an image of `spp` samples, relative to the mean of the
-/// samples' magnitudes: one rounding per addition within a block, and one of the mean to f32 (N. Higham,
-/// "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2). What f64 adds to that
-/// stays below a millionth of it.
+/// Bound on the effect of rounding alone on a pixel of an image of `spp` samples, relative to the
+/// mean of the samples' magnitudes: one rounding per addition within a block, and one of the mean
+/// to f32 (N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section
+/// 4.2). The f64 part is below a millionth of it.
 pub fn rounding_bound(spp: u32) -> f64 {
     let roundings = f64::from(spp.min(BLOCK_SAMPLES));
     roundings * 0.5 * f64::from(f32::EPSILON) * (1.0 + 1e-6)
@@ -47,19 +48,19 @@ pub fn rounding_bound(spp: u32) -> f64 {
 pub struct RenderJob<'a> {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Where it is taken from.
+    /// The camera.
     pub camera: Camera,
-    /// What draws the samples.
+    /// The source of random numbers.
     pub sampler: &'a Sampler,
-    /// What is computed per sample.
+    /// The integrator.
     pub integrator: &'a ConfiguredIntegrator,
-    /// Where rays that leave a surface start.
+    /// Origins of rays that leave a surface.
     pub offset: RayOffset,
-    /// Whether the driver's checks are on.
+    /// Enables the driver's runtime checks.
     pub runtime_checks: bool,
 }
 
-/// The image after so many samples.
+/// The image after some number of samples.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     /// Samples per pixel.
@@ -75,7 +76,7 @@ struct Band {
     sums: wgpu::Buffer,
 }
 
-/// A compiled job on one scene and structure.
+/// A compiled job for one scene and structure.
 // Many fields: one for each buffer and pass that lives as long as the job.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
@@ -85,25 +86,25 @@ pub struct Renderer<'a> {
     uniform: UniformValues,
     passes: Passes,
     bands: Vec<Band>,
-    /// Where only some blocks take samples: which.
+    /// The listed blocks, if only some take samples.
     chosen: Option<Blocks>,
     status: wgpu::Buffer,
     /// Samples per pixel since the last reset.
     done: Cell<u32>,
-    /// Of these, how many the sums on the device hold.
+    /// Samples of these in the sums on the device.
     pending: Cell<u32>,
-    /// The sums of the blocks before; empty if there were none.
+    /// The sums of earlier blocks; empty if there were none.
     blocks: RefCell<Vec<[f64; 3]>>,
     slices: Slices,
-    /// Samples for which the buffers between passes have room.
+    /// Capacity of the buffers between passes, in samples.
     most: u64,
     /// GPU milliseconds of each stage since the last reset.
     stages: RefCell<BTreeMap<String, f64>>,
-    /// GPU milliseconds and wall milliseconds of all slices since the last reset.
+    /// Time of all slices since the last reset.
     spent: Cell<Elapsed>,
 }
 
-/// Buffers for the sums of an image, as many rows in each as the adapter can bind.
+/// Buffers for the sums of an image, each with as many rows as the adapter can bind.
 fn bands(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Vec<Band>, GpuError> {
     let row_bytes = u64::from(width) * 16;
     // Slices are multiples of eight rows, the height of a workgroup.
@@ -120,7 +121,7 @@ fn bands(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Vec<Band>, GpuError> {
         .collect()
 }
 
-/// Puts a sampler into a kernel that draws; its words are bound as `sampler_table`.
+/// Adds a sampler to a kernel that draws; its words are bound as `sampler_table`.
 #[must_use]
 pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composition {
     for (name, value) in sampler.constants() {
@@ -132,7 +133,7 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
         .with("decorrelation", &decorrelation)
 }
 
-/// Samples for which an integrator's buffers between passes have room.
+/// Number of samples that fit into an integrator's buffers between passes.
 fn most_samples(gpu: &Gpu, integrator: &ConfiguredIntegrator) -> u64 {
     let scratch = integrator.kind.scratch().iter();
     let limit = gpu
@@ -145,11 +146,11 @@ fn most_samples(gpu: &Gpu, integrator: &ConfiguredIntegrator) -> u64 {
 }
 
 impl<'a> Renderer<'a> {
-    /// Compiles the job's kernels and makes its buffers.
+    /// Compiles the job's kernels and allocates its buffers.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, the integrator needs another kind of structure, or the scene or
-    /// one row of the image is too large for a buffer.
+    /// A kernel does not compose or compile, the integrator needs another kind of structure, or the
+    /// scene or one row of the image is too large for a buffer.
     pub fn new(
         gpu: &'a Gpu,
         scene: &SceneBuffers,
@@ -160,11 +161,12 @@ impl<'a> Renderer<'a> {
         Self::compiled(gpu, scene, traced, job, [ray_counts, false])
     }
 
-    /// The same with a kernel that takes samples in some blocks of the image alone, see [`Renderer::only`]; in all at
-    /// first.
+    /// The same with a kernel that samples only listed blocks, see [`Renderer::only`]; initially
+    /// all.
     ///
     /// # Errors
-    /// As for [`Renderer::new`], or the integrator has passes of its own, or the sums do not fit into one buffer.
+    /// As for [`Renderer::new`], or the integrator has its own passes, or the sums do not fit into
+    /// one buffer.
     pub fn by_blocks(
         gpu: &'a Gpu,
         scene: &SceneBuffers,
@@ -193,9 +195,10 @@ impl<'a> Renderer<'a> {
             uniform: job_uniform(job, scene),
             passes: Passes::new(gpu, scene, traced, job, &status, [ray_counts, by_blocks])?,
             bands: bands(gpu, job.size)?,
-            chosen: match by_blocks {
-                true => Some(Blocks::all(gpu, job.size)?),
-                false => None,
+            chosen: if by_blocks {
+                Some(Blocks::all(gpu, job.size)?)
+            } else {
+                None
             },
             status,
             done: Cell::new(0),
@@ -221,10 +224,10 @@ impl<'a> Renderer<'a> {
         Ok(renderer)
     }
 
-    /// Looks from elsewhere: what is added from now on is seen by this camera.
+    /// Changes the camera for subsequent samples.
     ///
     /// # Errors
-    /// As [`Renderer::reset`], which forgets what was seen so far.
+    /// As [`Renderer::reset`], which discards earlier samples.
     pub fn look(&mut self, camera: Camera) -> Result<(), GpuError> {
         self.uniform = lens(self.uniform.clone(), camera, self.size);
         if let Some(visibility) = self.visibility() {
@@ -233,7 +236,7 @@ impl<'a> Renderer<'a> {
         self.reset()
     }
 
-    /// What was rasterised, if paths begin there.
+    /// The rasterised visibility, if paths begin there.
     pub fn visibility(&self) -> Option<&Visibility> {
         self.passes.visibility.as_ref()
     }
@@ -243,7 +246,7 @@ impl<'a> Renderer<'a> {
         self.passes.features()
     }
 
-    /// Features that other scenes need and these kernels are without; none of integrators that trace nothing.
+    /// Features that other scenes need but these kernels omit; empty if nothing is traced.
     pub fn left_out(&self) -> Vec<String> {
         self.passes.left_out()
     }
@@ -255,7 +258,7 @@ impl<'a> Renderer<'a> {
         texts.join("\n")
     }
 
-    /// BLAKE3 of the text of the one kernel, or of the names and texts of all passes.
+    /// BLAKE3 of the text of the only kernel, or of the names and texts of all passes.
     pub fn kernel_hash(&self) -> String {
         let texts = self.passes.texts();
         match &texts[..] {
@@ -293,7 +296,7 @@ impl<'a> Renderer<'a> {
     /// Adds samples `first … first + count - 1` to every pixel, in slices.
     ///
     /// # Errors
-    /// The device is lost, hangs, or the driver complains; a block of samples that ended is not whole.
+    /// The device is lost, hangs, or the driver complains; a finished block is incomplete.
     pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
         let mut sample = first;
         let end = first + count;
@@ -316,13 +319,13 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Samples, pixels times samples per pixel, of a slice.
+    /// Samples of a slice, pixels times samples per pixel.
     fn fitting(&self) -> u64 {
         self.slices.fitting().min(self.most)
     }
 
-    /// Samples of all pixels that a slice has time for. Where a driver ends loops, one alone, so that only
-    /// a sample that needs more turns than the driver allows is refused.
+    /// Samples of all pixels that fit into a slice's time. If the driver ends loops, only one, so
+    /// that only a sample that exceeds the driver's limit by itself is refused.
     fn samples_at_once(&self) -> u32 {
         if self.gpu.loop_limit.is_some() {
             return 1;
@@ -333,9 +336,9 @@ impl<'a> Renderer<'a> {
         (self.fitting() / pixels.max(1)).clamp(1, u64::from(BLOCK_SAMPLES)) as u32
     }
 
-    /// Takes samples, from the next reset on, in these blocks of [`BLOCK_EDGE`](super::BLOCK_EDGE) pixels squared alone,
-    /// each by its column and row; all other pixels of images are black. Of a renderer that was not made
-    /// [by blocks](Renderer::by_blocks) nothing changes.
+    /// Samples, from the next reset on, only these blocks of [`BLOCK_EDGE`](super::BLOCK_EDGE)
+    /// pixels squared, by column and row; all other pixels are black. Has no effect on a renderer
+    /// that was not created [by blocks](Renderer::by_blocks).
     pub fn only(&self, blocks: &[[u32; 2]]) {
         if let Some(known) = &self.chosen {
             known.set(self.gpu, blocks);
@@ -440,18 +443,18 @@ impl<'a> Renderer<'a> {
         self.spent.get()
     }
 
-    /// Milliseconds of the longest slice of its life: no dispatch took longer.
+    /// Milliseconds of the longest slice so far: no dispatch took longer.
     pub fn longest_slice_ms(&self) -> f64 {
         self.slices.longest_ms()
     }
 
-    /// GPU milliseconds of each stage since the last reset, summed over its runs: [`RAY_QUERIES`](super::RAY_QUERIES) and those of the
-    /// organisation. None without timestamps.
+    /// GPU milliseconds of each stage since the last reset, summed over its runs:
+    /// [`RAY_QUERIES`](super::RAY_QUERIES) and those of the organisation. Empty without timestamps.
     pub fn stages(&self) -> BTreeMap<String, f64> {
         self.stages.borrow().clone()
     }
 
-    /// Renders from nothing and returns the images after each of `spps` (ascending) samples.
+    /// Renders from scratch and returns the images after each of `spps` (ascending) samples.
     ///
     /// # Errors
     /// As for [`Renderer::image`], or the driver complains.
@@ -473,8 +476,7 @@ impl<'a> Renderer<'a> {
     /// The mean so far.
     ///
     /// # Errors
-    /// A kernel raised its error word, a pixel did not take every sample, or the device is lost or
-    /// hangs.
+    /// A kernel raised its error word, a pixel lacks samples, or the device is lost or hangs.
     pub fn image(&self) -> Result<Image, GpuError> {
         let mut totals = self.blocks.borrow().clone();
         self.add_pending(&mut totals)?;
@@ -487,7 +489,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Takes the sums of a whole block over to the host.
+    /// Adds the sums of a whole block on the host.
     fn close_block(&self) -> Result<(), GpuError> {
         self.add_pending(&mut self.blocks.borrow_mut())?;
         let mut recording = Recording::new();
@@ -497,7 +499,7 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Whether everything since the last reset is sound.
+    /// Checks everything since the last reset.
     ///
     /// # Errors
     /// As for [`Renderer::image`].
@@ -505,7 +507,7 @@ impl<'a> Renderer<'a> {
         self.add_pending(&mut Vec::new())
     }
 
-    /// Adds the sums on the device to those of the blocks before, if they are sound.
+    /// Adds the sums on the device to those of earlier blocks, if they are valid.
     fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
         let mut recording = Recording::new();
         recording.download("status", &self.status);
@@ -557,8 +559,8 @@ impl<'a> Renderer<'a> {
         Ok(self.gpu.read::<u32>(&self.status)?[0])
     }
 
-    /// Rays per class since the last reset, in the order of [`CountedRays`](super::CountedRays); zeros unless the
-    /// kernel was compiled to count.
+    /// Rays per class since the last reset, in the order of [`CountedRays`](super::CountedRays);
+    /// zeros unless the kernel was compiled to count.
     ///
     /// # Errors
     /// As for [`Renderer::image`].
@@ -567,8 +569,8 @@ impl<'a> Renderer<'a> {
         Ok(std::array::from_fn(|class| totals[class]))
     }
 
-    /// Paths that sent a ray from the camera, after one bounce, after two, …, since the last reset; nothing unless the kernel
-    /// was compiled to count.
+    /// Paths alive at the camera, after one bounce, after two, …, since the last reset; empty
+    /// unless the kernel was compiled to count.
     ///
     /// # Errors
     /// As for [`Renderer::image`].
@@ -579,7 +581,7 @@ impl<'a> Renderer<'a> {
         Ok(live)
     }
 
-    /// What kernels have counted behind the error word.
+    /// The kernels' counters after the error word.
     fn totals(&self) -> Result<Vec<u64>, GpuError> {
         self.check()?;
         let words: Vec<u32> = self.gpu.read(&self.status)?;

@@ -1,27 +1,27 @@
-//! The kinds of materials or lights of a scene in the order of their numbers in kernels: those of the program, then those that the
-//! scene brings from outside, whose tables are written here.
+//! The kinds of materials or lights of a scene, ordered by their kernel numbers: the built-in ones,
+//! then external ones, whose tables are generated here.
 
 use raystone_core::params::Sources;
 use raystone_gpu::Composition;
 use raystone_scene::{DIFFUSE, LIGHT_KINDS, LightKind, Lobes, MATERIAL_KINDS, MaterialKind};
 
-/// What tables of kinds know of one.
+/// The interface of kinds for their tables.
 pub trait SceneKind: PartialEq + Sized + 'static {
-    /// All of the program.
+    /// All built-in kinds.
     fn built_in() -> &'static [&'static Self];
-    /// The feature that brings it into kernels; none if all have it.
+    /// The feature that enables it in kernels; `None` if always enabled.
     fn feature(&self) -> Option<&'static str>;
-    /// Kernel modules that it brings along.
+    /// Its own kernel modules.
     fn sources(&self) -> Sources;
-    /// The feature of kernels that ask the table of kinds from outside, its module, and the table with these numbers.
+    /// The feature of kernels with external kinds, its module, and their table with these numbers.
     fn table(others: &[(usize, &'static Self)]) -> (&'static str, &'static str, String);
 }
 
-/// The kinds, each with whether something is of it; a place is a number.
+/// The kinds, each with whether the scene uses it; the index is the number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneKinds<K: 'static>(Vec<(&'static K, bool)>);
 
-/// Those of the program, none of which is there.
+/// The built-in kinds, none of them in use.
 impl<K: SceneKind> Default for SceneKinds<K> {
     fn default() -> Self {
         Self(K::built_in().iter().map(|kind| (*kind, false)).collect())
@@ -29,7 +29,6 @@ impl<K: SceneKind> Default for SceneKinds<K> {
 }
 
 impl<K: SceneKind> SceneKinds<K> {
-    /// The kinds of what a scene has.
     pub(super) fn of(used: impl Iterator<Item = &'static K>) -> Self {
         let mut kinds = Self::default();
         for kind in used {
@@ -41,39 +40,36 @@ impl<K: SceneKind> SceneKinds<K> {
         kinds
     }
 
-    /// How many there are and could be.
     pub(super) fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// The kind of a number.
     pub(super) fn kind(&self, number: usize) -> &'static K {
         self.0[number].0
     }
 
-    /// The number of a kind.
     pub(super) fn number(&self, kind: &K) -> u32 {
         let place = self.0.iter().position(|(known, _)| *known == kind);
         place.unwrap_or_default() as u32
     }
 
-    /// Numbers of the kinds that there are.
+    /// Numbers of the kinds in use.
     pub(super) fn present(&self) -> impl Iterator<Item = usize> {
         (0..self.0.len()).filter(|number| self.0[*number].1)
     }
 
-    /// Whether there is more than one.
+    /// True if more than one is in use.
     pub(super) fn are_several(&self) -> bool {
         self.present().count() > 1
     }
 
-    /// Features, with whether they are on.
+    /// Features, and whether they are enabled.
     pub(super) fn flags(&self) -> impl Iterator<Item = (&'static str, bool)> {
         let flag = |(kind, there): &(&'static K, bool)| Some((kind.feature()?, *there));
         self.0.iter().filter_map(flag)
     }
 
-    /// The kernel with the kinds from outside: their table, and the modules that they bring.
+    /// The kernel with the external kinds: their table and modules.
     pub(super) fn activate(&self, mut kernel: Composition) -> Composition {
         let others = self.0.iter().map(|(kind, _)| *kind).enumerate();
         let others: Vec<_> = others.skip(K::built_in().len()).collect();
@@ -101,7 +97,7 @@ impl SceneKind for LightKind {
         self.sources
     }
 
-    /// As `kernels/shading/lights.wesl` asks it.
+    /// The table for `kernels/shading/lights.wesl`.
     fn table(others: &[(usize, &'static Self)]) -> (&'static str, &'static str, String) {
         let import = |(_, kind): &(usize, &Self)| {
             let name = kind.feature;
@@ -140,7 +136,7 @@ impl SceneKind for MaterialKind {
         self.sources
     }
 
-    /// As `kernels/shading/bsdf.wesl` asks it.
+    /// The table for `kernels/shading/bsdf.wesl`.
     fn table(others: &[(usize, &'static Self)]) -> (&'static str, &'static str, String) {
         let import = |(_, kind): &(usize, &Self)| {
             let name = kind.feature;

@@ -1,4 +1,4 @@
-//! The rows and samples of one dispatch, and what `kernels/integrator/frame.wesl` is told of them.
+//! The rows and samples of one dispatch, and their values for `kernels/integrator/frame.wesl`.
 
 use super::RenderJob;
 use super::tables::SceneBuffers;
@@ -17,7 +17,7 @@ pub(super) struct Slice {
     pub seed: u32,
 }
 
-/// The camera of an image of this size among the values of a job.
+/// Adds the camera of an image of this size to the values of a job.
 pub(super) fn lens(values: UniformValues, camera: Camera, size: [u32; 2]) -> UniformValues {
     let [forward, right, up] = camera.basis(size).map(|v| v.to_array());
     values
@@ -27,7 +27,7 @@ pub(super) fn lens(values: UniformValues, camera: Camera, size: [u32; 2]) -> Uni
         .vec("up", &up)
 }
 
-/// What all slices of a job have in common.
+/// Values common to all slices of a job.
 pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValues {
     let [width, height] = job.size;
     let ao_radius = job.integrator.facts.ao_radius.unwrap_or(0.0) * scene.diagonal;

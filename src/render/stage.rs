@@ -1,4 +1,4 @@
-//! A scene on the device, ready for structures: the one assembly from scene to answers.
+//! A scene on the device, ready for structures: the complete setup from scene to answers.
 
 use super::tables::SceneBuffers;
 use raystone_accel::tracer::count_work;
@@ -12,21 +12,21 @@ use raystone_scene::SceneData;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Why a structure is not on the device.
+/// The reason why a structure is not on the device.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// Nothing is called so.
+    /// An unknown name.
     #[error("no structure is called `{name}`; there are: {known}")]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// All names.
         known: String,
     },
-    /// It is not built, or not valid.
+    /// It cannot be built, or is invalid.
     #[error(transparent)]
     Accel(#[from] AccelError),
-    /// The device does not take it.
+    /// An error of the device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
@@ -37,14 +37,14 @@ pub struct Stage {
     pub gpu: Gpu,
     /// The scene.
     pub scene: Arc<SceneData>,
-    /// Its triangles as structures see them.
+    /// Its triangles for structures.
     pub soup: TriangleSoup,
-    /// What kernels read of it.
+    /// Its buffers for kernels.
     pub buffers: SceneBuffers,
 }
 
 impl Stage {
-    /// Uploads a scene whose triangles are met by these tests.
+    /// Uploads a scene, with these intersection tests.
     ///
     /// # Errors
     /// A buffer exceeds the adapter's limit.
@@ -63,10 +63,10 @@ impl Stage {
         })
     }
 
-    /// Builds a structure over the scene, on the device where it asks for that, and checks its invariants.
+    /// Builds a structure over the scene, on the device if required, and checks its invariants.
     ///
     /// # Errors
-    /// It cannot be built, or is not valid.
+    /// It cannot be built, or is invalid.
     pub fn build(
         &self,
         kind: &dyn AccelKind,
@@ -89,7 +89,7 @@ impl Stage {
     /// A registered structure with its default parameters.
     ///
     /// # Errors
-    /// As [`Stage::traced`], or nothing is called so.
+    /// As [`Stage::traced`], or an unknown name.
     pub fn structure(&self, registry: &AccelRegistry, name: &str) -> Result<Traced, StageError> {
         let kind = registry.get(name).ok_or_else(|| {
             let known: Vec<&str> = registry.iter().map(AccelKind::name).collect();
@@ -101,7 +101,7 @@ impl Stage {
         self.traced(kind, &Params::default())
     }
 
-    /// What answers buffers of rays through a structure of this scene.
+    /// A tracer for buffers of rays through a structure of this scene.
     ///
     /// # Errors
     /// A kernel does not compose or compile.
@@ -122,7 +122,8 @@ impl Stage {
         })
     }
 
-    /// Whether anything is hit; no, too, where a kernel left a ray out, which the nearest hit shows.
+    /// Whether each ray hits anything; also false for a ray that a kernel omitted, which a
+    /// closest-hit query reveals.
     ///
     /// # Errors
     /// As for [`Stage::closest`].
@@ -135,7 +136,7 @@ impl Stage {
         })
     }
 
-    /// Counted work of every ray; `None` for a structure that counts none.
+    /// Counted work of every ray; `None` if the structure does not count work.
     ///
     /// # Errors
     /// As for [`Stage::closest`].
@@ -148,7 +149,7 @@ impl Stage {
         count_work(&self.gpu, &self.buffers.triangles, traced, query, rays)
     }
 
-    /// The same triangles met by another choice of tests that needs no other words.
+    /// Changes to other intersection tests that need no other precomputed words.
     pub fn set_tests(&mut self, tests: Intersection) {
         self.soup.intersection = tests;
         self.buffers.triangles.intersection = tests;

@@ -1,36 +1,34 @@
-//! What `shading_tables` holds of surfaces besides the numbers of materials: places of textures, texture coordinates, normals,
-//! colours of vertices, texels.
+//! Surface data in `shading_tables` apart from material numbers: texture placements, texture
+//! coordinates, normals, vertex colours, texels.
 
 use raystone_scene::{Material, SceneData, TextureUse, Wrap};
 
-/// Words of a material without its parameters; the last four are the places of its textures.
+/// Words of a material without its parameters; the last four refer to texture placements.
 pub(super) const MATERIAL_WORDS: usize = 12;
-/// Words of the place of a texture.
 const USE_WORDS: usize = 12;
 
-/// What the surfaces of a scene make kernels carry; absent features are not in the kernel.
+/// Features that the surfaces of a scene require; absent ones are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SurfaceFeatures {
-    /// Some material has a texture.
+    /// A material has a texture.
     pub textures: bool,
-    /// Some texture is of metalness and roughness.
+    /// A texture holds metalness and roughness.
     pub metallic_roughness_textures: bool,
-    /// Some texture bends normals.
+    /// There is a normal map.
     pub normal_maps: bool,
-    /// Some texture is of emission.
+    /// There is an emission texture.
     pub emission_textures: bool,
-    /// Some texture is moved, or does not repeat.
+    /// A texture is transformed, or does not repeat.
     pub texture_transforms: bool,
-    /// Some vertex has a normal that is not its triangle's.
+    /// A vertex has its own normal.
     pub normals: bool,
-    /// Some vertex has a colour.
+    /// A vertex has a colour.
     pub vertex_colors: bool,
 }
 
 impl SurfaceFeatures {
-    /// Of these materials among those of the scene.
     pub(super) fn of(scene: &SceneData, is_among: impl Fn(&Material) -> bool) -> Self {
-        // Without coordinates, materials show their constants.
+        // Without coordinates, materials use their constants.
         let is_mapped = scene.uvs.len() == scene.triangles.len();
         let materials = scene.materials.iter();
         let materials = materials.filter(|material| is_mapped && is_among(material));
@@ -48,7 +46,7 @@ impl SurfaceFeatures {
         }
     }
 
-    /// Feature names as kernels write them, with whether they are on.
+    /// Feature names in kernels, and whether they are enabled.
     pub(super) fn flags(&self) -> [(&'static str, bool); 7] {
         [
             ("textures", self.textures),
@@ -64,8 +62,8 @@ impl SurfaceFeatures {
         ]
     }
 
-    /// Features that a kernel for surfaces with these does without, whatever else there is in the scene. Emission and its textures
-    /// are those of lights, too.
+    /// Features that a kernel for these surfaces omits, whatever else is in the scene. Emission and
+    /// its textures also belong to lights.
     pub(super) fn unneeded(&self) -> impl Iterator<Item = &'static str> {
         let of_one_surface = [
             "textures",
@@ -80,7 +78,7 @@ impl SurfaceFeatures {
     }
 }
 
-/// Where things begin, in words; 0 for what the scene does not have.
+/// Start offsets in words; 0 if the scene has no such data.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Places {
     pub first_uv: u32,
@@ -89,11 +87,12 @@ pub(super) struct Places {
     pub first_mirrored: u32,
 }
 
-/// Appends, in this order: places of textures, three `vec4` each; six words of texture coordinates a triangle; three of normals;
-/// six of colours; a bit whether it is mirrored; texels. Tells the materials where the places of their textures are, in `vec4`.
+/// Appends, in this order: texture placements, three `vec4` each; per triangle, six words of
+/// texture coordinates, three of normals, six of colours and a mirrored bit; texels. Sets the
+/// indices of the materials' texture placements, in `vec4`.
 ///
-/// A place: first texel, in words, width, height, and how it wraps (in v times 4, in u); the matrix by columns; what is added, and the scale of
-/// normals.
+/// A placement: first texel, in words, width, height, and wrap modes (u plus 4 times v); the matrix
+/// by columns; the translation, and the scale of normals.
 pub(super) fn append(
     scene: &SceneData,
     features: &SurfaceFeatures,
@@ -111,12 +110,13 @@ pub(super) fn append(
             }
         }
     }
-    // Materials come first: 0 is where neither can begin.
+    // Materials come first, so 0 never is a valid start.
     let place_of = |there: bool, words: &[u32]| if there { words.len() as u32 } else { 0 };
     let first_uv = place_of(features.textures, words);
-    let texels = match features.textures {
-        true => scene.textures.iter().map(|t| t.texels.len()).sum(),
-        false => 0,
+    let texels = if features.textures {
+        scene.textures.iter().map(|t| t.texels.len()).sum()
+    } else {
+        0
     };
     let corners = 6 * scene.uvs.len() + 3 * scene.normals.len() + 6 * scene.colors.len();
     let mirrored = scene.mirrored.len().div_ceil(32);
@@ -139,7 +139,7 @@ pub(super) fn append(
         set.sum::<u32>()
     }));
     if features.textures {
-        // Those of masks alone are with the triangles.
+        // Textures used only by masks are stored with the triangles.
         let shown = (0_u32..).zip(&scene.textures);
         for (id, texture) in shown.filter(|(id, _)| rows.iter().any(|(_, used)| used == id)) {
             let first = words.len() as u32;

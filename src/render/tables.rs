@@ -11,18 +11,18 @@ use raystone_scene::{
     Daylight, LIGHT_KINDS, LightKind, LightList, Material, MaterialKind, SceneData,
 };
 
-/// What a scene makes kernels carry; absent features are not in the kernel.
+/// Features that a scene requires; absent ones are not in the kernel.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
     /// Textures, normals and colours of vertices.
     pub surfaces: SurfaceFeatures,
-    /// There are lights that can be sampled.
+    /// There are lights to sample.
     pub lights: bool,
     /// Kinds of lights.
     pub light_kinds: SceneKinds<LightKind>,
-    /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
+    /// Lights must be chosen: there are several, or an emissive triangle outside of the only one.
     pub many_lights: bool,
-    /// Some surface emits from its front alone.
+    /// A surface emits only from its front.
     pub one_sided_lights: bool,
     /// Rays that leave the scene find light.
     pub background: bool,
@@ -30,16 +30,16 @@ pub struct SceneFeatures {
     pub daylight: bool,
     /// Kinds of materials.
     pub materials: SceneKinds<MaterialKind>,
-    /// Of each of them by number: textures of its materials, normals and colours of vertices.
+    /// Surface features of each material kind, by number.
     pub kinds: Vec<SurfaceFeatures>,
     /// Instances add to the error of points.
     pub transforms: bool,
-    /// Some triangle is mirrored, so that its corners turn the other way round.
+    /// A triangle is mirrored, with reversed orientation.
     pub mirrored: bool,
 }
 
-/// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need. Kinds of materials and
-/// lights join theirs.
+/// Groups of features that kernels can be made to include although a scene does not need them.
+/// Kinds of materials and lights are added to theirs.
 const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
     ("materials", &["several_materials"]),
     (
@@ -62,7 +62,7 @@ const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
     ("transforms", &["transforms", "mirrored_triangles"]),
 ];
 
-/// Features of the kinds of the program and of all else, each with its group.
+/// All features, including those of built-in kinds, each with its group.
 pub(super) fn grouped_features() -> impl Iterator<Item = (&'static str, &'static str)> {
     let others = FEATURE_GROUPS.iter();
     let others = others.flat_map(|(group, names)| names.iter().map(move |name| (*group, *name)));
@@ -74,7 +74,7 @@ pub(super) fn grouped_features() -> impl Iterator<Item = (&'static str, &'static
 }
 
 impl SceneFeatures {
-    /// Feature names as kernels write them, with whether they are on.
+    /// Feature names in kernels, and whether they are enabled.
     pub fn flags(&self) -> Vec<(&'static str, bool)> {
         let mut flags: Vec<_> = self.materials.flags().collect();
         flags.extend([
@@ -93,12 +93,12 @@ impl SceneFeatures {
         flags
     }
 
-    /// The kernel with what a scene brings from outside.
+    /// The kernel with the scene's external kinds.
     pub(super) fn activate(&self, kernel: Composition) -> Composition {
         self.light_kinds.activate(self.materials.activate(kernel))
     }
 
-    /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
+    /// Features omitted by a kernel for surfaces of only this kind, by its number, or only misses.
     pub(crate) fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
         let own = kind.and_then(|number| self.materials.kind(number).feature());
         let others = self.materials.flags().map(|(name, _)| name);
@@ -113,27 +113,27 @@ impl SceneFeatures {
 pub struct SceneBuffers {
     /// `triangles`, `shading_tables`.
     pub bindings: Bindings,
-    /// The triangles alone, and how rays meet them.
+    /// The triangles alone, and how rays intersect them.
     pub triangles: TriangleBuffers,
-    /// How many there are.
+    /// Number of triangles.
     pub triangle_count: u32,
-    /// What instances add to the error of points.
+    /// Error of points from instance transforms.
     pub transform_error: TransformError,
-    /// What kernels must carry.
+    /// The features required of kernels.
     pub features: SceneFeatures,
     /// Radiance of the environment.
     pub environment: [f32; 3],
     /// The sky; kernels without its feature do not read it.
     pub daylight: Daylight,
-    /// What is sampled.
+    /// The sampled lights.
     pub lights: LightTables,
-    /// Where texture coordinates begin in `shading_tables`, in words.
+    /// Start of texture coordinates in `shading_tables`, in words.
     pub first_uv: u32,
-    /// Where normals begin in `shading_tables`, in words.
+    /// Start of normals in `shading_tables`, in words.
     pub first_normal: u32,
-    /// Where colours of vertices begin in `shading_tables`, in words.
+    /// Start of vertex colours in `shading_tables`, in words.
     pub first_color: u32,
-    /// Where the bits of mirrored triangles begin in `shading_tables`, in words.
+    /// Start of the bits of mirrored triangles in `shading_tables`, in words.
     pub first_mirrored: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
@@ -142,7 +142,7 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Uploads what shading needs.
+    /// Uploads the shading data.
     ///
     /// # Errors
     /// A buffer exceeds the adapter's limit.
@@ -195,11 +195,12 @@ impl SceneBuffers {
     }
 }
 
-/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights, and what
-/// [`surface_tables`](super::surface_tables) appends.
+/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials,
+/// lights, and the data of [`surface_tables`](super::surface_tables).
 ///
-/// A material: base colour and number of its kind, with the highest bit set where it emits from its front alone; emission
-/// and place of its parameters, in `vec4`; places of its textures, 0 where it has none.
+/// A material: base colour and kind number, with the highest bit set if it emits only from its
+/// front; emission and index of its parameters, in `vec4`; indices of its texture placements, 0 for
+/// none.
 struct Tables {
     words: Vec<u32>,
     places: Places,
@@ -232,7 +233,7 @@ impl Tables {
     }
 }
 
-/// Whether the material emits, and from its front alone.
+/// True if the material emits only from its front.
 pub(super) fn emits_in_front(material: &Material) -> bool {
     !material.emits_both_sides && material.emission != Vec3::ZERO
 }

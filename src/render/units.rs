@@ -1,23 +1,24 @@
-//! Choices by one number, in whole numbers: each of the 2²⁴ values that a draw can have belongs to one choice, and the
-//! probability that is divided by is how many belong to it, over 2²⁴. What is chosen is thus chosen exactly as often as
-//! it is said to be, and nothing that shines is never chosen. Twin: `kernels/shading/light/units.wesl`.
+//! Choices by one number, in integers: each of the 2²⁴ values of a draw belongs to one choice,
+//! whose probability is its number of values over 2²⁴. The probability used as a divisor is thus
+//! exact, and no light has probability zero. Also in `kernels/shading/light/units.wesl`.
 
 /// Values of a draw.
 pub(super) const UNITS: u32 = 1 << 24;
 
-/// The probability of so many values.
+/// The probability of this many values.
 pub(super) fn unit_share(units: u32) -> f32 {
     units as f32 / UNITS as f32
 }
 
-/// How many values belong to each of these weights, which are finite and not negative: one to each that is above 0, the
-/// others by rounded sums of the weights. Where all are 0, all are alike.
+/// The number of values of each of these weights, which are finite and not negative: at least one
+/// for each above 0, the rest by rounded cumulative weights. Equal shares if all are 0.
 pub(super) fn shared_out(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let alike = vec![1.0; weights.len()];
-    let (weights, total) = match total > 0.0 {
-        true => (weights, total),
-        false => (&alike[..], weights.len() as f64),
+    let (weights, total) = if total > 0.0 {
+        (weights, total)
+    } else {
+        (&alike[..], weights.len() as f64)
     };
     let some = weights.iter().filter(|weight| **weight > 0.0).count() as u32;
     let spare = f64::from(UNITS.saturating_sub(some));

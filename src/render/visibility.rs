@@ -1,20 +1,22 @@
-//! Primary visibility by rasterisation: a G-buffer of one word a pixel, the triangle that its centre sees.
+//! Primary visibility by rasterisation: a G-buffer of one word per pixel, the triangle seen at its
+//! centre.
 //!
-//! T. Saito, T. Takahashi, "Comprehensible rendering of 3-D shapes", SIGGRAPH 1990. Paths with `primary = "raster"` begin there, with
-//! distance and weights from the triangle test of the run, so that a path whose triangle a ray would have found, too, is the same to
-//! the bit. What may differ is which triangle that is: rasterisers move vertices to a grid of fractions of a pixel, and compare
-//! depths that they interpolate. Kernels: `kernels/integrator/visibility.wesl` draws, `visible.wesl` beside it reads.
+//! T. Saito, T. Takahashi, "Comprehensible rendering of 3-D shapes", SIGGRAPH 1990. Paths with
+//! `primary = "raster"` begin there, with distance and weights from the run's triangle test, so
+//! that a path whose triangle a ray would also have found is bit-identical. Only the choice of the
+//! triangle may differ: rasterisers snap vertices to a subpixel grid, and compare interpolated
+//! depths. Kernels: `kernels/integrator/visibility.wesl` draws, `visible.wesl` beside it reads.
 
 use super::tables::SceneBuffers;
 use raystone_accel::Space;
 use raystone_core::geometry::Camera;
 use raystone_gpu::{Composition, Elapsed, Gpu, GpuError, Raster, UniformValues};
 
-/// Distance of the near plane, as a part of the scene's diagonal. Depth is near / distance in f32, whose relative precision is the same at all
-/// distances, so that the plane may be this near; what is nearer still is not seen.
+/// Distance of the near plane, as a fraction of the scene's diagonal. Depth is near / distance in
+/// f32, equally precise at all distances, so it may be this near; anything nearer is not seen.
 const NEAR: f64 = 1e-6;
 
-/// The triangles of a scene, as a rasteriser sees them.
+/// The triangles of a scene, for rasterisation.
 pub struct Visibility {
     raster: Raster,
     size: [u32; 2],
@@ -26,8 +28,8 @@ impl Visibility {
     /// Compiles the rasterisation of a scene to images of this size.
     ///
     /// # Errors
-    /// The rays of a structure are of another space, the image exceeds a limit of the adapter, or
-    /// the kernel does not compile.
+    /// The structure's rays are in another space, the image exceeds a limit of the adapter, or the
+    /// kernel does not compile.
     pub(super) fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -47,7 +49,7 @@ impl Visibility {
         })
     }
 
-    /// Draws what a camera sees, and tells the wall time of it.
+    /// Draws the view of a camera, and returns the wall time.
     ///
     /// # Errors
     /// The driver complains, or the device is lost or hangs.
@@ -63,12 +65,11 @@ impl Visibility {
         self.raster.draw(self.triangles, ("view", view))
     }
 
-    /// The words as they lie on the device.
     pub(super) fn words(&self) -> &wgpu::Buffer {
         self.raster.words()
     }
 
-    /// The triangle of each pixel, row by row from the top; [`NO_HIT`](raystone_accel::NO_HIT) where there is none.
+    /// The triangle of each pixel, row by row; [`NO_HIT`](raystone_accel::NO_HIT) for none.
     ///
     /// # Errors
     /// The device is lost or hangs.
@@ -77,7 +78,7 @@ impl Visibility {
     }
 }
 
-/// Why what is met in this space is not rasterised.
+/// The reason why this space cannot be rasterised, if any.
 pub(super) fn refusal(space: Space) -> Option<&'static str> {
     (space == Space::Instances).then_some(
         "primary = raster: this structure meets triangles in the space of their objects, and the rasteriser in that of the world; take another structure, or `traced` or `centre`",

@@ -1,13 +1,13 @@
-//! `blue-noise`: shifts by a dither mask, so that the errors of neighbouring pixels differ. Twin of
-//! `kernels/sampling/blue_noise.wesl`.
+//! `blue-noise`: shifts by a dither mask, so that the errors of neighbouring pixels differ. CPU
+//! version of `kernels/sampling/blue_noise.wesl`.
 //!
-//! Source: I. Georgiev, M. Fajardo, "Blue-noise dithered sampling", SIGGRAPH Talks 2016: Cranley and
-//! Patterson's shift, taken from a mask of 64×64 pixels ([`super::void_and_cluster`]) that each dimension
-//! and seed moves elsewhere. Or, with the parameter `tables`, the points of E. Heitz, L. Belcour, V.
-//! Ostromoukhov, D. Coeurjolly, J.-C. Iehl, "A low-discrepancy sampler that distributes Monte Carlo
-//! errors as a blue noise in screen space", SIGGRAPH Talks 2019: 256 Owen-scrambled Sobol points, ranked
-//! and scrambled by tiles of 128×128 pixels that were optimised for one number of samples. They bring
-//! their own points, which take the place of those of `sobol`.
+//! Source: I. Georgiev, M. Fajardo, "Blue-noise dithered sampling", SIGGRAPH Talks 2016: Cranley
+//! and Patterson's shift, from a mask of 64×64 pixels ([`super::void_and_cluster`]) that is moved
+//! for each dimension and seed. Or, with the parameter `tables`, the points of E. Heitz, L.
+//! Belcour, V. Ostromoukhov, D. Coeurjolly, J.-C. Iehl, "A low-discrepancy sampler that distributes
+//! Monte Carlo errors as a blue noise in screen space", SIGGRAPH Talks 2019: 256 Owen-scrambled
+//! Sobol points, ranked and scrambled by tiles of 128×128 pixels optimised for one number of
+//! samples. These points replace those of `sobol`.
 //!
 //! Words: the image's width, then the mask or points, ranking and scrambling, four bytes per word.
 
@@ -35,13 +35,13 @@ const TILE_SIZE: u32 = 128;
 const HEITZ_LIMIT: u32 = 256;
 
 impl BlueNoise {
-    /// The folder of Heitz's tables, if they are asked for.
+    /// The folder of Heitz's tables, if requested.
     fn folder(&self) -> Option<&str> {
         Some(self.tables.as_str()).filter(|folder| !folder.is_empty())
     }
 }
 
-/// Where the pixel lies in a tile that repeats every `size` pixels and is moved at random by `key`.
+/// Index of the pixel in a tile that repeats every `size` pixels and is moved at random by `key`.
 fn tile_index(table: &SamplerTable, at: Coordinate, size: u32, key: u32) -> u32 {
     let width = table.decorrelation_word(0);
     let shift = keyed_hash(pcg_hash(at.seed), key);
@@ -54,7 +54,7 @@ fn table_byte(table: &SamplerTable, first: u32, i: u32) -> u32 {
     (table.decorrelation_word(first + (i >> 2)) >> (8 * (i & 3))) & 0xff
 }
 
-/// Heitz's points take the place of the sequence's.
+/// Heitz's point, which replaces that of the sequence.
 fn heitz_point(table: &SamplerTable, at: Coordinate) -> u32 {
     let key = 8 * tile_index(table, at, TILE_SIZE, 0) + (at.dimension & 7);
     let ranked = (at.sample & 0xff) ^ table_byte(table, RANKING, key);
@@ -81,7 +81,7 @@ fn read_words(folder: &Path, name: &str, bytes: usize) -> Result<Vec<u32>, Strin
         .collect())
 }
 
-/// Points, ranking and scrambling for `samples` samples per pixel. There is no ranking of one sample.
+/// Points, ranking and scrambling for `samples` samples per pixel. One sample has no ranking.
 fn read_tables(folder: &Path, samples: u32) -> Result<Vec<u32>, String> {
     if !samples.is_power_of_two() || samples > HEITZ_LIMIT {
         return Err(format!(

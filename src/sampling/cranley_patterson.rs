@@ -1,4 +1,4 @@
-//! `cranley-patterson`: each pixel and dimension adds its own random shift modulo 1. Twin of
+//! `cranley-patterson`: a random shift modulo 1 for each pixel and dimension. CPU version of
 //! `kernels/sampling/cranley_patterson.wesl`.
 //!
 //! Source: R. Cranley, T. Patterson, "Randomization of number theoretic methods for multiple

@@ -1,10 +1,11 @@
-//! `cranley-patterson-micro-jitter`: two decorrelations composed, a random shift modulo 1 for each pixel and
-//! dimension, then a small one for each sample. Twin of
+//! `cranley-patterson-micro-jitter`: two combined decorrelations, a random shift modulo 1 for each
+//! pixel and dimension, then a small one for each sample. CPU version of
 //! `kernels/sampling/cranley_patterson_micro_jitter.wesl`.
 //!
-//! Sources: those of [`super::CranleyPatterson`] and [`super::MicroJitter`]. The first makes every number uniform,
-//! so that nothing is biased; the second moves each point within μ = K·N^(−1/s) of its place, so that the regular
-//! structure of points that all pixels share is broken at the scale of their distances. Word: the width 2μ.
+//! Sources: those of [`super::CranleyPatterson`] and [`super::MicroJitter`]. The first makes every
+//! number uniform, so nothing is biased; the second moves each point by at most μ = K·N^(−1/s),
+//! which breaks the regular structure of points shared by all pixels at the scale of their
+//! distances. Word: the width 2μ.
 
 use super::fixed_point::mul_high;
 use super::hash::{dimension_number, sample_number};

@@ -1,20 +1,20 @@
-//! What a decorrelation is.
+//! The interface of decorrelations.
 
 use super::{Coordinate, Demand, Facts, SamplerTable, Seeding};
 use raystone_core::params::{Parameters, Registered};
 use std::sync::Arc;
 
-/// The sequence that a decorrelation is to work on.
+/// The sequence that a decorrelation is combined with.
 #[derive(Debug, Clone, Copy)]
 pub struct Partner<'a> {
     /// Its name.
     pub name: &'a str,
-    /// What is to be known of it.
+    /// Its properties.
     pub facts: Facts,
 }
 
 impl Partner<'_> {
-    /// A reason to refuse a sequence whose pixels are independent already.
+    /// A reason to reject a sequence whose pixels are already independent.
     pub fn without_structure(&self) -> Option<String> {
         let reason = || {
             format!(
@@ -25,7 +25,7 @@ impl Partner<'_> {
         self.facts.independent.then(reason)
     }
 
-    /// A reason to refuse a sequence whose structure exclusive or destroys.
+    /// A reason to reject a sequence whose structure is destroyed by exclusive or.
     pub(crate) fn not_base_2(&self) -> Option<String> {
         let reason = || {
             format!(
@@ -37,7 +37,7 @@ impl Partner<'_> {
         (!self.facts.base_2).then(reason)
     }
 
-    /// A reason to refuse a sequence whose index must not be moved.
+    /// A reason to reject a sequence whose index must not be moved.
     pub(crate) fn not_extensible(&self) -> Option<String> {
         let reason = || {
             format!(
@@ -49,49 +49,49 @@ impl Partner<'_> {
     }
 }
 
-/// A decorrelation of pixels: the struct of its parameters, one line in the registry.
+/// A decorrelation of pixels: its parameter struct, with one line in the registry.
 pub trait Decorrelation: Send + Sync {
-    /// Module of the kernel, relative to the kernel folder, if it is not that of the name: `sampling/owen_sobol`
-    /// for `owen-sobol`.
+    /// Kernel module, relative to the kernel folder, if it differs from the name:
+    /// `sampling/owen_sobol` for `owen-sobol`.
     fn kernel(&self) -> Option<&'static str> {
         None
     }
-    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    /// Paths and texts of its own kernel modules, for decorrelations that are not built in.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[]
     }
-    /// Whether pixels draw different numbers from it.
+    /// Which pixels draw the same numbers from it.
     fn seeding(&self) -> Seeding {
         Seeding::PixelSample
     }
-    /// Whether another seed gives other points.
+    /// True if another seed gives other points.
     fn is_random(&self) -> bool {
         true
     }
-    /// Whether the mean over seeds of an estimate by a fixed sequence is the integral, at any number of
-    /// samples: every number that it makes is uniform in [0, 1). One that is not, by design, may be
+    /// True if the mean over seeds of an estimate with a fixed sequence is the integral, at any
+    /// number of samples: every number is uniform in [0, 1). One that is biased by design may be
     /// found to be biased without being at fault.
     fn is_unbiased(&self) -> bool {
         self.is_random()
     }
-    /// Whether it depends on how many samples are drawn.
+    /// True if it depends on the number of samples.
     fn by_count(&self) -> bool {
         false
     }
-    /// Whether it depends on where the pixel lies in the image.
+    /// True if it depends on the pixel's position in the image.
     fn by_width(&self) -> bool {
         false
     }
-    /// Dimensions and samples it has; `None` is any number.
+    /// Maximum dimensions and samples; `None` is unlimited.
     fn limits(&self) -> [Option<u32>; 2] {
         [None, None]
     }
-    /// Why it makes no sense with this sequence, if so.
+    /// The reason why it cannot be combined with this sequence, if any.
     fn refusal(&self, partner: &Partner) -> Option<String>;
     /// Words that the kernel reads by `decorrelation_word`.
     ///
     /// # Errors
-    /// A file cannot be read or holds something else, or the demand cannot be met: in words.
+    /// A description of a file that is unreadable or invalid, or of a demand that cannot be met.
     fn table(&self, _partner: &Partner, _demand: &Demand) -> Result<Vec<u32>, String> {
         Ok(Vec::new())
     }
@@ -99,13 +99,13 @@ pub trait Decorrelation: Send + Sync {
     fn constants(&self) -> Vec<(&'static str, u32)> {
         Vec::new()
     }
-    /// Twin of the kernel's `index`: which point of the sequence the sample takes.
+    /// CPU version of the kernel's `index`: the index of the sample's point in the sequence.
     fn index(&self, table: &SamplerTable, at: Coordinate) -> u32;
-    /// Twin of the kernel's `decorrelate`: moves the fraction `x` of 2³².
+    /// CPU version of the kernel's `decorrelate`: moves the fraction `x` of 2³².
     fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32;
 }
 
-/// The decorrelation that `D` declares, under this name; the doc comment of `D` describes it.
+/// The decorrelation declared by `D`, under this name; the doc comment of `D` describes it.
 pub fn decorrelation_kind<D: Decorrelation + Parameters + 'static>(
     name: &str,
 ) -> Registered<dyn Decorrelation> {

@@ -1,9 +1,9 @@
-//! `digital-shift`: flips the same random bits in all points of a pixel and dimension. Twin of
-//! `kernels/sampling/digital_shift.wesl`.
+//! `digital-shift`: flips the same random bits in all points of a pixel and dimension. CPU version
+//! of `kernels/sampling/digital_shift.wesl`.
 //!
-//! Source: P. L'Ecuyer, C. Lemieux, "Recent advances in randomized quasi-Monte Carlo methods", 2002;
-//! Kollig and Keller 2002 in rendering. It keeps nets in base 2, as Cranley and Patterson's shift does
-//! not, and leaves other structure in ruins.
+//! Source: P. L'Ecuyer, C. Lemieux, "Recent advances in randomized quasi-Monte Carlo methods",
+//! 2002; Kollig and Keller 2002 in rendering. Unlike Cranley and Patterson's shift it preserves
+//! nets in base 2, but it destroys other structure.
 
 use super::hash::dimension_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};

@@ -1,5 +1,6 @@
 //! The fixed table of dimensions: (bounce, purpose) → dimension. A draw added in one branch of an
-//! integrator cannot shift the dimensions of another. Twin of `kernels/sampling/dimensions.wesl`.
+//! integrator cannot shift the dimensions of another. CPU version of
+//! `kernels/sampling/dimensions.wesl`.
 
 /// Position in the pixel, two dimensions.
 pub const PIXEL: u32 = 0;
@@ -9,7 +10,7 @@ pub const FIRST_BOUNCE: u32 = 2;
 pub const DIRECTION: u32 = 0;
 /// Point on the emitter, two dimensions, within a bounce.
 pub const LIGHT_POINT: u32 = 2;
-/// Which emitter, within a bounce.
+/// Choice of the emitter, within a bounce.
 pub const LIGHT_CHOICE: u32 = 4;
 /// Russian roulette, within a bounce.
 pub const ROULETTE: u32 = 5;
@@ -21,12 +22,12 @@ pub fn at_bounce(bounce: u32, purpose: u32) -> u32 {
     FIRST_BOUNCE + bounce * PER_BOUNCE + purpose
 }
 
-/// Dimensions that a path of `max_depth` bounces consumes.
+/// Dimensions that a path of `max_depth` bounces uses.
 pub fn needed(max_depth: u32) -> u32 {
     at_bounce(max_depth, 0)
 }
 
-/// What the path uses a dimension for, in words.
+/// Description of the path's use of a dimension.
 pub(crate) fn purpose(dimension: u32) -> String {
     if dimension < FIRST_BOUNCE {
         return format!("pixel {}", ["x", "y"][dimension as usize]);
@@ -43,7 +44,7 @@ pub(crate) fn purpose(dimension: u32) -> String {
     format!("bounce {bounce}: {what}")
 }
 
-/// What the path uses a pair of dimensions for, in words.
+/// Description of the path's use of a pair of dimensions.
 pub fn pair_purpose([a, b]: [u32; 2]) -> String {
     let (a, b) = (purpose(a), purpose(b));
     match (a.strip_suffix(" 1"), b.strip_suffix(" 2")) {

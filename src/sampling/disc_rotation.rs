@@ -1,9 +1,9 @@
-//! `disc-rotation`: turns the points on the disc by a random angle. Twin of
+//! `disc-rotation`: rotates the points on the disc by a random angle. CPU version of
 //! `kernels/sampling/disc_rotation.wesl`.
 //!
-//! Source: Dufay 2017, §5.3.2. The hemisphere is sampled through the disc, whose angle is the second
-//! number of a pair: turning it is Cranley and Patterson's shift of odd dimensions alone. It leaves rings,
-//! since no radius changes.
+//! Source: Dufay 2017, §5.3.2. The hemisphere is sampled through the disc, whose angle is the
+//! second number of a pair: the rotation is Cranley and Patterson's shift of odd dimensions only.
+//! It leaves rings, since no radius changes.
 
 use super::hash::dimension_number;
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
@@ -22,7 +22,7 @@ impl Decorrelation for DiscRotation {
         self.seeded.seeding
     }
 
-    /// No radius is moved.
+    /// No radius changes.
     fn is_unbiased(&self) -> bool {
         false
     }

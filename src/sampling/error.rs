@@ -1,10 +1,10 @@
-//! Why a sampler cannot be had.
+//! Errors of samplers.
 
 use raystone_core::params::ParamError;
 use thiserror::Error;
 
-/// Why a sequence and a decorrelation do not make a sampler; every message names the limit or what to
-/// take instead.
+/// The reason why a sequence and a decorrelation do not form a sampler; every message names the
+/// limit or an alternative.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SamplerError {
     /// A name that is not registered.
@@ -12,26 +12,26 @@ pub enum SamplerError {
     Unknown {
         /// `sequence` or `decorrelation`.
         axis: &'static str,
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
-    /// A parameter that one of the two does not have, or a value that it does not allow.
+    /// An unknown parameter, or a value that is not allowed.
     #[error("{name}: {error}")]
     Parameter {
         /// The sequence or decorrelation.
         name: String,
-        /// What is wrong.
+        /// The error.
         error: ParamError,
     },
-    /// The two make no sense together.
+    /// The two cannot be combined.
     #[error("{pair} makes no sense: {reason}")]
     Pair {
         /// `sequence × decorrelation`.
         pair: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// More dimensions than there are.
+    /// Too many dimensions.
     #[error(
         "{asked} dimensions are needed, {pair} has {limit}: lower max_depth or take a sequence with \
          more (pixel-hash has any number)"
@@ -39,35 +39,35 @@ pub enum SamplerError {
     Dimensions {
         /// `sequence × decorrelation`.
         pair: String,
-        /// Dimensions asked for.
+        /// Requested dimensions.
         asked: u32,
-        /// Dimensions there are.
+        /// Available dimensions.
         limit: u32,
     },
-    /// More samples than there are.
+    /// Too many samples.
     #[error("{asked} samples are asked for, {pair} has {limit}")]
     Samples {
         /// `sequence × decorrelation`.
         pair: String,
-        /// Samples asked for.
+        /// Requested samples.
         asked: u32,
-        /// Samples there are.
+        /// Available samples.
         limit: u32,
     },
-    /// Something that has to be known beforehand is not.
+    /// A required quantity is not known beforehand.
     #[error("{pair} depends on {what}, which is not known here")]
     NotKnown {
         /// `sequence × decorrelation`.
         pair: String,
-        /// What has to be known.
+        /// The quantity.
         what: &'static str,
     },
-    /// A table cannot be made.
+    /// A table cannot be generated.
     #[error("{pair}: {reason}")]
     Table {
         /// `sequence × decorrelation`.
         pair: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }

@@ -1,5 +1,4 @@
-//! Arithmetic on fractions of 2³². Twin of `kernels/sampling/fixed_point.wesl`, where 64 bits are not
-//! to be had.
+//! Arithmetic on fractions of 2³². `kernels/sampling/fixed_point.wesl` has no 64-bit integers.
 
 /// The upper word of a product.
 pub(crate) fn mul_high(a: u32, b: u32) -> u32 {

@@ -1,9 +1,10 @@
-//! `halton`: radical inverses in prime bases, with plain or permuted digits. Twin of
+//! `halton`: radical inverses in prime bases, with plain or permuted digits. CPU version of
 //! `kernels/sampling/halton.wesl`.
 //!
 //! Source: J. Halton, "On the efficiency of certain quasi-random sequences of points in evaluating
-//! multi-dimensional integrals", Numer. Math. 2, 1960. Words: for each dimension its base and where its
-//! permutation begins, then the permutations. All of them keep 0, so that an expansion ends.
+//! multi-dimensional integrals", Numer. Math. 2, 1960. Words: for each dimension its base and the
+//! start of its permutation, then the permutations. All of them map 0 to 0, so that an expansion
+//! ends.
 
 use super::primes::{faure_permutation, primes, random_permutation};
 use super::radical_inverse::{first_weight, prepend_digit, radical_inverse};
@@ -25,13 +26,13 @@ parameters! {
         digits: Digits = Digits::Faure;
     }
 
-    /// What becomes of digits.
+    /// How digits are permuted.
     pub enum Digits {
-        /// They stay as they are.
+        /// Unpermuted.
         Plain = "plain",
         /// Faure's permutations (1992).
         Faure = "faure",
-        /// Permutations drawn once and for all.
+        /// Fixed random permutations.
         Random = "random",
     }
 }
@@ -50,13 +51,13 @@ fn permuted_inverse(table: &SamplerTable, n: u32, base: u32, first: u32) -> u32 
 }
 
 impl DigitRule {
-    /// The constant of the kernel that tells whether digits are permuted.
+    /// The constant of the kernel that selects permuted digits.
     pub(super) fn constants(&self) -> Vec<(&'static str, u32)> {
         vec![("PERMUTED", u32::from(self.digits != Digits::Plain))]
     }
 
-    /// For each of the first primes the base and where its permutation begins, then the permutations; all of it
-    /// stands behind `before` words.
+    /// For each of the first primes the base and the start of its permutation, then the
+    /// permutations; preceded by `before` words.
     pub(super) fn digit_table(&self, count: u32, before: u32) -> Vec<u32> {
         let bases = primes(count as usize);
         let permutation = match self.digits {
@@ -75,7 +76,7 @@ impl DigitRule {
         words
     }
 
-    /// The radical inverse in the base that word `place` holds, by the permutation that the next one leads to.
+    /// The radical inverse in the base in word `place`, with the permutation in the next word.
     pub(super) fn inverse_at(&self, table: &SamplerTable, n: u32, place: u32) -> u32 {
         let base = table.sequence_word(place);
         if base > 2 && self.digits != Digits::Plain {

@@ -1,10 +1,10 @@
-//! `hammersley`: i / N, then radical inverses in prime bases. Twin of
+//! `hammersley`: i / N, then radical inverses in prime bases. CPU version of
 //! `kernels/sampling/hammersley.wesl`.
 //!
-//! Source: J. Hammersley, "Monte Carlo methods for solving multivariable problems", Ann. New York Acad.
-//! Sci. 86, 1960. The set is made for N points: a part of it is biased, so a run draws a set of its own
-//! for every number of samples. Words: N, the quotient and the remainder of 2³² / N, then those of Halton's
-//! sequence for the dimensions after the first.
+//! Source: J. Hammersley, "Monte Carlo methods for solving multivariable problems", Ann. New York
+//! Acad. Sci. 86, 1960. The set is made for N points: a part of it is biased, so a run draws a
+//! separate set for every number of samples. Words: N, the quotient and the remainder of 2³² / N,
+//! then those of Halton's sequence for the dimensions after the first.
 
 use super::halton::DigitRule;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};

@@ -1,4 +1,4 @@
-//! Integer hashes. Twin of `kernels/sampling/hash.wesl`.
+//! Integer hashes. CPU version of `kernels/sampling/hash.wesl`.
 
 use super::Coordinate;
 
@@ -22,21 +22,22 @@ pub(crate) fn wang_hash(x: u32) -> u32 {
     s ^ (s >> 15)
 }
 
-/// Weyl's: the golden ratio's fraction, odd.
+/// Weyl's factor: the golden ratio's fraction, odd.
 const STRIDE_FACTOR: u32 = 0x9e37_79b1;
 
-/// Place x of the progression that begins at `key`, with an odd stride of the key's own.
+/// Element x of the progression that starts at `key`, with an odd stride derived from the key.
 ///
-/// Were the stride the same for all keys (`key + x`), the numbers of one seed would be those of another, moved by
-/// the difference of the keys: of 30 seeds over 1920 × 1080 pixels two would share a run in 35 % of all cases. Two
-/// progressions with different strides meet in single places only. Equal ones belong to keys k, k′ with
-/// `k · STRIDE_FACTOR` equal but for the last bit: one partner for each key, whose run lies 2³² places away at random.
+/// With the same stride for all keys (`key + x`), the numbers of one seed would be those of
+/// another, shifted by the difference of the keys: of 30 seeds over 1920 × 1080 pixels two would
+/// share a run in 35 % of all cases. Two progressions with different strides share isolated
+/// elements only. Equal strides belong to keys k, k′ whose `k · STRIDE_FACTOR` differ in the last
+/// bit only: one partner per key, whose run has a random offset within 2³² elements.
 pub(super) fn strided(key: u32, x: u32) -> u32 {
     let stride = key.wrapping_mul(STRIDE_FACTOR) | 1;
     key.wrapping_add(x.wrapping_mul(stride))
 }
 
-/// A random number of key and x, for each key a permutation of all x; `key` has to be well mixed.
+/// A random number of key and x, for each key a permutation of all x; `key` must be well mixed.
 pub(crate) fn keyed_hash(key: u32, x: u32) -> u32 {
     pcg_hash(strided(key, x))
 }
@@ -51,7 +52,6 @@ pub fn dimension_number(at: Coordinate) -> u32 {
     keyed_hash(pixel_number(at), at.dimension)
 }
 
-/// A random number of the pixel, dimension and sample.
 pub(crate) fn sample_number(at: Coordinate) -> u32 {
     keyed_hash(dimension_number(at), at.sample)
 }

@@ -1,7 +1,7 @@
-//! `index-offset`: each pixel begins at another point of the sequence. Twin of
+//! `index-offset`: each pixel starts at another point of the sequence. CPU version of
 //! `kernels/sampling/index_offset.wesl`.
 //!
-//! Source: Dufay 2017, §5.3.2, eq. 5.7. He does not say from what range offsets are drawn; here it is a
+//! Source: Dufay 2017, §5.3.2, eq. 5.7. He does not give the range of the offsets; here it is a
 //! parameter. Pixels with close offsets share points, and neighbouring rays need far-apart indices.
 
 use super::fixed_point::mul_high;
@@ -24,7 +24,7 @@ impl Decorrelation for IndexOffset {
         self.seeded.seeding
     }
 
-    /// The mean is that of the first points of the sequence, as many as there are offsets.
+    /// The mean is that of as many first points of the sequence as there are offsets.
     fn is_unbiased(&self) -> bool {
         false
     }

@@ -1,13 +1,15 @@
-//! `jittered`: one random point in each of as many strata as samples, for each pair of dimensions. Twin of
-//! `kernels/sampling/jittered.wesl`.
+//! `jittered`: one random point in each of as many strata as samples, for each pair of dimensions.
+//! CPU version of `kernels/sampling/jittered.wesl`.
 //!
-//! Source: R. Cook, "Stochastic sampling in computer graphics", ACM Trans. Graph. 5, 1986. Each pair of
-//! dimensions visits its strata in an order of its own, by the permutation that A. Kensler computes in
-//! "Correlated multi-jittered sampling", Pixar Technical Memo 13-01, 2013, so that pairs are independent.
+//! Source: R. Cook, "Stochastic sampling in computer graphics", ACM Trans. Graph. 5, 1986. Each
+//! pair of dimensions visits its strata in a separate order, by the permutation that A. Kensler
+//! computes in "Correlated multi-jittered sampling", Pixar Technical Memo 13-01, 2013, so that
+//! pairs are independent.
 //!
-//! N samples have a · b strata: the factors of N if one is at most twice the other, else ⌈√N⌉ times as many as
-//! are needed, of which those that the permutation puts last stay empty; each sample alone is uniform either
-//! way. The set is made for N samples: of more, sample N + i lies in the stratum of sample i again.
+//! N samples have a · b strata: the factors of N if one is at most twice the other, otherwise ⌈√N⌉
+//! columns of as many rows as needed, of which those last in the permutation stay empty; each
+//! sample alone is uniform either way. The set is made for N samples: beyond it, sample N + i is in
+//! the stratum of sample i again.
 //!
 //! Words, for a and then for b: the number, the quotient and the remainder of 2³² over it.
 
@@ -27,7 +29,7 @@ parameters! {
 
 const PAIR_KEY: u32 = 0x5bd1_e995;
 
-/// Columns and rows of strata for so many samples.
+/// Columns and rows of strata for this many samples.
 fn strata(samples: u32) -> [u32; 2] {
     let samples = samples.max(1);
     let rows = (1..=samples.isqrt())
@@ -77,7 +79,7 @@ fn permuted(i: u32, length: u32, key: u32) -> u32 {
     (x + key % length) % length
 }
 
-/// Where stratum `i` of as many as the word at `place` says begins.
+/// Start of stratum `i`, with the number of strata in the word at `place`.
 fn begin(table: &SamplerTable, i: u32, place: u32) -> u32 {
     let [count, quotient, remainder] = [0, 1, 2].map(|k| table.sequence_word(place + k));
     let part = i.wrapping_mul(remainder) / count;

@@ -2,28 +2,26 @@
 //!
 //! Quality is the squared worst-case error in the Korobov space of smoothness 2 with product weights:
 //! e²(N, z) = −1 + 1/N Σ_i Π_j (1 + γ_j ω(i z_j / N mod 1)), ω(x) = 2π² (x² − x + 1/6). The search goes
-//! component by component (I. Sloan, A. Reztsov 2002) over all odd z below 2¹⁰ and takes the least
-//! product of e² over N = 2, 4, … 2¹⁰, for the prefixes count as well. For N = 2¹¹ … 2¹⁶ each component
-//! gets one more binary digit, the better of two (as F. Hickernell, H. Niederreiter 2003 extend
-//! lattices), so earlier prefixes stay as they are. A lattice of N points has N / 4 different components
-//! but for the sign: late dimensions of small prefixes repeat early ones.
+//! component by component (I. Sloan, A. Reztsov 2002) over all odd z below 2¹⁰ and minimises the
+//! product of e² over N = 2, 4, … 2¹⁰, since the prefixes count as well. For N = 2¹¹ … 2¹⁶ each
+//! component gets one more binary digit, the better of two (as F. Hickernell, H. Niederreiter 2003
+//! extend lattices), so earlier prefixes are unchanged. A lattice of N points has N / 4 different
+//! components except for the sign: late dimensions of small prefixes repeat early ones.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Components of the vector.
 pub(super) const DIMENSIONS: usize = 128;
-/// Points are meant for up to 2^LAST_LEVEL samples.
+/// Points are optimised for up to 2^LAST_LEVEL samples.
 pub(super) const LAST_LEVEL: u32 = 16;
-/// All candidates are tried up to here.
+/// Exhaustive search up to this level.
 const SEARCH_LEVEL: u32 = 10;
 
-/// Weight of component `j`: late dimensions of a path matter less, none is without weight.
+/// Weight of component `j`: late dimensions of a path matter less, but none has weight zero.
 fn weight(j: usize) -> f64 {
     1.0 / (j as f64 + 1.0)
 }
 
-/// ω at the multiples of 2^-level.
 fn kernel(level: u32) -> Vec<f64> {
     let omega = |x: f64| 2.0 * PI * PI * (x * x - x + 1.0 / 6.0);
     (0..1_u32 << level)
@@ -74,7 +72,7 @@ fn multiply(products: &mut [f64], omega: &[f64], gamma: f64, z: usize) {
     }
 }
 
-/// Gives every component the digit 2^(level−1) or not.
+/// Adds the digit 2^(level−1) to every component or not, whichever is better.
 fn extend(vector: &mut [u32], level: u32) {
     let omega = kernel(level);
     let mask = omega.len() - 1;
@@ -99,7 +97,7 @@ fn extend(vector: &mut [u32], level: u32) {
     }
 }
 
-/// The vector, found once in a process. It begins with the same components however many are wanted.
+/// The vector, computed once per process; its first components are the same for any length.
 pub(super) fn generating_vector() -> &'static [u32] {
     static VECTOR: OnceLock<Vec<u32>> = OnceLock::new();
     VECTOR.get_or_init(|| {

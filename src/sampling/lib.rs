@@ -1,8 +1,8 @@
 //! Samplers: sequences and decorrelations as two independent axes, each with a kernel and a scalar
-//! twin that equals it to the bit on the u32 before the conversion to float.
+//! CPU version that is bit-identical on the u32 before the conversion to float.
 //!
-//! A decorrelation acts twice: it chooses the index of the point (`index`), the sequence gives the
-//! point's coordinate, and the decorrelation moves that (`decorrelate`).
+//! A decorrelation acts twice: it chooses the index of the point (`index`), the sequence computes
+//! the point's coordinate, and the decorrelation moves that (`decorrelate`).
 #![warn(missing_docs)]
 
 mod blue_noise;
@@ -73,18 +73,18 @@ pub(crate) use van_der_corput::VanDerCorput;
 use raystone_core::params::Variant;
 use std::sync::Arc;
 
-/// What will be drawn: tables are made for it, and no longer than it needs.
+/// The intended draws: tables are made for these, and no longer than needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Demand {
-    /// Samples per pixel, all of them together; `None` where that is not known beforehand.
+    /// Total samples per pixel; `None` if not known beforehand.
     pub samples: Option<u32>,
-    /// Dimensions: 0 … this, excluded.
+    /// Upper bound (exclusive) of the dimensions.
     pub dimensions: u32,
-    /// Width of the image, pixels; `None` where pixels lie in no image.
+    /// Width of the image, pixels; `None` if pixels are not in an image.
     pub width: Option<u32>,
 }
 
-/// A sequence and a decorrelation with their parameters: what a kernel draws from.
+/// A sequence and a decorrelation with their parameters, from which a kernel draws.
 #[derive(Clone)]
 pub struct Sampler {
     /// The sequence.
@@ -95,27 +95,26 @@ pub struct Sampler {
     pub decorrelation: Arc<dyn Decorrelation>,
     /// Its parameters.
     pub decorrelation_variant: Variant,
-    /// What it was made for.
+    /// The demand it was made for.
     pub demand: Demand,
     /// The words of both.
     pub table: SamplerTable,
-    /// Which pixels draw the same from the sequence and from the decorrelation.
+    /// Which pixels draw the same from the sequence, and from the decorrelation.
     seeding: [Seeding; 2],
 }
 
 impl Sampler {
-    /// Whether seeds give different points; a deterministic sampler has one replicate.
+    /// True if seeds give different points; a deterministic sampler has one replicate.
     pub fn is_random(&self) -> bool {
         self.sequence.facts().random || self.decorrelation.is_random()
     }
 
-    /// Whether each number of samples has points of its own: the first half of the points for 2N is not
-    /// the set for N.
+    /// True if each number of samples has its own points, rather than a prefix of a longer set.
     pub fn by_count(&self) -> bool {
         self.sequence.facts().by_count || self.decorrelation.by_count()
     }
 
-    /// `sequence × decorrelation`, for people.
+    /// `sequence × decorrelation`, for display.
     pub fn label(&self) -> String {
         format!(
             "{} × {}",
@@ -123,7 +122,7 @@ impl Sampler {
         )
     }
 
-    /// Modules of the kernels of sequence and decorrelation.
+    /// Kernel modules of sequence and decorrelation.
     pub fn kernels(&self) -> [String; 2] {
         let module = |own: Option<&str>, variant: &Variant| match own {
             Some(module) => module.to_owned(),
@@ -145,7 +144,7 @@ impl Sampler {
         out
     }
 
-    /// How far the pixels of a workgroup should lie apart, in each direction, so that they draw the same: see [`paired`].
+    /// Spacing of a workgroup's pixels for which they draw the same: see [`paired`].
     pub fn stride(&self) -> u32 {
         let [sequence, decorrelation] = self.seeding.map(Seeding::stride);
         sequence.max(decorrelation)
@@ -154,7 +153,7 @@ impl Sampler {
     /// The u32 that the kernel computes for this coordinate.
     ///
     /// # Panics
-    /// A dimension beyond the demand, where there is a table.
+    /// A dimension beyond the demand, if there is a table.
     pub fn sample_u32(&self, at: Coordinate) -> u32 {
         let width = self.table.image_width();
         let [mut point, own] = self.seeding.map(|seeding| Coordinate {
@@ -167,8 +166,8 @@ impl Sampler {
     }
 }
 
-/// The float that kernels make of a u32: the upper 24 bits, so that 1.0 is never reached and no
-/// rounding is involved. Twin of `to_unit` in `kernels/sampling/sampler.wesl`.
+/// The float that kernels make of a u32: the upper 24 bits, so that 1.0 is never reached and
+/// nothing is rounded. CPU version of `to_unit` in `kernels/sampling/sampler.wesl`.
 pub fn to_unit(x: u32) -> f32 {
     (x >> 8) as f32 * 2.0_f32.powi(-24)
 }

@@ -1,11 +1,12 @@
-//! `linear-scramble`: a random lower triangular matrix over the bits of a fraction, then a digital shift. Twin of
-//! `kernels/sampling/linear_scramble.wesl`.
+//! `linear-scramble`: a random lower triangular matrix over the bits of a fraction, then a digital
+//! shift. CPU version of `kernels/sampling/linear_scramble.wesl`.
 //!
-//! Source: J. Matoušek, "On the L2-discrepancy for anchored boxes", J. Complexity 14, 1998 (random linear
-//! scrambling), with the shift of L'Ecuyer and Lemieux 2002. Bit j of the input, from the highest, adds column j
-//! modulo 2: bit j itself and random ones below. The matrix keeps nets in base 2, and the mean of squared errors
-//! over matrices and shifts is that of Owen's scrambling, with 32 random words a dimension for a bit at each node of a tree.
-//! Columns are hashed where a bit is set: as many as the points have digits.
+//! Source: J. Matoušek, "On the L2-discrepancy for anchored boxes", J. Complexity 14, 1998 (random
+//! linear scrambling), with the shift of L'Ecuyer and Lemieux 2002. Bit j of the input, from the
+//! highest, adds column j modulo 2: bit j itself and random ones below. The matrix preserves nets
+//! in base 2, and the mean of squared errors over matrices and shifts is that of Owen's scrambling,
+//! with 32 random words per dimension instead of a bit at each node of a tree. Columns are hashed
+//! only where a bit is set: as many as the points have digits.
 
 use super::hash::{dimension_number, pcg_hash};
 use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};

@@ -1,10 +1,11 @@
-//! `micro-jitter`: a random shift of at most μ = K·N^(−1/s) for each pixel and dimension, or for each sample. Twin of
-//! `kernels/sampling/micro_jitter.wesl`.
+//! `micro-jitter`: a random shift of at most μ = K·N^(−1/s) for each pixel and dimension, or for
+//! each sample. CPU version of `kernels/sampling/micro_jitter.wesl`.
 //!
-//! Source: Dufay 2017, §5.4: at sample i all pixels use nearly the same point, hence nearly the same ray.
-//! K = 2.5 for Halton and 1.5 for Hammersley, s = 2; from μ = ½ on it is Cranley and Patterson's shift.
-//! With a shift of its own for each sample a set of points is jittered about its places, and rays stay as coherent.
-//! A shift that stops at the edges instead of wrapping is biased. Word: the width 2μ.
+//! Source: Dufay 2017, §5.4: at sample i all pixels use nearly the same point, hence nearly the
+//! same ray. K = 2.5 for Halton and 1.5 for Hammersley, s = 2; from μ = ½ on it is Cranley and
+//! Patterson's shift. With a separate shift per sample, points are jittered about their positions,
+//! and rays stay as coherent. Clamping at the edges instead of wrapping is biased. Word: the width
+//! 2μ.
 
 use super::fixed_point::mul_high;
 use super::hash::{dimension_number, sample_number};
@@ -27,29 +28,28 @@ parameters! {
         seeded: Seeded;
     }
 
-    /// What has a shift of its own.
+    /// The scope of a shift.
     pub(crate) enum Per {
-        /// All samples of a pixel are shifted alike (Dufay 2017).
+        /// All samples of a pixel have the same shift (Dufay 2017).
         Pixel = "pixel",
-        /// Every sample.
         Sample = "sample",
     }
 
-    /// What a shift beyond the ends of [0, 1) does.
+    /// Handling of shifts beyond [0, 1).
     pub enum Edge {
-        /// It comes in again at the other end.
+        /// Wrap around.
         Wrap = "wrap",
-        /// It stops there.
+        /// Clamp.
         Clamp = "clamp",
     }
 }
 
-/// Dufay's K for Halton points, also taken for sequences that he did not fit.
+/// Dufay's K for Halton points, also used for sequences that he did not fit.
 const HALTON_K: f64 = 2.5;
 const HAMMERSLEY_K: f64 = 1.5;
 
 impl MicroJitter {
-    /// K, where nothing else is said that for the sequence.
+    /// K, by default that for the sequence.
     fn amplitude(&self, sequence: &str) -> f64 {
         match self.k {
             0.0 if sequence == "hammersley" => HAMMERSLEY_K,
@@ -80,7 +80,7 @@ impl Decorrelation for MicroJitter {
         true
     }
 
-    /// Shifts smaller than the square keep a part of the error of the points.
+    /// Shifts smaller than the square retain a part of the error of the points.
     fn is_unbiased(&self) -> bool {
         false
     }

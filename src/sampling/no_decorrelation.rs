@@ -1,5 +1,5 @@
-//! `none`: every pixel uses the same points, the coherent path tracer of Dufay 2017. Twin of
-//! `kernels/sampling/no_decorrelation.wesl`.
+//! `none`: every pixel uses the same points, as in the coherent path tracer of Dufay 2017. CPU
+//! version of `kernels/sampling/no_decorrelation.wesl`.
 
 use super::{Coordinate, Decorrelation, Partner, SamplerTable};
 use raystone_core::parameters;

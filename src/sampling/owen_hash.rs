@@ -1,9 +1,9 @@
-//! `owen-hash`: nested uniform scrambling of index and digits by hashes. Twin of
+//! `owen-hash`: nested uniform scrambling of index and digits by hashes. CPU version of
 //! `kernels/sampling/owen_hash.wesl`.
 //!
 //! Source: A. Owen, "Randomly permuted (t, m, s)-nets and (t, s)-sequences", 1995, by the hash of
-//! [`super::owen`]. The index is scrambled as well (B. Burley 2020), so that pixels differ in order and
-//! not in place alone; blocks of 2^m samples stay blocks.
+//! [`super::owen`]. The index is scrambled as well (B. Burley 2020), so that pixels differ in order
+//! as well as in position; blocks of 2^m samples stay blocks.
 
 use super::hash::{dimension_number, pixel_number};
 use super::owen::owen_scramble;

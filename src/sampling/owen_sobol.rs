@@ -1,10 +1,10 @@
-//! `owen-sobol`: Sobol points in an order and with digits scrambled by hashes. Twin of
+//! `owen-sobol`: Sobol points with order and digits scrambled by hashes. CPU version of
 //! `kernels/sampling/owen_sobol.wesl`.
 //!
-//! Source: B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, as the crate
-//! `sobol_burley` computes it: the numbers of a pixel are `sobol_burley::sample(sample, dimension,
-//! pixel_number)` to the bit. Words: 16 direction numbers per dimension, bits in reverse order, which is
-//! why 2¹⁶ samples are its limit.
+//! Source: B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, as in the crate
+//! `sobol_burley`: the numbers of a pixel are bit-identical to `sobol_burley::sample(sample,
+//! dimension, pixel_number)`. Words: 16 direction numbers per dimension, bits in reverse order,
+//! which limits it to 2¹⁶ samples.
 
 use super::hash::pixel_number;
 use super::owen::{owen_key, scramble_reversed};

@@ -1,5 +1,5 @@
-//! `pixel-hash`: independent random numbers by hashing pixel, sample, dimension and seed. Twin of
-//! `kernels/sampling/pixel_hash.wesl`.
+//! `pixel-hash`: independent random numbers by hashing pixel, sample, dimension and seed. CPU
+//! version of `kernels/sampling/pixel_hash.wesl`.
 
 use super::hash::{pcg_hash, strided, wang_hash};
 use super::trig_hash::trig_hash;
@@ -16,7 +16,7 @@ parameters! {
         seeded: Seeded;
     }
 
-    /// How numbers are hashed.
+    /// The hash function.
     pub enum Hash {
         /// PCG's output permutation (Jarzynski & Olano 2020).
         Pcg = "pcg",

@@ -1,8 +1,9 @@
-//! `pmj02`: progressive multi-jittered (0, 2) points from a table. Twin of `kernels/sampling/pmj02.wesl`.
+//! `pmj02`: progressive multi-jittered (0, 2) points from a table. CPU version of
+//! `kernels/sampling/pmj02.wesl`.
 //!
-//! Every prefix of 2^m points has one point in each elementary interval of area 2^-m. Words: the number
-//! of points less one, then for each pair of dimensions a set of its own in an order of its own, x and y by
-//! turns.
+//! Every prefix of 2^m points has one point in each elementary interval of area 2^-m. Words: the
+//! number of points minus one, then for each pair of dimensions a separate set in a separate order,
+//! alternating x and y.
 
 use super::pmj02_points::shuffled_points;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};

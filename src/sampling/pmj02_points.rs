@@ -1,13 +1,14 @@
 //! Generates progressive multi-jittered (0, 2) points.
 //!
-//! Source: P. Christensen, A. Kensler, C. Kilpatrick, "Progressive multi-jittered sample sequences",
-//! EGSR 2018, for the order of the cells; M. Pharr, "Efficient generation of points that satisfy
-//! two-dimensional elementary intervals", JCGT 8(1), 2019, for choosing the digits of x and y apart.
+//! Source: P. Christensen, A. Kensler, C. Kilpatrick, "Progressive multi-jittered sample
+//! sequences", EGSR 2018, for the order of the cells; M. Pharr, "Efficient generation of points
+//! that satisfy two-dimensional elementary intervals", JCGT 8(1), 2019, for choosing the digits of
+//! x and y separately.
 
 use raystone_core::random::SplitMix64;
 
-/// Which elementary intervals of area 2^-m hold a point: bit column · rows + row of shape k, which has
-/// 2^k columns and 2^(m−k) rows.
+/// Elementary intervals of area 2^-m that contain a point: bit column · rows + row of shape k,
+/// which has 2^k columns and 2^(m−k) rows.
 struct Occupancy {
     m: u32,
     shapes: Vec<Vec<bool>>,
@@ -43,11 +44,11 @@ impl Occupancy {
     }
 }
 
-/// A point in the cell of `corner`, whose first `x_bits` and `y_bits` digits (m together) are given.
+/// A point in the cell of `corner`, given its first `x_bits` and `y_bits` digits (m together).
 ///
-/// The interval of x's first k + 1 digits and y's first m − k − 1 depends on no later digit of either,
-/// so the digits are chosen one after the other. Its two halves came from two intervals with one point
-/// each, so one of them is always free.
+/// The interval of x's first k + 1 digits and y's first m − k − 1 depends on no later digit of
+/// either, so the digits are chosen one after the other. Its two halves came from two intervals
+/// with one point each, so one of them is always free.
 fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut SplitMix64) -> [u32; 2] {
     let m = occupied.m;
     let mut point = corner;
@@ -75,8 +76,7 @@ fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut Split
     point
 }
 
-/// Nested uniform shuffle: the halves of every block, down to single points, change places or not at
-/// random.
+/// Nested uniform shuffle: randomly swaps the halves of every block, down to single points.
 fn shuffle(block: &mut [[u32; 2]], random: &mut SplitMix64) {
     if block.len() < 2 {
         return;
@@ -89,16 +89,17 @@ fn shuffle(block: &mut [[u32; 2]], random: &mut SplitMix64) {
     shuffle(second, random);
 }
 
-/// The points of one pair of dimensions, to be combined with those of other pairs at the same index.
+/// The points of one pair of dimensions, to be combined with those of other pairs at the same
+/// index.
 ///
-/// In the generator's order the quarter of the square follows from the index modulo 4, for the point that
-/// is added lies opposite of another: two sets in that order leave half of the quadrants of (x, x') empty.
-/// So the order is shuffled within each block from 2^k to 2^(k+1), which keeps every prefix of 2^m points.
-/// A set for fewer points is a prefix of one for more.
+/// In the generator's order the index modulo 4 determines the quadrant, since each added point is
+/// opposite another: two sets in that order leave half of the quadrants of (x, x') empty. So the
+/// order is shuffled within each block from 2^k to 2^(k+1), which preserves every prefix of 2^m
+/// points. A set for fewer points is a prefix of one for more.
 ///
-/// Source: the nested uniform shuffle of A. Helmer, P. Christensen, A. Kensler, "Stochastic generation of
-/// (t, s) sample sequences", EGSR 2021. That of all indices at once, by hashing, needs sequences whose every
-/// aligned block is a net; here only prefixes are.
+/// Source: the nested uniform shuffle of A. Helmer, P. Christensen, A. Kensler, "Stochastic
+/// generation of (t, s) sample sequences", EGSR 2021. Shuffling all indices at once by hashing
+/// needs sequences whose every aligned block is a net; here only prefixes are.
 pub(super) fn shuffled_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     let mut points = pmj02_points(count, seed);
     let mut random = SplitMix64(u64::from(seed) << 32 | 1);
@@ -110,7 +111,7 @@ pub(super) fn shuffled_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     points
 }
 
-/// Adds a point in the quarter that lies `turned` from that of point `i`, whose cell has `bits` digits.
+/// Adds a point in the quadrant `turned` away from that of point `i`, whose cell has `bits` digits.
 fn add_beside(
     points: &mut Vec<[u32; 2]>,
     i: usize,
@@ -130,8 +131,8 @@ fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     let mut random = SplitMix64(u64::from(seed) << 32);
     let mut points = vec![[random.next_u32(), random.next_u32()]];
     let mut k = 0;
-    // From 4^k points to 4^(k+1): first into the opposite quarter of each point's cell, then into
-    // either of the two left, at last opposite of those.
+    // From 4^k points to 4^(k+1): first into the opposite quadrant of each point's cell, then into
+    // either of the two left, finally opposite those.
     while points.len() < count as usize {
         let half = 0x8000_0000 >> k;
         let before = points.len();

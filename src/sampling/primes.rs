@@ -2,7 +2,6 @@
 
 use super::hash::pcg_hash;
 
-/// The first `count` primes.
 pub(super) fn primes(count: usize) -> Vec<u32> {
     let mut primes: Vec<u32> = Vec::with_capacity(count);
     let mut candidate = 2;
@@ -16,7 +15,7 @@ pub(super) fn primes(count: usize) -> Vec<u32> {
     primes
 }
 
-/// Faure's permutation of the digits of `base`; 0 stays.
+/// Faure's permutation of the digits of `base`; 0 is fixed.
 ///
 /// Source: H. Faure, "Good permutations for extreme discrepancy", J. Number Theory 42, 1992.
 pub fn faure_permutation(base: u32) -> Vec<u32> {
@@ -35,8 +34,7 @@ pub fn faure_permutation(base: u32) -> Vec<u32> {
     out
 }
 
-/// A random permutation of the digits of `base` by Fisher and Yates, always the same; 0 stays, so that
-/// an expansion ends.
+/// A fixed random permutation of the digits (Fisher–Yates); 0 is fixed, so an expansion ends.
 pub(super) fn random_permutation(base: u32) -> Vec<u32> {
     let mut out: Vec<u32> = (0..base).collect();
     for i in (2..base).rev() {

@@ -1,13 +1,15 @@
-//! `r2`: multiples of powers of a generalised golden ratio. Twin of `kernels/sampling/r2.wesl`.
+//! `r2`: multiples of powers of a generalised golden ratio. CPU version of
+//! `kernels/sampling/r2.wesl`.
 //!
 //! Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018:
 //! x_j(i) = ½ + (i + 1) φ_d^(−j−1) modulo 1, where φ_d is the positive root of x^(d+1) = x + 1. The
-//! powers are fractions of 2³², so point i is off by less than (i + 1) / 2³³.
+//! powers are fractions of 2³², so the error of point i is below (i + 1) / 2³³.
 //!
-//! The more dimensions, the nearer φ_d is to 1 and the more alike its powers are: with d = 20 a pair of
-//! dimensions has D* = 0.124 after 1024 points. Beyond [`GOLDEN`] dimensions the steps are therefore the
-//! square roots of primes (R. Richtmyer, "The evaluation of definite integrals, and a quasi-Monte-Carlo
-//! method based on the properties of algebraic numbers", 1951), whose worst pair of 20 has 0.032.
+//! With more dimensions, φ_d is closer to 1 and its powers are more similar: with d = 20 a pair of
+//! dimensions has D* = 0.124 after 1024 points. Beyond [`GOLDEN`] dimensions the steps are
+//! therefore the square roots of primes (R. Richtmyer, "The evaluation of definite integrals, and a
+//! quasi-Monte-Carlo method based on the properties of algebraic numbers", 1951), whose worst pair
+//! of 20 has 0.032.
 
 use super::primes::primes;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
@@ -22,10 +24,10 @@ parameters! {
     }
 }
 
-/// Most dimensions that take powers of the ratio.
+/// Maximum dimensions that use powers of the ratio.
 const GOLDEN: u32 = 8;
 
-/// φ_d by Newton's method from above, with nothing but products: the same on every machine.
+/// φ_d by Newton's method from above, with products only: the same on every machine.
 fn generalised_golden_ratio(dimensions: u32) -> f64 {
     let mut x = 2.0_f64;
     for _ in 0..64 {

@@ -1,9 +1,10 @@
-//! `rank1-lattice`: multiples of a generating vector in the order of van der Corput. Twin of
+//! `rank1-lattice`: multiples of a generating vector in van der Corput order. CPU version of
 //! `kernels/sampling/rank1_lattice.wesl`.
 //!
-//! Source: F. Hickernell, H. Hong, P. L'Ecuyer, C. Lemieux, "Extensible lattice sequences for quasi-Monte
-//! Carlo quadrature", SIAM J. Sci. Comput. 22, 2000: x(i) = φ₂(i) · z modulo 1, so the first 2^m points
-//! are a lattice for every m. φ₂(i) is the reversed index, and the product of words wraps by itself.
+//! Source: F. Hickernell, H. Hong, P. L'Ecuyer, C. Lemieux, "Extensible lattice sequences for
+//! quasi-Monte Carlo quadrature", SIAM J. Sci. Comput. 22, 2000: x(i) = φ₂(i) · z modulo 1, so the
+//! first 2^m points are a lattice for every m. φ₂(i) is the reversed index, and the product of
+//! words wraps by itself.
 
 use super::lattice_search::generating_vector;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};

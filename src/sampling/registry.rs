@@ -10,7 +10,7 @@ use crate::{decorrelation_kind, sequence_kind};
 use raystone_core::params::{Entry, Params, Registry, Variant};
 use std::sync::Arc;
 
-/// Everything that can be named on the `sequence` and `decorrelation` axes; more can be added.
+/// The values of the `sequence` and `decorrelation` axes; more can be added.
 #[derive(Clone)]
 pub struct SamplerRegistry {
     /// The sequences.
@@ -55,7 +55,7 @@ fn pair(sequence: &Variant, decorrelation: &Variant) -> String {
     format!("{sequence} × {decorrelation}")
 }
 
-/// The kind of `registry` that `variant` names, with its parameters, and the variant with all of them.
+/// The kind of `registry` named by `variant`, with its parameters, and the full variant.
 fn configured<T: ?Sized>(
     registry: &Registry<T>,
     axis: &'static str,
@@ -83,7 +83,7 @@ fn configured<T: ?Sized>(
 type Pair = (Arc<dyn Sequence>, Arc<dyn Decorrelation>);
 
 impl SamplerRegistry {
-    /// The two kinds with their parameters, if they make sense together.
+    /// The two kinds with their parameters, if they can be combined.
     fn pair(
         &self,
         sequence: &Variant,
@@ -105,7 +105,7 @@ impl SamplerRegistry {
         Ok(((first, second), [sequence, decorrelation]))
     }
 
-    /// What is to be known of a sequence.
+    /// The properties of a sequence.
     ///
     /// # Errors
     /// An unknown name or parameter, or a value out of its range.
@@ -113,10 +113,10 @@ impl SamplerRegistry {
         Ok(configured(&self.sequences, "sequence", sequence)?.0.facts())
     }
 
-    /// Whether seeds change what this pair draws. No table is made.
+    /// True if seeds change the draws of this pair. No table is generated.
     ///
     /// # Errors
-    /// An unknown name, or a pair that makes no sense.
+    /// An unknown name, or a pair that cannot be combined.
     pub fn is_random(
         &self,
         sequence: &Variant,
@@ -126,18 +126,18 @@ impl SamplerRegistry {
         Ok(first.facts().random || second.is_random())
     }
 
-    /// Whether the mean over seeds is the integral at any number of samples: the sequence is random by
-    /// itself, or the decorrelation sees to it. False for unknown names.
+    /// True if the mean over seeds is the integral at any number of samples, by a random sequence
+    /// or by the decorrelation. False for unknown names.
     pub fn is_unbiased(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
         let pair = self.pair(sequence, decorrelation);
         pair.is_ok_and(|((first, second), _)| first.facts().random || second.is_unbiased())
     }
 
-    /// The sampler of two variants, with tables for what is demanded.
+    /// The sampler of two variants, with tables for the demand.
     ///
     /// # Errors
-    /// An unknown name, a pair that makes no sense, a demand beyond a limit (which the message names),
-    /// or a table that cannot be made.
+    /// An unknown name, a pair that cannot be combined, a demand beyond a limit (which the message
+    /// names), or a table that cannot be generated.
     pub fn sampler(
         &self,
         sequence: &Variant,

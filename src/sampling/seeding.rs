@@ -1,9 +1,10 @@
-//! Which pixels draw the same random numbers. Twin of `kernels/sampling/seeding.wesl`.
+//! Which pixels draw the same random numbers. CPU version of `kernels/sampling/seeding.wesl`.
 //!
-//! F. Nilsson and H. Otte dag (master's thesis, Chalmers 2018) seed by the sample alone, which forces rays to be alike at the price of
-//! a pattern that is the same in all pixels (Table 5.3). They propose, and leave undone, what hides it (section 6.1.1): the
-//! pixels of a workgroup share a seed, and lie far apart. Here these are 8 × 8 pixels, each [`STRIDE`] from the next, of a tile of
-//! 64 × 64; [`Seeding::Workgroup`] is the same with neighbours.
+//! F. Nilsson and H. Otte dag (master's thesis, Chalmers 2018) seed by the sample alone, which
+//! forces rays to be coherent at the price of a pattern that is the same in all pixels (Table 5.3).
+//! They propose, but do not implement, a way to hide it (section 6.1.1): the pixels of a workgroup
+//! share a seed, and are far apart. Here these are 8 × 8 pixels, each [`STRIDE`] from the next, of
+//! a tile of 64 × 64; [`Seeding::Workgroup`] is the same with neighbours.
 
 use raystone_core::parameters;
 
@@ -18,28 +19,27 @@ parameters! {
     pub enum Seeding {
         /// Each pixel draws its own.
         PixelSample = "pixel-sample",
-        /// All pixels draw the same: coherence by force (Nilsson & Otte dag 2018, Table 5.3).
+        /// All pixels draw the same: forced coherence (Nilsson & Otte dag 2018, Table 5.3).
         Sample = "sample",
         /// The 8 × 8 neighbours of a workgroup draw the same.
         Workgroup = "workgroup",
-        /// 8 × 8 pixels draw the same that lie 8 apart (ibid., section 6.1.1).
+        /// 8 × 8 pixels with a spacing of 8 draw the same (ibid., section 6.1.1).
         Sparse = "sparse",
     }
 }
 
-/// As kernels know [`Seeding`]: `SEQUENCE_SEEDING` and `DECORRELATION_SEEDING`.
+/// Kernel numbers of [`Seeding`], for `SEQUENCE_SEEDING` and `DECORRELATION_SEEDING`.
 const PIXEL_SAMPLE: u32 = 0;
 const SAMPLE: u32 = 1;
 const WORKGROUP: u32 = 2;
 const SPARSE: u32 = 3;
 
-/// Pixels of a group in each direction, as lanes of a workgroup.
+/// Pixels of a group in each direction, as in a workgroup.
 const EDGE: u32 = 8;
-/// How far the pixels of a sparse group lie apart, in each direction.
+/// Spacing of a sparse group's pixels in each direction.
 pub(crate) const STRIDE: u32 = 8;
 
 impl Seeding {
-    /// As kernels know it.
     pub(super) const fn number(self) -> u32 {
         match self {
             Self::PixelSample => PIXEL_SAMPLE,
@@ -49,12 +49,12 @@ impl Seeding {
         }
     }
 
-    /// Whether it depends on where the pixel lies in the image.
+    /// True if it depends on the pixel's position in the image.
     pub(super) const fn by_width(self) -> bool {
         matches!(self, Self::Workgroup | Self::Sparse)
     }
 
-    /// How far the pixels of a workgroup should lie apart, so that they draw the same.
+    /// Spacing of a workgroup's pixels for which they draw the same.
     pub const fn stride(self) -> u32 {
         match self {
             Self::Sparse => STRIDE,
@@ -62,7 +62,8 @@ impl Seeding {
         }
     }
 
-    /// Twin of the kernel's `seed_pixel`: the pixel whose random numbers a pixel draws, in an image of this width.
+    /// CPU version of the kernel's `seed_pixel`: the pixel whose random numbers a pixel draws, in
+    /// an image of this width.
     pub(crate) fn seed_pixel(self, pixel: u32, width: u32) -> u32 {
         match self {
             Self::PixelSample => pixel,
@@ -75,8 +76,8 @@ impl Seeding {
     }
 }
 
-/// The pixel at this place of the image as workgroups hold it, whose pixels lie so far apart: the place is moved within a tile
-/// of `EDGE`·`stride` pixels, and each place has a pixel of its own.
+/// The pixel for this position when workgroups have pixels of this spacing: a permutation within
+/// tiles of `EDGE`·`stride` pixels.
 pub fn paired([x, y]: [u32; 2], stride: u32) -> [u32; 2] {
     [x, y].map(|at| {
         let (tile, within) = (at / (EDGE * stride), at % (EDGE * stride));
@@ -90,7 +91,7 @@ mod tests {
     use super::*;
     use std::collections::{BTreeMap, BTreeSet};
 
-    /// What is wrong with a pairing of the places of an image of whole tiles with its pixels, if anything is.
+    /// The fault of a pairing of positions with pixels for an image of whole tiles, if any.
     fn fault(seeding: Seeding, paired: impl Fn([u32; 2], u32) -> [u32; 2]) -> Option<String> {
         let edge = 2 * EDGE * STRIDE;
         let places = || (0..edge).flat_map(|y| (0..edge).map(move |x| [x, y]));

@@ -1,5 +1,5 @@
 //! `sobol`: the digital (t, s)-sequence in base 2 with Joe and Kuo's direction numbers, in natural
-//! order from index 0. Twin of `kernels/sampling/sobol.wesl`.
+//! order from index 0. CPU version of `kernels/sampling/sobol.wesl`.
 //!
 //! Source: S. Joe, F. Kuo, "Constructing Sobol sequences with better two-dimensional projections",
 //! SIAM J. Sci. Comput. 30, 2008 (set D6, from the crate `sobol`).
@@ -18,8 +18,8 @@ parameters! {
     pub(crate) struct Sobol {}
 }
 
-/// Direction numbers of the first `dimensions` dimensions: `bits` a dimension, the one of the index's
-/// bit 0 first; they are fractions of 2³². The crate packs Joe and Kuo's file in three lengths.
+/// Direction numbers of the first `dimensions` dimensions, as fractions of 2³²: `bits` per
+/// dimension, from bit 0 of the index on. The crate packs Joe and Kuo's file in three lengths.
 pub(super) fn direction_numbers(dimensions: u32, bits: usize) -> Vec<u32> {
     let parameters = match dimensions {
         ..=100 => JoeKuoD6::minimal(),

@@ -1,7 +1,7 @@
-//! What a draw depends on, and the words that sequence and decorrelation read. Twin of
+//! The coordinates of a draw, and the words that sequence and decorrelation read. CPU version of
 //! `kernels/sampling/state.wesl`.
 
-/// What one coordinate is asked for.
+/// The coordinates of one draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coordinate {
     /// Linear pixel index.
@@ -14,18 +14,17 @@ pub struct Coordinate {
     pub seed: u32,
 }
 
-/// Words before those of the sequence: where the words of the decorrelation begin.
+/// Words before those of the sequence: the start of the decorrelation's words.
 const HEADER: u32 = 1;
 
-/// The words that kernels read as the texture `sampler_table`: the header, the sequence's, the width of the image, the
-/// decorrelation's, and zeros up to a whole texel of four.
-/// Lengths are data, not constants, so that neither the number of samples nor that of dimensions
-/// makes another kernel.
+/// The words that kernels read as the texture `sampler_table`: the header, the sequence's, the
+/// width of the image, the decorrelation's, and zeros up to a whole texel of four. Lengths are
+/// data, not constants, so that the numbers of samples and dimensions do not require other kernels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SamplerTable(Vec<u32>);
 
 impl SamplerTable {
-    /// A table of the words of a sequence and those of a decorrelation, for images of this width (0 if that is not known).
+    /// A table of both words, for images of this width (0 if unknown).
     pub fn new(sequence: &[u32], width: u32, decorrelation: &[u32]) -> Self {
         let header = [HEADER + sequence.len() as u32 + 1];
         let mut words = [&header, sequence, &[width], decorrelation].concat();
@@ -33,7 +32,7 @@ impl SamplerTable {
         Self(words)
     }
 
-    /// All words, as the device gets them.
+    /// All words, as uploaded to the device.
     pub fn words(&self) -> &[u32] {
         &self.0
     }
@@ -45,7 +44,7 @@ impl SamplerTable {
     /// Word `i` of the sequence.
     ///
     /// # Panics
-    /// Beyond the table: a dimension that the sampler was not made for.
+    /// Beyond the table: a dimension outside the sampler's demand.
     pub fn sequence_word(&self, i: u32) -> u32 {
         self.word(HEADER + i)
     }

@@ -1,11 +1,13 @@
-//! The trigonometric hash of shaders, a negative control. Twin of `kernels/sampling/trig_hash.wesl`.
+//! The trigonometric hash of shaders, a negative control. CPU version of
+//! `kernels/sampling/trig_hash.wesl`.
 //!
-//! Source: Dufay 2017, Alg. 5.1: per pixel s = 0.0174532·y·W + x; s = s·sin(s); then each pair of numbers
-//! takes two steps of 0.1 and is frac(sin(s) · (43758.5453123, 22578.1459123)). A device's `sin` may be
-//! anything, so angles are fractions of a turn in 2³², the sine is a polynomial (Taylor's, of degree 11,
-//! off by less than 1e-7), and all of it is integer arithmetic. Two things differ from the printed text,
-//! since a draw has to depend on its coordinates alone: the linear pixel index stands for y·W and the
-//! seed for x, and sample i begins 256 steps after sample i − 1.
+//! Source: Dufay 2017, Alg. 5.1: per pixel s = 0.0174532·y·W + x; s = s·sin(s); then each pair of
+//! numbers takes two steps of 0.1 and is frac(sin(s) · (43758.5453123, 22578.1459123)). The
+//! accuracy of `sin` is not specified on devices, so angles are fractions of a turn in 2³², the
+//! sine is a Taylor polynomial of degree 11 (error below 1e-7), and everything is integer
+//! arithmetic. Two things differ from the printed text, since a draw must depend on its coordinates
+//! alone: the linear pixel index replaces y·W and the seed replaces x, and sample i begins 256
+//! steps after sample i − 1.
 
 use super::Coordinate;
 use super::fixed_point::mul_high;
@@ -114,8 +116,8 @@ mod tests {
             };
             let found = f64::from(trig_hash(at)) * 2.0_f64.powi(-32);
             let off = (found - exact).abs();
-            // 43758 times the errors of the sine and of the rounded steps, times the angle: for large
-            // angles nothing is left, and with f32 no sooner.
+            // 43758 times the errors of the sine and of the rounded steps, times the angle: for
+            // large angles nothing is left, and with f32 no sooner.
             assert!(off.min(1.0 - off) < 0.03, "{at:?}: {found} is not {exact}");
         }
     }

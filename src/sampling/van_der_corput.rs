@@ -1,4 +1,4 @@
-//! `van-der-corput`: the radical inverse in one base. Twin of `kernels/sampling/van_der_corput.wesl`.
+//! The radical inverse in one base. CPU version of `kernels/sampling/van_der_corput.wesl`.
 
 use super::radical_inverse::radical_inverse;
 use super::{Coordinate, Facts, SamplerTable, Sequence};

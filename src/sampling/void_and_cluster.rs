@@ -1,20 +1,18 @@
-//! A dither mask of blue noise.
+//! A blue-noise dither mask.
 //!
-//! Source: R. Ulichney, "The void-and-cluster method for dither array generation", SPIE 1913, 1993, with
-//! a Gaussian of σ = 1.5 on the torus. Weights are integers, so that sums do not depend on the order and
-//! masks not on the machine.
+//! Source: R. Ulichney, "The void-and-cluster method for dither array generation", SPIE 1913, 1993,
+//! with a Gaussian of σ = 1.5 on the torus. Weights are integers, so that sums do not depend on the
+//! order and masks not on the machine.
 
 use super::hash::pcg_hash;
 use std::sync::OnceLock;
 
-/// Pixels along a side.
 pub(super) const SIZE: usize = 64;
 const PIXELS: usize = SIZE * SIZE;
 const SIGMA: f64 = 1.5;
-/// Pixels of the first pattern.
 const FIRST: usize = PIXELS / 10;
 
-/// Pixels that are set, and the blurred pattern.
+/// The set pixels, and the blurred pattern.
 #[derive(Clone)]
 struct Pattern {
     set: Vec<bool>,
@@ -43,9 +41,10 @@ impl Pattern {
             let dx = (i % SIZE + SIZE - x) % SIZE;
             let dy = (i / SIZE + SIZE - y) % SIZE;
             let weight = self.weights[dy * SIZE + dx];
-            *energy = match self.set[pixel] {
-                true => *energy + weight,
-                false => *energy - weight,
+            *energy = if self.set[pixel] {
+                *energy + weight
+            } else {
+                *energy - weight
             };
         }
     }
@@ -64,7 +63,7 @@ impl Pattern {
     }
 }
 
-/// A random pattern, whose clusters are moved into voids until that changes nothing.
+/// A random pattern, with clusters moved into voids until nothing changes.
 fn first_pattern() -> Pattern {
     let mut pattern = Pattern::new();
     let mut pixels = (0..).map(|i| pcg_hash(i) as usize % PIXELS);
@@ -101,7 +100,7 @@ fn generate() -> Vec<u32> {
     ranks
 }
 
-/// The rank 0 … SIZE² − 1 of each pixel, row by row; generated once in a process.
+/// The rank 0 … SIZE² − 1 of each pixel, row by row; generated once per process.
 pub(super) fn ranks() -> &'static [u32] {
     static RANKS: OnceLock<Vec<u32>> = OnceLock::new();
     RANKS.get_or_init(generate)

@@ -1,12 +1,14 @@
-//! The gate: no figure is printed for a structure whose hits differ from the judge's.
+//! The correctness check: no figure is printed for a structure whose hits differ from the reference
+//! tracer's.
 //!
-//! The judge is the scalar CPU twin of the plain BVH. It is itself compared with brute force and with
-//! the f64 oracle on as many rays as a budget allows. On an adapter that computes like the host,
-//! hits must be equal to the bit. On one that fuses or divides otherwise, a differing hit is a *tie*
-//! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
+//! The reference tracer is the scalar CPU version of the plain BVH. It is checked against brute
+//! force and the f64 oracle on as many rays as a budget allows. On an adapter with the host's
+//! arithmetic, hits must be bit-identical. On one that fuses or divides differently, a differing
+//! hit is a *tie* if both triangles lie within 4 ulp of the same distance in f64; ties are counted
+//! and reported.
 //!
-//! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
-//! see `instance_judge`.
+//! Instanced scenes have a second reference for structures that transform rays to object space: see
+//! `instance_judge`.
 
 use crate::holes::SceneHoles;
 use crate::instance_judge;
@@ -24,36 +26,36 @@ use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use raystone_record::{ClassVerdict, GateVerdict, JudgeCheck};
 use raystone_scene::SceneData;
 
-/// The judge is compared with brute force on at least this many rays.
+/// Minimum number of rays on which the reference tracer is checked against brute force.
 const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
-/// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
+/// Distances within this many ulp count as equal on an adapter with inexact arithmetic.
 const TIE_ULPS: f64 = 4.0;
 
-/// The judge of a scene: recorded rays with its answers. The scalar BVH that gave them is not kept.
+/// The reference answers of a scene: recorded rays with their hits.
 pub struct Judge {
-    /// Rays and true hits, per class.
+    /// Rays and reference hits, per class.
     pub sets: Vec<RaySet>,
-    /// The judge against brute force.
+    /// The reference tracer against brute force.
     pub brute_force: JudgeCheck,
-    /// The judge against the f64 oracle.
+    /// The reference tracer against the f64 oracle.
     pub oracle: JudgeCheck,
-    /// The first ray on which the judge itself is wrong.
+    /// The first ray on which the reference tracer itself is wrong.
     pub first_wrong: Option<String>,
-    /// The judge of structures that trace instances; `None` if no ray of the scene is transformed.
+    /// The reference for structures that trace instances; `None` if no ray is transformed.
     pub instances: Option<Box<Judge>>,
 }
 
-/// What becomes of checks of a judge that were carried out before.
+/// How to treat earlier checks of the reference tracer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Checks {
-    /// They are repeated.
+    /// Repeat them.
     Repeated,
-    /// Those of a judge that is the same to the bit are found again on disk.
+    /// Reuse those cached on disk for a bit-identical reference.
     Kept,
 }
 
 impl Judge {
-    /// Builds the judge, records the rays and checks the judge itself.
+    /// Builds the reference tracer, records the rays and checks the reference itself.
     ///
     /// # Errors
     /// The scene has too many triangles for a BVH.
@@ -86,7 +88,7 @@ impl Judge {
         Ok(judge)
     }
 
-    /// A judge of these answers, as yet unchecked.
+    /// A reference with these answers, not yet checked.
     pub(super) fn of_sets(sets: Vec<RaySet>) -> Self {
         Self {
             sets,
@@ -107,7 +109,7 @@ impl Judge {
         }
     }
 
-    /// The same judge with every so many of its rays.
+    /// The same reference with every `every`-th ray.
     pub fn thinned(&self, every: usize) -> Self {
         let thin = |set: &RaySet| RaySet {
             class: set.class,
@@ -127,7 +129,7 @@ impl Judge {
         }
     }
 
-    /// The judge of structures that meet triangles in this space.
+    /// The reference for structures that intersect triangles in this space.
     pub fn of(&self, space: Space) -> &Self {
         match (space, &self.instances) {
             (Space::Instances, Some(judge)) => judge,
@@ -140,20 +142,19 @@ impl Judge {
         sets.flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()))
     }
 
-    /// All hard rays.
     pub(super) fn hard(&self) -> impl Iterator<Item = (Ray, Hit)> {
         self.pairs(false)
     }
 
-    /// `count` rays (or all, if there are fewer) spread evenly over all classes but the hard one.
+    /// `count` rays (or all, if fewer) spread evenly over all classes except the hard one.
     pub(super) fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
         let all: Vec<(Ray, Hit)> = self.pairs(true).collect();
         let count = count.min(all.len());
         (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
-    /// Compares with `brute_force`, which costs a ray `triangles` tests, as far as `tests` reach, and on
-    /// all hard rays.
+    /// Compares with `brute_force` on all hard rays and on as many others as `tests` triangle tests
+    /// allow, at `triangles` tests per ray.
     pub(super) fn check_brute_force(
         &mut self,
         tests: u64,
@@ -181,7 +182,7 @@ impl Judge {
         let questions: Vec<_> = pairs
             .iter()
             .map(|(ray, hit)| {
-                // As it is traced: what is raised next to 0 decides at edges.
+                // The ray as traced: clamping components near zero decides hits at edges.
                 let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
                 (soup.intersection.raised(ray), answer)
             })
@@ -195,7 +196,7 @@ impl Judge {
         self.note_oracle(&pairs, verdicts);
     }
 
-    /// Counts what the oracle thinks of these answers, of which those of hard rays come last.
+    /// Counts the oracle's verdicts on these answers; those of hard rays come last.
     pub(super) fn note_oracle(&mut self, pairs: &[(Ray, Hit)], verdicts: Vec<Verdict>) {
         let hard = self.hard().count().min(pairs.len());
         self.oracle.rays = pairs.len();
@@ -215,17 +216,17 @@ impl Judge {
         }
     }
 
-    /// Whether the judge agrees with brute force and with the oracle.
+    /// True if the reference tracer agrees with brute force and with the oracle.
     pub fn is_sound(&self) -> bool {
         self.brute_force.wrong == 0 && self.oracle.wrong == 0
     }
 }
 
-/// Traces all recorded rays, closest and any hit, and compares with the judge of the space in which
-/// the structure meets triangles.
+/// Traces all recorded rays, closest and any hit, and compares with the reference for the space in
+/// which the structure intersects triangles.
 ///
 /// # Errors
-/// A kernel does not compile, the device is lost or hangs, or its driver cuts the loops short.
+/// A kernel does not compile, the device is lost or hangs, or its driver cuts loops short.
 pub fn gate(
     gpu: &Gpu,
     triangles: &TriangleBuffers,
@@ -251,7 +252,8 @@ pub fn gate(
         closest.trace()?;
         any.trace()?;
         if !set.is_timed() {
-            // What is timed is looked at again; here a second turn shows what a first one left behind.
+            // Timed batches are checked after timing; a second pass exposes state left by the
+            // first.
             closest.trace_in_rows()?;
             any.trace_in_rows()?;
         }
@@ -280,8 +282,8 @@ pub fn gate(
     })
 }
 
-/// What is wrong with the answers that a timed batch left behind, all of them looked at, and with the
-/// error word of all its dispatches; nothing if nothing is.
+/// Checks all answers left by a timed batch, and the error word of all its dispatches. Returns a
+/// description of the faults, or `None`.
 ///
 /// # Errors
 /// The device is lost or hangs.
@@ -309,7 +311,7 @@ pub fn timed_fault(
     Ok((!faults.is_empty()).then(|| faults.join("; ")))
 }
 
-/// Compares the answers of a structure with the judge's.
+/// Compares the answers of a structure with the reference.
 pub fn compare(
     set: &RaySet,
     hits: &[Hit],
@@ -352,9 +354,9 @@ pub fn compare(
     verdict
 }
 
-/// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer, and the
-/// ray may hit the other one there: a plane goes on beyond its triangle. Where rays are transformed,
-/// what rounding the transform can move the distance by comes on top.
+/// True if both triangles and the answer lie within 4 ulp of the same distance in f64 and the ray
+/// may hit the other triangle (a plane extends beyond its triangle). For transformed rays, the
+/// error from rounding the transform is added.
 fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup, space: Space) -> bool {
     let (Some(found), Some(expected)) = (
         Meeting::new(ray, hit, soup, space),
@@ -370,16 +372,16 @@ fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup, space: Space) 
         && (hit.triangle == truth.triangle || found.may_hit(hit.t))
 }
 
-/// A ray and a triangle in the space where they meet.
+/// A ray and a triangle in the space where they are intersected.
 pub(super) struct Meeting {
     pub ray: Ray,
     pub record: TriangleRecord,
-    /// How far rounding of the transformed ray may move the distance to the plane.
+    /// Largest change of the distance to the plane from rounding the transformed ray.
     pub transform_error: f64,
 }
 
 impl Meeting {
-    /// `None` for a miss, or for a triangle that the scene has not.
+    /// `None` for a miss or for a triangle index that is not in the scene.
     fn new(ray: &Ray, hit: &Hit, soup: &TriangleSoup, space: Space) -> Option<Self> {
         if hit.triangle == NO_HIT {
             return None;
@@ -396,7 +398,6 @@ impl Meeting {
         }
     }
 
-    /// Distance to the triangle's plane, f64.
     fn plane_distance(&self) -> f64 {
         let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
         let [v0, v1, v2] = self.record.vertices().map(v);
@@ -404,7 +405,7 @@ impl Meeting {
         normal.dot(v0 - v(self.ray.origin)) / normal.dot(v(self.ray.direction))
     }
 
-    /// Whether rounding alone can explain that the triangle was found at `t`.
+    /// True if rounding alone can explain a hit on the triangle at `t`.
     fn may_hit(&self, t: f32) -> bool {
         let triangle = self.record.triangle();
         !matches!(
@@ -414,7 +415,7 @@ impl Meeting {
     }
 }
 
-/// A ray as `raystone trace --ray` takes it, with two answers.
+/// A ray in the format of `raystone trace --ray`, with two answers.
 fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
     format!("ray {ray} | {left} {a} | {right} {b}")
 }

@@ -1,30 +1,30 @@
-//! Hard rays: what cameras, lamps and surfaces hardly ever send out, and what a fault hides behind.
+//! Hard rays: rays that cameras, lights and surfaces hardly ever produce, and behind which faults
+//! hide.
 //!
-//! Half of them are whole rays: through corners, edges and insides of triangles, along edges and in planes
-//! of triangles, along axes with zeros of both signs and with components next to zero, along the diagonals
-//! of the scene; from corners, from planes of triangles, from the planes of boxes and of cells, from far
-//! outside; with directions from 1e-10 to 1e10 long. The other half are parts of these: they end or begin
+//! Half of them are whole rays: through corners, edges and interiors of triangles, along edges and
+//! in triangle planes, along axes with zeros of both signs and components near zero, along the
+//! diagonals of the scene; from corners, triangle planes, box and cell planes, and far outside;
+//! with direction lengths from 1e-10 to 1e10. The other half are parts of these: they end or begin
 //! exactly at, just before or just behind the hit, are a point, or are empty.
 //!
-//! They are made from the scene and a seed alone, and never timed.
+//! They depend only on the scene and a seed, and are never timed.
 
 use glam::Vec3;
 use raystone_accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
 use raystone_core::random::Pcg32;
 
-/// How many there are: no multiple of a workgroup.
+/// Number of hard rays; not a multiple of a workgroup.
 pub const HARD_RAYS: usize = 4100;
 
-/// Origins outside the scene lie up to this many diagonals away: the margins of grids are made for these.
+/// Origins outside the scene are up to this many diagonals away, as far as grid margins allow.
 const OUTSIDE: f32 = 15.0;
 
-/// Lengths of directions.
 const LENGTHS: [f32; 8] = [1.0, 1e-4, 1e-7, 1e-10, 1e4, 1e7, 1e10, 0.3];
 
-/// What takes the place of components of directions.
+/// Replacements for direction components.
 const NEXT_TO_ZERO: [f32; 8] = [0.0, -0.0, 1e-12, -1e-12, 1e-25, -1e-25, 1e-37, -1e-37];
 
-/// The hard rays of a scene, with intervals that end at the hits that `judge` finds.
+/// The hard rays of a scene. Intervals end at hits found by `judge`.
 pub fn hard_rays(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Vec<Ray> {
     if soup.records.is_empty() {
         return Vec::new();
@@ -62,7 +62,6 @@ fn part(ray: &Ray, t: f32, turn: usize) -> Ray {
     ray.between(t_min, t_max)
 }
 
-/// Makes rays of one scene.
 struct Maker<'a> {
     soup: &'a TriangleSoup,
     random: Pcg32,
@@ -84,7 +83,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// From nothing to far away; the kinds take turns.
+    /// A ray from zero to far away; `kind` selects the construction.
     fn whole(&mut self, kind: usize) -> Ray {
         let (origin, direction) = match kind % 8 {
             0 => self.along_an_axis(),
@@ -120,7 +119,7 @@ impl<'a> Maker<'a> {
         corners
     }
 
-    /// A corner, a point of an edge, the middle, or a point of the inside of some triangle.
+    /// A corner, an edge point, the centroid, or an interior point of a random triangle.
     fn point_of_a_triangle(&mut self) -> Vec3 {
         let [a, b, c] = self.triangle();
         match self.random.below(5) {
@@ -142,8 +141,8 @@ impl<'a> Maker<'a> {
         direction.normalize_or(Vec3::X)
     }
 
-    /// Inside, outside, on triangles, and on planes: of the scene's box, of halves, quarters, … of it, and
-    /// of the boxes of triangles.
+    /// An origin inside, outside, on a triangle, or on a plane: of the scene's box, of its halves,
+    /// quarters, …, or of a triangle's box.
     fn origin(&mut self) -> Vec3 {
         let mut origin = match self.random.below(6) {
             0 | 1 => self.inside(),
@@ -177,8 +176,8 @@ impl<'a> Maker<'a> {
         (origin, target - origin)
     }
 
-    /// Along an axis through a point of a triangle or from anywhere; the other components are zeros of
-    /// either sign or next to it.
+    /// Along an axis, through a point of a triangle or from anywhere; the other components are
+    /// zeros of either sign or close to zero.
     fn along_an_axis(&mut self) -> (Vec3, Vec3) {
         let axis = self.random.below(3);
         let mut origin = match self.random.below(3) {
@@ -196,7 +195,7 @@ impl<'a> Maker<'a> {
         (origin, direction)
     }
 
-    /// In the plane of a triangle, as far as f32 goes: along an edge, through a corner, or beside it.
+    /// In the plane of a triangle, to f32 precision: along an edge, through a corner, or beside it.
     fn in_a_plane(&mut self) -> (Vec3, Vec3) {
         let [a, b, c] = self.triangle();
         let (e, f) = (b - a, c - a);
@@ -209,7 +208,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// Along one of the diagonals of the scene or of a face of it, either way: past as many boxes as can be.
+    /// Along a diagonal of the scene or of one of its faces, either way: passes many boxes.
     fn along_a_diagonal(&mut self) -> (Vec3, Vec3) {
         let pick = [(); 3].map(|()| self.random.below(2) == 0);
         let [mut from, mut to] = [self.low, self.high];

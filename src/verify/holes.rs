@@ -1,28 +1,27 @@
-//! What masks cut out of the triangles of a scene, in f64 from the images and texture coordinates as they were loaded: nothing here
-//! reads the words that kernels read. Formula: `docs/shading.md`.
+//! Holes cut into triangles by masks, in f64 from the images and texture coordinates as loaded;
+//! independent of the data that kernels read. Formula: `docs/shading.md`.
 
 use glam::DVec2;
 use raystone_accel::oracle::{Cut, Holes, Weight};
 use raystone_scene::{AlphaMask, SceneData, Texture, TextureUse, Wrap};
 
-/// How far kernels may place a point in an image off where it is, texels: coordinates of corners and of points are multiples of
-/// 1/256 texel, and are rounded three times.
+/// Largest error with which kernels place a point in an image, texels: coordinates of corners and
+/// points are multiples of 1/256 texel, and are rounded three times.
 pub(crate) const PLACED: f64 = 2.0 / 256.0;
-/// Weights are multiples of it.
+/// Weights are multiples of this.
 const WEIGHT: f64 = 1.0 / (1_u32 << 24) as f64;
-/// Texels over which the error of a point may reach for anything to be said of it.
+/// Largest error of a point, texels, for which a verdict is still possible.
 const MOST_TEXELS: f64 = 16.0;
 
-/// The masks of a scene.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneHoles<'a> {
     scene: &'a SceneData,
-    /// Added to the index of each triangle.
+    /// Offset added to each triangle index.
     first: u32,
 }
 
 impl<'a> SceneHoles<'a> {
-    /// `None` where nothing is cut out.
+    /// `None` if nothing is cut out.
     pub(crate) fn of(scene: &'a SceneData) -> Option<Self> {
         let mut materials = scene.materials.iter();
         let first = 0;
@@ -31,13 +30,13 @@ impl<'a> SceneHoles<'a> {
             .then_some(Self { scene, first })
     }
 
-    /// Those of a copy of an object, whose first triangle this is in the scene.
+    /// The holes of a copy of an object whose first triangle in the scene is `first`.
     pub(crate) fn of_copy(self, first: u32) -> Self {
         Self { first, ..self }
     }
 
-    /// Whether there is no surface at the point of a triangle with these weights of its second and third corner, moved by `shift`
-    /// texels.
+    /// True if there is no surface at the point of a triangle with these weights of its second and
+    /// third corners, shifted by `shift` texels.
     pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
         let Some(mask) = self.mask(triangle) else {
             return false;
@@ -58,7 +57,7 @@ impl<'a> SceneHoles<'a> {
         self.scene.materials[id as usize].mask
     }
 
-    /// The first corner in texels from the centre of the first one, and what a weight of the others adds.
+    /// The first corner in texels from the first texel's centre, and the differences to the others.
     fn placed(&self, triangle: u32, used: &TextureUse) -> [DVec2; 3] {
         let uvs = self.scene.uvs.get((triangle + self.first) as usize);
         let texture = &self.scene.textures[used.texture as usize];
@@ -94,11 +93,11 @@ impl Holes for SceneHoles<'_> {
 
 fn is_below(mask: &AlphaMask, alpha: f64) -> bool {
     let alpha = alpha * f64::from(mask.factor);
-    // A factor that is no number cuts out all.
+    // A NaN factor cuts out everything.
     (alpha < f64::from(mask.cutoff) || alpha.is_nan()) && mask.cutoff > 0.0
 }
 
-/// What is known where the image has values between these.
+/// The verdict for a region whose image values lie in this range.
 fn said(mask: &AlphaMask, range: [f64; 2]) -> Cut {
     match range.map(|alpha| is_below(mask, alpha)) {
         [false, false] => Cut::Surface,
@@ -107,7 +106,6 @@ fn said(mask: &AlphaMask, range: [f64; 2]) -> Cut {
     }
 }
 
-/// The alphas of an image.
 struct Image<'a> {
     texture: &'a Texture,
     mask: &'a AlphaMask,
@@ -134,7 +132,7 @@ impl<'a> Image<'a> {
         f64::from(value) / 255.0
     }
 
-    /// Bilinear between the centres of texels.
+    /// Bilinear interpolation between texel centres.
     fn between(&self, at: DVec2) -> f64 {
         let (cell, part) = (at.floor(), at - at.floor());
         let row = |y: f64| {
@@ -144,7 +142,7 @@ impl<'a> Image<'a> {
         row(0.0) * (1.0 - part.y) + row(1.0) * part.y
     }
 
-    /// Least and greatest value in a rectangle: both lie at corners of its parts in cells.
+    /// Minimum and maximum in a rectangle, from the corners of its intersections with cells.
     fn range(&self, low: DVec2, high: DVec2) -> [f64; 2] {
         let stops = |low: f64, high: f64| {
             let mut stops = vec![low, high];
@@ -166,7 +164,7 @@ impl<'a> Image<'a> {
     }
 }
 
-/// The texel that a place on an axis of `size` texels stands for.
+/// The texel index for a position on an axis of `size` texels.
 pub(super) fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
     let inside = match wrap {
         Wrap::Repeat => at.rem_euclid(size),

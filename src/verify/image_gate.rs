@@ -1,24 +1,29 @@
-//! The gate of integrators: single samples of single pixels, as the image kernel computes them, against the
-//! oracle for images ([`PathOracle`]). No error figure is printed for an integrator that fails.
+//! The correctness check of integrators: single samples of single pixels from the image kernel,
+//! compared with the image oracle ([`PathOracle`]). No error figure is printed for an integrator
+//! that fails.
 //!
-//! Each path is put into one of four classes:
+//! Each path falls into one of four classes:
 //!
-//! * it *agrees*: every channel within `TOLERANCE`, relative, or below a floor of `FLOOR` of the mean radiance;
-//! * it is *ill-conditioned*: it differs by more, but by no more than `SPREAD` times what the same path does when a few
-//!   roundings of f32 are played in f64 ([`Rounding`]), all its decisions being the same: texture coordinates on long triangles,
-//!   grazing light;
-//! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere and then gives the kernel's answer. That decision
-//!   had a margin below `MOST_ROUNDINGS` roundings. By what is decided otherwise first, it is of one of three kinds: *another surface*
-//!   that lies within rounding of the first (walls of two layers), *an edge* of what is met or in the way, or anything else, such as a
-//!   random number against a probability;
-//! * else it is *wrong*: a fault of the kernels, or of the oracle.
+//! * it *agrees*: every channel is within `TOLERANCE`, relative, or below a floor of `FLOOR` of the
+//!   mean radiance;
+//! * it is *ill-conditioned*: it differs by more, but by at most `SPREAD` times the change of the
+//!   same path when a few f32 roundings are simulated in f64 ([`Rounding`]) with all decisions
+//!   unchanged: texture coordinates on long triangles, grazing light;
+//! * it is a *flip*: with that many roundings the oracle takes another decision somewhere and then
+//!   gives the kernel's answer. That decision had a margin below `MOST_ROUNDINGS` roundings. The
+//!   first differing decision gives its kind: *another surface* within rounding of the first
+//!   (two-layer walls), *an edge* of a hit or an occluder, or anything else, such as a random
+//!   number against a probability;
+//! * otherwise it is *wrong*: a fault of the kernels or of the oracle.
 //!
-//! Means of some samples that are summed in one dispatch are compared with those of single samples ([`sums`]).
+//! Means of a few samples summed in one dispatch are compared with those of single samples
+//! ([`sums`]).
 //!
-//! One wrong path fails. So do more flips than `FLIPS` of the paths beyond chance, not counting other surfaces, of which there may be as
-//! many as paths meet surfaces with another one within rounding, or more ill-conditioned ones than
-//! `ILL_CONDITIONED` and a median difference above `MEDIAN`, which no single path shows. Texture coordinates that repeat often have
-//! few digits left within a texel, so that the last two have bounds of their own where textures are.
+//! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance (other
+//! surfaces are counted separately, up to the number of paths that meet surfaces with another
+//! within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
+//! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
+//! left within a texel, so the last two have separate bounds for textures.
 
 use crate::path_oracle::{MOST_ROUNDINGS, Parting, Path, PathId, PathOracle, Rounding, View};
 use glam::DVec3;
@@ -28,44 +33,46 @@ use raystone_record::PathsRecord;
 use raystone_render::Renderer;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Relative difference of a channel that is agreement.
+/// Relative difference of a channel that counts as agreement.
 pub(crate) const TOLERANCE: f64 = 1e-4;
-/// Radiance below which differences do not count, as a part of the mean radiance of the judged paths.
+/// Radiance below which differences are ignored, relative to the mean radiance of the paths.
 pub(crate) const FLOOR: f64 = 1e-3;
-/// Roundings of f32 that are played, in this order.
+/// Simulated f32 roundings, in this order.
 pub(crate) const SCALES: [f64; 3] = [4.0, 16.0, MOST_ROUNDINGS];
-/// Part of the paths that may be flips.
+/// Fraction of the paths that may be flips.
 pub(crate) const FLIPS: f64 = 1e-3;
-/// Part of the paths that may be ill-conditioned: where nothing is textured, where a map shines, and where surfaces have textures. Measured
-/// on Mesa's software driver: at most 0.07 % of 1,482 paths of a trial scene (0.03 % of 3,952 of the Cornell box), 1.0 % with maps,
-/// and in the last case 0.2 % of a trial scene but a third of those of a large building, whose textures repeat often.
+/// Fraction of the paths that may be ill-conditioned: without textures, with an environment map,
+/// and with textured surfaces. Measured on Mesa's software driver: at most 0.07 % of 1,482 paths of
+/// a trial scene (0.03 % of 3,952 of the Cornell box), 1.0 % with maps, and in the last case 0.2 %
+/// of a trial scene but a third of those of a large building with often-repeated textures.
 pub(crate) const ILL_CONDITIONED: [f64; 3] = [0.02, 0.05, 0.6];
-/// Greatest median of the relative differences in the same cases; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
+/// Largest median of the relative differences; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
 pub(crate) const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
-/// Times that each scale is played; twice as often for each surface of a path that has another one within rounding, and on as long as
-/// plays take branches that none took before (light that is passed on by many small facets), but never more often than [`MOST_TRIALS`].
+/// Trials per scale, and per surface with another within rounding twice as many; more while trials
+/// take new branches (light passed on by many small facets), up to [`MOST_TRIALS`].
 const TRIALS: u64 = 24;
 const MOST_TRIALS: u64 = TRIALS << 5;
-/// By this factor a kernel may differ more than the worst of the played paths of its branch.
+/// Factor by which a kernel may differ more than the worst simulated path of its branch.
 const SPREAD: f64 = 3.0;
-/// A difference that the second of [`SCALES`] may excuse, too: several offsets add up on long paths in corners.
+/// A difference that the second of [`SCALES`] may excuse too: offsets add up in corners.
 const SLIGHT: f64 = 1e-3;
-/// Samples that are summed in one dispatch to be compared with single ones, and by how much their mean may differ, relative.
+/// Samples summed in one dispatch for comparison with single ones.
 const SUMMED: u32 = 4;
+/// Relative tolerance of their mean.
 const SUM_TOLERANCE: f64 = 1e-6;
-/// After so many wrong paths no more are looked at.
+/// Checking stops after this many wrong paths.
 const ENOUGH: usize = 16;
 
-/// A path as the kernel has it.
+/// A path as computed by the kernel.
 #[derive(Debug, Clone, Copy)]
 pub struct Answer {
-    /// Which one.
+    /// The sample.
     pub id: PathId,
     /// Its radiance.
     pub radiance: DVec3,
 }
 
-/// What a path of a kernel is that does not agree.
+/// The class of a kernel path that does not agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Class {
     IllConditioned,
@@ -73,20 +80,20 @@ enum Class {
     Wrong,
 }
 
-/// Which paths are judged.
+/// The paths to check.
 #[derive(Debug, Clone)]
 pub struct Pixels {
     /// Width and height of the image, pixels.
     pub size: [u32; 2],
-    /// Of so many pixels one, others with each sample.
+    /// One pixel in `every` is checked, a different set for each sample.
     pub every: u32,
-    /// Indices of samples.
+    /// Sample indices.
     pub samples: Vec<u32>,
     /// Seed of the replicate.
     pub seed: u32,
 }
 
-/// Renders single samples, each by itself.
+/// Renders single samples, each in its own dispatch.
 ///
 /// # Errors
 /// A kernel raised its error word, or the device is lost or hangs.
@@ -111,7 +118,8 @@ pub fn answers(renderer: &Renderer, pixels: &Pixels) -> Result<Vec<Answer>, GpuE
     Ok(out)
 }
 
-/// What is wrong with the sum of some samples in one dispatch: it must be that of the same samples each by itself.
+/// Checks that several samples summed in one dispatch equal the same samples rendered singly.
+/// Returns a description of the fault, or `None`.
 ///
 /// # Errors
 /// A kernel raised its error word, or the device is lost or hangs.
@@ -145,7 +153,7 @@ pub fn sums(renderer: &Renderer, pixels: &Pixels) -> Result<Option<String>, GpuE
     Ok(None)
 }
 
-/// Judges the answers of a kernel.
+/// Classifies the answers of a kernel.
 pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecord {
     let truth: Vec<Path> = (answers.par_iter())
         .map(|answer| oracle.trace(view, answer.id, Rounding::none()))
@@ -197,20 +205,21 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     record
 }
 
-/// The greatest difference of a channel, relative to the oracle's, or to the floor.
+/// The largest difference of a channel, relative to the oracle's value or to the floor.
 fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
     let off = (kernel - oracle).abs();
     let relative = off / oracle.abs().max(DVec3::splat(floor));
-    // Where nothing shines the floor is 0, too, and equal is equal. Unlike `max_element`, what follows keeps NaN.
+    // Without light the floor is 0 too, and equal is equal. This keeps NaN, unlike `max_element`.
     let [r, g, b] = DVec3::select(off.cmpeq(DVec3::ZERO), DVec3::ZERO, relative).to_array();
-    match r.is_nan() || g.is_nan() || b.is_nan() {
-        true => f64::NAN,
-        false => r.max(g).max(b),
+    if r.is_nan() || g.is_nan() || b.is_nan() {
+        f64::NAN
+    } else {
+        r.max(g).max(b)
     }
 }
 
-/// Median difference of the paths that found light. One that is no number, or infinite, is the greatest: records have no number for it,
-/// and could not be read.
+/// Median difference of the paths that found light. NaN and infinity become the largest finite
+/// number, since records cannot represent them.
 fn median(truth: &[Path], differences: &[f64], floor: f64) -> f64 {
     let lit = truth.iter().zip(differences);
     let lit = lit.filter(|(path, _)| path.radiance.max_element() > floor);
@@ -220,7 +229,7 @@ fn median(truth: &[Path], differences: &[f64], floor: f64) -> f64 {
     lit.get(lit.len() / 2).copied().unwrap_or_default()
 }
 
-/// Plays roundings until a path of the oracle explains the kernel's.
+/// Simulates roundings until a path of the oracle explains the kernel's.
 fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, floor: f64) -> Class {
     let mut spread = 0.0_f64;
     let mut near = TOLERANCE;
@@ -228,7 +237,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     let off = difference(answer.radiance, truth.radiance, floor);
     let least = (TRIALS << truth.layers.min(8)).min(MOST_TRIALS);
     for (index, scale) in (0..).zip(SCALES) {
-        // Many roundings would excuse anything of a path that keeps its branch.
+        // Many roundings would excuse anything of a path that stays on its branch.
         let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
         let (mut trial, mut since_new) = (0, 0);
         while since_new < least && trial < MOST_TRIALS {
@@ -249,7 +258,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
             }
         }
         if is_excused {
-            // A path on a boundary may have no play of its own branch: then those of the others say how far they lie apart.
+            // A path on a boundary may have no trial of its own branch; others then give a spread.
             near = TOLERANCE + SPREAD * spread.max(spread_of_branches(&others, floor));
         }
         let explains = |other: &Path| difference(answer.radiance, other.radiance, floor) <= near;
@@ -261,7 +270,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     Class::Wrong
 }
 
-/// What the fewest roundings that are played make of a path, for people.
+/// Classifies a path by the fewest simulated roundings, for reports.
 fn spread_of(
     oracle: &PathOracle,
     view: &View,
@@ -292,7 +301,7 @@ fn spread_of(
     )
 }
 
-/// The greatest difference of a path from the first one of its branch.
+/// The largest difference of a path from the first one of its branch.
 fn spread_of_branches(paths: &[Path], floor: f64) -> f64 {
     let from_first = |path: &Path| {
         let first = paths.iter().find(|first| first.parting(path).is_none());
@@ -303,13 +312,13 @@ fn spread_of_branches(paths: &[Path], floor: f64) -> f64 {
     paths.iter().map(from_first).fold(0.0, f64::max)
 }
 
-/// The most of `paths` that may be of a class with this share: six standard deviations above the mean.
+/// The most of `paths` that may be in a class with this share: mean plus six deviations.
 fn most(paths: usize, share: f64) -> usize {
     let mean = share * paths as f64;
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// What the numbers of a record say against it, when no single path does; `texturing` is that of the oracle.
+/// Checks the totals of a record against their bounds; `texturing` comes from the oracle.
 pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
@@ -339,7 +348,7 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
         })
 }
 
-/// Both answers, and the path, a line for each vertex.
+/// Both answers, and the path, one line per vertex.
 fn describe(answer: &Answer, truth: &Path) -> String {
     let mut text = format!(
         "{}: kernel {}, oracle {}",

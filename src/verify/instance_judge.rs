@@ -1,7 +1,7 @@
-//! The judge of structures that take rays to the spaces of objects. Its answers are those of brute
-//! force over the same instances with the same transforms and the same records, so that hits must be
-//! equal to the bit here too; flat triangles in world space round otherwise and judge flat
-//! structures only.
+//! The reference for structures that transform rays to object space. Its answers come from brute
+//! force over the same instances with the same transforms and records, so hits must be
+//! bit-identical here too. Flat triangles in world space round differently and are the reference
+//! for flat structures only.
 
 use crate::gate::{Judge, Meeting};
 use crate::holes::SceneHoles;
@@ -16,11 +16,10 @@ use raystone_core::geometry::Triangle;
 use raystone_record::RayClass;
 use raystone_scene::{Instance, SceneData};
 
-/// Answers of the oracle that are held at a time, one for each ray and instance.
+/// Oracle answers held at a time, one per ray and instance.
 const ORACLE_QUESTIONS: usize = 1_000_000;
 
-/// The judge of the same rays in the spaces of the objects, as yet unchecked; `None` if no ray is
-/// transformed.
+/// The unchecked reference for the same rays in object space; `None` if no ray is transformed.
 ///
 /// # Errors
 /// An object has too many triangles for a BVH.
@@ -34,7 +33,7 @@ pub(super) fn new(
         return Ok(None);
     };
     let twin = InstanceJudge::new(placed)?;
-    // The intervals of hard rays end where this judge finds hits.
+    // The intervals of hard rays end at this reference's hits.
     let of_class = |set: &RaySet| match set.class {
         RayClass::Hard => RaySet::hard(soup, &twin, seed),
         _ => set.judged_by(&twin),
@@ -42,7 +41,7 @@ pub(super) fn new(
     Ok(Some(Judge::of_sets(sets.iter().map(of_class).collect())))
 }
 
-/// Compares this judge with brute force and the oracle.
+/// Compares this reference with brute force and the oracle.
 pub(super) fn check(judge: &mut Judge, (scene, placed): (&SceneData, &Placed), settings: &Gate) {
     let triangles = scene.triangles.len();
     judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
@@ -55,9 +54,8 @@ pub(super) fn check(judge: &mut Judge, (scene, placed): (&SceneData, &Placed), s
     judge.note_oracle(&pairs, verdicts);
 }
 
-/// What the oracle thinks of each answer. Every instance is asked with the ray as it is in its
-/// object's space: the one that was hit whether the hit is right, the others whether they leave the
-/// way to it free.
+/// The oracle's verdict on each answer. Every instance is tested with the ray in its object space:
+/// the hit one for a correct hit, the others for a free path to it.
 fn oracle_verdicts((scene, placed): (&SceneData, &Placed), pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict::Agrees; pairs.len()];
     for (index, object) in placed.objects.iter().enumerate() {
@@ -80,7 +78,7 @@ fn oracle_verdicts((scene, placed): (&SceneData, &Placed), pairs: &[(Ray, Hit)])
         }
         let records = object.records.iter();
         let triangles: Vec<Triangle> = records.map(|record| record.triangle()).collect();
-        // All copies of an object are cut alike.
+        // All copies of an object have the same holes.
         let first = placed.instances.iter().find(of_object).map(|i| i.first);
         let holes = SceneHoles::of(scene).map(|holes| holes.of_copy(first.unwrap_or(0)));
         let surfaces = Surfaces {
@@ -98,7 +96,7 @@ fn oracle_verdicts((scene, placed): (&SceneData, &Placed), pairs: &[(Ray, Hit)])
     verdicts
 }
 
-/// Where a ray meets the triangle `id` of the scene: in the space of its object.
+/// The intersection of a ray with triangle `id` of the scene, in object space.
 pub(super) fn meeting(placed: &Placed, ray: &Ray, id: u32, t: f32) -> Option<Meeting> {
     let (instance, record) = placed.locate(id)?;
     Some(Meeting {
@@ -108,8 +106,8 @@ pub(super) fn meeting(placed: &Placed, ray: &Ray, id: u32, t: f32) -> Option<Mee
     })
 }
 
-/// How far, to first order, rounding of the transformed ray moves the distance to the plane of a
-/// triangle: t = n·(v0 − o′) / n·d′, and o′ and d′ are sums of four and three products.
+/// First-order change of the distance to a triangle's plane from rounding the transformed ray: t =
+/// n·(v0 − o′) / n·d′, where o′ and d′ are sums of four and three products.
 fn transform_error(
     instance: &Instance,
     record: &raystone_accel::triangle::TriangleRecord,

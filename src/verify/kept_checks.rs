@@ -1,9 +1,9 @@
-//! A judge that was checked is not checked again: what brute force and the oracle said of it is kept on
-//! disk, under a hash of everything that it depends on.
+//! A cache of checks of the reference tracer: the verdicts of brute force and the oracle are stored
+//! on disk under a hash of everything that they depend on.
 //!
-//! The hash covers the scene, the tests, every ray with the judge's answer, how much was checked, and the
-//! program, so that a wrong answer never finds the checks of a right one. Only checks without a fault are
-//! kept; a file that is not whole, or stands under another's name, counts for nothing.
+//! The hash covers the scene, the tests, every ray with its reference answer, how much was checked,
+//! and the program, so that a wrong answer never finds the checks of a right one. Only checks
+//! without a fault are stored; a file that is incomplete or has the wrong name is ignored.
 
 use crate::gate::Judge;
 use raystone_accel::Intersection;
@@ -14,10 +14,9 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-/// Names a folder for kept checks in place of the user's cache folder; `off` keeps none.
+/// Names a cache folder to use instead of the user's; `off` disables the cache.
 pub(crate) const CACHE_VARIABLE: &str = "RAYSTONE_CACHE";
 
-/// Where the checks of one judge are kept.
 pub(super) struct KeptChecks {
     folder: PathBuf,
     key: String,
@@ -32,7 +31,7 @@ struct Content {
 }
 
 impl KeptChecks {
-    /// The place in a folder for a judge with these rays; `None` without an identity of the program.
+    /// The place in a folder for a reference with these rays; `None` without a program identity.
     pub(crate) fn of(
         folder: PathBuf,
         judge: &Judge,
@@ -59,7 +58,7 @@ impl KeptChecks {
         self.folder.join(format!("judge-{}.json", self.key))
     }
 
-    /// Puts kept checks into the judge; whether there were any.
+    /// Restores cached checks; returns true if there were any.
     pub(crate) fn restore(&self, judge: &mut Judge) -> bool {
         let Some(content) = self.read() else {
             return false;
@@ -91,7 +90,7 @@ impl KeptChecks {
         (content.key == self.key && right).then_some(content)
     }
 
-    /// Keeps what was found of a sound judge. What cannot be written is found again next time.
+    /// Stores the checks of a sound reference. After a failed write they merely run again.
     pub(crate) fn keep(&self, judge: &Judge) {
         let instances = judge.instances.as_deref();
         if !judge.is_sound() || instances.is_some_and(|judge| !judge.is_sound()) {
@@ -111,12 +110,12 @@ impl KeptChecks {
         let sum = blake3::hash(line.as_bytes()).to_hex();
         let written = std::fs::create_dir_all(&self.folder)
             .and_then(|()| write_atomic(&self.path(), format!("{line}\n{sum}\n").as_bytes()));
-        // A cache that cannot be written costs time, nothing else.
+        // A cache that cannot be written only costs time.
         drop(written);
     }
 }
 
-/// The folder of kept checks, if they are to be kept.
+/// The cache folder, if the cache is enabled.
 pub(super) fn folder() -> Option<PathBuf> {
     let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     match named(CACHE_VARIABLE) {
@@ -130,7 +129,7 @@ pub(super) fn folder() -> Option<PathBuf> {
     }
 }
 
-/// What tells this program from another build of it.
+/// Identifies this build of the program.
 fn program() -> Option<String> {
     let file = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
     let built = file.modified().ok()?;
@@ -196,7 +195,7 @@ mod tests {
         let mut again = judge(1.0);
         assert!(here.restore(&mut again));
         assert!(again.brute_force.reused_unix_s.is_some() && again.oracle.rays == 7);
-        // One bit of an answer, or more to be checked.
+        // One bit of an answer, or a larger number of checks.
         let next = 1.0_f32.next_up();
         assert!(!place(folder.path(), &judge(next), &GATE).restore(&mut judge(next)));
         let more = Gate {

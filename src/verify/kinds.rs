@@ -1,13 +1,13 @@
-//! What checks know of the kinds of materials and lights.
+//! The checks of each kind of material and light.
 
 use crate::lights::LightRegistry;
 use crate::materials::MaterialRegistry;
 
-/// The rows of all kinds: those of the program, until more are registered.
+/// The registered kinds: the built-in ones by default.
 #[derive(Clone, Default)]
 pub struct KindChecks {
-    /// Of materials.
+    /// Materials.
     pub materials: MaterialRegistry,
-    /// Of lights.
+    /// Lights.
     pub lights: LightRegistry,
 }

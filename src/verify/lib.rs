@@ -1,4 +1,4 @@
-//! Checks of hits and images against references of their own: the gate, the path oracle, images in closed form, Mitsuba.
+//! Checks of hits and images: the gate, the path oracle, closed-form images, Mitsuba.
 #![warn(missing_docs)]
 
 pub mod gate;

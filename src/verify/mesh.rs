@@ -1,17 +1,16 @@
-//! Scenes that are put together from a few polygons, balls and blocks: what trial scenes and known images are made of.
+//! Scenes built from a few polygons, balls and blocks, for trial scenes and known images.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use raystone_core::geometry::{Camera, Triangle};
 use raystone_scene::{self as scene, Material, SceneData, SceneError, Texture};
 use std::f32::consts::{PI, TAU};
 
-/// A scene that grows.
 pub(super) struct Mesh {
     pub scene: SceneData,
 }
 
 impl Mesh {
-    /// Nothing but a camera under a sky of this radiance.
+    /// An empty scene with a camera under a sky of this radiance.
     pub(crate) fn new(name: &str, camera: Camera, environment: Vec3) -> Result<Self, SceneError> {
         let scene = SceneData {
             name: name.to_owned(),
@@ -37,7 +36,7 @@ impl Mesh {
         self.scene.material_ids.push(material);
     }
 
-    /// A parallelogram whose texture coordinates run over `uv`.
+    /// A parallelogram with texture coordinates over `uv`.
     pub(crate) fn quad(
         &mut self,
         [corner, along, across]: [Vec3; 3],
@@ -57,7 +56,7 @@ impl Mesh {
         self.quad(quad, [Vec2::ZERO, Vec2::ONE], material);
     }
 
-    /// A box; corners turn counter-clockwise seen from outside.
+    /// A box; corners run counter-clockwise seen from outside.
     pub(crate) fn block(&mut self, low: Vec3, size: Vec3, material: u32) {
         let high = low + size;
         let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
@@ -67,7 +66,7 @@ impl Mesh {
         }
     }
 
-    /// A ball of facets; corners turn counter-clockwise seen from outside.
+    /// A faceted ball; corners run counter-clockwise seen from outside.
     pub(crate) fn ball(&mut self, centre: Vec3, radius: f32, material: u32) {
         const ROWS: u32 = 9;
         let at = |row: u32, column: u32| {
@@ -106,7 +105,6 @@ impl Mesh {
     }
 }
 
-/// Interpolation of numbers.
 trait Lerp {
     fn lerp(self, to: Self, t: f32) -> Self;
 }

@@ -1,5 +1,6 @@
-//! Whether the answers of a ray caster of others are right. Its hits differ from ours by rounding, so they are not compared to the bit:
-//! where its triangle is not the judge's, the oracle decides in double precision whether rounding explains that.
+//! Correctness check of external tracers. Their hits differ from ours by rounding, so they are not
+//! compared bit by bit: where the triangle differs from the reference, the oracle decides in double
+//! precision whether rounding explains it.
 
 use crate::holes::SceneHoles;
 use crate::rays::RaySet;
@@ -8,27 +9,30 @@ use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
 use raystone_accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
 use raystone_scene::SceneData;
 
-/// Most rays of a class that the oracle looks at, spread evenly over those that differ: it tests every triangle of the scene.
+/// Maximum rays per class checked by the oracle, spread evenly over those that differ: it tests
+/// every triangle of the scene.
 const MOST_JUDGED: usize = 256;
-/// Share of the distance (and of a hundredth of the origin's greatest coordinate, whose rounding a short one shows) that single
-/// precision explains: plain Möller–Trumbore tests of far and thin triangles lose three digits.
+/// Relative difference of the distance that single precision explains. The distance counts as at
+/// least a hundredth of the origin's largest coordinate, whose rounding dominates short rays. Plain
+/// Möller–Trumbore tests of distant and thin triangles lose three digits.
 const EXPLAINED: f64 = 1e-3;
 
-/// How the answers to the rays of a class differ from the judge's.
+/// Differences of the answers for one class from the reference.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Differences {
-    /// Rays with another triangle.
+    /// Rays with a different triangle.
     pub unlike: usize,
-    /// How many of them were put to the oracle.
+    /// The number of them that the oracle checked.
     pub judged: usize,
-    /// Greatest difference of a distance at the same triangle from the judge's or the exact one, whichever is nearer: see `EXPLAINED`.
+    /// Largest difference of a distance, for the same triangle, from the reference or the exact
+    /// one, whichever is nearer: see `EXPLAINED`.
     pub farthest: f64,
 }
 
-/// Compares answers with the judge's.
+/// Compares answers with the reference.
 ///
 /// # Errors
-/// The first answer that rounding does not explain, in words.
+/// A description of the first answer that rounding does not explain.
 pub fn differences(
     scene: &SceneData,
     soup: &TriangleSoup,
@@ -49,7 +53,7 @@ pub fn differences(
         if !same {
             unlike.push((ray, hit));
         } else if is && set.query() == Query::Closest {
-            // Of a ray along a triangle the judge's own distance is rounded, too: it may be the peer that is right.
+            // Along a triangle the reference is rounded too: the external tracer may be right.
             let off = off_by(ray, hit.t, f64::from(truth.t)).min(off_the_plane(soup, ray, hit));
             if !off.is_finite() || off > EXPLAINED {
                 return Err(format!(
@@ -68,7 +72,8 @@ pub fn differences(
     Ok(found)
 }
 
-/// How far a distance is from another, over that or a hundredth of the greatest coordinate of the ray's origin.
+/// Difference of a distance from another, relative to that or to a hundredth of the largest
+/// coordinate of the ray's origin.
 fn off_by(ray: &Ray, found: f32, t: f64) -> f64 {
     let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let reach = 0.01 * vector(ray.origin).abs().max_element() / vector(ray.direction).length();
@@ -111,8 +116,8 @@ fn judge(
     Ok(())
 }
 
-/// The distance, or where the ray meets the plane of the triangle that it is said to hit, if that is the same in single precision: the oracle
-/// allows our own tests' rounding and no more.
+/// The distance, or the ray's intersection with the plane of the reported triangle if equal in
+/// single precision: the oracle allows only the rounding of our own tests.
 fn distance(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> f32 {
     match plane(soup, ray, hit) {
         Some(t) if off_by(ray, hit.t, t) <= EXPLAINED => t as f32,
@@ -120,12 +125,12 @@ fn distance(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> f32 {
     }
 }
 
-/// How far the distance is from that to the plane of the triangle: see [`off_by`].
+/// Difference between the reported distance and that to the triangle's plane: see [`off_by`].
 fn off_the_plane(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> f64 {
     plane(soup, ray, hit).map_or(f64::INFINITY, |t| off_by(ray, hit.t, t))
 }
 
-/// Where the ray meets the plane of the triangle that it is said to hit, in double precision.
+/// Distance to the plane of the reported triangle, in double precision.
 fn plane(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> Option<f64> {
     let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let [a, b, c] = soup

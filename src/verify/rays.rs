@@ -1,8 +1,8 @@
-//! Recorded ray sets: made once per scene on the host, traced by every structure.
+//! Recorded ray sets: generated once per scene on the host, traced by every structure.
 //!
 //! The classes follow common practice (Aila & Laine 2009; Meister & Bittner 2022): primary rays in
-//! 8×8 tiles, then shadow, ambient-occlusion and bounce rays from the first hits in the same order,
-//! and chords between random points of the bounding box.
+//! 8×8 tiles; shadow, ambient-occlusion and bounce rays from the first hits in the same order; and
+//! chords between random points of the bounding box.
 
 use crate::hard_rays::hard_rays;
 use crate::shadow_rays::{Segment, lights_of, other_orders};
@@ -15,23 +15,23 @@ use raystone_core::random::Pcg32;
 use raystone_record::RayClass;
 use raystone_scene::{Bounds, SceneData};
 
-/// Origins are moved off their surface by this fraction of the scene's diagonal.
+/// Offset of origins from their surface, as a fraction of the scene's diagonal.
 const OFFSET: f32 = 1e-5;
 /// Length of AO rays as a fraction of the scene's diagonal.
 const AO_LENGTH: f32 = 0.1;
 const TILE: u32 = 8;
 
-/// Rays of one class with the judge's answers.
+/// Rays of one class with reference answers.
 #[derive(Debug, Clone)]
 pub struct RaySet {
-    /// What they are.
+    /// The ray class.
     pub class: RayClass,
     /// The rays.
     pub rays: Vec<Ray>,
-    /// The judge's nearest hits.
+    /// The reference hits.
     pub truth: Vec<Hit>,
-    /// For each the place of the ray of [`RayClass::Shadow`] between the same ends; empty for classes that are not made
-    /// from these.
+    /// For each ray the index of the [`RayClass::Shadow`] ray between the same ends; empty for
+    /// classes not derived from it.
     pub shadow: Vec<u32>,
 }
 
@@ -49,12 +49,11 @@ impl RaySet {
         }
     }
 
-    /// The hard rays of the scene.
     pub(super) fn hard(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Self {
         Self::new(RayClass::Hard, hard_rays(soup, judge, seed), judge)
     }
 
-    /// The same rays with the answers of another judge.
+    /// The same rays with the answers of another reference.
     pub fn judged_by(&self, judge: &dyn CpuTwin) -> Self {
         Self {
             shadow: self.shadow.clone(),
@@ -62,17 +61,17 @@ impl RaySet {
         }
     }
 
-    /// Whether the class is timed.
+    /// True if the class is timed.
     pub fn is_timed(&self) -> bool {
         self.class != RayClass::Hard
     }
 
-    /// Whether neighbouring rays take nearly the same way.
+    /// True if neighbouring rays take nearly the same path.
     pub fn is_coherent(&self) -> bool {
         self.class == RayClass::Primary
     }
 
-    /// What the class asks.
+    /// The kind of query: closest or any hit.
     pub fn query(&self) -> Query {
         match self.class {
             RayClass::Shadow
@@ -118,7 +117,7 @@ pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
     pixels
 }
 
-/// Point and unit normal, on the side of the ray, of every primary hit.
+/// Point and unit normal, on the ray's side, of every primary hit.
 fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
     let hits = primary
         .rays
@@ -140,8 +139,8 @@ fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
     .collect()
 }
 
-/// Records all classes with about `settings.rays` rays each. Classes that start on surfaces are missing when
-/// no primary ray hits anything. The hard rays, of which there is a fixed number, come last.
+/// Records all classes with about `settings.rays` rays each, then a fixed number of hard rays.
+/// Classes that start on surfaces are missing if no primary ray hits anything.
 pub fn record_rays(
     scene: &SceneData,
     soup: &TriangleSoup,
@@ -216,7 +215,7 @@ pub fn record_rays(
     sets
 }
 
-/// A point on a random emissive triangle with its place among them, or on the bounding sphere of a scene without any.
+/// A point on a random emissive triangle with its index, or without any on the bounding sphere.
 fn light_point(
     scene: &SceneData,
     emitters: &[u32],

@@ -1,9 +1,11 @@
-//! Shadow rays from the other end, and light by light: the same segments in other directions and another order.
+//! Shadow rays from the other end, and grouped by light: the same segments in other directions and
+//! another order.
 //!
-//! Lights are chosen at random, so neighbouring shadow rays go to different ones. A. Dufay (thesis, Bordeaux 2017, section
-//! 3.6, and a patent that was filed) traces them from the light to the surface, those of one light side by side, so that the
-//! lanes of a warp begin at the same place; he could not measure a gain. Which segments there are, and so the image, does not
-//! change. What light by light costs, a compaction by light, is measured by itself: `compaction:radix-sort`.
+//! Lights are chosen at random, so neighbouring shadow rays go to different ones. A. Dufay (thesis,
+//! Bordeaux 2017, section 3.6, and a filed patent) traces them from the light to the surface,
+//! grouped by light, so that the lanes of a warp start at the same place; he could not measure a
+//! gain. The set of segments, and so the image, does not change. The cost of grouping, a compaction
+//! by light, is measured separately: `compaction:radix-sort`.
 
 use crate::rays::RaySet;
 use glam::Vec3;
@@ -12,33 +14,33 @@ use raystone_record::RayClass;
 use raystone_scene::{LightList, SceneData, Source};
 use std::collections::BTreeMap;
 
-/// A shadow ray ends so much before its light, as a fraction of the way, that it does not meet it.
+/// Fraction of the way at which a shadow ray ends, so that it does not hit its light.
 const BEFORE_LIGHT: f32 = 0.9999;
 
-/// From a surface to a light.
+/// A segment from a surface to a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
-    /// Off the surface, scene units.
+    /// End near the surface, scene units.
     pub surface: Vec3,
-    /// On the light, scene units.
+    /// End on the light, scene units.
     pub light: Vec3,
-    /// Which light.
+    /// Index of the light.
     pub number: u32,
 }
 
 impl Segment {
-    /// The ray from the surface, which ends a little before the light.
+    /// The ray from the surface, which ends just before the light.
     pub(crate) fn forward(&self) -> Ray {
         Ray::new(self.surface, self.light - self.surface).between(0.0, BEFORE_LIGHT)
     }
 
-    /// The ray from the light, which begins a little behind it.
+    /// The ray from the light, which begins just off it.
     pub(crate) fn reversed(&self) -> Ray {
         Ray::new(self.light, self.surface - self.light).between(1.0 - BEFORE_LIGHT, 1.0)
     }
 }
 
-/// The number of the light that each of these triangles is, or is half of: see [`LightList`].
+/// For each triangle, the index of the light that it is, or is half of: see [`LightList`].
 pub(super) fn lights_of(scene: &SceneData, emitters: &[u32]) -> Vec<u32> {
     let mut numbers = BTreeMap::new();
     for (number, light) in (0..).zip(LightList::of(scene).lights) {
@@ -54,14 +56,14 @@ pub(super) fn lights_of(scene: &SceneData, emitters: &[u32]) -> Vec<u32> {
     emitters.iter().map(number).collect()
 }
 
-/// The places of segments light by light; those of one light stay in order, as a stable compaction leaves them.
+/// The indices of segments, stably grouped by light.
 pub fn by_light(segments: &[Segment]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..segments.len() as u32).collect();
     order.sort_by_key(|place| segments[*place as usize].number);
     order
 }
 
-/// The three classes beside [`RayClass::Shadow`].
+/// The three classes derived from [`RayClass::Shadow`].
 pub(super) fn other_orders(segments: &[Segment], judge: &dyn CpuTwin) -> Vec<RaySet> {
     let as_they_are: Vec<u32> = (0..segments.len() as u32).collect();
     let clustered = by_light(segments);
@@ -83,8 +85,8 @@ pub(super) fn other_orders(segments: &[Segment], judge: &dyn CpuTwin) -> Vec<Ray
     ]
 }
 
-/// Rays of a set whose answer differs from that of the shadow ray between the same ends, of which there is one for each;
-/// `None` of a set that is made from no other.
+/// Number of rays in a set whose answer differs from that of the shadow ray between the same ends;
+/// `None` for a set not derived from shadow rays.
 pub fn unlike_shadow(set: &RaySet, sets: &[RaySet]) -> Option<usize> {
     let shadow = sets.iter().find(|other| other.class == RayClass::Shadow)?;
     let is_hit = |set: &RaySet, place: usize| set.truth[place].triangle != NO_HIT;

@@ -1,4 +1,4 @@
-//! Trial scenes of what shines in ways of its own: maps all around, measured luminaires, many lights in a tree.
+//! Trial scenes for special lights: environment maps, measured luminaires, many lights in a tree.
 
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
@@ -20,7 +20,6 @@ fn tree() -> (&'static str, ParamValue) {
     word("light_choice", "tree")
 }
 
-/// Of maps.
 pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
     Ok(vec![TrialScene {
         scene: sky()?,
@@ -37,7 +36,7 @@ pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
     }])
 }
 
-/// Of lights of all kinds in a tree.
+/// Lights of all kinds in a tree.
 pub(super) fn many() -> Result<TrialScene, SceneError> {
     Ok(TrialScene {
         scene: many_lamps()?,
@@ -49,8 +48,8 @@ pub(super) fn many() -> Result<TrialScene, SceneError> {
     })
 }
 
-/// The trial scenes that a scene's own paths may show too little of: of its maps, its luminaires, and the tree that an integrator chooses
-/// its lights by. The integrator is judged as it is.
+/// Trial scenes for features that a scene's own paths may exercise too little: its maps, its
+/// luminaires, and the light tree of an integrator. The integrator is checked as configured.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -76,7 +75,6 @@ pub fn trials_of(
     Ok(scenes)
 }
 
-/// Numbers in [0, 1) that look like chance.
 fn mixed(seed: u32) -> f32 {
     let word = (seed + 1)
         .wrapping_mul(0x9e37_79b9)
@@ -134,7 +132,7 @@ fn sky() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A luminaire of this type, no two of whose intensities are alike but where angles meet.
+/// A luminaire of this type; all intensities differ except where angles meet.
 fn profile(photometry: Photometry, axial: bool) -> IesProfile {
     let (vertical, horizontal) = match (photometry, axial) {
         (_, true) => (vec![0.0, 35.0, 80.0, 110.0], vec![0.0]),
@@ -224,7 +222,6 @@ pub(super) fn luminaires() -> Result<Vec<TrialScene>, SceneError> {
     }])
 }
 
-/// A floor, two walls, a block.
 fn room(mesh: &mut Mesh) {
     let wall = |name, r, g, b| Material::diffuse(name, vec3(r, g, b));
     let [floor, left, back, block] = [
@@ -240,8 +237,9 @@ fn room(mesh: &mut Mesh) {
     mesh.block(vec3(-0.4, 0.0, -0.3), vec3(0.6, 0.8, 0.5), block);
 }
 
-/// Lamps of all kinds, sizes and directions: flat ones of one side and of two, balls, points, cones, luminaires, and from far away. The floor
-/// has vertex normals, so that it matters which normal a light is chosen by.
+/// Lamps of all kinds, sizes and directions: one- and two-sided flat ones, balls, points, spots,
+/// luminaires, directional lights. The floor has vertex normals, so it matters which normal the
+/// choice of a light uses.
 fn many_lamps() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.2, 1.8, 3.4), vec3(-0.1, 0.6, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("many-lamps", camera, Vec3::ZERO)?;

@@ -1,6 +1,6 @@
-//! Small scenes with what single paths can go wrong with: unequal, small, grazing and hidden lamps, glass in glass, panes,
-//! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
-//! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
+//! Small scenes with everything that single paths can get wrong: unequal, small, grazing and hidden
+//! lamps, nested glass, panes, mirrors, repeating textures, and light from all sides. The tests of
+//! the gate check paths on them, so a kernel fault shows even if no user scene triggers it.
 
 use crate::kinds::KindChecks;
 use crate::lights::LightRegistry;
@@ -11,14 +11,14 @@ use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
 use raystone_scene::{self as scene, Material, SceneData, SceneError, Texture, TextureUse};
 
-/// What is judged on a scene: integrator and the parameters that are not at their defaults.
+/// An integrator and its non-default parameters.
 pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
 
-/// A scene and what is judged on it.
+/// A scene and the integrators checked on it.
 pub struct TrialScene {
     /// The scene, with a camera.
     pub scene: SceneData,
-    /// Integrators.
+    /// The integrators.
     pub trials: Vec<Trial>,
 }
 
@@ -26,7 +26,7 @@ pub use crate::trial_lights::trials_of;
 pub use crate::trial_slivers::sheets;
 pub use crate::trial_surfaces::layers;
 
-/// All of the program's kinds.
+/// The trial scenes of the built-in kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -34,7 +34,7 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
     trial_scenes_of(&KindChecks::default())
 }
 
-/// All of these kinds of materials and lights.
+/// The trial scenes of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`trial_scenes`].
@@ -130,8 +130,8 @@ pub(super) fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
     }
 }
 
-/// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and bright, one in the
-/// plane of a wall, one on edge, one hidden behind a block, one that faces away.
+/// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and
+/// bright, one in the plane of a wall, one on edge, one hidden behind a block, one that faces away.
 fn lamps() -> Result<SceneData, SceneError> {
     let camera = camera(
         vec3(2.3, 2.2, 3.7),
@@ -164,7 +164,7 @@ fn lamps() -> Result<SceneData, SceneError> {
         [vec3(0.9, 1.9, -0.9), 0.04 * Vec3::X, 0.05 * Vec3::Z],
         bright,
     );
-    // Standing on the floor, along the wall: light grazes both.
+    // Stands on the floor, along the wall: light grazes both.
     mesh.plain([vec3(-1.9, 0.0, -1.9), 0.6 * Vec3::Y, 1.4 * Vec3::Z], green);
     mesh.triangle(
         [
@@ -175,7 +175,7 @@ fn lamps() -> Result<SceneData, SceneError> {
         [Vec2::ZERO; 3],
         violet,
     );
-    // In the shadow of the block, and facing away from all else.
+    // In the shadow of the block, and facing away from everything else.
     mesh.triangle(
         [
             vec3(-0.5, 0.2, -0.9),
@@ -197,7 +197,7 @@ fn lamps() -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// Lights without triangles, of every kind but measured ones and maps, over a floor with a block and a lamp.
+/// All kinds of lights without triangles except measured ones and maps, with a block and a lamp.
 fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
@@ -215,7 +215,7 @@ fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A row of balls of every glossy kind over a glossy floor, between two lamps of one side and a sheet.
+/// Balls of every glossy kind over a glossy floor, between two one-sided lamps and a sheet.
 fn glossy(kinds: &MaterialRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
@@ -249,7 +249,7 @@ fn glossy(kinds: &MaterialRegistry) -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// Textures that are not square, repeat, begin below 0 and are tinted, on a floor, a wall, a mirror and a lamp.
+/// Non-square, repeating, shifted and tinted textures on a floor, a wall, a mirror and a lamp.
 fn textured() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.7, 1.6, 2.4), vec3(0.0, 0.5, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("textured", camera, vec3(0.4, 0.5, 0.6))?;

@@ -1,5 +1,5 @@
-//! Thin triangles: needles and strips whose plane and weights f32 knows badly, in general position. Surfaces of them must not
-//! shadow themselves.
+//! Thin triangles: needles and strips in general position, with planes and weights that are
+//! inaccurate in f32. Such surfaces must not shadow themselves.
 
 use crate::mesh::Mesh;
 use crate::trial_scenes::{TrialScene, camera, depth};
@@ -7,7 +7,6 @@ use glam::{Quat, Vec2, Vec3, vec3};
 use raystone_core::params::ParamValue;
 use raystone_scene::{Material, SceneData, SceneError};
 
-/// All of them.
 pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
     let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
     Ok(vec![TrialScene {
@@ -21,8 +20,9 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
     }])
 }
 
-/// A flat fan of needles, 250 times as long as they are wide, and a flat sheet of strips, 1,500 times, of three long edges each: all
-/// that is seen of a plane that lies along no axis. It is white where nothing else stands.
+/// A flat fan of needles with an aspect ratio of 250, and a flat sheet of strips with a ratio of
+/// 1,500 and three long edges each. They fill the view of a plane that is not axis-aligned, white
+/// where nothing else is visible.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -62,7 +62,7 @@ fn with_sheets(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// The sheets with a block that stands on them, and a lamp.
+/// The sheets with a block standing on them, and a lamp.
 fn slivers() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.4, 1.6, 3.2), vec3(0.0, 0.0, 0.0), Vec3::Y);
     let mut mesh = with_sheets(Mesh::new("slivers", camera, vec3(0.2, 0.3, 0.4))?);

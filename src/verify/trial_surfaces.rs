@@ -1,5 +1,6 @@
-//! Trial scenes of what surfaces and paths may be: textures of every use and wrap, vertex normals, daylight over scenes without a
-//! light, and a pane so close above a floor that rays must not start far from it.
+//! Trial scenes for surfaces and paths: textures of every use and wrap mode, vertex normals,
+//! daylight over scenes without a light, and a pane so close above a floor that rays must not start
+//! far from it.
 
 use crate::mesh::Mesh;
 use crate::trial_scenes::{TrialScene, camera, depth};
@@ -9,7 +10,6 @@ use raystone_scene::{
     encode_color, encode_normal,
 };
 
-/// All of them.
 pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
     let trial = |scene, changes: &[_]| TrialScene {
         scene,
@@ -30,8 +30,8 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
     ])
 }
 
-/// A floor and a wall of two coloured layers each, in one plane but for the rounding of their corners, or so far apart, scene
-/// units: which one is met is up to the last bit.
+/// A floor and a wall of two coloured layers each, coplanar except for rounding, or `apart` scene
+/// units apart: the last bit decides which is hit.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -71,8 +71,8 @@ fn texture(name: &str, [width, height]: [u32; 2], texel: impl Fn(u32) -> [u32; 3
     }
 }
 
-/// Textures of colour, metalness and roughness, normals and emission, each placed and wrapped in a way of its own, on a floor, a wall with
-/// vertex normals, and a lamp.
+/// Textures of colour, metalness and roughness, normals and emission, each placed and wrapped
+/// differently, on a floor, a wall with vertex normals, and a lamp.
 fn mapped() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.5, 1.7, 2.6), vec3(0.0, 0.5, -0.3), Vec3::Y);
     let mut mesh = Mesh::new("mapped", camera, vec3(0.3, 0.4, 0.6))?;
@@ -133,7 +133,7 @@ fn mapped() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A room without a lamp, with colours of vertices: the sky is seen by what leaves it, and through what is far.
+/// A room without a lamp, with vertex colours: escaping rays see the sky, also through surfaces.
 fn under_the_sky() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.3, 1.5, 2.2), vec3(0.0, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("under-the-sky", camera, vec3(0.9, 1.1, 0.8))?;
@@ -143,7 +143,7 @@ fn under_the_sky() -> Result<SceneData, SceneError> {
     mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::X, 2.0 * Vec3::Y], floor);
     mesh.block(vec3(-0.5, 0.0, -0.4), vec3(0.7, 0.8, 0.6), block);
     let mut scene = mesh.done(Vec::new());
-    // The floor and the wall have vertices of unequal colours.
+    // The floor and the wall have vertices of different colours.
     let color = |k: usize| {
         let part = |step: usize| ((k * step) % 7) as f32 / 7.0;
         encode_color(vec3(part(3), part(5), 1.0 - part(2)))
@@ -158,7 +158,8 @@ fn under_the_sky() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// Mirrored lamps that shine from their front, and balls with vertex normals: of glass, mirrored, a mirror, and a glossy one.
+/// Mirrored lamps that emit from their front, and balls with vertex normals: of glass, mirrored, a
+/// mirror, and a glossy one.
 fn mirrored() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.3, 1.6, 3.1), vec3(0.0, 0.6, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("mirrored", camera, vec3(0.3, 0.4, 0.5))?;
@@ -198,7 +199,7 @@ fn mirrored() -> Result<SceneData, SceneError> {
     scene.normals = vec![[GEOMETRIC; 3]; scene.triangles.len()];
     for (ball, (centre, _)) in balls.windows(2).zip(places) {
         for id in ball[0]..ball[1] {
-            // What is mirrored turns the other way.
+            // Mirroring reverses the orientation.
             if scene.mirrored[id] {
                 scene.triangles[id].vertices.swap(1, 2);
             }
@@ -209,10 +210,10 @@ fn mirrored() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// Some offsets above a floor.
+/// A few ray offsets above a floor.
 const CLOSE: f32 = 1e-4;
 
-/// A tinted pane so close above a floor that a ray which starts ten times too far off it starts above the pane.
+/// A tinted pane so close above a floor that a ray with ten times the offset starts above it.
 fn close_pane() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.9, 1.9, 1.6), Vec3::ZERO, Vec3::Y);
     let mut mesh = Mesh::new("close-pane", camera, vec3(0.6, 0.5, 0.4))?;

@@ -1,9 +1,9 @@
-//! Nodes of 32 bytes with their own box, the two children of a node next to each other. Twin of
+//! Nodes of 32 bytes with their own box, siblings next to each other. CPU version of
 //! `kernels/accel/bvh/boxes.wesl`.
 //!
-//! The root has place 0, place 1 is empty, so that every pair begins at an even place. Which child
-//! comes first in memory is decided by the boxes: the one that lies lower on the axis along which
-//! their centres are farthest apart. A ray that runs up that axis takes it first.
+//! The root has index 0 and index 1 is empty, so that every pair begins at an even index. The boxes
+//! decide which child comes first in memory: the lower one on the axis along which their centres
+//! are farthest apart. A ray in the positive direction of that axis visits it first.
 
 use super::super::bounds::Bounds;
 use super::super::leaf::{LEAF, LeafReader, Leaves, leaf_reference};
@@ -19,7 +19,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Content of an inner node: axis, first child.
 pub(super) const AXIS_SHIFT: u32 = 29;
-/// Greatest place of a first child.
+/// Largest index of a first child.
 pub(super) const CHILD_MASK: u32 = 0x1fff_ffff;
 
 /// A node, two `vec4<u32>`.
@@ -30,12 +30,12 @@ pub(super) struct BoxNode {
     /// A leaf's reference, or axis and first child.
     pub content: u32,
     pub max: [f32; 3],
-    /// Parent or rope, whichever the traversal follows.
+    /// Parent or rope, depending on the traversal.
     pub link: u32,
 }
 
 impl BoxNode {
-    /// Root of an empty scene, and place 1.
+    /// Root of an empty scene, and node 1.
     const NOTHING: BoxNode = BoxNode {
         min: [0.0; 3],
         content: NONE,
@@ -66,20 +66,19 @@ fn split_axis(first: &Bounds, second: &Bounds) -> (u32, bool) {
     (axis as u32, apart[axis] < 0.0)
 }
 
-/// Which child the ray comes to first: 1 if it runs down the axis.
+/// The child that the ray enters first: 1 if it goes down the axis.
 fn near_side(content: u32, ray: &Ray) -> u32 {
     u32::from(ray.direction[(content >> AXIS_SHIFT) as usize] < 0.0)
 }
 
-/// All nodes of a tree.
 pub(super) struct Boxes(pub Vec<BoxNode>);
 
 impl Boxes {
-    /// Lays out a tree; links lead to parents.
+    /// Lays out a tree; links point to parents.
     pub(super) fn new(tree: &Tree, order: NodeOrder) -> Self {
         let bounds = |node: u32| &tree.nodes[node as usize].bounds;
         let inner = InnerNodes::new(tree, order, |l, r| split_axis(bounds(l), bounds(r)).1);
-        // The children of the inner node at place k lie at 2k + 2 and 2k + 3.
+        // The children of the inner node at index k are at 2k + 2 and 2k + 3.
         let content = |node: u32| match tree.nodes[node as usize].kind {
             NodeKind::Leaf { first, count } => leaf_reference(first, count),
             NodeKind::Inner { left, right } => {
@@ -108,8 +107,8 @@ impl Boxes {
         Self(boxes)
     }
 
-    /// Checks reachability, containment, links and depth; `link_of` tells where a node must lead,
-    /// from what its parent links to, its parent and its place.
+    /// Checks reachability, containment, links and depth. `link_of` gives the expected link of a
+    /// node from its parent's link, its parent and its index.
     ///
     /// # Errors
     /// The first violated invariant, with the node.

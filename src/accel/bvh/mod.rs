@@ -1,8 +1,8 @@
-//! `bvh` and `roped-bvh`: one binary tree, traversed in several ways over several layouts of its nodes
+//! `bvh` and `roped-bvh`: one binary tree with several traversals over several layouts of its nodes
 //! and leaves. `roped-bvh` is the same with skip pointers by default.
 //!
-//! A traversal is a file here and one in `kernels/accel/bvh/`; what it asks of the nodes stands in
-//! `pairs` (64 bytes, both children's boxes) and `boxes` (32 bytes, own box).
+//! Each traversal has a file here and one in `kernels/accel/bvh/`; the node layouts are in `pairs`
+//! (64 bytes, both children's boxes) and `boxes` (32 bytes, own box).
 
 mod boxes;
 mod layout;
@@ -27,9 +27,8 @@ use pairs::Pairs;
 use raystone_core::params::Parameters;
 use std::marker::PhantomData;
 
-/// The root.
 const ROOT: u32 = 0;
-/// No node: also a leaf without triangles.
+/// No node; also a leaf without triangles.
 const NONE: u32 = 0x8000_0000;
 
 /// The registry entry `bvh`.
@@ -126,7 +125,6 @@ impl BuiltBvh {
         Self::of_tree(&tree, soup, params, log)
     }
 
-    /// Lays out a tree.
     fn of_tree(
         tree: &Tree,
         soup: &TriangleSoup,
@@ -159,8 +157,8 @@ impl BuiltBvh {
         Ok(built)
     }
 
-    /// The scalar twin over the triangles that it was built over; with default parameters it is the
-    /// judge of the gate.
+    /// The scalar CPU version over the triangles it was built from; with default parameters this is
+    /// the reference tracer of the correctness check.
     pub fn twin<'a>(&'a self, soup: &'a TriangleSoup) -> Twin<'a, Self> {
         Twin(self, soup)
     }
@@ -174,7 +172,7 @@ impl BuiltBvh {
     }
 }
 
-/// Whether every leaf fits into a reference.
+/// Checks that every leaf fits into a reference.
 pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
     let count = |kind: &NodeKind| match kind {
         NodeKind::Inner { .. } => 0,

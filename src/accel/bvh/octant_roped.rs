@@ -1,5 +1,5 @@
-//! Skip pointers for each of the eight orders in which rays of an octant of directions come to the
-//! boxes. Twin of `kernels/accel/bvh/octant_roped.wesl`.
+//! Separate skip pointers for each direction octant's visiting order. CPU version of
+//! `kernels/accel/bvh/octant_roped.wesl`.
 
 use super::super::leaf::{LEAF, LeafReader, Leaves};
 use super::super::ray::Hit;
@@ -9,7 +9,7 @@ use super::boxes::{AXIS_SHIFT, BoxNode, Boxes, CHILD_MASK};
 use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
-/// Box and content of [`BoxNode`], whose link is not used, and a rope for each octant.
+/// Box and content of a [`BoxNode`], without its link, and a rope per octant.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct OctantNode {
@@ -17,21 +17,19 @@ pub(super) struct OctantNode {
     pub ropes: [u32; 8],
 }
 
-/// All nodes of a tree.
 pub(super) struct Octants(pub Vec<OctantNode>);
 
-/// Bit `axis`: the ray runs down that axis.
+/// Bit `axis` is set if the ray goes down that axis.
 fn octant_of(direction: [f32; 3]) -> u32 {
     let bit = |axis: usize| u32::from(direction[axis] < 0.0) << axis;
     bit(0) | bit(1) | bit(2)
 }
 
-/// Which child of a node with this content rays of an octant come to first.
+/// The child of a node with this content that rays of an octant enter first.
 fn near_side(content: u32, octant: u32) -> u32 {
     octant >> (content >> AXIS_SHIFT) & 1
 }
 
-/// Ropes of a child from those of its parent.
 fn ropes_of(parent: &OctantNode, child: u32) -> [u32; 8] {
     std::array::from_fn(|octant| {
         if child & 1 == near_side(parent.node.content, octant as u32) {

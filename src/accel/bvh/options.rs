@@ -1,15 +1,15 @@
-//! Parameters of `bvh` and `roped-bvh` beyond those of the tree: which traversal reads which layout.
+//! Parameters of `bvh` and `roped-bvh` beyond those of the tree: the traversal and its layout.
 
 use crate::AccelError;
 use crate::tracer::{Refill, RefillParameters};
 use crate::tree::TreeParameters;
 use raystone_core::parameters;
 
-/// Invocations of a workgroup, `LANES` of `kernels/common/lane.wesl`.
+/// Invocations per workgroup, `LANES` of `kernels/common/lane.wesl`.
 const LANES: u32 = raystone_gpu::WORKGROUP_SIZE;
-/// Workgroup memory that WebGPU promises, bytes.
+/// Workgroup memory guaranteed by WebGPU, bytes.
 const WORKGROUP_BYTES: u32 = 16384;
-/// Levels that the two words of a restart trail hold.
+/// Levels that fit in the two words of a restart trail.
 const TRAIL_LEVELS: u32 = 64;
 
 parameters! {
@@ -75,7 +75,7 @@ parameters! {
 
     /// Bytes of a node.
     pub(crate) enum NodeBytes {
-        /// What the traversal does best.
+        /// The best layout for the traversal.
         Auto = "auto",
         /// Its own box.
         Own = "32",
@@ -83,7 +83,7 @@ parameters! {
         Both = "64",
     }
 
-    /// Where a stack lies.
+    /// Location of a stack.
     pub(crate) enum StackMemory {
         /// In a variable of the function.
         Function = "function",
@@ -93,11 +93,10 @@ parameters! {
         Workgroup = "workgroup",
     }
 
-    /// What leaves hold.
+    /// Contents of leaves.
     pub(crate) enum LeafTriangles {
         /// Copies of the triangles.
         Gathered = "gathered",
-        /// Indices.
         Indexed = "indexed",
     }
 
@@ -127,7 +126,7 @@ impl From<RopedParameters> for BvhParameters {
 }
 
 impl BvhParameters {
-    /// Whether the choices go together.
+    /// Checks that the options are compatible.
     ///
     /// # Errors
     /// Two of them contradict each other.
@@ -155,7 +154,7 @@ impl BvhParameters {
         }
     }
 
-    /// When the batch kernel refills its invocations: never for traversals without a state to stop at.
+    /// When the batch kernel refills its invocations: only for traversals with a resumable state.
     pub(super) fn refill(&self) -> RefillParameters {
         match self.traversal {
             Traversal::Stack => self.refill.clone(),
@@ -163,12 +162,12 @@ impl BvhParameters {
         }
     }
 
-    /// Whether nodes have 32 bytes with their own box instead of 64 with both children's.
+    /// True if nodes have 32 bytes with their own box instead of 64 with both children's.
     pub(super) fn has_boxes(&self) -> bool {
         self.node_bytes == NodeBytes::Own || self.traversal == Traversal::Roped
     }
 
-    /// Whether a tree of this depth can be walked.
+    /// Checks that a tree of this depth can be traversed.
     ///
     /// # Errors
     /// Its stack does not fit into workgroup memory, or its trail into two words.
@@ -184,8 +183,8 @@ impl BvhParameters {
         Ok(())
     }
 
-    /// Entries of the kernel's stack for a tree of this depth; 0 if it has none. One entry is pushed
-    /// a level at most; a multiple of 16, so that scenes of like depth share a kernel.
+    /// Entries of the kernel's stack for a tree of this depth; 0 if it has none. At most one entry
+    /// is pushed per level; a multiple of 16, so that scenes of similar depth share a kernel.
     pub(super) fn stack_entries(&self, depth: u32) -> u32 {
         match self.traversal {
             Traversal::Stack => depth.max(1).next_multiple_of(16),
@@ -194,7 +193,7 @@ impl BvhParameters {
         }
     }
 
-    /// Steps that a traversal of `nodes` nodes and this depth takes at most.
+    /// Maximum steps of a traversal of `nodes` nodes at this depth.
     pub(super) fn step_fuse(&self, nodes: usize, depth: u32) -> usize {
         match self.traversal {
             Traversal::Stack | Traversal::Roped | Traversal::OctantRoped => nodes + 1,
@@ -206,7 +205,6 @@ impl BvhParameters {
         .min(u32::MAX as usize)
     }
 
-    /// Module of the kernel.
     pub(super) fn kernel(&self) -> &'static str {
         match self.traversal {
             Traversal::Stack => "accel/bvh/stack",
@@ -217,7 +215,7 @@ impl BvhParameters {
         }
     }
 
-    /// Features of the kernel, less those of the leaves.
+    /// Features of the kernel, except those of the leaves.
     pub(super) fn features(&self) -> Vec<&'static str> {
         let boxes = self.has_boxes() && self.traversal != Traversal::Roped;
         let features = [

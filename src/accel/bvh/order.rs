@@ -1,21 +1,20 @@
-//! Where the inner nodes of a tree lie in memory. In every order parents come before their children.
+//! Memory order of the inner nodes of a tree. Parents always come before their children.
 
 use super::super::tree::{NodeKind, Tree};
 use super::options::NodeOrder;
 use std::collections::VecDeque;
 
-/// Inner nodes of a tree in memory order.
 pub(super) struct InnerNodes {
     /// Tree index of each.
     pub nodes: Vec<u32>,
-    /// Place in `nodes` of each node of the tree; of no meaning for leaves.
+    /// Index into `nodes` for each node of the tree; undefined for leaves.
     pub places: Vec<u32>,
-    /// Children of each node of the tree in the order of the layout.
+    /// Children of each node of the tree in layout order.
     children: Vec<Option<[u32; 2]>>,
 }
 
 impl InnerNodes {
-    /// Orders the inner nodes; `swap` tells of which the right child goes first.
+    /// Orders the inner nodes; `swap` returns true if the right child goes first.
     pub(super) fn new(tree: &Tree, order: NodeOrder, swap: impl Fn(u32, u32) -> bool) -> Self {
         let children: Vec<_> = tree
             .nodes
@@ -75,9 +74,9 @@ fn breadth_first(children: &Children, out: &mut Vec<u32>) {
     }
 }
 
-/// The top half of the levels, then each subtree below it, both in this order (P. van Emde Boas 1975;
-/// Bender et al. 2000). Appends the inner nodes of the upper `levels` levels below `node` and returns
-/// the inner nodes under them.
+/// The top half of the levels, then each subtree below it, both recursively (P. van Emde Boas 1975;
+/// Bender et al. 2000). Appends the inner nodes of the upper `levels` levels below `node` and
+/// returns the inner nodes under them.
 fn van_emde_boas(children: &Children, node: u32, levels: u32, out: &mut Vec<u32>) -> Vec<u32> {
     if levels <= 1 {
         out.push(node);

@@ -1,4 +1,5 @@
-//! Nodes of 64 bytes with the boxes of both children. Twin of `kernels/accel/bvh/pairs.wesl`.
+//! Nodes of 64 bytes with the boxes of both children. CPU version of
+//! `kernels/accel/bvh/pairs.wesl`.
 //!
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
@@ -15,7 +16,7 @@ use super::options::NodeOrder;
 use super::order::InnerNodes;
 use bytemuck::{Pod, Zeroable};
 
-/// Boxes of both children with what they refer to: four `vec4<u32>`.
+/// Boxes and references of both children: four `vec4<u32>`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct Pair {
@@ -30,7 +31,7 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
-    /// What stands for a missing child: a box of no extent with nothing in it.
+    /// A missing child: an empty box without contents.
     pub(crate) const MISSING: (u32, Bounds) = (
         NONE,
         Bounds {
@@ -39,7 +40,7 @@ impl Pair {
         },
     );
 
-    /// A node of these children, reference and box, which has no parent yet.
+    /// A node of these children, reference and box, without a parent yet.
     pub(crate) fn new([(left, left_box), (right, right_box)]: [(u32, Bounds); 2]) -> Self {
         Self {
             left_min: left_box.min,
@@ -53,7 +54,6 @@ impl Pair {
         }
     }
 
-    /// References and boxes of both children.
     pub(crate) fn children(&self) -> [(u32, Bounds); 2] {
         let bounds = |min, max| Bounds { min, max };
         [
@@ -62,13 +62,12 @@ impl Pair {
         ]
     }
 
-    /// Box around both children.
     pub(crate) fn bounds(&self) -> Bounds {
         let present = self.children().into_iter().filter(|(r, _)| *r != NONE);
         present.fold(Bounds::EMPTY, |all, (_, bounds)| all.union(&bounds))
     }
 
-    /// The node after what it refers to moved up by this many places.
+    /// The node after its targets moved up by these offsets.
     pub(crate) fn moved_by(self, nodes: u32, triangles: u32) -> Self {
         let moved = |reference| match reference {
             NONE => NONE,
@@ -88,12 +87,10 @@ impl Pair {
 pub(crate) struct Pairs(pub Vec<Pair>);
 
 impl Pairs {
-    /// Lays out a tree depth first.
     pub(crate) fn depth_first(tree: &Tree) -> Self {
         Self::new(tree, NodeOrder::DepthFirst)
     }
 
-    /// Lays out a tree.
     pub(super) fn new(tree: &Tree, order: NodeOrder) -> Self {
         let inner = InnerNodes::new(tree, order, |_, _| false);
         let child = |index: u32| {
@@ -121,8 +118,8 @@ impl Pairs {
     }
 }
 
-/// Checks reachability, containment, parents and depth of a tree of `nodes`, whose references count the
-/// first one as number `first`; `cover` notes a leaf, given its reference and its box.
+/// Checks reachability, containment, parents and depth of a tree of `nodes`, with references
+/// relative to index `first`; `cover` records a leaf, given its reference and its box.
 ///
 /// # Errors
 /// The first violated invariant, with the node.
@@ -178,7 +175,7 @@ impl Nodes for Pairs {
                 inner.first = near.1;
             }
         }
-        // The far child is looked at again: the near one may have brought a nearer hit.
+        // Test the far child again: the near one may have found a nearer hit.
         let entered = far.0.is_some_and(|e| e <= walk.hit.t * walk.inverse.pad);
         if entered && !walk.is_answered() {
             if far.1 >= LEAF {

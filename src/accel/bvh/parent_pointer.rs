@@ -1,8 +1,9 @@
-//! No stack: up to the parent, and from there to the far child. Twin of
+//! Stackless: up to the parent, and from there to the far child. CPU version of
 //! `kernels/accel/bvh/parent_pointer.wesl`.
 //!
-//! Sources: M. Hapala et al., "Efficient stack-less BVH traversal for ray tracing", SCCG 2011; Dufay
-//! 2017, Algorithm 4.3, which as printed ends early after a missed first child and forgets hits.
+//! Sources: M. Hapala et al., "Efficient stack-less BVH traversal for ray tracing", SCCG 2011;
+//! Dufay 2017, Algorithm 4.3, which as printed ends early after a missed first child and forgets
+//! hits.
 
 use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
@@ -12,7 +13,7 @@ use super::{NONE, ROOT};
 
 pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut walk: Walk) -> Hit {
     let mut current = ROOT;
-    // The child that we come from, NONE on the way down.
+    // The child we come from; NONE on the way down.
     let mut from_child = NONE;
     loop {
         let next = if from_child == NONE {

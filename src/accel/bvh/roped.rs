@@ -1,4 +1,4 @@
-//! Skip pointers: one order for all rays, no stack. Twin of `kernels/accel/bvh/roped.wesl`.
+//! Skip pointers: one order for all rays, no stack. CPU version of `kernels/accel/bvh/roped.wesl`.
 //!
 //! Sources: B. Smits, "Efficiency issues for ray tracing", 1998; Dufay 2017, Algorithm 4.4.
 
@@ -8,8 +8,7 @@ use super::super::twin::Walk;
 use super::boxes::{Boxes, CHILD_MASK};
 use super::{NONE, ROOT};
 
-/// The rope of a node, from its parent's rope: the first child leads to the second, the second to
-/// where the parent leads.
+/// The rope of a node: the first child points to the second, the second to the parent's target.
 pub(super) fn rope_of(parent_rope: u32, child: u32) -> u32 {
     if child & 1 == 0 {
         child + 1

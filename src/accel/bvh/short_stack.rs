@@ -1,9 +1,9 @@
-//! A stack of few entries that forgets the oldest; a trail of one bit a level leads back to what was
-//! forgotten. Twin of `kernels/accel/bvh/short_stack.wesl`.
+//! A short stack that drops its oldest entries; a trail of one bit per level leads back to them.
+//! CPU version of `kernels/accel/bvh/short_stack.wesl`.
 //!
-//! Source: S. Laine, "Restart trail for stackless BVH traversal", HPG 2010. The trail here says which
-//! child the path takes, so that a restart tests no box; a second word says where the other child is
-//! still to be visited. Visits are those of the full stack.
+//! Source: S. Laine, "Restart trail for stackless BVH traversal", HPG 2010. Here the trail records
+//! which child the path takes, so that a restart tests no box; a second word records where the
+//! other child is still pending. Visits are the same as with a full stack.
 
 use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
@@ -24,7 +24,7 @@ pub(super) fn trace(nodes: &impl Nodes, entries: usize, leaves: LeafReader, mut 
     let (mut side, mut pending) = (0_u64, 0_u64);
     let mut current = ROOT;
     let mut level = 0;
-    // Levels above this one are walked again: the trail leads, nothing is tested.
+    // Levels above this one are re-descended along the trail, without tests.
     let mut restart_end = 0;
     loop {
         if level < restart_end {

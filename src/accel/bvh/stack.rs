@@ -1,4 +1,4 @@
-//! Near child first, the far one on a stack. Twin of `kernels/accel/bvh/stack.wesl`.
+//! Near child first, the far one on a stack. CPU version of `kernels/accel/bvh/stack.wesl`.
 
 use super::super::leaf::LeafReader;
 use super::super::ray::Hit;

@@ -1,16 +1,16 @@
 //! Chebyshev distance of every cell to the nearest occupied one, in O(cells).
 //!
 //! Source: A. Meijster, J. Roerdink, W. Hesselink, "A general algorithm for computing distance
-//! transforms in linear time", 2000, with the chessboard metric: one pass of two sweeps along x, and
-//! one lower envelope for each line along y, then along z.
+//! transforms in linear time", 2000, with the chessboard metric: one pass of two sweeps along x,
+//! and one lower envelope per line along y, then along z.
 
 use rayon::prelude::*;
 
-/// Distances are cut off here: they travel in the upper bits of a cell's word.
+/// Maximum distance; distances are stored in the upper bits of a cell's word.
 pub(crate) const FARTHEST: u8 = 127;
 
-/// For cells in the order of [`super::Grid::index`], the number of steps, diagonal ones included, to
-/// the nearest cell for which `occupied` holds; 0 there, at most [`FARTHEST`].
+/// For cells in the order of [`super::Grid::index`], the number of steps, including diagonal ones,
+/// to the nearest cell for which `occupied` holds; 0 there, at most [`FARTHEST`].
 pub(crate) fn chebyshev(
     [nx, ny, nz]: [u32; 3],
     occupied: impl Fn(usize) -> bool + Sync,
@@ -69,11 +69,11 @@ fn sweep(line: &mut [u8]) {
     line.iter_mut().rev().fold(FARTHEST, step);
 }
 
-/// The lower envelope of the functions max(|i − k|, g(k)) over a line; keeps memory between lines.
+/// The lower envelope of the functions max(|i − k|, g(k)) over a line; reuses memory between lines.
 #[derive(Default)]
 struct Envelope {
     given: Vec<u8>,
-    /// Sites k whose functions are part of the envelope, and where each begins.
+    /// Sites k of the envelope, and the start of each.
     parts: Vec<(i32, i32)>,
     result: Vec<u8>,
 }
@@ -89,7 +89,7 @@ impl Envelope {
         }
         let g = |k: i32| i32::from(self.given[k as usize]);
         let value = |i: i32, k: i32| (i - k).abs().max(g(k));
-        // From where on site u lies below site k < u.
+        // The index from which site u lies below site k < u.
         let separation = |k: i32, u: i32| {
             if g(k) <= g(u) {
                 (k + g(u)).max((k + u) / 2)

@@ -1,8 +1,9 @@
-//! The triangles of each cell: a counting sort in two steps, on all cores, whose result depends on
-//! neither their number nor the cutting of the work.
+//! The triangles of each cell: a two-step counting sort on all cores. The result does not depend on
+//! the number of cores or the division of the work.
 //!
-//! Triangles are inserted in runs; each run throws its (cell, triangle) pairs into buckets, which are
-//! equal ranges of cells. Each bucket is then sorted by counting in memory that fits a cache.
+//! Triangles are inserted in runs; each run distributes its (cell, triangle) pairs over buckets,
+//! which are equal ranges of cells. Each bucket is then counting-sorted in memory that fits a
+//! cache.
 
 use super::super::{AccelError, TriangleSoup, triangle::TriangleRecord};
 use super::raster::Raster;
@@ -12,13 +13,12 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Buckets of a sort; more would spill the write buffers, fewer the counters.
+/// Number of buckets; more would spill the write buffers, fewer the counters.
 const BUCKETS: u32 = 64;
-/// References are counted up to so many times as many as there may be, which is too many by far.
+/// References are counted up to this multiple of the limit.
 const ENOUGH: u64 = 16;
-/// References after which a run tells the others how many it found.
+/// References after which a run reports its count to the others.
 const REPORT: u64 = 1 << 16;
-/// Fewest triangles of a run.
 const LEAST_RUN: usize = 2048;
 /// Cells that one task cuts.
 const RUN: usize = 64;
@@ -26,9 +26,8 @@ const RUN: usize = 64;
 /// Cell `c` lists `references[starts[c]..starts[c + 1]]`, triangles ascending.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Lists {
-    /// Begin of each cell, and the end of the last.
+    /// Start of each cell, and the end of the last.
     pub starts: Vec<u32>,
-    /// Triangle indices.
     pub references: Vec<u32>,
 }
 
@@ -62,20 +61,19 @@ impl Lists {
         Ok(log.phase("sort", || sort(grid.cells() as usize, shift, &runs)))
     }
 
-    /// The list of a cell.
     pub(crate) fn of(&self, cell: usize) -> &[u32] {
         &self.references[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 }
 
-/// Cells of a bucket, as a power of two, so that there are at most [`BUCKETS`].
+/// Cells of a bucket, as a power of two, for at most [`BUCKETS`] buckets.
 fn bucket_shift(cells: u32) -> u32 {
     let bits = 32 - (cells - 1).leading_zeros();
     bits.saturating_sub(BUCKETS.ilog2())
 }
 
-/// Pairs of every run in the order of the triangles, and their number. Beyond `most` they are only counted, and beyond [`ENOUGH`]
-/// times as many no more.
+/// Pairs of every run in triangle order, and their number. Beyond `most` they are only counted, and
+/// beyond [`ENOUGH`] times that not even counted.
 fn insert(
     grid: &Grid,
     records: &[TriangleRecord],
@@ -142,8 +140,7 @@ fn sort(cells: usize, shift: u32, runs: &[Pairs]) -> Lists {
     Lists { starts, references }
 }
 
-/// Counting sort of the pairs of one bucket, whose first cell is `first_cell` and whose first
-/// reference is number `begin` of all.
+/// Counting sort of one bucket's pairs, with its first cell and first reference index.
 fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
     first_cell: u32,
     begin: u32,
@@ -157,7 +154,7 @@ fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
         sum += *start;
         *start = sum - *start;
     }
-    // Filling moves each start to its end, which is where the next one began.
+    // Filling moves each start to its end, the start of the next cell.
     pairs().for_each(|(cell, triangle)| {
         let slot = &mut starts[(cell - first_cell) as usize];
         references[*slot as usize] = triangle;
@@ -169,18 +166,17 @@ fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
     }
 }
 
-/// Lists of one part of a grid from a few triangles, by the calling thread; keeps memory between
-/// parts.
+/// Lists of one part of a grid from a few triangles, on one thread; reuses memory.
 #[derive(Debug, Default)]
 pub(crate) struct PartLists {
     raster: Raster,
     pairs: Vec<(u32, u32)>,
-    /// What was filled last.
+    /// Result of the last fill.
     pub lists: Lists,
 }
 
 impl PartLists {
-    /// Lists `ids`, which ascend, in the cells of `grid`.
+    /// Lists `ids`, which must ascend, in the cells of `grid`.
     pub(crate) fn fill(&mut self, grid: &Grid, soup: &TriangleSoup, ids: &[u32]) {
         let Self { raster, pairs, .. } = self;
         let Lists { starts, references } = &mut self.lists;
@@ -201,17 +197,17 @@ impl PartLists {
     }
 }
 
-/// What tasks make of runs of cells, in their order; the number of threads does not matter.
+/// Results of tasks over runs of cells, in order; independent of the number of threads.
 pub(crate) fn in_runs<T: Send>(cells: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let runs = (0..cells.div_ceil(RUN)).into_par_iter();
     let of_run = |run: usize| run * RUN..((run + 1) * RUN).min(cells);
     runs.map(|run| work(of_run(run))).collect()
 }
 
-/// Checks that lists begin where the ones before them end, and that they hold all references.
+/// Checks that lists are contiguous and hold all references.
 ///
 /// # Errors
-/// The first for which it does not hold.
+/// The first violation.
 pub(crate) fn check_starts(
     starts: impl ExactSizeIterator<Item = usize>,
     cells: usize,
@@ -230,12 +226,12 @@ pub(crate) fn check_starts(
     Ok(())
 }
 
-/// Checks what every grid promises: each triangle of the scene lies in the grid, and the cells at
-/// its corners and its centroid list it. `is_listed` tells whether the cell of a position lists a
-/// triangle.
+/// Checks the invariant of every grid: each triangle of the scene lies in the grid, and the cells
+/// at its corners and its centroid list it. `is_listed` returns true if the cell of a position
+/// lists a triangle.
 ///
 /// # Errors
-/// The first triangle for which it does not hold, or a reference to one that does not exist.
+/// The first triangle that violates it, or a reference to a missing triangle.
 pub(crate) fn check_lists(
     grid: &Grid,
     soup: &TriangleSoup,

@@ -1,11 +1,11 @@
-//! What the grids share: the box cut into cells, the place of a position, the insertion of triangles.
-//! Twin of `kernels/accel/grid.wesl`.
+//! Shared parts of the grids: the subdivided box, the cell of a position, the insertion of
+//! triangles. CPU version of `kernels/accel/grid.wesl`.
 //!
-//! A triangle is listed in every cell that it overlaps once the cell is grown by [`GridBox::margin`],
-//! which is larger than what rounding can move the walk. The planes of a grid are the same f32
-//! expression everywhere, and the distance to a plane is monotone in the plane even after rounding,
-//! so that a walk passes planes in order; the margin covers the rounding of positions, from which
-//! cells are found on entry and after a jump.
+//! A triangle is listed in every cell that it overlaps after the cell is grown by
+//! [`GridBox::margin`], which exceeds the largest effect of rounding on the walk. The planes of a
+//! grid are the same f32 expression everywhere, and the distance to a plane is monotone in the
+//! plane even after rounding, so a walk passes planes in order; the margin covers the rounding of
+//! positions, from which cells are found on entry and after a jump.
 
 pub(crate) mod distance;
 pub(crate) mod lists;
@@ -19,36 +19,37 @@ use super::{AccelError, BuildLog, TriangleSoup};
 use rayon::prelude::*;
 use raystone_gpu::UniformValues;
 
-/// Words that an array of a grid may have on the adapter of `log`, less the sentinel.
+/// Maximum words of a grid array on the adapter of `log`, without the sentinel.
 pub(crate) fn most_words(log: &BuildLog) -> u64 {
     log.most_words() - 1
 }
 
-/// [`AccelError::Limit`] if `needed` words are more than [`most_words`].
+/// Checks `needed` words against [`most_words`].
 ///
 /// # Errors
-/// The limit with both numbers.
+/// [`AccelError::Limit`] with both numbers.
 pub(crate) fn check_words(what: &str, needed: u64, log: &BuildLog) -> Result<(), AccelError> {
     AccelError::check_limit(what, needed, most_words(log))
 }
 
-/// The box that a grid fills, and how exact positions in it are.
+/// The box that a grid fills, and the accuracy of positions in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GridBox {
     /// Around all triangles, grown by the margin.
     pub bounds: Bounds,
-    /// By how much cells are grown along each axis when triangles are listed, scene units. Positions
-    /// along a ray that starts within 16 diagonals of the scene are wrong by less.
+    /// Growth of cells along each axis when triangles are listed, scene units. Positions along a
+    /// ray that starts within 16 diagonals of the scene have a smaller error.
     ///
-    /// 2⁻¹⁸ diagonals for what is relative to the way of a ray, and 2⁻²² of the greatest coordinate along
-    /// the axis: half an ulp each for the position, the plane that bounds its cell, and the box of a
-    /// triangle once it is grown; differences of positions are exact to their own half ulp.
+    /// 2⁻¹⁸ diagonals for errors relative to the length of the ray, and 2⁻²² of the largest
+    /// coordinate along the axis: half an ulp each for the position, the plane that bounds its
+    /// cell, and the box of a triangle once it is grown; differences of positions are exact to
+    /// their own half ulp.
     pub margin: [f32; 3],
     diagonal: f32,
 }
 
 impl GridBox {
-    /// That of a scene; a unit box if it is empty.
+    /// The grid box of a scene; a unit box if it is empty.
     pub(crate) fn new(soup: &TriangleSoup) -> Self {
         let mut bounds = bounds_of(&soup.records);
         if soup.records.is_empty() {
@@ -73,7 +74,7 @@ impl GridBox {
         }
     }
 
-    /// Cells along each axis for `lambda` cells a triangle, from 1 to `most`.
+    /// Cells along each axis for `lambda` cells per triangle, from 1 to `most`.
     pub(crate) fn resolution(&self, triangles: usize, lambda: f64, most: u32) -> [u32; 3] {
         // A flat scene still needs a volume for Cleary's rule.
         let extent = self.bounds.extent();
@@ -95,29 +96,28 @@ pub(crate) fn finest(side: f64, margin: f32) -> f64 {
     (side / (4.0 * f64::from(margin))).max(1.0)
 }
 
-/// Cells along each axis of a box with these sides: side · cbrt(λ · triangles / volume)
-/// (J. Cleary et al., 1986).
+/// Cells along each axis: side · cbrt(λ · triangles / volume) (J. Cleary et al., 1986).
 pub(crate) fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
     let volume = side.iter().product::<f64>();
     let density = (lambda * triangles.max(1) as f64 / volume).cbrt();
     side.map(|s| s * density)
 }
 
-/// References that a cut of a cell may make of one, on average.
+/// Average number of references that cutting a cell may make of one.
 const MOST_COPIES: f64 = 8.0;
 
-/// Parts along each axis of a cell that is to be cut, before rounding.
+/// Unrounded number of parts along each axis for a cell to be cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cut {
     /// By Cleary's rule.
     pub wanted: [f64; 3],
-    /// At most 1: beyond this share of the wanted parts, triangles that cross the whole cell would be
-    /// listed in too many, which no number of triangles per cell makes up for.
+    /// At most 1: beyond this fraction of the wanted parts, triangles that cross the whole cell
+    /// would be listed too often for any reduction of triangles per cell to pay off.
     pub share: f64,
 }
 
 impl Cut {
-    /// A cell with these sides, which lists triangles of these areas.
+    /// A cell with these sides that lists triangles of these areas.
     pub(crate) fn new(
         side: [f64; 3],
         areas: impl ExactSizeIterator<Item = f32>,
@@ -131,7 +131,7 @@ impl Cut {
         let volume = side.iter().product::<f64>();
         let section = (volume / side.iter().copied().fold(longest, f64::min)) as f32;
         let area = areas.map(|a| f64::from(a.min(section))).sum::<f64>();
-        // A surface meets about one and a half times its area in faces of parts.
+        // A surface crosses about one and a half times its area in faces of parts.
         let face = (volume / wanted.iter().product::<f64>()).powf(2.0 / 3.0);
         let copies = 1.5 * area / face / count as f64;
         Self {
@@ -141,7 +141,6 @@ impl Cut {
     }
 }
 
-/// Area of each triangle.
 pub(crate) fn areas(soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
         let [e, f] = record.edges();
@@ -150,7 +149,6 @@ pub(crate) fn areas(soup: &TriangleSoup) -> Vec<f32> {
     soup.records.par_iter().map(area).collect()
 }
 
-/// Box around the triangles.
 fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     let around = |chunk: &[TriangleRecord]| {
         chunk.iter().fold(Bounds::EMPTY, |bounds, record| {
@@ -162,23 +160,18 @@ fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     boxes.iter().fold(Bounds::EMPTY, |b, c| b.union(c))
 }
 
-/// A box cut into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Grid {
-    /// The box.
     pub bounds: Bounds,
-    /// Cells along each axis.
     pub resolution: [u32; 3],
     /// Sides of a cell, scene units.
     pub cell: [f32; 3],
-    /// Their reciprocals.
     pub inverse_cell: [f32; 3],
     /// See [`GridBox::margin`].
     pub margin: [f32; 3],
 }
 
 impl Grid {
-    /// A box cut into `resolution` cells.
     pub(crate) fn new(grid_box: &GridBox, resolution: [u32; 3]) -> Self {
         let extent = grid_box.bounds.extent();
         Self::with_cells(
@@ -189,7 +182,7 @@ impl Grid {
         )
     }
 
-    /// The cells from `lowest` on, `size` along each axis, cut into `resolution` cells.
+    /// The cells from `lowest` on, `size` along each axis, subdivided into `resolution` cells.
     pub(crate) fn part(&self, lowest: [u32; 3], size: [u32; 3], resolution: [u32; 3]) -> Self {
         Self::with_cells(
             std::array::from_fn(|a| self.plane(a, lowest[a])),
@@ -213,17 +206,15 @@ impl Grid {
         }
     }
 
-    /// Number of cells.
     pub(crate) fn cells(&self) -> u64 {
         self.resolution.iter().map(|&r| u64::from(r)).product()
     }
 
-    /// Index of a cell: x runs fastest.
+    /// Index of a cell; x varies fastest.
     pub(crate) fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
         (z * self.resolution[1] + y) * self.resolution[0] + x
     }
 
-    /// The cell of an index.
     pub(crate) fn coordinates(&self, index: u32) -> [u32; 3] {
         let [nx, ny, _] = self.resolution;
         [index % nx, index / nx % ny, index / nx / ny]
@@ -235,12 +226,10 @@ impl Grid {
         clamped(cells, self.resolution[axis])
     }
 
-    /// The plane below cell `coordinate`.
     pub(crate) fn plane(&self, axis: usize, coordinate: u32) -> f32 {
         self.bounds.min[axis] + coordinate as f32 * self.cell[axis]
     }
 
-    /// The uniform `grid` of the kernels.
     pub(crate) fn uniform(&self) -> (&'static str, UniformValues) {
         (
             "grid",
@@ -253,7 +242,7 @@ impl Grid {
         )
     }
 
-    /// Where the ray is at distance `t`, in cells from the low corner.
+    /// Position of the ray at distance `t`, in cells from the low corner.
     pub(crate) fn in_cells(&self, ray: &Ray, t: f32) -> [f32; 3] {
         std::array::from_fn(|a| {
             (ray.origin[a] + ray.direction[a] * t - self.bounds.min[a]) * self.inverse_cell[a]
@@ -275,7 +264,7 @@ pub(crate) fn clamped(position: f32, resolution: u32) -> u32 {
     (if position < last { position } else { last }) as u32
 }
 
-/// The axis that is left first; of equal ones the first.
+/// The axis exited first; the lowest on a tie.
 pub(crate) fn first_axis(next: [f32; 3], leave: f32) -> usize {
     if next[0] == leave {
         0
@@ -286,7 +275,6 @@ pub(crate) fn first_axis(next: [f32; 3], leave: f32) -> usize {
     }
 }
 
-/// Whether a cell lies beside the grid.
 pub(crate) fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
     (0..3).any(|a| cell[a] >= resolution[a])
 }

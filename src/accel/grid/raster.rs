@@ -1,16 +1,15 @@
-//! Which cells a triangle overlaps: exact, row by row.
+//! The cells that a triangle overlaps: exact, row by row.
 //!
 //! The separating-axis test of T. Akenine-Möller ("Fast 3D triangle–box overlap testing", 2001) in
 //! the arrangement of M. Schwarz and H.-P. Seidel ("Fast parallel surface and solid voxelization on
 //! GPUs", 2010): a triangle overlaps a cell if the cell is in its box, touches its plane, and the
-//! three projections of both overlap. Each condition leaves an interval of cells in a row, so that a
-//! row costs the same however many of its cells are listed.
+//! three projections of both overlap. Each condition gives an interval of cells in a row, so the
+//! cost of a row does not depend on the number of cells listed.
 
 use super::super::spatial::cross;
 use super::super::triangle::TriangleRecord;
 use super::Grid;
 
-/// Least and greatest coordinates.
 pub(crate) fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
     let pick = |first: fn(f32, f32) -> bool| {
         std::array::from_fn(|a| {
@@ -23,7 +22,7 @@ pub(crate) fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
     [pick(|a, b| a < b), pick(|a, b| a > b)]
 }
 
-/// Finds the cells of triangles; keeps memory between them.
+/// Finds the cells of triangles; reuses memory between them.
 #[derive(Debug, Default)]
 pub(crate) struct Raster {
     /// First and last cell in x by y, from the projection along z.
@@ -32,8 +31,8 @@ pub(crate) struct Raster {
 
 impl Raster {
     /// Calls `row(first cell, number of cells)` for every row of cells along x that the triangle
-    /// overlaps once cells are grown by the margin, more for needles ([`margin_of`]); without `exact`,
-    /// for every row of its box.
+    /// overlaps after cells are grown by the margin, more for needles ([`margin_of`]); without
+    /// `exact`, for every row of its box.
     pub(crate) fn rows(
         &mut self,
         grid: &Grid,
@@ -47,7 +46,7 @@ impl Raster {
         let last: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, high[a] + grid.margin[a]));
         let wide: [bool; 3] = std::array::from_fn(|a| first[a] != last[a]);
         let wide_axes = wide.iter().filter(|&&w| w).count();
-        // A triangle is in one piece: in a single row of cells it leaves out none.
+        // A triangle is connected: in a single row it overlaps every cell of its box.
         if !exact || wide_axes < 2 {
             for z in first[2]..=last[2] {
                 for y in first[1]..=last[1] {
@@ -87,9 +86,9 @@ impl Raster {
     }
 }
 
-/// By how many margins the cells inside the box of a triangle are grown for it. The distance to the
-/// plane of a needle is less exact by its length over its width, so that hits land beside it; they
-/// stay in its box.
+/// Margins by which cells inside a triangle's box are grown for it. The distance to the plane of a
+/// needle loses accuracy by its length over its width, so hits land beside it; they stay in its
+/// box.
 fn margin_of(record: &TriangleRecord) -> f64 {
     let [e, f] = record.edges();
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
@@ -100,7 +99,7 @@ fn margin_of(record: &TriangleRecord) -> f64 {
     if ratio > 1.0 { ratio.min(1e6) } else { 1.0 }
 }
 
-/// A triangle in units of cells, and by how much cells are grown.
+/// A triangle in cell units, and the growth of cells.
 struct Shape {
     corners: [[f64; 3]; 3],
     grow: [f64; 3],
@@ -118,14 +117,14 @@ impl Shape {
     }
 }
 
-/// Cells of `within` that lie in the interval; an empty range where there are none.
+/// Cells of `within` that lie in the interval; an empty range if there are none.
 fn cells_between(low: f64, high: f64, within: [u32; 2]) -> [u32; 2] {
     let [first, last] = within;
     let [f, l] = within.map(f64::from);
     if low > l + 1.0 || high < f {
         return [1, 0];
     }
-    // Casts truncate, which for what is not negative is the floor.
+    // Casts truncate, which is the floor for non-negative values.
     let low = if low > f { low as u32 } else { first };
     let high = if high < l { high as u32 } else { last };
     [low, high]
@@ -146,7 +145,7 @@ impl Outline {
             let [p, q] = [points[i], points[(i + 1) % 3]];
             let [p, q] = if p[0] <= q[0] { [p, q] } else { [q, p] };
             let rise = q[0] - p[0];
-            // Only edges that leave a slab are cut, and those are not level.
+            // Only edges that exit a slab are cut, and those are not level.
             let slope = if rise > 0.0 {
                 (q[1] - p[1]) / rise
             } else {
@@ -184,7 +183,7 @@ impl Outline {
     }
 }
 
-/// The plane of a triangle with the reach of a grown cell.
+/// The plane of a triangle with the extent of a grown cell.
 struct Plane {
     normal: [f64; 3],
     offset: f64,
@@ -200,7 +199,7 @@ impl Plane {
         let normal = cross(e, f);
         let reach = (0..3).map(|a| normal[a].abs() * (0.5 + shape.grow[a]));
         let size = |v: [f64; 3]| v.iter().map(|x| x.abs()).sum::<f64>();
-        // What rounding may do to the plane of a needle.
+        // The effect of rounding on the plane of a needle.
         let slack = size(e) * size(f) * (size(e) + size(f) + size(p)) * 2.0_f64.powi(-48);
         Self {
             normal,
@@ -220,7 +219,7 @@ impl Plane {
                 [1, 0]
             };
         }
-        // Between these lie the centres of cells that touch the plane; half a cell more is the cell.
+        // Centres of cells that touch the plane lie between these; the cell adds half a cell.
         let centre = rest * self.inverse_x;
         let radius = self.reach * self.inverse_x.abs();
         let [low, high] = cells_between(centre - radius - 0.5, centre + radius - 0.5, within);
@@ -282,7 +281,7 @@ mod tests {
             };
             let (exact, boxed) = (listed(true), listed(false));
             let margins = margin_of(&record);
-            // The box is grown by one margin only, also that of a needle.
+            // The box is grown by one margin only, even for a needle.
             assert!(
                 boxed.is_superset(&sat(0.99)),
                 "case {case}: a cell of the box is missing"

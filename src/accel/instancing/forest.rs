@@ -12,29 +12,26 @@ use crate::StructureStats;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Where the BVH of one object lies.
+/// The location of one object's BVH.
 #[derive(Debug, Clone)]
 pub(super) struct Root {
-    /// Its nodes, the root first.
+    /// Its nodes, root first.
     pub nodes: Range<u32>,
-    /// Its triangles, leaf by leaf; one that spatial splits cut stands there more than once.
+    /// Its triangles, leaf by leaf; triangles cut by spatial splits appear more than once.
     pub triangles: Range<u32>,
-    /// Triangles of the object.
     pub object_size: usize,
-    /// Box around it, object space.
+    /// Object-space bounds.
     pub bounds: Bounds,
-    /// Deepest leaf.
     pub depth: u32,
 }
 
-/// All objects.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Forest {
     pub nodes: Vec<Pair>,
-    /// Records in object space, leaf by leaf, with ids of the object.
+    /// Object-space records, leaf by leaf, with object ids.
     pub triangles: Vec<TriangleRecord>,
     pub roots: Vec<Root>,
-    /// How rays meet the triangles.
+    /// How rays intersect the triangles.
     pub intersection: Intersection,
     /// Sums over all objects.
     pub stats: StructureStats,
@@ -101,7 +98,6 @@ impl Forest {
         }
     }
 
-    /// Stack entries that the traversal of any object can need.
     pub(super) fn stack_entries(&self) -> u32 {
         self.roots
             .iter()

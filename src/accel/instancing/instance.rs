@@ -1,5 +1,6 @@
-//! What the two-level traversals share: instances as kernels read them, rays in an object's space,
-//! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
+//! Shared parts of the two-level traversals: instances as read by kernels, object-space rays, boxes
+//! grown for the ray, and the traversal of one object. CPU version of
+//! `kernels/accel/instance.wesl`.
 
 use super::super::bounds::Bounds;
 use super::super::bvh::pairs::Pair;
@@ -12,24 +13,23 @@ use super::forest::Forest;
 use bytemuck::{Pod, Zeroable};
 use raystone_scene::{Instance, Transform};
 
-/// `LEAF` without content: the missing child of a node with one.
+/// `LEAF` without content: the missing child of a node with one child.
 pub(super) const NOTHING: u32 = 0x8000_0000;
 /// Flag of an entry whose rays need no transform.
 pub(super) const IDENTITY: u32 = 1;
 
 /// An instance, or the part of it below a node of its object: four `vec4<u32>`. The columns of the
-/// map to the object's space and the translation.
+/// map to object space and the translation.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct Entry {
     pub x: [f32; 3],
-    /// Node of the object's BVH to start from.
+    /// Start node in the object's BVH.
     pub node: u32,
     pub y: [f32; 3],
-    /// Index in the scene of the instance's first triangle.
+    /// Scene index of the instance's first triangle.
     pub first_id: u32,
     pub z: [f32; 3],
-    /// [`IDENTITY`] or 0.
     pub flags: u32,
     pub offset: [f32; 3],
     /// Index of the instance, for checks.
@@ -67,13 +67,13 @@ impl Entry {
     }
 }
 
-/// The ray in the space of an instance's object. Distances stay the same.
+/// The ray in the object space of an instance. Distances are unchanged.
 pub(super) fn object_ray(instance: &Instance, ray: &Ray) -> Ray {
     Entry::new(0, instance, 0).object_ray(ray)
 }
 
-/// A ray as the boxes of one level see it: low planes from one origin and high planes from another,
-/// which grows every box by their distance.
+/// A ray for the box tests of one level: low planes use one origin and high planes another, which
+/// grows every box by their distance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
     pub ray: Ray,
@@ -82,8 +82,7 @@ pub(super) struct Level {
     high_origin: [f32; 3],
 }
 
-/// The level of the boxes that are tested with a raised ray, grown by `growth` for each unit of the origin's
-/// greatest coordinate.
+/// A level for boxes grown by `growth` per unit of the raised ray origin's largest coordinate.
 pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
     let [x, y, z] = ray.origin.map(f32::abs);
     let grown = growth * x.max(y).max(z);
@@ -95,7 +94,6 @@ pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
     }
 }
 
-/// The level of the object of an entry.
 pub(super) fn object_level(entry: &Entry, ray: &Ray, tests: Intersection) -> Level {
     level(&tests.raised(&entry.object_ray(ray)), 0.0, tests)
 }
@@ -113,7 +111,7 @@ pub(super) fn enter_grown(level: &Level, bounds: &Bounds, t_best: f32) -> Option
     (enter <= exit.min(t_best) * level.inverse.pad).then_some(enter)
 }
 
-/// Tests the triangles of a leaf; `first_id` turns their ids into those of the scene.
+/// Tests the triangles of a leaf; `first_id` converts their ids to those of the scene.
 pub(super) fn leaf(
     triangles: &[TriangleRecord],
     reference: u32,
@@ -132,7 +130,7 @@ pub(super) fn leaf(
     }
 }
 
-/// Both children of a node in the order of their distance, with where they are entered.
+/// Both children of a node in order of distance, with their entry distances.
 pub(super) fn near_and_far(
     (place, node): (u32, &Pair),
     level: &Level,
@@ -151,7 +149,7 @@ pub(super) fn near_and_far(
     }
 }
 
-/// Whether a child is worth a visit: the near one may have brought a hit in the meantime.
+/// True if a child still needs a visit: the near one may have found a hit in the meantime.
 pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
     enter.is_some_and(|e| e <= hit.t * level.inverse.pad)
 }
@@ -165,7 +163,7 @@ pub(super) fn trace_object(forest: &Forest, entry: &Entry, walk: &mut Walk) {
     });
 }
 
-/// The loop of both levels where one is inside the other: `visit` gets the references of leaves.
+/// The traversal loop of each level in the nested version; `visit` gets the references of leaves.
 pub(super) fn descend<'a>(
     node: impl Fn(u32) -> &'a Pair,
     root: u32,

@@ -1,4 +1,4 @@
-//! The truth for structures that transform rays: every instance is looked at, whatever its world box.
+//! The reference for structures that transform rays: every instance is tested, without world boxes.
 
 use super::super::bounds::Bounds;
 use super::super::brute_force::EveryTriangle;
@@ -29,8 +29,8 @@ pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
     rays.par_iter().map(closest).collect()
 }
 
-/// The same answers faster: the scalar plain BVH of every object, for one instance after the other.
-/// No world box takes part, so it can judge those of the structures.
+/// The same answers, faster: the scalar plain BVH of every object, for one instance after the
+/// other. It uses no world box, so it can check those of the structures.
 pub struct InstanceJudge<'a> {
     placed: &'a Placed,
     objects: Vec<(Bounds, BuiltBvh)>,
@@ -62,7 +62,7 @@ impl CpuTwin for InstanceJudge<'_> {
             let object = &self.placed.objects[instance.object as usize];
             let tests = object.intersection;
             let mut local = tests.raised(&object_ray(instance, &tests.raised(ray)));
-            // A hit at the same distance counts: its triangle may have the lower index.
+            // Include hits at the same distance: the triangle may have the lower index.
             local.t_max = best.t;
             let (bounds, built) = &self.objects[instance.object as usize];
             let inverse = tests.inverse(local.direction);

@@ -1,8 +1,8 @@
 //! `meta-bvh`: a BVH over the instances above the BVHs of their objects, traversed in one loop over
-//! both levels. Twin of `kernels/accel/meta_bvh.wesl`.
+//! both levels. CPU version of `kernels/accel/meta_bvh.wesl`.
 //!
-//! Sources: the meta-BVH of J. Dufay's thesis (2017, §4.1.5), parts of instances in the upper level by
-//! C. Benthin et al. (HPG 2017), see [`super::top`].
+//! Sources: the meta-BVH of J. Dufay's thesis (2017, §4.1.5); parts of instances in the upper level
+//! by C. Benthin et al. (HPG 2017), see [`super::top`].
 
 use super::super::bvh::pairs::Pair;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
@@ -13,7 +13,7 @@ use super::top::Top;
 use super::world_box::BoxMap;
 use super::{Base, Layout, TwoLevel, Upper, clamped, meta_bvh_nested};
 
-/// Stands for the size of the stack when an object was entered, outside of any.
+/// Replaces the stack size at object entry while outside any object.
 const OUTSIDE: u32 = u32::MAX;
 
 parameters! {
@@ -57,21 +57,20 @@ impl Structure for MetaBvh {
     }
 }
 
-/// Refuses more entries than references can address: like triangles, by `FIRST_MASK`.
+/// Rejects more entries than references can address: as for triangles, by `FIRST_MASK`.
 fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     let needed = instances as u64 * rebraid.max(1) as u64;
     let what = "entries of the upper level of a meta-bvh";
     AccelError::check_limit(what, needed, FIRST_MASK)
 }
 
-/// A BVH over the instances.
 struct Instances {
     top: Top,
     rebraid: usize,
     nested: bool,
 }
 
-/// Both levels as the traversals see them.
+/// Both levels for the traversals.
 #[derive(Clone, Copy)]
 pub(super) struct Levels<'a> {
     pub base: &'a Base,
@@ -79,12 +78,11 @@ pub(super) struct Levels<'a> {
 }
 
 impl<'a> Levels<'a> {
-    /// The root of the upper level, behind the nodes of all objects.
+    /// The root of the upper level, after the nodes of all objects.
     pub(super) fn root(&self) -> u32 {
         self.base.forest.nodes.len() as u32
     }
 
-    /// A node of either level.
     pub(super) fn node(&self, index: u32) -> &'a Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;
@@ -93,12 +91,11 @@ impl<'a> Levels<'a> {
             .unwrap_or_else(|| &self.top.nodes[index - objects.len()])
     }
 
-    /// The entry behind a leaf reference of the upper level.
     pub(super) fn load_entry(&self, reference: u32) -> &'a Entry {
         &self.top.entries[(reference & FIRST_MASK) as usize]
     }
 
-    /// Visits that no ray exceeds: every upper node once, and below every entry all of its object.
+    /// Upper bound on visits per ray: every upper node, and below every entry all of its object.
     fn step_fuse(&self) -> usize {
         let roots = &self.base.forest.roots;
         let below = self.top.entries.iter().map(|entry| {
@@ -112,7 +109,7 @@ impl<'a> Levels<'a> {
     fn validate_top(&self) -> Result<(), AccelError> {
         let maps: Vec<BoxMap> = self.base.instances.iter().map(BoxMap::new).collect();
         let (nothing, nodes) = (TriangleSoup::default(), self.top.nodes.len());
-        // Entries are counted behind the nodes.
+        // Entries are numbered after the nodes.
         let coverage = Coverage::new(&nothing, nodes + self.top.entries.len());
         coverage.descend(self.top.levels(), |coverage, index, around, below| {
             for (reference, bounds) in self.top.nodes[index].children() {
@@ -143,7 +140,7 @@ impl<'a> Levels<'a> {
         })
     }
 
-    /// Checks that the entries of each instance make up its object, each part once.
+    /// Checks that the entries of each instance form its object, each part once.
     fn validate_parts(&self) -> Result<(), AccelError> {
         let instances = &self.base.instances;
         let mut parts: Vec<Vec<u32>> = vec![Vec::new(); instances.len()];
@@ -201,9 +198,10 @@ impl Upper for Instances {
         let top = &self.top;
         let (nodes, objects) = (base.forest.nodes.len(), base.forest.stack_entries());
         // Nested loops have a stack each, of the same size.
-        let (kernel, stack_entries) = match self.nested {
-            true => ("accel/meta_bvh_nested", objects.max(top.levels())),
-            false => ("accel/meta_bvh", objects + top.levels()),
+        let (kernel, stack_entries) = if self.nested {
+            ("accel/meta_bvh_nested", objects.max(top.levels()))
+        } else {
+            ("accel/meta_bvh", objects + top.levels())
         };
         Layout {
             kernel,
@@ -230,9 +228,10 @@ impl Upper for Instances {
 
     fn trace(&self, base: &Base, walk: Walk) -> Hit {
         let top = &self.top;
-        match self.nested {
-            true => meta_bvh_nested::trace(Levels { base, top }, walk),
-            false => trace(Levels { base, top }, walk),
+        if self.nested {
+            meta_bvh_nested::trace(Levels { base, top }, walk)
+        } else {
+            trace(Levels { base, top }, walk)
         }
     }
 }
@@ -242,8 +241,7 @@ fn trace(levels: Levels, mut walk: Walk) -> Hit {
     let tests = levels.base.forest.intersection;
     let world = level(&walk.ray, levels.top.growth, tests);
     let mut stack: Vec<u32> = Vec::new();
-    // The level that is traversed: the world, or the object that was entered with `floor` entries
-    // on the stack.
+    // The current level: the world, or the object entered with `floor` entries on the stack.
     let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
     let mut current = levels.root();
     loop {

@@ -1,5 +1,5 @@
 //! `meta-bvh` with `loop = nested`: the traversal of an object is a loop inside that of the upper
-//! level. Twin of `kernels/accel/meta_bvh_nested.wesl`.
+//! level. CPU version of `kernels/accel/meta_bvh_nested.wesl`.
 
 use super::super::ray::Hit;
 use super::super::twin::Walk;

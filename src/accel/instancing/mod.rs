@@ -1,14 +1,14 @@
-//! Two-level structures: a BVH for each object in the object's own space, and above them either a
-//! list of the instances (`object-list`) or a BVH over them (`meta-bvh`). A moved instance changes
-//! the upper level only.
+//! Two-level structures: an object-space BVH per object, and above them either a list of the
+//! instances (`object-list`) or a BVH over them (`meta-bvh`). Moving an instance changes the upper
+//! level only.
 //!
-//! Rays are taken to the object's space, so t, u and v are those of brute force *over the same
-//! instances with the same transforms* ([`brute_force_instances`]), to the bit; brute force over the
-//! flat triangles rounds otherwise. The direction is transformed and not normalised, which makes the
-//! distance of a hit the same number in both spaces.
+//! Rays are transformed to object space, so t, u and v are bit-identical to brute force *over the
+//! same instances with the same transforms* ([`brute_force_instances`]); brute force over the flat
+//! triangles rounds differently. The transformed direction is not normalised, so a hit's distance
+//! is the same in both spaces.
 //!
-//! Where a scene has no instances, it is one object that lies where it is. Rays are then not
-//! transformed, and all answers equal those of the flat list.
+//! A scene without instances is treated as one untransformed object. All answers then equal those
+//! of the flat list.
 
 mod forest;
 mod instance;
@@ -36,46 +36,43 @@ use placed::View;
 use raystone_gpu::UniformValues;
 use raystone_scene::Instance;
 
-/// What stands above the trees of the objects.
+/// The level above the objects' trees.
 trait Upper: Send + Sync + 'static {
-    /// Puts it up anew over the instances as they stand.
+    /// Rebuilds it over the instances at their current transforms.
     fn place(&mut self, base: &Base);
     /// Checks it against the instances.
     ///
     /// # Errors
     /// The first violated invariant.
     fn validate(&self, base: &Base) -> Result<(), AccelError>;
-    /// As kernels bind it.
     fn layout(&self, base: &Base) -> Layout<'_>;
-    /// Figures of the whole, given those of the objects.
+    /// Statistics of the whole structure, given those of the objects.
     fn figures(&self, objects: &StructureStats) -> StructureStats;
-    /// Twin of the kernel's `trace`.
     fn trace(&self, base: &Base, walk: Walk) -> Hit;
 }
 
-/// An upper level as kernels bind it.
+/// Data of an upper level for kernel bindings.
 struct Layout<'a> {
     kernel: &'static str,
-    /// What lies behind the nodes of the objects.
+    /// The data after the nodes of the objects.
     parts: [&'a [u32]; 2],
     step_fuse: usize,
     entries: usize,
-    /// Its first node.
+    /// Index of its first node.
     root: usize,
-    /// Place of the first entry, in nodes.
+    /// Index of the first entry, in nodes.
     first_entry: usize,
     growth: f32,
     stack_entries: u32,
 }
 
-/// A two-level structure.
 struct TwoLevel<U> {
     base: Base,
     upper: U,
 }
 
 impl<U: Upper> TwoLevel<U> {
-    /// An upper level over the objects' trees; putting it up is a phase of this name.
+    /// An upper level over the objects' trees; its construction is a phase of this name.
     fn build(mut upper: U, base: Base, phase: &str, log: &mut BuildLog) -> BuildResult {
         log.phase(phase, || upper.place(&base));
         Ok(Box::new(Self { base, upper }))
@@ -112,9 +109,10 @@ impl<U: Upper> BuiltAccel for TwoLevel<U> {
     }
 
     fn space(&self) -> Space {
-        match self.base.instances.iter().all(Instance::is_identity) {
-            true => Space::World,
-            false => Space::Instances,
+        if self.base.instances.iter().all(Instance::is_identity) {
+            Space::World
+        } else {
+            Space::Instances
         }
     }
 
@@ -134,7 +132,7 @@ impl<U: Upper> Traverse for TwoLevel<U> {
     }
 }
 
-/// What both structures are built from: the BVHs of the objects and where these stand.
+/// Input of both structures: the BVHs of the objects, and the instances.
 struct Base {
     instances: Vec<Instance>,
     forest: Forest,
@@ -147,8 +145,8 @@ impl Base {
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let view = View::of(soup);
-        // Rays come to an object from as far as instances are moved apart, in units of any scale: no margin
-        // around its clipped triangles would do.
+        // Rays reach an object from as far as instances are apart, in units of any scale: no margin
+        // around clipped triangles would suffice.
         let tree = TreeParameters {
             spatial_clip: tree.spatial_clip && soup.placed.is_none(),
             ..tree.clone()
@@ -159,7 +157,7 @@ impl Base {
         })
     }
 
-    /// Buffers of the objects with an upper level behind their nodes.
+    /// Buffers of the objects, followed by an upper level.
     fn buffers(&self, top: &Layout) -> GpuBuffers<'_> {
         let forest = &self.forest;
         let nodes: &[u32] = bytemuck::cast_slice(&forest.nodes);
@@ -184,13 +182,13 @@ impl Base {
                         .f32("growth", top.growth),
                 ),
             ],
-            // Rounded up, so that scenes of like depth share a kernel.
+            // Rounded up, so that scenes of similar depth share a kernel.
             constants: vec![("STACK_ENTRIES", top.stack_entries.next_multiple_of(8))],
             ..Default::default()
         }
     }
 
-    /// Takes over the transforms of `soup`.
+    /// Applies the transforms of `soup`.
     fn update(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let moved = View::of(soup);
         self.has_instances_of(&moved)?;
@@ -198,7 +196,7 @@ impl Base {
         Ok(())
     }
 
-    /// Whether these are the same instances of objects of the same size, wherever they stand.
+    /// Checks that `view` has the same instances of objects of the same size, with any transforms.
     fn has_instances_of(&self, view: &View) -> Result<(), AccelError> {
         let key = |i: &Instance| (i.object, i.first);
         let same_instances = self
@@ -230,7 +228,7 @@ impl Base {
     }
 }
 
-/// The step fuse as the uniform holds it: no sum of subtrees wraps around.
+/// The step fuse for the uniform, saturated so that sums of subtrees do not wrap.
 fn clamped(steps: u64) -> usize {
     steps.min(u64::from(u32::MAX)) as usize
 }

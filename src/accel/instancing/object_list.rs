@@ -1,8 +1,8 @@
-//! `object-list`: the instances one after the other, each with a world box and the BVH of its object.
-//! Twin of `kernels/accel/object_list.wesl`.
+//! `object-list`: the instances one after the other, each with a world box and the BVH of its
+//! object. CPU version of `kernels/accel/object_list.wesl`.
 //!
-//! Source: the per-object BVHs in an array of student path tracers, as analysed in §4.1.5 of
-//! J. Dufay's thesis (2017), where the meta-BVH replaces the list.
+//! Source: the per-object BVHs in an array of student path tracers, as analysed in §4.1.5 of J.
+//! Dufay's thesis (2017), where the meta-BVH replaces the list.
 
 use super::super::structure::prelude::*;
 use super::super::tree::TreeParameters;
@@ -54,11 +54,9 @@ impl BoxWords {
     }
 }
 
-/// The instances as they stand.
 #[derive(Default)]
 struct List {
     entries: Vec<Entry>,
-    /// World box of each entry.
     boxes: Vec<BoxWords>,
     growth: f32,
 }

@@ -1,4 +1,4 @@
-//! Objects and instances as structures see them.
+//! Objects and instances for structures.
 
 use super::super::triangle::TriangleRecord;
 use super::super::{Ray, TriangleSoup};
@@ -10,7 +10,7 @@ use raystone_scene::{Assembly, Instance, Transform};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Canonical records of each object in its own space, and where the objects stand.
+/// Canonical records of each object in its own space, and the instances.
 #[derive(Debug, Clone, Default)]
 pub struct Placed {
     /// Record `i` of an object has the id `i`; an instance adds its first id.
@@ -20,7 +20,7 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// The records of an assembly. Materials belong to the triangles of the scene: they are 0 here.
+    /// The records of an assembly. Materials belong to the scene's triangles; they are 0 here.
     pub fn new(assembly: &Assembly) -> Self {
         let records = |triangles: &Vec<Triangle>| -> TriangleSoup {
             let triangles = triangles.iter().enumerate();
@@ -33,8 +33,8 @@ impl Placed {
         }
     }
 
-    /// The same with the masks that `words`, one a triangle of the scene, lead to; `None` if copies of an object are cut out in
-    /// different ways, so that they are no copies.
+    /// Adds masks through `words`, one per triangle of the scene; `None` if copies of an object
+    /// have different holes and so are not copies.
     #[must_use]
     pub fn masked(mut self, masks: &Arc<Masks>, words: &[u32]) -> Option<Self> {
         for instance in &self.instances {
@@ -54,7 +54,7 @@ impl Placed {
         Some(self)
     }
 
-    /// The ray in the space of an instance's object. Distances stay the same.
+    /// The ray in the object space of an instance. Distances are unchanged.
     pub fn object_ray(&self, instance: &Instance, ray: &Ray) -> Ray {
         object_ray(instance, ray)
     }
@@ -76,7 +76,7 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// Those of the scene; without any, the whole scene as one object where it is.
+    /// The objects of a scene; without instances, the whole scene as one untransformed object.
     pub(super) fn of(soup: &'a TriangleSoup) -> Self {
         if let Some(placed) = &soup.placed {
             return Self {

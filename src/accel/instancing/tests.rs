@@ -1,4 +1,4 @@
-//! World boxes against rays that only just hit: nothing that an object's triangles accept is culled.
+//! World boxes against grazing rays: no hit accepted by an object's triangles is culled.
 
 use super::super::bounds::Bounds;
 use super::super::intersection::Intersection;
@@ -20,8 +20,8 @@ fn vector(rng: &mut Pcg32) -> Vec3 {
     Vec3::new(signed(rng), signed(rng), signed(rng))
 }
 
-/// A transform of one of five sorts: rigid, scaled as a whole by 10⁻⁴ to 10⁴, scaled unevenly and
-/// mirrored, sheared until nearly flat, and all that far from the origin.
+/// One of five sorts of transform: rigid; uniformly scaled by 10⁻⁴ to 10⁴; unevenly scaled and
+/// mirrored; sheared until nearly flat; and all of these far from the origin.
 fn transform(rng: &mut Pcg32) -> Transform {
     let sort = rng.below(5);
     let turn = |rng: &mut Pcg32| {
@@ -44,7 +44,7 @@ fn transform(rng: &mut Pcg32) -> Transform {
     Transform::new(columns, vector(rng) * distance)
 }
 
-/// A triangle, one time in three flat along an axis: its box then has no thickness of its own.
+/// A triangle; one in three is axis-aligned, with a box of zero thickness.
 fn triangle(rng: &mut Pcg32) -> Triangle {
     let mut vertices = [vector(rng), vector(rng), vector(rng)];
     let axis = rng.below(9);
@@ -56,7 +56,7 @@ fn triangle(rng: &mut Pcg32) -> Triangle {
     Triangle { vertices }
 }
 
-/// A ray towards a vertex, an edge or the inside of the instance's triangle, from nearby or far off.
+/// A ray from near or far towards a vertex, an edge or the inside of the instance's triangle.
 fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
     let world = triangle.vertices.map(|v| instance.to_world.point(v));
     let mut weights = [rng.uniform(), rng.uniform(), rng.uniform()].map(|w| w as f32);
@@ -78,8 +78,7 @@ fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
     Ray::new(origin, (goal - origin) * scale)
 }
 
-/// Hits of rays at single triangles in instances, and how many of them the world box would cull,
-/// with this much pad.
+/// Hits on single triangles in instances, and how many of them a world box with this pad culls.
 fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usize) {
     let tests = Intersection::default();
     let one = |seed: u64| {
@@ -109,7 +108,7 @@ fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usi
                     continue;
                 }
                 counts.0 += 1;
-                // The least t_best with which the box may be tested.
+                // The smallest t_best that the box may be tested with.
                 let entered = enter_grown(&level(&ray, map.growth(), tests), &world_box, hit.t);
                 counts.1 += usize::from(entered.is_none());
             }

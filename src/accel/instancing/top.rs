@@ -1,10 +1,10 @@
 //! The upper level: a tree over the instances, or over parts of them.
 //!
 //! Source of the parts: C. Benthin, S. Woop, I. Wald, A. T. Áfra, "Improved two-level BVHs using
-//! partial re-braiding", HPG 2017. While the tree is built from the top, instances that are large
-//! against the present box are replaced by the two children of their object's node, as long as there
-//! is room for more entries. Here this is done only where the best split leaves its halves
-//! overlapping: apart, there is nothing to gain.
+//! partial re-braiding", HPG 2017. While the tree is built top-down, instances that are large
+//! relative to the current box are replaced by the two children of their object's node, as long as
+//! there is room for more entries. Here this is done only where the halves of the best split
+//! overlap; otherwise there is nothing to gain.
 
 use super::super::bounds::Bounds;
 use super::super::bvh::pairs::Pair;
@@ -15,10 +15,10 @@ use super::world_box::BoxMap;
 use raystone_scene::Instance;
 
 const BINS: usize = 16;
-/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
-/// `SAH_DEPTH + log2(entries)` whatever the input.
+/// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
+/// log2(entries)` for any input.
 const SAH_DEPTH: u32 = 32;
-/// An instance is opened if it reaches over more than this part of the present box.
+/// Fraction of the current box above which an instance is opened.
 const LARGE: f32 = 0.1;
 
 /// Tree and entries of the upper level.
@@ -26,22 +26,20 @@ const LARGE: f32 = 0.1;
 pub(super) struct Top {
     /// Root first. References to inner nodes count from the first node after the forest's.
     pub nodes: Vec<Pair>,
-    /// What the leaves hold.
+    /// The contents of the leaves.
     pub entries: Vec<Entry>,
-    /// Deepest leaf.
     pub depth: u32,
     /// Growth of boxes, see [`super::world_box`].
     pub growth: f32,
 }
 
 impl Top {
-    /// Levels of nodes, at least one, and so the entries of a stack for them.
+    /// Levels of nodes, at least one, and so the stack entries for them.
     pub(super) fn levels(&self) -> u32 {
         self.depth.max(1)
     }
 
-    /// Builds the upper level over the instances as they stand, with up to `rebraid` entries for an
-    /// instance on average.
+    /// Builds the upper level, with up to `rebraid` entries per instance on average.
     pub(super) fn build(instances: &[Instance], forest: &Forest, rebraid: usize) -> Self {
         let mut builder = Builder {
             forest,
@@ -67,12 +65,11 @@ impl Top {
     }
 }
 
-/// An instance, or what lies below a node of its object.
+/// An instance, or the part below a node of its object.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     instance: u32,
     node: u32,
-    /// World box.
     bounds: Bounds,
 }
 
@@ -107,7 +104,7 @@ impl Builder<'_> {
         })
     }
 
-    /// Builds the tree over `parts`, which may become `room` more; returns what refers to it.
+    /// Builds the tree over `parts`, which may grow by `room`; returns the reference to it.
     fn subtree(&mut self, mut parts: Vec<Part>, mut room: usize, depth: u32) -> (u32, Bounds) {
         let bounds = bounds_of(&parts);
         if let [part] = parts[..] {
@@ -143,7 +140,7 @@ impl Builder<'_> {
         leaf_reference(self.top.entries.len() as u32 - 1, 1)
     }
 
-    /// Replaces large parts by their halves, the largest first; returns how many.
+    /// Replaces large parts by their halves, largest first; returns the number of replacements.
     fn open(&self, parts: &mut Vec<Part>, bounds: &Bounds, room: usize) -> usize {
         if parts.iter().all(|part| part.instance == parts[0].instance) {
             // Its own BVH does this better.
@@ -191,8 +188,7 @@ struct Split {
 }
 
 impl Split {
-    /// The cheapest of the bin borders by SAH; the median where there is none, or too deep. `parts`
-    /// are two or more.
+    /// The cheapest bin border by SAH; the median without one or below the SAH depth.
     fn best(parts: &[Part], depth: u32) -> Self {
         let plane = (depth < SAH_DEPTH).then(|| Plane::best(parts)).flatten();
         let sides: [Vec<Part>; 2] = match plane {
@@ -201,7 +197,7 @@ impl Split {
                 let axis = longest_axis(&bounds_of(parts));
                 let mut sorted = parts.to_vec();
                 let key = |part: &Part| part.bounds.doubled_centre()[axis];
-                // Stable: equal centres stay in their order.
+                // Stable: equal centres keep their order.
                 sorted.sort_by(|a, b| key(a).total_cmp(&key(b)));
                 let high = sorted.split_off(parts.len() / 2);
                 [sorted, high]
@@ -221,7 +217,7 @@ impl Split {
     }
 }
 
-/// A bin border: parts whose centre lies in a lower bin are on the low side.
+/// A bin border: parts with their centre in a lower bin are on the low side.
 struct Plane {
     axis: usize,
     origin: f32,
@@ -277,7 +273,7 @@ impl Plane {
     }
 }
 
-/// Boxes and counts of the first bins, of the first two, and so on.
+/// Boxes and counts of the first bin, of the first two, and so on.
 fn prefixes<'a>(bins: impl Iterator<Item = &'a (Bounds, u32)>) -> Vec<(Bounds, u32)> {
     bins.scan((Bounds::EMPTY, 0), |sum, bin| {
         *sum = (sum.0.union(&bin.0), sum.1 + bin.1);

@@ -1,14 +1,14 @@
 //! World boxes of transformed boxes, grown so that no hit behind them is lost.
 //!
-//! *Claim.* Let M be the map to the object's space with f32 entries, B a box there, W the image of B
-//! under the exact M⁻¹ grown by [`world_box`], and let a triangle whose bounds lie in B accept the
+//! *Claim.* Let M be the map to object space with f32 entries, B a box there, W the image of B
+//! under the exact M⁻¹ grown by [`world_box`], and let a triangle with bounds in B accept the
 //! transformed ray at distance t. If t is the final answer, every box around W is entered by
-//! `enter_grown`, whenever it is tested: the theorem of [`super::super::triangle`] goes on through
+//! `enter_grown`, whenever it is tested: the theorem of [`super::super::triangle`] extends through
 //! the transform.
 //!
-//! *Proof.* ε = 2⁻²⁴ is the unit roundoff, |·| the greatest component, ‖·‖ the greatest row sum,
-//! κ = ‖M‖ · ‖M⁻¹‖, β the greatest coordinate of B, o and d the ray's origin and direction, c the
-//! translation of M, and x = o + t·d the point of the hit, formed exactly.
+//! *Proof.* ε = 2⁻²⁴ is the unit roundoff, |·| the largest component, ‖·‖ the largest row sum, κ =
+//! ‖M‖ · ‖M⁻¹‖, β the largest coordinate of B, o and d the ray's origin and direction, c the
+//! translation of M, and x = o + t·d the hit point, formed exactly.
 //!
 //! 1. The computed o' and d' differ from M·o + c and M·d by at most 4ε (‖M‖|o| + |c|) and 3ε ‖M‖|d|:
 //!    sums of four and three products.
@@ -18,19 +18,20 @@
 //!    most 2⁻⁶⁰|d'| or 2⁻⁸⁴, the hit lies on the raised ray, which differs by as much times t.
 //! 3. |t·d| = |x − o| ≤ |x| + |o|. Together, M·x + c lies in B up to
 //!    ε (17β + 21|c| + 24‖M‖|o| + 3‖M‖|x|), and so x in M⁻¹(B) up to ‖M⁻¹‖ times that.
-//! 4. |x| ≤ X + pad, X being the greatest coordinate of M⁻¹(B). With κ ≤ 2²⁰ the term 3εκ·pad is
+//! 4. |x| ≤ X + pad, X being the largest coordinate of M⁻¹(B). With κ ≤ 2²⁰ the term 3εκ·pad is
 //!    below 0.19 pad, so a factor 1/(1 − 0.19) < 1.24 removes it: the pad
 //!    32ε (‖M⁻¹‖(β + |c|) + κX) + 32ε κ|o| covers everything with room for 2εκ(|x| + |o|).
 //!    The first part is in W; the second depends on the ray: the *growth* κ·2⁻¹⁹ times |o|.
-//! 5. The ray's own slab test of a box that holds x has relative errors of 7ε, a seventh of what
+//! 5. The ray's own slab test of a box that contains x has relative errors of 7ε, a seventh of what
 //!    `BOX_PAD` allows; the rounding of the two grown origins (ε|o|) and the raising of
-//!    components of d and d' take the room of step 4, if |d| ≥ 2⁻⁵⁶ max(1, 1/‖M‖). The four
-//!    inequalities of the plain theorem follow, and monotony carries them to boxes around W. ∎
+//!    components of d and d' use the room of step 4, if |d| ≥ 2⁻⁵⁶ max(1, 1/‖M‖). The four
+//!    inequalities of the plain theorem follow, and monotonicity extends them to boxes around W. ∎
 //!
-//! Where spatial splits list a triangle in several leaves, only together covering its bounds, the clamped
-//! point of step 2 lies in one of them ([`super::super::tree::Coverage`]), and B is the box of that.
+//! If spatial splits list a triangle in several leaves, which only together cover its bounds, the
+//! clamped point of step 2 lies in one of them ([`super::super::tree::Coverage`]), and B is the box
+//! of that leaf.
 //!
-//! M⁻¹ and ‖·‖ are computed in f64 from the f32 entries of M; its errors are 2⁻²⁹ of ours.
+//! M⁻¹ and ‖·‖ are computed in f64 from the f32 entries of M, with relative errors of 2⁻²⁹ of ours.
 
 use super::super::bounds::Bounds;
 use glam::DVec3;
@@ -39,7 +40,7 @@ use raystone_scene::{Instance, row_sum_norm};
 /// 32 ε of the proof, 2⁻¹⁹.
 const PAD: f64 = 1.0 / 524_288.0;
 
-/// An instance as the proof sees it.
+/// An instance with the norms of the proof.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoxMap {
     instance: Instance,
@@ -55,7 +56,7 @@ impl BoxMap {
         Self::with_pad(instance, PAD)
     }
 
-    /// Another pad than that of the proof: for tests.
+    /// With a pad other than that of the proof, for tests.
     pub(super) fn with_pad(instance: &Instance, pad: f64) -> Self {
         let (linear, offset) = instance.to_object.parts();
         let inverse = linear.inverse();
@@ -70,8 +71,7 @@ impl BoxMap {
         }
     }
 
-    /// What top-level boxes must grow by for each unit of the ray origin's greatest coordinate; 0 if
-    /// rays are not transformed.
+    /// Growth of top-level boxes per unit of the ray origin's largest coordinate.
     pub(super) fn growth(&self) -> f32 {
         if self.instance.is_identity() {
             0.0
@@ -80,7 +80,7 @@ impl BoxMap {
         }
     }
 
-    /// The grown world box of a box in the object's space; empty if that is.
+    /// The grown world box of an object-space box; empty if that is empty.
     pub(super) fn world_box(&self, bounds: &Bounds) -> Bounds {
         if self.instance.is_identity() || bounds.min[0] > bounds.max[0] {
             return *bounds;

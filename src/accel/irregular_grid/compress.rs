@@ -1,25 +1,21 @@
-//! Last phase: 16 bytes per cell, four bytes per entry of the map and a reference.
+//! Last phase: 16 bytes per cell, four bytes per map entry and reference.
 
 use super::voxels::{Block, Entry, GridCell, Map};
 use super::{EMPTY, LAST, LOG_BITS, Partition};
 use rayon::prelude::*;
 
-/// Greatest logarithm of the entries along an axis that one entry leads to.
+/// Largest log2 of the side of a block.
 const MOST_LOG: u32 = 3;
-/// Top cells that one task writes.
+/// Top cells written by one task.
 const RUN: usize = 64;
 
-/// The arrays of the kernel.
 pub(super) struct Compressed {
-    /// Four words per cell.
     pub cells: Vec<u32>,
-    /// Entries of the map, then references.
+    /// Map entries, then references.
     pub words: Vec<u32>,
-    /// Place of the first reference.
     pub first_reference: usize,
 }
 
-/// Writes the arrays.
 pub(super) fn compress(partition: &Partition) -> Compressed {
     let mut words = entries(&partition.map);
     let first_reference = words.len();
@@ -44,15 +40,14 @@ pub(super) fn compress(partition: &Partition) -> Compressed {
     }
 }
 
-/// Words of a cell: six coordinates of 16 bits and the place of its list.
+/// Words of a cell: six coordinates of 16 bits and the index of its list.
 fn pack(cell: &GridCell, list: u32) -> [u32; 4] {
     let [x, y, z] = cell.min.map(u32::from);
     let [u, v, w] = cell.max.map(u32::from);
     [x | y << 16, z | u << 16, v | w << 16, list]
 }
 
-/// Entries with blocks of at most 2^[`MOST_LOG`] along an axis; what belongs to one cell is one
-/// entry.
+/// Entries with blocks of at most 2^[`MOST_LOG`] along an axis; a single cell is one entry.
 fn entries(map: &Map) -> Vec<u32> {
     let tops = map.top_cells();
     let write_run = |words: &[u32]| {
@@ -118,7 +113,7 @@ impl Writer<'_> {
         if log == 0 || (uniform && matches!(Map::decode(first), Entry::GridCell(_))) {
             return self.entry(first);
         }
-        // As few levels as possible, of sides as equal as possible.
+        // As few levels as possible, with sides as equal as possible.
         let parts = log.div_ceil(log.div_ceil(MOST_LOG));
         let place = self.below.len();
         self.below.resize(place + (1 << (3 * parts)), 0);

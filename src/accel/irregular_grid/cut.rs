@@ -1,5 +1,5 @@
-//! First phase: top cells by Cleary's rule, each cut into a power of two of voxels by its own count of
-//! triangles, and cells of one voxel; empty octants are one cell from the start.
+//! First phase: top cells by Cleary's rule, each cut into a power of two of voxels by its own count
+//! of triangles, with one cell per voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists, in_runs};
 use super::super::grid::{Cut, Grid, GridBox, areas, finest, most_words};
@@ -9,12 +9,11 @@ use super::{MOST_PLACES, Options, Partition};
 use crate::BuildLog;
 use rayon::prelude::*;
 
-/// Most top cells along an axis, so that cells can still be cut with 16-bit coordinates.
+/// Most top cells along an axis, so that they can still be cut with 16-bit coordinates.
 const MOST_TOP: u32 = 2048;
-/// Greatest logarithm of a block's side.
+/// Largest log2 of a block's side.
 const MOST_LOG: u32 = 6;
-/// A voxel with at least this many triangles, and more than one in [`BUNCHED`] of those of its
-/// block, is cut again.
+/// A voxel with at least this many triangles, and over 1/[`BUNCHED`] of its block's, is cut again.
 const LEAST_BUNCH: usize = 32;
 const BUNCHED: usize = 4;
 
@@ -62,8 +61,7 @@ pub(super) fn cut(
     })
 }
 
-/// Logarithm of the parts into which a cube of 2^`size` voxels that lists triangles of these areas is
-/// cut along each axis.
+/// log2 of the parts per axis for a cube of 2^`size` voxels that lists triangles of these areas.
 fn parts_log(
     fine: &Grid,
     settings: &Options,
@@ -81,7 +79,7 @@ fn parts_log(
     } else {
         MOST_LOG
     };
-    // Parts are cubes of voxels: the axis that can be cut least decides, but a flat cell may be cut.
+    // Parts are cubes of voxels: the least divisible axis decides, but a flat cell may be cut.
     let longest = side.iter().copied().fold(0.0, f64::max);
     let finest = (0..3)
         .map(|a| finest(side[a].max(longest / 16.0), fine.margin[a]))
@@ -94,7 +92,7 @@ fn parts_log(
         .min(MOST_LOG)
 }
 
-/// What a task produces; places and numbers count from its own begin.
+/// Output of a task; indices are relative to its own start.
 #[derive(Default)]
 struct Pieces {
     top: Vec<u32>,
@@ -104,7 +102,7 @@ struct Pieces {
     pool: Vec<u32>,
 }
 
-/// Joins what the tasks produced, in their order.
+/// Joins the output of the tasks, in order.
 fn join(fine: Grid, top: [u32; 3], shift: u32, runs: Vec<Pieces>) -> Partition {
     let tops = runs.iter().map(|run| run.top.len()).sum::<usize>();
     let total = |length: fn(&Pieces) -> usize| runs.iter().map(length).sum::<usize>();
@@ -159,23 +157,21 @@ fn join(fine: Grid, top: [u32; 3], shift: u32, runs: Vec<Pieces>) -> Partition {
     }
 }
 
-/// One task.
 struct Run<'a> {
     fine: &'a Grid,
     soup: &'a TriangleSoup,
     areas: &'a [f32],
     settings: &'a Options,
     made: Pieces,
-    /// Memory for lists, one for each level in use.
+    /// Memory for lists, one per active level.
     spare: Vec<PartLists>,
 }
 
-/// A block that is being filled.
 struct Open<'a> {
     block: Block,
     lists: &'a Lists,
     lowest: [u32; 3],
-    /// Logarithm of the voxels along a side of one of its entries.
+    /// log2 of the voxels along a side of one of its entries.
     size: u32,
     /// Triangles in the whole block.
     count: usize,
@@ -183,7 +179,7 @@ struct Open<'a> {
 }
 
 impl Run<'_> {
-    /// Word of the entry of a cube of 2^`size` voxels, with all that is below it.
+    /// Word of the entry of a cube of 2^`size` voxels, including everything below it.
     fn entry(&mut self, lowest: [u32; 3], size: u32, ids: &[u32], level: u32) -> u32 {
         let areas = ids.iter().map(|&id| self.areas[id as usize]);
         let log = parts_log(self.fine, self.settings, size, areas);

@@ -1,13 +1,13 @@
-//! Third phase: the boxes of cells grow over neighbours whose lists are parts of their own, so that a
-//! ray jumps farther. Voxels keep their cells; only the boxes overlap.
+//! Third phase: cell boxes grow over neighbours whose lists are subsets of their own, for longer
+//! ray jumps. Voxels keep their cells; only the boxes overlap.
 
 use super::Partition;
 use super::voxels::{GridCell, is_subset};
 use rayon::prelude::*;
 
-/// Grows all boxes `passes` times along each axis. Boxes of a step are computed from those before it.
+/// Grows all boxes `passes` times along each axis. Each step uses the boxes of the previous one.
 pub(super) fn expand(partition: &mut Partition, passes: u32) {
-    // Two bits per axis: down and up are blocked for good, since lists never change.
+    // Two bits per axis: up and down, once blocked, stay blocked, since lists never change.
     let mut blocked = vec![0u8; partition.cells.len()];
     for _ in 0..passes {
         for axis in 0..3 {
@@ -40,8 +40,8 @@ fn grow(partition: &Partition, cell: &GridCell, axis: usize, blocked: &mut u8) -
     grown
 }
 
-/// How far the box may grow along an axis; `None` if a neighbour lists what the cell does not, or the
-/// grid ends.
+/// The possible growth of the box along an axis; `None` if a neighbour lists a triangle that the
+/// cell does not, or the grid ends.
 fn reach(partition: &Partition, cell: &GridCell, axis: usize, up: bool) -> Option<u16> {
     let map = &partition.map;
     let end = (map.top[axis] << map.shift) as u16;

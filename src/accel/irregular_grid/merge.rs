@@ -1,9 +1,10 @@
-//! Second phase: neighbours become one cell where the surface area heuristic gains by it.
+//! Second phase: neighbours merge into one cell if the surface area heuristic improves.
 //!
-//! Passes along x, y and z in turn; in a pass, a cell may join the next one along the axis if their
-//! sections are equal and A(union) · (|union of lists| + 1) ≤ A₁ · (n₁ + 1) + A₂ · (n₂ + 1). Cells that
-//! want the next one form chains, which are cut into pairs from their begin, so that the result does
-//! not depend on the order of work. Rounds go on while they leave fewer than α times the cells.
+//! Passes along x, y and z alternate. In a pass, a cell may join the next one along the axis if
+//! their cross-sections are equal and A(union) · (|union of lists| + 1) ≤ A₁ · (n₁ + 1) +
+//! A₂ · (n₂ + 1). Cells that want the next one form chains, split into pairs from their start, so
+//! that the result does not depend on the order of work. Rounds continue while they leave fewer
+//! than α times the cells.
 
 use super::Partition;
 use super::voxels::{Entry, GridCell, Map, is_subset, push_union, union_length};
@@ -13,7 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 const NONE: u32 = u32::MAX;
 const UNKNOWN: u32 = u32::MAX - 1;
 
-/// Merges cells, drops those that are gone, and renumbers the rest in the map.
+/// Merges cells, removes the merged ones, and renumbers the rest in the map.
 pub(super) fn merge(partition: &mut Partition, alpha: f64) {
     let mut state = State::new(partition);
     let mut pass = 1;
@@ -42,15 +43,15 @@ struct State<'a> {
     voxel: [f32; 3],
     /// Cells that still exist, ascending.
     alive: Vec<u32>,
-    /// Which cell each was joined to; its own number while it exists.
+    /// The cell that each was merged into; itself while it exists.
     owner: Vec<u32>,
-    /// Pass in which each cell changed last.
+    /// Pass of each cell's last change.
     changed: Vec<u32>,
     /// Previous pass along each axis.
     tried: [u32; 3],
-    /// The cell at the far end of each one along each axis, once it was looked up.
+    /// Cached neighbour of each cell along each axis.
     neighbours: [Vec<AtomicU32>; 3],
-    /// The cell that each one wants to join in this pass, and whether it is wanted itself.
+    /// The cell that each one wants to join in this pass, and whether another wants to join it.
     next: Vec<u32>,
     is_wanted: Vec<bool>,
 }
@@ -108,7 +109,7 @@ impl<'a> State<'a> {
         self.alive.retain(|&id| owner[id as usize] == id);
     }
 
-    /// The next cell along `axis` if joining it pays.
+    /// The next cell along `axis` if joining it pays off.
     fn wish(&self, id: u32, axis: usize) -> Option<u32> {
         let slot = &self.neighbours[axis][id as usize];
         let mut other = slot.load(Relaxed);
@@ -130,8 +131,8 @@ impl<'a> State<'a> {
         (same_section && self.pays(cell, next, axis)).then_some(other)
     }
 
-    /// The cell that begins where this one ends, at the same low corner otherwise. It keeps the number
-    /// that the map of the first phase gives the voxel there, whatever it was joined with since.
+    /// The next cell at the same low corner otherwise. It has the number that the first phase's map
+    /// gives the voxel there, whatever it was merged with since.
     fn neighbour(&self, id: u32, axis: usize) -> u32 {
         let cell = &self.cells[id as usize];
         let mut voxel = cell.min.map(u32::from);
@@ -161,7 +162,6 @@ impl<'a> State<'a> {
         whole * (count + 1) as f32 <= apart
     }
 
-    /// Cuts the chains of wishes into pairs.
     fn pairs(&mut self, wishes: &[[u32; 2]]) -> Vec<[u32; 2]> {
         for &[id, other] in wishes {
             self.next[id as usize] = other;
@@ -187,8 +187,8 @@ impl<'a> State<'a> {
         pairs
     }
 
-    /// Place and length of the union of the lists of each pair; a list that holds the other one is
-    /// kept, the rest are new and lie, marked by [`NEW`], in the second vector.
+    /// Offset and length of the union of each pair's lists. If one list contains the other, it is
+    /// reused; the rest are new, in the second vector, and marked by [`NEW`].
     fn unions(&self, pairs: &[[u32; 2]]) -> (Vec<(u32, u32)>, Vec<u32>) {
         let mut new = Vec::new();
         let union = |&[left, right]: &[u32; 2]| {
@@ -207,11 +207,11 @@ impl<'a> State<'a> {
     }
 }
 
-/// Marks the place of a list as one in the new lists of a task.
+/// Marks the offset of a list as one in a task's new lists.
 const NEW: u32 = 1 << 31;
 
 fn renumber(partition: &mut Partition, alive: &[u32], owner: &mut [u32]) {
-    // An owner may have been joined itself.
+    // An owner may have been merged itself.
     for id in 0..owner.len() {
         let mut root = owner[id];
         while owner[root as usize] != root {

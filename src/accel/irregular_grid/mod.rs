@@ -1,14 +1,14 @@
-//! `irregular-grid`: boxes of voxels of any size, found through a map of voxels. Twin of
+//! `irregular-grid`: boxes of voxels of any size, found through a map of voxels. CPU version of
 //! `kernels/accel/irregular_grid.wesl`.
 //!
-//! Source: A. Pérard-Gayot, J. Kalojanov, P. Slusallek, "GPU ray tracing using irregular grids", 2017;
-//! defaults of the parameters are those of the authors' code (hagrid).
+//! Source: A. Pérard-Gayot, J. Kalojanov, P. Slusallek, "GPU ray tracing using irregular grids",
+//! 2017; parameter defaults are those of the authors' code (hagrid).
 //!
-//! The build has four phases, a file each: [`cut`] makes voxels where triangles are, [`merge`] joins
-//! cells by the surface area heuristic, [`expand`] lets their boxes grow over neighbours that list
-//! nothing more, [`compress`] writes 16 bytes per cell. Voxels have 16-bit coordinates, and a ray keeps
-//! the voxel it is in: on leaving a box it steps across the exit plane by integers, and its other two
-//! coordinates may only move forward and within the box.
+//! The build has four phases, one file each: [`cut`] creates voxels where triangles are, [`merge`]
+//! joins cells by the surface area heuristic, [`expand`] grows their boxes over neighbours that
+//! list nothing more, [`compress`] writes 16 bytes per cell. Voxels have 16-bit coordinates, and a
+//! ray keeps its current voxel: on exiting a box it steps across the exit plane in integers, and
+//! its other two coordinates may only move forward and within the box.
 
 mod compress;
 mod cut;
@@ -23,14 +23,14 @@ use super::structure::prelude::*;
 use super::watch;
 use raystone_gpu::UniformValues;
 
-/// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
+/// Bits of an entry for log2 of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
-/// Places that an entry can name.
+/// Number of indices that an entry can address.
 const MOST_PLACES: u64 = (1 << (32 - LOG_BITS)) - 1;
 const LOG_MASK: u32 = 3;
 /// Marks the last reference of a list.
 const LAST: u32 = 0x8000_0000;
-/// Place of the list of an empty cell.
+/// List index of an empty cell.
 const EMPTY: u32 = 0xffff_ffff;
 
 parameters! {
@@ -50,7 +50,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct IrregularGrid;
 
 impl Structure for IrregularGrid {
@@ -88,29 +87,25 @@ impl Structure for IrregularGrid {
 
 /// The grid between its phases.
 struct Partition {
-    /// The voxels.
     fine: Grid,
     map: Map,
     cells: Vec<GridCell>,
-    /// Lists of cells.
     pool: Vec<u32>,
 }
 
 struct Built {
-    /// The voxels.
     fine: Grid,
     /// A top cell has 2^`shift` voxels along each axis.
     shift: u32,
-    /// Four words per cell: coordinates of the lowest voxel and of the one past the highest, 16 bits
-    /// each, and the place of its list.
+    /// Four words per cell: coordinates of the lowest voxel and of the one past the highest, 16
+    /// bits each, and the index of its list.
     cells: Vec<u32>,
-    /// Entries, each place << [`LOG_BITS`] | logarithm; then references, the last of a list marked by
-    /// [`LAST`].
+    /// Entries (index << [`LOG_BITS`] | log2), then references, with [`LAST`] at the end of a list.
     words: Vec<u32>,
     first_reference: usize,
 }
 
-/// A cell as the kernel reads it.
+/// A cell as read by the kernel.
 struct Found {
     min: [i32; 3],
     max: [i32; 3],
@@ -123,7 +118,7 @@ impl Built {
         self.fine.resolution.map(|n| n >> self.shift)
     }
 
-    /// The cell of a voxel; twin of `find_cell` of the kernel.
+    /// The cell of a voxel; CPU version of the kernel's `find_cell`.
     fn find_cell(&self, voxel: [u32; 3]) -> u32 {
         let mut shift = self.shift;
         let [nx, ny, _] = self.top();
@@ -175,7 +170,7 @@ impl Built {
         self.cells.len() / 4
     }
 
-    /// Checks that lists are whole, and that a box lists what the cells at its corners do.
+    /// Checks that lists are complete, and that a box lists the same as the cells at its corners.
     fn check_cells(&self) -> Result<(), AccelError> {
         let references = self.words.len() - self.first_reference;
         for number in 0..self.count() as u32 {
@@ -286,7 +281,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: an equally near one may wait next door.
+            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }
@@ -319,7 +314,7 @@ mod tests {
     use crate::fixtures::{random_triangle, soup};
     use raystone_core::random::Pcg32;
 
-    /// Triangles of all sizes, bunched in one corner.
+    /// Triangles of all sizes, clustered in one corner.
     fn bunched() -> TriangleSoup {
         let mut random = Pcg32::new(3);
         soup((0..400).map(|id| {

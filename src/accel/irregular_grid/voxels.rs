@@ -1,19 +1,16 @@
-//! Voxels and cells while an irregular grid is built: which cell a voxel belongs to, and what a cell
-//! lists.
+//! Voxels and cells while an irregular grid is built.
 
-/// Marks an entry as the number of a block.
+/// Marks an entry as a block index.
 const BLOCK: u32 = 1 << 31;
 
 /// A box of voxels with a list of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct GridCell {
-    /// Lowest voxel.
     pub min: [u16; 3],
     /// One past the highest voxel.
     pub max: [u16; 3],
-    /// Place of its list in the pool.
+    /// Index of its list in the pool.
     pub first: u32,
-    /// Length of its list.
     pub count: u32,
 }
 
@@ -27,22 +24,18 @@ impl GridCell {
 /// A cube of entries, 2^`log` along each axis, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Block {
-    /// Its first entry.
     pub first: u32,
-    /// Binary logarithm of the entries along an axis.
+    /// log2 of the entries along an axis.
     pub log: u32,
 }
 
-/// What an entry leads to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Entry {
-    /// A cell, by number.
     GridCell(u32),
-    /// A block, by number.
     Block(u32),
 }
 
-/// Which cell each voxel belongs to: an entry for each top cell, each a cell or a block of entries.
+/// The cell of each voxel: one entry per top cell, each a cell or a block of entries.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Map {
     /// Top cells along each axis.
@@ -51,12 +44,10 @@ pub(super) struct Map {
     pub shift: u32,
     /// Entries of the top cells, then of the blocks.
     pub entries: Vec<u32>,
-    /// Blocks.
     pub blocks: Vec<Block>,
 }
 
 impl Map {
-    /// Word of an entry.
     pub(super) fn encode(entry: Entry) -> u32 {
         match entry {
             Entry::GridCell(cell) => cell,
@@ -64,7 +55,6 @@ impl Map {
         }
     }
 
-    /// Entry of a word.
     pub(super) fn decode(word: u32) -> Entry {
         if word & BLOCK == 0 {
             Entry::GridCell(word)
@@ -73,12 +63,10 @@ impl Map {
         }
     }
 
-    /// Number of top cells.
     pub(super) fn top_cells(&self) -> usize {
         self.top.iter().map(|&n| n as usize).product()
     }
 
-    /// The cell that a voxel belongs to.
     pub(super) fn cell_at(&self, voxel: [u32; 3]) -> u32 {
         let mut shift = self.shift;
         let [x, y, z] = voxel.map(|v| v >> shift);
@@ -93,7 +81,7 @@ impl Map {
     }
 }
 
-/// Whether every entry of `part` is in `whole`; both ascend.
+/// True if every entry of `part` is in `whole`; both ascend.
 pub(super) fn is_subset(part: &[u32], whole: &[u32]) -> bool {
     if part.len() > whole.len() {
         return false;
@@ -103,7 +91,6 @@ pub(super) fn is_subset(part: &[u32], whole: &[u32]) -> bool {
         .all(|id| rest.by_ref().find(|other| *other >= id) == Some(id))
 }
 
-/// Length of the union of two ascending lists.
 pub(super) fn union_length(a: &[u32], b: &[u32]) -> usize {
     let (mut i, mut k, mut common) = (0, 0, 0);
     while i < a.len() && k < b.len() {

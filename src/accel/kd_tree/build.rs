@@ -1,8 +1,8 @@
-//! The builder of `kd-tree`: SAH over all box faces in O(N log N), by lists of events that are sorted
-//! once and keep their order while cells are divided.
+//! The builder of `kd-tree`: SAH over all box faces in O(N log N), with event lists that are sorted
+//! once and keep their order while cells are split.
 //!
-//! Source: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
-//! O(N log N)", 2006, algorithms 4 and 5.
+//! Source: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N
+//! log N)", 2006, algorithms 4 and 5.
 
 use super::{Node, Options};
 use crate::bounds::Bounds;
@@ -13,14 +13,14 @@ use crate::{AccelError, BuildLog, TriangleSoup};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// More references than this (1 GiB) are refused while they are made.
+/// Limit on references (1 GiB), enforced during the build.
 pub(super) const MAX_REFERENCES: u64 = 1 << 28;
-/// Subtrees tell of their references by so many: threads that write to one counter wait for each other.
+/// Batch size with which subtrees update the shared reference count, to avoid contention.
 const COUNTED: usize = 1024;
-/// Indices of items share a word with the kind of an event.
+/// Limit on items: indices share a word with the kind of an event.
 const MAX_ITEMS: u64 = 1 << 30;
 
-/// Nodes and references in their final places.
+/// Nodes and references in their final order.
 pub(super) struct KdTree {
     pub nodes: Vec<Node>,
     pub references: Vec<u32>,
@@ -57,7 +57,7 @@ pub(super) fn build(
             |cell, depth, order| cell.node(depth, &settings, order),
         )
     });
-    // Beyond the limit cells are not divided: how many there would be is not known.
+    // Beyond the limit cells are not split, so the full number is unknown.
     let made = (grown.order.len() as u64).min(MAX_REFERENCES + 1);
     AccelError::check_limit("references of a kd-tree, at least", made, MAX_REFERENCES)?;
     let nodes = log.phase("layout", || lay_out(&grown));
@@ -65,26 +65,25 @@ pub(super) fn build(
     Ok(KdTree { nodes, references })
 }
 
-/// Depth where trees usually stop to gain: 8 + 1.3 log2 N (Havran 2000).
+/// Depth beyond which trees usually stop to improve: 8 + 1.3 log2 N (Havran 2000).
 pub(super) fn default_depth(triangles: usize) -> u32 {
     (8.0 + 1.3 * (triangles.max(1) as f64).log2()) as u32
 }
 
 struct Settings<'a> {
     options: &'a Options,
-    /// What of its cost a split keeps that cuts off empty space.
+    /// Remaining fraction of a split's cost if it cuts off empty space.
     kept_if_empty: f32,
     max_depth: u32,
     /// Set if triangles are clipped.
     margin: Option<Margin>,
     soup: &'a TriangleSoup,
-    /// How many were listed so far; beyond the limit nothing is divided any more.
+    /// References so far; beyond the limit nothing is split any more.
     references: AtomicU64,
 }
 
-/// A triangle in a cell.
 struct Item {
-    /// Box of its part within the cell.
+    /// Bounds of its part within the cell.
     bounds: Bounds,
     id: u32,
 }
@@ -96,7 +95,7 @@ enum PlaneKind {
     Start,
 }
 
-/// Where the interval of an item on an axis starts or ends, or both at once.
+/// Start or end of an item's interval on an axis, or both at once.
 #[derive(Clone, Copy)]
 struct Event {
     position: f32,
@@ -120,7 +119,6 @@ impl Event {
     }
 }
 
-/// Appends the events of an item on one axis.
 fn push_events(bounds: &Bounds, axis: usize, item: u32, events: &mut Vec<Event>) {
     let (low, high) = (bounds.min[axis], bounds.max[axis]);
     if low == high {
@@ -131,19 +129,18 @@ fn push_events(bounds: &Bounds, axis: usize, item: u32, events: &mut Vec<Event>)
     }
 }
 
-/// A cell to be built: what touches it, and along each axis the sorted events of that.
+/// A cell to be built: its items, and their sorted events along each axis.
 struct Region {
     bounds: Bounds,
     items: Vec<Item>,
     events: [Vec<Event>; 3],
 }
 
-/// Where a cell is divided.
 #[derive(Clone, Copy)]
 struct Split {
     axis: usize,
     position: f32,
-    /// Whether what lies in the plane goes below.
+    /// True if planar items go below.
     planar_below: bool,
     cost: f32,
 }
@@ -170,8 +167,8 @@ impl Region {
         }
     }
 
-    /// The plane that divides the cell, axis and position, and both halves; what a leaf lists is appended to
-    /// `order`, and its plane of no meaning.
+    /// The plane that splits the cell, axis and position, and both halves. A leaf appends its list
+    /// to `order`; its plane is undefined.
     fn node(
         self,
         depth: u32,
@@ -195,7 +192,7 @@ impl Region {
         (plane, Some(self.divide(&split, settings)))
     }
 
-    /// The split of least cost, if it costs less than a leaf.
+    /// The split of least cost, if cheaper than a leaf.
     fn best_split(&self, settings: &Settings) -> Option<Split> {
         let leaf_cost = settings.options.intersection_cost * self.items.len() as f32;
         let sweep = |axis: usize| self.sweep(axis, settings);
@@ -264,7 +261,7 @@ impl Region {
         best
     }
 
-    /// Both halves. Items on one side keep their events; those on both get new ones, which are few.
+    /// Both halves. Items on one side keep their events; the few on both sides get new ones.
     fn divide(self, split: &Split, settings: &Settings) -> [Region; 2] {
         let axis = split.axis;
         let mut bounds = [self.bounds; 2];
@@ -318,7 +315,7 @@ impl Region {
     }
 }
 
-/// Index of an item that is not in a half, or there with new events.
+/// Index of an item that is not in a half, or has new events there.
 const ELSEWHERE: u32 = u32::MAX;
 
 /// The box of an item within half a cell; `None` if the half is clearly missed.
@@ -338,7 +335,7 @@ fn transpose([below, above]: [[Vec<Event>; 3]; 2]) -> impl Iterator<Item = [Vec<
     below.into_iter().zip(above).map(|(b, a)| [b, a])
 }
 
-/// Splits a sorted list by the places of its items and merges each half with its new events.
+/// Splits a sorted list by the sides of its items and merges each half with its new events.
 fn distribute(
     events: Vec<Event>,
     mut fresh: [Vec<Event>; 2],
@@ -369,7 +366,7 @@ fn distribute(
     halves
 }
 
-/// Brings the children of a node side by side.
+/// Places the children of each node next to each other.
 fn lay_out(grown: &Grown<(usize, f32)>) -> Vec<Node> {
     let mut nodes = vec![Node::EMPTY; grown.nodes.len()];
     let mut places = vec![0; grown.nodes.len()];

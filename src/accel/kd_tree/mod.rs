@@ -1,10 +1,11 @@
-//! `kd-tree`: space halved by planes that the SAH places, leaves with references, traversed near side
-//! first with a stack. Twin of `kernels/accel/kd_tree.wesl`.
+//! `kd-tree`: space halved by planes placed by the SAH, leaves with references, traversed near side
+//! first with a stack. CPU version of `kernels/accel/kd_tree.wesl`.
 //!
 //! Sources: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
 //! O(N log N)", 2006 (builder); V. Havran, "Heuristic ray shooting algorithms", 2000, algorithm
-//! `TA_rec_B` (traversal with the interval of the ray in each cell); M. Pharr et al., "Physically based
-//! rendering", 2004 (8-byte nodes). Why hits are equal to brute force to the bit: [`super::spatial`].
+//! `TA_rec_B` (traversal with the interval of the ray in each cell); M. Pharr et al., "Physically
+//! based rendering", 2004 (8-byte nodes). Why hits are bit-identical to brute force:
+//! [`super::spatial`].
 
 mod build;
 mod validate;
@@ -19,8 +20,8 @@ const KIND_MASK: u32 = 3;
 const LEAF: u32 = 3;
 /// The other bits: first of two children, or number of references.
 const LINK_SHIFT: u32 = 2;
-/// A cell that begins behind the hit by this factor ends the walk: all others on the stack begin
-/// no more than `BOX_PAD` before it. More than its square.
+/// A cell that begins behind the hit by this factor ends the traversal: all others on the stack
+/// begin no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 
 parameters! {
@@ -39,7 +40,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct KdTree;
 
 impl Structure for KdTree {
@@ -73,14 +73,13 @@ impl Structure for KdTree {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 struct Node {
-    /// Bits of the plane's position, or the leaf's first place in the references.
+    /// Bits of the plane's position, or the leaf's first index into the references.
     word: u32,
-    /// Kind in the low bits; above them the first of two children, below and above the plane, or the
-    /// leaf's number of references.
+    /// Kind in the low bits; above them the first of two children, below and above the plane, or
+    /// the leaf's number of references.
     link: u32,
 }
 
-/// A node in words.
 #[derive(Clone, Copy)]
 enum Content {
     Inner {
@@ -130,7 +129,6 @@ impl Node {
     }
 }
 
-/// Both halves of a cell.
 fn halves(cell: &Bounds, axis: usize, position: f32) -> [Bounds; 2] {
     let mut halves = [*cell; 2];
     halves[0].max[axis] = position;
@@ -141,7 +139,7 @@ fn halves(cell: &Bounds, axis: usize, position: f32) -> [Bounds; 2] {
 struct Built {
     bounds: Bounds,
     clipped: bool,
-    /// Root first; children of a node lie side by side.
+    /// Root first; children of a node are adjacent.
     nodes: Vec<Node>,
     /// Triangle indices, leaf by leaf, ascending in each.
     references: Vec<u32>,
@@ -149,7 +147,6 @@ struct Built {
 }
 
 impl Built {
-    /// Figures of the tree.
     fn measure(&self) -> StructureStats {
         let mut counts = Vec::new();
         let (mut cost, mut deepest) = (0.0, 0);
@@ -208,8 +205,7 @@ impl BuiltAccel for Built {
                 ("tree", tree),
                 limits(self.nodes.len() + 1, self.nodes.len()),
             ],
-            // One entry for each level at most; a multiple of 16, so that scenes of like depth share
-            // a kernel.
+            // At most one entry per level; rounded, so that scenes of similar depth share a kernel.
             constants: vec![("STACK_ENTRIES", depth.max(1).next_multiple_of(16))],
         }
     }
@@ -234,7 +230,7 @@ impl Traverse for Built {
         if enter > exit * inverse.pad {
             return walk.hit;
         }
-        // Far sides that wait, with the distance where the ray enters them.
+        // Pending far sides, with the ray's entry distance.
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
@@ -269,7 +265,7 @@ impl Traverse for Built {
                         }
                         _ => return walk.hit,
                     }
-                    // A cell ends where the one waiting below it begins.
+                    // A cell ends where the next one on the stack begins.
                     exit = stack.last().map_or(end, |(_, next)| *next).min(walk.hit.t);
                 }
             }

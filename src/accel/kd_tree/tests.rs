@@ -45,7 +45,7 @@ fn validation_finds_planted_faults() {
         }
     };
     plant("a lost reference", &|b| {
-        // Another triangle in the place of one, still ascending.
+        // Replaces one triangle by another, still ascending.
         let (first, _) = first_of(b.nodes[leaf_with(b, 1)]);
         let id = b.references[first];
         b.references[first] = if id == 0 { 1 } else { id - 1 };

@@ -1,4 +1,4 @@
-//! What must hold of a built kd-tree.
+//! Invariants of a built kd-tree.
 
 use super::{Built, Content, halves};
 use crate::bounds::Bounds;
@@ -6,11 +6,11 @@ use crate::spatial::{corners, touches};
 use crate::tree::Coverage;
 use crate::{AccelError, TriangleSoup};
 
-/// Every node is reached once, every plane lies in its cell, and every leaf lists the triangles that
-/// it must.
+/// Checks that every node is reached once, every plane lies in its cell, and every leaf lists the
+/// required triangles.
 ///
 /// # Errors
-/// The first of these that does not hold.
+/// The first violation.
 pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelError> {
     for record in &soup.records {
         let inside = built.bounds.contains(&record.bounds());
@@ -40,7 +40,6 @@ pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelEr
     check.nodes.is_complete()
 }
 
-/// On the way down.
 struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,
@@ -48,7 +47,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Those of `triangles`, all of which the cell of node `index` must list, that its leaves lack.
+    /// Those of `triangles`, which the cell of node `index` must list, that its leaves lack.
     fn lacking(
         &mut self,
         index: usize,
@@ -77,7 +76,7 @@ impl Check<'_> {
         ensure!(inside, "node {index}: its plane lies outside its cell");
         let cells = halves(cell, axis, position);
         let (mut sides, planar) = self.sides(&cells, axis, position, triangles);
-        // What lies in the plane may be on either side.
+        // Planar triangles may be on either side.
         sides.iter_mut().for_each(|side| side.extend(&planar));
         let [below, above] = sides;
         let on_one_side = |id: &u32| planar.binary_search(id).is_ok();
@@ -91,7 +90,7 @@ impl Check<'_> {
         Ok(lost)
     }
 
-    /// What must be listed below and above a plane, and, ascending, what lies in it.
+    /// The triangles required below and above a plane, and, ascending, those in it.
     fn sides(
         &self,
         cells: &[Bounds; 2],

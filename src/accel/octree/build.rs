@@ -6,17 +6,17 @@ use crate::spatial::{Margin, Overlap, corners};
 use crate::{AccelError, TriangleSoup};
 use rayon::prelude::*;
 
-/// Blocks of children are numbered with 23 bits.
+/// Limit on blocks of children: 23-bit indices.
 const MAX_BLOCKS: u64 = 1 << (31 - INNER_SHIFT);
-/// References are numbered with 31 bits, triangles as well.
+/// Limit on references: 31-bit indices, for triangles as well.
 const MAX_REFERENCES: u64 = 1 << 31;
-/// A level is not begun that would bring more than this many references for each triangle: where
-/// many large triangles coincide, cells along their edges would never run out.
+/// A level that would exceed this many references per triangle is not started: where many large
+/// triangles coincide, cells along their edges would never run out.
 const MOST_REFERENCES_PER_TRIANGLE: usize = 16;
 
-/// Cells and references in their final places.
+/// Cells and references in their final order.
 pub(super) struct Octree {
-    /// Block 0 holds the root in its first place, each other block the children of a cell.
+    /// Block 0 has the root first; each other block holds the children of a cell.
     pub nodes: Vec<u32>,
     pub references: Vec<u32>,
     pub depth: u32,
@@ -27,7 +27,7 @@ pub(super) struct Octree {
 struct Open {
     slot: usize,
     position: [u32; 3],
-    /// Its triangles: from here to where those of the next begin.
+    /// Start of its triangles, which end at the start of the next cell's.
     first: usize,
 }
 
@@ -67,8 +67,7 @@ pub(super) fn build(
     Ok(tree)
 }
 
-/// Deepest level by default: that where the cells along a surface are as many as the triangles, and
-/// two more.
+/// Default depth: the level at which cells along a surface are as many as the triangles, plus two.
 pub(super) fn default_depth(triangles: usize) -> u32 {
     ((triangles.max(1) as f64).log2() / 2.0).ceil() as u32 + 2
 }
@@ -98,7 +97,7 @@ impl<'a> Settings<'a> {
         }
     }
 
-    /// Children of every cell of a level that gets any.
+    /// Children of every cell of a level that is split.
     fn divide_all(&self, cells: &[Open], triangles: &[u32], depth: u32) -> Vec<Option<Children>> {
         if depth >= self.max_depth {
             return cells.iter().map(|_| None).collect();
@@ -118,7 +117,7 @@ impl<'a> Settings<'a> {
         divided
     }
 
-    /// The children of a cell; `None` if it is to be a leaf.
+    /// The children of a cell; `None` if it becomes a leaf.
     fn divide(&self, position: [u32; 3], triangles: &[u32], depth: u32) -> Option<Children> {
         if triangles.len() <= self.options.leaf_size {
             return None;
@@ -146,7 +145,7 @@ impl<'a> Settings<'a> {
         Some(children)
     }
 
-    /// Which children of the cell at `position` list a triangle, a bit each.
+    /// The children of the cell at `position` that list a triangle, one bit each.
     fn octants(&self, id: u32, position: [u32; 3], depth: u32) -> u8 {
         let middle = self.space.middle(position, depth);
         let mut mask = by_box(&self.boxes[id as usize], middle);
@@ -167,7 +166,7 @@ impl<'a> Settings<'a> {
     }
 }
 
-/// The octants around `middle` that a box reaches; what ends in a plane is below it only.
+/// The octants around `middle` that a box overlaps; a box that ends in a plane is only below it.
 pub(super) fn by_box(bounds: &Bounds, middle: [f32; 3]) -> u8 {
     const ABOVE: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
     let mut mask = 0xff;

@@ -1,11 +1,11 @@
-//! `octree`: cells halved along all axes at once, leaves with references, descended by the distances of
-//! their middle planes. Twin of `kernels/accel/octree.wesl`.
+//! `octree`: cells halved along all axes at once, leaves with references, traversed by the
+//! distances of their middle planes. CPU version of `kernels/accel/octree.wesl`.
 //!
 //! Sources: J. Revelles, C. Ureña, M. Lastra, "An efficient parametric algorithm for octree
-//! traversal", 2000 (middle planes, octants mirrored by the direction); S. Laine, T. Karras, "Efficient
-//! sparse voxel octrees", 2010 (cells by integer position, masks of children); T. Akenine-Möller, "Fast
-//! 3D triangle–box overlap testing", 2001. Why hits are equal to brute force to the bit:
-//! [`super::spatial`]; a level is three splits, one along each axis.
+//! traversal", 2000 (middle planes, octants mirrored by the direction); S. Laine, T. Karras,
+//! "Efficient sparse voxel octrees", 2010 (cells by integer position, masks of children); T.
+//! Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001. Why hits are bit-identical to
+//! brute force: [`super::spatial`]; a level is three splits, one along each axis.
 
 mod build;
 mod validate;
@@ -13,17 +13,17 @@ mod validate;
 use super::structure::prelude::*;
 use raystone_gpu::UniformValues;
 
-/// Marks the word of a leaf; the other bits are its first place in the references.
+/// Marks a leaf's word; the other bits are its first index into the references.
 const LEAF: u32 = 0x8000_0000;
-/// Other words: the block of the children, and below this bit which of them hold anything.
+/// Other words: the block of the children, and below this bit a mask of the non-empty ones.
 const INNER_SHIFT: u32 = 8;
 const FILLED_MASK: u32 = 255;
 /// Marks the last reference of a leaf.
 const LAST: u32 = 0x8000_0000;
-/// A cell that begins behind the hit by this factor ends the walk: all that were not yet visited begin
+/// A cell that begins behind the hit by this factor ends the traversal: all unvisited cells begin
 /// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
-/// Cells have integer positions that a float holds exactly.
+/// Maximum depth at which a float holds the integer cell positions exactly.
 const DEEPEST: u32 = 20;
 
 parameters! {
@@ -40,7 +40,6 @@ parameters! {
     }
 }
 
-/// The registry entry.
 pub(crate) struct Octree;
 
 impl Structure for Octree {
@@ -62,7 +61,7 @@ impl Structure for Octree {
     }
 }
 
-/// Where cells lie: at depth `d` the planes of an axis are `low + k · extent · 2⁻ᵈ`.
+/// The cell grid: at depth `d` the planes of an axis are `low + k · extent · 2⁻ᵈ`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct RootCell {
     low: [f32; 3],
@@ -91,7 +90,6 @@ impl RootCell {
         }
     }
 
-    /// Edges of the cells at this depth.
     fn size(&self, depth: u32) -> [f32; 3] {
         self.extent.map(|e| e * 0.5_f32.powi(depth as i32))
     }
@@ -100,7 +98,7 @@ impl RootCell {
         self.low[axis] + k as f32 * size
     }
 
-    /// Where the three middle planes of a cell meet.
+    /// The intersection of the three middle planes of a cell.
     fn middle(&self, position: [u32; 3], depth: u32) -> [f32; 3] {
         let size = self.size(depth + 1);
         std::array::from_fn(|a| self.plane(a, 2 * position[a] + 1, size[a]))
@@ -134,7 +132,7 @@ impl RootCell {
 struct Built {
     space: RootCell,
     clipped: bool,
-    /// Block 0 holds the root in its first place, each other block the children of a cell.
+    /// Block 0 has the root first; each other block holds the children of a cell.
     nodes: Vec<u32>,
     /// Triangle indices, leaf by leaf, ascending in each, the last marked.
     references: Vec<u32>,
@@ -142,14 +140,14 @@ struct Built {
 }
 
 impl Built {
-    /// The references of a leaf that begins at `first`; `None` if no end is marked.
+    /// The references of a leaf that begins at `first`; `None` without an end mark.
     fn list(&self, first: u32) -> Option<&[u32]> {
         let from = self.references.get(first as usize..)?;
         let last = from.iter().position(|r| r & LAST != 0)?;
         Some(&from[..=last])
     }
 
-    /// Word, position and depth of every cell that holds anything, from the root.
+    /// Word, position and depth of every non-empty cell, from the root.
     fn each_cell(&self, mut visit: impl FnMut(u32, [u32; 3], u32)) {
         let mut stack = vec![(self.nodes[0], [0; 3], 0)];
         while let Some((word, position, depth)) = stack.pop() {
@@ -186,8 +184,7 @@ impl BuiltAccel for Built {
                 ("space", space),
                 limits(self.nodes.len() + 1, self.references.len()),
             ],
-            // One entry for each level and one for the root; a multiple of 8, so that scenes of like
-            // depth share a kernel.
+            // One entry per level plus the root; rounded, so that similar scenes share a kernel.
             constants: vec![("STACK_ENTRIES", (self.depth + 1).next_multiple_of(8))],
         }
     }
@@ -207,7 +204,7 @@ impl BuiltAccel for Built {
             filled += 1;
             cost += weight * 0.25_f64.powi(depth as i32);
         });
-        // Octants that nothing reaches into are leaves as well.
+        // Empty octants count as leaves.
         let empty = cells + 1 - filled;
         let counts = counts.into_iter().chain((0..empty).map(|_| 0));
         StructureStats {
@@ -224,8 +221,7 @@ impl BuiltAccel for Built {
     }
 }
 
-/// A bit for each child; bit `i` stands for octant `i ^ flip`, so that lower bits come first along
-/// the ray.
+/// Bit `i` stands for octant `i ^ flip`, so that lower bits come first along the ray.
 fn mirrored(mask: u32, flip: u32) -> u32 {
     let mut out = mask;
     if flip & 1 != 0 {
@@ -240,7 +236,7 @@ fn mirrored(mask: u32, flip: u32) -> u32 {
     out
 }
 
-/// Which children, mirrored, the segment from `enter` to `exit` visits: those whose interval is not
+/// The mirrored children visited by the segment from `enter` to `exit`: those whose interval is not
 /// empty by more than the pad, given the distances of the middle planes.
 fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
     let [x, y, z] = middle;
@@ -261,7 +257,6 @@ fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
 }
 
 impl Built {
-    /// Tests the triangles of the leaf that begins at `first`.
     fn leaf(&self, first: u32, soup: &TriangleSoup, walk: &mut Walk) {
         for reference in &self.references[first as usize..] {
             walk.read(reference);
@@ -285,8 +280,8 @@ impl Traverse for Built {
         let inverse = walk.inverse;
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
-        // The cell whose children are being visited: its block and the children to come. At first one
-        // of twice the size, of which the root is the only child.
+        // The cell whose children are being visited: its block and the remaining children. At
+        // first, a cell of twice the size whose only child is the root.
         let mut open = 1 << flip;
         let mut position = [0; 3];
         let mut size = self.space.extent.map(|e| 2.0 * e);

@@ -1,14 +1,14 @@
-//! What must hold of a built octree.
+//! Invariants of a built octree.
 
 use super::{Built, INNER_SHIFT, LAST, LEAF, RootCell, build};
 use crate::spatial::{corners, touches};
 use crate::tree::Coverage;
 use crate::{AccelError, TriangleSoup};
 
-/// Every block is reached once, and every cell lists the triangles that it must.
+/// Checks that every block is reached once, and every cell lists the required triangles.
 ///
 /// # Errors
-/// The first of these that does not hold.
+/// The first violation.
 pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelError> {
     let root = built.space.cell([0; 3], 0);
     for record in &soup.records {
@@ -33,7 +33,6 @@ pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelEr
     check.blocks.is_complete()
 }
 
-/// On the way down.
 struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,
@@ -42,7 +41,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// A cell, which must list `triangles`.
+    /// Checks a cell, which must list `triangles`.
     fn cell(
         &mut self,
         word: u32,
@@ -88,7 +87,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Which of the triangles that a cell must list a child must list, too.
+    /// The subset of a cell's required triangles that a child must list.
     fn needed(&self, position: [u32; 3], depth: u32, octant: u32, triangles: &[u32]) -> Vec<u32> {
         let space = &self.built.space;
         let middle = space.middle(position, depth);

@@ -1,14 +1,14 @@
-//! Which triangles a ray may hit at all: every one whose group the ray's line meets.
+//! Candidate triangles of a ray: all those whose group the ray's line meets.
 
 use super::groups::{Groups, Line};
 use rayon::prelude::*;
 use raystone_core::geometry::{Ray, Triangle};
 
-/// From so many rays on it pays to bring neighbours together.
+/// Minimum number of rays for which sorting triangles into groups pays off.
 const MANY: usize = 64;
 
-/// For each ray the triangles that it may hit, increasing; all triangles of which an f32 test could answer
-/// a point near the triangle are among them, wherever on the ray's line.
+/// For each ray the triangles that it may hit, in ascending order. They include every triangle for
+/// which an f32 test could return a point near the triangle, anywhere on the ray's line.
 pub(super) fn candidates(triangles: &[Triangle], rays: &[Ray]) -> Vec<Vec<u32>> {
     let corners = |id: usize| triangles[id].vertices.map(|v| v.to_array());
     let groups = Groups::new(triangles.len(), rays.len() >= MANY, corners);
@@ -37,7 +37,7 @@ mod tests {
         let mut random = Pcg32::new(4);
         let mut signed = || 2.0 * random.uniform_f32() - 1.0;
         let mut vector = || Vec3::new(signed(), signed(), signed());
-        // Groups of neighbours are small against the scene only where there are many triangles.
+        // Groups of neighbours are small relative to the scene only with many triangles.
         let mut triangle = |_| {
             let centre = vector();
             [0; 3].map(|_| centre + 0.05 * vector()).into()

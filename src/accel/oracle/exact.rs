@@ -1,5 +1,5 @@
-//! The exact mode: whether a ray goes through a triangle, past it, or through an edge, without any
-//! rounding, and the distance in f64.
+//! The exact mode: tests without any rounding if a ray hits, misses or meets an edge of a triangle,
+//! and computes the distance in f64.
 //!
 //! With a = v₀ − o, b = v₁ − o, c = v₂ − o the three edge functions and the volume are
 //!
@@ -11,13 +11,13 @@
 //! The line goes through the triangle if no two of E₀, E₁, E₂ differ in sign, through an edge if one
 //! of them is zero as well, and does not cross the plane if D is zero.
 //!
-//! Each is first computed in f64 with a bound on its error. Where that leaves the sign open, the
-//! determinants are taken apart: they are linear in every row, so det(d, v₁ − o, v₂ − o) is a sum of
-//! determinants of rows that are f32 numbers themselves. A product of two of those is exact in f64, and
-//! that of three is a sum of two f64 numbers (Dekker 1971), so that a sum of at most a hundred f64
-//! numbers remains, whose sign expansions give exactly (Shewchuk 1997, *Adaptive Precision
-//! Floating-Point Arithmetic*, GROW-EXPANSION). Products stay between 2⁻⁴⁴⁷ and 2³⁸⁴: nothing underflows
-//! or overflows for any finite f32 input.
+//! Each is first computed in f64 with an error bound. If that leaves the sign open, the
+//! determinants are expanded: they are linear in every row, so det(d, v₁ − o, v₂ − o) is a sum of
+//! determinants of rows that are f32 numbers themselves. A product of two of those is exact in f64,
+//! and that of three is a sum of two f64 numbers (Dekker 1971). The result is a sum of at most a
+//! hundred f64 numbers, whose sign expansions give exactly (Shewchuk 1997, *Adaptive Precision
+//! Floating-Point Arithmetic*, GROW-EXPANSION). Products stay between 2⁻⁴⁴⁷ and 2³⁸⁴: nothing
+//! underflows or overflows for any finite f32 input.
 
 use super::triangle::{Vector, cross, dot, subtract, widen};
 use raystone_core::geometry::{Ray, Triangle};
@@ -25,38 +25,38 @@ use raystone_core::geometry::{Ray, Triangle};
 /// Half an ulp of 1 in f64.
 const EPSILON: f64 = f64::EPSILON / 2.0;
 
-/// Roundings that a determinant computed in f64 may pass through, with room to spare.
+/// Roundings in a determinant computed in f64, with a safety margin.
 const ROUNDINGS: f64 = 16.0;
 
-/// A quotient whose operands are known better than this is as good as exact: 2⁻²¹ ulp of f32.
+/// A quotient of operands with a smaller relative error counts as exact: 2⁻²¹ ulp of f32.
 const WELL_KNOWN: f64 = 1.0 / (1u64 << 44) as f64;
 
-/// Where the line of a ray meets a triangle.
+/// Position of a ray's line relative to a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Through its inside.
+    /// Through the interior.
     Inside,
     /// Through an edge or a vertex.
     Edge,
-    /// Past it.
+    /// Outside.
     Outside,
-    /// Not at all: it runs in the plane or beside it, or the triangle has no area.
+    /// No intersection: the line is in the plane or parallel to it, or the triangle has no area.
     Parallel,
 }
 
-/// How a line and a triangle lie, exactly.
+/// The exact relation between a line and a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactCrossing {
-    /// Where the line passes.
+    /// The side on which the line passes.
     pub side: Side,
     /// Distance to the plane in units of the direction, to within 2⁻⁴³ of itself; NaN if parallel.
     pub t: f64,
-    /// Whether `t_min ≤ t ≤ t_max`, exactly.
+    /// True if `t_min ≤ t ≤ t_max`, exactly.
     pub in_interval: bool,
 }
 
 impl ExactCrossing {
-    /// Looks at one triangle. Every number of `ray` and `triangle` must be finite, but for `t_max`.
+    /// Tests one triangle. All numbers of `ray` and `triangle` except `t_max` must be finite.
     pub fn new(triangle: &Triangle, ray: &Ray) -> Self {
         let pair = Pair::new(triangle, ray);
         let signs = pair.edges().map(|e| e.sign());
@@ -88,7 +88,7 @@ impl ExactCrossing {
         in_interval: false,
     };
 
-    /// Whether the ray meets the triangle, edges included, within its interval.
+    /// True if the ray hits the triangle, edges included, within its interval.
     pub(crate) fn is_hit(&self) -> bool {
         self.in_interval && matches!(self.side, Side::Inside | Side::Edge)
     }
@@ -117,7 +117,7 @@ fn compare(volume: &Determinant, determinant: &Determinant, t: f32) -> i32 {
     sign * sum.sign()
 }
 
-/// The vectors of a ray and a triangle, widened, and the triangle's corners seen from the origin.
+/// The vectors of a ray and a triangle in f64, and the triangle's corners relative to the origin.
 struct Pair {
     o: Vector,
     d: Vector,
@@ -125,11 +125,11 @@ struct Pair {
     seen: [Vector; 3],
 }
 
-/// A determinant: its f64 value with a bound on the error, and the f32 rows of which it is made.
+/// A determinant: its f64 value with an error bound, and the f32 rows it is made of.
 struct Determinant {
     value: f64,
     error: f64,
-    /// Rows of the determinants whose sum it is, with their signs.
+    /// Rows of the determinants that sum to it, with their signs.
     parts: Vec<(f64, [Vector; 3])>,
 }
 
@@ -219,7 +219,7 @@ impl Determinant {
         }
     }
 
-    /// Numbers whose sum it is.
+    /// Numbers that sum to it.
     fn terms(&self) -> impl Iterator<Item = f64> + '_ {
         self.parts.iter().flat_map(|(sign, [a, b, c])| {
             let permutations = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
@@ -242,7 +242,7 @@ fn signum(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
-/// A number as an unevaluated sum of f64 numbers that do not overlap, by growing magnitude.
+/// A number as an unevaluated sum of non-overlapping f64 numbers, by growing magnitude.
 #[derive(Default)]
 struct Expansion(Vec<f64>);
 
@@ -275,14 +275,14 @@ impl Expansion {
     }
 }
 
-/// a + b as its rounded value and the rest (Knuth).
+/// a + b as its rounded value and the rounding error (Knuth).
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     (sum, (a - (sum - b_part)) + (b - b_part))
 }
 
-/// a · b as its rounded value and the rest.
+/// a · b as its rounded value and the rounding error.
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     (product, a.mul_add(b, -product))
@@ -294,7 +294,7 @@ mod tests {
     use glam::Vec3;
     use raystone_core::random::Pcg32;
 
-    /// The same from integers: exact as long as coordinates are small.
+    /// The same with integers: exact as long as coordinates are small.
     fn by_integers(
         triangle: [[i64; 3]; 3],
         origin: [i64; 3],
@@ -334,7 +334,7 @@ mod tests {
         let mut seen = [0; 4];
         for round in 0..40_000 {
             let extent = [1, 3, 1000, 8_000_000][round % 4];
-            // Powers of two change nothing but exponents.
+            // Powers of two only change exponents.
             let unit = [1.0, f32::MIN_POSITIVE, 2f32.powi(90)][round % 3];
             let corners = [0; 3].map(|_| point(&mut random, extent));
             let origin = point(&mut random, extent);
@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn the_last_bit_of_a_vertex_decides() {
-        // A ray at the corner where a huge triangle begins: it meets the plane there and nowhere else.
+        // A ray at the corner where a huge triangle begins: it meets the plane only there.
         let far = 3.0e7_f32;
         let side = |y: f32| {
             let corner = Vec3::new(1.0, y, 0.0);

@@ -1,4 +1,4 @@
-//! The exact mode's opinion of answers: rounding is counted here, not forgiven.
+//! The exact mode's verdict on answers: rounding errors are counted, not tolerated.
 
 use super::exact::{ExactCrossing, Side};
 use super::triangle::Crossing;
@@ -6,55 +6,54 @@ use super::{ClosestHit, brute_force};
 use rayon::prelude::*;
 use raystone_core::geometry::{Ray, Triangle};
 
-/// A triangle that a ray meets within its interval, exactly.
+/// A triangle that a ray hits within its interval, exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossed {
     /// Its index.
     pub triangle: u32,
-    /// Through its inside or an edge.
+    /// Through its interior or an edge.
     pub side: Side,
     /// Distance in units of the direction, f64.
     pub t: f64,
-    /// What rounding may move the distance by in an f32 test; infinite
-    /// where the ray grazes the plane.
+    /// Rounding error bound of the distance in f32; infinite where the ray grazes the plane.
     pub slack: f64,
-    /// Whether every such test must find it.
+    /// True if every such test must find it.
     pub definite: bool,
 }
 
-/// Everything that a ray meets.
+/// All exact hits of a ray.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ExactTruth {
-    /// By growing distance.
+    /// By increasing distance.
     pub hits: Vec<Crossed>,
 }
 
-/// What an answer is, exactly.
+/// The exact verdict on an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ExactVerdict {
-    /// A miss where there is nothing.
+    /// A correct miss.
     Miss,
-    /// The triangle is hit, none is nearer than rounding can tell; its distance.
+    /// The triangle is hit, and none is nearer beyond rounding; its distance.
     Hit(f64),
     /// Only rounding decides whether the hit lies in the interval of the ray.
     Borderline,
-    /// A triangle is hit, and a miss was answered.
+    /// A triangle is hit, but the answer is a miss.
     FalseMiss {
-        /// Whether rounding explains it: the ray passes near the edge of every triangle it hits.
+        /// True if rounding explains it: the ray passes near the edge of every triangle it hits.
         explained: bool,
     },
-    /// Nothing is hit, and a triangle was answered.
+    /// Nothing is hit, but the answer is a triangle.
     FalseHit {
-        /// Whether rounding explains it: the ray passes near an edge of the triangle.
+        /// True if rounding explains it: the ray passes near an edge of the triangle.
         explained: bool,
     },
-    /// Something is hit, but not this triangle.
+    /// Something else is hit, but not this triangle.
     WrongTriangle,
     /// This triangle is hit, but another one is nearer.
     NotNearest,
 }
 
-/// What every ray meets, edges included, on all cores. All numbers must be finite, but for `t_max`.
+/// All hits of every ray, edges included, on all cores. All numbers except `t_max` must be finite.
 pub fn exact_truths(triangles: &[Triangle], rays: &[Ray]) -> Vec<ExactTruth> {
     let candidates = brute_force::candidates(triangles, rays);
     (rays.par_iter().zip(&candidates))
@@ -83,7 +82,7 @@ impl ExactTruth {
         Self { hits }
     }
 
-    /// The opinion of a closest-hit answer to `ray`, whose truth this is.
+    /// The verdict on a closest-hit answer to `ray`, given its exact hits.
     pub fn judge(&self, triangles: &[Triangle], ray: &Ray, answer: ClosestHit) -> ExactVerdict {
         let Some((id, _)) = answer else {
             return self.judge_miss(ray);
@@ -94,18 +93,20 @@ impl ExactTruth {
         let own = ExactCrossing::new(triangle, ray);
         let bounded = Crossing::new(triangle, ray);
         if matches!(own.side, Side::Outside | Side::Parallel) {
-            return match self.hits.is_empty() {
-                true => ExactVerdict::FalseHit {
+            return if self.hits.is_empty() {
+                ExactVerdict::FalseHit {
                     explained: bounded.is_possible(ray),
-                },
-                false => ExactVerdict::WrongTriangle,
+                }
+            } else {
+                ExactVerdict::WrongTriangle
             };
         }
         let slack = slack(&bounded);
         if !own.in_interval {
-            return match near_end(own.t, slack, ray) {
-                true => ExactVerdict::Borderline,
-                false => ExactVerdict::FalseHit { explained: false },
+            return if near_end(own.t, slack, ray) {
+                ExactVerdict::Borderline
+            } else {
+                ExactVerdict::FalseHit { explained: false }
             };
         }
         let nearer = |other: &&Crossed| other.t + other.slack < own.t - slack;
@@ -132,8 +133,8 @@ fn slack(crossing: &Crossing) -> f64 {
     crossing.distance().map_or(f64::INFINITY, |d| d.error)
 }
 
-/// Whether rounding may move the distance over an end of the interval. A distance of exactly an end is
-/// in the interval: where it is exactly representable, a test has no excuse.
+/// True if rounding may move the distance across an end of the interval. A distance exactly at an
+/// end is inside: where it is exactly representable, rounding is no excuse.
 fn near_end(t: f64, slack: f64, ray: &Ray) -> bool {
     [ray.t_min, ray.t_max]
         .map(f64::from)

@@ -1,29 +1,27 @@
-//! Triangles in small groups of neighbours, each with a box around it, so that a ray looks only at the
-//! groups whose widened box its line meets. There is no hierarchy and no order of visits: one flat list of
-//! boxes, tested sixteen side by side.
+//! Triangles in small groups of neighbours, each with a box around it, so that a ray tests only the
+//! groups whose widened box its line meets. There is no hierarchy and no order of visits: one flat
+//! list of boxes, tested sixteen at a time.
 //!
-//! Boxes are widened by far more than f32 can move a ray or a triangle, so that a group is passed over only
-//! if no test could find a hit in it: planes by [`WIDENED`] of the coordinates involved, and distances
-//! along the ray by the same fraction of themselves.
+//! Boxes are widened by far more than the effect of f32 rounding on a ray or a triangle, so that a
+//! group is skipped only if no test could find a hit in it: planes by [`WIDENED`] of the
+//! coordinates involved, and distances along the ray by the same fraction.
 
 use rayon::prelude::*;
 
-/// Triangles of a group.
 pub(crate) const GROUP: usize = 16;
 
-/// Boxes tested side by side.
+/// Boxes tested at a time.
 const LANES: usize = 16;
 
-/// How far boxes and distances are widened, as a fraction: 512 roundings of f32.
+/// Relative widening of boxes and distances: 512 roundings of f32.
 const WIDENED: f32 = 1.0 / 32768.0;
 
-/// The least direction component whose reciprocal is taken as it is; it stays finite.
+/// Smallest direction component whose reciprocal is used unchanged; it stays finite.
 const LEAST_DIRECTION: f32 = 1e-37;
 
-/// Sets from this size on are put in order by two threads.
+/// Minimum set size for sorting with two threads.
 const PARALLEL: usize = 8192;
 
-/// Three corners.
 type Corners = [[f32; 3]; 3];
 
 /// Triangles in groups.
@@ -33,18 +31,18 @@ pub struct Groups {
     blocks: Vec<Block>,
 }
 
-/// Minima and maxima of [`LANES`] boxes by axis; missing ones are empty.
+/// Minima and maxima of [`LANES`] boxes by axis; unused lanes are empty.
 struct Block {
     low: [[f32; LANES]; 3],
     high: [[f32; LANES]; 3],
 }
 
-/// The part of a ray on which groups are looked for.
+/// The part of a ray for which groups are searched.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
     origin: [f32; 3],
     inverse: [f32; 3],
-    /// Distances of interest.
+    /// The distance range.
     pub span: [f32; 2],
 }
 
@@ -66,8 +64,8 @@ impl Line {
 }
 
 impl Groups {
-    /// Groups of `count` triangles; `corners` must be finite. Neighbours are found (median splits along the
-    /// widest axis) only for `many` rays: for a few, triangles are taken as they come.
+    /// Groups of `count` triangles; `corners` must be finite. Neighbours are grouped (median splits
+    /// along the widest axis) only for `many` rays; for a few, triangles stay in their order.
     pub fn new(count: usize, many: bool, corners: impl Fn(usize) -> Corners + Sync) -> Self {
         let mut order: Vec<u32> = (0..count as u32).collect();
         if many {
@@ -97,13 +95,13 @@ impl Groups {
         self.order.len().div_ceil(GROUP)
     }
 
-    /// Whether there are none.
+    /// True if there are no groups.
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
     }
 
-    /// Calls `visit` with every group that the line may meet, increasing; what `visit` returns is the
-    /// end of the part that is still of interest.
+    /// Calls `visit` with every group that the line may meet, in ascending order; `visit` returns
+    /// the new end of the search interval.
     pub fn visit(&self, line: &Line, mut visit: impl FnMut(usize) -> f32) {
         let mut line = *line;
         for (place, block) in self.blocks.iter().enumerate() {
@@ -165,7 +163,7 @@ impl Block {
         block
     }
 
-    /// One bit for each box that the line may meet. Whatever is not a number counts as met.
+    /// One bit for each box that the line may meet. NaN counts as met.
     fn met_by(&self, line: &Line) -> u32 {
         let met: [u32; LANES] = std::array::from_fn(|lane| {
             let (mut enter, mut exit) = (line.span[0], line.span[1]);

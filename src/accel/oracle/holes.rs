@@ -1,20 +1,20 @@
-//! What is cut out of triangles, as the oracle asks for it.
+//! The oracle's interface to holes in triangles.
 
 use super::triangle::Crossing;
 use raystone_core::geometry::Triangle;
 
-/// Whether there is a surface at a point of a triangle.
+/// Verdict on the surface at a point of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
-    /// For certain.
+    /// Certainly a surface.
     Surface,
-    /// There is none for certain.
+    /// Certainly a hole.
     Hole,
     /// Rounding decides.
     Open,
 }
 
-/// The weight of a corner, and how far that of an f32 test may be from it.
+/// The weight of a corner, and the possible error of an f32 test's weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weight {
     /// In f64.
@@ -23,24 +23,24 @@ pub struct Weight {
     pub error: f64,
 }
 
-/// Knows what is cut out of triangles.
+/// Holes in the triangles of a scene.
 pub trait Holes: Sync {
-    /// Whether there is a surface at the point of a triangle with these weights of its second and third corner; `None` where nothing
-    /// is known of the weights.
+    /// Tests for a surface at the point of a triangle with these weights of its second and third
+    /// corners; `None` if the weights are unknown.
     fn cut(&self, triangle: u32, weights: Option<[Weight; 2]>) -> Cut;
 }
 
-/// The triangles of a scene, with what is cut out of them.
+/// The triangles of a scene, with their holes.
 #[derive(Clone, Copy)]
 pub struct Surfaces<'a> {
     /// The triangles.
     pub triangles: &'a [Triangle],
-    /// `None` if all are whole.
+    /// `None` if no triangle has holes.
     pub holes: Option<&'a dyn Holes>,
 }
 
 impl Surfaces<'_> {
-    /// Whether there is a surface where a ray crosses a triangle.
+    /// Tests for a surface where a ray crosses a triangle.
     pub(super) fn cut(&self, id: u32, crossing: &Crossing) -> Cut {
         let holes = self.holes;
         holes.map_or(Cut::Surface, |holes| holes.cut(id, crossing.weights()))

@@ -1,11 +1,12 @@
-//! The oracle: the answer to a ray in f64, over every triangle near it, with the rounding of f32 allowed
+//! The oracle: the answer to a ray in f64, over every triangle near it, with f32 rounding accounted
 //! for.
 //!
-//! It passes over triangles far from the ray by the group ([`Groups`]) and shares no code with the
-//! structures, so it can judge them. A verdict is [`Verdict::Wrong`] only if no f32 test of products of edges (Möller–Trumbore) or of
-//! sheared vertices (Woop, Benthin, Wald) could have given the answer (the bounds are derived in `triangle.rs`), and [`Verdict::Agrees`] only if every such
-//! test gives it; [`Verdict::Ambiguous`] is the small rest: near edges, at grazing angles, between
-//! surfaces closer than rounding.
+//! It skips triangles far from the ray by group ([`Groups`]) and shares no code with the
+//! structures, so it is an independent reference for them. A verdict is [`Verdict::Wrong`] only if
+//! no f32 test of edge products (Möller–Trumbore) or sheared vertices (Woop, Benthin, Wald) could
+//! have given the answer (the bounds are derived in `triangle.rs`), and [`Verdict::Agrees`] only if
+//! every such test gives it. [`Verdict::Ambiguous`] is the small rest: near edges, at grazing
+//! angles, between surfaces closer than rounding.
 
 mod brute_force;
 mod exact;
@@ -26,37 +27,37 @@ use std::fmt;
 use thiserror::Error;
 use triangle::Crossing;
 
-/// The nearest hit that a structure found: triangle index and distance; `None` for a miss.
+/// The nearest hit found by a structure: triangle index and distance; `None` for a miss.
 pub type ClosestHit = Option<(u32, f32)>;
 
-/// The oracle's opinion of an answer.
+/// The oracle's verdict on an answer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// The only answer that rounding leaves open.
+    /// The only answer consistent with rounding.
     Agrees,
-    /// One of several answers that rounding leaves open.
+    /// One of several answers consistent with rounding.
     Ambiguous,
-    /// Not to be explained by rounding.
+    /// Not explained by rounding.
     Wrong(Fault),
 }
 
-/// What is wrong with an answer.
+/// The fault of an answer.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Fault {
-    /// The triangle index is not one of the scene.
+    /// The triangle index is not in the scene.
     #[error("triangle {id} does not exist: the scene has {triangles}")]
     NoSuchTriangle {
-        /// Index answered.
+        /// Triangle index in the answer.
         id: u32,
-        /// Triangles of the scene.
+        /// Number of triangles in the scene.
         triangles: usize,
     },
     /// The distance is not within the ray's interval, or NaN.
     #[error("triangle {id} at t = {t} is outside the ray's interval [{t_min}, {t_max}]")]
     OutOfInterval {
-        /// Index answered.
+        /// Triangle index in the answer.
         id: u32,
-        /// Distance answered.
+        /// Distance in the answer.
         t: f32,
         /// Start of the interval.
         t_min: f32,
@@ -66,47 +67,47 @@ pub enum Fault {
     /// The ray does not pass through the triangle.
     #[error("triangle {id}, answered at t = {t}, is not hit by the ray")]
     FalseHit {
-        /// Index answered.
+        /// Triangle index in the answer.
         id: u32,
-        /// Distance answered.
+        /// Distance in the answer.
         t: f32,
     },
-    /// The triangle is hit elsewhere.
+    /// The triangle is hit at another distance.
     #[error("triangle {id} is hit at {expected}, not at t = {t}")]
     Distance {
-        /// Index answered.
+        /// Triangle index in the answer.
         id: u32,
-        /// Distance answered.
+        /// Distance in the answer.
         t: f32,
-        /// Where it is hit.
+        /// The correct distance.
         expected: Distance,
     },
-    /// A nearer triangle was overlooked.
+    /// A nearer triangle was missed.
     #[error("triangle {nearer} at {distance} is nearer than the answer, triangle {id} at t = {t}")]
     NotNearest {
-        /// Index answered.
+        /// Triangle index in the answer.
         id: u32,
-        /// Distance answered.
+        /// Distance in the answer.
         t: f32,
-        /// The nearest triangle that is hit for certain.
+        /// The nearest triangle that is certainly hit.
         nearer: u32,
-        /// Where it is hit.
+        /// Its distance.
         distance: Distance,
     },
-    /// A triangle was overlooked and a miss answered.
+    /// The answer is a miss, but a triangle is hit.
     #[error("the answer is a miss, but triangle {id} is hit at {distance}")]
     FalseMiss {
-        /// The nearest triangle that is hit for certain.
+        /// The nearest triangle that is certainly hit.
         id: u32,
-        /// Where it is hit.
+        /// Its distance.
         distance: Distance,
     },
-    /// A segment was called blocked, but nothing blocks it.
+    /// The answer is blocked, but nothing blocks the segment.
     #[error("the answer is that the ray is blocked, but no triangle is hit")]
     FalseBlock,
 }
 
-/// A distance in f64 with the error that an f32 test may make; NaN if the ray grazes the triangle.
+/// A distance in f64 with the error bound of an f32 test; NaN if the ray grazes the triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
     /// Distance along the ray, in units of its direction.
@@ -121,14 +122,14 @@ impl fmt::Display for Distance {
     }
 }
 
-/// Judges one closest-hit answer over all `triangles`.
+/// Checks one closest-hit answer against all `triangles`.
 pub fn judge<'a>(surfaces: impl Into<Surfaces<'a>>, ray: Ray, answer: ClosestHit) -> Verdict {
     let surfaces = surfaces.into();
     let candidates = brute_force::candidates(surfaces.triangles, &[ray]);
     Scene::new(surfaces, &ray, &candidates[0]).judge_closest(answer)
 }
 
-/// Judges many closest-hit answers, in the order of `queries`, on all cores.
+/// Checks many closest-hit answers, in the order of `queries`, on all cores.
 pub fn judge_closest_hits<'a>(
     surfaces: impl Into<Surfaces<'a>>,
     queries: &[(Ray, ClosestHit)],
@@ -138,7 +139,7 @@ pub fn judge_closest_hits<'a>(
     })
 }
 
-/// Judges many any-hit answers (`true`: something lies in the ray's interval), on all cores.
+/// Checks many any-hit answers (`true`: something lies in the ray's interval), on all cores.
 pub fn judge_any_hits<'a>(
     surfaces: impl Into<Surfaces<'a>>,
     queries: &[(Ray, bool)],
@@ -167,11 +168,11 @@ struct Scene<'a> {
     possible: Vec<Possible>,
 }
 
-/// A triangle that an f32 test may answer.
+/// A triangle that an f32 test may return.
 struct Possible {
     id: u32,
     crossing: Crossing,
-    /// Whether every test must.
+    /// True if every test must.
     is_definite: bool,
 }
 
@@ -240,8 +241,8 @@ impl<'a> Scene<'a> {
             let expected = Distance::of(crossing);
             return Some(Fault::Distance { id, t, expected });
         }
-        // The f32 distance of a definite hit is at most its upper bound, so a structure that looked
-        // at that triangle cannot have kept a greater t.
+        // The f32 distance of a definite hit is at most its upper bound, so a structure that tested
+        // that triangle cannot have returned a greater t.
         let (nearer, distance) = self.nearest_definite()?;
         (distance.t + distance.bound < f64::from(t)).then_some(Fault::NotNearest {
             id,
@@ -251,14 +252,17 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Whether the triangle is hit for certain and nothing else may lie at its distance or before.
+    /// True if the triangle is certainly hit and nothing else may lie at its distance or before.
     fn is_only_answer(&self, id: u32, t: f32) -> bool {
         let behind = |crossing: &Crossing| {
             (crossing.distance()).is_some_and(|other| other.value - other.error > f64::from(t))
         };
-        self.possible.iter().all(|other| match other.id == id {
-            true => other.is_definite,
-            false => behind(&other.crossing),
+        self.possible.iter().all(|other| {
+            if other.id == id {
+                other.is_definite
+            } else {
+                behind(&other.crossing)
+            }
         })
     }
 
@@ -267,7 +271,7 @@ impl<'a> Scene<'a> {
         Some(&self.possible[at].crossing)
     }
 
-    /// The definite hit of which the upper bound of the distance is least.
+    /// The definite hit with the smallest upper bound of its distance.
     fn nearest_definite(&self) -> Option<(u32, Distance)> {
         let upper = |d: &Distance| d.t + d.bound;
         (self.possible.iter())

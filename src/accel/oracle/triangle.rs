@@ -1,4 +1,4 @@
-//! One ray against one triangle in f64, with bounds on what an f32 test may get wrong.
+//! One ray against one triangle in f64, with bounds on the errors of an f32 test.
 //!
 //! With edges e₁ = v₁ − v₀, e₂ = v₂ − v₀ and c = v₀ − o, Cramer's rule gives four triple products:
 //!
@@ -7,32 +7,33 @@
 //! u = U/det   v = V/det   w = W/det   t = T/det
 //! ```
 //!
-//! # What f32 may get wrong
+//! # Errors in f32
 //!
-//! Let ε = 2⁻²⁴. The vertices, the origin and the direction are f32 and so exact. However a
+//! Let ε = 2⁻²⁴. The vertices, the origin and the direction are f32 and so exact. In whatever way a
 //! Möller–Trumbore-type test groups a triple product, each of its six terms passes at most eight
 //! roundings: up to three differences (edges and c), the product of two factors, the subtraction
 //! inside the cross product, the product with the third factor, two additions. So the error is at
 //! most about 8 ε times the sum of the absolute values of the six terms, the *permanent*; fused
-//! multiply-adds only leave roundings out. A quotient may add 2.5 ulp (WGSL), one more rounding if it
-//! is taken as a reciprocal, and w = 1 − u − v two more: 8 ε of the terms again. [`ROUNDINGS`] = 10
-//! leaves room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
+//! multiply-adds only omit roundings. A quotient may add 2.5 ulp (WGSL), one more rounding if it
+//! uses a reciprocal, and w = 1 − u − v two more: 8 ε of the terms again. [`ROUNDINGS`] = 10 leaves
+//! room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
 //!
 //! Everything is compared in the multiplied form (U against 0, T against t·det), which stays
 //! meaningful where the ray grazes the plane and det is smaller than its own error.
 //!
-//! # What a shear may get wrong
+//! # Errors of a shear
 //!
-//! A test of the kind of Woop, Benthin and Wald moves the vertices into a frame in which the ray is the
-//! axis along which its direction is longest, say z: with c = v − o, x′ = c.x − (d.x/d.z) c.z and y′
-//! alike. Then U/d.z = x′₀·y′₂ − y′₀·x′₂ and so on, in terms of the vertices and not of the edges. With
+//! A test like that of Woop, Benthin and Wald moves the vertices into a frame in which the ray is
+//! the axis of its longest direction component, say z: with c = v − o, x′ = c.x − (d.x/d.z) c.z and
+//! y′ alike. Then U/d.z = x′₀·y′₂ − y′₀·x′₂ and so on, in terms of vertices instead of edges. With
 //! X = |c.x| + |d.x/d.z|·|c.z|, x′ errs by at most 9 ε X: a difference, a quotient of 2.5 ulp, two
 //! products, a difference. A product of two errs by 19 ε, their difference by 20 ε of its terms:
-//! [`SHEARED`] = 22 leaves room. The distance is the average of those of the vertices, Σ Uᵢ·tᵢ / Σ Uᵢ, so
-//! that an error of Uᵢ counts only as far as tᵢ is from it; [`AVERAGED`] = 16 roundings are its own.
+//! [`SHEARED`] = 22 leaves room. The distance is the average of those of the vertices, Σ Uᵢ·tᵢ / Σ
+//! Uᵢ, so an error of Uᵢ is scaled by the difference of tᵢ from it; [`AVERAGED`] = 16 roundings are
+//! its own.
 //!
-//! The bounds here are those of both kinds, whichever is wider. A test that moves vertices into a frame
-//! of the triangle's own (Baldwin and Weber) has wider ones still, and is wrong by these.
+//! The bounds here are the wider of both kinds. A test that moves vertices into the triangle's own
+//! frame (Baldwin and Weber) has still wider ones, and is wrong by these.
 
 use super::holes::Weight;
 use raystone_core::geometry::{Ray, Triangle};
@@ -43,37 +44,35 @@ const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 /// Roundings of f32 allowed in any quantity.
 pub(super) const ROUNDINGS: f64 = 10.0;
 
-/// Roundings of an edge function of sheared vertices, and of their average distance.
+/// Roundings of an edge function of sheared vertices.
 const SHEARED: f64 = 22.0;
 const AVERAGED: f64 = 16.0;
 
-/// Allowed for products that f32 flushes to zero, where there are products.
+/// Allowance for products that f32 flushes to zero, if there are products.
 const FLUSHED: f64 = f64::from_bits((1023 - 110) << 52);
 
-/// A vector.
 pub(super) type Vector = [f64; 3];
 
-/// A number with a bound on the error of its f32 counterpart.
+/// A number with an error bound for its f32 counterpart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounded {
-    /// Value, in f64.
     pub value: f64,
-    /// Largest distance of the f32 result from it.
+    /// Largest difference of the f32 result.
     pub error: f64,
 }
 
 /// The triple products of a ray and a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing {
-    /// By the first kind of test.
+    /// For the first kind of test.
     det: Bounded,
-    /// By either kind.
+    /// For either kind.
     barycentrics: [Bounded; 3],
     t: Bounded,
     sheared: Sheared,
 }
 
-/// What only a test of sheared vertices gets wrong.
+/// The additional errors of a test with sheared vertices.
 #[derive(Debug, Clone, Copy)]
 struct Sheared {
     /// Errors of the barycentrics, which are weights of the vertices.
@@ -110,12 +109,12 @@ impl Crossing {
         }
     }
 
-    /// Bound on the error of the determinant by either kind of test.
+    /// Error bound of the determinant for either kind of test.
     fn det_error(&self) -> f64 {
         larger(self.det.error, self.sheared.errors.iter().sum())
     }
 
-    /// Whether an f32 test may find a hit in the ray's interval.
+    /// True if an f32 test may find a hit in the ray's interval.
     pub(super) fn is_possible(&self, ray: &Ray) -> bool {
         let facing = |sign: f64| {
             sign * self.det.value + self.det_error() > 0.0
@@ -127,7 +126,7 @@ impl Crossing {
         (facing(1.0) || facing(-1.0)) && self.distance().is_none_or(in_reach)
     }
 
-    /// Whether every f32 test must find a hit in the ray's interval.
+    /// True if every f32 test must find a hit in the ray's interval.
     pub(super) fn is_definite(&self, ray: &Ray) -> bool {
         let sign = self.det.value.signum();
         let inside = (self.barycentrics.iter()).all(|b| sign * b.value > b.error);
@@ -137,7 +136,7 @@ impl Crossing {
         inside && self.distance().is_some_and(in_reach)
     }
 
-    /// Distance along the ray in units of its direction; `None` if det may be zero or of either sign.
+    /// Distance along the ray in units of its direction; `None` if the sign of det is uncertain.
     pub(super) fn distance(&self) -> Option<Bounded> {
         let least_det = self.det.value.abs() - self.det_error();
         let value = self.t.value / self.det.value;
@@ -149,7 +148,8 @@ impl Crossing {
         })
     }
 
-    /// Weights of the second and third corner, with the error of those of an f32 test; `None` as for [`Crossing::distance`].
+    /// Weights of the second and third corners, with the error of an f32 test; `None` as for
+    /// [`Crossing::distance`].
     pub(super) fn weights(&self) -> Option<[Weight; 2]> {
         let least_det = self.det.value.abs() - self.det_error();
         let weight = |b: Bounded| {
@@ -162,7 +162,7 @@ impl Crossing {
         (least_det > 0.0).then(|| [u, v].map(weight))
     }
 
-    /// Whether an f32 test may answer the distance `t`.
+    /// True if an f32 test may return the distance `t`.
     pub(super) fn accepts(&self, t: f32) -> bool {
         let t = f64::from(t);
         let rounding = ROUNDINGS * EPSILON * (self.det.value.abs() + self.det.error);
@@ -209,8 +209,8 @@ impl Sheared {
     }
 }
 
-/// a·(b×c) with the bound of its f32 counterpart. A product of which every term has a zero factor is
-/// zero in f32 as well.
+/// a·(b×c) with the error bound of its f32 counterpart. If every term has a zero factor, the
+/// product is zero in f32 as well.
 fn triple(a: Vector, b: Vector, c: Vector) -> Bounded {
     let magnitude = |v: Vector| v.map(f64::abs);
     let (b_abs, c_abs) = (magnitude(b), magnitude(c));
@@ -218,9 +218,10 @@ fn triple(a: Vector, b: Vector, c: Vector) -> Bounded {
     let permanent = dot(magnitude(a), minors);
     Bounded {
         value: dot(a, cross(b, c)),
-        error: match permanent > 0.0 {
-            true => ROUNDINGS * EPSILON * permanent + FLUSHED,
-            false => 0.0,
+        error: if permanent > 0.0 {
+            ROUNDINGS * EPSILON * permanent + FLUSHED
+        } else {
+            0.0
         },
     }
 }

@@ -1,4 +1,4 @@
-//! Rays of the host, traced: uploaded once, answered as often as asked.
+//! Tracing of host rays: uploaded once, traced any number of times.
 
 use super::{Ask, Query, RayBuffers, Traced, Tracer, TriangleBuffers};
 use crate::{Counters, Hit, Ray};
@@ -6,26 +6,25 @@ use bytemuck::Pod;
 use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage};
 use std::cell::Cell;
 
-/// What stands in the output before a trace; no answer of either query begins with it (as a distance it is
-/// NaN), so that a ray which a dispatch leaves out is seen.
+/// Fill word of the output before a trace; no answer of either query begins with it (as a distance
+/// it is NaN), which exposes rays that a dispatch omits.
 const POISON: u32 = 0xffff_dead;
 
 /// Workgroups in a row of [`RayBatch::trace_in_rows`].
 const NARROW_ROW: u32 = 3;
 
-/// Rays of the first dispatch through an unknown structure: few, it may be brute force over a million
-/// triangles.
+/// Rays of the first dispatch: few, as it may be brute force over a million triangles.
 const FIRST_SLICE: u64 = 64;
 
 /// Answers with the error word of the kernels.
 pub struct Answers<T> {
     /// One per ray.
     pub answers: Vec<T>,
-    /// 0, or what went wrong.
+    /// The error word; 0 for none.
     pub errors: u32,
 }
 
-/// A tracer with rays on the device and room for their answers.
+/// A tracer with rays on the device and a buffer for their answers.
 pub struct RayBatch {
     tracer: Tracer,
     player: Player,
@@ -33,7 +32,7 @@ pub struct RayBatch {
     /// As large as the answers, copied over them before each trace.
     poison: Storage,
     rays: u32,
-    /// Most workgroups in a row.
+    /// Maximum workgroups in a row.
     row: Cell<u32>,
     slices: Slices,
 }
@@ -42,7 +41,7 @@ impl Tracer {
     /// Uploads rays.
     ///
     /// # Errors
-    /// They, or their answers, exceed the adapter's binding limit.
+    /// The rays or their answers exceed the adapter's binding limit.
     pub fn batch(self, rays: &[Ray]) -> Result<RayBatch, GpuError> {
         let gpu = &self.gpu;
         let bytes_per_ray = if self.ask.counters { 32 } else { 16 };
@@ -71,13 +70,14 @@ impl RayBatch {
         &self.tracer.gpu
     }
 
-    /// What traces.
+    /// The tracer.
     pub fn tracer(&self) -> &Tracer {
         &self.tracer
     }
 
-    /// Traces all rays, in as many dispatches as needed to keep each short. Answers of earlier traces are
-    /// wiped out before the clock starts; the error word is kept. Times are sums over all passes.
+    /// Traces all rays, in as many dispatches as needed to limit the time of each. Overwrites
+    /// earlier answers before the clock starts, but not the error word. Times are sums over all
+    /// passes.
     ///
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
@@ -97,13 +97,13 @@ impl RayBatch {
         Ok(total)
     }
 
-    /// Milliseconds of the longest slice of its life: no dispatch took longer.
+    /// Milliseconds of the longest slice so far: no dispatch took longer.
     pub fn longest_slice_ms(&self) -> f64 {
         self.slices.longest_ms()
     }
 
-    /// Traces all rays again in dispatches of narrow rows of workgroups, as dispatches of millions of rays
-    /// are cut by the limit on a row.
+    /// Traces all rays again in dispatches with narrow rows of workgroups, in the same way that the
+    /// row limit splits dispatches of millions of rays.
     ///
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
@@ -146,7 +146,7 @@ impl RayBatch {
         Ok(hits)
     }
 
-    /// Answers of the last trace of an any-hit query; `None` where there is no answer.
+    /// Answers of the last trace of an any-hit query; `None` for a missing answer.
     ///
     /// # Errors
     /// The device is lost or hangs.
@@ -156,7 +156,7 @@ impl RayBatch {
         Ok(words.iter().take(self.rays as usize).map(answer).collect())
     }
 
-    /// Hash of what the last trace left in the output.
+    /// Hash of the output of the last trace.
     ///
     /// # Errors
     /// The device is lost or hangs.
@@ -164,7 +164,7 @@ impl RayBatch {
         Ok(blake3::hash(&self.read::<u8>(&self.buffers.answers)?))
     }
 
-    /// Counted work of the last trace, and the answers that were found beside it.
+    /// Counted work of the last trace, and the corresponding answers.
     ///
     /// # Errors
     /// The device is lost or hangs.
@@ -192,7 +192,7 @@ impl RayBatch {
     }
 }
 
-/// Counted work of every ray, from kernels of their own; `None` for a structure that counts none.
+/// Counted work of every ray, from separate kernels; `None` if the structure does not count work.
 ///
 /// # Errors
 /// A kernel does not compile, or the device is lost or hangs.

@@ -1,8 +1,8 @@
-//! Tracing: a buffer of rays in, a buffer of answers out, whatever the structure is like inside.
+//! Tracing: a buffer of rays in, a buffer of answers out, for any structure.
 //!
-//! A structure is either *inline*, a kernel module with `closest_hit` and `any_hit` that other kernels
-//! import, or a *pipeline*, an object that records the passes which answer a buffer of rays
-//! ([`TracePasses`]). A [`Tracer`] sees no difference: an inline structure is a pipeline of one pass.
+//! A structure is either *inline*, a kernel module with `closest_hit` and `any_hit` that other
+//! kernels import, or a *pipeline*, an object that records passes to answer a buffer of rays
+//! ([`TracePasses`]). To a [`Tracer`], an inline structure is a pipeline of one pass.
 
 mod batch;
 mod passes;
@@ -23,30 +23,30 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What is asked of each ray.
+/// The query for each ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Query {
     /// The nearest hit.
     Closest,
-    /// Whether there is a hit.
+    /// Any hit.
     Any,
 }
 
-/// What a tracer is made for.
+/// Options of a tracer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ask {
-    /// What is asked of each ray.
+    /// The query for each ray.
     pub query: Query,
-    /// Whether work is counted instead of answers kept.
+    /// Counts work and stores it with the answers.
     pub counters: bool,
-    /// Whether neighbouring rays are alike: see `Auto`.
+    /// True if neighbouring rays are similar: see `Auto`.
     pub coherent: bool,
-    /// Whether the driver's checks are on.
+    /// Enables the driver's runtime checks.
     pub runtime_checks: bool,
 }
 
 impl From<Query> for Ask {
-    /// Answers, with the driver's checks, of rays of which nothing is known.
+    /// Answers only, with runtime checks, for rays that are not coherent.
     fn from(query: Query) -> Self {
         Self {
             query,
@@ -57,13 +57,13 @@ impl From<Query> for Ask {
     }
 }
 
-/// Where rays are read and answers written.
+/// Buffers of rays and answers.
 #[derive(Debug, Clone)]
 pub struct RayBuffers {
     /// 32 bytes per ray: origin, `t_min`, direction, `t_max`.
     pub rays: Storage,
-    /// 16 bytes per ray: a hit (`t`, triangle, u, v), or 1 or 0 and zeros for [`Query::Any`]; 32 where work
-    /// is counted, the counters first.
+    /// 16 bytes per ray: a hit (`t`, triangle, u, v), or 1 or 0 and zeros for [`Query::Any`]; 32 if
+    /// work is counted, counters first.
     pub answers: Storage,
     /// At least 4 bytes: the kernels' error word, to which bits are added.
     pub status: Storage,
@@ -80,10 +80,10 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Compiles what the structure needs to answer the query.
+    /// Compiles the kernels for the query.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, or work is to be counted and the structure counts none.
+    /// A kernel does not compose or compile, or the structure does not count the requested work.
     pub fn new(
         gpu: &Gpu,
         triangles: &TriangleBuffers,
@@ -112,16 +112,16 @@ impl Tracer {
         Ok(tracer)
     }
 
-    /// Whether the structure can count its work.
+    /// True if the structure can count its work.
     pub fn counts_work(&self) -> bool {
         self.traced.passes.counts_work()
     }
 
-    /// Adds the passes that answer rays `range.start … range.end − 1` of the buffers; each answer goes to
-    /// the place of its ray.
+    /// Adds the passes that answer rays `range.start … range.end − 1` of the buffers; each answer
+    /// is stored at the index of its ray.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, or a pass names a buffer that nobody gave.
+    /// A kernel does not compose or compile, or a pass uses an unknown buffer.
     pub fn record(
         &self,
         recording: &mut Recording,
@@ -131,7 +131,7 @@ impl Tracer {
         self.record_live(recording, buffers, range, None)
     }
 
-    /// The same, where the device knows how many of the rays there are.
+    /// The same, with the number of rays on the device.
     ///
     /// # Errors
     /// As [`Tracer::record`].
@@ -147,7 +147,7 @@ impl Tracer {
         self.record_steps(steps)
     }
 
-    /// [`Tracer::record`] with at most so many workgroups in a row.
+    /// [`Tracer::record`] with a limit on the workgroups in a row.
     fn record_in_rows(
         &self,
         recording: &mut Recording,
@@ -210,14 +210,13 @@ impl Tracer {
         pipelines.values().map(|p| p.kernel.wgsl.clone()).collect()
     }
 
-    /// Milliseconds that the first use of each pass's kernel cost, once it ran; see [`Pipeline::cold_ms`].
+    /// Milliseconds of the first use of each pass's kernel, once it ran; see [`Pipeline::cold_ms`].
     pub fn cold_ms(&self) -> Vec<(String, Option<f64>)> {
         let pipelines = self.pipelines();
         let entries = pipelines.into_iter();
         entries.map(|(pass, p)| (pass, p.cold_ms())).collect()
     }
 
-    /// BLAKE3 of the kernels.
     fn hash(&self) -> String {
         let hashes: Vec<(String, String)> = self
             .pipelines()

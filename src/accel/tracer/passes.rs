@@ -6,27 +6,25 @@ use raystone_gpu::{
 };
 use std::ops::Range;
 
-/// A structure that answers a buffer of rays in passes of its own: rays may be sorted, compacted, traced by
-/// levels, and put back.
+/// A structure with its own passes, which may sort, compact, trace by level, and reorder.
 pub trait TracePasses: Send + Sync {
-    /// Buffers that the passes need beside rays, answers and the structure's arrays, for so many rays:
-    /// names of kernel variables, and bytes. What they hold at first is unspecified.
+    /// Additional buffers: kernel variable names and bytes, with unspecified initial content.
     fn scratch(&self, _rays: u32) -> Vec<(&'static str, u64)> {
         Vec::new()
     }
-    /// Whether the passes count work where that is asked for; where not, no counters are shown.
+    /// True if the passes can count work; otherwise no counters are shown.
     fn counts_work(&self) -> bool {
         false
     }
-    /// Records the passes that answer the rays of `steps`. With no rays at all they are recorded, too, to
-    /// be compiled, and not played.
+    /// Records the passes that answer the rays of `steps`. With zero rays, passes are recorded for
+    /// compilation only, and not played.
     ///
     /// # Errors
     /// A kernel does not compose or compile.
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError>;
 }
 
-/// An inline structure: each ray by an invocation of its own, or by one that is refilled.
+/// An inline structure: one invocation per ray, or refilled invocations.
 pub(super) struct OnePass(pub RefillParameters);
 
 impl TracePasses for OnePass {
@@ -37,45 +35,46 @@ impl TracePasses for OnePass {
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
         let (ask, gpu) = (steps.tracer.ask, &steps.tracer.gpu);
         let refilled = self.0.applies(ask.coherent, gpu.is_software());
-        let lanes = match refilled {
-            true => self.0.lanes(steps.count, steps.lanes()),
-            false => steps.count,
+        let lanes = if refilled {
+            self.0.lanes(steps.count, steps.lanes())
+        } else {
+            steps.count
         };
         let kernel = Composition::new("integrator/trace_rays").feature("refill", refilled);
-        match refilled {
-            true => steps.run_counted("trace", kernel, steps.groups(lanes), &Bindings::new()),
-            false => steps.run_rays("trace", kernel, &Bindings::new()),
+        if refilled {
+            steps.run_counted("trace", kernel, steps.groups(lanes), &Bindings::new())
+        } else {
+            steps.run_rays("trace", kernel, &Bindings::new())
         }
     }
 }
 
-/// What passes are recorded with.
+/// Recorder of a structure's passes.
 ///
-/// Kernels find bound: the canonical triangles, the structure's arrays and uniforms, its scratch, `rays`,
-/// `hits` (or `work`), `status`, and the uniform `batch` with the members `first` and `count`.
+/// Kernels can bind: triangles, the structure's arrays and uniforms, its scratch, `rays`, `hits`
+/// (or `work`), `status`, and the uniform `batch` with the members `first` and `count`.
 pub struct TraceSteps<'a> {
     tracer: &'a Tracer,
     recording: &'a mut Recording,
     bindings: Bindings,
     row: u32,
-    /// The first ray to be answered.
+    /// The first ray.
     pub first: u32,
-    /// How many are; where the device knows better, at most.
+    /// Number of rays; an upper bound if `live` is set.
     pub count: u32,
-    /// How many of them there are, if that stands on the device. A structure may answer the others, too; kernels that are run by
-    /// [`TraceSteps::run_rays`] leave them out.
+    /// The number of rays if stored on the device. A structure may answer the others too; kernels
+    /// run by [`TraceSteps::run_rays`] skip them.
     pub live: Option<LiveRays>,
 }
 
-/// How many rays of a buffer there are, where the device decides.
+/// A ray count stored on the device.
 #[derive(Debug, Clone)]
 pub struct LiveRays {
     /// Words on the device.
     pub counts: Storage,
-    /// Which of them is the number.
+    /// Index of the count among them.
     pub word: u32,
-    /// Workgroups for as many rays or more: with as many invocations as the structure's kernels have, see
-    /// [`TraceSteps::lanes`].
+    /// Workgroups for at least that many rays, with [`TraceSteps::lanes`] invocations each.
     pub groups: Groups,
 }
 
@@ -111,7 +110,7 @@ impl<'a> TraceSteps<'a> {
         self.bindings.buffer(name, scratch);
     }
 
-    /// What is asked of each ray.
+    /// The query for each ray.
     pub fn query(&self) -> Query {
         self.tracer.ask.query
     }
@@ -125,17 +124,18 @@ impl<'a> TraceSteps<'a> {
         found.ok_or_else(|| GpuError::Kernel(format!("a pass names the buffer `{name}`, which is neither scratch nor an array of the structure")))
     }
 
-    /// Invocations of a workgroup: 64 in the passes of structures that have their own.
+    /// Invocations per workgroup: 64 for structures with their own passes.
     pub fn lanes(&self) -> u32 {
         self.tracer.traced.workgroup.lanes()
     }
 
-    /// Workgroups for a kernel of one dimension with so many invocations.
+    /// Workgroups for a one-dimensional kernel with this many invocations.
     pub fn groups(&self, items: u32) -> [u32; 3] {
         let [x, y, z] = grid_of(items.div_ceil(self.lanes()));
-        match x > self.row {
-            true => [self.row, y * x.div_ceil(self.row), z],
-            false => [x, y, z],
+        if x > self.row {
+            [self.row, y * x.div_ceil(self.row), z]
+        } else {
+            [x, y, z]
         }
     }
 
@@ -149,9 +149,10 @@ impl<'a> TraceSteps<'a> {
         Ok(())
     }
 
-    /// Runs a kernel of one dimension with an invocation per ray: for all of them, or, where the device knows how many there are, for
-    /// about as many. It is composed with the feature `counted` then, and finds that number in `live[batch.word]`;
-    /// `batch` is what [`TraceSteps::rays_from`] says, which `special` can say otherwise.
+    /// Runs a one-dimensional kernel with an invocation per ray: for all of them, or, if the count
+    /// is on the device, for about that many. The kernel then has the feature `counted` and reads
+    /// the count from `live[batch.word]`. `batch` is that of [`TraceSteps::rays_from`] unless
+    /// `special` overrides it.
     ///
     /// # Errors
     /// As [`TraceSteps::run`].
@@ -168,7 +169,7 @@ impl<'a> TraceSteps<'a> {
         self.run_counted(name, kernel, groups, special)
     }
 
-    /// The same in so many workgroups, for kernels that share the rays out among their invocations.
+    /// The same with this many workgroups, for kernels that share out the rays themselves.
     ///
     /// # Errors
     /// As [`TraceSteps::run`].
@@ -191,7 +192,7 @@ impl<'a> TraceSteps<'a> {
         self.run(&name, kernel, groups, &bindings.merged(special))
     }
 
-    /// The uniform `batch` for as many rays, the first of which stands there.
+    /// The uniform `batch` for the same number of rays, starting at `first`.
     pub fn rays_from(&self, first: u32) -> UniformValues {
         let batch = rays_of_batch(first, self.count);
         match &self.live {
@@ -200,8 +201,8 @@ impl<'a> TraceSteps<'a> {
         }
     }
 
-    /// Runs a kernel with the structure, the tests and the query in it. What `special` binds goes before
-    /// the buffers and values of those names. A pass has one kernel: `name` decides.
+    /// Runs a kernel with the structure, the tests and the query. Bindings in `special` override
+    /// those of the same name. A pass has one kernel: `name` decides.
     ///
     /// # Errors
     /// The kernel does not compose or compile.
@@ -219,7 +220,7 @@ impl<'a> TraceSteps<'a> {
     }
 }
 
-/// The uniform `batch`: which rays of the buffer a kernel looks at.
+/// The uniform `batch`: the range of rays for a kernel.
 pub(crate) fn rays_of_batch(first: u32, count: u32) -> UniformValues {
     UniformValues::new().u32("first", first).u32("count", count)
 }

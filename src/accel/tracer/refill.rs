@@ -1,10 +1,11 @@
-//! Lane refill: an invocation of the batch kernel that is done with a ray begins its next one, instead of
-//! waiting for the longest ray of its vector.
+//! Lane refill: an invocation of the batch kernel that finishes a ray starts its next one, instead
+//! of waiting for the longest ray of its vector.
 //!
-//! T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009, §4 ("persistent
-//! threads", "replacing terminated rays"), here without atomics: each workgroup has a run of rays of its
-//! own, and each invocation its share of them. Kernel: `kernels/integrator/trace_rays.wesl`; a structure
-//! that can be refilled exports `Traversal`, `begin` and `advance` beside `trace`.
+//! T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009, §4
+//! ("persistent threads", "replacing terminated rays"), here without atomics: each workgroup has
+//! its own run of rays, and each invocation a share of it. Kernel:
+//! `kernels/integrator/trace_rays.wesl`; a refillable structure exports `Traversal`, `begin` and
+//! `advance` in addition to `trace`.
 
 use raystone_core::parameters;
 
@@ -20,17 +21,15 @@ parameters! {
 
     /// When invocations are refilled.
     pub(crate) enum Refill {
-        /// Never.
         None = "none",
-        /// Where it was measured to pay.
+        /// Where measurements show a gain.
         Auto = "auto",
-        /// For all rays, on all adapters.
         Always = "always",
     }
 }
 
-/// Workgroups that a dispatch has at least, if it has as many rays: with fewer, rays per invocation are
-/// fewer. It is enough for the cores of a software adapter.
+/// Minimum workgroups of a dispatch, if it has enough rays: rays per invocation are reduced to
+/// reach it. It is enough for the cores of a software adapter.
 const LEAST_GROUPS: u32 = 16;
 
 impl RefillParameters {
@@ -40,7 +39,7 @@ impl RefillParameters {
         rays_per_lane: 1,
     };
 
-    /// Whether invocations are refilled, for rays whose neighbours are alike or not.
+    /// True if invocations are refilled, for coherent rays or others.
     pub(super) fn applies(&self, coherent: bool, software: bool) -> bool {
         match self.refill {
             Refill::None => false,
@@ -49,7 +48,7 @@ impl RefillParameters {
         }
     }
 
-    /// Invocations for so many rays, in workgroups of so many.
+    /// Invocations for this many rays, in workgroups of `of_group`.
     pub(super) fn lanes(&self, rays: u32, of_group: u32) -> u32 {
         let few = rays / (LEAST_GROUPS * of_group);
         rays.div_ceil(few.clamp(1, self.rays_per_lane))

@@ -6,10 +6,10 @@ use crate::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
 use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
 use std::sync::Arc;
 
-/// The canonical triangles on the device, and how rays meet them.
+/// The canonical triangles on the device, and how rays intersect them.
 #[derive(Clone)]
 pub struct TriangleBuffers {
-    /// `triangles`, in as many parts as the adapter asks for.
+    /// `triangles`, in as many parts as the adapter's limits require.
     pub bindings: Bindings,
     /// The tests.
     pub intersection: Intersection,
@@ -35,20 +35,20 @@ impl TriangleBuffers {
     }
 }
 
-/// What kernels need to trace with a structure: its module, features, constants, arrays and uniforms, or
-/// the passes that stand for them.
+/// Everything that kernels need to trace with a structure: its module, features, constants, arrays
+/// and uniforms, or its own passes.
 #[derive(Clone)]
 pub struct Traced {
-    /// What the structure handed over, less the arrays and uniforms, which are bound.
+    /// The structure's data, without the arrays and uniforms, which are bound.
     active: GpuBuffers<'static>,
     pub(super) passes: Arc<dyn TracePasses>,
-    /// Whether other kernels can import it.
+    /// True if other kernels can import it.
     inline: bool,
     /// Arrays and uniforms of the structure.
     pub bindings: Bindings,
-    /// Workgroups of the kernels that trace with it.
+    /// Workgroup shape of the kernels that trace with it.
     pub workgroup: GroupShape,
-    /// Where triangles are met: decides which judge and which images it is compared with.
+    /// The space in which triangles are intersected: selects the reference for hits and images.
     pub space: Space,
 }
 
@@ -64,7 +64,7 @@ impl Traced {
             if built.divisible().contains(&array.name) {
                 bindings.parts(array.name, &gpu.storage_parts(array.name, &array.words)?);
             } else {
-                // What a kernel reads as a texture may exceed what it can bind as a buffer.
+                // Data read as a texture may exceed the buffer binding limit.
                 bindings.buffer(array.name, &gpu.array(array.name, &array.words)?);
             }
         }
@@ -84,9 +84,10 @@ impl Traced {
             Access::Inline => (true, Arc::new(OnePass(built.refill()))),
             Access::Pipeline(passes) => (false, passes),
         };
-        let workgroup = match inline {
-            true => Workgroup::default().shape(gpu),
-            false => GroupShape::default(),
+        let workgroup = if inline {
+            Workgroup::default().shape(gpu)
+        } else {
+            GroupShape::default()
         };
         Ok(Self {
             active,
@@ -98,15 +99,15 @@ impl Traced {
         })
     }
 
-    /// Whether a kernel of another part can import it: a pipeline answers buffers of rays alone.
+    /// True if other kernels can import it; a pipeline only answers buffers of rays.
     pub fn is_inline(&self) -> bool {
         self.inline
     }
 
-    /// The same, traced in other workgroups.
+    /// The same with another workgroup shape.
     ///
     /// # Errors
-    /// A structure with passes of its own, unless `workgroup` is the default: it has workgroups of its own, too.
+    /// A structure with its own passes, and thus workgroups, supports the default only.
     pub fn in_workgroups(mut self, gpu: &Gpu, workgroup: &Workgroup) -> Result<Self, GpuError> {
         if self.inline {
             self.workgroup = workgroup.shape(gpu);

@@ -1,24 +1,24 @@
-//! Workgroups: how many invocations of a kernel that traces start together, and which pixels these are.
+//! Workgroups: how many invocations of a tracing kernel start together, and their pixels.
 //!
-//! Hits and images do not depend on it, times do. What traces a buffer of rays takes them in their order, as many as
-//! the workgroup has invocations; what traces an image takes rectangles of pixels of this shape. Kernels read
-//! `GROUP_WIDTH` and `GROUP_HEIGHT` of `package::active::constants`.
+//! The choice affects times, but not hits and images. Kernels for a buffer of rays process them in
+//! order, one per invocation; kernels for an image process rectangles of pixels of this shape.
+//! Kernels read `GROUP_WIDTH` and `GROUP_HEIGHT` of `package::active::constants`.
 
 use raystone_core::params::{Kinds, Named};
 use raystone_gpu::{Composition, Gpu, WORKGROUP_EDGE};
 
-/// An entry of the axis `workgroup`.
+/// A value of the `workgroup` axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Workgroup {
-    /// Name as a user types it.
+    /// Name used in configurations.
     pub name: &'static str,
-    /// One line: what it is.
+    /// One-line description.
     pub description: &'static str,
-    /// Invocations across and down; `None`: what measured best on adapters of this type.
+    /// Invocations across and down; `None`: the best measured shape for adapters of this type.
     edges: Option<[u32; 2]>,
 }
 
-/// Everything that can be named on the `workgroup` axis.
+/// The values of the `workgroup` axis.
 pub type WorkgroupRegistry = Kinds<Workgroup>;
 
 impl Named for Workgroup {
@@ -42,7 +42,7 @@ impl Default for Workgroup {
 }
 
 impl Workgroup {
-    /// Every workgroup of the program, the default first.
+    /// All workgroup shapes, the default first.
     pub const ALL: [Self; 7] = [
         Self {
             name: "auto",
@@ -78,7 +78,7 @@ impl Workgroup {
         GroupShape(self.edges.unwrap_or(Self::measured(gpu.is_software())))
     }
 
-    /// Squares of 8 × 8 on adapters of every type: on software adapters no size measured better than another
+    /// 8 × 8 on all adapters: on software adapters no size measured better than another
     /// (docs/performance.md), on others none was measured.
     const fn measured(_is_software: bool) -> [u32; 2] {
         [WORKGROUP_EDGE; 2]
@@ -90,19 +90,19 @@ impl Workgroup {
 pub struct GroupShape([u32; 2]);
 
 impl Default for GroupShape {
-    /// That of all kernels that no workgroup was chosen for.
+    /// The shape of kernels without a chosen workgroup.
     fn default() -> Self {
         Self([WORKGROUP_EDGE; 2])
     }
 }
 
 impl GroupShape {
-    /// All invocations.
+    /// Number of invocations.
     pub fn lanes(self) -> u32 {
         self.0[0] * self.0[1]
     }
 
-    /// Workgroups that cover so many columns and rows of pixels.
+    /// Workgroups that cover this many columns and rows of pixels.
     pub fn over(self, columns: u32, rows: u32) -> [u32; 3] {
         [columns.div_ceil(self.0[0]), rows.div_ceil(self.0[1]), 1]
     }

@@ -1,7 +1,7 @@
 //! Binned SAH, in place and on all cores.
 //!
-//! Bins divide the box of a node rather than that of its centres. The cost of a split takes both
-//! sides for leaves, which overrates large sides, so among many borders the cheapest is often one that
+//! Bins divide the box of a node rather than that of its centres. The cost of a split assumes that
+//! both sides are leaves, which overrates large sides, so among many borders the cheapest often
 //! cuts a few large triangles off an end. Borders spread evenly over the box rarely do that:
 //! Sponza's SAH is 70 to 72 over the box and 74 to 81 over the centres, for 8 to 32 bins.
 //!
@@ -16,12 +16,11 @@ use crate::bounds::Bounds;
 use glam::Vec3A;
 use rayon::prelude::*;
 
-/// Up to so many references every partition is tried.
+/// Up to this many references, every partition is tried.
 const EXHAUSTIVE: usize = 4;
-/// Nodes of more references are binned by several threads.
+/// Nodes with more references are binned by several threads.
 const PARALLEL_BINNING: usize = 1 << 16;
 
-/// The tree over `references`.
 pub(super) fn build(mut references: Vec<Reference>, settings: &TreeParameters) -> Tree {
     let bounds = bounds_of(&references);
     let whole = (&mut references[..], bounds);
@@ -41,8 +40,7 @@ pub(super) fn build(mut references: Vec<Reference>, settings: &TreeParameters) -
     tree.into()
 }
 
-/// Partitions `references`; returns where the second half starts and the boxes of both. `None` makes a
-/// leaf.
+/// Partitions `references`; returns the start of the second half and both boxes. `None`: a leaf.
 fn split(
     references: &mut [Reference],
     bounds: Box3,
@@ -65,8 +63,7 @@ fn split(
     })
 }
 
-/// Halves, in an order that depends on the input alone: for nodes whose centres coincide, or that
-/// are already deep.
+/// Halves in an order given by the input alone: for equal centres, or below the SAH depth.
 pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize, [Box3; 2]) {
     let middle = references.len() / 2;
     references.sort_unstable_by(|a, b| a.compare(b, axis));
@@ -78,7 +75,7 @@ pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize,
 fn exhaustive_split(references: &mut [Reference]) -> (usize, [Box3; 2]) {
     let count = references.len();
     let all = (1_usize << count) - 1;
-    // Boxes and costs of all subsets, each made of a smaller one.
+    // Boxes and costs of all subsets, each built from a smaller one.
     let mut subsets = [Box3::EMPTY; 1 << EXHAUSTIVE];
     let mut costs = [0.0_f32; 1 << EXHAUSTIVE];
     for subset in 1..=all {
@@ -87,7 +84,7 @@ fn exhaustive_split(references: &mut [Reference]) -> (usize, [Box3; 2]) {
         subsets[subset] = subsets[smaller].union(lowest);
         costs[subset] = subsets[subset].half_area() * subset.count_ones() as f32;
     }
-    // The last reference stays in the second half: each partition comes up once.
+    // The last reference stays in the second half, so each partition occurs once.
     let mut chosen = 1;
     for subset in 2..=all / 2 {
         if costs[subset] + costs[all - subset] < costs[chosen] + costs[all - chosen] {
@@ -104,7 +101,6 @@ fn exhaustive_split(references: &mut [Reference]) -> (usize, [Box3; 2]) {
     (middle, [subsets[chosen], subsets[all - chosen]])
 }
 
-/// A border between two bins.
 pub(super) struct BinSplit {
     axis: usize,
     grid: BinGrid,
@@ -116,7 +112,7 @@ pub(super) struct BinSplit {
 }
 
 impl BinSplit {
-    /// Whether a reference belongs to the first side.
+    /// True if a reference belongs to the first side.
     pub(super) fn is_low(&self, reference: &Reference) -> bool {
         let (min, max) = (reference.min[self.axis], reference.max[self.axis]);
         let (origin, scale) = (self.grid.origin[self.axis], self.grid.scale[self.axis]);
@@ -124,7 +120,7 @@ impl BinSplit {
     }
 }
 
-/// Where the bins lie: as many on each axis.
+/// A grid of bins: the same number on each axis.
 #[derive(Clone, Copy)]
 struct BinGrid {
     origin: Vec3A,
@@ -136,7 +132,7 @@ impl BinGrid {
     fn new(over: Box3, bins: usize) -> Option<Self> {
         let extent = over.max - over.min;
         let scale = Vec3A::splat(bins as f32 - 1.0) / extent;
-        // An axis without extent, or with an infinite one, puts everything into bin 0.
+        // An axis with zero or infinite extent puts everything into bin 0.
         let usable = extent.cmpgt(Vec3A::ZERO) & scale.cmplt(Vec3A::INFINITY);
         usable.any().then(|| Self {
             origin: over.min,
@@ -144,14 +140,13 @@ impl BinGrid {
         })
     }
 
-    /// Bins of a centre.
     fn bins(&self, centre: Vec3A) -> [usize; 3] {
         ((centre - self.origin) * self.scale).to_array().map(bin_of)
     }
 }
 
-/// The bin at a place in units of bins. Adding 2²³ rounds to the nearest integer and leaves it in the
-/// low bits; whatever the input, the bin exists.
+/// The bin of a position in bin units. Adding 2²³ rounds to the nearest integer in the low bits;
+/// the bin exists for any input.
 fn bin_of(place: f32) -> usize {
     (place + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
 }
@@ -209,8 +204,8 @@ impl<const N: usize> Bins<N> {
 
 /// The best border between bins of all axes; `None` if all centres coincide.
 ///
-/// Bins divide the box of the node, not that of the centres: see the module's text. Where all
-/// centres fall into one such bin of each axis, their own box is divided.
+/// Bins divide the box of the node, not that of the centres: see the module's text. If all centres
+/// fall into a single bin on each axis, their own box is divided.
 pub(super) fn best_bin_split(
     references: &[Reference],
     bounds: Box3,
@@ -219,7 +214,7 @@ pub(super) fn best_bin_split(
     let bins = bins.min(references.len().max(4));
     let over = |grid_box: Box3| {
         let grid = BinGrid::new(grid_box, bins)?;
-        // Small nodes are the most, and their bins cost more than their references.
+        // Most nodes are small, and for them bins cost more than references.
         match bins {
             0..=8 => best_border::<8>(references, grid, bins),
             9..=16 => best_border::<16>(references, grid, bins),
@@ -278,8 +273,8 @@ fn best_border<const N: usize>(
     })
 }
 
-/// Moves the references of the first side to the front; returns how many there are. Every one is
-/// swapped, since a branch would be mispredicted half the time.
+/// Moves the references of the first side to the front; returns their number. Every one is swapped,
+/// since a branch would be mispredicted half the time.
 fn partition(references: &mut [Reference], is_low: impl Fn(&Reference) -> bool) -> usize {
     let mut middle = 0;
     for place in 0..references.len() {

@@ -1,35 +1,36 @@
-//! What `validate()` of a structure over triangles checks.
+//! The checks of `validate()` for structures over triangles.
 //!
-//! A triangle may stand in several leaves, none of which contains its box T (after spatial splits). Each
-//! point of the triangle must then lie in one of their boxes.
+//! A triangle may be in several leaves, none of which contains its box T (after spatial splits).
+//! Each point of the triangle must then lie in one of their boxes.
 //!
-//! Where spatial splits cut boxes and not triangles (`spatial_clip = false`), these leaves together even
-//! *cover* T, and the theorem of `docs/design.md` holds for any ray. Let the triangle's hit at t be the
-//! final answer. On each axis a, the computed slab distances of T's sides bound an interval; let t_a be t
-//! clamped into it. The computed distance is monotone in the coordinate, so some coordinate y_a of T, or
-//! one as near as we like, has the distance t_a. The point y lies in T, hence in some box B of the finite
-//! cover, and by monotonicity n(B) ≤ max t_a ≤ max(t, n(T)) and f(B) ≥ min t_a ≥ min(t, f(T)). With
-//! t ≤ f(T)(1 + p) and n(T)(1 − p) ≤ t, the four inequalities of the theorem follow for B, and for
-//! every box around B. No pad is needed, and nothing is assumed about where in T the hit lies.
+//! Where spatial splits cut boxes and not triangles (`spatial_clip = false`), these leaves together
+//! even *cover* T, and the theorem of `docs/design.md` holds for any ray. Let the triangle's hit at
+//! t be the final answer. On each axis a, the computed slab distances of T's sides bound an
+//! interval; let t_a be t clamped into it. The computed distance is monotone in the coordinate, so
+//! some coordinate y_a of T, or one arbitrarily close, has the distance t_a. The point y lies in T,
+//! hence in some box B of the finite cover, and by monotonicity n(B) ≤ max t_a ≤ max(t, n(T)) and
+//! f(B) ≥ min t_a ≥ min(t, f(T)). With t ≤ f(T)(1 + p) and n(T)(1 − p) ≤ t, the four inequalities
+//! of the theorem follow for B, and for every box around B. No pad is needed, and nothing is
+//! assumed about where in T the hit lies.
 //!
-//! Where triangles are clipped, the same follows if y lies within the margin of the triangle: it does
-//! unless the ray is almost in its plane (`src/accel/spatial.rs`).
+//! Where triangles are clipped, the same follows if y lies within the margin of the triangle: it
+//! does unless the ray is almost in its plane (`src/accel/spatial.rs`).
 
 use crate::bounds::Bounds;
 use crate::polygon::Polygon;
 use crate::triangle::TriangleRecord;
 use crate::{AccelError, TriangleSoup};
 
-/// A node that is still to be looked at, and the box that it must lie in.
+/// An unvisited node, and the box that it must lie in.
 pub(super) type Below = (usize, Bounds);
 
-/// Bookkeeping of `validate()`: every node reached once, and every triangle in a leaf that contains
-/// it or in several that together cover it. More leaves than needed are a waste, which
-/// `references` of the statistics shows, but no fault.
+/// State of `validate()`: every node is reached once, and every triangle is in a leaf that contains
+/// it or in several that together cover it. More leaves than needed are wasteful (see `references`
+/// of the statistics), but no fault.
 pub struct Coverage<'a> {
     soup: &'a TriangleSoup,
     nodes: Vec<bool>,
-    /// Whether a leaf contains the whole triangle.
+    /// True if a leaf contains the whole triangle.
     contained: Vec<bool>,
     /// Leaves that contain a part of a triangle.
     parts: Vec<(u32, Bounds)>,
@@ -46,9 +47,9 @@ impl<'a> Coverage<'a> {
         }
     }
 
-    /// Goes down from node 0 and checks that every node is reached once, none on more than `most_levels`
-    /// levels, and nothing is missed. `look` checks a node, given the box around it, and appends its children
-    /// with theirs.
+    /// Traverses from node 0 and checks that every node is reached once, with at most `most_levels`
+    /// levels, and that none is missing. `look` checks a node, given the box around it, and appends
+    /// its children with theirs.
     ///
     /// # Errors
     /// The first violated invariant, with the node.
@@ -75,7 +76,7 @@ impl<'a> Coverage<'a> {
         self.is_complete()
     }
 
-    /// Notes that a node is reached.
+    /// Records that a node is reached.
     ///
     /// # Errors
     /// It does not exist or was reached before.
@@ -90,11 +91,10 @@ impl<'a> Coverage<'a> {
         Ok(())
     }
 
-    /// Notes the triangles of a leaf with these bounds; `None` is a range outside the array.
+    /// Records the triangles of a leaf with these bounds; `None` is a range outside the array.
     ///
     /// # Errors
-    /// The range does not exist, or a triangle differs from the scene's, is in the leaf twice, or lies
-    /// outside it.
+    /// The range does not exist, or a triangle is wrong, twice in the leaf, or outside it.
     pub fn leaf(
         &mut self,
         triangles: Option<&[TriangleRecord]>,
@@ -123,7 +123,7 @@ impl<'a> Coverage<'a> {
         Ok(())
     }
 
-    /// Checks that nothing was missed.
+    /// Checks that nothing is missing.
     ///
     /// # Errors
     /// A node was not reached, or a triangle is in no leaf, or its leaves do not cover it.
@@ -158,13 +158,13 @@ impl<'a> Coverage<'a> {
     }
 }
 
-/// Whether two closed boxes have a point in common.
+/// True if two closed boxes have a point in common.
 fn meet(a: &Bounds, b: &Bounds) -> bool {
     (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
 }
 
-/// Whether closed `boxes` together cover `rest`: what sticks out of the first that reaches it must be
-/// covered by the others.
+/// True if closed `boxes` together cover `rest`: the parts outside the first one that overlaps it
+/// must be covered by the others.
 fn covers(boxes: &[Bounds], mut rest: Polygon) -> bool {
     let reaches = |b: &Bounds| {
         (0..3).all(|axis| {
@@ -233,8 +233,7 @@ mod tests {
 
     #[test]
     fn leaves_need_not_hold_the_corners_of_the_box_that_the_triangle_misses() {
-        // Below x = 2 the triangle reaches from y = 0 to 2 and from z = 0 to 8, above it from y = 1 and to
-        // z = 4.
+        // Below x = 2 the triangle spans y = 0 to 2, z = 0 to 8; above, y starts at 1, z ends at 4.
         let low = slab([0.0; 3], [2.0, 2.0, 8.0]);
         let high = |y: f32, z: f32| slab([2.0, y, 0.0], [4.0, 2.0, z]);
         assert_eq!(check(&[low, high(1.0, 4.0)]), Ok(()));

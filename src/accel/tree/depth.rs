@@ -1,19 +1,18 @@
-//! A bound on the depth of trees whose builder knows none.
+//! A bound on the depth of trees whose builder has none.
 
 use super::grow::lay_out;
 use super::{NodeKind, Tree, TreeNode};
 
-/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
-/// `SAH_DEPTH + log2(references) + 1` whatever the input.
+/// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
+/// log2(references) + 1` for any input.
 pub(super) const SAH_DEPTH: u32 = 48;
 
-/// Deepest leaf that a tree of so many references may have.
+/// Maximum leaf depth of a tree with this many references.
 pub(super) fn depth_limit(references: usize) -> u32 {
     SAH_DEPTH + references.max(1).ilog2() + 1
 }
 
-/// `tree`, if it is not too deep; else with everything below [`SAH_DEPTH`] in balanced subtrees over
-/// the same leaves.
+/// `tree`, with balanced subtrees over the same leaves below [`SAH_DEPTH`] if it is too deep.
 pub(super) fn limit_depth(tree: Tree) -> Tree {
     if tree.depth() <= depth_limit(tree.order.len()) {
         return tree;
@@ -46,9 +45,7 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
     })
 }
 
-/// What becomes a subtree.
 enum Part {
-    /// A node of the tree as it was.
     Below(u32),
     /// A balanced tree over these leaves, at least one.
     Balanced(Vec<TreeNode>),
@@ -72,7 +69,6 @@ mod tests {
     use super::*;
     use crate::bounds::Bounds;
 
-    /// A chain of so many leaves.
     fn chain(leaves: u32) -> Tree {
         let mut nodes = Vec::new();
         let bounds = |from: u32| Bounds {

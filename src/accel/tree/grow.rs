@@ -1,9 +1,9 @@
-//! Growing a binary tree from the top, on all cores: what builders do the same.
+//! Top-down construction of a binary tree on all cores, shared by the builders.
 
 use super::{NodeKind, Tree, TreeNode};
 use crate::bounds::Bounds;
 
-/// Subtrees over no more references are built by one thread.
+/// Subtrees with at most this many references are built by one thread.
 pub(crate) const PARALLEL_GRAIN: usize = 4096;
 
 /// Nodes in depth-first order, and the references of their leaves one after the other.
@@ -12,15 +12,15 @@ pub(crate) struct Grown<N> {
     pub order: Vec<u32>,
 }
 
-/// Subtrees under construction, joined by reference and laid out once in the end: copying them at every
-/// level would cost O(n log n).
+/// Subtrees under construction, joined by reference and laid out once at the end: copying them at
+/// every level would cost O(n log n).
 enum Subtree<N> {
     Whole(Grown<N>),
     Inner(N, Box<[Subtree<N>; 2]>),
 }
 
-/// The tree over all of `whole`. `len` counts the references of a part; `split` makes the node above it, given
-/// its depth, and divides it in two, or appends what it lists as a leaf.
+/// The tree over all of `whole`. `len` counts the references of a part; `split` makes the node
+/// above it, given its depth, and splits it in two, or appends a leaf's list.
 pub(crate) fn grow<P: Send, N: Send>(
     whole: P,
     len: impl Fn(&P) -> usize + Sync,
@@ -31,8 +31,7 @@ pub(crate) fn grow<P: Send, N: Send>(
     grown
 }
 
-/// Lays out a tree whose nodes are known, on one thread: `look` tells of a node its box and its children, or
-/// appends what it lists.
+/// Lays out a known tree on one thread: `look` gives box and children, or appends a leaf's list.
 pub(super) fn lay_out<P>(
     root: P,
     look: impl Fn(P, u32, &mut Vec<u32>) -> (Bounds, Option<[P; 2]>),
@@ -82,8 +81,8 @@ impl<N> Grown<N> {
         depth: u32,
         split: &impl Fn(P, u32, &mut Vec<u32>) -> (N, Option<[P; 2]>),
     ) {
-        // What is to be divided, with the parent whose second child it is. No recursion: trees that are only laid
-        // out may be of any depth.
+        // Pending parts, with the parent if the part is its second child. No recursion: trees that
+        // are only laid out may be of any depth.
         let mut open = vec![(part, depth, None)];
         while let Some((part, depth, second_of)) = open.pop() {
             if let Some(parent) = second_of {
@@ -117,7 +116,7 @@ impl<N> Grown<N> {
         here
     }
 
-    /// Tells an inner node that its second child comes next.
+    /// Sets an inner node's second child to the next node.
     fn end_first_child(&mut self, here: usize) {
         let (left, right) = (here as u32 + 1, self.nodes.len() as u32);
         self.nodes[here].1 = NodeKind::Inner { left, right };

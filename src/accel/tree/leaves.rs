@@ -1,13 +1,13 @@
 //! Merging of subtrees that cost more than one leaf over their triangles.
 //!
-//! Greedy builders decide on a leaf before they know what a split would lead to. Here the subtree
-//! exists already, so the decision is exact: for the given splits no other choice of leaves is
+//! Greedy builders decide on a leaf before they know the result of a split. Here the subtree
+//! already exists, so the decision is exact: for the given splits no other choice of leaves is
 //! cheaper.
 
 use super::parameters::TreeParameters;
 use super::{NodeKind, Tree};
 
-/// What is known of a subtree once all below it is decided.
+/// Properties of a subtree once everything below it is decided.
 #[derive(Clone, Copy, Default)]
 struct Below {
     /// Cost with the best choice of leaves, times the area of the root.
@@ -15,14 +15,14 @@ struct Below {
     /// Entries of the order.
     first: u32,
     count: u32,
-    /// Whether all of it is one leaf.
+    /// True if it is a single leaf.
     is_leaf: bool,
-    /// The node behind the subtree in depth-first order.
+    /// The node after the subtree in depth-first order.
     end: u32,
 }
 
-/// Chooses the leaves of `tree`, whose leaves are consecutive runs of the order; a triangle that comes
-/// twice into one leaf is listed there once.
+/// Chooses the leaves of `tree`, whose leaves are consecutive runs of the order; a triangle that
+/// occurs twice in one leaf is listed there once.
 pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &TreeParameters) -> Tree {
     let mut below = vec![Below::default(); tree.nodes.len()];
     let triangles = |first: u32, count: u32| {
@@ -68,7 +68,7 @@ pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &TreePar
     copy_kept(&tree, &below, has_duplicates)
 }
 
-/// Entries without repetition, in the order of their first places.
+/// Distinct entries, in order of first occurrence.
 pub(crate) fn distinct(entries: &[u32]) -> impl Iterator<Item = u32> {
     let is_first = |(place, id): &(usize, &u32)| !entries[..*place].contains(id);
     entries

@@ -1,8 +1,8 @@
-//! The binary tree under `bvh`, `roped-bvh` and their kin: one type, several builders, the same tree
-//! for any number of threads.
+//! The binary tree of `bvh`, `roped-bvh` and related structures: one type, several builders, the
+//! same tree for any number of threads.
 //!
 //! A builder makes a tree down to (nearly) single triangles; rounds of reinsertion may improve it;
-//! then leaves are chosen. Each step has a file of its own.
+//! then leaves are chosen. Each step has its own file.
 
 mod binned;
 mod coverage;
@@ -28,16 +28,16 @@ use parallel::Method;
 use raystone_core::params::Choice as _;
 use sweep::Axes;
 
-/// A node; children of an inner node lie at `left` and `right`.
+/// A node; children of an inner node are at `left` and `right`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeNode {
     /// Box around everything below.
     pub bounds: Bounds,
-    /// What is below.
+    /// The contents.
     pub kind: NodeKind,
 }
 
-/// What a node holds.
+/// The contents of a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NodeKind {
     /// Two children, by node index.
@@ -56,7 +56,7 @@ pub enum NodeKind {
     },
 }
 
-/// Boxes visited for the end-point overlap of a record, about: some tenths of a second.
+/// Limit on boxes visited for a record's end-point overlap: some tenths of a second.
 const EPO_VISITS: u64 = 4_000_000;
 
 /// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.
@@ -64,15 +64,15 @@ const EPO_VISITS: u64 = 4_000_000;
 pub struct Tree {
     /// Nodes; empty for an empty scene.
     pub nodes: Vec<TreeNode>,
-    /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
-    /// stand in several leaves, whose boxes cover it only together.
+    /// Triangle indices, leaf by leaf in node order. After spatial splits a triangle may be in
+    /// several leaves, whose boxes cover it only together.
     pub order: Vec<u32>,
-    /// End-point overlap, where [`Tree::note_epo`] took it.
+    /// End-point overlap, if [`Tree::note_epo`] computed it.
     pub epo: Option<f64>,
 }
 
 impl Tree {
-    /// Builds the tree with the builder that `settings` name; phases are timed in `log`.
+    /// Builds the tree with the builder in `settings`; phases are timed in `log`.
     ///
     /// # Errors
     /// A limit of the builder is exceeded.
@@ -94,13 +94,13 @@ impl Tree {
         }))
     }
 
-    /// Takes the end-point overlap ([`Tree::epo`]) for the record, of every triangle where that is quick and of
-    /// a part else. No part of a build, and not timed.
+    /// Computes the end-point overlap ([`Tree::epo`]) for the record, over all triangles if fast
+    /// enough, otherwise over a subset. Not part of a build, and not timed.
     pub fn note_epo(&mut self, soup: &TriangleSoup) {
         self.epo = Some(self.epo(soup, EPO_VISITS));
     }
 
-    /// The tree of the builder alone.
+    /// The builder's tree, before later steps.
     fn grow(
         soup: &TriangleSoup,
         settings: &TreeParameters,
@@ -119,7 +119,7 @@ impl Tree {
                 Builder::Sbvh => sbvh::build(references, soup, settings),
                 Builder::Ploc => ploc::build(&references, settings, false)?,
                 Builder::PlocReinsertion => ploc::build(&references, settings, true)?,
-                // Of the pair only the one on the host comes here.
+                // Only the host variant of each pair is built here.
                 Builder::HostLbvh | Builder::DeviceLbvh => {
                     parallel::build(soup, &settings.parallel(Method::Lbvh))?.into()
                 }
@@ -138,7 +138,7 @@ impl Tree {
         }
     }
 
-    /// Whether some triangle is listed more than once, in leaves that only together cover it.
+    /// True if some triangle is listed more than once, in leaves that only together cover it.
     pub fn has_duplicates(&self, soup: &TriangleSoup) -> bool {
         self.order.len() > soup.records.len()
     }

@@ -4,9 +4,8 @@ use super::parallel::{self, Method};
 use super::reference::Box3;
 use raystone_core::parameters;
 
-/// Most neighbours on either side that clustering looks at, as in the kernel `nearest`.
+/// Maximum neighbours examined on either side in clustering, as in the kernel `nearest`.
 pub(super) const LARGEST_RADIUS: u32 = 32;
-/// Most bins on an axis.
 pub(super) const MAX_BINS: usize = 32;
 
 parameters! {
@@ -77,23 +76,17 @@ parameters! {
 
     /// Presets of the crate obvhs.
     pub(crate) enum Preset {
-        /// `fastest_build`.
         Fastest = "fastest",
-        /// `very_fast_build`.
         VeryFast = "very-fast",
-        /// `fast_build`.
         Fast = "fast",
-        /// `medium_build`.
         Medium = "medium",
-        /// `slow_build`.
         Slow = "slow",
-        /// `very_slow_build`.
         VerySlow = "very-slow",
     }
 }
 
 impl TreeParameters {
-    /// These, with leaves of one triangle: for structures that merge leaves themselves.
+    /// The same with single-triangle leaves, for structures that merge leaves themselves.
     #[must_use]
     pub(crate) fn with_single_leaves(&self) -> Self {
         Self {
@@ -102,7 +95,7 @@ impl TreeParameters {
         }
     }
 
-    /// What the builders that a device can follow are told.
+    /// Settings of the builders that can run on a device.
     pub(super) fn parallel(&self, method: Method) -> parallel::Settings {
         parallel::Settings {
             method,
@@ -110,14 +103,13 @@ impl TreeParameters {
         }
     }
 
-    /// Clustering with the radius that is set.
     pub(super) fn clustering(&self) -> Method {
         Method::Ploc {
             radius: self.search_radius,
         }
     }
 
-    /// What the device is told, if it is to build.
+    /// Settings for the device, if it is to build.
     pub(crate) fn on_device(&self) -> Option<parallel::Settings> {
         match self.builder {
             Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
@@ -126,12 +118,12 @@ impl TreeParameters {
         }
     }
 
-    /// Most triangles of a node that becomes a leaf whatever it costs.
+    /// Maximum triangles of a node that becomes a leaf at any cost.
     pub(super) fn least_leaf(&self) -> usize {
         self.min_leaf_size.min(self.leaf_size)
     }
 
-    /// Whether no subtree over these references can be cheaper than a leaf, decided without
+    /// True if no subtree over these references can be cheaper than a leaf, decided without
     /// building one: each reference lies in some leaf at least as large as itself.
     pub(super) fn must_be_leaf(
         &self,
@@ -142,7 +134,7 @@ impl TreeParameters {
         if count <= self.least_leaf().max(1) {
             return true;
         }
-        // Reinsertion wants leaves of one triangle; those that do not pay are merged after it.
+        // Reinsertion wants leaves of one triangle; unprofitable ones are merged after it.
         if count > self.leaf_size || self.reinsertion > 0 {
             return false;
         }

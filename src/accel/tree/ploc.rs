@@ -1,7 +1,7 @@
-//! Parallel locally-ordered clustering, as the crate `obvhs` builds it.
+//! Parallel locally-ordered clustering by the crate `obvhs`.
 //!
-//! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
-//! construction", 2018.
+//! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume
+//! hierarchy construction", 2018.
 
 use super::Tree;
 use super::depth::limit_depth;
@@ -15,7 +15,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
-/// Boxes whose coordinates exceed this have areas that are not finite, and obvhs compares areas.
+/// Boxes with larger coordinates have infinite areas, and obvhs compares areas.
 const LARGEST_COORDINATE: f32 = 1e18;
 
 impl Boundable for Reference {
@@ -25,7 +25,7 @@ impl Boundable for Reference {
     }
 }
 
-/// The parameters of obvhs' presets. Those that split triangles do without: see `sbvh`.
+/// The parameters of obvhs' presets, without triangle splitting: see `sbvh`.
 fn preset(preset: Preset) -> BvhBuildParams {
     match preset {
         Preset::Fastest => BvhBuildParams::fastest_build(),
@@ -71,7 +71,6 @@ pub(super) fn build(
     Ok(limit_depth(take_over(&bvh)))
 }
 
-/// The nodes in depth-first order.
 fn take_over(bvh: &Bvh2) -> Tree {
     lay_out(0, |index: u32, _, order| {
         let node = &bvh.nodes[index as usize];

@@ -1,4 +1,4 @@
-//! Figures that tell how good a tree is: SAH cost and end-point overlap.
+//! Quality metrics of trees: SAH cost and end-point overlap.
 
 use super::{NodeKind, Tree, TreeNode};
 use crate::StructureStats;
@@ -7,14 +7,13 @@ use crate::polygon::Polygon;
 use crate::triangle::TriangleRecord;
 use rayon::prelude::*;
 
-/// Triangles whose overlap one task sums up: a constant, so that the sum does not depend on the
-/// number of threads.
+/// Triangles per task; constant, so that the sum does not depend on the number of threads.
 const TRIANGLES_PER_TASK: usize = 16;
-/// Triangles between two looks at the budget.
+/// Triangles between two checks of the budget.
 const TRIANGLES_PER_BATCH: usize = 128;
 
 impl Tree {
-    /// Deepest leaf; the root has depth 0.
+    /// Depth of the deepest leaf; the root has depth 0.
     pub fn depth(&self) -> u32 {
         let mut depths = vec![0u32; self.nodes.len()];
         let mut deepest = 0;
@@ -28,8 +27,8 @@ impl Tree {
         deepest
     }
 
-    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1: sum over
-    /// inner nodes of A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
+    /// Statistics of the tree; `bytes` is left 0. SAH with both constants 1: sum over inner nodes
+    /// of A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
     pub fn stats(&self) -> StructureStats {
         let leaves = self.nodes.iter().filter_map(|node| match node.kind {
             NodeKind::Inner { .. } => None,
@@ -50,12 +49,13 @@ impl Tree {
 
     /// End-point overlap (Aila, Karras, Laine, "On quality metrics of bounding volume hierarchies",
     /// 2013, eq. 2) with both constants 1: for each node, the area of the surface inside its box
-    /// that belongs to none of its triangles, times the node's cost, over the area of all triangles.
-    /// Rays that end on that surface visit the node in vain. Triangles are clipped exactly (f64).
+    /// that belongs to none of its triangles, times the node's cost, over the area of all
+    /// triangles. Rays that end on that surface visit the node in vain. Triangles are clipped
+    /// exactly (f64).
     ///
     /// 0 if the triangles have no area. Takes time in proportion to triangles × nodes that overlap
-    /// one; once `most` boxes have been visited, the triangles seen until then, spread over all, stand
-    /// for the rest.
+    /// one; once `most` boxes have been visited, the result is extrapolated from the triangles so
+    /// far, which are spread over all.
     pub fn epo(&self, soup: &TriangleSoup, most: u64) -> f64 {
         if self.nodes.is_empty() {
             return 0.0;
@@ -71,7 +71,7 @@ impl Tree {
                     self.overlap_of(triangles, &leaves_of)
                 })
                 .collect();
-            // One after the other: the sum must not depend on the threads.
+            // Sequential: the sum must not depend on the threads.
             for part in parts {
                 total.area += part.area;
                 total.foreign += part.foreign;
@@ -136,8 +136,7 @@ struct Overlap {
     visits: u64,
 }
 
-/// All of `0..count`, in an order whose every beginning is spread evenly: steps of about the golden
-/// ratio (Weyl).
+/// `0..count` in an order whose every prefix is spread evenly: golden-ratio steps (Weyl).
 fn spread(count: usize) -> Vec<usize> {
     let golden = (count as f64 * 0.618_033_988_749_895) as usize;
     let step = (golden..).find(|&step| gcd(step, count) == 1).unwrap_or(1);
@@ -156,7 +155,7 @@ fn weight(kind: NodeKind) -> f64 {
     }
 }
 
-/// The walk of one triangle through the boxes that it overlaps.
+/// The traversal of one triangle through the boxes that it overlaps.
 struct OverlapWalk<'a> {
     tree: &'a Tree,
     /// Leaves that list the triangle, ascending.
@@ -165,8 +164,8 @@ struct OverlapWalk<'a> {
 }
 
 impl OverlapWalk<'_> {
-    /// Weighted area of the polygon in boxes of the subtree of nodes `node..end` that do not list its
-    /// triangle. In depth-first order a subtree is one run of nodes.
+    /// Weighted area of the polygon in boxes of the subtree of nodes `node..end` that do not list
+    /// its triangle. In depth-first order a subtree is one run of nodes.
     fn overlap(&mut self, node: u32, end: u32, polygon: &Polygon) -> f64 {
         self.visits += 1;
         let TreeNode { bounds, kind } = self.tree.nodes[node as usize];
@@ -192,7 +191,7 @@ mod tests {
     use super::*;
     use crate::fixtures::soup;
 
-    /// Two leaves, the second of them a box whose lower half the first triangle reaches into.
+    /// Two leaves; the first triangle extends into the lower half of the second one's box.
     fn two_leaves() -> (Tree, TriangleSoup) {
         let soup = soup([
             [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
@@ -210,7 +209,7 @@ mod tests {
     #[test]
     fn end_point_overlap_counts_foreign_surface_in_each_box_and_nothing_else() {
         let (tree, soup) = two_leaves();
-        // Of the first triangle (area 8) the unit square in its corner lies in the second leaf's
+        // The unit square in the corner of the first triangle (area 8) lies in the second leaf's
         // box; the second triangle touches the first leaf's box in one point.
         let second = Polygon::new(&soup.records[1]).area();
         let expected = 1.0 / (8.0 + second);

@@ -1,11 +1,11 @@
-//! Boxes in vector registers, and references: what builders move around.
+//! Boxes in vector registers, and references: the working data of builders.
 
 use crate::TriangleSoup;
 use crate::bounds::Bounds;
 use glam::{Vec3A, Vec3Swizzles, Vec4};
 use rayon::prelude::*;
 
-/// An axis-aligned box as builders compute with it: [`Bounds`] in two vector registers.
+/// An axis-aligned box for builders: [`Bounds`] in two vector registers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Box3 {
     pub min: Vec3A,
@@ -13,7 +13,7 @@ pub(super) struct Box3 {
 }
 
 impl Box3 {
-    /// The neutral element of [`Box3::union`].
+    /// Identity of [`Box3::union`].
     pub(super) const EMPTY: Box3 = Box3 {
         min: Vec3A::INFINITY,
         max: Vec3A::NEG_INFINITY,
@@ -47,7 +47,6 @@ impl Box3 {
         e.dot(e.yzx())
     }
 
-    /// The axis of the greatest extent.
     pub(super) fn longest_axis(self) -> usize {
         (self.max - self.min).max_position()
     }
@@ -71,14 +70,14 @@ impl From<Box3> for Bounds {
     }
 }
 
-/// A triangle in a leaf: its box, or after a spatial split a part of its box. 32 bytes.
+/// A triangle in a leaf: its box, or after a spatial split a part of it. 32 bytes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
 pub(super) struct Reference {
     pub min: [f32; 3],
     pub id: u32,
     pub max: [f32; 3],
-    /// Fills the register: 1, since arithmetic on tiny numbers is slow on some processors.
+    /// Padding; 1, since arithmetic on tiny numbers is slow on some processors.
     filling: f32,
 }
 
@@ -93,7 +92,7 @@ impl Reference {
     }
 
     pub(super) fn bounds(&self) -> Box3 {
-        // One load each; the fourth lane takes part in nothing.
+        // One load each; the fourth lane is unused.
         let [x, y, z] = self.min;
         let min = Vec4::new(x, y, z, f32::from_bits(self.id));
         let [x, y, z] = self.max;
@@ -104,14 +103,13 @@ impl Reference {
         }
     }
 
-    /// Twice the centre: enough to sort and bin by, without the division.
+    /// Twice the centre: sufficient for sorting and binning, without the division.
     pub(super) fn centre(&self) -> Vec3A {
         let Box3 { min, max } = self.bounds();
         min + max
     }
 
-    /// Sorts by centre along `axis`; ids make the order total, so that it does not depend on the
-    /// order before.
+    /// Orders by centre along `axis`, then id: the result does not depend on the input order.
     pub(super) fn compare(&self, other: &Self, axis: usize) -> std::cmp::Ordering {
         let centre = |r: &Self| r.min[axis] + r.max[axis];
         centre(self)
@@ -120,7 +118,6 @@ impl Reference {
     }
 }
 
-/// One reference for each triangle.
 pub(super) fn references(soup: &TriangleSoup) -> Vec<Reference> {
     let reference = |record: &crate::triangle::TriangleRecord| {
         Reference::new(record.bounds().into(), record.id)
@@ -128,7 +125,6 @@ pub(super) fn references(soup: &TriangleSoup) -> Vec<Reference> {
     soup.records.par_iter().map(reference).collect()
 }
 
-/// Box around references.
 pub(super) fn bounds_of(references: &[Reference]) -> Box3 {
     let boxes = references.iter().map(Reference::bounds);
     boxes.fold(Box3::EMPTY, Box3::union)

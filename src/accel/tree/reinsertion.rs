@@ -1,12 +1,12 @@
-//! Reinsertion: subtrees are taken out and put back where the tree's surface area shrinks most.
+//! Reinsertion: subtrees are moved to where they reduce the tree's surface area most.
 //!
-//! A round looks for the best place of the largest subtrees on all cores while the tree rests, then
-//! moves them one after the other, most profitable first. A move is dropped if an earlier one
+//! A round searches the best positions of the largest subtrees on all cores while the tree is
+//! constant, then moves them one by one, most profitable first. A move is dropped if an earlier one
 //! touched its nodes, so the result does not depend on the number of threads.
 //!
 //! Sources: J. Bittner, M. Hapala, V. Havran, "Fast insertion-based optimization of bounding volume
-//! hierarchies", 2013 (the search); D. Meister, J. Bittner, "Parallel reinsertion for bounding volume
-//! hierarchy optimization", 2018 (rounds).
+//! hierarchies", 2013 (the search); D. Meister, J. Bittner, "Parallel reinsertion for bounding
+//! volume hierarchy optimization", 2018 (rounds).
 
 use super::depth::depth_limit;
 use super::grow::lay_out;
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 const ROOT: u32 = 0;
 
-/// A node with a way up. Children lie side by side, at an odd index and the even one behind it.
+/// A node with a parent link. Siblings are adjacent, at an odd index and the next even one.
 #[derive(Clone, Copy)]
 struct Node {
     bounds: Box3,
@@ -30,16 +30,16 @@ struct Node {
     height: u32,
 }
 
-/// A move: `node` next to `target`.
+/// A move: `node` becomes the sibling of `target`.
 #[derive(Clone, Copy)]
 struct Move {
     node: u32,
     target: u32,
-    /// Half area by which the tree shrinks.
+    /// Reduction of the tree's half area.
     gain: f32,
 }
 
-/// Improves `tree` by `settings.reinsertion` rounds; the leaves stay as they are.
+/// Improves `tree` by `settings.reinsertion` rounds; leaves are unchanged.
 pub(super) fn optimise(tree: Tree, settings: &TreeParameters) -> Tree {
     let mut hierarchy = Hierarchy::new(&tree);
     let order = tree.order;
@@ -54,9 +54,8 @@ pub(super) fn optimise(tree: Tree, settings: &TreeParameters) -> Tree {
 
 struct Hierarchy {
     nodes: Vec<Node>,
-    /// Moves may not make the tree deeper than this.
     depth_limit: u32,
-    /// Nodes that a move of this round changed.
+    /// Nodes changed by moves of this round.
     touched: Vec<bool>,
 }
 
@@ -71,7 +70,7 @@ impl Hierarchy {
             let TreeNode { bounds, kind } = tree.nodes[index as usize];
             let (first, count) = match kind {
                 NodeKind::Leaf { first, count } => (first, count),
-                // For now where its children come from.
+                // For now the source of its children.
                 NodeKind::Inner { .. } => (index, 0),
             };
             Node {
@@ -83,7 +82,7 @@ impl Hierarchy {
             }
         };
         nodes.push(node(0, ROOT));
-        // Breadth first: large nodes, which searches visit most, lie together.
+        // Breadth first keeps large nodes, which searches visit most, together.
         let mut here = 0;
         while here < nodes.len() {
             if nodes[here].count == 0
@@ -121,7 +120,7 @@ impl Hierarchy {
         }
     }
 
-    /// One round; returns how many subtrees were moved.
+    /// One round; returns the number of moved subtrees.
     fn round(&mut self, share: f32) -> usize {
         let mut moves: Vec<Move> = self
             .candidates(share)
@@ -133,7 +132,7 @@ impl Hierarchy {
         moves.into_iter().filter(|&m| self.apply(m)).count()
     }
 
-    /// The largest nodes, in the order of their index.
+    /// The largest nodes, by index.
     fn candidates(&self, share: f32) -> Vec<u32> {
         // Neither the root nor its children can move.
         let mut all: Vec<u32> = (3..self.nodes.len() as u32).collect();
@@ -147,10 +146,10 @@ impl Hierarchy {
         all
     }
 
-    /// The best new place of a subtree, by branch and bound over the rest of the tree.
+    /// The best new position of a subtree, by branch and bound over the rest of the tree.
     ///
-    /// Going up from the node, `saved` is what its removal takes from the boxes of the nodes passed;
-    /// going down again, what the insertion adds to the boxes on the way is taken off.
+    /// Going up from the node, `saved` is the area that its removal saves in the nodes passed;
+    /// going down again, the area that the insertion adds to boxes on the way is subtracted.
     fn best_move(&self, index: u32) -> Option<Move> {
         let moved = self.node(index).bounds;
         let least = moved.half_area();
@@ -173,7 +172,7 @@ impl Hierarchy {
                 }
                 let node = self.node(target);
                 let gain = saved - node.bounds.union(moved).half_area();
-                // Next to its present sibling it is already.
+                // Moving it next to its current sibling changes nothing.
                 if gain > best.gain && target != sibling(index) {
                     (best.gain, best.target) = (gain, target);
                 }
@@ -197,7 +196,7 @@ impl Hierarchy {
     }
 
     /// Moves a subtree unless an earlier move of the round is in the way or the tree would become
-    /// too deep; says whether it did.
+    /// too deep; returns true if it did.
     fn apply(&mut self, Move { node, target, .. }: Move) -> bool {
         let parent = self.node(node).parent;
         let beside = sibling(node);
@@ -208,7 +207,7 @@ impl Hierarchy {
         let mut depth = 1;
         let mut above = target;
         while above != ROOT {
-            // Earlier moves may have brought the target below the node.
+            // Earlier moves may have moved the target below the node.
             if above == node {
                 return false;
             }
@@ -222,12 +221,12 @@ impl Hierarchy {
             .iter()
             .for_each(|&i| self.touched[i as usize] = true);
 
-        // The sibling takes the parent's place, which frees the pair.
+        // The sibling replaces the parent, which frees the pair.
         let pair = node.min(beside);
         let (moved, kept, displaced) = (*self.node(node), *self.node(beside), *self.node(target));
         let below = |parent, node| Node { parent, ..node };
         self.place(parent, below(self.node(parent).parent, kept));
-        // Had the target been the sibling, it would have moved; but that is excluded.
+        // If the target were the sibling, it would have moved; but that is excluded.
         self.place(pair, below(target, displaced));
         self.place(pair + 1, below(target, moved));
         let joint = &mut self.nodes[target as usize];
@@ -237,7 +236,7 @@ impl Hierarchy {
         true
     }
 
-    /// Puts a node at `index` and tells its children.
+    /// Stores a node at `index` and updates its children's links.
     fn place(&mut self, index: u32, node: Node) {
         self.nodes[index as usize] = node;
         if node.count == 0 {

@@ -1,15 +1,17 @@
-//! Spatial splits: where an object split leaves two boxes that overlap, space is split instead, and
+//! Spatial splits: where an object split leaves two overlapping boxes, space is split instead, and
 //! a triangle across the plane becomes a reference on either side, with the box of its part there.
 //!
-//! Exactness. The part is the triangle cut by planes, as in the paper, with the [`Margin`] of the kd-tree
-//! around it: the boxes of a triangle's references then hold every point of its box that is no farther
-//! from it than the margin, and so every hit of a ray that meets its plane at a cosine of 1/32 or more.
-//! A ray almost in the plane may be given a hit, by rounding, anywhere in the triangle's box, and no pad
-//! in proportion to the coordinates covers that. Without `spatial_clip` a reference's box is the
-//! triangle's *box* cut by planes. The boxes of a triangle's references then cover its box, and that is all
-//! that the theorem of `docs/design.md` needs, for any ray: see [`super::Coverage`].
+//! Exactness. The part is the triangle cut by planes, as in the paper, with the [`Margin`] of the
+//! kd-tree around it: the boxes of a triangle's references then contain every point of its box that
+//! is no farther from it than the margin, and so every hit of a ray that meets its plane at a
+//! cosine of 1/32 or more. Rounding may give a ray almost in the plane a hit anywhere in the
+//! triangle's box, and no pad proportional to the coordinates covers that. Without `spatial_clip` a
+//! reference's box is the triangle's *box* cut by planes. The boxes of a triangle's references then
+//! cover its box, which is all that the theorem of `docs/design.md` needs, for any ray: see
+//! [`super::Coverage`].
 //!
-//! Source: M. Stich, H. Friedrich, A. Dietrich, "Spatial splits in bounding volume hierarchies", 2009.
+//! Source: M. Stich, H. Friedrich, A. Dietrich, "Spatial splits in bounding volume hierarchies",
+//! 2009.
 
 use super::Tree;
 use super::binned::{best_bin_split, median_split};
@@ -39,7 +41,7 @@ pub(super) fn build(
             .spatial_clip
             .then(|| Margin::new(&side.bounds.into())),
     };
-    // A side may make so many new references.
+    // Budget of new references for a side.
     let divide = |(side, budget): (Side, usize), depth, order: &mut Vec<u32>| {
         let Side { references, bounds } = &side;
         let (node, count) = (Bounds::from(*bounds), references.len());
@@ -50,7 +52,7 @@ pub(super) fn build(
         let [low, high] = spatial.split(side, budget, depth);
         let sum = low.references.len() + high.references.len();
         let left = budget - (sum - count);
-        // Each side gets its share of what is left.
+        // Each side gets its share of the rest.
         let low_budget = (left as u64 * low.references.len() as u64 / sum as u64) as usize;
         (node, Some([(low, low_budget), (high, left - low_budget)]))
     };
@@ -59,10 +61,10 @@ pub(super) fn build(
 
 struct Spatial<'a> {
     settings: &'a TreeParameters,
-    /// Half area of overlap from which on spatial splits are tried.
+    /// Half area of overlap from which spatial splits are tried.
     least_overlap: f32,
     soup: &'a TriangleSoup,
-    /// Set if triangles are clipped, and not their boxes.
+    /// Set if triangles are clipped, rather than their boxes.
     margin: Option<Margin>,
 }
 
@@ -80,8 +82,8 @@ impl Side {
 }
 
 impl Spatial<'_> {
-    /// Whether no subtree can be cheaper than a leaf. The parts of a clipped triangle may be smaller than
-    /// its box by any amount.
+    /// True if no subtree can be cheaper than a leaf. The parts of a clipped triangle may be
+    /// smaller than its box by any amount.
     fn must_be_leaf(&self, side: &Side, budget: usize) -> bool {
         let may_clip =
             self.margin.is_some() && budget > 0 && side.bounds.half_area() >= self.least_overlap;
@@ -96,7 +98,7 @@ impl Spatial<'_> {
         self.settings.must_be_leaf(side.bounds, areas)
     }
 
-    /// Box of the part of a triangle within `cell`, a part of its box; `None` if it clearly misses it.
+    /// Box of a triangle's part within `cell`, a part of its box; `None` if clearly missed.
     fn part(&self, id: u32, cell: Box3) -> Option<Box3> {
         let Some(margin) = &self.margin else {
             return Some(cell);
@@ -113,7 +115,7 @@ impl Spatial<'_> {
         halves[0].max[axis] = position;
         halves[1].min[axis] = position;
         let parts = halves.map(|half| self.part(reference.id, half));
-        // Coordinates that are no numbers: nothing is known of the parts.
+        // NaN coordinates: nothing is known about the parts.
         if parts == [None; 2] {
             return halves.map(Some);
         }
@@ -154,7 +156,7 @@ impl Spatial<'_> {
     }
 }
 
-/// A plane with what lies on its sides, as far as bins tell.
+/// A plane with estimates of its sides from the bins.
 struct Plane {
     axis: usize,
     position: f32,
@@ -162,7 +164,6 @@ struct Plane {
     counts: [usize; 2],
 }
 
-/// A slice of the node.
 #[derive(Clone, Copy)]
 struct Bin {
     bounds: Box3,
@@ -180,7 +181,7 @@ struct Slices {
 }
 
 impl Slices {
-    /// Where a slice begins.
+    /// Start of a slice.
     fn border(&self, bin: usize) -> f32 {
         self.start + self.width * bin as f32
     }
@@ -190,7 +191,7 @@ impl Slices {
         (((x - self.start) / self.width) as usize).min(self.count - 1)
     }
 
-    /// What a box has in common with one of the slices `first` to `last` that it reaches.
+    /// The part of a box in one of the slices `first` to `last` that it overlaps.
     fn cell(&self, mut bounds: Box3, bin: usize, [first, last]: [usize; 2]) -> Box3 {
         if bin > first {
             bounds.min[self.axis] = self.border(bin);
@@ -201,8 +202,8 @@ impl Slices {
         bounds
     }
 
-    /// Adds to the boxes of `parts` the parts of a convex polygon in their slices: its corners, and the points
-    /// where its edges cross a border.
+    /// Extends the boxes of `parts` by the parts of a convex polygon in their slices: its corners,
+    /// and the points where its edges cross a border.
     fn chop(&self, polygon: &Polygon, parts: &mut [Box3], [first, last]: [usize; 2]) {
         let corners = polygon.corners();
         let slice = |corner: &[f64; 3]| self.of(corner[self.axis] as f32).clamp(first, last);
@@ -232,7 +233,7 @@ impl Spatial<'_> {
         for axis in 0..3 {
             let (start, end) = (bounds.min[axis], bounds.max[axis]);
             let width = (end - start) / count as f32;
-            // An axis without extent, or one that is not finite, cannot be cut.
+            // An axis with zero or non-finite extent cannot be cut.
             if !(width > 0.0 && width < f32::INFINITY) {
                 continue;
             }
@@ -273,7 +274,6 @@ impl Spatial<'_> {
         best
     }
 
-    /// Chops all references at the borders of the bins.
     fn fill_bins(&self, references: &[Reference], slices: &Slices) -> Vec<Bin> {
         let empty = Bin {
             bounds: Box3::EMPTY,
@@ -318,7 +318,7 @@ impl Spatial<'_> {
     }
 
     /// Splits references at a plane; one across it goes to both sides, or whole to one if that is
-    /// cheaper (the paper's unsplitting). `None` if that brings nothing or exceeds the budget.
+    /// cheaper (the paper's unsplitting). `None` without an improvement or beyond the budget.
     fn cut(&self, references: &[Reference], plane: &Plane, budget: usize) -> Option<[Side; 2]> {
         let Plane { axis, position, .. } = *plane;
         let mut sides = [Vec::new(), Vec::new()];
@@ -357,7 +357,7 @@ impl Spatial<'_> {
             counts[1 - side] -= 1.0;
         }
         let new = sides[0].len() + sides[1].len() - references.len();
-        // A side that keeps all has taken from the budget what the other one lists.
+        // If one side has everything, the budget paid for what the other one lists.
         let progress = sides.iter().all(|side| !side.is_empty());
         (progress && new <= budget).then(|| sides.map(Side::of))
     }

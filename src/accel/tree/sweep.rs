@@ -1,17 +1,17 @@
 //! SAH at every triangle, of all axes or only the longest.
 //!
-//! Why a full sweep may be worse than a few bins. The cost of a split takes both sides for leaves. It
-//! overrates a side of n triangles by about n over the logarithm of n, so it favours putting a few
-//! hundred triangles into a node nearly as large as its parent: at its second split Crytek Sponza loses
-//! 837 triangles of the floor and what stands on it to a node of 0.74 of the area, where 12 bins cut
-//! off the six large ones of the floor. A sweep finds such splits because it tries them all. On other scenes
-//! it is the better one (Dabrovic's Sponza: 68.1 against 69.7). Nodes of `sweep_bins_from` triangles
-//! or more are therefore split only at borders of bins over their box: 70.1 against 73.9 for Crytek
-//! Sponza, with 70.3 for bins alone.
+//! Why a full sweep may be worse than a few bins: the cost of a split assumes that both sides are
+//! leaves. It overrates a side of n triangles by about n over the logarithm of n, so it favours
+//! putting a few hundred triangles into a node nearly as large as its parent: at its second split
+//! Crytek Sponza loses 837 triangles of the floor and the objects on it to a node of 0.74 of the
+//! area, where 12 bins cut off the six large ones of the floor. A sweep finds such splits because
+//! it tries them all. On other scenes it is better (Dabrovic's Sponza: 68.1 against 69.7). Nodes of
+//! `sweep_bins_from` triangles or more are therefore split only at borders of bins over their box:
+//! 70.1 against 73.9 for Crytek Sponza, with 70.3 for bins alone.
 //!
-//! References are sorted once along each axis; a split divides the sorted lists and keeps their
-//! order. Sources: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that
-//! in O(N log N)", 2006; the longest axis alone: A. Dufay, 2017, chapter 4.
+//! References are sorted once along each axis; a split divides the sorted lists and preserves their
+//! order. Sources: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing
+//! that in O(N log N)", 2006; the longest axis alone: A. Dufay, 2017, chapter 4.
 
 use super::Tree;
 use super::depth::SAH_DEPTH;
@@ -21,14 +21,12 @@ use super::reference::{Box3, Reference};
 use crate::bounds::Bounds;
 use rayon::prelude::*;
 
-/// Which axes are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axes {
     All,
     Longest,
 }
 
-/// The tree over `references`.
 pub(super) fn build(references: &[Reference], axes: Axes, settings: &TreeParameters) -> Tree {
     let mut lists = [0, 1, 2].map(|axis| {
         let mut list: Vec<u32> = (0..references.len() as u32).collect();
@@ -43,7 +41,7 @@ pub(super) fn build(references: &[Reference], axes: Axes, settings: &TreeParamet
         settings,
     };
     let (mut scratch, mut areas) = (vec![0; references.len()], vec![0.0; references.len()]);
-    // The sorted lists of a node: the same references along x, y and z. Beside them memory of their length.
+    // The sorted lists of a node, with scratch of the same length.
     let lists = lists.each_mut().map(|list| &mut list[..]);
     let whole = (lists, &mut scratch[..], &mut areas[..]);
     let tree = grow(
@@ -130,7 +128,7 @@ impl Sweep<'_> {
         Some((best.1, best.2))
     }
 
-    /// Cost (half area times count, both sides) and place of the best split of one list between two
+    /// Cost (half area times count, both sides) and index of the best split of one list between two
     /// references that `allowed` accepts.
     fn best_place(
         &self,
@@ -156,8 +154,7 @@ impl Sweep<'_> {
         best
     }
 
-    /// Divides the lists, keeping their order. A reference belongs to the half where it lies in the
-    /// order along the axis of the split.
+    /// Splits the lists, preserving their order, by the position along the split axis.
     fn divide<'l>(
         &self,
         lists: Lists<'l>,

@@ -1,17 +1,18 @@
-//! The pre-transformed test. Twin of `kernels/accel/triangle/baldwin_weber.wesl`.
+//! The pre-transformed test. CPU version of `kernels/accel/triangle/baldwin_weber.wesl`.
 //! Source: D. Baldwin, M. Weber, "Fast ray–triangle intersections by coordinate transformation",
 //! JCGT 5(3), 2016.
 //!
-//! The transform is made on the host, in f64, and lies behind the records in the buffer `triangles`:
-//! nine numbers and an axis. The twin makes it anew for every test, with the same bits.
+//! The transform is computed on the host, in f64, and follows the records in the buffer
+//! `triangles`: nine numbers and an axis. The CPU version recomputes it for every test, with the
+//! same bits.
 
 use super::watertight::turned;
 use super::{APART, DISTANCE_PAD, Meeting, TriangleRecord, TriangleTest};
 use crate::ray::Ray;
 use crate::spatial::cross;
 
-/// To the unit triangle, with axes turned so that the one along which the normal is longest comes last;
-/// the coefficient of that axis is 1 in `plane` and 0 in `u` and `v`.
+/// The map to the unit triangle, with axes rotated so that the normal's longest one comes last; the
+/// coefficient of that axis is 1 in `plane` and 0 in `u` and `v`.
 #[derive(Debug, Clone, Copy)]
 struct Transform {
     /// Coefficients of x and y, and the height.
@@ -22,7 +23,7 @@ struct Transform {
     v: [f32; 3],
 }
 
-/// Never met: u is −1 everywhere.
+/// Never hit: u is −1 everywhere.
 const NOWHERE: Transform = Transform {
     plane: [0.0; 3],
     axis: 2,
@@ -31,7 +32,6 @@ const NOWHERE: Transform = Transform {
 };
 
 impl Transform {
-    /// As the kernel reads it.
     fn words(&self) -> [[u32; 4]; 3] {
         let row = |[x, y, z]: [f32; 3], w| [x.to_bits(), y.to_bits(), z.to_bits(), w];
         [
@@ -42,7 +42,7 @@ impl Transform {
     }
 }
 
-/// The transform of a triangle; one that is never met, if it has no area or is out of range.
+/// The transform of a triangle; one that is never hit if it has no area or is out of range.
 fn load_transform(triangle: &TriangleRecord) -> Transform {
     let [e, f] = triangle.edges();
     let normal = cross(e, f);
@@ -112,7 +112,7 @@ impl TriangleTest for BaldwinWeber {
         Meeting { area: 1.0, t, u, v }
     }
 
-    /// Bound on the rounding error of the distance, from coordinates and not from their differences.
+    /// Rounding error bound of the distance, from coordinates rather than their differences.
     fn allowance(
         &self,
         triangle: &TriangleRecord,

@@ -1,9 +1,9 @@
-//! The watertight test with exact signs. Twin of `kernels/accel/triangle/compensated.wesl`.
+//! The watertight test with exact signs. CPU version of `kernels/accel/triangle/compensated.wesl`.
 //!
-//! Edge functions are differences of two-products (T. Dekker, "A floating-point technique for extending
-//! the available precision", 1971), with significands cut by a mask, which no compiler simplifies. Where
-//! an adapter computes otherwise, signs are as good as the watertight test's:
-//! [`raystone_gpu::ArithmeticProbe::exact_products`] tells.
+//! Edge functions are differences of two-products (T. Dekker, "A floating-point technique for
+//! extending the available precision", 1971), with significands cut by a mask, which no compiler
+//! simplifies. On adapters with other arithmetic, signs are only as good as the watertight test's:
+//! [`raystone_gpu::ArithmeticProbe::exact_products`] detects them.
 
 use super::watertight::{area_of, products, residual, shear, sheared};
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
@@ -12,7 +12,6 @@ use crate::ray::Ray;
 /// The upper half of a significand.
 const UPPER: u32 = 0xffff_f000;
 
-/// What rounding took off the product `p` of `a` and `b`.
 pub(crate) fn product_error(a: f32, b: f32, p: f32) -> f32 {
     let a1 = f32::from_bits(a.to_bits() & UPPER);
     let b1 = f32::from_bits(b.to_bits() & UPPER);
@@ -52,7 +51,7 @@ impl TriangleTest for Compensated {
         let s = shear(ray, inverse);
         let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
         let (p, q) = products([a, b, c]);
-        // Where both products round apart, their order is the sign already.
+        // If both products round apart, their order already is the sign.
         if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
             return APART;
         }

@@ -1,18 +1,18 @@
-//! Ray–triangle tests and what all of them share. Twin of `kernels/accel/triangle.wesl`.
+//! Ray–triangle tests and their shared parts. CPU version of `kernels/accel/triangle.wesl`.
 //!
 //! A test decides whether the ray's line meets the triangle, and computes distance and barycentrics
-//! ([`Meeting`]). The step that follows is the same for all, and makes "equal to brute force" a theorem
-//! instead of a hope: the distance is clamped into the ray's padded slab interval of the triangle's own
-//! bounds, and a hit whose interval is empty is no hit. `(bound - origin) * inverse` is monotone in
-//! `bound` even after rounding, so every box that contains the triangle's bounds yields an interval that
-//! contains the clamped distance, whatever the rounding errors of the triangle test were. A hierarchy of
-//! such boxes therefore returns to the bit what brute force returns.
+//! ([`Meeting`]). The next step is the same for all, and makes "equal to brute force" a theorem:
+//! the distance is clamped into the ray's padded slab interval of the triangle's own bounds, and an
+//! empty interval means no hit. `(bound - origin) * inverse` is monotone in `bound` even after
+//! rounding, so every box that contains the triangle's bounds has an interval that contains the
+//! clamped distance, whatever the rounding errors of the triangle test. A hierarchy of such boxes
+//! therefore returns bit-identical results to brute force.
 //!
 //! The clamp may repair rounding, but not invent a distance: a ray that slides along a face of the
-//! bounds is inside them for a stretch that need not hold the point where it meets the plane (from
-//! an origin in the face it begins or ends at distance 0). Each test therefore says how far rounding may
-//! have carried its distance out of the slab of each axis (`allowance`). If it lies farther outside, the
-//! ray only grazed an edge of the triangle: no hit.
+//! bounds is inside them for a stretch that need not contain its intersection with the plane (from
+//! an origin in the face it begins or ends at distance 0). Each test therefore bounds the rounding
+//! error of its distance relative to the slab of each axis (`allowance`). If the distance lies
+//! farther outside, the ray only grazed an edge of the triangle: no hit.
 
 mod baldwin_weber;
 mod compensated;
@@ -40,11 +40,11 @@ use raystone_core::geometry::Triangle;
 use raystone_core::params::Sources;
 use std::fmt;
 
-/// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
+/// Relative widening of a triangle's own slab interval, 2⁻²¹: at least four ulp, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
 pub(crate) const TRIANGLE_PAD: f32 = 4.768_371_6e-7;
 
-/// A triangle as kernels read it: three `vec4<u32>`, 48 bytes, the vertices as they are in the scene.
+/// A triangle in kernel layout: three `vec4<u32>`, 48 bytes, with the scene's vertices unchanged.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TriangleRecord {
@@ -54,12 +54,12 @@ pub struct TriangleRecord {
     pub id: u32,
     /// Second vertex.
     pub v1: [f32; 3],
-    /// Material index; of a triangle with a mask, where its words are: see `MASKED`.
+    /// Material index; for a triangle with a mask, the index of its mask words: see `MASKED`.
     pub material: u32,
     /// Third vertex.
     pub v2: [f32; 3],
-    /// Where the words that [`TriangleTest::transformed`] makes of this triangle begin in the buffer
-    /// `triangles`, in `vec4`; 0 if the test needs none.
+    /// Start of the words from [`TriangleTest::transformed`] in the buffer `triangles`, in `vec4`;
+    /// 0 if the test needs none.
     pub transformed: u32,
 }
 
@@ -106,46 +106,45 @@ impl TriangleRecord {
     }
 }
 
-/// A ray–triangle test, registered by a line of its registry.
+/// A ray–triangle test, with one line in its registry.
 pub trait TriangleTest: Send + Sync {
-    /// Name as a user types it.
+    /// Name used in configurations.
     fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
+    /// One-line description with source.
     fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder: it exports `meet` and `allowance`, whose twins
-    /// are the functions below.
+    /// Kernel module, relative to the kernel folder: it exports `meet` and `allowance`, the kernel
+    /// versions of the functions below.
     fn kernel(&self) -> &'static str;
-    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    /// Paths and texts of its own kernel modules, for tests that are not built in.
     fn sources(&self) -> Sources {
         &[]
     }
-    /// Whether no ray slips through between the triangles of a closed mesh, not even along their edges: the
-    /// gate then asks for such rays.
+    /// True if no ray slips through between the triangles of a closed mesh, not even along their
+    /// edges; the correctness check then includes such rays.
     fn is_watertight(&self) -> bool {
         false
     }
-    /// Whether it is another test where an adapter does not keep two-products.
+    /// True if it becomes a different test on adapters without exact two-products.
     fn needs_exact_products(&self) -> bool {
         false
     }
-    /// Whether it accepts nothing but what the compared products of [`Watertight`] accept, so that brute
-    /// force may ask these first, for several triangles at once.
+    /// True if it accepts only hits that the compared products of [`Watertight`] accept, so that
+    /// brute force may test these first, for several triangles at once.
     fn follows_watertight_signs(&self) -> bool {
         false
     }
-    /// What the kernel reads beside the record, three `vec4` computed beforehand; `None` if nothing.
+    /// Precomputed kernel data in addition to the record, three `vec4`; `None` if there is none.
     fn transformed(&self, _triangle: &TriangleRecord) -> Option<[[u32; 4]; 3]> {
         None
     }
-    /// Bytes that it reads of a triangle: its record, and what was made of it beforehand.
+    /// Bytes read per triangle: its record and precomputed data.
     fn bytes(&self) -> u32 {
         let transformed = self.transformed(&TriangleRecord::zeroed());
         (size_of::<TriangleRecord>() + transformed.map_or(0, |words| size_of_val(&words))) as u32
     }
-    /// Where the line of a ray meets a triangle, with the reciprocal of its direction.
+    /// Intersection of a ray's line with a triangle, given the reciprocal of its direction.
     fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting;
-    /// How far rounding may have carried the distance of `found` out of the triangle's slab of each axis,
-    /// scene units.
+    /// Rounding error bound of the distance of `found` for each axis' slab, scene units.
     fn allowance(
         &self,
         triangle: &TriangleRecord,
@@ -154,8 +153,9 @@ pub trait TriangleTest: Send + Sync {
         found: &Meeting,
     ) -> [f32; 3];
 
-    /// Tests `ray` against `triangle`, which lets it pass where a mask has cut it out; a nearer hit, or an equally near one of a lower index, replaces
-    /// `hit`. What all tests share; it stands here so that each has a copy with its own `meet` in it.
+    /// Tests `ray` against `triangle`, with holes from its mask; a nearer hit, or one at the same
+    /// distance with a lower index, replaces `hit`. The part common to all tests; a provided method
+    /// so that each test has a copy with its own `meet` inlined.
     fn intersect(
         &self,
         (triangle, masks): (&TriangleRecord, Option<&Masks>),
@@ -186,7 +186,7 @@ pub trait TriangleTest: Send + Sync {
             if is_cut_out(masks, triangle, u, v) {
                 return;
             }
-            // None of the three is negative, but any may be −0, whose sign compilers do not keep.
+            // None is negative, but any may be −0, whose sign compilers do not preserve.
             *hit = Hit {
                 t: t.abs(),
                 triangle: triangle.id,
@@ -198,10 +198,10 @@ pub trait TriangleTest: Send + Sync {
     }
 }
 
-/// A test that was chosen.
+/// A chosen test.
 pub type AnyTriangleTest = &'static dyn TriangleTest;
 
-/// Tests are known by their names.
+/// Tests are compared by name.
 impl PartialEq for dyn TriangleTest {
     fn eq(&self, other: &Self) -> bool {
         self.name() == other.name()
@@ -214,10 +214,10 @@ impl fmt::Debug for dyn TriangleTest {
     }
 }
 
-/// Where a ray's line meets a triangle.
+/// Intersection of a ray's line with a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
-    /// What barycentrics are to be divided by; 0 if they do not meet.
+    /// Divisor of the barycentrics; 0 if they do not meet.
     pub area: f32,
     /// Distance, as computed.
     pub t: f32,
@@ -227,7 +227,7 @@ pub struct Meeting {
     pub v: f32,
 }
 
-/// They do not meet.
+/// No intersection.
 pub const APART: Meeting = Meeting {
     area: 0.0,
     t: 0.0,
@@ -235,14 +235,13 @@ pub const APART: Meeting = Meeting {
     v: 0.0,
 };
 
-/// A bound of the distance moved by a share of itself. Rounding keeps its order, so that the nearest of padded bounds is
-/// the padded nearest one.
+/// A bound moved by a relative pad. Rounding preserves order, so the minimum may be padded last.
 fn padded(t: f32, share: f32) -> f32 {
     t + t.abs() * share
 }
 
-/// Whether a ray runs in the plane of a triangle, but for what raising its direction
-/// ([`super::ray::raised`]) has tilted it: from an origin in the triangle it would meet it at 0.
+/// True if a ray lies in the plane of a triangle, except for the tilt from raising its direction
+/// ([`super::ray::raised`]): from an origin in the triangle it would meet it at 0.
 fn is_along(triangle: &TriangleRecord, direction: [f32; 3]) -> bool {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
@@ -257,7 +256,8 @@ fn is_along(triangle: &TriangleRecord, direction: [f32; 3]) -> bool {
     (nx * dx + ny * dy + nz * dz).abs() <= (nx.abs() + ny.abs() + nz.abs()) * tilt
 }
 
-/// Tests `ray` against a triangle, given with the masks of its scene, by the test of the reciprocal: see [`TriangleTest::intersect`].
+/// Tests `ray` against a triangle with its scene's masks, using the test of the reciprocal: see
+/// [`TriangleTest::intersect`].
 pub fn intersect_triangle(
     triangle: (&TriangleRecord, Option<&Masks>),
     ray: &Ray,

@@ -1,6 +1,7 @@
-//! Möller and Trumbore's test. Twin of `kernels/accel/triangle/moeller_trumbore.wesl`.
+//! Möller and Trumbore's test. CPU version of `kernels/accel/triangle/moeller_trumbore.wesl`.
 //! Source: T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of
-//! Graphics Tools 2(1), 1997; with the unnormalised normal and without a division before the accept.
+//! Graphics Tools 2(1), 1997; with the unnormalised normal and without a division before
+//! acceptance.
 
 use super::plane::plane_error;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};

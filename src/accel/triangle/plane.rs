@@ -1,16 +1,15 @@
-//! What tests that compute a distance to the plane of the triangle share. Twin of
+//! Shared part of the tests that compute a distance to the triangle's plane. CPU version of
 //! `kernels/accel/triangle/plane.wesl`.
 
 use super::{Meeting, TriangleRecord};
 use crate::ray::Ray;
 
-/// Bound on the relative rounding error of the distance to the plane, 2⁻²⁰, in units of the sum of
-/// the magnitudes of all terms that it is made of: twice the seven roundings of 2⁻²⁴ on the longest
-/// way from an edge to numerator or denominator, and the division.
+/// Relative rounding error bound of the distance to the plane, 2⁻²⁰, in units of the sum of the
+/// magnitudes of all its terms: twice the seven roundings of 2⁻²⁴ on the longest path from an edge
+/// to numerator or denominator, and the division.
 pub(crate) const DISTANCE_PAD: f32 = 9.536_743e-7;
 
-/// Bound on the rounding error of a distance to the plane that was computed from differences of
-/// vertices, `DISTANCE_PAD`.
+/// Rounding error bound of a plane distance from vertex differences, by `DISTANCE_PAD`.
 pub fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);

@@ -1,6 +1,6 @@
-//! Plücker products with a tolerance. Twin of `kernels/accel/triangle/pluecker.wesl`.
-//! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows
-//! R. Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
+//! Plücker products with a tolerance. CPU version of `kernels/accel/triangle/pluecker.wesl`.
+//! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows R.
+//! Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
 
 use super::plane::plane_error;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
@@ -9,7 +9,6 @@ use crate::ray::Ray;
 /// Embree's tolerance, one ulp of 1.
 const TOLERANCE: f32 = 1.192_092_9e-7;
 
-/// a × b · d
 fn triple(a: [f32; 3], b: [f32; 3], d: [f32; 3]) -> f32 {
     let x = a[1] * b[2] - a[2] * b[1];
     let y = a[2] * b[0] - a[0] * b[2];

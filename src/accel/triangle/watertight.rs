@@ -1,28 +1,28 @@
-//! The watertight test. Twin of `kernels/accel/triangle/watertight.wesl`.
+//! The watertight test. CPU version of `kernels/accel/triangle/watertight.wesl`.
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013.
 //!
-//! Vertices are sheared so that the ray is the z axis. What a vertex becomes depends on vertex and ray
-//! alone, so that the triangles of a closed mesh still fit together. The sign of an edge function
-//! `p − q` is that of comparing the rounded products: rounding is monotone, so it is the true sign or
-//! 0, never the opposite. Zero counts as inside, on both sides of the edge. So wherever the sheared mesh
-//! holds the ray, some triangle accepts it, and the paper's second test in double precision, which WGSL
-//! has not got, is not needed: without it a ray on an edge may meet both triangles.
+//! Vertices are sheared so that the ray is the z axis. A sheared vertex depends on vertex and ray
+//! alone, so the triangles of a closed mesh still fit together. The sign of an edge function `p −
+//! q` is that of comparing the rounded products: rounding is monotone, so it is the true sign or 0,
+//! never the opposite. Zero counts as inside, on both sides of the edge. So wherever the sheared
+//! mesh contains the ray, some triangle accepts it, and the paper's second test in double
+//! precision, which WGSL lacks, is not needed: without it a ray on an edge may hit both triangles.
 //!
-//! The distance is not the paper's average of those of the vertices, which errs by the length over the height
-//! of a thin triangle, but that of the point of the plane that is abreast of the ray ([`step_along`]). Of a triangle
-//! that is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
-//! no hit. A closed mesh has others there.
+//! The distance is not the paper's average over the vertices, whose error for a thin triangle
+//! scales with length over height, but that of the point of the plane closest to the ray
+//! ([`step_along`]). For an edge-on triangle the weights are pure rounding, and would place the hit
+//! anywhere in its box: it counts as a miss. A closed mesh has other triangles there.
 
 use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord, TriangleTest};
 use crate::ray::Ray;
 
-/// The axis along which the direction is longest.
+/// The axis of the direction's longest component.
 pub(crate) fn longest(d: [f32; 3]) -> usize {
     let [x, y, z] = d.map(f32::abs);
     if z >= x.max(y) { 2 } else { usize::from(y > x) }
 }
 
-/// Axes turned so that `axis` comes last.
+/// Axes rotated so that `axis` comes last.
 pub(crate) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     match axis {
         0 => [y, z, x],
@@ -31,7 +31,6 @@ pub(crate) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     }
 }
 
-/// The inverse of [`turned`].
 fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     match axis {
         0 => [z, x, y],
@@ -40,7 +39,7 @@ fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     }
 }
 
-/// A ray as vertices are sheared by it: x and y for each unit of z, and 1 / direction along z.
+/// The shear for a ray: x and y per unit of z, and 1 / direction along z.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shear {
     axis: usize,
@@ -71,16 +70,17 @@ pub(crate) fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
     [x - s.x * z, y - s.y * z, z]
 }
 
-/// The share of the terms of an area that their rounding makes: what is no larger is edge-on.
+/// Relative rounding error of an area's terms: a smaller area is edge-on.
 const EDGE_ON: f32 = 5.960_464_5e-8;
 
-/// Twice the area that the weights make; 0 if it is edge-on.
+/// Twice the area from the weights; 0 if it is edge-on.
 pub(super) fn area_of(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
     let area = w[0] + w[1] + w[2];
     let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
-    match area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
-        true => area,
-        false => 0.0,
+    if area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
+        area
+    } else {
+        0.0
     }
 }
 
@@ -92,29 +92,30 @@ pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     )
 }
 
-/// The least denominator: of edges that are shorter, squares underflow.
+/// The smallest denominator: squares of shorter edges underflow.
 const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
-/// Smaller steps, as parts of an edge, are what rounding makes of any triangle: a quarter of what the offset leaves room for.
+/// Smaller steps, as fractions of an edge, are rounding: a quarter of the offset's margin.
 const NEGLIGIBLE: f32 = 2.384_185_8e-7;
 
 /// A step along an edge, times the area.
 struct Step {
-    /// Whether it is the edge to the second vertex, not that to the third one.
+    /// True for the edge to the second vertex, false for the third.
     is_first: bool,
-    /// Part of the edge.
+    /// Fraction of the edge.
     size: f32,
-    /// How far it leads along the ray.
+    /// Length along the ray.
     z: f32,
 }
 
-/// The step along the longer of two edges of a triangle of sheared vertices that brings the point of the weights abreast of the ray.
+/// The step along the longer of two edges of a sheared triangle that brings the weighted point
+/// closest to the ray.
 ///
-/// Weights err by the rounding of products of edges over the area: of a thin triangle by its length over
-/// its height. Whatever they are, the point lies in the plane, and beside the ray almost along the
-/// triangle's length alone, since across it there are only so many heights. So a step along a long edge
-/// brings the point to the ray, but for rounding of the vertices, and does not leave the plane. Of two
-/// edges the longer one has half of the greatest length at least. No normal is made: that of a thin
-/// triangle with three long edges is a difference of large products.
+/// Weights err by the rounding of products of edges over the area: for a thin triangle by its
+/// length over its height. In any case the point lies in the plane, and misses the ray almost only
+/// along the triangle's length, since the height leaves little room. So a step along a long edge
+/// brings the point to the ray, except for rounding of the vertices, and stays in the plane. The
+/// longer of two edges has at least half of the maximum length. No normal is computed: that of a
+/// thin triangle with three long edges is a difference of large products.
 fn step_along([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> Step {
     let x = w[0] * a[0] + w[1] * b[0] + w[2] * c[0];
     let y = w[0] * a[1] + w[1] * b[1] + w[2] * c[1];
@@ -125,9 +126,10 @@ fn step_along([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> Step {
     let is_first = first >= second;
     let along = if is_first { ab } else { ac };
     let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
-    let size = match part.abs() > area * NEGLIGIBLE {
-        true => part,
-        false => 0.0,
+    let size = if part.abs() > area * NEGLIGIBLE {
+        part
+    } else {
+        0.0
     };
     Step {
         is_first,
@@ -171,12 +173,13 @@ impl TriangleTest for Watertight {
         let area = area_of(w, p, q);
         let step = step_along([a, b, c], w, area);
         let t = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2] - step.z) * s.scale / area;
-        // Not past an end, for what is interpolated.
+        // Not past an end, for interpolation.
         let from = if step.is_first { w[1] } else { w[2] };
         let back = step.size.min(from).max(-w[0]);
-        let [u, v] = match step.is_first {
-            true => [w[1] - back, w[2]],
-            false => [w[1], w[2] - back],
+        let [u, v] = if step.is_first {
+            [w[1] - back, w[2]]
+        } else {
+            [w[1], w[2] - back]
         };
         Meeting { area, t, u, v }
     }
@@ -192,15 +195,16 @@ impl TriangleTest for Watertight {
     }
 }
 
-/// How far the distance may lie outside the slab of each axis.
+/// Bound on how far the distance may lie outside the slab of each axis.
 ///
 /// The point Σ wᵢ·vᵢ lies in the bounds. The ray passes it by the residual Σ wᵢ·v′ᵢ of the sheared
-/// vertices, which is 0 but for rounding: of the weights (three units of the products, times x or y of
-/// the vertex) and of the vertices (a unit of the difference, up to seven of what is taken off by the
-/// shear where division errs by 2.5 ulp). Divided by the direction, that is how far the distance may lie
-/// outside the slab. Where the point was moved abreast of the ray, the distance is off its average by
-/// what the weights' errors make of z. Weights are no larger than the terms that they are differences of, so
-/// that moments of the terms, twice, bound all of it. [`TRIANGLE_PAD`] is eight units.
+/// vertices, which is 0 except for rounding: of the weights (three units of the products, times x
+/// or y of the vertex) and of the vertices (a unit of the difference, up to seven of the shear's
+/// offset where division errs by 2.5 ulp). Divided by the direction, that is how far the distance
+/// may lie outside the slab. Where the point was moved along an edge, the distance differs from its
+/// average by the weights' errors times z. Weights are no larger than the terms that they are
+/// differences of, so twice the moments of the terms bound all of it. [`TRIANGLE_PAD`] is eight
+/// units.
 pub(super) fn residual(
     triangle: &TriangleRecord,
     ray: &Ray,

@@ -1,8 +1,9 @@
-//! `bvh4`: compressed 4-wide BVH with nodes of 48 bytes, traversed in the order of distances.
-//! Twin of `kernels/accel/bvh4.wesl`.
+//! `bvh4`: compressed 4-wide BVH with nodes of 48 bytes, traversed in order of distance. CPU
+//! version of `kernels/accel/bvh4.wesl`.
 //!
-//! Source: H. Dammertz, J. Hanika, A. Keller, "Shallow bounding volume hierarchies for fast SIMD ray
-//! tracing of incoherent rays", EGSR 2008, with the quantised boxes of Ylitie, Karras & Laine 2017.
+//! Source: H. Dammertz, J. Hanika, A. Keller, "Shallow bounding volume hierarchies for fast SIMD
+//! ray tracing of incoherent rays", EGSR 2008, with the quantised boxes of Ylitie, Karras & Laine
+//! 2017.
 
 use super::{
     OfNodes, Quantisation, Wide, WideChild, WideKind, WideNode, WideParameters, enter_four, frame,
@@ -48,7 +49,7 @@ impl Structure for Bvh4 {
 struct Node {
     /// First plane on each axis.
     low: [f32; 3],
-    /// Biased exponents, and which slots are inner children in the highest byte.
+    /// Biased exponents, and a mask of slots with inner children in the highest byte.
     exponents: u32,
     /// Index, and the triangles of each slot, two bits each, in the highest byte.
     first_child: u32,
@@ -73,7 +74,7 @@ impl Node {
         self.first_child >> MASK_SHIFT
     }
 
-    /// Places of the triangles of the leaf in `slot`; empty if it is none.
+    /// Indices of the triangles of the leaf in `slot`; empty if it is none.
     fn leaf(&self, slot: u32) -> Range<usize> {
         let before = self.counts() & ((1 << (2 * slot)) - 1);
         let first = self.first_triangle as usize + sum_of_pairs(before) as usize;
@@ -144,7 +145,7 @@ impl WideNode for Node {
     }
 }
 
-/// A ray on its way, between two nodes.
+/// The state of a ray between two nodes.
 struct Traversal<'a> {
     walk: Walk<'a>,
     children: u32,
@@ -163,7 +164,7 @@ fn begin(walk: Walk) -> Traversal {
     }
 }
 
-/// Visits a node and tests the triangles of its leaves; whether the ray goes on.
+/// Visits a node and tests the triangles of its leaves; returns true if the ray continues.
 fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     let walk = &mut at.walk;
     let place = child(at.children, at.list & SLOT_MASK) as usize;
@@ -203,7 +204,7 @@ fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     true
 }
 
-/// Keys of the children that are entered, in ascending order, then `MISSED`.
+/// Keys of the entered children, in ascending order, then `MISSED`.
 fn sorted_keys(node: &Node, walk: &Walk) -> [u32; 4] {
     let (ray, inverse) = (&walk.ray, walk.inverse);
     let planes = frame(node.low, node.exponents, ray.origin, inverse);
@@ -232,14 +233,13 @@ fn sorted_keys(node: &Node, walk: &Walk) -> [u32; 4] {
     keys
 }
 
-/// The slots of keys as a list.
 fn list_of(keys: [u32; 4]) -> u32 {
     (0..4).fold(0, |list, i| {
         list | (keys[i] & SLOT_MASK) << (SLOT_BITS * i as u32)
     })
 }
 
-/// How many bits of a list belong to keys below `bound`.
+/// Number of list bits for keys below `bound`.
 fn list_bits(keys: [u32; 4], bound: u32) -> u32 {
     SLOT_BITS * keys.iter().filter(|&&key| key < bound).count() as u32
 }

@@ -1,5 +1,5 @@
-//! Wide trees out of binary ones: of all ways to pull grandchildren up and to merge leaves, the one
-//! of least SAH cost.
+//! Wide trees from binary ones: the least SAH cost over all ways to pull up grandchildren and merge
+//! leaves.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.
@@ -11,27 +11,21 @@ use crate::tree::{NodeKind, Tree, TreeParameters, distinct};
 use crate::triangle::TriangleRecord;
 use crate::{StructureStats, TriangleSoup};
 
-/// What the nodes of a wide tree are like.
+/// The node format of a wide tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
-    /// Most children, 2 to 8.
+    /// Maximum children, 2 to 8.
     pub width: usize,
-    /// Whether children get slots by where they lie ([`arrange`]), of which there are 8.
+    /// True if children get slots by position ([`arrange`]), of which there are 8.
     pub by_octant: bool,
 }
 
-/// What a child of a wide node is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WideKind {
     /// A node, by index.
     Node(u32),
     /// A range of [`WideTree::order`].
-    Leaf {
-        /// First entry.
-        first: u32,
-        /// Number of entries.
-        count: u32,
-    },
+    Leaf { first: u32, count: u32 },
 }
 
 /// A child of a wide node with its box.
@@ -39,37 +33,35 @@ pub(crate) enum WideKind {
 pub(crate) struct WideChild {
     /// Box around everything below.
     pub bounds: Bounds,
-    /// What is below.
+    /// The contents.
     pub kind: WideKind,
 }
 
 impl WideChild {
-    /// No child.
     pub(crate) const NOTHING: WideChild = WideChild {
         bounds: Bounds::EMPTY,
         kind: WideKind::Leaf { first: 0, count: 0 },
     };
 
-    /// Whether this is [`WideChild::NOTHING`].
     pub(crate) fn is_nothing(&self) -> bool {
         matches!(self.kind, WideKind::Leaf { count: 0, .. })
     }
 }
 
-/// A tree of nodes with up to `width` children each. Node 0 is the root; the nodes among the
-/// children of one node follow each other, in the order of the children.
+/// A tree of nodes with up to `width` children each. Node 0 is the root; node children of one node
+/// are consecutive, in the order of the children.
 #[derive(Debug, Clone, Default)]
 pub(super) struct WideTree {
     /// Children of every node; one node without children for an empty scene.
     pub nodes: Vec<Vec<WideChild>>,
-    /// Triangle indices, leaf by leaf in the order in which nodes list them.
+    /// Triangle indices, leaf by leaf in the order of the nodes' children.
     pub order: Vec<u32>,
     /// Nodes on the longest path from the root.
     pub depth: u32,
 }
 
 impl WideTree {
-    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
+    /// Statistics of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
     pub(super) fn stats(&self) -> StructureStats {
         let children = || self.nodes.iter().flatten().filter(|c| !c.is_nothing());
         let leaves = children().filter_map(|child| match child.kind {
@@ -95,7 +87,6 @@ impl WideTree {
         }
     }
 
-    /// The triangles in the order of the leaves.
     pub(super) fn records(&self, soup: &TriangleSoup) -> Vec<TriangleRecord> {
         self.order
             .iter()
@@ -114,7 +105,7 @@ impl WideTree {
             return out;
         }
         let costs = Costs::new(tree, shape.width, settings);
-        // Wide nodes whose children are still to be found, as (place, binary node, depth).
+        // Wide nodes whose children are not yet found, as (index, binary node, depth).
         let mut open = vec![(0_u32, 0_u32, 1_u32)];
         let mut listed = Vec::new();
         while let Some((place, binary, depth)) = open.pop() {
@@ -158,7 +149,6 @@ impl WideTree {
     }
 }
 
-/// Appends the triangles below a binary node.
 fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
     match tree.nodes[root as usize].kind {
         NodeKind::Leaf { first, count } => {
@@ -184,7 +174,7 @@ mod tests {
         }
     }
 
-    /// A random tree over `count` boxes of one triangle each; returns where it stands.
+    /// A random tree over `count` boxes of one triangle each; returns its index.
     fn grow(nodes: &mut Vec<TreeNode>, first: u32, count: u32, random: &mut Pcg32) -> usize {
         let here = nodes.len();
         let leaf = NodeKind::Leaf { first, count };
@@ -222,8 +212,8 @@ mod tests {
         }
     }
 
-    /// Least cost of all ways to collapse, by trying each: every set of roots that stands for the
-    /// subtree of a node is opened root by root.
+    /// Least cost of all ways to collapse, by exhaustive search: every set of roots that represents
+    /// the subtree of a node is opened root by root.
     fn least_cost(tree: &Tree, node: usize, count: &dyn Fn(usize) -> u32, width: usize) -> f32 {
         let area = tree.nodes[node].bounds.half_area();
         let as_leaf = if count(node) <= 3 {

@@ -1,5 +1,5 @@
-//! Least costs of representing the subtree of each binary node by 1, 2, … children of a wide node, and which nodes are
-//! the children of one. Twin of `kernels/accel/wide/costs.wesl`.
+//! Least costs of representing the subtree of each binary node by 1, 2, … children of a wide node,
+//! and the resulting children. CPU version of `kernels/accel/wide/costs.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.
@@ -7,39 +7,38 @@
 use super::WideKind;
 use crate::tree::{NodeKind, Tree, TreeParameters};
 
-/// Most children of a node; its table has one entry less.
+/// Maximum children of a node; its table has one entry less.
 const MAX_WIDTH: usize = 8;
 /// Words of the largest table.
 pub(super) const WORDS: u64 = MAX_WIDTH as u64 - 1;
 /// Larger than the cost of any tree.
 const NEVER: f32 = 3.4e38;
-/// A wide node is cheaper than a leaf.
+/// Set if a wide node is cheaper than a leaf.
 const IS_NODE: u32 = 0x8000_0000;
-/// Bits of a choice.
 const BITS: u32 = 3;
-/// Fewest children that there is a choice for.
+/// Smallest number of children that needs a choice.
 const FEWEST: u32 = 2;
 
-/// C(n, i) of the paper for all nodes n and i below the width, and how many triangles each node holds.
+/// C(n, i) of the paper for all nodes n and i below the width, and the triangles per node.
 pub(super) struct Costs<'a> {
     tree: &'a Tree,
     width: u32,
     settings: &'a TreeParameters,
     costs: Vec<[f32; MAX_WIDTH - 1]>,
     triangles: Vec<u32>,
-    /// For 2, 3, … children three bits each, how many of them the first child's subtree gets; 0 where so many do not
-    /// pay. And [`IS_NODE`].
+    /// For 2, 3, … children three bits each: the number that go to the first child's subtree; 0 if
+    /// that many do not pay off. Plus [`IS_NODE`].
     choices: Vec<u32>,
 }
 
-/// The least cost of two subtrees, and how many of the children the first one gets.
+/// The least cost of two subtrees, and the number of children of the first one.
 struct Share {
     cost: f32,
     first: u32,
 }
 
 impl<'a> Costs<'a> {
-    /// Of nodes with so many children at most, 2 to 8.
+    /// For nodes with at most `width` children, 2 to 8.
     pub(super) fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
         let mut costs = Self {
             tree,
@@ -56,7 +55,6 @@ impl<'a> Costs<'a> {
         costs
     }
 
-    /// The children of an inner node.
     fn links(&self, node: u32) -> Option<[u32; 2]> {
         match self.tree.nodes[node as usize].kind {
             NodeKind::Inner { left, right } => Some([left, right]),
@@ -98,7 +96,7 @@ impl<'a> Costs<'a> {
         best
     }
 
-    /// Costs of a node whose children have theirs.
+    /// Computes the costs of a node from those of its children.
     fn fill(&mut self, node: u32) {
         let index = node as usize;
         let pair = match self.tree.nodes[index].kind {
@@ -131,26 +129,27 @@ impl<'a> Costs<'a> {
         self.choices[index] = choices;
     }
 
-    /// Whether a node whose costs are known is a leaf, if it is one child.
+    /// True if a node with known costs is a leaf when represented by one child.
     fn is_leaf(&self, node: u32) -> bool {
         self.choices[node as usize] & IS_NODE == 0
     }
 
-    /// What a subtree that is one child is: a leaf has its binary root in place of the first triangle.
+    /// The kind of a subtree represented by one child; a leaf's `first` is its binary root.
     pub(super) fn kind(&self, root: u32) -> WideKind {
-        match self.is_leaf(root) {
-            false => WideKind::Node(root),
-            true => WideKind::Leaf {
+        if self.is_leaf(root) {
+            WideKind::Leaf {
                 first: root,
                 count: self.triangles[root as usize],
-            },
+            }
+        } else {
+            WideKind::Node(root)
         }
     }
 
-    /// Binary roots of the children of the wide node in the place of `node`.
+    /// Binary roots of the children of the wide node that replaces `node`.
     pub(super) fn children(&self, node: u32) -> Vec<u32> {
         let mut roots = Vec::with_capacity(self.width as usize);
-        // Subtrees with the children they get, the first last.
+        // Subtrees with their numbers of children, the first last.
         let mut open = vec![(node, self.width)];
         while let Some((subtree, children)) = open.pop() {
             let choices = self.choices[subtree as usize];
@@ -167,7 +166,7 @@ impl<'a> Costs<'a> {
     }
 }
 
-/// How many of so many children pay, by the choices of a node. All that a wide node may have do.
+/// The number of `children` that pay off, by the choices of a node. The maximum always does.
 fn used(choices: u32, children: u32) -> u32 {
     let paying = choices & ((1 << (BITS * (children - 1))) - 1);
     paying.checked_ilog2().map_or(1, |bit| bit / BITS + FEWEST)

@@ -1,5 +1,5 @@
-//! `cwbvh`: compressed 8-wide BVH with nodes of 80 bytes, traversed in the order of the ray's octant.
-//! Twin of `kernels/accel/cwbvh.wesl`.
+//! `cwbvh`: compressed 8-wide BVH with nodes of 80 bytes, traversed in the order of the ray's
+//! octant. CPU version of `kernels/accel/cwbvh.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017.
@@ -46,12 +46,12 @@ impl Structure for Cwbvh {
 struct Node {
     /// First plane on each axis.
     low: [f32; 3],
-    /// Biased exponents, and which slots are inner children in the highest byte.
+    /// Biased exponents, and a mask of slots with inner children in the highest byte.
     exponents: u32,
-    /// Index, and which slots are leaves in the highest byte.
+    /// Index, and a mask of leaf slots in the highest byte.
     first_child: u32,
     first_triangle: u32,
-    /// Leaves: how many triangles, shifted by 5, and from where after the first of the node.
+    /// Leaves: number of triangles, shifted by 5, and their offset from the node's first.
     triangles: [u8; WIDTH],
     /// Planes at the minimum on x, y, z.
     lows: [[u8; WIDTH]; 3],
@@ -68,12 +68,10 @@ impl Node {
         self.first_child >> MASK_SHIFT
     }
 
-    /// Index of the inner child in `slot`.
     fn child(&self, slot: u32) -> u32 {
         (self.first_child & INDEX_MASK) + (self.inner_mask() & ((1 << slot) - 1)).count_ones()
     }
 
-    /// Places of the triangles of the leaf in `slot`.
     fn leaf(&self, slot: usize) -> Range<usize> {
         let triangles = u32::from(self.triangles[slot]);
         let first = self.first_triangle as usize + (triangles & PLACE_MASK) as usize;
@@ -142,7 +140,7 @@ impl WideNode for Node {
     }
 }
 
-/// A ray on its way, between two nodes.
+/// The state of a ray between two nodes.
 struct Traversal<'a> {
     walk: Walk<'a>,
     octant: u32,
@@ -161,7 +159,7 @@ fn begin(walk: Walk) -> Traversal {
     }
 }
 
-/// Visits a node and tests the triangles of its leaves; whether the ray goes on.
+/// Visits a node and tests the triangles of its leaves; returns true if the ray continues.
 fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     let (walk, group) = (&mut at.walk, at.group);
     walk.counters.box_tests += WIDTH as u32;
@@ -201,12 +199,12 @@ fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     true
 }
 
-/// The number of a bit that stands alone.
+/// The index of a single set bit.
 fn bit_number(bit: u32) -> u32 {
     bit.trailing_zeros()
 }
 
-/// Slots of a node whose boxes are entered, as bits.
+/// Mask of a node's slots whose boxes are entered.
 fn slot_bits(node: &Node, walk: &Walk) -> u32 {
     let (ray, inverse) = (&walk.ray, walk.inverse);
     let planes = frame(node.low, node.exponents, ray.origin, inverse);

@@ -1,6 +1,7 @@
-//! Collapsing on the device: costs go up the binary tree and places down, a dispatch for each of its levels; the kernels
-//! are in `kernels/accel/wide/device/`. The same wide tree as [`WideTree::collapse`] makes, to the bit: costs are sums
-//! and products that no compiler can take apart, and every node knows from the counts below it where it goes.
+//! Collapsing on the device: costs go up the binary tree and node indices down, one dispatch per
+//! level; the kernels are in `kernels/accel/wide/device/`. The wide tree is bit-identical to that
+//! of [`WideTree::collapse`]: costs are sums and products that no compiler can reassociate, and
+//! every node derives its position from the counts below it.
 
 use super::collapse::{Shape, WideChild, WideKind, WideTree};
 use super::{MAX_LEAF, costs};
@@ -13,27 +14,27 @@ use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Recording, Storage, UniformValues, groups_for,
 };
 
-/// Workgroups of a pass at most: an invocation takes several nodes of a long level.
+/// Maximum workgroups of a pass: an invocation handles several nodes of a long level.
 const MOST_GROUPS: u32 = 128;
 
-/// As `places.wesl` writes it.
+/// In the layout of `places.wesl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Place {
-    /// One more than the number of its slot, or 0.
+    /// Slot index plus 1, or 0.
     slot: u32,
-    /// Its own, among nodes or triangles.
+    /// Its own index, among nodes or triangles.
     own: u32,
-    /// 0 of a leaf.
+    /// 0 for a leaf.
     first_node: u32,
-    /// Of a leaf, how many.
+    /// Number of triangles, for a leaf.
     triangles: u32,
 }
 
 /// Collapses `tree`, whose leaves hold one triangle each, on this device.
 ///
 /// # Errors
-/// What the device met with, or an array does not fit it.
+/// The device reported an error, or an array exceeds its limits.
 pub(super) fn collapse(
     gpu: &Gpu,
     tree: &Tree,
@@ -60,7 +61,6 @@ pub(super) fn collapse(
     })
 }
 
-/// The passes over one tree.
 struct Passes<'a> {
     gpu: &'a Gpu,
     bindings: Bindings,
@@ -104,7 +104,7 @@ impl<'a> Passes<'a> {
         })
     }
 
-    /// Down for the levels, up for the costs, down for the places.
+    /// Down for the levels, up for the costs, down for the indices.
     fn record(
         mut self,
         recording: &mut Recording,
@@ -133,7 +133,7 @@ impl<'a> Passes<'a> {
     }
 }
 
-/// The wide tree, from the place of every binary node. What a faulty kernel could have written is no reason to panic.
+/// The wide tree, from every binary node's index. Faulty kernel output must not cause a panic.
 fn gather(
     tree: &Tree,
     places: &[Place],

@@ -1,5 +1,5 @@
-//! What the wide structures `bvh4` and `cwbvh` share: a binary tree, collapsed; nodes of quantised
-//! boxes; their build, validation, buffers and figures.
+//! Shared parts of the wide structures `bvh4` and `cwbvh`: a collapsed binary tree; nodes of
+//! quantised boxes; build, validation, buffers and statistics.
 
 mod bvh4;
 mod collapse;
@@ -23,7 +23,7 @@ use collapse::{Shape, WideTree};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Most triangles that a slot of either structure can count, in bits or in unary.
+/// Maximum triangles that a slot of either structure can count, in bits or in unary.
 const MAX_LEAF: usize = 3;
 
 parameters! {
@@ -38,7 +38,7 @@ parameters! {
     }
 }
 
-/// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
+/// The binary tree to collapse, with single-triangle leaves: the collapse decides about leaves.
 fn wide_tree(
     soup: &TriangleSoup,
     parameters: &TreeParameters,
@@ -54,32 +54,25 @@ fn wide_tree(
     Ok(tree)
 }
 
-/// A node of a wide structure, as what the structures share sees it.
+/// The interface of a wide structure's nodes.
 pub(crate) trait WideNode: Pod + Send + Sync {
-    /// Name of the structure.
     const STRUCTURE: &'static str;
-    /// Module of the kernel.
     const KERNEL: &'static str;
-    /// Most children.
     const WIDTH: usize;
-    /// Most nodes.
     const MOST_NODES: u64;
-    /// Whether children get slots by the octant that they lie in.
+    /// True if children get slots by octant.
     const BY_OCTANT: bool;
 
     /// The node with these children in its slots.
     fn pack(slots: &[WideChild]) -> Self;
-    /// Box of a slot, as kernels decode it.
+    /// Box of a slot, as decoded by kernels.
     fn bounds(&self, slot: usize) -> Bounds;
     /// Node and triangles in a slot; at most one of them, if the structure is valid.
     fn content(&self, slot: usize) -> (Option<usize>, Option<Range<usize>>);
-    /// Twin of the kernel's `trace`.
     fn trace(built: &Wide<Self>, walk: Walk) -> Hit;
 }
 
-/// A built wide structure.
 pub(crate) struct Wide<N> {
-    /// The root first.
     pub nodes: Vec<N>,
     /// Triangle records, leaf by leaf.
     pub leaf_triangles: Vec<TriangleRecord>,
@@ -92,7 +85,7 @@ impl<N: WideNode> Wide<N> {
     /// Builds the binary tree and collapses it.
     ///
     /// # Errors
-    /// The tree cannot be built, or there are more nodes than an index can name.
+    /// The tree cannot be built, or there are more nodes than an index can address.
     pub(crate) fn build(
         soup: &TriangleSoup,
         parameters: &WideParameters,
@@ -105,7 +98,7 @@ impl<N: WideNode> Wide<N> {
         Ok(Box::new(Self::of_tree(&tree, soup, parameters, log)?))
     }
 
-    /// Collapses a tree with one triangle a leaf.
+    /// Collapses a tree with single-triangle leaves.
     fn of_tree(
         tree: &Tree,
         soup: &TriangleSoup,
@@ -117,7 +110,7 @@ impl<N: WideNode> Wide<N> {
             by_octant: N::BY_OCTANT,
         };
         let wide = match log.gpu().cloned() {
-            // Without a device the same to the bit: what a tree of one was fitted to may be laid out anywhere.
+            // Bit-identical without a device: a refitted tree may be laid out anywhere.
             Some(gpu) if parameters.tree.on_device().is_some() => {
                 device::collapse(&gpu, tree, shape, &parameters.tree, log)?
             }
@@ -144,7 +137,7 @@ impl<N: WideNode> Wide<N> {
         }))
     }
 
-    /// Groups on the stack at most: a level leaves one behind.
+    /// Maximum groups on the stack: a level leaves one behind.
     fn depth(&self) -> u32 {
         self.stats.depth.unwrap_or(0)
     }
@@ -181,7 +174,7 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
         coverage.descend(self.depth(), |coverage, index, around, below| {
             let node = &self.nodes[index];
             for slot in 0..N::WIDTH {
-                // What is below must lie in every decoded box on the way.
+                // Descendants must lie in every decoded box on the way.
                 let bounds = around.intersection(&node.bounds(slot));
                 let (child, leaf) = node.content(slot);
                 let is_one = child.is_none() || leaf.is_none();
@@ -208,7 +201,7 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
                 NamedWords::new("leaf_triangles", &self.leaf_triangles),
             ],
             uniforms: vec![limits(self.nodes.len(), self.nodes.len())],
-            // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
+            // A multiple of 8, so that scenes of similar depth share a kernel, and one spare entry.
             constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
         }
     }

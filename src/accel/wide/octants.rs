@@ -1,5 +1,5 @@
-//! Slots for the children of a wide node, such that visiting them in ascending order of `slot ^ octant of the ray` is
-//! about front to back. Twin of `kernels/accel/wide/octants.wesl`.
+//! Slots for the children of a wide node, such that visiting them in ascending order of `slot ^
+//! octant of the ray` is roughly front to back. CPU version of `kernels/accel/wide/octants.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.3.
@@ -7,10 +7,10 @@
 use super::WideChild;
 use crate::bounds::Bounds;
 
-/// One for each octant.
+/// One per octant.
 const SLOTS: usize = 8;
 
-/// How far a child lies in the direction that a slot stands for.
+/// Projection of a child's offset on the direction of a slot.
 fn agreement(offset: [f32; 3], slot: usize) -> f32 {
     let along = |axis: usize| {
         let x = offset[axis];
@@ -19,8 +19,7 @@ fn agreement(offset: [f32; 3], slot: usize) -> f32 {
     along(0) + along(1) + along(2)
 }
 
-/// The children of a node with this box by slots: greedily, the child and the slot of best agreement first. Slots
-/// without a child get an empty leaf.
+/// The children in slots, assigned greedily by best agreement. Empty slots get an empty leaf.
 pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
     let middle = bounds.doubled_centre();
     let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(SLOTS * SLOTS);

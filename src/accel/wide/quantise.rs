@@ -1,22 +1,23 @@
-//! Boxes of eight bits a plane on the grid of planes of their node. Twin of `kernels/accel/wide.wesl`.
+//! Boxes with eight bits per plane on the plane grid of their node. CPU version of
+//! `kernels/accel/wide.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, sections 3.1 and 4.1.
 //!
-//! A plane lies at `low + q · 2^e` for a whole q in 0..256. `low` is a multiple of `2^e`, and `e` is
-//! so large that all planes are multiples of `2^e` below `2^24 · 2^e`: they are floats, their decoding
-//! is exact however an adapter rounds, and a box of planes contains what it was made for by integer
+//! A plane lies at `low + q · 2^e` for an integer q in 0..256. `low` is a multiple of `2^e`, and
+//! `e` is so large that all planes are multiples of `2^e` below `2^24 · 2^e`: they are floats,
+//! their decoding is exact on any adapter, and a box of planes contains the original box by integer
 //! arithmetic ([`Quantisation::new`]).
 //!
-//! **No hit is lost.** The proof in `docs/design.md` needs of a box B that its computed distances
-//! enclose those of every coordinate in it: n(B) ≤ d(y) ≤ f(B) with `d(y) = (y − origin) · inverse` as
-//! computed. Decoding planes and calling `slab` would give that by monotony. Kernels save the decoding:
-//! with `s = 2^e · inverse` (exact) and `b = (low − origin) · inverse` they compute `q · s + (b ∓ slack)`.
-//! Let u = 2⁻²⁴ and M = |b| + 256 |s|, which bounds |q · s| + |b|. The two roundings of b, those of
-//! the product, of slack and of the two sums move the result by less than 5uM, and those of d(y) by
-//! less than 2u(1 + u) times a distance that grows with y: taken at the plane of B, it is below 3uM.
-//! With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) there is a factor of two left. Both sides use the
-//! same reciprocal, whose own error does not count.
+//! **No hit is lost.** The proof in `docs/design.md` requires that the computed distances of a box
+//! B enclose those of every coordinate in it: n(B) ≤ d(y) ≤ f(B) with `d(y) = (y − origin) ·
+//! inverse` as computed. Decoding planes and calling `slab` would give that by monotonicity.
+//! Kernels save the decoding: with `s = 2^e · inverse` (exact) and `b = (low − origin) · inverse`
+//! they compute `q · s + (b ∓ slack)`. Let u = 2⁻²⁴ and M = |b| + 256 |s|, which bounds |q · s| +
+//! |b|. The two roundings of b, those of the product, of slack and of the two sums move the result
+//! by less than 5uM, and those of d(y) by less than 2u(1 + u) times a distance that grows with y:
+//! at the plane of B, it is below 3uM. With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) a factor
+//! of two remains. Both sides use the same reciprocal, so its own error does not matter.
 
 use super::WideChild;
 use crate::bounds::Bounds;
@@ -24,26 +25,25 @@ use crate::intersection::Reciprocal;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub(super) const FRAME_PAD: f32 = 9.536_743e-7;
-/// Number of planes on an axis.
 pub(super) const PLANES: f32 = 256.0;
 
-/// Quanta are at least 2⁻⁶⁰: their distances stay far from denormal numbers.
+/// Quanta are at least 2⁻⁶⁰: their distances stay far from denormals.
 const LEAST_EXPONENT: i32 = -60;
 const BIAS: i32 = 127;
 const MANTISSA: i32 = 24;
 
-/// The planes of a node: where the first one lies and how far they are apart.
+/// The planes of a node: position of the first one, and their spacing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Quantisation {
     /// First plane on each axis.
     pub low: [f32; 3],
-    /// Biased exponents of the distance between planes.
+    /// Biased exponents of the plane spacing.
     pub exponents: [u8; 3],
 }
 
 impl Quantisation {
-    /// That of a node with these children, and the planes of each slot at the minimum and the maximum
-    /// of each axis; zeros if there are no children.
+    /// The quantisation of a node with these children, and the planes of each slot at the minimum
+    /// and the maximum of each axis; zeros without children.
     pub(crate) fn of_children<const WIDTH: usize>(
         children: &[WideChild],
     ) -> (Self, [[[u8; WIDTH]; 3]; 2]) {
@@ -87,14 +87,12 @@ impl Quantisation {
 /// A box by plane numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Planes {
-    /// Planes at the minimum.
     pub low: [u8; 3],
-    /// Planes at the maximum.
     pub high: [u8; 3],
 }
 
 impl Quantisation {
-    /// The finest that covers `bounds`.
+    /// The finest quantisation that covers `bounds`.
     pub(crate) fn new(bounds: &Bounds) -> Self {
         let mut grid = Self {
             low: [0.0; 3],
@@ -143,26 +141,24 @@ impl Quantisation {
         }
     }
 
-    /// The exponents as kernels read them, a byte each; the highest byte is `top`.
+    /// The exponents in kernel layout, a byte each; the highest byte is `top`.
     pub(crate) fn exponent_word(&self, top: u8) -> u32 {
         let [x, y, z] = self.exponents;
         u32::from_le_bytes([x, y, z, top])
     }
 }
 
-/// Exponent of the leading bit; that of the smallest normal number for what lies below.
+/// Exponent of the leading bit; for denormals that of the smallest normal number.
 fn exponent(x: f32) -> i32 {
     ((x.to_bits() >> 23 & 255) as i32 - BIAS).max(1 - BIAS)
 }
 
-/// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box,
-/// `+ far` where it leaves.
+/// Distances along a ray to a node's planes: `q · scale + near` on entry, `+ far` on exit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaneDistances {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
-    /// The pad of boxes.
     pad: f32,
 }
 
@@ -200,18 +196,17 @@ fn planes(word: u32, scale: f32, base: f32) -> [f32; 4] {
     bytes(word).map(|q| q * scale + base)
 }
 
-/// The later of two distances as kernels see it: by integers, so that of two negative distances it
-/// may be the earlier one.
+/// The later of two distances by integer comparison; of two negative ones possibly the earlier.
 fn later(a: f32, b: f32) -> f32 {
     f32::from_bits((a.to_bits() as i32).max(b.to_bits() as i32) as u32)
 }
 
-/// The earlier of two distances, of two negative ones perhaps the later.
+/// The earlier of two distances; of two negative ones possibly the later.
 fn earlier(a: f32, b: f32) -> f32 {
     f32::from_bits((a.to_bits() as i32).min(b.to_bits() as i32) as u32)
 }
 
-/// Where the segment enters four boxes, whose near planes on the three axes are these.
+/// Entry distances of four boxes with these near planes on the three axes.
 pub(crate) fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
@@ -221,7 +216,7 @@ pub(crate) fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> 
     })
 }
 
-/// Where it leaves them, padded: a box is entered if it does not leave before it enters.
+/// Exit distances, padded: a box is entered if it is not exited before it is entered.
 pub(crate) fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
@@ -239,7 +234,7 @@ mod tests {
     use crate::ray::Ray;
     use raystone_core::random::Pcg32;
 
-    /// Numbers of all sizes, both signs, zero and neighbours of powers of two among them.
+    /// Numbers of all sizes and both signs, including zero and neighbours of powers of two.
     fn number(random: &mut Pcg32) -> f32 {
         let magnitude = 10.0_f64.powf(20.0 * random.uniform() - 10.0) as f32;
         let signed = if random.below(2) == 0 {
@@ -302,7 +297,7 @@ mod tests {
                     let quantum = 2.0_f64.powi(i32::from(grid.exponents[axis]) - BIAS);
                     let exact = f64::from(grid.low[axis]) + f64::from(planes.high[axis]) * quantum;
                     assert_eq!(f64::from(decoded.max[axis]), exact);
-                    // And no looser than a quantum; the difference from a denormal would be rounded.
+                    // No looser than a quantum; the difference from a denormal would be rounded.
                     assert!(
                         exact - quantum < f64::from(inner.max[axis]),
                         "{inner:?}: {grid:?}"
@@ -312,7 +307,7 @@ mod tests {
         }
     }
 
-    /// How many boxes of planes are entered later or left earlier than a box inside them.
+    /// Number of quantised boxes that are entered later or exited earlier than a box inside them.
     fn narrower(pad: f32) -> usize {
         let mut random = Pcg32::new(2);
         let mut wrong = 0;
@@ -340,7 +335,7 @@ mod tests {
             let (enter, leave) = slab(&inner, &ray, *inverse);
             let quantised_enter = enter_four(word(false), &frame, 0.0)[0];
             let quantised_leave = leave_four(word(true), &frame, 1e30)[0];
-            // Boxes behind the origin are left before 0, whatever the exact distance.
+            // Boxes behind the origin are exited before 0, whatever the exact distance.
             if quantised_enter > enter.max(0.0)
                 || (leave >= 0.0 && quantised_leave < leave.min(1e30) * inverse.pad)
             {

@@ -1,4 +1,4 @@
-//! `atomic`: one atomic for each element that stays.
+//! `atomic`: one atomic for each selected element.
 
 use super::passes::{bound, kernel};
 use super::{Compaction, Order, Passes, Stays};

@@ -1,4 +1,4 @@
-//! `blelloch`: the same with the scan that does no more additions than there are elements.
+//! `blelloch`: like `horn`, with a work-efficient scan.
 
 use super::horn::{gather, mark_holes};
 use super::passes::{bound, kernel};
@@ -17,7 +17,7 @@ impl Compaction for Blelloch {
     }
 
     fn record(&self, passes: &mut Passes) -> Result<(), GpuError> {
-        // The tree is whole, and has a root.
+        // The tree is complete, and has a root.
         let words = passes.stream.capacity.max(2).next_power_of_two();
         let tree = passes.scratch("holes", u64::from(words));
         mark_holes(passes, &tree, words)?;

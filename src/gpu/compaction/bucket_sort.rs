@@ -1,4 +1,4 @@
-//! `bucket-sort`: several compactions at once, one behind the other.
+//! `bucket-sort`: several compactions at once, one after the other.
 
 use super::reduce_scan_scatter::record_buckets;
 use super::tile::Tile;

@@ -1,4 +1,4 @@
-//! `horn`: a scan of all holes in log n steps, and each slot looks for its element.
+//! `horn`: a scan of all holes in log n steps, then each slot searches for its element.
 
 use super::passes::{bound, kernel};
 use super::{Compaction, Order, Passes};
@@ -32,7 +32,7 @@ impl Compaction for Horn {
     }
 }
 
-/// Records what makes a word of each element: 1 for a hole.
+/// Records the conversion of each element to a word: 1 for a hole.
 pub(super) fn mark_holes(passes: &mut Passes, holes: &Storage, words: u32) -> Result<(), GpuError> {
     let bindings = bound(&[("holes", holes)], ("padded", &[("words", words)]));
     passes.run_for(kernel("holes"), &bindings, words)

@@ -1,14 +1,16 @@
-//! Stream compaction: of the elements of a stream those that are wanted, side by side, without the holes between.
+//! Stream compaction: the selected elements of a stream, stored contiguously.
 //!
-//! Methods are a registry ([`CompactionRegistry`]); each records its passes over a [`Stream`]. What belongs together
-//! is told by a word per element, its flag: 0 is a hole, `k` what belongs to the `k`-th bucket. Most methods know one
-//! bucket, so that a flag says whether an element stays; a `BucketSort` or `RadixSorted` puts several buckets one behind the other.
-//! How many elements there are stands on the device, and so does how many stay: nothing comes to the host in between,
-//! and [`Passes::groups_of_kept`] is what a pass over them is dispatched with.
+//! Methods are a registry ([`CompactionRegistry`]); each records its passes over a [`Stream`]. A
+//! flag word per element selects it: 0 is a hole, `k` the `k`-th bucket. Most methods have one
+//! bucket, so a flag only says if an element stays; `BucketSort` and `RadixSorted` store several
+//! buckets one after the other. The numbers of input and output elements stay on the device,
+//! without a round trip to the host, and [`Passes::groups_of_kept`] dispatches a pass over the
+//! output.
 //!
-//! Scans of the device are *reduce, scan, scatter* in passes of their own (`scan`). A single pass in which workgroups
-//! wait for those before them (decoupled look-back, Merrill and Garland 2016) would read the stream once less, but
-//! WebGPU does not promise that a workgroup which is waited for makes progress, or has even begun.
+//! Device scans are *reduce, scan, scatter* in separate passes (`scan`). A single pass in which
+//! workgroups wait for earlier ones (decoupled look-back, Merrill and Garland 2016) would read the
+//! stream once less, but WebGPU does not guarantee that such a workgroup makes progress, or has
+//! even started.
 
 mod atomic;
 mod blelloch;
@@ -41,39 +43,39 @@ pub use workgroup::Workgroup;
 
 use crate::{Gpu, GpuError};
 
-/// How a method leaves the elements.
+/// The order of the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// As they came, bucket by bucket.
+    /// Input order, bucket by bucket.
     Stable,
-    /// In an order that another run may change.
+    /// Unstable: it may differ between runs.
     Any,
-    /// As they came, with the holes between them.
+    /// Input order, with the holes.
     WithHoles,
 }
 
-/// A way to compact streams: the struct of its parameters, a kernel or some, one line in the registry.
+/// A way to compact streams: its parameter struct, some kernels, one line in the registry.
 pub trait Compaction: Send + Sync {
-    /// How it leaves the elements.
+    /// The order of the output.
     fn order(&self) -> Order;
 
-    /// Buckets that it puts one behind the other; flags are at most this.
+    /// Number of buckets that it stores one after the other; flags are at most this.
     fn buckets(&self) -> u32 {
         1
     }
 
-    /// Whether it can leave all buckets at once, each in a part of its own ([`Stays::Apart`]).
+    /// True if it can write all buckets at once, each in its own part ([`Stays::Apart`]).
     fn keeps_apart(&self) -> bool {
         false
     }
 
-    /// Why it cannot run on this adapter, if so.
+    /// The reason why it cannot run on this adapter, if any.
     fn refusal(&self, _gpu: &Gpu) -> Option<String> {
         None
     }
 
-    /// Records the passes that leave what stays in [`Stream::kept`], and how many that are in the first word of
-    /// [`Stream::count`].
+    /// Records the passes that write the output to [`Stream::kept`], and its length to the first
+    /// word of [`Stream::count`].
     ///
     /// # Errors
     /// A kernel does not compose or compile.

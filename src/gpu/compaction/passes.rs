@@ -1,46 +1,47 @@
-//! What a compaction reads and writes, and the passes that it is made of.
+//! Input and output of a compaction, and its passes.
 
 use crate::{
     Bindings, Composition, Gpu, GpuError, Groups, Pairs, RadixSort, Recording, Storage,
     UniformValues, WORKGROUP_SIZE, grid_of,
 };
 
-/// What of a stream stays.
+/// The selected buckets of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stays {
     /// Every bucket.
     All,
-    /// This one alone; its elements are in the first then.
+    /// Only this one, which becomes the first bucket.
     Bucket(u32),
-    /// So many buckets, each in a part of its own of [`Stream::kept`], with room for [`Stream::capacity`] elements; the words of
-    /// [`Stream::count`] tell how many are in each. For methods that [keep them apart](super::Compaction::keeps_apart).
+    /// This many buckets, each in its own part of [`Stream::kept`] of [`Stream::capacity`]
+    /// elements; the words of [`Stream::count`] hold their lengths. For methods that [keep them
+    /// apart](super::Compaction::keeps_apart).
     Apart(u32),
 }
 
-/// A stream on the device, and where it is compacted to.
+/// A stream on the device, and the target of its compaction.
 #[derive(Debug, Clone)]
 pub struct Stream {
-    /// Elements that the buffers have room for.
+    /// Capacity of the buffers in elements.
     pub capacity: u32,
-    /// Bytes of an element, a multiple of 4.
+    /// Bytes per element, a multiple of 4.
     pub element_bytes: u32,
-    /// One word: elements that there are, at most [`Stream::capacity`].
+    /// One word: number of elements, at most [`Stream::capacity`].
     pub length: Storage,
-    /// A word per element: 0 for a hole, else its bucket, from 1 on.
+    /// A word per element: 0 for a hole, otherwise its bucket, from 1.
     pub flags: Storage,
-    /// Which of the buckets.
+    /// The selected buckets.
     pub stays: Stays,
     /// The elements.
     pub elements: Storage,
-    /// What stays; as large as [`Stream::elements`], and another buffer.
+    /// The output; as large as [`Stream::elements`], and a separate buffer.
     pub kept: Storage,
-    /// One word: elements that stay.
+    /// One word: number of output elements.
     pub count: Storage,
 }
 
 impl Stream {
-    /// A kernel that sees the elements as what they have fewest of, `vec4`s where whole ones fit, else words, and the flags as
-    /// those of the bucket that stays.
+    /// The kernel with the widest possible element type, `vec4`s if they fit, otherwise words, and
+    /// with flags for the selected bucket.
     pub fn seen_by(&self, kernel: Composition) -> Composition {
         let wide = self.element_bytes.is_multiple_of(16);
         let cells = self.element_bytes / if wide { 16 } else { 4 };
@@ -65,13 +66,13 @@ impl Stream {
     }
 }
 
-/// Where a method writes down its passes.
+/// Recorder of a method's passes.
 pub struct Passes<'a> {
     gpu: &'a Gpu,
     recording: &'a mut Recording,
-    /// What is compacted.
+    /// The stream to compact.
     pub stream: &'a Stream,
-    /// Kernels that were recorded.
+    /// Kernels recorded so far.
     pub runs: u32,
     /// Bytes of the buffers between passes.
     pub scratch_bytes: u64,
@@ -89,18 +90,18 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// A buffer of so many words that is needed between passes. All recordings of a player share it.
+    /// A buffer of this many words for use between passes. All recordings of a player share it.
     pub fn scratch(&mut self, name: &str, words: u64) -> Storage {
         self.scratch_bytes += 4 * words;
         Storage::scratch(&format!("compaction {name}"), 4 * words)
     }
 
-    /// Sets the count to 0, for those who add to it.
+    /// Sets the count to 0, for kernels that add to it.
     pub(crate) fn clear_count(&mut self) {
         self.recording.clear(&self.stream.count);
     }
 
-    /// Runs `compaction/NAME`, which sees the stream and what is `further` bound, in so many workgroups.
+    /// Runs `compaction/NAME` with the bindings of the stream and `further`.
     ///
     /// # Errors
     /// The kernel does not compose or compile.
@@ -120,7 +121,7 @@ impl<'a> Passes<'a> {
         Ok(())
     }
 
-    /// The same for a kernel of an invocation per item.
+    /// The same for a kernel with one invocation per item.
     ///
     /// # Errors
     /// As [`Passes::run`].
@@ -133,7 +134,7 @@ impl<'a> Passes<'a> {
         self.run(kernel, further, items.div_ceil(WORKGROUP_SIZE))
     }
 
-    /// Sorts pairs of words by the lowest `bits` of the keys, and tells where they are then: see [`RadixSort::record`].
+    /// Sorts pairs of words by the lowest `bits` of the keys: see [`RadixSort::record`].
     ///
     /// # Errors
     /// A kernel does not compose or compile.
@@ -146,8 +147,8 @@ impl<'a> Passes<'a> {
 }
 
 impl Passes<'_> {
-    /// Records what turns the count into workgroups of [`WORKGROUP_SIZE`] invocations, for a kernel of an invocation per
-    /// element that stays: nothing is run where none does.
+    /// Records the conversion of the count to workgroups of [`WORKGROUP_SIZE`] invocations, for a
+    /// kernel with one invocation per output element; none for an empty output.
     ///
     /// # Errors
     /// The kernel does not compose or compile.
@@ -160,12 +161,11 @@ impl Passes<'_> {
     }
 }
 
-/// A kernel of this folder.
 pub(super) fn kernel(name: &str) -> Composition {
     Composition::new(&format!("compaction/{name}"))
 }
 
-/// Some buffers and one uniform of words.
+/// Bindings of some buffers and one uniform of words.
 pub(super) fn bound(
     buffers: &[(&str, &Storage)],
     (uniform, words): (&str, &[(&str, u32)]),

@@ -1,7 +1,8 @@
-//! `radix-sort`: places are sorted by bucket, then each element goes to its place.
+//! `radix-sort`: indices are sorted by bucket, then each element is moved to its place.
 //!
-//! [`super::BucketSort`] looks at a tile once for each bucket; here a digit of eight bits takes three passes over words, whatever
-//! the buckets, and elements move once. So it costs the same with one bucket and with 255.
+//! [`super::BucketSort`] reads a tile once per bucket; here a digit of eight bits takes three
+//! passes over words for any number of buckets, and elements move once. So one bucket costs the
+//! same as 255.
 
 use super::passes::{bound, kernel};
 use super::{Compaction, Order, Passes};

@@ -1,4 +1,4 @@
-//! `reduce-scan-scatter`: counts of tiles, a scan of the counts, and each element to its place.
+//! `reduce-scan-scatter`: counts of tiles, a scan of the counts, and the scatter.
 
 use super::passes::{bound, kernel};
 use super::scan::record_scan;
@@ -25,7 +25,7 @@ impl Compaction for ReduceScanScatter {
     }
 }
 
-/// Counts of each bucket and tile, their scan, and the scatter.
+/// Records the counts of each bucket and tile, their scan, and the scatter.
 pub(super) fn record_buckets(
     passes: &mut Passes,
     tile: &Tile,

@@ -8,7 +8,7 @@ use raystone_core::params::{Parameters, Registered, Registry, Variant};
 use raystone_core::text::nearest;
 use std::sync::Arc;
 
-/// Every compaction that can be named; more can be added.
+/// All compactions by name; more can be added.
 #[derive(Clone)]
 pub struct CompactionRegistry(pub Registry<dyn Compaction>);
 
@@ -30,10 +30,10 @@ impl Default for CompactionRegistry {
 }
 
 impl CompactionRegistry {
-    /// The compaction that a variant names, with its parameters.
+    /// The compaction of a variant, with its parameters.
     ///
     /// # Errors
-    /// A name that is not registered, or parameters that it does not have; in words.
+    /// A description of an unknown name or parameter.
     pub fn configured(&self, variant: &Variant) -> Result<Arc<dyn Compaction>, String> {
         let Some(kind) = self.0.find(&variant.name) else {
             let near = nearest(&variant.name, self.0.iter().map(Registered::name));
@@ -48,7 +48,7 @@ impl CompactionRegistry {
     }
 }
 
-/// A compaction whose parameters are its own struct.
+/// A compaction that is its own parameter struct.
 pub fn compaction_kind<C: Compaction + Parameters + 'static>(
     name: &str,
 ) -> Registered<dyn Compaction> {

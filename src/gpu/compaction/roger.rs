@@ -1,9 +1,10 @@
-//! `roger`: blocks are compacted each for itself, then moved together.
+//! `roger`: blocks are compacted separately, then concatenated.
 //!
-//! D. Roger, U. Assarsson, N. Holzschuch, "Efficient stream reduction on the GPU", GPGPU workshop, 2007; D. Roger,
-//! "Réflexions spéculaires et glossy interactives dans des scènes dynamiques", thesis, Grenoble 2008, chapter 4. The search
-//! stays within a block, so that a stream costs O(n + n log s) and not O(n log n). Where kernels can scatter, none of
-//! it is needed, as he says himself: `reduce-scan-scatter` has no search.
+//! D. Roger, U. Assarsson, N. Holzschuch, "Efficient stream reduction on the GPU", GPGPU workshop,
+//! 2007; D. Roger, "Réflexions spéculaires et glossy interactives dans des scènes dynamiques",
+//! thesis, Grenoble 2008, chapter 4. The search stays within a block, so a stream costs O(n + n log
+//! s) and not O(n log n). Where kernels can scatter, the method is unnecessary, as he notes
+//! himself: `reduce-scan-scatter` has no search.
 
 use super::passes::{bound, kernel};
 use super::scan::record_scan;
@@ -11,7 +12,7 @@ use super::{Compaction, Order, Passes};
 use crate::GpuError;
 use raystone_core::parameters;
 
-/// Invocations of a workgroup, at least and at most.
+/// Minimum and maximum invocations of a workgroup.
 const LANES: [u32; 2] = [64, 256];
 
 parameters! {
@@ -40,7 +41,7 @@ impl Compaction for Roger {
     fn record(&self, passes: &mut Passes) -> Result<(), GpuError> {
         let stream = passes.stream;
         let blocks = stream.capacity.div_ceil(self.block);
-        // Whole blocks in a workgroup: as many as it has invocations for, or one.
+        // Whole blocks per workgroup: as many as it has invocations for, or one.
         let lanes = self.block.clamp(LANES[0], LANES[1]);
         let in_tile = (lanes / self.block).max(1);
         let tile = in_tile * self.block;

@@ -1,16 +1,15 @@
-//! Scans of the device: each word becomes the sum of those before it.
+//! Device scans: each word becomes the sum of those before it.
 //!
-//! Blocks of a workgroup each are scanned in their place, then the sums of the blocks, and those are added to the words
-//! of their blocks; where the sums are more than a block, the same is done with them, level upon level. Workgroups wait
-//! for each other between passes only: see [`super`].
+//! Blocks of one workgroup each are scanned in place, then the sums of the blocks, which are added
+//! to the words of their blocks; if the sums exceed a block, this is repeated level by level.
+//! Workgroups synchronise only between passes: see [`super`].
 
 use super::passes::{Passes, bound, kernel};
 use crate::{GpuError, Storage};
 
-/// Words in a block.
 pub(crate) const BLOCK: u32 = 256;
 
-/// Records an exclusive scan of the first `words` of `sums`, in their place, modulo 2³².
+/// Records an in-place exclusive scan of the first `words` of `sums`, modulo 2³².
 ///
 /// # Errors
 /// A kernel does not compose or compile.

@@ -1,4 +1,4 @@
-//! `subgroup`: a ballot and one atomic for each subgroup.
+//! `subgroup`: a ballot and one atomic per subgroup.
 
 use super::passes::kernel;
 use super::{Compaction, Order, Passes};

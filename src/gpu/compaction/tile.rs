@@ -1,4 +1,4 @@
-//! The tile of a workgroup: so many invocations, each with some elements side by side.
+//! The tile of a workgroup: its invocations, each with several consecutive elements.
 
 use crate::Composition;
 use raystone_core::parameters;
@@ -14,12 +14,11 @@ parameters! {
 }
 
 impl Tile {
-    /// How many there are of them for so many elements.
+    /// Number of tiles for this many elements.
     pub(crate) fn count(&self, elements: u32) -> u32 {
         elements.div_ceil(self.lanes * self.per_lane)
     }
 
-    /// A kernel over them.
     pub(crate) fn kernel(&self, kernel: Composition) -> Composition {
         kernel
             .constant("SCAN_LANES", self.lanes)

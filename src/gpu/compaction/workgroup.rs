@@ -1,4 +1,4 @@
-//! `workgroup`: a scan and one atomic for each workgroup.
+//! `workgroup`: a scan and one atomic per workgroup.
 
 use super::passes::kernel;
 use super::tile::Tile;

@@ -1,8 +1,8 @@
-//! Twin of `kernels/integrator/offset/error_bound.wesl`.
+//! CPU version of `kernels/integrator/offset/error_bound.wesl`.
 
 use super::RayOffset;
 
-/// By the bound of the point's error.
+/// By the error bound of the point.
 pub const ERROR_BOUND: RayOffset = RayOffset {
     name: "error-bound",
     description: "the rounding error of the point, from its triangle and the instances' transforms",
@@ -12,7 +12,7 @@ pub const ERROR_BOUND: RayOffset = RayOffset {
     offset_point,
 };
 
-/// The next number away from zero where the coordinate moved outwards, towards zero where inwards.
+/// The next number away from zero if the coordinate moved outwards, towards zero if inwards.
 fn next(x: f32, step: f32) -> f32 {
     let bits = x.to_bits() as i32;
     if step == 0.0 || bits & 0x7fff_ffff == 0 {
@@ -22,8 +22,8 @@ fn next(x: f32, step: f32) -> f32 {
     f32::from_bits(bits.wrapping_add(if away { 1 } else { -1 }) as u32)
 }
 
-/// Out of the box of the point's error, then one representable number farther.
-/// Source: M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 6.8.6.
+/// Out of the error box of the point, then one representable number farther. Source: M. Pharr, W.
+/// Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 6.8.6.
 fn offset_point(p: [f32; 3], n: [f32; 3], error: [f32; 3]) -> [f32; 3] {
     let distance = n[0].abs() * error[0] + n[1].abs() * error[1] + n[2].abs() * error[2];
     let step = n.map(|n| n * distance);

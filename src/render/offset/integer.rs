@@ -1,4 +1,4 @@
-//! Twin of `kernels/integrator/offset/integer.wesl`.
+//! CPU version of `kernels/integrator/offset/integer.wesl`.
 
 use super::RayOffset;
 
@@ -12,14 +12,13 @@ pub(crate) const INTEGER: RayOffset = RayOffset {
     offset_point,
 };
 
-/// Below this coordinate a fixed step is the larger one, scene units.
+/// Coordinate below which the fixed step is larger, scene units.
 const SMALL: f32 = 0.03125;
 const SMALL_STEP: f32 = 1.525_878_9e-5;
 const STEPS: f32 = 256.0;
 
-/// As many representable numbers as the normal has 256ths.
-/// Source: C. Wächter, N. Binder, "A fast and robust method for avoiding self-intersection",
-/// Ray Tracing Gems, chapter 6, 2019.
+/// As many representable numbers as the normal has 256ths. Source: C. Wächter, N. Binder, "A fast
+/// and robust method for avoiding self-intersection", Ray Tracing Gems, chapter 6, 2019.
 fn offset_point(p: [f32; 3], n: [f32; 3], _error: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|a| {
         if p[a].abs() < SMALL {

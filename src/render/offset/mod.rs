@@ -1,4 +1,4 @@
-//! Where rays that leave a surface start, so that they do not meet it again.
+//! Origins of rays that leave a surface, chosen so that they do not hit it again.
 
 mod error_bound;
 mod fixed;
@@ -16,26 +16,26 @@ use raystone_gpu::Composition;
 use raystone_scene::{Instance, row_sum_norm};
 use std::fmt;
 
-/// How the origin of a ray is moved off the surface that it leaves.
+/// An offset of ray origins from the surface.
 #[derive(Clone, Copy)]
 pub struct RayOffset {
-    /// Name as a user types it.
+    /// Name used in configurations.
     pub name: &'static str,
-    /// One line: what it is and where it comes from.
+    /// One-line description with source.
     pub description: &'static str,
-    /// Module of the kernel, relative to the kernel folder: it exports `offset_point`.
+    /// Kernel module, relative to the kernel folder: it exports `offset_point`.
     pub kernel: &'static str,
-    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    /// Paths and texts of its own kernel modules, for offsets that are not built in.
     pub sources: Sources,
-    /// Whether images are claimed to be free of light that leaks and of surfaces that shadow themselves. The
-    /// bias of others is measured, and is no fault.
+    /// True if images should have neither light leaks nor self-shadowing. The bias of other offsets
+    /// is measured, and is no fault.
     pub is_unbiased: bool,
-    /// The origin of a ray that leaves the point p on the side of the unit normal n, from p, n and what
-    /// [`position_error`] says of the point. Twin of the kernel's.
+    /// The origin of a ray that leaves the point p on the side of the unit normal n, from p, n and
+    /// the error bound of [`position_error`]. CPU version of the kernel's function.
     pub offset_point: fn([f32; 3], [f32; 3], [f32; 3]) -> [f32; 3],
 }
 
-/// Everything that can be named on the `offset` axis.
+/// The values of the `offset` axis.
 pub type OffsetRegistry = Kinds<RayOffset>;
 
 impl Default for RayOffset {
@@ -44,7 +44,7 @@ impl Default for RayOffset {
     }
 }
 
-/// Offsets are known by their names.
+/// Offsets are compared by name.
 impl PartialEq for RayOffset {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
@@ -76,7 +76,7 @@ impl Named for RayOffset {
 }
 
 impl RayOffset {
-    /// `composition` with this offset, unless it chose another before.
+    /// `composition` with this offset, unless it already selects another.
     #[must_use]
     pub fn activate(self, composition: Composition) -> Composition {
         if composition.active.contains_key("offset") {
@@ -90,18 +90,18 @@ impl RayOffset {
 /// Eight roundings, 8 · 2⁻²⁴; see [`position_error`].
 pub(crate) const POSITION_ERROR: f32 = 4.768_371_6e-7;
 
-/// What instances add to the error of a point: a factor of its greatest coordinate, and scene units,
+/// Error of a point from instance transforms: a factor of its largest coordinate, and scene units,
 /// both to be multiplied by `POSITION_ERROR`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TransformError {
-    /// Greatest ‖M‖·‖M⁻¹‖ of all maps to objects; 0 if no ray is transformed.
+    /// Largest ‖M‖·‖M⁻¹‖ of all maps to objects; 0 if no ray is transformed.
     pub scale: f32,
-    /// Greatest ‖M⁻¹‖ times the greatest coordinate of the translation.
+    /// Largest ‖M⁻¹‖ times the largest coordinate of the translation.
     pub shift: f32,
 }
 
 impl TransformError {
-    /// That of the instances of a scene.
+    /// The error for the instances of a scene.
     pub fn of(soup: &TriangleSoup) -> Self {
         let instances = soup.placed.iter().flat_map(|p| &p.instances);
         let moved = instances.filter(|instance| !instance.is_identity());
@@ -118,17 +118,17 @@ impl TransformError {
     }
 }
 
-/// Bound on the distance, per axis, between a triangle and a point v₀ − u·e₁ + v·e₂ that was computed
-/// on it, with e₁ = v₀ − v₁ and e₂ = v₂ − v₀, as a triangle test sees it.
+/// Bound on the distance, per axis, between a triangle and a point v₀ − u·e₁ + v·e₂ computed on it,
+/// with e₁ = v₀ − v₁ and e₂ = v₂ − v₀, as in a triangle test.
 ///
-/// Two products and two sums make at most four roundings of |v₀| + |e₁| + |e₂|; a test takes differences
-/// of vertices and shears them, at most four more. A point that is taken to an object's space adds a
-/// transform of four products, forth, and its vertices one back: see [`TransformError`].
+/// Two products and two sums make at most four roundings of |v₀| + |e₁| + |e₂|; a test takes
+/// differences of vertices and shears them, at most four more. A point transformed to object space
+/// adds a transform of four products, and its vertices one back: see [`TransformError`].
 ///
-/// A ray that leaves must not meet the triangle either, although its distance to the plane errs by up to
-/// sixteen roundings of the triangle's extent: a plane through 0 along an axis has an exact position, and
-/// one that is nearly so an almost exact one. So twice `POSITION_ERROR` of the extent come on top.
-/// Twin of `kernels/integrator/position_error.wesl`.
+/// A ray that leaves must not hit the triangle either, although its distance to the plane errs by
+/// up to sixteen roundings of the triangle's extent: an axis-aligned plane through 0 has an exact
+/// position, and a nearly aligned one an almost exact one. So twice `POSITION_ERROR` of the extent
+/// is added. CPU version of `kernels/integrator/position_error.wesl`.
 pub fn position_error(
     v0: [f32; 3],
     e1: [f32; 3],

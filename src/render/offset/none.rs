@@ -1,8 +1,8 @@
-//! Twin of `kernels/integrator/offset/none.wesl`.
+//! CPU version of `kernels/integrator/offset/none.wesl`.
 
 use super::RayOffset;
 
-/// Not at all.
+/// No offset.
 pub const NONE: RayOffset = RayOffset {
     name: "none",
     description: "rays start at the point that was hit",

@@ -1,6 +1,7 @@
-//! How the path tracer is organised on the device: which kernels take a path from its camera to its end, and when its rays
-//! are traced. Every organisation makes the same image to the bit: a path draws the same numbers, adds what it finds in
-//! the same order, and samples are added in theirs. `docs/organisations.md` says how.
+//! Organisations of the path tracer on the device: which kernels process a path from camera to end,
+//! and when its rays are traced. All organisations render bit-identical images: a path draws the
+//! same numbers, adds its contributions in the same order, and samples are added in order. See
+//! `docs/organisations.md`.
 
 mod queued;
 mod registry;
@@ -18,24 +19,25 @@ use super::{ImageSteps, Integrator};
 use raystone_core::params::Params;
 use raystone_gpu::GpuError;
 
-/// An organisation: the struct of its parameters, one line in the registry.
+/// An organisation: its parameter struct, with one line in the registry.
 pub trait Organisation: Send + Sync {
-    /// Whether its kernels call the structure themselves, so that they need one whose traversal is a function.
+    /// True if its kernels call the structure themselves, and so need an inline traversal.
     fn is_inline(&self) -> bool {
         false
     }
 
-    /// Whether the integrator's own passes are recorded, whatever they are.
+    /// True if it records the integrator's own passes, whatever they are.
     fn takes_any(&self) -> bool {
         false
     }
 
-    /// Samples that a slice of the image may have, where no buffer between passes may have more than so many bytes.
+    /// Maximum samples per slice of the image, given the byte limit of each buffer between passes.
     fn samples_at_once(&self, _bytes: u64) -> u64 {
         u64::MAX
     }
 
-    /// Records the passes that add the samples of a slice to the sums, sample after sample within a pixel.
+    /// Records the passes that add the samples of a slice to the sums, in sample order within a
+    /// pixel.
     ///
     /// # Errors
     /// A kernel does not compose or compile, or the adapter cannot run it.

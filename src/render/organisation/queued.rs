@@ -1,5 +1,5 @@
-//! Organisations of several kernels: camera, trace, shade, trace shadow rays, finish, and again; at last the results are added
-//! to the sums.
+//! Organisations with several kernels: camera, trace, shade, trace shadow rays, finish, and repeat;
+//! finally the results are added to the sums.
 
 use super::{Organisation, shading, sorting};
 use crate::{ImageSteps, Integrator};
@@ -12,20 +12,20 @@ use std::sync::Arc;
 
 /// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
 const PATH_BYTES: u64 = 7 * 16;
-/// Batches of a slice at most: what is submitted at once has a limit, and an end within a second.
+/// Maximum batches per slice: a submission is limited in size, and should end within a second.
 const BATCHES: u64 = 4;
 /// Words of `counts`, as in `kernels/organisation/queue.wesl`.
 const LIVE: u32 = 0;
 const SHADOWS: u32 = 1;
-/// Bytes of them, with words to spare.
+/// Bytes of `counts`, with spare words.
 const COUNTS_BYTES: u64 = 32;
 
 parameters! {
-    /// How the queue of live paths is kept without holes.
+    /// The compaction of the queue of live paths.
     pub(crate) enum CompactionMethod {
-        /// What measured best: `atomic` on software adapters, where a workgroup's barriers are dear, else `workgroup`.
+        /// `atomic` on software adapters, with their expensive barriers, else `workgroup`, as
+        /// measured.
         Auto = "auto",
-        /// An atomic for each path.
         Atomic = "atomic",
         /// A scan and one atomic for each workgroup.
         Workgroup = "workgroup",
@@ -33,29 +33,25 @@ parameters! {
         Subgroup = "subgroup",
         /// Counts, a scan of them, and each path to its place: stable.
         ReduceScanScatter = "reduce-scan-scatter",
-        /// Horn 2005: stable.
         Horn = "horn",
-        /// Blelloch 1990: stable.
         Blelloch = "blelloch",
-        /// Roger 2008: stable.
         Roger = "roger",
     }
 
-    /// What is brought side by side.
+    /// What is sorted.
     pub(crate) enum Sorting {
-        /// Nothing.
         Never = "none",
-        /// Paths that have met the same material, before they are shaded.
+        /// Paths by the material they hit, before they are shaded.
         Material = "material",
-        /// Rays of one octant of directions, along the Morton code of their origins, before they are traced.
+        /// Rays by octant of the direction and Morton code of the origin, before they are traced.
         RayKey = "ray-key",
     }
 
-    /// How many kernels shade.
+    /// The number of shading kernels.
     pub(crate) enum Shading {
-        /// One, with every kind of material of the scene in it.
+        /// One, with every kind of material of the scene.
         One = "one",
-        /// One for each kind of material, with that alone in it and a queue of its own, and one for what has met nothing.
+        /// One per kind of material, each with its own queue, and one for misses.
         PerMaterial = "per-material",
     }
 
@@ -78,13 +74,11 @@ parameters! {
     }
 }
 
-/// What the passes of a batch share.
+/// Shared state of a batch's passes.
 pub(super) struct Queues<'a> {
-    /// Slots for paths.
     pub capacity: u32,
-    /// Invocations of a workgroup.
     lanes: u32,
-    /// None where all slots are looked at at every bounce.
+    /// `None` if every bounce processes all slots.
     wavefront: Option<&'a Wavefront>,
     integrator: &'static str,
     pub bindings: Bindings,
@@ -134,7 +128,7 @@ impl<'a> Queues<'a> {
         Storage::scratch(&format!("image {name}"), bytes)
     }
 
-    /// A kernel that sees paths, queues and the integrator.
+    /// A kernel with the bindings of paths, queues and the integrator.
     pub(super) fn kernel(&self, entry: &str) -> Composition {
         let is = |of: fn(&Wavefront) -> bool| self.wavefront.is_some_and(of);
         Composition::new(entry)
@@ -146,12 +140,12 @@ impl<'a> Queues<'a> {
             .feature("sorted_hits", is(|w| w.sorting == Sorting::Material))
     }
 
-    /// An invocation for each slot.
+    /// An invocation per slot.
     pub(super) fn all(&self) -> Groups {
         grid_of(self.capacity.div_ceil(self.lanes)).into()
     }
 
-    /// An invocation for each live path.
+    /// An invocation per live path.
     pub(super) fn live_groups(&self) -> Groups {
         match self.wavefront {
             Some(_) => Groups::Indirect(self.scratch("live_groups", COUNTS_BYTES), 0),
@@ -159,7 +153,7 @@ impl<'a> Queues<'a> {
         }
     }
 
-    /// How many rays of a half of `rays` there are.
+    /// Number of rays in a half of `rays`.
     fn live(&self, word: u32) -> Option<LiveRays> {
         self.wavefront.map(|_| LiveRays {
             counts: self.scratch("counts", COUNTS_BYTES),
@@ -188,7 +182,6 @@ impl<'a> Queues<'a> {
         steps.trace_live(query, buffers, range, self.live(word))
     }
 
-    /// The compaction of a wavefront.
     pub(super) fn method(
         &self,
         gpu: &Gpu,
@@ -212,7 +205,8 @@ impl<'a> Queues<'a> {
         }
     }
 
-    /// Brings what is flagged side by side: words of `elements`, one for each live path, go to `kept`, and how many are there to `count`.
+    /// Compacts flagged elements: words of `elements`, one per live path, are copied to `kept`, and
+    /// their number to `count`.
     pub(super) fn keep(
         &self,
         steps: &mut ImageSteps,
@@ -234,7 +228,7 @@ impl<'a> Queues<'a> {
         method.record(&mut Passes::new(&gpu, steps.recording(), &stream))
     }
 
-    /// Keeps the slots of live paths side by side.
+    /// Compacts the slots of live paths.
     fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let queue = self.scratch("queue", 4 * u64::from(self.capacity));
@@ -248,7 +242,7 @@ impl<'a> Queues<'a> {
         Ok(())
     }
 
-    /// Shades what was met, in this order if there is one.
+    /// Shades the hits, in this order if given.
     fn shade(&self, steps: &mut ImageSteps, order: Option<Storage>) -> Result<(), GpuError> {
         if let Some(wavefront) = self.wavefront
             && wavefront.shading == Shading::PerMaterial
@@ -285,14 +279,13 @@ impl<'a> Queues<'a> {
     }
 }
 
-/// Rays of a path at most.
 fn rays_of_path(integrator: &dyn Integrator, params: &Params) -> u32 {
     let constants = integrator.constants(params);
     let depth = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");
     depth.map_or(1, |(_, depth)| depth + 1)
 }
 
-/// All batches of a slice, and its results into the sums.
+/// All batches of a slice; adds its results to the sums.
 fn record(
     steps: &mut ImageSteps,
     wavefront: Option<&Wavefront>,
@@ -311,7 +304,8 @@ fn record(
                 .clear(queues.scratch("results", 16 * u64::from(total.max(1))));
         }
         queues.run(steps, "generate", queues.all())?;
-        // With regeneration no path waits while a slot is free, and none takes longer than its rays: all have ended by then.
+        // With regeneration no path waits while a slot is free, and none takes longer than its
+        // rays: all have ended by then.
         let is_refilled = wavefront.is_some_and(|w| w.regeneration);
         let bounces = if is_refilled {
             batches.max(1) * rays

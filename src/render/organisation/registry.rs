@@ -5,7 +5,7 @@ use raystone_core::params::{Parameters, Registered, Registry, Variant};
 use raystone_core::text::nearest;
 use std::sync::Arc;
 
-/// Every organisation that can be named; more can be added.
+/// All organisations by name; more can be added.
 #[derive(Clone)]
 pub struct OrganisationRegistry(pub Registry<dyn Organisation>);
 
@@ -21,10 +21,10 @@ impl Default for OrganisationRegistry {
 }
 
 impl OrganisationRegistry {
-    /// The organisation that a variant names, with its parameters.
+    /// The organisation of a variant, with its parameters.
     ///
     /// # Errors
-    /// A name that is not registered, or parameters that it does not have; in words.
+    /// A description of an unknown name or parameter.
     pub fn configured(&self, variant: &Variant) -> Result<Arc<dyn Organisation>, String> {
         let Some(kind) = self.0.find(&variant.name) else {
             let near = nearest(&variant.name, self.0.iter().map(Registered::name));
@@ -39,7 +39,7 @@ impl OrganisationRegistry {
     }
 }
 
-/// An organisation whose parameters are its own struct.
+/// An organisation that is its own parameter struct.
 pub fn organisation_kind<O: Organisation + Parameters + 'static>(
     name: &str,
 ) -> Registered<dyn Organisation> {

@@ -1,4 +1,4 @@
-//! A queue and a kernel for each kind of material (Laine, Karras & Aila 2013, section 4).
+//! A queue and a kernel per kind of material (Laine, Karras & Aila 2013, section 4).
 
 use super::queued::{Queues, Wavefront};
 use crate::ImageSteps;
@@ -6,26 +6,25 @@ use raystone_gpu::compaction::{Compaction, Stays};
 use raystone_gpu::{Bindings, GpuError, Groups, Storage};
 use std::sync::Arc;
 
-/// The queue of a kind by its number, or of what has met nothing. Flags are one more: `kernels/organisation/kinds.wesl`.
+/// The queue of a kind, or of misses; flags are one larger: `kernels/organisation/kinds.wesl`.
 fn queue_of(kind: Option<usize>) -> u32 {
     kind.map_or(0, |kind| kind as u32 + 1)
 }
 
-/// Where the places of paths are brought, kind by kind.
+/// Queues of path indices, by material kind.
 struct Kinds<'a> {
     queues: &'a Queues<'a>,
-    /// How many.
     number: u32,
     method: Arc<dyn Compaction>,
-    /// Places of all live paths.
     places: Storage,
-    /// Those of the queues, and how long they are: of all, where the compaction keeps them apart, else of one after the other.
+    /// Indices in queue order, and the queue lengths: all queues if the compaction keeps them
+    /// apart, otherwise one at a time.
     kept: Storage,
     count: Storage,
 }
 
-/// Shades what each kind of material was met by, and what has met nothing, kind after kind. In a queue paths stand in `order`, if
-/// there is one and the compaction is stable.
+/// Shades the hits of each kind of material, and the misses, one kind after the other. A queue's
+/// paths are in `order`, if given and the compaction is stable.
 pub(super) fn by_kind(
     steps: &mut ImageSteps,
     queues: &Queues,
@@ -53,7 +52,7 @@ pub(super) fn by_kind(
 }
 
 impl Kinds<'_> {
-    /// Flags all live paths by what they have met, and fills all queues if that can be done at once.
+    /// Flags all live paths by the kind they hit, and fills all queues if one compaction can.
     fn fill(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let mut bindings = self.queues.bindings.clone();
@@ -72,7 +71,7 @@ impl Kinds<'_> {
         self.queues.keep(steps, &*self.method, stays, buffers)
     }
 
-    /// Shades the paths that have met this kind of material, by its number, or nothing.
+    /// Shades the paths that hit this kind of material, by its number, or missed.
     fn shade(&self, steps: &mut ImageSteps, kind: Option<usize>) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let mut queue = queue_of(kind);

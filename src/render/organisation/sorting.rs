@@ -1,17 +1,17 @@
-//! The queue of live paths in another order.
+//! Sorting of the queue of live paths.
 
 use super::queued::Queues;
 use crate::ImageSteps;
 use raystone_gpu::{Bindings, Composition, GpuError, Pairs, RadixSort, Storage, UniformValues};
 
-/// Bits of a ray's key: an octant, and seven for each axis.
+/// Bits of a ray's key: an octant, and seven per axis.
 const RAY_KEY_BITS: u32 = 24;
-/// Bits of the number of a material that are sorted by.
+/// Bits of a material number used for sorting.
 const MATERIAL_BITS: u32 = 16;
 /// Cells of a ray's key along an axis.
 const CELLS: f32 = 128.0;
 
-/// Keys and values, one for each slot.
+/// Keys and values, one per slot.
 fn pairs(queues: &Queues) -> Pairs {
     let scratch = |name: &str| Storage::scratch(name, 4 * u64::from(queues.capacity));
     Pairs {
@@ -21,7 +21,7 @@ fn pairs(queues: &Queues) -> Pairs {
     }
 }
 
-/// Writes keys by this kernel and sorts them; whoever reads `values` finds them sorted in what is returned.
+/// Writes keys with this kernel and sorts them; the result contains the sorted `values`.
 fn sorted(
     steps: &mut ImageSteps,
     queues: &Queues,
@@ -43,7 +43,7 @@ fn sorted(
     Ok(order)
 }
 
-/// Puts the queue into the order of the octants and origins of its rays.
+/// Sorts the queue by the octants and origins of its rays.
 pub(super) fn by_ray(steps: &mut ImageSteps, queues: &Queues) -> Result<(), GpuError> {
     let [low, high] = steps.bounds();
     let scale = [0, 1, 2].map(|axis| CELLS / (high[axis] - low[axis]).max(f32::MIN_POSITIVE));
@@ -58,7 +58,7 @@ pub(super) fn by_ray(steps: &mut ImageSteps, queues: &Queues) -> Result<(), GpuE
     steps.run("take_order", kernel, queues.live_groups(), &bindings)
 }
 
-/// The order in which answers of one material lie side by side.
+/// The order in which answers of one material are contiguous.
 pub(super) fn by_material(steps: &mut ImageSteps, queues: &Queues) -> Result<Storage, GpuError> {
     sorted(
         steps,

@@ -1,12 +1,12 @@
-//! Closed forms and quadrature of what surfaces receive.
+//! Closed forms and quadrature for the light that surfaces receive.
 
 use glam::DVec3;
 use raystone_scene::EnvironmentMap;
 use std::f64::consts::{PI, TAU};
 
-/// Irradiance over radiance at `point` with this normal from a polygon wholly above its horizon, which is seen from its front
-/// (J. H. Lambert, Photometria, 1760): half the sum over edges of the angle that an edge spans times the cosine of the normal to the
-/// plane through it.
+/// Irradiance over radiance at `point` with this normal from a polygon wholly above its horizon and
+/// seen from its front (J. H. Lambert, Photometria, 1760): half the sum over edges of the angle
+/// subtended by the edge times the cosine between the normal and the plane through it.
 pub fn polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let towards: Vec<DVec3> = corners.iter().map(|c| *c - point).collect();
     let edges = towards.iter().zip(towards.iter().cycle().skip(1));
@@ -19,27 +19,29 @@ pub fn polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * sum.abs()
 }
 
-/// Irradiance over radiance from a disk parallel to the surface, whose axis passes the point at `offset` (J. R. Howell,
-/// A Catalog of Radiation Heat Transfer Configuration Factors, B-13, times π).
+/// Irradiance over radiance from a parallel disk whose axis passes the point at `offset` (J. R.
+/// Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-13, times π).
 pub fn disk(height: f64, radius: f64, offset: f64) -> f64 {
     let (h, r) = (height / offset, radius / offset);
     let z = 1.0 + h * h + r * r;
     0.5 * PI * (1.0 - (z - 2.0 * r * r) / (z * z - 4.0 * r * r).sqrt())
 }
 
-/// Irradiance over radiance of a sphere wholly above the horizon at this offset from its centre: π sin²α cos θ (Howell, B-43, times π).
+/// Irradiance over radiance of a sphere wholly above the horizon, with this offset from its centre:
+/// π sin²α cos θ (Howell, B-43, times π).
 pub fn sphere(offset: DVec3, normal: DVec3, radius: f64) -> f64 {
     PI * radius * radius / offset.length_squared() * offset.normalize().dot(normal)
 }
 
-/// Part of the cosine-weighted hemisphere whose directions have a component of at least `c` along an axis in the plane: the
-/// segment of the unit disk that is cut off at distance `c` from its centre (W. Nusselt, 1928).
+/// Fraction of the cosine-weighted hemisphere whose directions have a component of at least `c`
+/// along an axis in the plane: the segment of the unit disk cut off at distance `c` from its centre
+/// (W. Nusselt, 1928).
 pub(crate) fn segment(c: f64) -> f64 {
     let c = c.clamp(-1.0, 1.0);
     (c.acos() - c * (1.0 - c * c).sqrt()) / PI
 }
 
-/// The same of directions with at least `a` along one axis and at least `b` along the other one, by quadrature.
+/// The same with at least `a` along one axis and at least `b` along the other, by quadrature.
 pub(crate) fn corner(a: f64, b: f64) -> f64 {
     let end = (1.0 - b * b).max(0.0).sqrt();
     if a >= end {
@@ -48,7 +50,7 @@ pub(crate) fn corner(a: f64, b: f64) -> f64 {
     integral([a, end], |x| (1.0 - x * x).max(0.0).sqrt() - b) / PI
 }
 
-/// ∫ f over an interval: Gauss and Legendre's rule of five points in 200 parts.
+/// ∫ f over an interval: five-point Gauss–Legendre quadrature in 200 parts.
 pub fn integral([start, end]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     const PARTS: u32 = 200;
     const RULE: [[f64; 2]; 5] = [
@@ -69,11 +71,11 @@ pub fn integral([start, end]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     (0..PARTS).map(part).sum()
 }
 
-/// ∫ f over the directions above the plane z = 0: the midpoints of `2 n · n` cells of even solid angle.
+/// ∫ f over the directions above z = 0: the midpoints of `2 n · n` cells of equal solid angle.
 pub(crate) fn over_hemisphere(n: u32, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for row in 0..n {
-        // Squares of cosines in even steps: what is weighted with a cosine is sampled evenly.
+        // Equal steps in the squared cosine: cosine-weighted integrands are sampled evenly.
         let cos = ((f64::from(row) + 0.5) / f64::from(n)).sqrt();
         let sin = (1.0 - cos * cos).sqrt();
         for column in 0..2 * n {
@@ -84,10 +86,10 @@ pub(crate) fn over_hemisphere(n: u32, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
     sum * PI / f64::from(2 * n * n)
 }
 
-/// Radiance of a map in the direction of these angles, written from its description: bilinear between the centres of texels.
+/// Radiance of a map for these angles, from its description: bilinear between texel centres.
 pub(crate) fn map_radiance(map: &EnvironmentMap, turn: f64, polar: f64, azimuth: f64) -> DVec3 {
     let (width, height) = (map.width as usize, map.height as usize);
-    // A turn by +a about y takes the azimuth φ, measured from −z towards +x, to φ − a.
+    // A turn by +a about y maps the azimuth φ, measured from −z towards +x, to φ − a.
     let around = (azimuth + turn).rem_euclid(TAU) / TAU * width as f64 - 0.5;
     let down = (polar / PI * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
     let column = around.floor();
@@ -98,7 +100,7 @@ pub(crate) fn map_radiance(map: &EnvironmentMap, turn: f64, polar: f64, azimuth:
     (1.0 - t) * along(row) + t * along(row + 1)
 }
 
-/// Irradiance below a map of a plane with the normal +y, by the midpoints of half a million cells.
+/// Irradiance of a plane with normal +y below a map, by the midpoints of half a million cells.
 pub(crate) fn map_irradiance(map: &EnvironmentMap, turn: f64) -> DVec3 {
     let (rows, columns) = (500, 1000);
     let cell = 0.5 * PI / f64::from(rows) * TAU / f64::from(columns);
@@ -113,8 +115,8 @@ pub(crate) fn map_irradiance(map: &EnvironmentMap, turn: f64) -> DVec3 {
     sum
 }
 
-/// Part of unpolarised light that a smooth surface reflects, by the angle whose cosine is `cos` on the side of index 1, towards a
-/// medium of this index (A. Fresnel, 1823, by Snell's angles).
+/// Fresnel reflectance of a smooth surface for unpolarised light; `cos` is on the side of index 1,
+/// `index` that of the other medium (A. Fresnel, 1823, by Snell's angles).
 pub(crate) fn fresnel(cos: f64, index: f64) -> f64 {
     let (i, t) = (cos.acos(), ((1.0 - cos * cos).sqrt() / index).asin());
     if i == 0.0 {

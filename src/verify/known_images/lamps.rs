@@ -1,4 +1,4 @@
-//! A floor below lamps of triangles: unequal, small, grazing, occluded, with one side and with two.
+//! A floor below triangle lights: unequal, small, grazing, occluded, one-sided and two-sided.
 
 use super::closed::polygon;
 use super::{KnownImage, View};
@@ -11,10 +11,10 @@ use std::f64::consts::PI;
 
 /// Colour of the floor y = 0.
 pub(crate) const FLOOR: Vec3 = vec3(0.6, 0.5, 0.4);
-/// From where a point of the floor is seen: from so close by that no lamp is between.
+/// Offset of the camera from a floor point: so close that no lamp is in between.
 pub(crate) const NEAR: Vec3 = vec3(0.02, 0.05, -0.04);
 
-/// A rectangle that shines on the side from which `along`, `across` turn counter-clockwise.
+/// A rectangle that emits from the side from which `along`, `across` turn counter-clockwise.
 #[derive(Clone, Copy)]
 struct Lamp {
     corner: Vec3,
@@ -24,7 +24,6 @@ struct Lamp {
 }
 
 impl Lamp {
-    /// Its irradiance of the floor.
     fn irradiance(&self, point: Vec3) -> DVec3 {
         let normal = self.along.cross(self.across);
         if normal.dot(point - self.corner) <= 0.0 {
@@ -47,12 +46,11 @@ pub(crate) fn reflected(irradiance: DVec3) -> DVec3 {
     FLOOR.as_dvec3() / PI * irradiance
 }
 
-/// A floor under a sky of this radiance.
 pub(crate) fn on_floor(name: &str, sky: Vec3) -> Result<Mesh, SceneError> {
     on_floor_of(name, sky, 6.0)
 }
 
-/// The same of twice this width.
+/// The same with this half-width.
 fn on_floor_of(name: &str, sky: Vec3, half: f32) -> Result<Mesh, SceneError> {
     let camera = raystone_core::geometry::Camera::upright(vec3(0.0, 2.0, 5.0), Vec3::ZERO, 45.0);
     let mut mesh = Mesh::new(name, camera, sky)?;
@@ -62,7 +60,7 @@ fn on_floor_of(name: &str, sky: Vec3, half: f32) -> Result<Mesh, SceneError> {
     Ok(mesh)
 }
 
-/// Parameters of `path`: greatest depth, and names.
+/// Parameters of `path`: maximum depth, and named options.
 pub(crate) fn path(depth: i64, names: &[(&'static str, &str)]) -> super::Trial {
     let mut parameters = vec![("max_depth", ParamValue::Integer(depth))];
     let named = |(key, name): &(&'static str, &str)| (*key, ParamValue::Name((*name).to_owned()));
@@ -70,7 +68,7 @@ pub(crate) fn path(depth: i64, names: &[(&'static str, &str)]) -> super::Trial {
     ("path", parameters)
 }
 
-/// The floor is no wider than it needs to be: rays start off it by a part of that.
+/// The floor is no wider than necessary: ray offsets scale with its size.
 fn lit(name: &str, lamps: &[Lamp]) -> Result<SceneData, SceneError> {
     let mut mesh = on_floor_of(name, Vec3::ZERO, 1.0)?;
     lamps.iter().for_each(|lamp| lamp.build(&mut mesh));
@@ -86,7 +84,6 @@ fn views(lamps: &[Lamp], points: &[Vec3]) -> Vec<View> {
     points.iter().map(view).collect()
 }
 
-/// All of them.
 pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {
     let mut all = Vec::new();
     let mut add = |name, lamps: &[Lamp], points: &[Vec3], trial| -> Result<(), SceneError> {
@@ -137,8 +134,8 @@ pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {
     Ok(all)
 }
 
-/// A small ball of facets near the origin and far from what it lights: the error of its own points is small beside that of the rays
-/// which reach it, so that it easily lies in its own shadow.
+/// A small faceted ball near the origin and far from the surface it lights: the error of its own
+/// points is small compared with that of incoming rays, so it easily shadows itself.
 fn facets() -> Result<KnownImage, SceneError> {
     let radiance = vec3(2e4, 3e4, 1e4);
     let mut mesh = on_floor_of("ball of facets", Vec3::ZERO, 6.0)?;
@@ -171,7 +168,7 @@ fn facets() -> Result<KnownImage, SceneError> {
     })
 }
 
-/// One 60 times as powerful as the other one, in other colours.
+/// One is 60 times as powerful as the other, in other colours.
 const UNEQUAL: [Lamp; 2] = [
     Lamp {
         corner: vec3(-1.0, 1.2, -0.4),
@@ -187,7 +184,7 @@ const UNEQUAL: [Lamp; 2] = [
     },
 ];
 
-/// Seen in a large part of all directions.
+/// Covers a large part of the hemisphere.
 const WIDE: [Lamp; 1] = [Lamp {
     corner: vec3(-1.3, 0.9, -1.2),
     along: vec3(2.5, 0.0, 0.0),
@@ -195,7 +192,7 @@ const WIDE: [Lamp; 1] = [Lamp {
     radiance: vec3(2.0, 3.0, 4.0),
 }];
 
-/// Above all, so that nearly all of it is found by directions of the material.
+/// Overhead: nearly all of its light is found by material sampling.
 const CEILING: [Lamp; 1] = [Lamp {
     corner: vec3(-11.0, 0.5, -9.0),
     along: vec3(20.0, 0.0, 0.0),
@@ -203,7 +200,7 @@ const CEILING: [Lamp; 1] = [Lamp {
     radiance: vec3(1.0, 0.8, 0.6),
 }];
 
-/// A centimetre across.
+/// One centimetre wide.
 const SMALL: [Lamp; 1] = [Lamp {
     corner: vec3(0.4, 2.0, 0.3),
     along: vec3(0.01, 0.0, 0.0),
@@ -211,7 +208,7 @@ const SMALL: [Lamp; 1] = [Lamp {
     radiance: vec3(8e4, 5e4, 9e4),
 }];
 
-/// In red light that grazes the floor, in green one that grazes floor and lamp, in blue one that grazes the lamp.
+/// Red light grazes the floor, green grazes floor and lamp, blue grazes the lamp.
 const GRAZING: [Lamp; 3] = [
     Lamp {
         corner: vec3(4.0, 0.02, -0.5),
@@ -233,7 +230,7 @@ const GRAZING: [Lamp; 3] = [
     },
 ];
 
-/// Two triangles that are no rectangle, of unequal power.
+/// Two triangles that do not form a rectangle, of unequal power.
 fn triangles() -> Result<KnownImage, SceneError> {
     let lamps = [
         (
@@ -288,12 +285,12 @@ const SHADED: Lamp = Lamp {
     radiance: vec3(4.0, 5.0, 6.0),
 };
 
-/// A lamp behind the edge of a plate half-way up, and a plate so low over the floor that a ray which starts too far off the
-/// surface passes it.
+/// A lamp behind the edge of a plate half-way up, and a plate so close to the floor that a ray with
+/// too large an offset starts above it.
 fn occluded() -> Result<KnownImage, SceneError> {
-    /// Edge of the plate, which reaches from there to +x.
+    /// Edge of the plate, which extends from there towards +x.
     const EDGE: f32 = -0.1;
-    /// Where the low plate begins, and its height.
+    /// Start of the low plate, and its height.
     const LOW: [f32; 2] = [-3.0, 5e-4];
     let mut mesh = on_floor("occluded lamp", Vec3::ZERO)?;
     SHADED.build(&mut mesh);
@@ -307,16 +304,17 @@ fn occluded() -> Result<KnownImage, SceneError> {
         ("deep penumbra", 0.0),
         ("umbra", 0.4),
     ] {
-        // As far as the plate's edge, thrown onto the lamp's plane, lets it be seen.
+        // Visible up to the projection of the plate's edge onto the lamp's plane.
         let end = (x + 2.0 * (EDGE - x)).clamp(-0.5, 0.5);
         let visible = Lamp {
             along: (end + 0.5) * Vec3::X,
             ..SHADED
         };
         let point = vec3(x, 0.0, 0.1);
-        let irradiance = match end > -0.5 {
-            true => visible.irradiance(point),
-            false => DVec3::ZERO,
+        let irradiance = if end > -0.5 {
+            visible.irradiance(point)
+        } else {
+            DVec3::ZERO
         };
         views.push(View::new(name, point, NEAR, reflected(irradiance)));
     }
@@ -333,7 +331,7 @@ fn occluded() -> Result<KnownImage, SceneError> {
     })
 }
 
-/// A lamp with one side and one with two, seen and shining before them and behind.
+/// A one-sided and a two-sided lamp, seen and emitting in front and behind.
 fn sides() -> Result<KnownImage, SceneError> {
     let lamp = |z: f32, radiance| Lamp {
         corner: vec3(0.0, 0.2, z),

@@ -1,4 +1,4 @@
-//! A floor below lights without triangles: images of kinds of lights, and the sky.
+//! A floor below lights without triangles: images of the light kinds, and the sky.
 
 use super::closed::over_hemisphere;
 use super::lamps::{NEAR, on_floor, path, reflected};
@@ -8,7 +8,6 @@ use crate::trial_scenes::Trial;
 use glam::{DVec3, Vec3, vec3};
 use raystone_scene::{Daylight, Light, SceneError};
 
-/// All of them.
 pub(super) fn images(kinds: &LightRegistry) -> Result<Vec<KnownImage>, SceneError> {
     let mut all = Vec::new();
     for kind in kinds.iter() {
@@ -18,7 +17,6 @@ pub(super) fn images(kinds: &LightRegistry) -> Result<Vec<KnownImage>, SceneErro
     Ok(all)
 }
 
-/// A floor below these lights.
 pub(crate) fn image(
     name: &'static str,
     lights: Vec<Light>,
@@ -35,7 +33,7 @@ pub(crate) fn image(
     })
 }
 
-/// The sky over scenes without a light: its radiance as `docs/shading.md` has it.
+/// The sky over scenes without a light, with the radiance given in `docs/shading.md`.
 fn sky() -> Result<KnownImage, SceneError> {
     let [up, key] = [vec3(0.1, 1.0, -0.2), vec3(-0.4, 0.7, 0.5)].map(Vec3::normalize);
     let scale = vec3(1.5, 1.0, 0.5);

@@ -1,9 +1,12 @@
-//! Images whose radiance is known in closed form, or by quadrature in f64: each shows what one kind of fault of an integrator,
-//! a material or a light would change. `raystone verify --images` renders them through the kernels.
+//! Images with radiance known in closed form or by f64 quadrature. Each exposes one kind of fault
+//! of an integrator, a material or a light. `raystone verify --images` renders them through the
+//! kernels.
 //!
-//! A view looks at one point: every pixel of it is an independent estimate of the same radiance, and their spread gives the standard
-//! error. Samples are doubled until four standard errors are at most [`NOISE`] of the radiance; it is then judged against the known one with
-//! [`SYSTEMATIC`] beside them, so that no fault above 0.2 % passes but by chance, and one of 0.3 % in no case.
+//! A view shows one point: every pixel is an independent estimate of the same radiance, and their
+//! spread gives the standard error. Samples are doubled until four standard errors are at most
+//! [`NOISE`] of the radiance. The result is then compared with the known radiance with an added
+//! tolerance of [`SYSTEMATIC`], so that a fault above 0.2 % passes only by chance, and one of 0.3 %
+//! never.
 
 pub mod closed;
 pub(crate) mod lamps;
@@ -22,29 +25,29 @@ use raystone_scene::{Light, SceneData, SceneError, decode_normal, encode_normal}
 
 /// Width and height of a view, pixels.
 pub const SIZE: [u32; 2] = [8, 8];
-/// What four standard errors may be of a radiance that is judged.
+/// Limit of four standard errors, relative to the radiance.
 pub const NOISE: f64 = 1.5e-3;
-/// By what a radiance may differ beyond four standard errors: f32, and the width of a pixel.
+/// Relative difference allowed beyond four standard errors: f32, and the width of a pixel.
 pub const SYSTEMATIC: f64 = 5e-4;
-/// Samples per pixel: the least, and the most, after which the noise is a fault.
+/// Samples per pixel: minimum, and maximum, beyond which the noise counts as a fault.
 const SAMPLES: [u32; 2] = [256, 1 << 14];
-/// Part of the brightest channel that a channel without light may show.
+/// Fraction of the brightest channel that a channel without light may show.
 const DARK: f64 = 1e-5;
 const SEED: u32 = 4_242;
 const FIELD_OF_VIEW: f32 = 0.01;
 
-/// A point seen from somewhere, and its radiance.
+/// A view of one point, and its radiance.
 pub struct View {
-    /// Which.
+    /// The name.
     pub name: String,
-    /// Sees nothing else.
+    /// The camera, which sees only this point.
     pub camera: Camera,
     /// Linear RGB.
     pub expected: DVec3,
 }
 
 impl View {
-    /// The point `at` from the place `at + from`.
+    /// A view of the point `at` from `at + from`.
     pub fn new(name: &str, at: Vec3, from: Vec3, expected: DVec3) -> Self {
         let camera = Camera {
             eye: at + from,
@@ -62,19 +65,19 @@ impl View {
 
 /// A scene with points of known radiance.
 pub struct KnownImage {
-    /// Which.
+    /// The name.
     pub name: &'static str,
     /// The scene.
     pub scene: SceneData,
-    /// Integrator, and its parameters that are not at their defaults.
+    /// Integrator, and its non-default parameters.
     pub trial: Trial,
-    /// Points.
+    /// The views.
     pub views: Vec<View>,
 }
 
 impl KnownImage {
-    /// The image turned and moved as a whole, so that no plane of it is exact in f32. Maps turn about one axis alone: an image with
-    /// one stays as it is.
+    /// The image turned and moved as a whole, so that none of its planes is exact in f32. Maps turn
+    /// about one axis only, so an image with one stays unchanged.
     fn turned(mut self) -> Self {
         const BY: Vec3 = vec3(0.3, -0.2, 0.5);
         let is_map = |light: &Light| matches!(light, Light::Environment { .. });
@@ -101,7 +104,7 @@ impl KnownImage {
     }
 }
 
-/// All of the program's kinds.
+/// The images of the built-in kinds.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -109,7 +112,7 @@ pub fn known_images() -> Result<Vec<KnownImage>, SceneError> {
     known_images_of(&KindChecks::default())
 }
 
-/// All of these kinds of materials and lights.
+/// The images of these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`known_images`].
@@ -122,7 +125,7 @@ pub fn known_images_of(kinds: &KindChecks) -> Result<Vec<KnownImage>, SceneError
     Ok(all)
 }
 
-/// What a view of a known image showed.
+/// The measured result of one view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Image and view.
@@ -131,18 +134,18 @@ pub struct Seen {
     pub expected: DVec3,
     /// Mean over pixels and samples.
     pub measured: DVec3,
-    /// Its standard error.
+    /// Standard error of the mean.
     pub sigma: DVec3,
     /// Samples per pixel.
     pub spp: u32,
-    /// What is wrong, if something is.
+    /// Description of the fault, if any.
     pub fault: Option<String>,
 }
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 impl Seen {
-    /// What would be shown by kernels that cannot be run.
+    /// The result when the kernels cannot run.
     pub fn not_rendered(image: &KnownImage, reason: &str) -> Self {
         Self {
             name: image.name.to_owned(),
@@ -154,15 +157,16 @@ impl Seen {
         }
     }
 
-    /// Radiances against which differences of a channel count.
+    /// Radiance relative to which differences of a channel are measured.
     fn scale(&self, channel: usize) -> f64 {
-        match self.expected[channel] > 0.0 {
-            true => self.expected[channel],
-            false => self.expected.max_element().max(1.0) * DARK / SYSTEMATIC,
+        if self.expected[channel] > 0.0 {
+            self.expected[channel]
+        } else {
+            self.expected.max_element().max(1.0) * DARK / SYSTEMATIC
         }
     }
 
-    /// The channel that differs most, and by how much in parts of the known radiance.
+    /// The channel with the largest difference, and that difference relative to the known radiance.
     pub fn worst(&self) -> (usize, f64) {
         let off = |c: usize| (self.measured[c] - self.expected[c]) / self.scale(c);
         let all = [0, 1, 2].map(|c| (c, off(c)));
@@ -170,7 +174,7 @@ impl Seen {
         all.into_iter().reduce(greater).unwrap_or_default()
     }
 
-    /// The greatest standard error in parts of the known radiance.
+    /// The largest standard error, relative to the known radiance.
     pub fn noise(&self) -> f64 {
         let parts = [0, 1, 2].map(|c| self.sigma[c] / self.scale(c));
         parts.into_iter().fold(0.0, f64::max)
@@ -211,7 +215,7 @@ fn moments(pixels: &[[f32; 3]]) -> [DVec3; 2] {
     [mean, sigma.map(f64::sqrt)]
 }
 
-/// Looks at a view with more and more samples until its noise is small, and judges it.
+/// Renders a view with more and more samples until its noise is low enough, and checks it.
 ///
 /// # Errors
 /// A kernel raised its error word, or the device is lost or hangs.
@@ -238,7 +242,7 @@ pub fn look(renderer: &mut Renderer, image: &KnownImage, view: &View) -> Result<
     }
 }
 
-/// The most samples per pixel that a view takes.
+/// Maximum samples per pixel of a view.
 pub fn most_samples() -> u32 {
     SAMPLES[1]
 }
@@ -264,7 +268,7 @@ mod tests {
         assert_eq!(seen(2.0009, 0.0).fault, None);
         assert!(seen(2.002, 0.0).fault.is_some());
         assert_eq!(seen(2.002, 0.0005).fault, None);
-        // 0.3 % is found however large the noise is.
+        // 0.3 % is detected however large the noise is.
         assert!(seen(2.006, 0.5).fault.is_some());
         assert!(seen(2.0, 0.5).fault.is_some_and(|f| f.contains("noisy")));
         assert!(seen(f64::NAN, 0.0).fault.is_some());

@@ -8,10 +8,8 @@ use raystone_core::params::ParamValue;
 use raystone_scene::{Material, SceneData, SceneError};
 use std::f64::consts::PI;
 
-/// Height of the plate.
 const LOW: f32 = 0.2;
 
-/// All of them.
 pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {
     let mut all = Vec::new();
     for (name, radius) in [
@@ -26,7 +24,7 @@ pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {
     Ok(all)
 }
 
-/// The image with rays of this length; as long as can be if there is none.
+/// The image with rays of this length; unlimited if `None`.
 fn with_radius(
     name: &'static str,
     scene: SceneData,
@@ -46,7 +44,7 @@ fn with_radius(
     image
 }
 
-/// Two walls of a corner, and a plate.
+/// Two walls that form a corner, and a plate.
 fn walls() -> Result<SceneData, SceneError> {
     let mut mesh = on_floor("walls", Vec3::ZERO)?;
     let wall = mesh.material(Material::diffuse("wall", Vec3::splat(0.5)));
@@ -56,7 +54,7 @@ fn walls() -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// What is free with rays of this length that no end of a wall or plate is in reach of.
+/// Unoccluded fractions for rays too short to reach the ends of the walls and the plate.
 fn near(radius: f64) -> Vec<View> {
     let part = |distance: f32| (f64::from(distance) / radius).min(1.0);
     let view = |name, point, free| View::new(name, point, NEAR, DVec3::splat(free));
@@ -74,13 +72,13 @@ fn near(radius: f64) -> Vec<View> {
             vec3(close, 0.0, aside - 3.0),
             1.0 - segment(a) - segment(b) + corner(a, b),
         ),
-        // Directions whose cosine is below height over length: the square of that, cosine-weighted.
+        // Occluded: cosine below height over length; cosine-weighted, the square of that ratio.
         view("plate", vec3(4.0, 0.0, 3.0), part(LOW).powi(2)),
         view("nothing", vec3(-3.0, 0.0, 0.0), 1.0),
     ]
 }
 
-/// A plate above, which rays meet however long they are.
+/// A plate above that rays of any length meet.
 fn far() -> Result<(SceneData, Vec<View>), SceneError> {
     let mut mesh = on_floor("plate", Vec3::ZERO)?;
     let plate = mesh.material(Material::diffuse("plate", Vec3::splat(0.5)));

@@ -1,4 +1,4 @@
-//! Surfaces: images of kinds of materials, every glossy material, boxes in which light goes round.
+//! Surfaces: images of the material kinds, all glossy materials, boxes with interreflection.
 
 use super::closed::over_hemisphere;
 use super::lamps::{FLOOR, on_floor, path};
@@ -12,7 +12,6 @@ use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
 use raystone_scene::{self as scene, Light, Material, SceneError};
 
-/// All of them.
 pub(super) fn images(kinds: &MaterialRegistry) -> Result<Vec<KnownImage>, SceneError> {
     let mut all = Vec::new();
     for kind in kinds.iter() {
@@ -33,7 +32,7 @@ pub(super) fn images(kinds: &MaterialRegistry) -> Result<Vec<KnownImage>, SceneE
     Ok(all)
 }
 
-/// Every kind of glossy material under a white sky and light from one direction.
+/// Every glossy material kind under a white sky and light from one direction.
 fn materials(kinds: &MaterialRegistry) -> Result<KnownImage, SceneError> {
     const WAY: Vec3 = vec3(0.5, -1.0, 0.3);
     const STRENGTH: Vec3 = vec3(2.0, 1.0, 0.5);
@@ -73,10 +72,10 @@ fn materials(kinds: &MaterialRegistry) -> Result<KnownImage, SceneError> {
     })
 }
 
-/// Rows of cells of the sky over glossy materials: twice as many change the sixth digit.
+/// Rows of sky cells over glossy materials; doubling them changes the sixth digit.
 const SKY_CELLS: u32 = 150;
 
-/// What `primary` shows of a floor and a lamp seen aslant.
+/// The `primary` view of a floor and a lamp seen at an angle.
 fn base_colour() -> Result<KnownImage, SceneError> {
     const SHINING: Vec3 = vec3(0.3, 0.0, 2.0);
     let mut mesh = on_floor("base colour", Vec3::ZERO)?;

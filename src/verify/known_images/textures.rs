@@ -1,4 +1,4 @@
-//! Textures whose texels are told apart: wrap modes, transforms, orientation, encodings, normal maps, normals of vertices.
+//! Textures with distinct texels: wrapping, transforms, orientation, encodings, normals.
 
 use super::lamps::{NEAR, path};
 use super::{KnownImage, View};
@@ -12,8 +12,8 @@ use raystone_scene::{
 };
 use std::f64::consts::PI;
 
-/// Texels of the picture, row by row from the top; no two are alike, and none is so dark that a pixel's width shows beside its
-/// neighbours.
+/// Texels of the picture, row by row from the top. No two are alike, and none is so dark that
+/// bleeding from its neighbours over the width of a pixel shows.
 const PICTURE: [[u8; 3]; 8] = [
     [250, 120, 150],
     [130, 200, 170],
@@ -26,10 +26,9 @@ const PICTURE: [[u8; 3]; 8] = [
 ];
 const WIDTH: usize = 4;
 
-/// Light straight from above.
+/// Strength of the light from straight above.
 const STRENGTH: f64 = 3.0;
 
-/// All of them.
 pub(super) fn images() -> Result<Vec<KnownImage>, SceneError> {
     Ok(vec![
         pictures()?.turned(),
@@ -67,11 +66,12 @@ fn empty(name: &str) -> Result<Mesh, SceneError> {
     Mesh::new(name, camera, Vec3::ZERO)
 }
 
-/// A square whose u runs along +x from −1 to 2 and v along +z, in texture units of one half.
+/// A square with u along +x from −1 to 2 and v along +z, in texture units of one half.
 fn sheet(mesh: &mut Mesh, corner: Vec3, material: u32) {
     let uv = [vec2(-1.0, -1.0), vec2(2.0, 2.0)];
     let [x, z] = [1.5 * Vec3::X, 1.5 * Vec3::Z];
-    // Seen from above the corners turn counter-clockwise: v first, so that the square is laid with u and v exchanged, and back.
+    // Seen from above, corners run counter-clockwise with v first: lay the square with u and v
+    // swapped, and swap back.
     let p = |u: f32, v: f32| corner + u * x + v * z;
     let t = |u: f32, v: f32| uv[0] + vec2(u, v) * (uv[1] - uv[0]);
     for [a, b, c] in [
@@ -87,7 +87,7 @@ fn sheet(mesh: &mut Mesh, corner: Vec3, material: u32) {
     }
 }
 
-/// The point of a sheet with these coordinates.
+/// The point of a sheet with these texture coordinates.
 fn point_of(corner: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     corner + 0.5 * vec3(u + 1.0, 0.0, v + 1.0)
 }
@@ -99,10 +99,9 @@ fn below_light(scene: &mut SceneData) {
     }];
 }
 
-/// Coordinates, and the texels between which the picture is halved there.
+/// Texture coordinates, and the texels that the picture blends equally there.
 type Place = ([f32; 2], &'static [[usize; 2]]);
 
-/// Repeated in both directions.
 const REPEATED: [Place; 7] = [
     ([0.125, 0.25], &[[0, 0]]),
     ([0.875, 0.25], &[[3, 0]]),
@@ -113,7 +112,7 @@ const REPEATED: [Place; 7] = [
     ([-0.625, 1.25], &[[1, 0]]),
 ];
 
-/// Mirrored along u, held along v.
+/// Mirrored along u, clamped along v.
 const BOUNDED: [Place; 5] = [
     ([0.375, 0.75], &[[1, 1]]),
     ([1.375, 0.25], &[[2, 0]]),
@@ -166,9 +165,10 @@ fn pictures() -> Result<KnownImage, SceneError> {
         let id = mesh.material(material);
         sheet(&mut mesh, corner, id);
         for ([u, v], texels) in places {
-            let scale = match is_lamp {
-                true => EMITTED.as_dvec3(),
-                false => TINT.as_dvec3() * STRENGTH / PI,
+            let scale = if is_lamp {
+                EMITTED.as_dvec3()
+            } else {
+                TINT.as_dvec3() * STRENGTH / PI
             };
             let name = format!("{name} at {u} {v}");
             let at = point_of(corner, [*u, *v]);
@@ -185,7 +185,7 @@ fn pictures() -> Result<KnownImage, SceneError> {
     })
 }
 
-/// A normal map of one direction, as it is and scaled, and normals of vertices.
+/// A constant normal map, unscaled and scaled, and vertex normals.
 fn normals() -> Result<KnownImage, SceneError> {
     const GREY: f32 = 0.5;
     /// x along u, y against v, z up.
@@ -250,7 +250,7 @@ fn normals() -> Result<KnownImage, SceneError> {
     })
 }
 
-/// A material whose roughness and metalness come from a linear texture.
+/// A material with roughness and metalness from a linear texture.
 fn roughness() -> Result<KnownImage, SceneError> {
     const TEXELS: [[u8; 3]; 2] = [[10, 180, 60], [250, 240, 200]];
     const WAY: Vec3 = vec3(0.5, -1.0, 0.3);

@@ -1,4 +1,4 @@
-//! Lights of one direction: points, cones, and light from infinitely far away; of luminaires what they have in common with these.
+//! Delta lights: points, spots and directional lights, and their shared code with luminaires.
 
 use super::ies::candela;
 use super::{LightChecks, LightTwin};
@@ -12,7 +12,6 @@ use raystone_image::Image;
 use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::fmt::Write as _;
 
-/// The row of points.
 pub(super) static POINTS: LightChecks = LightChecks {
     points: || {
         vec![Light::Point {
@@ -23,14 +22,12 @@ pub(super) static POINTS: LightChecks = LightChecks {
     ..LightChecks::new(LIGHT_KINDS[3], LightTwin::Alone(sample), mitsuba)
 };
 
-/// The row of cones.
 pub(super) static SPOTS: LightChecks = LightChecks {
     points: spots,
     images,
     ..LightChecks::new(LIGHT_KINDS[4], LightTwin::Alone(sample), spot_in_mitsuba)
 };
 
-/// The row of light from far away.
 pub(super) static DIRECTIONAL: LightChecks = LightChecks {
     points: || {
         vec![Light::Directional {
@@ -53,10 +50,10 @@ fn spots() -> Vec<Light> {
     vec![spot(0.8, true), spot(-0.9, false)]
 }
 
-/// Distance of what has none.
+/// Distance of lights at infinity.
 pub(super) const FAR: f64 = 1e30;
 
-/// A point of one of these lights, and of luminaires.
+/// A sample of one of these lights or of a luminaire.
 pub(super) fn sample(
     light: &Light,
     from: DVec3,
@@ -128,7 +125,6 @@ pub(super) fn sample(
     })
 }
 
-/// Points and light from far away.
 fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
     let (kind, element, place, unit) = match light {
         Light::Directional { direction, .. } => (
@@ -155,10 +151,10 @@ fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), Expor
     Ok(())
 }
 
-/// Width and height of the picture that a spot throws: it fades from the middle to the edge in so many texels.
+/// Size of a spot's projected texture; the falloff from centre to edge spans this many texels.
 const SPOT_EDGE: u32 = 512;
 
-/// Mitsuba's spots fade linearly in the angle; one with a sharp edge throws the picture of how ours do.
+/// Mitsuba's spots fade linearly in the angle: a sharp-edged one projects our falloff.
 fn spot_in_mitsuba(
     export: &mut Export<'_>,
     number: usize,
@@ -218,7 +214,7 @@ fn spot_in_mitsuba(
     Ok(())
 }
 
-/// From a place to a point of the floor: the distance, the cosine there, and that to this axis of a light.
+/// Distance from a position to a floor point, and the cosines at the floor and to the axis.
 fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
     let way = (point - place).as_dvec3();
     let direction = way.normalize();
@@ -226,7 +222,7 @@ fn seen_from(place: Vec3, point: Vec3, axis: Vec3) -> [f64; 3] {
     [way.length(), -direction.y, direction.dot(axis)]
 }
 
-/// A point in red, a spot in green, and one without decay in blue.
+/// A point light in red, a spot in green, and one without decay in blue.
 fn images() -> Result<Vec<KnownImage>, SceneError> {
     const POINT: Vec3 = vec3(0.3, 1.5, -0.2);
     const SPOTS: [[Vec3; 2]; 2] = [

@@ -1,8 +1,9 @@
 //! Radiance from all around by an equirectangular map.
 //!
-//! Which texel a number chooses depends on the order in which an alias table was made: the table is read as data, whole numbers as
-//! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
-//! kernels divide by shows, as does a density that is none of the table.
+//! The texel chosen by a number depends on the order in which an alias table was built, so the
+//! table is read as data, in the integer format of docs/shading.md. The probability of each texel
+//! is counted from it, which exposes a table whose weights differ from the kernels' divisors, and a
+//! density that does not match the table.
 
 use super::delta::FAR;
 use super::{LightChecks, LightTwin};
@@ -23,15 +24,14 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
     trials: trial_lights::skies,
     images,
     ..LightChecks::new(LIGHT_KINDS[7], LightTwin::Map, mitsuba)
 };
 
-/// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other
-/// row of twice as many and one is one of ours. Columns run the same way.
+/// The same bilinear function. Mitsuba's rows go from pole to pole, ours have centres half a row
+/// inside, so every other of `2 n + 1` rows is one of ours. Columns match.
 fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
     let Light::Environment { map, scale, turn } = light else {
         return Ok(());
@@ -61,7 +61,7 @@ fn mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), Expor
     Ok(())
 }
 
-/// A choice by one number: threshold and alias of each part, and with what probability each entry is chosen.
+/// An alias table: threshold and alias of each part, and the probability of each entry.
 struct Aliases {
     parts: Vec<(u32, usize)>,
     /// Values of a number in each part.
@@ -84,32 +84,33 @@ impl Aliases {
         }
     }
 
-    /// The entry of a number in [0, 1), and how far along what chose it the number lies.
+    /// The entry for a number in [0, 1), and the number's relative position in its range.
     fn choose(&self, u: f64) -> (usize, f64) {
         let value = (u * UNITS).clamp(0.0, UNITS - 1.0) as u32;
         let part = (value / self.size) as usize;
         let place = value % self.size;
         let (own, alias) = self.parts[part];
         let along = |place: u32, of: u32| (f64::from(place) + 0.5) / f64::from(of);
-        match place < own {
-            true => (part, along(place, own)),
-            false => (alias, along(place - own, self.size - own)),
+        if place < own {
+            (part, along(place, own))
+        } else {
+            (alias, along(place - own, self.size - own))
         }
     }
 }
 
-/// A map with the tables that choose its texels.
+/// A map with its sampling tables.
 pub(crate) struct Map {
     map: Arc<EnvironmentMap>,
     scale: f64,
     turn: f64,
     rows: Aliases,
-    /// One for each row.
+    /// One per row.
     columns: Vec<Aliases>,
 }
 
 impl Map {
-    /// The map that a light is, if it is one.
+    /// The map of a light, if it is an environment.
     pub(crate) fn of(light: &Light) -> Option<Self> {
         let Light::Environment { map, scale, turn } = light else {
             return None;
@@ -137,26 +138,26 @@ impl Map {
         [self.map.width.into(), self.map.height.into()]
     }
 
-    /// Solid angle of a texel of a row.
     fn solid_angle(&self, row: usize) -> f64 {
         let [width, height] = self.size();
         let cosine = |row: usize| (PI * row as f64 / height).cos();
         TAU / width * (cosine(row) - cosine(row + 1))
     }
 
-    /// Column and row of a direction, as they run over the map.
+    /// Column and row of a direction, continuous over the map.
     fn place(&self, d: DVec3) -> [f64; 2] {
         let [width, height] = self.size();
-        // The poles of the map have no azimuth: there its first column begins, however it is turned.
-        let around = match d.x == 0.0 && d.z == 0.0 {
-            true => 0.0,
-            false => (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU),
+        // The poles have no azimuth: they map to the first column, however the map is turned.
+        let around = if d.x == 0.0 && d.z == 0.0 {
+            0.0
+        } else {
+            (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU)
         };
         let down = d.x.hypot(d.z).atan2(d.y);
         [around / TAU * width, down / PI * height]
     }
 
-    /// Bilinear between the centres of texels.
+    /// Bilinear between texel centres.
     pub(crate) fn radiance(&self, direction: DVec3) -> DVec3 {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
@@ -172,7 +173,7 @@ impl Map {
         self.scale * (along(above) * (1.0 - t) + along(above + 1) * t)
     }
 
-    /// The texel of a direction, and the density with which light samples find it.
+    /// The texel of a direction, and the density of light sampling for it.
     pub(crate) fn density(&self, direction: DVec3) -> (usize, f64) {
         let [x, y] = self.place(direction);
         let (width, height) = (self.map.width as usize, self.map.height as usize);
@@ -184,7 +185,7 @@ impl Map {
         self.rows.shares[row] * self.columns[row].shares[column] / self.solid_angle(row)
     }
 
-    /// A direction: the second number chooses the row and the place along it, the first one the column.
+    /// A sampled direction: `v` chooses the row and the position along it, `u` the column.
     pub(crate) fn sample(
         &self,
         [u, v]: [f64; 2],
@@ -219,7 +220,7 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
         .collect()
 }
 
-/// A map that is brighter towards one side and the horizon, turned.
+/// A turned map that is brighter towards one side and the horizon.
 fn shown(name: &'static str, trial: Trial) -> Result<KnownImage, SceneError> {
     const TURN: f32 = 0.4;
     let texel = |k: u32| {

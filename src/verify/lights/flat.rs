@@ -1,4 +1,4 @@
-//! Triangles and parallelograms: points on them evenly.
+//! Triangles and parallelograms, sampled uniformly.
 
 use super::{LightChecks, LightTwin};
 use crate::path_oracle::hits::Hits;
@@ -7,11 +7,10 @@ use crate::path_oracle::{LightSample, Rounding};
 use glam::DVec3;
 use raystone_scene::{LIGHT_KINDS, SceneData, Source};
 
-/// The row of single ones. Mitsuba is told of them with their meshes.
+/// Single triangles. Mitsuba gets them with their meshes.
 pub(super) static TRIANGLES: LightChecks =
     LightChecks::new(LIGHT_KINDS[0], LightTwin::Surface, |_, _, _| Ok(()));
 
-/// The row of two that form a parallelogram.
 pub(super) static PARALLELOGRAMS: LightChecks =
     LightChecks::new(LIGHT_KINDS[1], LightTwin::Surface, |_, _, _| Ok(()));
 
@@ -52,7 +51,7 @@ pub(crate) fn sample(
     let to_light = rounding.point(point, point.abs() + x.abs() + y.abs()) - from;
     let distance = to_light.length();
     let direction = to_light / distance;
-    // The edges of a parallelogram turn about its front, those of a triangle as the file has them.
+    // The edges of a parallelogram turn about its front, those of a triangle as in the file.
     let turns = matches!(source, Source::Triangle(_)) && scene.is_mirrored(id as usize);
     let front = x.cross(y).normalize() * if turns { -1.0 } else { 1.0 };
     let away = front.dot(direction);

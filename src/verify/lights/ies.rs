@@ -1,4 +1,4 @@
-//! Luminaires by their measured intensities.
+//! Luminaires with measured intensities.
 
 use super::{LightChecks, LightTwin, delta};
 use crate::known_images::lamps::{NEAR, path, reflected};
@@ -12,7 +12,6 @@ use raystone_scene::{IesProfile, LIGHT_KINDS, Light, Photometry, SceneError};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
     trials: trial_lights::luminaires,
     images,
@@ -26,10 +25,10 @@ pub(super) static CHECKS: LightChecks = LightChecks {
     )
 };
 
-/// Beyond the last angle by this much is not outside yet, degrees.
+/// Tolerance beyond the last angle, degrees.
 const SLACK: f64 = 1e-3;
 
-/// Candela in the direction in which light travels.
+/// Candela in the direction of propagation.
 pub(super) fn candela(
     profile: &IesProfile,
     rotation: Quat,
@@ -58,15 +57,16 @@ pub(super) fn candela(
     column.iter().map(|(h, w)| w * of_column(*h)).sum()
 }
 
-/// The angle of (x, y); 0 at their origin, whatever the signs of the zeros.
+/// The angle of (x, y); 0 at the origin for either sign of zero.
 fn angle(y: f64, x: f64) -> f64 {
-    match x == 0.0 && y == 0.0 {
-        true => 0.0,
-        false => y.atan2(x),
+    if x == 0.0 && y == 0.0 {
+        0.0
+    } else {
+        y.atan2(x)
     }
 }
 
-/// The two values between which `x` lies, with their weights; nothing outside of all.
+/// The two values around `x` with their weights; `None` out of range.
 fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
     let value = |at: usize| f64::from(values[at]);
     let last = values.len().checked_sub(1)?;
@@ -76,9 +76,10 @@ fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
     let x = x.clamp(value(0), value(last));
     let low = (0..last).rev().find(|at| value(*at) <= x).unwrap_or(0);
     let high = (low + 1).min(last);
-    let part = match high > low {
-        true => (x - value(low)) / (value(high) - value(low)),
-        false => 0.0,
+    let part = if high > low {
+        (x - value(low)) / (value(high) - value(low))
+    } else {
+        0.0
     };
     Some([(low, 1.0 - part), (high, part)])
 }
@@ -87,7 +88,7 @@ fn weights(values: &[f32], x: f64) -> Option<[(usize, f64); 2]> {
 const LUMINAIRE: &str = "TILT=NONE\n1 -1 2 4 5 1 2 0 0 0\n0.5 1 0\n0 30 50 80\n0 70 180 270 360\n\
                          90 60 40 10\n90 80 20 30\n90 50 70 5\n90 40 10 60\n90 60 40 10\n";
 
-/// Light from far away in red, a luminaire in green.
+/// A directional light in red, a luminaire in green.
 fn images() -> Result<Vec<KnownImage>, SceneError> {
     const WAY: Vec3 = vec3(0.4, -1.0, -0.7);
     const HEIGHT: f32 = 1.6;
@@ -108,7 +109,7 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
         },
     ];
     let facing = -WAY.as_dvec3().normalize().y;
-    // Vertical and horizontal angle, and the candela of the file there, before its two multipliers.
+    // Vertical and horizontal angle, and the candela in the file before its two multipliers.
     let places = [
         ("below the luminaire", 0.0_f64, 0.0_f64, 90.0),
         ("at a measured angle", 30.0, 70.0, 80.0),

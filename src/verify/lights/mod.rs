@@ -1,4 +1,4 @@
-//! What checks know of each kind of light: one row, in a file of its own.
+//! The checks of each light kind, one file per kind.
 
 mod delta;
 pub(crate) mod environment;
@@ -14,38 +14,38 @@ use glam::DVec3;
 use raystone_core::params::{Kinds, Named, Sources};
 use raystone_scene::{Light, LightKind, SceneError};
 
-/// How a point of a light is found in f64.
+/// How a point of a light is sampled in f64.
 #[derive(Clone, Copy)]
 pub enum LightTwin {
-    /// On triangles of a material that emits.
+    /// On triangles of an emissive material.
     Surface,
-    /// By the light alone, from a place, by two numbers in [0, 1); nothing if no light arrives.
+    /// From the light alone, for a position and two numbers in [0, 1); `None` if no light arrives.
     Alone(fn(&Light, DVec3, [f64; 2], &mut Rounding) -> Option<LightSample>),
     /// In a map around the scene.
     Map,
 }
 
-/// What checks know of a kind of light.
+/// The checks of one light kind.
 pub struct LightChecks {
     /// The kind.
     pub kind: &'static LightKind,
     /// Its formulas in f64.
     pub twin: LightTwin,
-    /// The light in Mitsuba.
+    /// Export to Mitsuba.
     pub mitsuba: ToMitsuba,
-    /// Those that shine in the trial scene `points`.
+    /// Lights of this kind in the trial scene `points`.
     pub points: fn() -> Vec<Light>,
-    /// Trial scenes of its own, on which paths of every scene with such a light are checked, too.
+    /// Additional trial scenes, used to check paths of every scene with such a light.
     pub trials: fn() -> Result<Vec<TrialScene>, SceneError>,
-    /// Known images of its own.
+    /// Additional known images.
     pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
 }
 
-/// Writes the light of this number for Mitsuba, or says with [`ExportError::Light`] why it cannot be.
+/// Writes the light with this index for Mitsuba, or fails with [`ExportError::Light`].
 pub type ToMitsuba = fn(&mut Export<'_>, usize, &Light) -> Result<(), ExportError>;
 
 impl LightChecks {
-    /// A kind that nothing shows yet.
+    /// A kind without trial scenes or images.
     pub const fn new(kind: &'static LightKind, twin: LightTwin, mitsuba: ToMitsuba) -> Self {
         Self {
             kind,
@@ -58,7 +58,7 @@ impl LightChecks {
     }
 }
 
-/// The rows of all kinds.
+/// The registered kinds.
 pub type LightRegistry = Kinds<LightChecks>;
 
 impl Named for LightChecks {

@@ -1,4 +1,4 @@
-//! Spheres: uniform over the solid angle of the cap that is seen, or over the area from inside.
+//! Spheres: uniform over the solid angle of the visible cap, or over the area from inside.
 
 use super::{LightChecks, LightTwin};
 use crate::known_images::lamps::{NEAR, path, reflected};
@@ -13,7 +13,6 @@ use raystone_scene::{LIGHT_KINDS, Light, SceneError};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// The row.
 pub(super) static CHECKS: LightChecks = LightChecks {
     points,
     images,
@@ -61,7 +60,6 @@ fn mitsuba(export: &mut Export<'_>, number: usize, light: &Light) -> Result<(), 
     Ok(())
 }
 
-/// A sphere that shines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ball {
     centre: DVec3,
@@ -86,13 +84,13 @@ impl Ball {
         })
     }
 
-    /// 1 - cos of the half angle under which it is seen; `None` from inside.
+    /// 1 - cos of the half angle it subtends; `None` from inside.
     fn cap(&self, from: DVec3) -> Option<f64> {
         let sin_2 = self.radius * self.radius / from.distance_squared(self.centre);
         (sin_2 < 1.0).then(|| sin_2 / (1.0 + (1.0 - sin_2).sqrt()))
     }
 
-    /// Where a ray meets it first.
+    /// Distance of the first intersection with a ray.
     pub(crate) fn meet(&self, ray: &Segment) -> Option<f64> {
         let to_centre = self.centre - ray.origin;
         let along = to_centre.dot(ray.direction);
@@ -122,7 +120,7 @@ impl Ball {
                 (point - from).normalize()
             }
         };
-        // A direction that just misses is one along the edge.
+        // A direction that just misses is treated as one along the edge.
         let edge = (self.centre - from).dot(direction).max(0.0);
         let distance = self
             .meet(&Segment::endless(from, direction, None))
@@ -136,7 +134,7 @@ impl Ball {
         })
     }
 
-    /// With which [`Ball::sample`] finds this direction.
+    /// Density with which [`Ball::sample`] finds this direction.
     pub(crate) fn density(&self, from: DVec3, direction: DVec3) -> f64 {
         if let Some(cap) = self.cap(from) {
             return 1.0 / (TAU * cap);

@@ -5,7 +5,6 @@ use super::*;
 use raystone_scene as scene;
 use raystone_scene::{COOK_TORRANCE, Fresnel, Masking};
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("cook_torrance.py"),
     balls,
@@ -42,14 +41,14 @@ impl<'a> CookTorrance<'a> {
         }
     }
 
-    /// Beckmann's density of facet normals, of their cosine.
+    /// Beckmann's density of facet normals, as a function of their cosine.
     fn facets(&self, cos: f64) -> f64 {
         let (cos_2, m_2) = (cos * cos, self.roughness * self.roughness);
         let tan_2 = (1.0 - cos_2) / cos_2;
         (-tan_2 / m_2).exp() / (PI * m_2 * cos_2 * cos_2)
     }
 
-    /// The part that is neither masked nor in shadow, of n·o, n·i, n·h and o·h.
+    /// The unmasked and unshadowed fraction, for n·o, n·i, n·h and o·h.
     fn visible(&self, [n_o, n_i, n_h, o_h]: [f64; 4]) -> f64 {
         if !self.is_smith {
             let cavity = |cos: f64| 2.0 * n_h * cos / o_h;
@@ -57,18 +56,20 @@ impl<'a> CookTorrance<'a> {
         }
         let one = |cos: f64| {
             let a = cos / (self.roughness * (1.0 - cos * cos).max(0.0).sqrt());
-            match a < 1.6 {
-                true => (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a),
-                false => 1.0,
+            if a < 1.6 {
+                (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
+            } else {
+                1.0
             }
         };
         one(n_o) * one(n_i)
     }
 
     fn reflectance(&self, cos: f64) -> f64 {
-        match self.is_exact {
-            true => fresnel(cos, 1.0, self.index).map_or(1.0, |(r, _)| r),
-            false => schlick(normal_reflectance(self.index), cos),
+        if self.is_exact {
+            fresnel(cos, 1.0, self.index).map_or(1.0, |(r, _)| r)
+        } else {
+            schlick(normal_reflectance(self.index), cos)
         }
     }
 }
@@ -77,16 +78,15 @@ impl Bsdf for CookTorrance<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
         let normal = self.surface.normal;
-        let direction = match is_diffuse {
-            true => cosine_direction(normal, [u, v]),
-            false => {
-                let tan_2 = -self.roughness * self.roughness * (1.0 - u).ln();
-                let cos = 1.0 / (1.0 + tan_2).sqrt();
-                let radius = cos * tan_2.sqrt();
-                let (sin_phi, cos_phi) = (TAU * v).sin_cos();
-                let facet = around(normal, DVec3::new(radius * cos_phi, radius * sin_phi, cos));
-                mirrored(self.surface.out, facet)
-            }
+        let direction = if is_diffuse {
+            cosine_direction(normal, [u, v])
+        } else {
+            let tan_2 = -self.roughness * self.roughness * (1.0 - u).ln();
+            let cos = 1.0 / (1.0 + tan_2).sqrt();
+            let radius = cos * tan_2.sqrt();
+            let (sin_phi, cos_phi) = (TAU * v).sin_cos();
+            let facet = around(normal, DVec3::new(radius * cos_phi, radius * sin_phi, cos));
+            mirrored(self.surface.out, facet)
         };
         bounce(self, direction, rounding)
     }
@@ -105,7 +105,7 @@ impl Bsdf for CookTorrance<'_> {
         let (n_h, o_h) = (rounding.number(n.dot(h)).min(1.0), o.dot(h));
         let facets = self.facets(n_h);
         let visible = self.visible([n_o, n_i, n_h, o_h]);
-        // f · cos: n·i is taken out.
+        // f · cos, with n·i cancelled.
         let lobe = self.reflectance(o_h.min(1.0)) * visible * facets / (4.0 * n_o);
         let cosine = cosine_density(n, direction);
         Some(Reflected {
@@ -136,7 +136,7 @@ fn balls() -> Vec<(Option<usize>, Material)> {
     [
         (2, (Masking::VCavities, Fresnel::Schlick, 0.4)),
         (3, (Masking::Smith, Fresnel::Exact, 0.15)),
-        // Rough enough for half of the angles to be masked.
+        // Rough enough to mask half of the angles.
         (8, (Masking::Smith, Fresnel::Schlick, 0.6)),
         (9, (Masking::VCavities, Fresnel::Exact, 0.7)),
     ]

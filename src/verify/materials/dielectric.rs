@@ -8,7 +8,6 @@ use crate::trial_scenes::{camera, depth};
 use raystone_core::geometry::Camera;
 use raystone_scene::DIELECTRIC;
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     balls,
     trials,
@@ -22,18 +21,17 @@ pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
 
 struct Dielectric<'a>(&'a Surface<'a>);
 
-/// Schlick's polynomial of a cosine on the optically thinner side.
+/// Schlick's polynomial for a cosine on the optically thinner side.
 pub(super) fn schlick(f0: f64, cos: f64) -> f64 {
     f0 + (1.0 - f0) * (1.0 - cos).max(0.0).powi(5)
 }
 
-/// Reflectance at normal incidence.
 pub(super) fn normal_reflectance(index: f64) -> f64 {
     ((index - 1.0) / (index + 1.0)).powi(2)
 }
 
-/// Reflectance for unpolarised light between media of these indices, and the cosine of the refracted direction;
-/// `None` at total reflection.
+/// Reflectance for unpolarised light between media of these indices, and the cosine of the
+/// refracted direction; `None` at total internal reflection.
 pub(super) fn fresnel(cos: f64, from: f64, to: f64) -> Option<(f64, f64)> {
     let sin_2 = (1.0 - cos * cos) * (from / to).powi(2);
     if sin_2 >= 1.0 {
@@ -49,9 +47,10 @@ impl Bsdf for Dielectric<'_> {
     fn sample(&self, [u, _]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let surface = self.0;
         let (index, is_thin) = (parameter(surface, 0), parameter(surface, 1) > 0.5);
-        let (from, to) = match is_thin || surface.side > 0.0 {
-            true => (1.0, index),
-            false => (index, 1.0),
+        let (from, to) = if is_thin || surface.side > 0.0 {
+            (1.0, index)
+        } else {
+            (index, 1.0)
         };
         let cos = surface.normal.dot(surface.out).min(1.0);
         let delta = |direction, weight, medium| Bounce {
@@ -62,12 +61,13 @@ impl Bsdf for Dielectric<'_> {
         };
         let passed = fresnel(cos, from, to);
         let reflectance = passed.map_or(1.0, |(exact, beyond)| {
-            let r = match parameter(surface, 2) > 0.5 {
-                false => exact,
-                true => schlick(
+            let r = if parameter(surface, 2) > 0.5 {
+                schlick(
                     normal_reflectance(index),
                     if from > to { beyond } else { cos },
-                ),
+                )
+            } else {
+                exact
             };
             if is_thin { 2.0 * r / (1.0 + r) } else { r }
         });
@@ -125,7 +125,7 @@ fn balls() -> Vec<(Option<usize>, Material)> {
     vec![(Some(7), glass.with_schlick())]
 }
 
-/// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
+/// Glass balls, nested, a pane, a mirror, tints, and a lamp seen through all of them.
 fn trials() -> Result<Vec<TrialScene>, SceneError> {
     let camera = camera(
         vec3(0.3, 1.3, 4.1),
@@ -162,7 +162,7 @@ fn trials() -> Result<Vec<TrialScene>, SceneError> {
     }])
 }
 
-/// A slab and a pane of glass between a bright wall and the dimmer one that they reflect.
+/// A slab and a pane of glass between a bright wall and a dimmer one that they reflect.
 fn images() -> Result<Vec<KnownImage>, SceneError> {
     const TINT: Vec3 = vec3(0.9, 0.8, 0.95);
     const INDEX: f32 = 1.5;
@@ -181,19 +181,16 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
     let [x, y] = [20.0 * Vec3::X, 20.0 * Vec3::Y];
     mesh.plain([vec3(-10.0, -10.0, -2.0), x, y], far);
     mesh.plain([vec3(-10.0, -10.0, 4.0), y, x], near);
-    // Light is tinted at each passage of a surface, and goes to and fro inside.
+    // Light is tinted at each surface crossing, and is reflected back and forth inside.
     let [tint, behind, before] = [TINT, behind, before].map(Vec3::as_dvec3);
     let seen = |name, at: Vec3, from: Vec3, is_thin: bool| {
         let r = closed::fresnel(from.as_dvec3().normalize().z, INDEX.into());
-        let radiance = match is_thin {
-            true => {
-                let both = 2.0 * r / (1.0 + r);
-                (1.0 - both) * tint * behind + both * before
-            }
-            false => {
-                let through = (1.0 - r) / (1.0 + r) * tint * tint;
-                through * behind + r * before + through * r * before
-            }
+        let radiance = if is_thin {
+            let both = 2.0 * r / (1.0 + r);
+            (1.0 - both) * tint * behind + both * before
+        } else {
+            let through = (1.0 - r) / (1.0 + r) * tint * tint;
+            through * behind + r * before + through * r * before
         };
         View::new(name, at, from, radiance)
     };

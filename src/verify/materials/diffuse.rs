@@ -3,7 +3,6 @@
 use super::*;
 use raystone_scene::DIFFUSE;
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks =
     MaterialChecks::new(&DIFFUSE, |surface| Box::new(Diffuse(surface)), mitsuba);
 

@@ -6,7 +6,6 @@ use crate::known_images::closed::polygon;
 use crate::known_images::lamps::{FLOOR, NEAR, on_floor, path};
 use raystone_scene::MIRROR;
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     images,
     ..MaterialChecks::new(&MIRROR, |surface| Box::new(Mirror(surface)), mitsuba)
@@ -47,10 +46,10 @@ fn mitsuba(_: &Material, color: &Color, id: &str, _: &mut Vec<String>) -> String
     )
 }
 
-/// A floor beside a mirror under a white sky, and two mirrors that face each other below it.
+/// A floor beside a mirror under a white sky, and two facing mirrors below it.
 fn images() -> Result<Vec<KnownImage>, SceneError> {
     const TINT: Vec3 = vec3(0.95, 0.85, 0.7);
-    /// What a path rises or falls while it passes from one mirror to the other.
+    /// Change in height of a path between the two mirrors.
     const STEP: f32 = 0.29;
     let mut mesh = on_floor("mirrors", Vec3::ONE)?;
     let mirror = mesh.material(Material::mirror("mirror", TINT));
@@ -60,7 +59,7 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
         mesh.plain([vec3(x, -3.0, -1.0), 1.5 * Vec3::Y, 2.0 * Vec3::Z], mirror);
     }
     let tint = TINT.as_dvec3();
-    // What of the sky the wall hides, it reflects: what goes down to the wall goes on upwards.
+    // The wall reflects exactly as much sky as it hides: downward paths to it continue upwards.
     let floor = |point: Vec3| {
         let [c, a, b] = wall.map(Vec3::as_dvec3);
         let corners = [c, c + a, c + a + b, c + b];
@@ -75,7 +74,7 @@ fn images() -> Result<Vec<KnownImage>, SceneError> {
         View::new("floor by the mirror", close, NEAR, floor(close)),
         View::new("floor away from it", away, NEAR, floor(away)),
         View::new("floor in the mirror", seen, from, tint * floor(met)),
-        // Met at 0.195 and every 0.29 below the upper edge of 1.5: five times.
+        // Hits at 0.195 and every 0.29 below the upper edge of 1.5: five times.
         View::new(
             "five mirrors",
             vec3(4.0, -1.695, 0.0),

@@ -1,4 +1,4 @@
-//! What checks know of each kind of material: one row, in a file of its own.
+//! The checks of each material kind, one file per kind.
 
 mod cook_torrance;
 mod dielectric;
@@ -21,32 +21,32 @@ use std::f64::consts::{PI, TAU};
 pub(crate) use diffuse::CHECKS as DIFFUSE_CHECKS;
 pub(crate) use principled::CHECKS as PRINCIPLED_CHECKS;
 
-/// The formulas of a kind in f64, at a point.
+/// Builds the f64 formulas of a kind at a point.
 pub type Twin = for<'a> fn(&'a Surface<'a>) -> Box<dyn Bsdf + 'a>;
 
-/// What checks know of a kind of material.
+/// The checks of one material kind.
 pub struct MaterialChecks {
     /// The kind.
     pub kind: &'static MaterialKind,
     /// Its formulas in f64.
     pub twin: Twin,
-    /// A material as an element of a Mitsuba scene with this attribute: `id="…"`, or nothing. What Mitsuba draws otherwise is said in
-    /// the last argument.
+    /// A material as an element of a Mitsuba scene with this attribute: `id="…"`, or nothing.
+    /// Differences in what Mitsuba renders are appended to the last argument.
     pub mitsuba: fn(&Material, &Color, &str, &mut Vec<String>) -> String,
-    /// Python that teaches Mitsuba the kind after `mitsuba/opaque.py`; empty where it knows it.
+    /// Python that defines the kind for Mitsuba, after `mitsuba/opaque.py`; empty if built in.
     pub python: &'static str,
-    /// What balls of the trial scene `glossy` are made of, and the places where they stand: those without one stand last.
+    /// Materials for the balls of the trial scene `glossy`, with positions; `None` comes last.
     pub balls: fn() -> Vec<(Option<usize>, Material)>,
-    /// What planes of the known image `materials` are made of.
+    /// Materials for the planes of the known image `materials`.
     pub planes: fn() -> Vec<(&'static str, Material)>,
-    /// Trial scenes of its own.
+    /// Additional trial scenes.
     pub trials: fn() -> Result<Vec<TrialScene>, SceneError>,
-    /// Known images of its own.
+    /// Additional known images.
     pub images: fn() -> Result<Vec<KnownImage>, SceneError>,
 }
 
 impl MaterialChecks {
-    /// A kind that nothing shows yet.
+    /// A kind without trial scenes or images.
     pub const fn new(
         kind: &'static MaterialKind,
         twin: Twin,
@@ -65,7 +65,7 @@ impl MaterialChecks {
     }
 }
 
-/// The rows of all kinds.
+/// The registered kinds.
 pub type MaterialRegistry = Kinds<MaterialChecks>;
 
 impl Named for MaterialChecks {
@@ -93,7 +93,7 @@ impl Named for MaterialChecks {
     }
 }
 
-/// Parameter number `place` of a material; 0 where it has none.
+/// Parameter number `place` of a material; 0 if it has none.
 fn number(material: &Material, place: usize) -> f32 {
     material.parameters.get(place).copied().unwrap_or_default()
 }

@@ -3,7 +3,6 @@
 use super::*;
 use raystone_scene::PHONG;
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("phong.py"),
     balls,
@@ -38,15 +37,14 @@ impl<'a> Phong<'a> {
 impl Bsdf for Phong<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
-        let direction = match is_diffuse {
-            true => cosine_direction(self.surface.normal, [u, v]),
-            false => {
-                let cos = u.powf(1.0 / (self.exponent + 1.0));
-                let radius = (1.0 - cos * cos).max(0.0).sqrt();
-                let (sin_phi, cos_phi) = (TAU * v).sin_cos();
-                let local = DVec3::new(radius * cos_phi, radius * sin_phi, cos);
-                around(self.mirror(), local)
-            }
+        let direction = if is_diffuse {
+            cosine_direction(self.surface.normal, [u, v])
+        } else {
+            let cos = u.powf(1.0 / (self.exponent + 1.0));
+            let radius = (1.0 - cos * cos).max(0.0).sqrt();
+            let (sin_phi, cos_phi) = (TAU * v).sin_cos();
+            let local = DVec3::new(radius * cos_phi, radius * sin_phi, cos);
+            around(self.mirror(), local)
         };
         bounce(self, direction, rounding)
     }
@@ -58,10 +56,11 @@ impl Bsdf for Phong<'_> {
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
         let towards = rounding.number(direction.dot(self.mirror())).min(1.0);
-        // Behind the plane across the mirror direction there is nothing, also where 0⁰ is 1: exponent 0 is a hemisphere.
-        let lobe = match towards > 0.0 {
-            true => (self.exponent + 1.0) / TAU * towards.powf(self.exponent),
-            false => 0.0,
+        // Zero behind the plane across the mirror direction: exponent 0 is a hemisphere.
+        let lobe = if towards > 0.0 {
+            (self.exponent + 1.0) / TAU * towards.powf(self.exponent)
+        } else {
+            0.0
         };
         (cosine > 0.0).then(|| Reflected {
             value: self.surface.base * cosine + self.specular * lobe,
@@ -73,7 +72,7 @@ impl Bsdf for Phong<'_> {
 fn balls() -> Vec<(Option<usize>, Material)> {
     let phong =
         |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
-    // The last is a hemisphere about the mirror direction, which ends at a step.
+    // The last is a hemisphere about the mirror direction, with a hard edge.
     [(0, 3.0), (1, 150.0), (10, 0.0)]
         .map(|(place, exponent)| (Some(place), phong(exponent)))
         .into()

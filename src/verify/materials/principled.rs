@@ -4,7 +4,6 @@ use super::dielectric::schlick;
 use super::*;
 use raystone_scene::{PRINCIPLED, reflectance_of_ior};
 
-/// The row.
 pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     python: include_str!("principled.py"),
     balls,
@@ -16,7 +15,7 @@ pub(crate) static CHECKS: MaterialChecks = MaterialChecks {
     )
 };
 
-/// The least width of the facets' distribution.
+/// Minimum width of the facet distribution.
 const LEAST_ALPHA: f64 = 0.001;
 
 struct Principled<'a> {
@@ -24,9 +23,8 @@ struct Principled<'a> {
     metallic: f64,
     roughness: f64,
     alpha: f64,
-    /// Reflectance of the dielectric part at normal incidence.
+    /// Normal-incidence reflectance of the dielectric part.
     f0: f64,
-    /// n·o.
     n_o: f64,
     /// Probability of the diffuse lobe.
     diffuse: f64,
@@ -54,7 +52,7 @@ impl<'a> Principled<'a> {
         made
     }
 
-    /// Of the facets, of both parts together.
+    /// Reflectance of the facets, dielectric and metallic parts together.
     fn reflectance(&self, cos: f64) -> DVec3 {
         let base = self.surface.base.to_array();
         let metal = DVec3::from_array(base.map(|f0| schlick(f0, cos)));
@@ -79,7 +77,6 @@ impl<'a> Principled<'a> {
         self.surface.base / PI * (energy * side(n_i) * side(self.n_o))
     }
 
-    /// A facet's normal among those that the viewer sees.
     fn visible_normal(&self, [u, v]: [f64; 2]) -> DVec3 {
         let n = self.surface.normal;
         let [x, y] = basis(n);
@@ -100,9 +97,10 @@ impl<'a> Principled<'a> {
 impl Bsdf for Principled<'_> {
     fn sample(&self, [u, v]: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
         let (is_diffuse, u) = choose(u, self.diffuse, rounding);
-        let direction = match is_diffuse {
-            true => cosine_direction(self.surface.normal, [u, v]),
-            false => mirrored(self.surface.out, self.visible_normal([u, v])),
+        let direction = if is_diffuse {
+            cosine_direction(self.surface.normal, [u, v])
+        } else {
+            mirrored(self.surface.out, self.visible_normal([u, v]))
         };
         bounce(self, direction, rounding)
     }
@@ -120,7 +118,7 @@ impl Bsdf for Principled<'_> {
         let (n_i, o_h) = (n.dot(direction), o.dot(h).min(1.0));
         let facets = self.facets(rounding.number(n.dot(h)).min(1.0));
         let (seen, lit) = (self.lambda(self.n_o), self.lambda(n_i));
-        // Of the facets alone, over n·i.
+        // The facets alone, over n·i.
         let specular = facets / (1.0 + seen + lit) / (4.0 * self.n_o);
         let passed = (1.0 - schlick(self.f0, self.n_o)) * (1.0 - schlick(self.f0, n_i));
         let diffuse = (1.0 - self.metallic) * passed * self.diffuse_part(n_i, o_h) * n_i;

@@ -1,4 +1,4 @@
-//! Materials, textures and skies in Mitsuba's words.
+//! Materials, textures and skies for Mitsuba.
 
 use super::{Export, ExportError, vector};
 use crate::materials::DIFFUSE_CHECKS;
@@ -8,18 +8,18 @@ use raystone_scene::{AlphaMask, Daylight, Material, SceneData, Texture, TextureU
 use std::f32::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-/// Python that the materials build on which Mitsuba lacks, and the file that all are written to.
+/// Python base code of the materials that Mitsuba lacks, and the file name for all of them.
 const OPAQUE: &str = include_str!("opaque.py");
 const MATERIALS_FILE: &str = "materials.py";
 
-/// Texels of a written mask for one of its image.
+/// Texels of a written mask per texel of its image, on each axis.
 const FINER: u32 = 4;
 
-/// Size of the map that stands for a sky with a gradient, texels.
+/// Size of the map that replaces a gradient sky, texels.
 const SKY_SIZE: [u32; 2] = [1024, 512];
 
 impl Export<'_> {
-    /// The material as a BSDF named by its number. Surfaces look the same from both sides, as ours do.
+    /// The material as a BSDF named by its number, two-sided as in our kernels.
     pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
         let material = &scene.materials[id];
         let color = self.color(scene, id)?;
@@ -49,17 +49,18 @@ impl Export<'_> {
         }
         let name = format!("id=\"material-{id}\"");
         let opening = self.mask(scene, id, &name)?;
-        // The mask has the name, and around it what it cuts.
-        let (id, closing) = match opening {
-            true => (String::new(), "    </bsdf>\n"),
-            false => (name, ""),
+        // The mask carries the name and wraps the material it cuts.
+        let (id, closing) = if opening {
+            (String::new(), "    </bsdf>\n")
+        } else {
+            (name, "")
         };
         self.xml += &(kind.mitsuba)(material, &color, &id, &mut self.warnings);
         self.xml += closing;
         Ok(())
     }
 
-    /// Writes the kinds of materials that Mitsuba lacks, once.
+    /// Writes the material kinds that Mitsuba lacks, once.
     fn teach(&mut self) -> Result<(), ExportError> {
         if !self.needs_materials {
             self.needs_materials = true;
@@ -115,8 +116,8 @@ impl Export<'_> {
         Ok(true)
     }
 
-    /// The base colour: constant, or a texture file. Mitsuba multiplies no colours, so that a texture with a factor is written as the
-    /// product, in floats.
+    /// The base colour: constant, or a texture file. Mitsuba cannot multiply colours, so a texture
+    /// with a factor is written as the product, in floats.
     fn color(&self, scene: &SceneData, id: usize) -> Result<Color, ExportError> {
         let material = &scene.materials[id];
         let factor = material.base_color;
@@ -136,7 +137,6 @@ impl Export<'_> {
         Ok(Color::Texture(name))
     }
 
-    /// What surrounds the scene.
     pub(super) fn sky(&mut self, scene: &SceneData) -> Result<(), ExportError> {
         if scene.environment == Vec3::ZERO {
             return Ok(());
@@ -169,12 +169,12 @@ impl Export<'_> {
 pub enum Color {
     /// Linear RGB.
     Constant(Vec3),
-    /// A file of the exported folder.
+    /// A file in the exported folder.
     Texture(String),
 }
 
 impl Color {
-    /// The element that gives it this name.
+    /// This colour as an element with this name.
     pub fn named(&self, name: &str) -> String {
         match self {
             Self::Constant(color) => {
@@ -212,7 +212,8 @@ fn picture(texture: &Texture) -> Picture {
     }
 }
 
-/// Where the surface is there, white, in [`FINER`] texels for each of the image's in both directions: Mitsuba's masks know no cutoff.
+/// White where the surface exists, with [`FINER`] texels per image texel in each direction:
+/// Mitsuba's masks have no cutoff.
 fn cut(mask: &AlphaMask, textures: &[Texture]) -> Picture {
     let texture = mask
         .texture
@@ -259,8 +260,8 @@ fn product(texture: &Texture, factor: Vec3) -> Result<Image, ExportError> {
     Ok(Image::new(texture.width, texture.height, texels)?)
 }
 
-/// The sky as a map of directions in Mitsuba's convention: from +y in the first row to −y in the last, the middle of the
-/// first column beside −z, from there to +x.
+/// The sky as a map of directions in Mitsuba's convention: from +y in the first row to −y in the
+/// last, the middle of the first column at −z, continuing to +x.
 fn sky_image(daylight: &Daylight, scale: Vec3) -> Result<Image, ExportError> {
     let [width, height] = SKY_SIZE;
     let texel = |at: u32| {
@@ -281,9 +282,10 @@ fn sky_image(daylight: &Daylight, scale: Vec3) -> Result<Image, ExportError> {
 /// A component of an sRGB texel as linear radiance (IEC 61966-2-1).
 fn decoded(encoded: u8) -> f32 {
     let encoded = f32::from(encoded) / 255.0;
-    match encoded <= 0.04045 {
-        true => encoded / 12.92,
-        false => ((encoded + 0.055) / 1.055).powf(2.4),
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
     }
 }
 

@@ -4,9 +4,10 @@ use glam::{Vec2, Vec3};
 use raystone_scene::SceneData;
 use raystone_scene::decode_normal;
 
-/// The triangles of material `id`, none of whose vertices are shared, so that each keeps its own normal and texture
-/// coordinates; nothing if there are none, and whether they have normals of their own. The base colour's texture, or else the mask, is
-/// placed by the coordinates. With `back` they are turned over and moved behind themselves by so much.
+/// The triangles of material `id`, and whether they have vertex normals; `None` if there are none.
+/// Vertices are not shared, so each keeps its own normal and texture coordinates, which follow the
+/// base colour's texture, or else the mask. With `back`, triangles are flipped and moved behind
+/// themselves by that distance.
 pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<u8>, bool)> {
     let of_material = |(index, found): (usize, &u32)| (*found == id).then_some(index);
     let ids = scene.material_ids.iter().enumerate();
@@ -65,7 +66,7 @@ pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<
     Some((bytes, smooth))
 }
 
-/// The normal at a corner, on the front of the triangle; that of the triangle where the file has none.
+/// The normal at a corner, on the triangle's front; the triangle's if the file has none.
 fn normal(scene: &SceneData, index: usize, corner: usize) -> Vec3 {
     let face = front(scene, index);
     let own = scene

@@ -1,9 +1,10 @@
-//! Scenes for other renderers, so that the images of both can be compared: [Mitsuba 3](https://mitsuba.readthedocs.io)
-//! as an XML file with meshes and textures beside it.
+//! Scene export for image comparisons with other renderers: [Mitsuba
+//! 3](https://mitsuba.readthedocs.io), as an XML file with meshes and textures beside it.
 //!
-//! Everything is written so that the other renderer has the same integral to estimate: the same triangles in the same
-//! space, the same camera, a box filter, no clipping. Mitsuba's `max_depth` counts vertices behind the camera, ours
-//! bounces: a path of `b` bounces there has depth `b + 1`. What has no counterpart is drawn as something near, and said.
+//! The other renderer gets the same integral to estimate: the same triangles in the same space, the
+//! same camera, a box filter, no clipping. Mitsuba's `max_depth` counts vertices after the camera,
+//! ours counts bounces: a path of `b` bounces there has depth `b + 1`. Features without a
+//! counterpart are approximated, and reported.
 
 mod look;
 mod mesh;
@@ -19,40 +20,40 @@ use raystone_scene::{Bounds, Light, SceneData};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What of an exported scene is not in the scene itself.
+/// Settings of an export that the scene itself does not contain.
 #[derive(Debug, Clone, Copy)]
 pub struct MitsubaSettings {
-    /// Where the image is taken from.
+    /// The camera.
     pub camera: Camera,
     /// Width and height of the image, pixels.
     pub size: [u32; 2],
-    /// Samples per pixel where the command line of Mitsuba names none (`-D spp=N`).
+    /// Samples per pixel unless Mitsuba's command line sets them (`-D spp=N`).
     pub spp: u32,
-    /// Most bounces of a path, as `path` counts them.
+    /// Maximum bounces of a path, as `path` counts them.
     pub bounces: u32,
-    /// Leaves out the back of emitters: right where nothing can see it, and fewer samples are lost on it.
+    /// Omits the back of emitters: correct where nothing can see it, and wastes fewer samples.
     pub fronts_only: bool,
 }
 
-/// A scene could not be written.
+/// The reason why a scene could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The operating system refused a file or the folder.
+    /// A file or folder could not be written.
     #[error("cannot write {}: {source}; check that the folder is writable and has space", path.display())]
     Write {
-        /// Where to.
+        /// The path.
         path: PathBuf,
-        /// Why not.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A light has no counterpart: the image would be another one.
+    /// A light has no counterpart: the image would differ.
     #[error("light {number}, a {kind}, cannot be written for Mitsuba: {reason}")]
     Light {
         /// Its index in [`SceneData::lights`].
         number: usize,
         /// Name of its kind.
         kind: &'static str,
-        /// Why not, and what to do.
+        /// The reason, and how to avoid it.
         reason: &'static str,
     },
     /// A texture or the sky could not be written.
@@ -61,7 +62,7 @@ pub enum ExportError {
 }
 
 impl ExportError {
-    /// The light of this number cannot be written, for this reason.
+    /// The error for a light with this number and reason.
     pub fn light(number: usize, light: &Light, reason: &'static str) -> Self {
         let kind = light.kind().name;
         Self::Light {
@@ -75,12 +76,13 @@ impl ExportError {
 /// Name of the XML file in the folder of an exported scene.
 pub const MITSUBA_FILE: &str = "scene.xml";
 
-/// The greatest distance between the front and the back of an emitter, in the largest coordinate of the scene. Mitsuba's
-/// area emitters shine from their front, so that one that shines from both is two, which must not coincide.
+/// The largest distance between the front and the back of an emitter, relative to the largest
+/// coordinate of the scene. Mitsuba's area emitters are one-sided, so a two-sided one becomes two,
+/// which must not coincide.
 const GAP: f32 = 2e-5;
 
-/// Writes `scene` as [`MITSUBA_FILE`] with its meshes and textures into `folder`, which is made if it is missing, and returns a
-/// line for everything that Mitsuba will draw in another way.
+/// Writes `scene` as [`MITSUBA_FILE`] with its meshes and textures into `folder`, creating it if
+/// missing. Returns a line for each thing that Mitsuba renders differently.
 ///
 /// # Errors
 /// [`ExportError`] with the file that could not be written.
@@ -92,7 +94,7 @@ pub fn export_mitsuba(
     export_mitsuba_of(&KindChecks::default(), scene, settings, folder)
 }
 
-/// The same of a scene of these kinds of materials and lights.
+/// The same for a scene with these kinds of materials and lights.
 ///
 /// # Errors
 /// As [`export_mitsuba`].
@@ -132,21 +134,20 @@ pub fn export_mitsuba_of(
     Ok(export.warnings)
 }
 
-/// An export under way.
+/// An export in progress.
 pub struct Export<'a> {
     folder: &'a Path,
     kinds: &'a KindChecks,
-    /// What is exported.
+    /// The exported scene.
     pub scene: &'a SceneData,
     warnings: Vec<String>,
-    /// Whether a material is one of those that Mitsuba has to be taught.
+    /// True if a material needs a Python definition.
     needs_materials: bool,
-    /// The text so far.
+    /// The XML text so far.
     pub xml: String,
 }
 
 impl Export<'_> {
-    /// Integrator, sensor, film.
     fn view(&mut self, scene: &SceneData, settings: &MitsubaSettings) {
         let Camera {
             eye,
@@ -191,7 +192,6 @@ impl Export<'_> {
         );
     }
 
-    /// Every light that shines.
     fn lights(&mut self) -> Result<(), ExportError> {
         let all = self.scene.lights.iter().enumerate();
         for (number, light) in all.filter(|(_, light)| light.problem().is_none()) {
@@ -203,7 +203,7 @@ impl Export<'_> {
         Ok(())
     }
 
-    /// A mesh for each material that has triangles, and one for the back of each emitter.
+    /// Writes a mesh for each material with triangles, and one for the back of each emitter.
     fn shapes(&mut self, scene: &SceneData, fronts_only: bool) -> Result<(), ExportError> {
         let Bounds { min, max } = scene.bounds();
         let gap = GAP * min.abs().max(max.abs()).max_element();
@@ -218,8 +218,8 @@ impl Export<'_> {
                 let side = ["", "-back"][usize::from(back.is_some())];
                 let name = format!("meshes/{id}{side}.ply");
                 self.write(&name, &bytes)?;
-                // Mitsuba takes the normals of vertices for those of the light, too, and then a faceted ball casts 0.3 % less
-                // around its shadows.
+                // Mitsuba emits by vertex normals too: a faceted ball casts 0.3 % less around its
+                // shadows.
                 let by_faces = emits || !smooth;
                 let _ = write!(
                     self.xml,
@@ -271,7 +271,7 @@ fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> ExportError + '_ {
     }
 }
 
-/// Three numbers that read back to the same bits.
+/// Three numbers that read back bit-identically.
 pub fn vector(v: Vec3) -> String {
     format!("{} {} {}", v.x, v.y, v.z)
 }

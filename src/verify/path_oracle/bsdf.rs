@@ -1,4 +1,4 @@
-//! What materials do, in the words of `docs/shading.md`. Each kind is a file in `src/verify/materials/`.
+//! Material evaluation as defined in `docs/shading.md`. The kinds are in `src/verify/materials/`.
 
 use super::luminance;
 use super::rounding::Rounding;
@@ -6,19 +6,19 @@ use super::surface::Surface;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// A direction in which a path goes on.
+/// A sampled direction in which a path continues.
 pub struct Bounce {
-    /// Of length 1.
+    /// Unit direction.
     pub direction: DVec3,
     /// f · cos / density.
     pub weight: DVec3,
     /// Density over solid angle; `None` for a delta lobe.
     pub density: Option<f64>,
-    /// The reciprocal of what refraction did to radiance.
+    /// The reciprocal of refraction's scale factor on radiance.
     pub medium: f64,
 }
 
-/// What a material does with light from one direction, delta lobes aside.
+/// The response of a material to light from one direction, without delta lobes.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflected {
     /// f · cos.
@@ -29,11 +29,11 @@ pub struct Reflected {
 
 /// A material at a point.
 pub trait Bsdf {
-    /// Where the path goes on; `None` ends it.
+    /// A sampled direction; `None` ends the path.
     fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce>;
-    /// Value and density of a direction by the shading normal.
+    /// Value and density of a direction relative to the shading normal.
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected>;
-    /// The surface, if what it would reflect behind itself is mirrored at it.
+    /// The surface, if reflection to its back side is mirrored at it.
     fn folded(&self) -> Option<&Surface<'_>> {
         None
     }
@@ -53,13 +53,13 @@ pub trait Bsdf {
         };
         parts.into_iter().flatten().reduce(sum)
     }
-    /// Whether all lobes are delta: light samples are not taken then.
+    /// True if all lobes are delta: no light samples are taken then.
     fn is_delta(&self) -> bool {
         false
     }
 }
 
-/// Unit vectors across `n`: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
+/// Orthonormal basis: T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
 pub(crate) fn basis(n: DVec3) -> [DVec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
@@ -70,13 +70,13 @@ pub(crate) fn basis(n: DVec3) -> [DVec3; 2] {
     ]
 }
 
-/// The direction of local coordinates around a unit vector `n`.
+/// Converts local coordinates around a unit vector `n` to a direction.
 pub fn around(n: DVec3, local: DVec3) -> DVec3 {
     let [x, y] = basis(n);
     (x * local.x + y * local.y + n * local.z).normalize()
 }
 
-/// A direction whose density is cos / π.
+/// A direction with density cos / π.
 pub fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     let (sin, cos) = (TAU * v).sin_cos();
     around(
@@ -101,52 +101,54 @@ pub fn parameter(surface: &Surface, place: usize) -> f64 {
     parameters.get(place).copied().unwrap_or_default().into()
 }
 
-/// The colour whose components are the first three parameters.
+/// The colour in the first three parameters.
 pub fn colour(surface: &Surface) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|place| parameter(surface, place)))
 }
 
-/// Whether the first of two lobes is chosen, of probability `p`, and the number that is left of `u`.
+/// Chooses the first of two lobes with probability `p`; also returns the rescaled `u`.
 pub fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
     let u = rounding.share(u).clamp(0.0, 1.0);
-    match u < p {
-        true => (true, u / p),
-        false => (false, (u - p) / (1.0 - p)),
+    if u < p {
+        (true, u / p)
+    } else {
+        (false, (u - p) / (1.0 - p))
     }
 }
 
 /// Probability of the diffuse lobe beside a specular one of this colour.
 pub fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
     let (base, specular) = (luminance(base), luminance(specular));
-    match base + specular > 0.0 {
-        true => base / (base + specular),
-        false => 1.0,
+    if base + specular > 0.0 {
+        base / (base + specular)
+    } else {
+        1.0
     }
 }
 
-/// The least n·o that is told apart from 0.
+/// The smallest n·o that is distinguished from 0.
 pub(crate) const LEAST_COSINE: f64 = 1e-7;
 
-/// Whether light that arrives from there is reflected at all by a surface that is not [`Bsdf::folded`].
+/// True if a surface that is not [`Bsdf::folded`] reflects light from this direction at all.
 pub fn is_above(surface: &Surface, direction: DVec3) -> bool {
     direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
 }
 
-/// The direction on the other side of the surface.
 fn across(surface: &Surface, direction: DVec3) -> DVec3 {
     direction - surface.geometric * (2.0 * direction.dot(surface.geometric))
 }
 
-/// A direction of a delta lobe, mirrored at the surface where that and the shading normal have it on different sides.
+/// A delta direction, mirrored at the surface where shading and geometric normal disagree.
 pub fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
     let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
-    match meant == found {
-        true => direction,
-        false => across(surface, direction),
+    if meant == found {
+        direction
+    } else {
+        across(surface, direction)
     }
 }
 
-/// The direction of a lobe with the weight of the whole material.
+/// A sampled direction of one lobe with the weight of the whole material.
 pub fn bounce(
     bsdf: &(impl Bsdf + ?Sized),
     direction: DVec3,

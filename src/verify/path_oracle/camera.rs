@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use raystone_core::geometry::Camera;
 
-/// A camera with the plane of its image.
+/// A camera with its image plane.
 pub(super) struct Lens {
     pub eye: DVec3,
     forward: DVec3,

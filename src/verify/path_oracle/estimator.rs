@@ -1,4 +1,4 @@
-//! What a sample is: primary visibility, ambient occlusion, path tracing.
+//! The estimators: primary visibility, ambient occlusion, path tracing.
 
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
 use super::hits::{Blocked, SHORT, Segment};
@@ -12,14 +12,14 @@ use raystone_sampling::dimensions::{
     DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
 };
 
-/// What a sample of an image is.
+/// The value estimated by a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Estimator {
     /// Base colour of the first hit times the cosine to the viewer, and its emission.
     Primary,
-    /// Whether a cosine-distributed ray of limited length is free.
+    /// Visibility along a cosine-distributed ray of limited length.
     Occlusion {
-        /// Its length, as a fraction of the diagonal of the scene's box.
+        /// Ray length as a fraction of the scene's diagonal.
         radius: f64,
     },
     /// The radiance of a path.
@@ -29,32 +29,27 @@ pub enum Estimator {
 /// The rules of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathRules {
-    /// Most bounces.
     max_depth: u32,
-    /// What light samples and found emission count.
+    /// The weighting of light samples and found emission.
     strategy: Strategy,
     roulette: Roulette,
-    /// First bounce with roulette.
+    /// First bounce with Russian roulette.
     roulette_depth: u32,
     pub(super) choice: Choice,
-    /// Greatest component of a contribution of bounce 1 and later; 0 is none.
+    /// Clamp for the largest component of a contribution from bounce 1 on; 0 disables it.
     clamp: f64,
-    /// Whether it begins with a ray through the centre of the pixel.
+    /// True if the path begins with a ray through the pixel centre.
     centred: bool,
 }
 
-/// How light is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Strategy {
-    /// Both ways, weighted by densities to this power.
+    /// Both, weighted by densities to this power.
     Both(i32),
-    /// By the directions of materials alone.
     Material,
-    /// By points of lights alone.
     Light,
 }
 
-/// With what probability paths survive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Roulette {
     None,
@@ -62,10 +57,9 @@ enum Roulette {
     Throughput,
 }
 
-/// The greatest probability of survival.
 const SURVIVAL: f64 = 0.95;
 
-/// Reads parameters and notes which were asked for.
+/// Reads parameters and notes which were read.
 struct Reader<'a> {
     name: &'a str,
     params: &'a Params,
@@ -109,7 +103,7 @@ impl Reader<'_> {
         self.choice("lights", &[("one", by), ("all", Choice::All)])
     }
 
-    /// Whether all parameters were asked for.
+    /// Fails if a parameter was not read.
     fn finish(&self) -> Result<(), String> {
         let unknown = |key: &&String| !self.known.contains(&key.as_str());
         match self.params.0.keys().find(unknown) {
@@ -123,7 +117,7 @@ impl Estimator {
     /// The estimator of an integrator.
     ///
     /// # Errors
-    /// What of the integrator the oracle does not know.
+    /// The part of the integrator that the oracle does not support.
     pub fn of(integrator: &ConfiguredIntegrator) -> Result<Self, String> {
         let name = integrator.kind.name();
         let mut read = Reader {
@@ -131,7 +125,7 @@ impl Estimator {
             params: &integrator.params,
             known: Vec::new(),
         };
-        // What a kernel carries besides changes no image.
+        // The other kernel parameters do not change the image.
         if name == "path" {
             read.get("carry");
         }
@@ -172,7 +166,7 @@ impl Estimator {
 }
 
 impl Strategy {
-    /// What a sample of density `own` counts that the other way finds with density `other`.
+    /// Weight of a sample with density `own` that the other strategy finds with density `other`.
     fn weight(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both(power) => 1.0 / (1.0 + (other / own).powi(power)),
@@ -182,7 +176,7 @@ impl Strategy {
 }
 
 impl Strategy {
-    /// What emission counts that a direction of this density has found; `other` is that of light samples.
+    /// Weight of emission found by a direction of this density; `other` is that of light sampling.
     fn found(self, density: Option<f64>, other: impl FnOnce() -> f64) -> f64 {
         match (density, self) {
             (None, _) => 1.0,
@@ -195,25 +189,24 @@ impl Strategy {
 impl PathRules {
     fn clamped(&self, depth: u32, light: DVec3) -> DVec3 {
         let greatest = light.max_element();
-        match self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
-            true => light * (self.clamp / greatest),
-            false => light,
+        if self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
+            light * (self.clamp / greatest)
+        } else {
+            light
         }
     }
 }
 
-/// Where a path is.
 struct State {
     ray: Segment,
     throughput: DVec3,
     radiance: DVec3,
-    /// Density of the last direction, if light samples could have found it.
+    /// Density of the last direction, if light sampling could have found it.
     density: Option<f64>,
     medium: f64,
 }
 
 impl PathOracle<'_> {
-    /// The radiance of a sample.
     pub(super) fn estimate(&self, walk: &mut Walk) -> DVec3 {
         let lens = walk.lens();
         let point = match walk.view.estimator {
@@ -230,7 +223,7 @@ impl PathOracle<'_> {
         }
     }
 
-    /// The first thing on a ray, noted.
+    /// The first hit on a ray, recorded.
     fn meet(&self, walk: &mut Walk, ray: &Segment) -> Option<(Surface<'_>, f64)> {
         let moved = walk.rounding.point(ray.origin, ray.origin.abs()) - ray.origin;
         let seen = Segment {
@@ -239,9 +232,10 @@ impl PathOracle<'_> {
             shift: walk.rounding.texel(),
             ..*ray
         };
-        let class = match walk.vertices.is_empty() {
-            true => CountedRays::Primary,
-            false => CountedRays::Bounce,
+        let class = if walk.vertices.is_empty() {
+            CountedRays::Primary
+        } else {
+            CountedRays::Bounce
         };
         walk.note_ray(class, 0, &seen);
         let met = self.hits.nearest(&seen, &mut walk.rounding);
@@ -335,7 +329,7 @@ impl PathOracle<'_> {
         walk.rounding.colour(state.radiance)
     }
 
-    /// Light from one point of a light, or of all lights, reflected and weighted.
+    /// Reflected and weighted light from a sample of one light, or of all lights.
     fn direct(
         &self,
         walk: &mut Walk,
@@ -359,7 +353,7 @@ impl PathOracle<'_> {
         sum
     }
 
-    /// What a ray brings that leaves the scene, weighted.
+    /// Weighted radiance of a ray that leaves the scene.
     fn escaped_found(&self, walk: &mut Walk, state: &State, rules: &PathRules) -> DVec3 {
         let light = self.escaped(state.ray.direction);
         let rounding = &mut walk.rounding;
@@ -372,7 +366,7 @@ impl PathOracle<'_> {
         }
     }
 
-    /// Light from a point of a light that was chosen.
+    /// Light from a sample of a chosen light.
     fn of_light(
         &self,
         walk: &mut Walk,
@@ -391,7 +385,7 @@ impl PathOracle<'_> {
         let Some(Reflected { value, density }) = reflected else {
             return DVec3::ZERO;
         };
-        // To the point of the light, from wherever it starts.
+        // Towards the light's point, wherever the ray starts.
         let left = surface.leave(light.direction, &mut walk.rounding);
         let towards = left.start + light.direction * light.distance - left.origin;
         let distance = towards.length();
@@ -413,7 +407,7 @@ impl PathOracle<'_> {
         value * light.radiance * (weight / chosen.share)
     }
 
-    /// Takes a path to its next ray; false if it ends.
+    /// Continues a path to its next ray; false if it ends.
     fn go_on(
         &self,
         walk: &mut Walk,
@@ -458,7 +452,7 @@ impl PathOracle<'_> {
             }
             state.throughput /= survival;
         }
-        // Light samples find no direction of a delta lobe, and none at all where nothing can be sampled.
+        // Light sampling finds no delta direction, and nothing at all if no light can be sampled.
         state.density = density;
         state.ray = surface.leave(direction, &mut walk.rounding);
         true

@@ -7,25 +7,24 @@ use raystone_accel::oracle::{Groups, Line};
 use raystone_core::geometry::Triangle;
 use raystone_scene::SceneData;
 
-/// Where a shadow ray ends, as a part of the distance to its light that is left out.
+/// Fraction of the distance to its light by which a shadow ray ends early.
 pub(crate) const SHORT: f64 = 1e-7;
 
-/// Hits nearer than this, in the greatest coordinate of the scene, are the surface that the ray leaves.
+/// Nearer hits, relative to the scene's largest coordinate, are the surface that the ray leaves.
 const START: f64 = 1e-9;
 
-/// By so much a barycentric may be negative, so that no ray slips through between two triangles.
+/// Tolerance for negative barycentrics, so that no ray slips through between two triangles.
 const EDGE: f64 = 1e-12;
 
-/// Distances that differ by less, relative, are equal: the lowest triangle counts.
+/// Distances with a smaller relative difference are equal: the lowest triangle index wins.
 const EQUAL: f64 = 1e-12;
 
-/// Surfaces whose distances differ by less than this many roundings of f32 are layers: a kernel may meet either first.
+/// Surfaces within this many f32 roundings are layers: a kernel may meet either first.
 const LAYERED: f64 = 16.0;
 
-/// Beyond this f32 distances are open-ended.
+/// Beyond this, f32 distances count as infinite.
 const FAR: f64 = 1e30;
 
-/// The triangles of a scene.
 pub(crate) struct Hits<'a> {
     triangles: &'a [Triangle],
     holes: Option<SceneHoles<'a>>,
@@ -33,7 +32,7 @@ pub(crate) struct Hits<'a> {
     start: f64,
 }
 
-/// Where a ray meets a triangle: distance, and the weights of the second and third corner.
+/// Intersection with a triangle: distance, and the weights of the second and third corners.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
     pub triangle: u32,
@@ -42,47 +41,46 @@ pub(crate) struct Hit {
 }
 
 impl Hit {
-    /// The least of the weights of the corners: how far the hit is from an edge.
+    /// The smallest corner weight: the distance of the hit from an edge.
     fn margin(&self) -> f64 {
         let [u, v] = self.weights;
         u.min(v).min(1.0 - u - v)
     }
 }
 
-/// What lies on a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Blocked {
     No,
-    /// A layer of the surface that it leaves, which a kernel may have passed.
+    /// Only by a layer of the surface it leaves, which a kernel may have passed.
     ByLayer,
     Yes,
 }
 
-/// The nearest hit, as rounding has it.
+/// The nearest hit after simulated rounding.
 pub(crate) struct Nearest {
     pub hit: Hit,
-    /// Whether rounding alone made it the nearest.
+    /// True if only rounding made it the nearest.
     pub is_swapped: bool,
-    /// Whether another surface is as near but for [`LAYERED`] roundings.
+    /// True if another surface is within [`LAYERED`] roundings.
     pub is_layered: bool,
 }
 
-/// A ray with a unit direction; what it does not see again.
+/// A ray with a unit direction, and the triangles it ignores.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment {
-    /// The point of the surface or lens that it leaves: where light is measured.
+    /// The point of the surface or lens that it leaves; light is measured there.
     pub start: DVec3,
-    /// Of the triangle there, on the viewer's side.
+    /// Normal of the triangle there, on the viewer's side.
     pub normal: DVec3,
-    /// Where it is traced from: `start`, unless an offset is played.
+    /// The origin for tracing: `start`, unless an offset is simulated.
     pub origin: DVec3,
     pub direction: DVec3,
     /// The triangle that it leaves.
     pub from: Option<u32>,
-    /// The triangles that it goes to.
+    /// The target triangles.
     pub to: Option<[u32; 2]>,
     pub length: f64,
-    /// How far masks are off their places on it, texels: see [`Rounding::texel`](super::Rounding::texel).
+    /// Displacement of masks along it, texels: see [`Rounding::texel`](super::Rounding::texel).
     pub shift: DVec2,
 }
 
@@ -100,7 +98,7 @@ impl Segment {
         }
     }
 
-    /// Point and normal where it begins.
+    /// Its start point and normal.
     pub(crate) fn place(&self) -> (DVec3, DVec3) {
         (self.start, self.normal)
     }
@@ -120,27 +118,28 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// The nearest hit of a segment.
     pub(crate) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
         let mut found: Vec<(Hit, Blur)> = Vec::new();
         let mut end = f64::INFINITY;
         self.visit(segment, |hit| {
             let blur = self.blur(&hit, segment);
-            // What is behind a triangle counts where a kernel may miss it.
+            // Hits behind a triangle count where a kernel may miss it.
             if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
                 end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
             }
             found.push((hit, blur));
-            // The end as f32, rounded away by more than rounding.
+            // The end as f32, rounded away by more than an ulp.
             (end * (1.0 + 1e-6)) as f32
         });
-        // In an order that groups do not decide.
+        // An order independent of the groups.
         found.sort_by_key(|(hit, _)| hit.triangle);
         found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
-        let before = |a: &Hit, b: &Hit| match (a.distance - b.distance).abs() <= EQUAL * b.distance
-        {
-            true => a.triangle < b.triangle,
-            false => a.distance < b.distance,
+        let before = |a: &Hit, b: &Hit| {
+            if (a.distance - b.distance).abs() <= EQUAL * b.distance {
+                a.triangle < b.triangle
+            } else {
+                a.distance < b.distance
+            }
         };
         let first = found
             .iter()
@@ -158,9 +157,10 @@ impl<'a> Hits<'a> {
                 rounding.distance(hit.distance, blur.of_rounding, blur.most),
             )
         });
-        let met = match is_played {
-            true => played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0,
-            false => first.0,
+        let met = if is_played {
+            played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0
+        } else {
+            first.0
         };
         Some(Nearest {
             hit: met,
@@ -169,7 +169,7 @@ impl<'a> Hits<'a> {
         })
     }
 
-    /// How far the distance of a hit may be off.
+    /// Error bound of the distance of a hit.
     fn blur(&self, hit: &Hit, segment: &Segment) -> Blur {
         let [a, b, c] = self.triangles[hit.triangle as usize]
             .vertices
@@ -187,7 +187,7 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// A hit as it is from the point that the ray leaves; as it is found, where the line from there passes the triangle.
+    /// The hit seen from the point that the ray leaves, unless the line from there misses.
     pub(crate) fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
         let from_there = Segment {
             origin: segment.start,
@@ -197,7 +197,7 @@ impl<'a> Hits<'a> {
         meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
     }
 
-    /// Whether anything lies on a segment, and whether that is a layer of the surface that it leaves and nothing else.
+    /// The occlusion of a segment, which may be only by a layer of the surface that it leaves.
     pub(crate) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
         let (mut by_layer, mut by_other) = (false, false);
         self.visit(segment, |hit| {
@@ -218,18 +218,18 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// Whether a hit is on a layer of the surface that a segment leaves.
+    /// True if a hit is on a layer of the surface that a segment leaves.
     fn is_at_start(&self, hit: &Hit, segment: &Segment) -> bool {
         segment.from.is_some() && hit.distance <= self.blur(hit, segment).within(LAYERED)
     }
 
-    /// Whether there is no surface at a point of a triangle.
+    /// True if there is no surface at a point of a triangle.
     pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
         let holes = self.holes.as_ref();
         holes.is_some_and(|holes| holes.is_cut_out(triangle, weights, shift))
     }
 
-    /// Calls `found` with every hit; it returns the end of what is still of interest.
+    /// Calls `found` with every hit; it returns the new end of the search interval.
     fn visit(&self, segment: &Segment, mut found: impl FnMut(Hit) -> f32) {
         let inverse = |d: f64| {
             let d = d as f32;
@@ -256,14 +256,14 @@ impl<'a> Hits<'a> {
     }
 }
 
-/// The error of a distance, scene units.
+/// Error bound of a distance, scene units.
 #[derive(Debug, Clone, Copy)]
 struct Blur {
-    /// Over the relative error of the coordinates that it is made of.
+    /// Error of the distance over the relative error of the input coordinates.
     of_rounding: f64,
-    /// A hit stays on its triangle.
+    /// Maximum: a hit stays on its triangle.
     most: f64,
-    /// Of the weights of its corners, over the same relative error.
+    /// Error of the corner weights, over the same relative error.
     of_weights: f64,
 }
 
@@ -273,7 +273,7 @@ impl Blur {
     }
 }
 
-/// The point at which the line of a segment meets a triangle, by Cramer's rule.
+/// The intersection of a segment's line with a triangle, by Cramer's rule.
 fn meet(triangle: &Triangle, id: u32, segment: &Segment) -> Option<Hit> {
     let [a, b, c] = triangle.vertices.map(|v| v.as_dvec3());
     let (e1, e2) = (b - a, c - a);

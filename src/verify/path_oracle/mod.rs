@@ -1,14 +1,14 @@
-//! The oracle for images: what one sample of one pixel must be, in f64.
+//! The image oracle: the value of one sample of one pixel, in f64.
 //!
-//! A plain path tracer on the host, written from the section "Formulas" of `docs/shading.md` and from the papers
-//! that it names, not from the kernels. It reads the scene as it was loaded, draws the same words as the kernels
-//! through the samplers' twins, and finds its hits by testing all triangles near a ray: neither tables that were made for
-//! the device nor a structure can mislead it.
+//! A plain path tracer on the host, written from the section "Formulas" of `docs/shading.md` and
+//! its references, not from the kernels. It reads the scene as loaded, draws the same words as the
+//! kernels through the samplers' CPU versions, and finds hits by testing all triangles near a ray:
+//! neither device tables nor an acceleration structure can mislead it.
 //!
-//! A ray starts exactly on the surface that it leaves and passes over the triangle there; a shadow ray ends
-//! `SHORT` before its light. Offsets, with which kernels have to keep off a surface, are thus no part of the answer.
+//! A ray starts exactly on the surface that it leaves and skips the triangle there; a shadow ray
+//! ends `SHORT` before its light. The offsets that kernels need are thus no part of the answer.
 //!
-//! What single precision may do to a path is found by playing it: see [`Rounding`].
+//! The effect of single precision on a path is simulated: see [`Rounding`].
 
 pub(crate) mod bsdf;
 mod camera;
@@ -61,18 +61,18 @@ impl fmt::Display for PathId {
     }
 }
 
-/// A vertex of a path, for people.
+/// A vertex of a path, for reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vertex {
-    /// Where.
+    /// The position.
     pub position: DVec3,
-    /// Which triangle.
+    /// The triangle index.
     pub triangle: u32,
     /// Name of the material.
     pub material: String,
-    /// Weight with which radiance that arrives from the next vertex counts, before roulette.
+    /// Weight of radiance arriving from the next vertex, before roulette.
     pub throughput: DVec3,
-    /// Radiance that the light sample of this vertex brought, weighted.
+    /// Weighted radiance of this vertex's light sample.
     pub direct: DVec3,
 }
 
@@ -93,69 +93,67 @@ impl fmt::Display for Vertex {
     }
 }
 
-/// A ray of a path, in the order in which they are traced.
+/// A ray of a path, in tracing order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathRay {
-    /// What it is for.
+    /// The purpose of the ray.
     pub class: CountedRays,
-    /// Bounces before it; of a shadow ray those before the point that it leaves.
+    /// Bounces before it; for a shadow ray, before the point that it leaves.
     pub depth: u32,
-    /// Which of all lights it goes to, where each is sampled; else 0.
+    /// Index of its light when all lights are sampled, otherwise 0.
     pub light: u32,
-    /// Where it begins: on a surface, or in the camera.
+    /// The origin: on a surface, or in the camera.
     pub origin: DVec3,
-    /// Unit normal there; 0 in the camera.
+    /// Unit normal at the origin; 0 in the camera.
     pub normal: DVec3,
     /// Unit direction.
     pub direction: DVec3,
-    /// Its length, scene units.
+    /// Length, scene units.
     pub length: f64,
 }
 
-/// A path and what it found.
+/// A path and its result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     /// Radiance, linear RGB.
     pub radiance: DVec3,
-    /// Its vertices from the camera on.
+    /// Vertices, from the camera on.
     pub vertices: Vec<Vertex>,
-    /// All that is traced for it.
+    /// All rays traced for it.
     pub rays: Vec<PathRay>,
-    /// All decisions: triangles, lobes, lights, what was occluded, where it ended. Paths of one branch differ by rounding
-    /// only.
+    /// All decisions: triangles, lobes, lights, occlusion, end. Otherwise paths differ by rounding.
     pub branch: Vec<Decision>,
-    /// Of its surfaces those that have another one within rounding.
+    /// Number of its surfaces that have another within rounding.
     pub layers: usize,
 }
 
-/// A decision of a path, and what it depends on.
+/// A decision of a path, with its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Decision {
-    /// Which triangle was met.
+    /// The triangle that was hit.
     Met(u64),
-    /// The same, where rounding alone put it before another.
+    /// The same, if only rounding put it before another.
     MetBefore(u64),
-    /// Whether something is in the way.
+    /// True if the ray is occluded.
     Blocked(bool),
-    /// A layer of the surface that the ray leaves is in the way, within rounding.
+    /// Occluded, within rounding, by a layer of the surface that the ray leaves.
     BlockedByLayer,
-    /// A number against a probability, a side, a place in a table.
+    /// A number against a probability, a side, an index into a table.
     Other(u64),
 }
 
-/// Why two paths take other branches.
+/// Why two paths branch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Parting {
-    /// They met surfaces that lie within rounding of each other.
+    /// They hit surfaces within rounding of each other.
     Surfaces,
     /// One passed an edge.
     Edge,
-    /// Anything else.
     Decision,
 }
 
 impl Decision {
-    /// What was decided, whatever made it so.
+    /// The outcome of the decision, regardless of its cause.
     fn outcome(self) -> (u8, u64) {
         match self {
             Self::Met(triangle) | Self::MetBefore(triangle) => (0, triangle),
@@ -167,7 +165,7 @@ impl Decision {
 }
 
 impl Path {
-    /// Where this path and another one part first, if they do.
+    /// The first decision in which the paths differ, if any.
     pub(crate) fn parting(&self, other: &Self) -> Option<Parting> {
         let longest = self.branch.len().max(other.branch.len());
         let at = |path: &Self, i: usize| path.branch.get(i).copied();
@@ -186,40 +184,38 @@ impl Path {
     }
 }
 
-/// A scene as the oracle sees it.
+/// The oracle of a scene.
 pub struct PathOracle<'a> {
     scene: &'a SceneData,
     hits: Hits<'a>,
     lights: Lights,
     textures: Textures<'a>,
-    /// What is known of the kind of each material.
     materials: Vec<&'static MaterialChecks>,
-    /// Of the box of all triangles.
     diagonal: f64,
 }
 
-/// What is estimated, of which image.
+/// The estimated image.
 pub struct View<'a> {
-    /// What a sample is.
+    /// The estimator.
     pub estimator: Estimator,
-    /// Where the image is taken from.
+    /// The camera.
     pub camera: Camera,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// What draws the numbers.
+    /// The source of random numbers.
     pub sampler: &'a Sampler,
 }
 
 impl<'a> PathOracle<'a> {
-    /// The oracle of a scene of the program's kinds.
+    /// The oracle of a scene with the built-in kinds.
     ///
     /// # Errors
-    /// What the scene has that the oracle does not know: nothing can be judged then.
+    /// The scene has a feature that the oracle does not support, so nothing can be checked.
     pub fn new(scene: &'a SceneData) -> Result<Self, String> {
         Self::knowing(scene, &KindChecks::default())
     }
 
-    /// The oracle of a scene of these kinds of materials and lights.
+    /// The oracle of a scene with these kinds of materials and lights.
     ///
     /// # Errors
     /// As [`PathOracle::new`].
@@ -242,16 +238,17 @@ impl<'a> PathOracle<'a> {
         })
     }
 
-    /// 2 where colours of surfaces come from textures, 1 where light comes from a map, else 0.
+    /// 2 if surface colours come from textures, 1 if light comes from a map, otherwise 0.
     pub(crate) fn texturing(&self) -> usize {
         let mut materials = self.scene.materials.iter();
-        match materials.any(|m| m.texture_uses().iter().any(Option::is_some)) {
-            true => 2,
-            false => usize::from(self.lights.have_map()),
+        if materials.any(|m| m.texture_uses().iter().any(Option::is_some)) {
+            2
+        } else {
+            usize::from(self.lights.have_map())
         }
     }
 
-    /// The path of one sample, computed in f64 throughout, or with the roundings of f32 played.
+    /// The path of one sample, computed in f64, or with simulated f32 roundings.
     pub fn trace(&self, view: &View, id: PathId, rounding: Rounding) -> Path {
         let mut walk = Walk {
             id,
@@ -273,8 +270,8 @@ impl<'a> PathOracle<'a> {
     }
 }
 
-/// f · cos of a material on the plane z = 0 for light that arrives from `from` and leaves towards `out`, both above it; delta lobes
-/// are no part of it.
+/// f · cos of a material on the plane z = 0 for light arriving from `from` and leaving towards
+/// `out`, both above the plane; delta lobes are excluded.
 pub(crate) fn scattered(
     checks: &'static MaterialChecks,
     material: &Material,
@@ -291,7 +288,7 @@ fn diagonal(scene: &SceneData) -> f64 {
     (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length()
 }
 
-/// What a path carries along.
+/// The state of a path while it is traced.
 struct Walk<'a> {
     id: PathId,
     view: &'a View<'a>,
@@ -303,7 +300,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Notes a ray that is traced after as many bounces as there are vertices but one.
+    /// Records a ray. Its depth is that of the last vertex, or of the next one for closest-hit rays.
     fn note_ray(&mut self, class: CountedRays, light: usize, ray: &Segment) {
         let closest = [CountedRays::Primary, CountedRays::Bounce].contains(&class);
         let vertices = self.vertices.len() as u32;
@@ -335,17 +332,15 @@ impl Walk<'_> {
         })))
     }
 
-    /// The numbers of a dimension and the next.
+    /// The numbers of this dimension and the next.
     fn draw_2d(&self, dimension: u32) -> [f64; 2] {
         [self.draw(dimension), self.draw(dimension + 1)]
     }
 
-    /// Notes a decision.
     fn decide(&mut self, what: u64) {
         self.branch.push(Decision::Other(what));
     }
 
-    /// Notes whether something is in the way.
     fn decide_blocked(&mut self, blocked: Blocked) {
         self.branch.push(match blocked {
             Blocked::ByLayer => Decision::BlockedByLayer,
@@ -354,7 +349,6 @@ impl Walk<'_> {
         self.layers += usize::from(blocked == Blocked::ByLayer);
     }
 
-    /// Notes what a ray has met.
     fn decide_met(&mut self, met: Option<&Nearest>) {
         let triangle = met.map_or(u64::MAX, |met| met.hit.triangle.into());
         self.branch.push(match met {
@@ -369,7 +363,7 @@ impl Walk<'_> {
     }
 }
 
-/// Brightness of a colour, as docs/shading.md defines it.
+/// Luminance of a colour, as defined in docs/shading.md.
 pub(crate) fn luminance(c: DVec3) -> f64 {
     0.212_671 * c.x + 0.715_160 * c.y + 0.072_169 * c.z
 }

@@ -1,10 +1,11 @@
-//! What single precision may do to a path, played.
+//! Simulated single-precision error of a path.
 //!
-//! A bound on the error of a path that is derived by hand would have to follow every decision (an edge, an occluder, a random
-//! number against a probability) and every ill-conditioned quotient. Instead the path is repeated in f64, with every
-//! quantity that a kernel rounds moved at random by as much as some roundings of f32: Monte Carlo arithmetic (D. Parker,
-//! "Monte Carlo arithmetic", 1997). What comes out is what a kernel may answer. A path that changes its decisions
-//! under so little is near a boundary, and its margin is the number of roundings that it took.
+//! A hand-derived error bound would have to follow every decision (an edge, an occluder, a random
+//! number against a probability) and every ill-conditioned quotient. Instead the path is repeated
+//! in f64, and every quantity that a kernel rounds is perturbed at random by some f32 roundings:
+//! Monte Carlo arithmetic (D. Parker, "Monte Carlo arithmetic", 1997). Any result is a valid kernel
+//! answer. A path that changes its decisions under such small changes is near a boundary; its
+//! margin is the number of roundings needed.
 
 use crate::holes::PLACED;
 use glam::{DVec2, DVec3};
@@ -13,32 +14,32 @@ use raystone_core::random::Pcg32;
 /// Half an ulp of 1 in f32.
 pub(super) const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 
-/// The margin below which a decision may come out otherwise, in roundings of f32: as far as they are ever played.
+/// Margin below which a decision may change, in f32 roundings: the largest simulated scale.
 pub(crate) const MOST_ROUNDINGS: f64 = 64.0;
 
-/// Roundings of a direction of unit length that was made of sines, cosines and roots, per component. Libraries of
-/// devices may be off by this much in these functions.
+/// Roundings per component of a unit direction made of sines, cosines and roots. Device libraries
+/// may be off by this much in these functions.
 const DIRECTION: f64 = 4.0;
 
-/// Stream of the numbers that move points in masks.
+/// Stream of the numbers that perturb points in masks.
 const MASKS: u64 = 2;
 
-/// Stream of the numbers that move hits.
+/// Stream of the numbers that perturb hits.
 const HITS: u64 = 3;
 
-/// Moves quantities by roundings of f32, or leaves them as they are.
+/// Perturbs quantities by f32 roundings, or leaves them unchanged.
 pub struct Rounding {
     random: Option<Pcg32>,
-    /// What moves points in masks: other numbers stay the same without masks.
+    /// Perturbs points in masks; separate, so that other numbers do not depend on masks.
     texels: Option<Pcg32>,
-    /// What moves hits: distances, and edges.
+    /// Perturbs hits: distances, and edges.
     hits: Option<Pcg32>,
-    /// By how many roundings.
+    /// Number of roundings.
     scale: f64,
 }
 
 impl Rounding {
-    /// No rounding.
+    /// No perturbation.
     pub fn none() -> Self {
         Self {
             random: None,
@@ -48,7 +49,7 @@ impl Rounding {
         }
     }
 
-    /// Every quantity is moved by up to `roundings` roundings; `trial` chooses by how much.
+    /// Perturbs every quantity by up to `roundings` roundings; `trial` selects the random numbers.
     pub(crate) fn played(roundings: f64, trial: u64) -> Self {
         Self {
             random: Some(Pcg32::new(trial)),
@@ -58,7 +59,6 @@ impl Rounding {
         }
     }
 
-    /// Whether anything is moved.
     pub(crate) fn is_played(&self) -> bool {
         self.random.is_some()
     }
@@ -67,35 +67,35 @@ impl Rounding {
         (self.random.as_mut()).map_or(0.0, |random| self.scale * random.signed())
     }
 
-    /// A number, by a fraction of itself.
+    /// Perturbs a number, relative to itself.
     pub fn number(&mut self, x: f64) -> f64 {
         x * (1.0 + self.signed())
     }
 
-    /// A number in [0, 1], by a fraction of 1.
+    /// Perturbs a number in [0, 1], relative to 1.
     pub fn share(&mut self, x: f64) -> f64 {
         x + self.signed()
     }
 
-    /// The error of the weight of a corner with one rounding of 1: that of 1, or of `terms` over `area` if that is more, of the
-    /// greatest product that it is a sum of and what that is divided by.
+    /// Error of a corner weight for one rounding of 1: the larger of 1 and `terms` over `area`,
+    /// that is the largest product in the sum over the divisor.
     pub(crate) fn of_weights(terms: f64, area: f64) -> f64 {
         (terms / area).clamp(1.0, 1.0 / EPSILON)
     }
 
-    /// The weight of a corner with such an error.
+    /// Perturbs a corner weight with this error.
     pub fn weight(&mut self, w: f64, error: f64) -> f64 {
         w + self.signed() * error
     }
 
-    /// Whether a triangle holds a hit whose least weight is this one: of each triangle by itself, so that a ray may slip through
-    /// between two of them, as triangle tests that are not watertight let it.
+    /// True if a triangle contains a hit with this smallest weight. Each triangle is perturbed
+    /// independently, so a ray may slip through between two, as with tests that are not watertight.
     pub(crate) fn holds(&mut self, margin: f64, error: f64) -> bool {
         let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
         margin.max(0.0) + signed * self.scale * error >= 0.0
     }
 
-    /// A colour, each component by itself.
+    /// Perturbs each component of a colour independently.
     pub fn colour(&mut self, c: DVec3) -> DVec3 {
         c * (1.0 + self.vector())
     }
@@ -104,7 +104,7 @@ impl Rounding {
         DVec3::new(self.signed(), self.signed(), self.signed())
     }
 
-    /// A unit vector.
+    /// Perturbs a unit vector.
     pub fn direction(&mut self, d: DVec3) -> DVec3 {
         match self.random {
             None => d,
@@ -112,26 +112,26 @@ impl Rounding {
         }
     }
 
-    /// A point whose coordinates are sums of terms as large as `terms`.
+    /// Perturbs a point whose coordinates are sums of terms as large as `terms`.
     pub fn point(&mut self, p: DVec3, terms: DVec3) -> DVec3 {
         p + terms * self.vector()
     }
 
-    /// How far a point may be off its place in a mask, texels, whatever the number of roundings: coordinates there are
-    /// multiples of 1/256 texel.
+    /// Displacement of a point in a mask, texels, independent of the number of roundings:
+    /// coordinates there are multiples of 1/256 texel.
     pub(crate) fn texel(&mut self) -> DVec2 {
         let mut signed = || (self.texels.as_mut()).map_or(0.0, Pcg32::signed);
         PLACED * DVec2::new(signed(), signed())
     }
 
-    /// The distance of a hit that errs by `error` with one rounding, and by `most` at most: of each triangle by itself, so that of
-    /// two surfaces that lie closer together either may be nearer.
+    /// Perturbs the distance of a hit by `error` per rounding, and by at most `most`. Each triangle
+    /// is perturbed independently, so either of two close surfaces may be nearer.
     pub fn distance(&mut self, distance: f64, error: f64, most: f64) -> f64 {
         let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
         distance + signed * (self.scale * error).min(most)
     }
 
-    /// How far a ray may start off its surface, where rays start at most `offset` off by one rounding.
+    /// Offset of a ray from its surface; at most `offset` per rounding.
     pub fn offset(&mut self, offset: f64) -> f64 {
         self.signed().abs() * offset
     }

@@ -1,4 +1,4 @@
-//! From a hit to what materials need.
+//! Surface properties at a hit.
 
 use super::PathOracle;
 use super::bsdf::Bsdf;
@@ -8,39 +8,38 @@ use crate::materials::MaterialChecks;
 use glam::DVec3;
 use raystone_scene::{Material, decode_color, decode_normal};
 
-/// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
-/// two times as many of the triangle's extent, and the ray starts by that off the surface: see
-/// [`raystone_render::offset::position_error`].
+/// Roundings of a point between the numbers in the file and a ray that leaves it. A kernel's bound
+/// is eight roundings of the point and twice as many of the triangle's extent, by which the ray
+/// starts off the surface: see [`raystone_render::offset::position_error`].
 const OFFSET: f64 = 8.0;
 
-/// Square of the length below which normals of corners cancel each other.
+/// Squared length below which corner normals cancel each other.
 const LEAST_SQUARE: f64 = 1e-12;
 
-/// A point that was hit.
+/// A hit point.
 pub struct Surface<'a> {
-    /// Its number.
+    /// The triangle index.
     pub triangle: u32,
-    /// Where.
+    /// The position.
     pub position: DVec3,
-    /// To where the path came from.
+    /// Direction back along the path.
     pub out: DVec3,
     /// Unit geometric normal on the side of `out`.
     pub geometric: DVec3,
     /// Unit shading normal on that side.
     pub normal: DVec3,
-    /// 1 where that is the front of the triangle, -1 where not.
+    /// 1 if that is the front of the triangle, otherwise -1.
     pub side: f64,
-    /// What it is made of.
+    /// The material.
     pub material: &'a Material,
-    /// Base colour, with the texture and the colours of vertices.
+    /// Base colour, with texture and vertex colours.
     pub base: DVec3,
-    /// What metalness and roughness are multiplied by.
+    /// Factors of metalness and roughness.
     pub varied: [f64; 2],
-    /// Radiance that it emits towards `out`.
+    /// Radiance emitted towards `out`.
     pub emission: DVec3,
-    /// What is known of the kind of its material.
     pub(super) checks: &'static MaterialChecks,
-    /// How far rays start off the surface by one rounding.
+    /// Ray offset from the surface for one rounding.
     offset: f64,
 }
 
@@ -69,7 +68,6 @@ impl<'a> Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// What its material does.
     pub(super) fn bsdf(&self) -> Box<dyn Bsdf + '_> {
         (self.checks.twin)(self)
     }
@@ -105,7 +103,7 @@ impl PathOracle<'_> {
         let exact = a + e1 * hit.weights[0] + e2 * hit.weights[1];
         let position = rounding.point(exact, terms);
         let area = e1.cross(e2);
-        // The rounding of a thin triangle's normal is that of its edges against its height.
+        // The error of a thin triangle's normal scales with edge lengths over height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
         let front = sign(!self.scene.is_mirrored(hit.triangle as usize));
@@ -114,7 +112,8 @@ impl PathOracle<'_> {
         let side = sign(outward.dot(out) > 0.0);
         let id = self.scene.material_ids[hit.triangle as usize];
         let material = &self.scene.materials[id as usize];
-        // The weights of a triangle that is thin, or small where coordinates are large, err by that of the point against its height.
+        // For a triangle that is thin, or small at large coordinates, weights err by the error of
+        // the point over the height.
         let farthest = (terms + segment.origin.abs()).max_element();
         let [u, v] = hit.weights;
         let weights = [(u, e2), (v, e1)].map(|(w, across)| {
@@ -148,16 +147,17 @@ impl PathOracle<'_> {
             material,
             base,
             varied: [varied.z, varied.y],
-            emission: match material.emits_both_sides || side > 0.0 {
-                true => emission,
-                false => DVec3::ZERO,
+            emission: if material.emits_both_sides || side > 0.0 {
+                emission
+            } else {
+                DVec3::ZERO
             },
             checks: self.materials[id as usize],
             offset: OFFSET * reach,
         }
     }
 
-    /// Between the colours of the corners; white where they have none.
+    /// Interpolated vertex colour; white if there are none.
     fn vertex_color(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec3 {
         let Some(words) = self.scene.colors.get(triangle as usize) else {
             return DVec3::ONE;
@@ -166,16 +166,17 @@ impl PathOracle<'_> {
         a * (1.0 - u - v) + b * u + c * v
     }
 
-    /// Between the normals of the corners; that of the triangle, `outward`, where they have none.
+    /// Interpolated vertex normal; the triangle's, `outward`, if there are none.
     fn vertex_normal(&self, triangle: u32, [u, v]: [f64; 2], outward: DVec3) -> DVec3 {
         let Some(words) = self.scene.normals.get(triangle as usize) else {
             return outward;
         };
         let [a, b, c] = words.map(|word| decode_normal(word).unwrap_or(outward));
         let sum = a * (1.0 - u - v) + b * u + c * v;
-        match sum.length_squared() > LEAST_SQUARE {
-            true => sum.normalize(),
-            false => outward,
+        if sum.length_squared() > LEAST_SQUARE {
+            sum.normalize()
+        } else {
+            outward
         }
     }
 }

@@ -1,22 +1,21 @@
-//! Textures: bilinear between texel centres, decoded before they are interpolated.
+//! Textures: bilinear between texel centres, decoded before interpolation.
 
 use crate::holes::wrapped;
 use glam::{DMat2, DVec2, DVec3};
 use raystone_scene::{SceneData, TextureUse};
 
-/// The textures of a scene.
 pub(crate) struct Textures<'a> {
     scene: &'a SceneData,
-    /// Whether triangles have texture coordinates.
     mapped: bool,
 }
 
-/// The linear value of a component of sRGB (IEC 61966-2-1).
+/// The linear value of an sRGB component (IEC 61966-2-1).
 fn linear(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 
@@ -28,12 +27,11 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// Whether triangles have texture coordinates; without them materials show their constants.
+    /// True if triangles have texture coordinates; otherwise materials use their constants.
     pub(crate) fn are_mapped(&self) -> bool {
         self.mapped
     }
 
-    /// Texture coordinates of a point of a triangle.
     pub(crate) fn coordinates(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec2 {
         if !self.mapped {
             return DVec2::ZERO;
@@ -42,13 +40,13 @@ impl<'a> Textures<'a> {
         a * (1.0 - u - v) + b * u + c * v
     }
 
-    /// A linear colour there; white where there is no texture.
+    /// A linear colour there; white without a texture.
     pub(crate) fn colour(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
         let used = used.filter(|_| self.mapped);
         used.map_or(DVec3::ONE, |used| self.bilinear(&used, at, linear))
     }
 
-    /// Numbers as they are; 1 where there is no texture.
+    /// Undecoded numbers; 1 without a texture.
     pub(crate) fn numbers(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
         let part = |byte| f64::from(byte) / 255.0;
         let used = used.filter(|_| self.mapped);
@@ -71,7 +69,7 @@ impl<'a> Textures<'a> {
         upper.lerp(lower, part.y)
     }
 
-    /// Bends a normal by a map, in the frame of ∂p/∂u and ∂p/∂v.
+    /// Perturbs a normal by a normal map, in the frame of ∂p/∂u and ∂p/∂v.
     pub(crate) fn bent(&self, used: TextureUse, triangle: u32, at: DVec2, normal: DVec3) -> DVec3 {
         let [a, b, c] = self.scene.triangles[triangle as usize]
             .vertices

@@ -1,5 +1,5 @@
-//! Boxes whose corners are integers in the order of the numbers they stand for: least and greatest are exact and
-//! the same in any order, signs of zero and denormal numbers included. Twin of
+//! Boxes with corners stored as integers in the order of the floats: minimum and maximum are exact
+//! and independent of order, including signs of zero and denormals. CPU version of
 //! `kernels/accel/tree/parallel/boxes.wesl`.
 
 use crate::bounds::Bounds;
@@ -8,16 +8,16 @@ use crate::triangle::TriangleRecord;
 /// An axis-aligned box; see `ordered`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OrderedBox {
-    /// Least corner.
+    /// Minimum corner.
     pub low: [u32; 3],
-    /// Greatest corner.
+    /// Maximum corner.
     pub high: [u32; 3],
 }
 
 const SIGN: u32 = 0x8000_0000;
 
 impl OrderedBox {
-    /// The neutral element of [`join`].
+    /// Identity of [`join`].
     pub(crate) const NOTHING: Self = Self {
         low: [u32::MAX; 3],
         high: [0; 3],
@@ -47,17 +47,16 @@ impl From<OrderedBox> for Bounds {
     }
 }
 
-/// The bits of a number as an integer in the order of the numbers.
+/// The bits of a float as an integer with the same order.
 pub(crate) fn ordered(bits: u32) -> u32 {
     if bits >= SIGN { !bits } else { bits ^ SIGN }
 }
 
-/// The number that such an integer stands for.
+/// The float of such an integer.
 pub fn number(key: u32) -> f32 {
     f32::from_bits(if key >= SIGN { key ^ SIGN } else { !key })
 }
 
-/// The smallest box around both.
 pub(crate) fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
     OrderedBox {
         low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),
@@ -65,12 +64,11 @@ pub(crate) fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
     }
 }
 
-/// Twice the centre.
 pub(crate) fn doubled_centre(around: OrderedBox) -> [f32; 3] {
     std::array::from_fn(|axis| number(around.low[axis]) + number(around.high[axis]))
 }
 
-/// Half of the surface of a box. Two products that share no factor: compilers of kernels put those together that do.
+/// Half the surface area. No common factor in the products: kernel compilers would merge them.
 pub(crate) fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| high[axis] - low[axis]);
     x * (y + z) + y * z

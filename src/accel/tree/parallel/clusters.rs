@@ -1,24 +1,27 @@
-//! Parallel locally-ordered clustering: in each round every cluster looks for the neighbour with which it would have the
-//! smallest box, and those that choose each other are joined. Twin of `kernels/accel/tree/parallel/clusters.wesl`.
+//! Parallel locally-ordered clustering: in each round every cluster finds the neighbour with which
+//! it would have the smallest box, and mutual choices are merged. CPU version of
+//! `kernels/accel/tree/parallel/clusters.wesl`.
 //!
-//! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
-//! construction", TVCG 24(3), 2018.
+//! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume
+//! hierarchy construction", TVCG 24(3), 2018.
 //!
-//! *Ties* are settled by the exclusive or of the two places. It is the same seen from both, and no two neighbours of a
-//! cluster share it, so that among all pairs of the smallest area one at least chooses each other, and every round
-//! joins something. Places themselves would do that, too, but where many areas are equal (copies, lattices) each cluster
-//! would choose the first of its neighbours and a round join one pair; so it joins about all.
+//! *Ties* are broken by the exclusive or of the two indices. It is symmetric, and no two neighbours
+//! of a cluster share it, so among all pairs of the smallest area at least one is mutual, and every
+//! round merges something. Indices alone would do that too, but with many equal areas (copies,
+//! lattices) each cluster would choose its first neighbour and a round would merge one pair; this
+//! way it merges nearly all.
 //!
-//! *Rounds* are bounded: boxes that shrink along the curve let only the last two choose each other. After
-//! [`FREE_ROUNDS`] clusters are joined two by two as they lie, so that all rounds together, and the depth of the tree,
-//! stay below those plus the logarithm of the number of triangles.
+//! *Rounds* are bounded: boxes that shrink along the curve could make only the last two choose each
+//! other. After [`FREE_ROUNDS`] clusters are merged pairwise in order, so that the total number of
+//! rounds, and the depth of the tree, stay below that plus the logarithm of the number of
+//! triangles.
 
 use super::boxes::{OrderedBox, half_area, join, number};
 use super::rounds::FREE_ROUNDS;
 use super::{LinkedNode, LinkedTree, Sorted};
 use rayon::prelude::*;
 
-/// A neighbour as it is compared with others.
+/// A neighbour with its sort key.
 #[derive(Clone, Copy)]
 struct Choice {
     area: f32,
@@ -34,20 +37,19 @@ fn is_better(a: Choice, b: Choice) -> bool {
     a.area < b.area || (a.area == b.area && a.apart < b.apart)
 }
 
-/// The places that are looked at, its own among them.
+/// The indices examined, its own among them.
 fn neighbourhood(place: u32, count: u32, radius: u32) -> std::ops::Range<u32> {
     place.saturating_sub(radius)..(place + radius + 1).min(count)
 }
 
-/// Whom a cluster is joined with without a look; itself if there is none.
+/// The cluster to merge with without a search; itself if there is none.
 fn next_door(place: u32, count: u32) -> u32 {
     if place ^ 1 < count { place ^ 1 } else { place }
 }
 
-/// Corners of a box.
 type Corners = [[f32; 3]; 2];
 
-/// The neighbour that a cluster would be joined with; itself if it is alone.
+/// The neighbour that a cluster would merge with; itself if it is alone.
 fn nearest(boxes: &[Corners], place: u32, radius: u32) -> u32 {
     let (mut best, mut chosen) = (WORST, place);
     let [low, high] = boxes[place as usize];
@@ -66,7 +68,7 @@ fn nearest(boxes: &[Corners], place: u32, radius: u32) -> u32 {
     chosen
 }
 
-/// The tree; inner nodes in the order in which they are made.
+/// The tree; inner nodes in order of creation.
 pub(super) fn build(sorted: Sorted, radius: u32) -> LinkedTree {
     let mut nodes = sorted.leaves;
     let mut clusters: Vec<u32> = (0..nodes.len() as u32).collect();
@@ -76,9 +78,12 @@ pub(super) fn build(sorted: Sorted, radius: u32) -> LinkedTree {
         let around = |cluster: &u32| nodes[*cluster as usize].around();
         let corners = |OrderedBox { low, high }| [low.map(number), high.map(number)];
         let boxes: Vec<Corners> = clusters.par_iter().map(around).map(corners).collect();
-        let choose = |place: u32| match round < FREE_ROUNDS {
-            true => nearest(&boxes, place, radius),
-            false => next_door(place, count),
+        let choose = |place: u32| {
+            if round < FREE_ROUNDS {
+                nearest(&boxes, place, radius)
+            } else {
+                next_door(place, count)
+            }
         };
         let chosen: Vec<u32> = (0..count).into_par_iter().map(choose).collect();
         let mut next = Vec::with_capacity(clusters.len());

@@ -1,7 +1,8 @@
-//! The passes that build a tree or fit its boxes on the device; their kernels are in `kernels/accel/tree/parallel/device/`.
+//! The passes that build a tree or refit its boxes on the device; their kernels are in
+//! `kernels/accel/tree/parallel/device/`.
 //!
-//! Nodes are read back, and the host lays them out, which bounds their depth; wide nodes are made of that by passes
-//! again (`accel/wide/device.rs`). What the way there and back takes are phases of their own.
+//! Nodes are read back and laid out on the host, which bounds their depth; device passes then make
+//! wide nodes from them (`accel/wide/device.rs`). The transfers are separate phases.
 
 use super::rounds::Rounds;
 use super::{LinkedNode, LinkedTree, Method, Settings, too_large};
@@ -13,19 +14,18 @@ use raystone_gpu::{
 };
 use std::sync::Arc;
 
-/// Bits of each word of a code.
 const WORD_BITS: u32 = 30;
 /// Children of a block, as in `blocks.wesl`.
 const BLOCK: u32 = 8;
-/// Words that `boxes.wesl` leaves of the whole scene, the last of which names a triangle that is too large.
+/// Words of `boxes.wesl` about the whole scene; the last identifies a too large triangle.
 const SCENE_WORDS: u32 = 7;
 
 pub(crate) fn failed(error: GpuError) -> AccelError {
     AccelError::Device(error.to_string())
 }
 
-/// Plays a recording. What the clock of the device does not tell is the phase `transfer`: submission, copies to the
-/// host, waiting.
+/// Plays a recording. Time that the device clock does not cover is the phase `transfer`:
+/// submission, copies to the host, waiting.
 pub(crate) fn play(recording: &Recording, log: &mut BuildLog) -> Result<Played, AccelError> {
     let played = log.play(recording)?;
     if let Some(ms) = played.elapsed().gpu_ms {
@@ -34,17 +34,18 @@ pub(crate) fn play(recording: &Recording, log: &mut BuildLog) -> Result<Played, 
     Ok(played)
 }
 
-/// Builds the tree on the device of `log`: the same to the bit as [`super::build`], where its arithmetic is exact.
+/// Builds the tree on the device of `log`: bit-identical to [`super::build`] if its arithmetic is
+/// exact.
 ///
 /// # Errors
-/// There is no device, or what it met with; a coordinate is too large or not a number.
+/// There is no device, or it reported an error; a coordinate is too large or NaN.
 pub fn build(
     soup: &TriangleSoup,
     settings: &Settings,
     log: &mut BuildLog,
 ) -> Result<LinkedTree, AccelError> {
     let Some(gpu) = log.gpu().cloned() else {
-        // Playing says that there is none.
+        // Playing reports the missing device.
         return log.play(&Recording::new()).map(|_| LinkedTree::default());
     };
     if soup.records.is_empty() {
@@ -74,21 +75,19 @@ pub fn build(
     Ok(tree)
 }
 
-/// The passes over one scene.
 pub(super) struct Passes<'a> {
     pub gpu: &'a Gpu,
-    /// Leaves.
     pub count: u32,
-    /// Nodes behind them.
+    /// Number of nodes after them.
     inner: u32,
     triangles: TriangleBuffers,
-    /// Leaves, inner nodes and blocks: what is kept from one submission to the next.
+    /// Leaves, inner nodes and blocks, which persist between submissions.
     nodes: wgpu::Buffer,
     scene: wgpu::Buffer,
 }
 
 impl<'a> Passes<'a> {
-    /// Over these triangles, for so many leaves and nodes behind them.
+    /// Passes over these triangles, for this many leaves and nodes after them.
     pub(super) fn new(
         gpu: &'a Gpu,
         soup: &TriangleSoup,
@@ -106,12 +105,11 @@ impl<'a> Passes<'a> {
         })
     }
 
-    /// So many words of scratch for each triangle.
+    /// Scratch with this many words per triangle.
     fn words(&self, name: &str, each: u32) -> Storage {
         Storage::scratch(name, 4 * u64::from(each) * u64::from(self.count))
     }
 
-    /// What all passes bind.
     pub(super) fn bindings(&self) -> Bindings {
         let mut bindings = self.triangles.bindings.clone();
         bindings
@@ -133,7 +131,6 @@ impl<'a> Passes<'a> {
         self.gpu.pipeline(&kernel, true)
     }
 
-    /// Runs a pass.
     pub(super) fn run(
         &self,
         recording: &mut Recording,
@@ -145,7 +142,7 @@ impl<'a> Passes<'a> {
         Ok(())
     }
 
-    /// The nodes, brought to the host.
+    /// The nodes, read back to the host.
     pub(super) fn nodes(
         &self,
         soup: &TriangleSoup,
@@ -166,15 +163,13 @@ impl<'a> Passes<'a> {
         Ok(nodes)
     }
 
-    /// The boxes of so many triangles, and the box around their centres.
     pub(super) fn boxes(&self, recording: &mut Recording, triangles: u32) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         bindings.uniform("size", UniformValues::new().u32("count", triangles));
         self.run(recording, "boxes", &bindings, groups_for(triangles))
     }
 
-    /// Boxes and codes of the triangles, and the leaves in the order of the codes; tells where the triangles are in that
-    /// order.
+    /// Boxes and codes, and the leaves in code order; returns the triangle indices in that order.
     fn sort(&self, recording: &mut Recording, long_codes: bool) -> Result<Storage, GpuError> {
         let items = groups_for(self.count);
         let mut pairs = Pairs {
@@ -215,7 +210,7 @@ impl<'a> Passes<'a> {
         self.run(recording, "leaves", &bindings, groups_for(self.count))
     }
 
-    /// The radix tree over the sorted codes, of two leaves or more.
+    /// The radix tree over the sorted codes, for at least two leaves.
     fn radix_tree(&self, recording: &mut Recording, sorted: &Storage) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
         let ranges = self.words("tree ranges", 2);
@@ -227,10 +222,10 @@ impl<'a> Passes<'a> {
         self.fit(recording, &ranges)
     }
 
-    /// The boxes of the nodes behind the leaves, whose first and last leaves are these.
+    /// The boxes of the nodes after the leaves, given their first and last leaves.
     pub(super) fn fit(&self, recording: &mut Recording, ranges: &Storage) -> Result<(), GpuError> {
         let mut bindings = self.bindings();
-        // Level by level: a dispatch sees what those before it wrote.
+        // Level by level: a dispatch sees the results of earlier ones.
         for level in levels([self.count, self.inner]) {
             let values = UniformValues::new()
                 .u32("below", level.below)
@@ -253,7 +248,7 @@ struct Level {
     count: u32,
 }
 
-/// Levels of blocks over so many leaves, up to the first of a single one; they lie behind leaves and nodes.
+/// Levels of blocks over this many leaves, up to a single one; they follow leaves and nodes.
 fn levels([leaves, inner]: [u32; 2]) -> Vec<Level> {
     let mut out = Vec::new();
     let (mut below, mut below_count) = (0, leaves);

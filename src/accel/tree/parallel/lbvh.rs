@@ -1,7 +1,8 @@
-//! The radix tree over sorted codes: ranges and splits of its inner nodes, each found on its own. Twin of
-//! `kernels/accel/tree/parallel/lbvh.wesl`.
+//! The radix tree over sorted codes: ranges and splits of its inner nodes, each found
+//! independently. CPU version of `kernels/accel/tree/parallel/lbvh.wesl`.
 //!
-//! Source: T. Karras, "Maximizing parallelism in the construction of BVHs, octrees, and k-d trees", HPG 2012.
+//! Source: T. Karras, "Maximizing parallelism in the construction of BVHs, octrees, and k-d trees",
+//! HPG 2012.
 
 use super::boxes::{OrderedBox, join};
 use super::{LEAF, LinkedNode, LinkedTree, Sorted};
@@ -9,11 +10,10 @@ use rayon::prelude::*;
 
 const CODE_BITS: i32 = 64;
 
-/// Codes in ascending order.
 struct Codes<'a>(&'a [[u32; 2]]);
 
 impl Codes<'_> {
-    /// Leading bits that the codes at two places share; places decide where codes are equal. −1 outside.
+    /// Length of the codes' common prefix; indices break ties. −1 out of range.
     fn common_prefix(&self, i: i32, j: i32) -> i32 {
         let code = |place: i32| self.0.get(usize::try_from(place).ok()?);
         let (Some(a), Some(b)) = (code(i), code(j)) else {
@@ -91,7 +91,7 @@ pub(super) fn build(sorted: Sorted) -> LinkedTree {
 }
 
 impl LinkedTree {
-    /// Boxes of the inner nodes from those of the leaves.
+    /// Computes the boxes of the inner nodes from those of the leaves.
     pub fn fit(&mut self) {
         let mut parents_first = Vec::with_capacity(self.nodes.len());
         let mut open = vec![self.root];

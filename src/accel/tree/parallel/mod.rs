@@ -1,8 +1,9 @@
-//! Trees from sorted triangles, bottom-up, by methods that a device can follow: `device-lbvh` and `device-ploc` are built
-//! there, `host-lbvh` and `host-ploc` are their twins, equal to the bit.
+//! Bottom-up trees over sorted triangles, by methods suited to a device: `device-lbvh` and
+//! `device-ploc` are built there, `host-lbvh` and `host-ploc` are their bit-identical CPU versions.
 //!
-//! Both sort triangles along a curve through the scene (`morton`). `lbvh` then reads the tree off the codes, `clusters`
-//! joins neighbours in rounds. [`device`] records the passes, `refit` fits boxes to triangles that moved.
+//! Both sort triangles along a curve through the scene (`morton`). `lbvh` then derives the tree
+//! from the codes, `clusters` merges neighbours in rounds. [`device`] records the passes, `refit`
+//! fits boxes to moved triangles.
 
 pub mod boxes;
 mod clusters;
@@ -21,41 +22,41 @@ use boxes::{OrderedBox, doubled_centre, number, ordered};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-/// In the place of a leaf's second child.
+/// Marks a leaf, in place of its second child.
 pub const LEAF: u32 = 0xffff_ffff;
-/// Larger coordinates have areas that are not finite.
+/// Larger coordinates have infinite areas.
 const LARGEST_COORDINATE: f32 = 1e18;
 
-/// How the tree comes about.
+/// How the tree is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// The radix tree over the codes.
     Lbvh,
     /// Parallel locally-ordered clustering.
     Ploc {
-        /// Neighbours on either side that a cluster looks at, 1 to 32.
+        /// Neighbours examined on either side of a cluster, 1 to 32.
         radius: u32,
     },
 }
 
-/// What both places of building are told.
+/// Settings shared by host and device builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// How the tree comes about.
+    /// The method.
     pub method: Method,
-    /// Whether codes have 60 bits instead of 30.
+    /// Codes of 60 bits instead of 30.
     pub long_codes: bool,
 }
 
-/// A node: its box, with a child behind each corner. A leaf has its triangle as the first and [`LEAF`] as the second.
+/// A node: a child after each corner of its box. A leaf has its triangle first, then [`LEAF`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct LinkedNode {
-    /// Least corner: see `ordered`.
+    /// Minimum corner: see `ordered`.
     pub low: [u32; 3],
     /// First child.
     pub left: u32,
-    /// Greatest corner.
+    /// Maximum corner.
     pub high: [u32; 3],
     /// Second child.
     pub right: u32,
@@ -79,13 +80,13 @@ impl LinkedNode {
         }
     }
 
-    /// Its children, unless it is a leaf.
+    /// Its children; meaningless for a leaf.
     pub fn children(&self) -> [u32; 2] {
         [self.left, self.right]
     }
 }
 
-/// A binary tree with a triangle in each leaf; leaves come first, in the order of their codes.
+/// A binary tree with a triangle in each leaf; leaves come first, in code order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct LinkedTree {
     /// Leaves, then inner nodes.
@@ -95,10 +96,11 @@ pub struct LinkedTree {
 }
 
 impl LinkedTree {
-    /// Whether every node but the root is the child of one other, and every leaf lists one of so many triangles.
+    /// Checks that every node except the root is the child of one other, and every leaf lists one
+    /// of `triangles` triangles.
     ///
     /// # Errors
-    /// The first node that is not, of a tree that a device with a fault handed over.
+    /// The first node for which this fails, in a tree from a faulty device.
     pub fn check(&self, triangles: usize) -> Result<(), AccelError> {
         let mut seen = vec![false; self.nodes.len()];
         let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
@@ -134,7 +136,6 @@ impl LinkedTree {
 }
 
 impl From<LinkedTree> for Tree {
-    /// The nodes in depth-first order.
     fn from(tree: LinkedTree) -> Self {
         if tree.nodes.is_empty() {
             return Self::default();
@@ -151,7 +152,7 @@ impl From<LinkedTree> for Tree {
 }
 
 impl Tree {
-    /// The nodes as passes read them; a leaf tells the first of its triangles alone.
+    /// The nodes for the passes; a leaf stores only its first triangle.
     pub(crate) fn linked(&self) -> Vec<LinkedNode> {
         let nodes = self.nodes.par_iter().map(|node| {
             let key = |corner: [f32; 3]| corner.map(|x| ordered(x.to_bits()));
@@ -169,13 +170,12 @@ impl Tree {
     }
 }
 
-/// Triangles in the order of their codes.
 struct Sorted {
     leaves: Vec<LinkedNode>,
     codes: Vec<[u32; 2]>,
 }
 
-/// The tree, built on the host: the twin of [`device::build`].
+/// The tree, built on the host: the CPU version of [`device::build`].
 ///
 /// # Errors
 /// A coordinate is too large or not a number.
@@ -193,7 +193,7 @@ pub fn build(soup: &TriangleSoup, settings: &Settings) -> Result<LinkedTree, Acc
     })
 }
 
-/// Whether all coordinates are numbers that are small enough.
+/// Checks that all coordinates are numbers and small enough.
 fn check_coordinates(soup: &TriangleSoup) -> Result<(), AccelError> {
     let limit = LARGEST_COORDINATE.to_bits();
     let is_usable = |x: &f32| x.to_bits() & 0x7fff_ffff <= limit;
@@ -204,7 +204,6 @@ fn check_coordinates(soup: &TriangleSoup) -> Result<(), AccelError> {
     }
 }
 
-/// What is said of a triangle that cannot be built over.
 fn too_large(soup: &TriangleSoup, triangle: usize) -> AccelError {
     let vertices = soup.records.get(triangle).map(|r| r.vertices());
     AccelError::Invalid(format!(

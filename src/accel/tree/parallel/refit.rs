@@ -1,9 +1,9 @@
-//! Refitting: new boxes for triangles that moved, in a tree that stays as it is; on the host and on the device, equal to
-//! the bit.
+//! Refitting: new boxes for moved triangles in an unchanged tree; on the host and on the device,
+//! bit-identical.
 //!
-//! What lies below a node is a range of [`Tree::order`], whatever built the tree. So on the device boxes are found like
-//! those of a radix tree: blocks of leaves, and each range from some of them (`blocks.wesl`, `inner.wesl`). The host
-//! goes from the leaves up.
+//! The entries below a node are a range of [`Tree::order`] for any builder. So the device computes
+//! boxes as in a radix tree: blocks of leaves, and each range from some of them (`blocks.wesl`,
+//! `inner.wesl`). The host works from the leaves up.
 
 use super::boxes::{OrderedBox, join};
 use super::check_coordinates;
@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use raystone_gpu::Recording;
 
 impl Tree {
-    /// Fits the boxes to triangles that moved since the tree was built, on the host. A triangle that was split stands
-    /// with its whole box in each of its leaves.
+    /// Refits the boxes to moved triangles on the host. A split triangle counts with its whole box
+    /// in each of its leaves.
     ///
     /// # Errors
-    /// There are other triangles than the tree lists, or a coordinate is too large or not a number.
+    /// The triangles differ from the tree's, or a coordinate is too large or NaN.
     pub fn refit(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
         self.check_triangles(soup)?;
         check_coordinates(soup)?;
@@ -27,7 +27,7 @@ impl Tree {
             .map(|id| OrderedBox::from(&soup.records[*id as usize]))
             .collect();
         let mut found = vec![OrderedBox::NOTHING; self.nodes.len()];
-        // Children come behind their parents.
+        // Children come after their parents.
         for (index, node) in self.nodes.iter_mut().enumerate().rev() {
             found[index] = match node.kind {
                 NodeKind::Leaf { first, count } => boxes[first as usize..(first + count) as usize]
@@ -43,10 +43,10 @@ impl Tree {
         Ok(())
     }
 
-    /// [`Tree::refit`] on the device of `log`, whose phases tell what it took; the boxes are read back.
+    /// [`Tree::refit`] on the device of `log`, which records the time; the boxes are read back.
     ///
     /// # Errors
-    /// As [`Tree::refit`]; there is no device, or what it met with.
+    /// As [`Tree::refit`]; there is no device, or it reported an error.
     pub fn refit_on_device(
         &mut self,
         soup: &TriangleSoup,
@@ -57,7 +57,7 @@ impl Tree {
             return Ok(());
         }
         let Some(gpu) = log.gpu().cloned() else {
-            // Playing says that there is none.
+            // Playing reports the missing device.
             return log.play(&Recording::new()).map(|_| ());
         };
         let ranges = log.phase("ranges", || self.ranges());

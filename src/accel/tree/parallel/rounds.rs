@@ -1,4 +1,4 @@
-//! The rounds of clustering on the device: some to a submission, until one cluster is left.
+//! The rounds of clustering on the device: several per submission, until one cluster is left.
 
 use super::device::{Passes, failed, play};
 use crate::tree::depth::SAH_DEPTH;
@@ -7,13 +7,13 @@ use raystone_gpu::{
     Bindings, GpuError, Groups, Recording, Storage, UniformValues, grid_of, groups_for,
 };
 
-/// Rounds in which clusters choose; behind these they are joined as they lie.
+/// Rounds in which clusters choose; after these they are merged in order.
 pub(super) const FREE_ROUNDS: u32 = SAH_DEPTH;
-/// Rounds in one submission; an even number, as two arrays of clusters take turns.
+/// Rounds per submission; even, as two cluster arrays alternate.
 const ROUNDS_PER_PLAY: u32 = 16;
 /// Clusters of a tile, as in `state.wesl`.
 const TILE: u32 = 256;
-/// Words of `state.wesl`: the clusters, and where the workgroups of its three kinds begin.
+/// Words of `state.wesl`: the clusters, and the offsets of the three kinds of workgroups.
 const CLUSTERS: usize = 0;
 const NODES: usize = 1;
 const SEARCH_GROUPS: usize = 4;
@@ -21,7 +21,6 @@ const TILE_GROUPS: usize = 8;
 const TILE_GROUPS_BEFORE: usize = 12;
 const STATE_WORDS: usize = 16;
 
-/// What the rounds keep from one submission to the next.
 pub(super) struct Rounds<'a> {
     passes: &'a Passes<'a>,
     radius: u32,
@@ -56,7 +55,7 @@ impl<'a> Rounds<'a> {
         })
     }
 
-    /// Plays what was recorded before and rounds behind it, until one cluster is left; tells the root.
+    /// Plays `first`, then rounds until one cluster is left; returns the root.
     pub(super) fn play(&self, first: Recording, log: &mut BuildLog) -> Result<u32, AccelError> {
         let count = self.passes.count;
         let most = FREE_ROUNDS + count.ilog2() + 2;
@@ -78,7 +77,7 @@ impl<'a> Rounds<'a> {
         )))
     }
 
-    /// One round; it does nothing where a single cluster is left.
+    /// One round; it does nothing once a single cluster is left.
     fn record(&self, recording: &mut Recording, round: u32) -> Result<(), GpuError> {
         let passes = self.passes;
         let words = |name: &str, words: u32| Storage::scratch(name, 4 * u64::from(words));

@@ -1,4 +1,4 @@
-//! How lights are chosen and joined, from `docs/shading.md`. Each way of shining is a file in `src/verify/lights/`.
+//! Choice and weighting of lights, from `docs/shading.md`. Kinds are in `src/verify/lights/`.
 
 mod sky;
 mod tree;
@@ -14,57 +14,47 @@ use raystone_scene::{LightList, SceneData, Source};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-/// What lights are chosen by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Choice {
-    /// Their power.
     Power,
-    /// Nothing.
     Uniform,
-    /// What they contribute at the point, about.
+    /// By their approximate contribution at the point.
     Tree,
-    /// All are sampled.
     All,
 }
 
-/// What shines on a scene.
 pub(super) struct Lights {
     list: LightList,
-    /// What is known of the kind of each.
     checks: Vec<&'static LightChecks>,
-    /// Values below the end of each light where lights are chosen by power.
+    /// Cumulative number of values up to each light, when lights are chosen by power.
     ends: Vec<f64>,
-    /// The light of an emissive triangle.
     owners: BTreeMap<u32, usize>,
-    /// The lights that rays meet though they have no triangles.
+    /// Lights without triangles that rays can hit.
     spheres: Vec<(usize, sphere::Ball)>,
-    /// The map around the scene, which is the last light.
     map: Option<environment::Map>,
     tree: OnceLock<tree::Tree>,
 }
 
-/// Where a light is chosen: a point of a surface, and the normal of the triangle there on the viewer's side.
+/// A shading point for light selection: position, and the triangle's normal on the viewer's side.
 pub(super) type Place = (DVec3, DVec3);
 
-/// Values that a number can have: those of a draw are multiples of the reciprocal.
+/// Number of values of a draw: draws are multiples of the reciprocal.
 pub(crate) const UNITS: f64 = (1u32 << 24) as f64;
 
-/// A light that was chosen.
 pub(super) struct Chosen {
     pub light: usize,
-    /// With what probability.
     pub share: f64,
 }
 
-/// A point of a light, as a surface sees it.
+/// A sampled point of a light, seen from a surface.
 pub struct LightSample {
-    /// From the surface, of length 1.
+    /// Unit direction from the surface.
     pub direction: DVec3,
-    /// How far it is, scene units.
+    /// Distance, scene units.
     pub distance: f64,
-    /// Radiance; irradiance of a surface that faces a delta light.
+    /// Radiance; for a delta light, irradiance of a surface facing it.
     pub radiance: DVec3,
-    /// Over solid angle, without the choice of the light in it; `None` for delta lights.
+    /// Density over solid angle, given the light; `None` for delta lights.
     pub density: Option<f64>,
     /// The triangles that the point may lie on.
     pub triangles: Option<[u32; 2]>,
@@ -74,7 +64,7 @@ impl Lights {
     /// The lights of a scene.
     ///
     /// # Errors
-    /// There is one of a kind that is none of these.
+    /// A light's kind is not registered.
     pub(super) fn new(scene: &SceneData, kinds: &LightRegistry) -> Result<Self, String> {
         let list = LightList::of(scene);
         let mut map = None;
@@ -105,12 +95,12 @@ impl Lights {
         })
     }
 
-    /// Whether there is nothing to sample.
+    /// True if there is nothing to sample.
     pub(super) fn are_none(&self) -> bool {
         self.list.lights.is_empty()
     }
 
-    /// Whether a map shines.
+    /// True if there is an environment map.
     pub(super) fn have_map(&self) -> bool {
         self.map.is_some()
     }
@@ -119,14 +109,14 @@ impl Lights {
         self.tree.get_or_init(|| tree::Tree::new(scene, &self.list))
     }
 
-    /// Values of each light without a place, and of the tree over all others.
+    /// Numbers of values of each light without a position, and of the tree over all others.
     fn groups(&self, tree: &tree::Tree) -> [f64; 2] {
         let placeless = (self.list.lights.len() - tree.len()) as f64;
         let each = ((UNITS - tree.len() as f64) / (placeless + 1.0)).floor();
         [each, UNITS - placeless * each]
     }
 
-    /// The first value of a light where all are chosen evenly.
+    /// The first value of a light when all are chosen uniformly.
     fn evenly(&self, light: usize) -> f64 {
         let count = self.list.lights.len() as f64;
         let (each, longer) = ((UNITS / count).floor(), UNITS % count);
@@ -134,7 +124,7 @@ impl Lights {
     }
 }
 
-/// One value for each light, and the others by rounded sums of their powers.
+/// One value per light, and the rest by rounded cumulative power.
 fn ends(list: &LightList) -> Vec<f64> {
     let powers = || list.lights.iter().map(|light| light.power);
     let all: f64 = powers().sum();
@@ -147,7 +137,7 @@ fn ends(list: &LightList) -> Vec<f64> {
     powers().enumerate().map(end).collect()
 }
 
-/// The point of the k-th light where all are sampled.
+/// The random numbers of the k-th light when all are sampled.
 pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
     let k = k as f64;
     [
@@ -157,7 +147,6 @@ pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
 }
 
 impl PathOracle<'_> {
-    /// Probability with which a light is chosen.
     fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
         let lights = &self.lights;
         match choice {
@@ -169,9 +158,10 @@ impl PathOracle<'_> {
             Choice::Tree if !lights.tree(self.scene).is_empty() => {
                 let tree = lights.tree(self.scene);
                 let [each, all] = lights.groups(tree);
-                match light < tree.len() {
-                    true => tree.values(light, all, at, rounding) / UNITS,
-                    false => each / UNITS,
+                if light < tree.len() {
+                    tree.values(light, all, at, rounding) / UNITS
+                } else {
+                    each / UNITS
                 }
             }
             Choice::Uniform | Choice::Tree => {
@@ -180,7 +170,6 @@ impl PathOracle<'_> {
         }
     }
 
-    /// The lights that are sampled.
     pub(super) fn chosen(
         &self,
         choice: Choice,
@@ -196,7 +185,7 @@ impl PathOracle<'_> {
         if choice == Choice::All {
             return (0..lights).map(chosen).collect();
         }
-        // Where a number is held against whole values, nothing is rounded.
+        // Comparisons of a number with integer values are free of rounding.
         let value = (number * UNITS).floor();
         let last = lights - 1;
         if choice == Choice::Power {
@@ -221,7 +210,7 @@ impl PathOracle<'_> {
         vec![chosen(light.unwrap_or(last))]
     }
 
-    /// A point of a light, and which part of it that is, where lights have parts that are chosen.
+    /// A sampled point of a light, and which part of the light it is on, if it has several.
     pub(super) fn light_sample(
         &self,
         surface: &Surface,
@@ -248,7 +237,7 @@ impl PathOracle<'_> {
         (0, light)
     }
 
-    /// With what density light samples find the point of an emitter that a ray has met.
+    /// Density with which light sampling finds the point of an emitter hit by a ray.
     pub(super) fn light_density(
         &self,
         emitter: &Surface,
@@ -265,7 +254,7 @@ impl PathOracle<'_> {
         })
     }
 
-    /// The nearest sphere before `end` on a ray: its radiance, and the density with which light samples find the direction.
+    /// The nearest sphere before `end` on a ray: its radiance, and its light sampling density.
     pub(super) fn sphere_met(
         &self,
         ray: &Segment,
@@ -283,7 +272,7 @@ impl PathOracle<'_> {
         Some((ball.radiance, share * density))
     }
 
-    /// Whether anything lies on the way to a light.
+    /// True if the way to a light is occluded.
     pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> Blocked {
         let balls = self.lights.spheres.iter();
         let mut others = balls.filter(|(place, _)| *place != light);
@@ -294,7 +283,7 @@ impl PathOracle<'_> {
         self.hits.blocked(shadow, &mut walk.rounding)
     }
 
-    /// What comes along a ray that leaves the scene. A map takes the place of the sky.
+    /// Radiance along a ray that leaves the scene. A map replaces the sky.
     pub(super) fn escaped(&self, direction: DVec3) -> DVec3 {
         let map = self.lights.map.as_ref();
         map.map_or_else(
@@ -303,8 +292,8 @@ impl PathOracle<'_> {
         )
     }
 
-    /// The part of the map that a ray meets which leaves the scene, and the density with which light samples find its direction;
-    /// nothing where there is no map.
+    /// The map texel hit by a ray that leaves the scene, and the density of light sampling for its
+    /// direction; `None` without a map.
     pub(super) fn escaped_density(
         &self,
         ray: &Segment,
@@ -319,7 +308,7 @@ impl PathOracle<'_> {
         ))
     }
 
-    /// Whether a bounced ray counts as one that leaves, though it hits something so far away.
+    /// True if a bounced ray counts as escaping although it hits something at this distance.
     pub(super) fn escapes(&self, distance: f64) -> bool {
         let sky = &self.scene.daylight;
         (sky.as_ref()).is_some_and(|sky| distance > f64::from(sky.reach))

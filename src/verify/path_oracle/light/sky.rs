@@ -1,9 +1,9 @@
-//! What rays see that leave the scene.
+//! Radiance of rays that leave the scene.
 
 use glam::DVec3;
 use raystone_scene::SceneData;
 
-/// The environment's radiance, times the sky's where the scene has no light of its own.
+/// The environment's radiance, times the sky's if the scene has no light of its own.
 pub(super) fn radiance(scene: &SceneData, direction: DVec3) -> DVec3 {
     let constant = scene.environment.as_dvec3();
     let Some(sky) = &scene.daylight else {

@@ -1,7 +1,7 @@
-//! The choice of a light by a hierarchy of bounds.
+//! Choice of a light by a bounding hierarchy.
 //!
-//! Which lights lie under which node is read from the tree that was built; what a node bounds and how important it is
-//! is computed here, from the scene.
+//! The topology is read from the built tree; the bounds and importance of its nodes are computed
+//! here from the scene.
 
 use crate::path_oracle::rounding::Rounding;
 use glam::{DQuat, DVec3};
@@ -9,21 +9,21 @@ use raystone_render::light_branches;
 use raystone_scene::{Light, LightList, SceneData, Source};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// By so much more than they do nodes may emit, radians.
+/// Margin of a node's emission cone, radians.
 const SLACK: f64 = 0.01;
-/// The least cosine of emission that counts.
+/// The smallest emission cosine that counts.
 const LEAST_COSINE: f64 = 0.01;
 
-/// What is known of the lights under a node.
+/// Bounds of the lights under a node.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     low: DVec3,
     high: DVec3,
     power: f64,
-    /// Axis and half angle of the cone of the normals.
+    /// Axis and half angle of the normal cone.
     axis: DVec3,
     normals: f64,
-    /// How far from a normal light is emitted.
+    /// Emission angle around a normal.
     spread: f64,
     both_sides: bool,
 }
@@ -91,7 +91,7 @@ impl Bounds {
         }
     }
 
-    /// About what its lights contribute at a point of a surface with this normal.
+    /// Approximate contribution of its lights at a surface point with this normal.
     fn importance(&self, at: DVec3, normal: DVec3) -> f64 {
         let to_centre = 0.5 * (self.low + self.high) - at;
         let radius = 0.5 * (self.high - self.low).length();
@@ -119,7 +119,6 @@ impl Bounds {
     }
 }
 
-/// The least cone around two.
 fn least_cone(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let between = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
@@ -135,16 +134,14 @@ fn least_cone(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     ((turn * wide.0).normalize(), half)
 }
 
-/// The lights that have a place, in a tree.
+/// A tree over the lights that have a position.
 pub(super) struct Tree {
     bounds: Vec<Bounds>,
-    /// How many lights lie under each node.
+    /// Number of lights under each node.
     below: Vec<f64>,
-    /// Left child of each node; none of a leaf.
+    /// Left child of each node; `None` for a leaf.
     children: Vec<Option<usize>>,
-    /// The light of each leaf.
     lights: Vec<usize>,
-    /// Node of each light.
     leaves: Vec<usize>,
     parents: Vec<usize>,
 }
@@ -152,7 +149,7 @@ pub(super) struct Tree {
 const ROOT: usize = 1;
 
 impl Tree {
-    /// The tree over the lights of a list that have a place, which are its first.
+    /// The tree over the lights of a list that have a position, which come first.
     pub(super) fn new(scene: &SceneData, list: &LightList) -> Self {
         let own: Vec<Bounds> = (list.lights.iter())
             .filter_map(|light| Bounds::of(scene, light.source, light.power))
@@ -176,7 +173,7 @@ impl Tree {
             let all = lights.iter().map(|light| own[*light]);
             all.reduce(Bounds::and)
         };
-        // Number 0 is none.
+        // 0 means none.
         let first = own.first().copied();
         let bounds = below
             .iter_mut()
@@ -193,7 +190,6 @@ impl Tree {
         }
     }
 
-    /// How many lights it holds.
     pub(super) fn len(&self) -> usize {
         self.leaves.len()
     }
@@ -202,7 +198,8 @@ impl Tree {
         self.leaves.is_empty()
     }
 
-    /// How many values of a node's its left child has: each light keeps one at least. Nothing if neither child contributes.
+    /// How many of a node's values go to its left child; each light keeps at least one. `None` if
+    /// neither child contributes.
     fn values_of_left(
         &self,
         left: usize,
@@ -224,7 +221,7 @@ impl Tree {
         }
     }
 
-    /// The light that one of so many values chooses, and how many of them choose it.
+    /// The light chosen by one of `values` values, and how many of them choose it.
     pub(super) fn choose(
         &self,
         mut value: f64,
@@ -235,15 +232,16 @@ impl Tree {
         let (mut node, mut values) = (ROOT, all);
         while let Some(left) = self.children[node] {
             let part = self.values_of_left(left, values, at, rounding)?;
-            (node, value, values) = match value < part {
-                true => (left, value, part),
-                false => (left + 1, value - part, values - part),
+            (node, value, values) = if value < part {
+                (left, value, part)
+            } else {
+                (left + 1, value - part, values - part)
             };
         }
         Some((self.lights[node], values))
     }
 
-    /// How many values [`Tree::choose`] gives a light.
+    /// The number of values for which [`Tree::choose`] returns a light.
     pub(super) fn values(
         &self,
         light: usize,
