@@ -283,6 +283,17 @@ impl Gpu {
         }
     }
 
+    /// Another device of the same adapter, with the same kernels: modules count for both, see [`Gpu::take_modules`].
+    ///
+    /// # Errors
+    /// As for [`open`].
+    pub fn twin(&self, choice: &AdapterChoice) -> Result<Self, GpuError> {
+        Ok(Self {
+            used: Arc::clone(&self.used),
+            ..open(choice, self.kernels.clone())?
+        })
+    }
+
     /// The same device that compiles every kernel so many times, and each library of kernels for itself also where texts are equal:
     /// what one compilation of a text has by chance over another is then part of what is measured.
     #[must_use]

@@ -104,7 +104,8 @@ impl Mul<f64> for Work {
 /// The expected work of a plan and of its steps.
 #[derive(Clone)]
 pub struct Cost<'a> {
-    pub(super) experiment: &'a Experiment,
+    /// What it is of.
+    pub experiment: &'a Experiment,
     pub(super) plan: &'a Plan,
     /// Rays of a sample by label of the integrator.
     rays_per_sample: BTreeMap<&'a str, f64>,

@@ -2,9 +2,10 @@
 
 use super::{Registries, RunError, RunOptions};
 use raystone_core::params::Variant;
-use raystone_gpu::{self as gpu, Gpu, KernelLibrary};
+use raystone_gpu::{self as gpu, AdapterChoice, Gpu, KernelLibrary};
 use raystone_record::{KernelFile, KernelFolder, KernelSetRecord};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// The embedded kernels with those of `folder` on top, checked as far as can be without composing.
 ///
@@ -91,6 +92,9 @@ pub(super) struct Device {
     /// With the embedded kernels.
     pub gpu: Gpu,
     views: Vec<(Variant, Gpu)>,
+    adapter: AdapterChoice,
+    /// See [`Self::hands`].
+    twin: OnceLock<Option<Gpu>>,
 }
 
 impl Device {
@@ -102,7 +106,27 @@ impl Device {
         let views =
             views.map(|(kernels, library)| (kernels.clone(), gpu.with_kernels(library.clone())));
         let views = views.collect();
-        Ok(Self { gpu, views })
+        Ok(Self {
+            gpu,
+            views,
+            adapter: options.adapter.clone(),
+            twin: OnceLock::new(),
+        })
+    }
+
+    /// Devices with these kernels that may work at once: two of a software adapter, for which the host does most of its work one
+    /// thread at a time.
+    pub(super) fn hands(&self, kernels: &Variant) -> Result<Vec<Gpu>, RunError> {
+        let first = self.of(kernels)?.clone();
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        if !first.is_software() || cores < 2 {
+            return Ok(vec![first]);
+        }
+        let twin = (self.twin).get_or_init(|| self.gpu.twin(&self.adapter).ok());
+        let twin = twin
+            .as_ref()
+            .map(|twin| twin.with_kernels(first.kernels.clone()));
+        Ok([first].into_iter().chain(twin).collect())
     }
 
     /// The device with these kernels; an error if the plan was made for others.

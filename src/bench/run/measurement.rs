@@ -5,6 +5,7 @@
 //! pages, comparisons and exports without another line of code; the others bring a loop of their own.
 
 use super::kernels::Device;
+use super::progress::Progress;
 use super::registries::Registries;
 use super::session::Session;
 use super::structures::Gated;
@@ -12,10 +13,10 @@ use super::world::World;
 use super::{Cost, RunError, Work};
 use crate::timing::{Measured, Samples};
 use raystone_accel::Traced;
-use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
-use raystone_record::Reading;
 use raystone_record::figure::Figure;
+use raystone_record::{Note, Reading};
 use raystone_render::Stage;
 use std::fmt;
 
@@ -32,6 +33,9 @@ pub trait Measurement: Send + Sync {
         &[]
     }
 
+    /// Adds what experiments may say of it: entries of axes, sections of settings.
+    fn declare(&self, _catalogue: &mut Catalogue) {}
+
     /// The cells of a plan that it measures, in the order of the plan.
     fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell>;
 
@@ -44,6 +48,11 @@ pub trait Measurement: Send + Sync {
     /// the cell.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
+    }
+
+    /// Whether what is done for one cell serves others as well: what kernels that took counts for all of its cells.
+    fn is_shared(&self) -> bool {
+        false
     }
 
     /// Whether clocks speak, so that figures of different machines must not meet.
@@ -80,6 +89,11 @@ pub trait Prepared {
     /// # Errors
     /// What is wrong with them, in words: the cell fails.
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String>;
+
+    /// What figures cannot say.
+    fn notes(&self) -> Vec<Note> {
+        Vec::new()
+    }
 }
 
 /// Why a cell is not timed.
@@ -110,6 +124,7 @@ pub struct At<'a> {
     /// The scene with its tests; `None` for cells without a scene.
     pub stage: Option<&'a Stage>,
     pub(super) device: &'a Device,
+    pub(super) progress: Progress,
     pub(super) gated: &'a [Gated],
 }
 
@@ -121,6 +136,20 @@ impl At<'_> {
     pub fn gpu(&self, cell: &Cell) -> Result<&Gpu, Absent> {
         let gpu = self.device.of(&cell[Axis::Kernels]);
         gpu.map_err(|error| Absent::Failed(error.to_string()))
+    }
+
+    /// Devices with the kernels of a cell that may work at once, where nothing is timed: one, or two of a software adapter.
+    ///
+    /// # Errors
+    /// The plan was made for other kernels.
+    pub fn gpus(&self, cell: &Cell) -> Result<Vec<Gpu>, Absent> {
+        let gpus = self.device.hands(&cell[Axis::Kernels]);
+        gpus.map_err(|error| Absent::Failed(error.to_string()))
+    }
+
+    /// Says what is being done.
+    pub fn say(&self, what: String) {
+        self.progress.say(what);
     }
 
     /// The structure of a cell on the device.

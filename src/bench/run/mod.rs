@@ -338,6 +338,7 @@ fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
         registries: session.registries,
         stage: None,
         device,
+        progress: session.progress.clone(),
         gated: &[],
     };
     for entry in session.registries.measurements.entries() {
@@ -415,6 +416,7 @@ fn run_world(
         registries: session.registries,
         stage: Some(&world.stage),
         device,
+        progress: session.progress.clone(),
         gated: &gated,
     };
     for entry in session.registries.measurements.entries() {
