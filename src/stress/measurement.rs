@@ -111,7 +111,7 @@ static PARTS: [Part; 6] = [
         axes: &[Axis::Triangle, Axis::Accel],
         has: suite::has_cell,
         measure: suite::families,
-        seconds: [0.4, 0.1],
+        seconds: [0.15, 0.08],
         is_timed: true,
     },
     Part {
@@ -134,7 +134,7 @@ static PARTS: [Part; 6] = [
             is_tried && scope.settings.shots != Some(0)
         },
         measure: shots::shots,
-        seconds: [10.0, 0.5],
+        seconds: [15.0, 1.0],
         is_timed: false,
     },
     Part {
@@ -159,7 +159,7 @@ static PARTS: [Part; 6] = [
         axes: &[],
         has: |_, _| true,
         measure: axes::offsets,
-        seconds: [10.0, 3.0],
+        seconds: [2.0, 0.5],
         is_timed: false,
     },
     Part {
@@ -190,7 +190,7 @@ static PARTS: [Part; 6] = [
         axes: &[],
         has: |_, _| true,
         measure: |suite, cells| Ok(vec![numerics::found(suite)?; cells.len()]),
-        seconds: [40.0, 8.0],
+        seconds: [40.0, 3.0],
         is_timed: false,
     },
 ];
@@ -328,7 +328,7 @@ impl Measurement for Part {
     }
 
     fn cost(&self, _: &Cell, cost: &Cost) -> Work {
-        Work::kernels(1) + Work::other(Settings::of(cost.experiment).either(self.seconds))
+        Work::other(Settings::of(cost.experiment).either(self.seconds))
     }
 
     fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {

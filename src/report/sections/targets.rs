@@ -46,10 +46,14 @@ fn check(data: &RunData, expect: &Expect, values: &[Value], context: &Context) -
     let detail = match (worst, rows.first()) {
         (Some((row, value)), _) => {
             let found = format::number(value);
-            format!("{found}; {}{}", row.reason, place(data, row, value))
+            let limit = row.reason.replacen("agrees:", "limit", 1);
+            format!("{found}, {limit}{}", place(data, row, value))
         }
-        (None, Some(row)) => format!("not looked at: {}", row.reason),
-        (None, None) => "not looked at.".to_owned(),
+        // Something was measured, but nothing where it looks: it may be misspelt.
+        (None, Some(row)) if values.iter().any(|v| v.figure.id == expect.figure) => {
+            format!("not looked at: {}.", row.reason)
+        }
+        _ => "not looked at.".to_owned(),
     };
     Check {
         verdict,

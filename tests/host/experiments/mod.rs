@@ -5,7 +5,6 @@ mod mistakes;
 
 use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan};
 use raystone::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
-use raystone::run::Registries;
 use std::collections::BTreeSet;
 use std::path::Path;
 
