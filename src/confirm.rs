@@ -96,7 +96,7 @@ fn restrict(plan: &mut Plan, cells: &[&Finding]) {
     let full = cells.iter().any(|f| f.figure.id == "ms-per-spp/v1");
     plan.times.retain(|cell| full && is_there(cell));
     let compacted = cells.iter().any(|f| f.figure.id == "compaction-ns/v1");
-    plan.compactions.retain(|_| compacted);
+    plan.benches.retain(|_| compacted);
     plan.samplers.clear();
     plan.streams.clear();
     plan.peers.clear();

@@ -68,6 +68,15 @@ pub mod repro {
     }
 }
 
+/// Everything that can be named in this program: what the crates below register, and the parts of the stress suite.
+pub fn registries() -> run::Registries {
+    let mut registries = run::Registries::default();
+    // Their names are their own: a test of the suite adds them to the same registries.
+    let added = stress::register(&mut registries);
+    debug_assert_eq!(added, Ok(()));
+    registries
+}
+
 /// This program: what it was built from.
 pub const PROGRAM: program::Program = program::Program {
     version: env!("CARGO_PKG_VERSION"),

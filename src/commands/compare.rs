@@ -12,7 +12,7 @@ use raystone::compare::judge::{Effects, Verdict};
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides, show};
 use raystone::gpu::AdapterChoice;
-use raystone::run::{Existing, Registries, RunOptions};
+use raystone::run::{Existing, RunOptions};
 use raystone::text::plain_text;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -179,7 +179,7 @@ impl Compare {
             Some(out) => out.clone(),
             None => work.folder()?.join("run"),
         };
-        let registries = Registries::default();
+        let registries = raystone::registries();
         let options = self.run_options(out)?;
         let rounds = self.rounds.unwrap_or(LEAST_ROUNDS);
         let sides = measure_kernels(
@@ -245,7 +245,7 @@ impl Compare {
         Ok(in_this_process(
             sides,
             &cells,
-            &Registries::default(),
+            &raystone::registries(),
             &options,
         )?)
     }

@@ -6,7 +6,7 @@ use clap::Args;
 use raystone::atomic::write_atomic;
 use raystone::export::select::Selection;
 use raystone::export::{FORMATS, Format, Source, Writer};
-use raystone::measure::record::{STRESS_FILE, read_records, records_file};
+use raystone::measure::record::read_records;
 use raystone::run::records_in;
 use raystone::text::nearest;
 use std::path::PathBuf;
@@ -44,12 +44,6 @@ fn format_of(name: &str) -> Result<&'static Format, String> {
 
 impl Export {
     pub fn execute(self) -> Result<ExitCode> {
-        if self.dir.join(STRESS_FILE).exists() && !records_file(&self.dir).exists() {
-            let folder = self.dir.display();
-            bail!(
-                "{folder} is of the stress suite, whose figures stand in its figures.csv: give the folder of a run"
-            );
-        }
         let name = self.format.name;
         let chooses = !self.figure.is_empty() || !self.only.is_empty();
         if chooses && !self.format.selective {

@@ -11,7 +11,6 @@ use raystone::export::FORMATS;
 use raystone::measure::figure::{Better, FIGURES};
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
-use raystone::run::Registries;
 use raystone::scene::{LIGHT_KINDS, MATERIAL_KINDS};
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -90,7 +89,7 @@ impl Topic {
 
 impl List {
     pub fn execute(self) -> Result<ExitCode> {
-        let catalogue = Registries::default().catalogue();
+        let catalogue = raystone::registries().catalogue();
         let topics = match &self.what {
             Some(topic) => std::slice::from_ref(topic),
             None => Topic::value_variants(),

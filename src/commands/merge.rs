@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::{RunRecord, all_of, read_records};
 use raystone::report::{failed_checks, write_report};
-use raystone::run::{Registries, merge};
+use raystone::run::merge;
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,7 +29,7 @@ pub struct Merge {
 
 impl Merge {
     pub fn execute(self) -> Result<ExitCode> {
-        let registries = Registries::default();
+        let registries = raystone::registries();
         let merged = merge(&self.dirs, &self.out, self.device.as_deref(), &registries)?;
         for note in &merged.notes {
             warn(note);

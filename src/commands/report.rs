@@ -4,22 +4,20 @@ use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::export::{checks_json, values_json};
-use raystone::measure::record::{STRESS_FILE, read_records, records_file};
+use raystone::measure::record::read_records;
 use raystone::report::data::RunData;
 use raystone::report::sections::belief::checks;
 use raystone::report::values::values;
 use raystone::report::write_report;
 use raystone::run::records_in;
-use raystone::stress::record::read;
-use raystone::stress::report::write_stress_page;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Write the report of a run, or of the stress suite, again from its records
+/// Write the report of a run again from its records
 #[derive(Args)]
 pub struct Report {
-    /// Folder that a run wrote, with records.jsonl, or the stress suite, with stress.jsonl
+    /// Folder that a run or the stress suite wrote, with records.jsonl
     dir: PathBuf,
     #[command(flatten)]
     output: OutputArguments,
@@ -27,16 +25,6 @@ pub struct Report {
 
 impl Report {
     pub fn execute(self) -> Result<ExitCode> {
-        let is_suite = self.dir.join(STRESS_FILE).exists();
-        if is_suite && !records_file(&self.dir).exists() {
-            let records = read(&self.dir)?;
-            let page = write_stress_page(&self.dir, &records)?;
-            match self.output.json {
-                true => print_json("report", json!({ "report": page }))?,
-                false => print(&format!("report: {}\n", page.display()))?,
-            }
-            return Ok(ExitCode::SUCCESS);
-        }
         let dir = &records_in(&self.dir);
         let paths = write_report(dir)?;
         for warning in &paths.warnings {

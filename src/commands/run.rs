@@ -83,7 +83,7 @@ pub struct Run {
 
 impl Run {
     pub fn execute(self) -> Result<ExitCode> {
-        let registries = Registries::default();
+        let registries = raystone::registries();
         let catalogue = registries.catalogue();
         let mut overrides = Vec::from_iter(self.device.kernels_override());
         overrides.extend(self.reference.as_deref().map(reference_override));
@@ -126,31 +126,50 @@ impl Run {
         if self.references {
             return references(&experiment, &plan, &registries, &options);
         }
-        signals::watch(options.interrupt.clone())?;
-        match raystone::run::run(&experiment, &plan, &registries, &options) {
-            Err(RunError::Interrupted) => signals::wait_for_end(),
-            Err(RunError::EndedEarly { folder, source }) if source.is_interruption() => {
-                let page = write_report(&folder)?.html;
-                output::tell(&format!(
-                    "interrupted; `--resume` goes on; report so far: {}",
-                    page.display()
-                ));
-                Ok(ExitCode::from(signals::INTERRUPTED))
-            }
-            Err(RunError::EndedEarly { folder, source }) => {
-                write_report(&folder)?;
-                Err(RunError::EndedEarly { folder, source }.into())
-            }
-            summary if self.output.json => {
-                let summary = summary?;
-                print_json(
-                    "run",
-                    findings(&summary.out, &write_report(&summary.out)?.html)?,
-                )?;
-                tell_failures(&summary, self.lenient)
-            }
-            summary => tell(&summary?, self.quiet, self.lenient),
+        carry_out(
+            "run",
+            &experiment,
+            &plan,
+            &registries,
+            &options,
+            &self.output,
+            self.quiet,
+        )
+    }
+}
+
+/// Runs a plan, writes its report, and tells what was found and what failed: of `command`.
+pub fn carry_out(
+    command: &str,
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+    output: &OutputArguments,
+    quiet: bool,
+) -> Result<ExitCode> {
+    signals::watch(options.interrupt.clone())?;
+    match raystone::run::run(experiment, plan, registries, options) {
+        Err(RunError::Interrupted) => signals::wait_for_end(),
+        Err(RunError::EndedEarly { folder, source }) if source.is_interruption() => {
+            let page = write_report(&folder)?.html;
+            output::tell(&format!(
+                "interrupted; `--resume` goes on; report so far: {}",
+                page.display()
+            ));
+            Ok(ExitCode::from(signals::INTERRUPTED))
         }
+        Err(RunError::EndedEarly { folder, source }) => {
+            write_report(&folder)?;
+            Err(RunError::EndedEarly { folder, source }.into())
+        }
+        summary if output.json => {
+            let summary = summary?;
+            let page = write_report(&summary.out)?.html;
+            print_json(command, findings(&summary.out, &page)?)?;
+            tell_failures(&summary, options.lenient)
+        }
+        summary => tell(&summary?, quiet, options.lenient),
     }
 }
 

@@ -1,26 +1,23 @@
 //! `raystone stress`.
 
-use super::arguments::{DeviceArguments, warn_of};
-use super::failure::FAILED;
+use super::arguments::{DeviceArguments, ValueArguments, list_override, plan, warn_of};
 use super::faults::plant_faults;
-use super::output::{OutputArguments, print, print_json, screen, tell};
+use super::output::OutputArguments;
+use super::run::carry_out;
 use anyhow::Result;
 use clap::Args;
-use raystone::measure::record::Verdict;
-use raystone::run::{Registries, lock_folder};
+use raystone::config::expect::Thesis;
+use raystone::config::{Experiment, STRESS};
+use raystone::run::Existing;
 use raystone::scene::named;
-use raystone::stress::record::{Line, Record, write};
-use raystone::stress::report::{stress_tables, write_stress_page};
-use raystone::stress::{StressOptions, run};
-use serde_json::json;
+use raystone::stress::EXPERIMENT;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 /// Run the numerical stress suite: every triangle test and structure on what rounding makes hard
 ///
-/// Prints tables, writes stress.jsonl and a page with pictures, and ends with 1 if the default
-/// configuration misses a target.
+/// Short for `raystone run experiments/stress.toml`, which is built in: writes records and a page, prints tables and targets,
+/// and ends with 1 if the default configuration misses one.
 #[derive(Args)]
 pub struct Stress {
     /// Few rungs and shots: a minute at most
@@ -37,13 +34,13 @@ pub struct Stress {
     family: Vec<String>,
     /// Rays per case [default: 512, quick 128]
     #[arg(long, value_name = "N")]
-    rays: Option<usize>,
+    rays: Option<u32>,
     /// Shots at each closed mesh, 0 for none [default: 1000000, quick 16384]
     #[arg(long, value_name = "N")]
-    shots: Option<usize>,
+    shots: Option<u32>,
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    seed: u32,
     /// A model to shoot at from inside, its holes closed [default: none]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -59,6 +56,9 @@ pub struct Stress {
     output: OutputArguments,
 }
 
+/// What messages call the experiment.
+const FILE: &str = "experiments/stress.toml";
+
 impl Stress {
     pub fn execute(self) -> Result<ExitCode> {
         if self.mutants {
@@ -68,53 +68,63 @@ impl Stress {
             // A model that was asked for has to be there; the default one may be missing.
             warn_of(&named(&model.to_string_lossy())?);
         }
-        let settings = self.settings();
-        settings.check()?;
-        let _lock = lock_folder(&self.out)?;
-        let registries = Registries::default();
-        let mut gpus = vec![self.device.open(&registries)?];
-        // The host does most of the work of a software adapter one thread at a time.
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        if gpus[0].is_software() && cores > 1 {
-            gpus.push(self.device.open(&registries)?);
-        }
-        let start = Instant::now();
-        let progress =
-            |what: &str| tell(&format!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
-        let records = run(&gpus, &settings, &progress)?;
-        write(&self.out, &records)?;
-        let page = write_stress_page(&self.out, &records)?;
-        match self.output.json {
-            true => print_json("stress", json!({ "records": records, "report": page }))?,
-            false => print(&format!(
-                "{}report: {}\n",
-                stress_tables(&records, screen()),
-                page.display()
-            ))?,
-        }
-        Ok(match records.iter().any(is_missed_target) {
-            true => ExitCode::from(FAILED),
-            false => ExitCode::SUCCESS,
-        })
+        let registries = raystone::registries();
+        let overrides = self.overrides()?;
+        let catalogue = registries.catalogue();
+        let experiment = Experiment::parse(EXPERIMENT, FILE, &overrides, &catalogue)?;
+        let plan = plan(&experiment, &[], &registries)?;
+        let values = ValueArguments {
+            set: Vec::new(),
+            allow_outside: false,
+        };
+        let mut options = self.device.options(self.out, &values, false);
+        options.existing = Existing::Replace;
+        carry_out(
+            "stress",
+            &experiment,
+            &plan,
+            &registries,
+            &options,
+            &self.output,
+            false,
+        )
     }
 
-    fn settings(&self) -> StressOptions {
-        let mut settings = StressOptions::new(self.quick);
-        settings.program = raystone::PROGRAM;
-        settings.seed = self.seed;
-        settings.families = self.family.clone();
-        settings.accels = self.accel.clone();
-        settings.triangles = self.triangle.clone();
-        settings.rays = self.rays.unwrap_or(settings.rays);
-        settings.shots = self.shots.unwrap_or(settings.shots);
-        if !self.family.is_empty() && self.shots.is_none() {
-            settings.shots = 0;
+    /// The options, laid over the experiment.
+    fn overrides(&self) -> Result<Vec<String>> {
+        let mut overrides = Vec::from_iter(self.device.kernels_override());
+        if self.quick {
+            overrides.extend(Thesis::parse(EXPERIMENT, FILE)?.unwrap_or_default().quick);
         }
-        settings.model = self.model.clone();
-        settings
+        if !self.triangle.is_empty() {
+            overrides.push(list_override("axes.triangle", &self.triangle));
+        }
+        if !self.accel.is_empty() {
+            let mut accels = vec!["brute-force".to_owned()];
+            accels.extend(
+                self.accel
+                    .iter()
+                    .filter(|name| *name != "brute-force")
+                    .cloned(),
+            );
+            overrides.push(list_override("axes.accel", &accels));
+        }
+        if !self.family.is_empty() {
+            let shots = self
+                .shots
+                .filter(|shots| *shots > 0)
+                .map(|_| "shots".to_owned());
+            let parts = self.family.iter().cloned().chain(shots);
+            let parts: Vec<String> = parts.map(|part| format!("{STRESS}{part}")).collect();
+            overrides.push(list_override("axes.integrator", &parts));
+        }
+        overrides.extend(self.rays.map(|rays| format!("stress.rays={rays}")));
+        overrides.extend(self.shots.map(|shots| format!("stress.shots={shots}")));
+        overrides.push(format!("run.seed={}", self.seed));
+        if let Some(model) = &self.model {
+            let model = toml::Value::from(model.display().to_string());
+            overrides.push(format!("stress.model={model}"));
+        }
+        Ok(overrides)
     }
-}
-
-fn is_missed_target(line: &Line) -> bool {
-    matches!(&line.body, Record::Target(target) if target.verdict == Verdict::Fail)
 }

@@ -41,11 +41,11 @@ macro_rules! axes {
 
 axes! {
     /// Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory.
-    /// Not needed if all integrators are `integrand:*` or `compaction:*`.
+    /// Not needed if all integrators are `integrand:*`, `compaction:*` or `stress:*`.
     Scene = "scene";
-    /// Acceleration structures. Not needed if all integrators are `integrand:*` or `compaction:*`.
+    /// Acceleration structures. Not needed if all integrators are `integrand:*`, `compaction:*` or `stress:*`.
     Accel = "accel";
-    /// Sample sequences. Not needed if all integrators are `compaction:*`.
+    /// Sample sequences. Not needed if all integrators are `compaction:*` or `stress:*`.
     Sequence = "sequence";
     /// How the pixels' sample points are made different.
     Decorrelation = "decorrelation" or "none";

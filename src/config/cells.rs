@@ -22,9 +22,14 @@ pub const COMPACTIONS: &str = "compaction:";
 /// The name on the axis of peers that stands for none.
 pub const NO_PEER: &str = "none";
 
-/// Whether an integrator is a compaction of a stream.
-pub fn is_compaction(integrator: &Variant) -> bool {
-    integrator.name.starts_with(COMPACTIONS)
+/// How names begin on the axis of integrators that are parts of the numerical stress suite, which render nothing either.
+pub const STRESS: &str = "stress:";
+
+/// Whether an integrator renders nothing and needs no scene: it names a measurement of something else.
+pub fn is_bench(integrator: &Variant) -> bool {
+    [COMPACTIONS, STRESS]
+        .iter()
+        .any(|of| integrator.name.starts_with(of))
 }
 
 /// What stands on an axis that does not matter.
@@ -71,8 +76,9 @@ impl Cell {
         Axis::Workgroup,
         Axis::Kernels,
     ];
-    /// What the compaction of a stream depends on.
-    pub(crate) const COMPACTION: [Axis; 2] = [Axis::Integrator, Axis::Kernels];
+    /// What may matter to a measurement that needs no scene.
+    pub(crate) const BENCH: [Axis; 4] =
+        [Axis::Integrator, Axis::Kernels, Axis::Triangle, Axis::Accel];
     /// What the words that a sampler draws depend on.
     pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
     /// What is loaded, uploaded and judged once for all cells on it.

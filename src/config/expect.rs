@@ -1,8 +1,9 @@
 //! What an experiment should show: the numbers and claims of a thesis, beside the experiment that tests them.
 //!
-//! An experiment file of a thesis has more sections, which a plain run passes over: `[thesis]` says what is
+//! An experiment file of a thesis has more sections, which change nothing that is measured: `[thesis]` says what is
 //! reproduced, `[[substitute]]` which scene stands for which, `[[expect]]` what is claimed, `[quick]` what a short run
-//! changes, `[software]` what a whole run on a software adapter does. docs/repro.md describes them.
+//! changes, `[software]` what a whole run on a software adapter does. docs/repro.md describes them. Without `[thesis]`,
+//! `[[expect]]` says what the experiment itself promises: its targets, which are checks of every run.
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
@@ -15,10 +16,10 @@ use std::sync::Arc;
 const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "software"];
 
 /// What a thesis printed, and how the experiment tests it.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thesis {
-    /// What is reproduced.
+    /// What is reproduced; empty where an experiment has targets of its own.
     pub title: String,
     /// Stem of the digest's file, for instance `dufay-2017`.
     pub source: String,
@@ -205,19 +206,16 @@ struct Changes {
 }
 
 impl Thesis {
-    /// Reads these sections of an experiment; `None` without `[thesis]`.
+    /// Reads these sections of an experiment; `None` without `[thesis]` and `[[expect]]`.
     ///
     /// # Errors
     /// An unknown key (with the nearest known one), a wrong type, an expectation that cannot be judged.
     pub fn parse(text: &str, file: &str) -> Result<Option<Self>, ConfigError> {
         let parsed: File = toml::from_str(text).map_err(|error| fault(text, file, &error))?;
-        let Some(mut thesis) = parsed.thesis else {
-            if parsed.expect.is_empty() {
-                return Ok(None);
-            }
-            let problem = "[[expect]] without [thesis]: say of what, with `title` and `source`";
-            return Err(refused(file, problem.to_owned()));
-        };
+        if parsed.thesis.is_none() && parsed.expect.is_empty() {
+            return Ok(None);
+        }
+        let mut thesis = parsed.thesis.unwrap_or_default();
         thesis.substitutes = parsed.substitute;
         thesis.expects = parsed.expect;
         thesis.quick = parsed.quick.set;
@@ -384,7 +382,12 @@ mod tests {
             "{HEAD}{ITEM}within = 1.1\nat = [{{ row = \"x\" }}]\n"
         ));
         assert!(within.contains("`thesis`"), "{within}");
-        assert!(complaint(ITEM).contains("[thesis]"));
+        let target = Thesis::parse(&format!("{ITEM}most = 1.0\n"), "x");
+        assert!(
+            target
+                .expect("a target")
+                .is_some_and(|t| t.title.is_empty())
+        );
         assert!(
             Thesis::parse("[run]\nname = \"x\"\n", "x")
                 .expect("none")

@@ -6,7 +6,7 @@
 
 use super::ConfigError;
 use super::axis::Axis;
-use super::cells::{Cell, NO_PEER, is_compaction};
+use super::cells::{Cell, NO_PEER, is_bench};
 use super::experiment::Experiment;
 use super::pattern::Selector;
 use super::product::{
@@ -44,8 +44,8 @@ pub struct Plan {
     pub peers: Vec<Cell>,
     /// Streams whose discrepancy is measured: see [`Cell::STREAM`].
     pub streams: Vec<Cell>,
-    /// Compactions of streams that are judged and timed: see `COMPACTION`.
-    pub compactions: Vec<Cell>,
+    /// What is measured without a scene, compactions of streams and the stress suite, on all axes that may matter to it.
+    pub benches: Vec<Cell>,
     /// What is left out.
     pub skipped: Vec<Skipped>,
     /// Seeds that the error of a randomised sampler is measured with.
@@ -93,7 +93,7 @@ impl Plan {
         let mut wanted = full;
         wanted.retain(|point| is_wanted(experiment, &filter, point));
         let refused = refused(&wanted, &is_randomised);
-        let renders = !axes[Axis::Integrator].iter().all(is_compaction);
+        let renders = !axes[Axis::Integrator].iter().all(is_bench);
         let cells = |which: &[Axis]| -> Vec<Cell> {
             let mut points = product(&variants, which);
             points.retain(|point| {
@@ -104,11 +104,11 @@ impl Plan {
         // Cells that render, and those of the axes that all integrators share if some do.
         let rendering = |which: &[Axis]| -> Vec<Cell> {
             let mut cells = cells(which);
-            cells.retain(|cell| renders && !is_compaction(&cell[Axis::Integrator]));
+            cells.retain(|cell| renders && !is_bench(&cell[Axis::Integrator]));
             cells
         };
-        let mut compactions = cells(&Cell::COMPACTION);
-        compactions.retain(|cell| is_compaction(&cell[Axis::Integrator]));
+        let mut benches = cells(&Cell::BENCH);
+        benches.retain(|cell| is_bench(&cell[Axis::Integrator]));
         let mut peers = rendering(&Cell::PEER);
         peers.retain(|cell| cell[Axis::Peer].name != NO_PEER);
         let structures = rendering(&Cell::STRUCTURE);
@@ -123,7 +123,7 @@ impl Plan {
             times: rendering(&Cell::FULL),
             peers,
             streams: rendering(&Cell::STREAM),
-            compactions,
+            benches,
             structures,
             samplers,
             kernels: Vec::new(),
@@ -141,20 +141,20 @@ impl Plan {
         refused: Vec<Skipped>,
         only: &[String],
     ) -> Result<Self, ConfigError> {
-        let users = [&self.structures[..], &self.streams, &self.compactions];
+        let users = [&self.structures[..], &self.streams, &self.benches];
         self.kernels = needed(&experiment.axes[Axis::Kernels], Axis::Kernels, users);
         let nothing_left = |reason: String| ConfigError::NothingLeft {
             file: experiment.source.clone(),
             reason,
         };
         if let (true, Some(first)) = (
-            self.times.is_empty() && self.compactions.is_empty(),
+            self.times.is_empty() && self.benches.is_empty(),
             refused.first(),
         ) {
             return Err(nothing_left(first.reason.clone()));
         }
         self.skipped.extend(refused);
-        if self.structures.is_empty() && self.compactions.is_empty() {
+        if self.structures.is_empty() && self.benches.is_empty() {
             let filters = if only.is_empty() { "" } else { " and --only" };
             return Err(nothing_left(format!(
                 "the excludes{filters} leave no scene with a structure"
@@ -192,6 +192,13 @@ impl Plan {
             }
         }
         worlds
+    }
+
+    /// What is measured without a scene, on the axes alone that matter to it: each cell once.
+    pub fn benches_on(&self, axes: &[Axis]) -> Vec<Cell> {
+        let mut known = HashSet::new();
+        let cells = self.benches.iter().map(|cell| cell.on(axes));
+        cells.filter(|cell| known.insert(cell.identity())).collect()
     }
 
     /// All cells on these axes of `part`, left out for this reason.
@@ -243,14 +250,12 @@ impl Plan {
         for cell in &self.streams {
             writeln!(text, "  {cell}")?;
         }
-        if !self.compactions.is_empty() {
-            writeln!(
-                text,
-                "{} compactions to judge and time:",
-                self.compactions.len()
-            )?;
+        let axes = [Axis::Integrator, Axis::Kernels];
+        let benches = self.benches_on(&axes);
+        if !benches.is_empty() {
+            writeln!(text, "{} things to measure without a scene:", benches.len())?;
         }
-        for cell in &self.compactions {
+        for cell in &benches {
             writeln!(text, "  {cell}")?;
         }
         for skipped in &self.skipped {

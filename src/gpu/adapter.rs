@@ -284,6 +284,17 @@ impl Gpu {
         }
     }
 
+    /// Another device of the same adapter, with the same kernels: modules count for both, see [`Gpu::take_modules`].
+    ///
+    /// # Errors
+    /// As for [`open`].
+    pub fn twin(&self, choice: &AdapterChoice) -> Result<Self, GpuError> {
+        Ok(Self {
+            used: Arc::clone(&self.used),
+            ..open(choice, self.kernels.clone())?
+        })
+    }
+
     /// The same device, but it compiles every kernel this many times, and each kernel library
     /// separately even for equal texts: measurements then include the random differences between
     /// compilations of the same text.

@@ -266,18 +266,33 @@ figures! {
     NOT_NEAREST = "not-nearest/v1", "not nearest", "", Lower, Count, Exact;
     BORDERLINE = "borderline/v1", "borderline", "", Neither, Count, Exact;
     DIFFERING = "differing/v1", "differing from brute force", "", Lower, Count, Exact;
+    UNEQUAL = "unequal/v1", "closest and any hits that differ from brute force", "", Lower, Count, Exact;
     ANY_DIFFERING = "any-differing/v1", "any hits differing from brute force", "", Lower, Count, Exact;
     TIES = "ties/v1", "ties", "", Neither, Count, Exact;
     SLOWDOWN = "slowdown/v1", "slowdown", "", Lower, THREE, Single;
+    FAILED_CASES = "failed-cases/v1", "failed", "", Lower, Count, Exact;
+    T_ULP_MEDIAN = "t-ulp-median/v1", "median of the error of t", "ulp", Lower, Digits(2), Exact;
     T_ULP_P99 = "t-ulp-p99/v1", "99th percentile of the error of t", "ulp", Lower, Digits(2), Exact;
+    T_ULP_MOST = "t-ulp-most/v1", "greatest error of t", "ulp", Lower, Digits(2), Exact;
+    T_MEDIAN = "t-median/v1", "median of the relative error of t", "", Lower, Digits(2), Exact;
+    T_P99 = "t-p99/v1", "99th percentile of the relative error of t", "", Lower, Digits(2), Exact;
+    T_MOST = "t-most/v1", "greatest relative error of t", "", Lower, Digits(2), Exact;
+    POINT_ULP_MEDIAN = "point-ulp-median/v1", "median of the error of the point", "ulp", Lower, Digits(2), Exact;
     POINT_ULP_P99 = "point-ulp-p99/v1", "99th percentile of the error of the point", "ulp", Lower, Digits(2), Exact;
+    POINT_ULP_MOST = "point-ulp-most/v1", "greatest error of the point", "ulp", Lower, Digits(2), Exact;
+    POINT_MEDIAN = "point-median/v1", "median of the relative error of the point", "", Lower, Digits(2), Exact;
+    POINT_P99 = "point-p99/v1", "99th percentile of the relative error of the point", "", Lower, Digits(2), Exact;
+    POINT_MOST = "point-most/v1", "greatest relative error of the point", "", Lower, Digits(2), Exact;
     TRIANGLES = "triangles/v1", "triangles", "", Neither, Count, Exact;
     MISSES = "misses/v1", "misses", "", Lower, Count, Exact;
+    MISS_SHARE = "miss-share/v1", "share of misses", "", Lower, THREE, Exact;
     CONFIRMED_MISSES = "confirmed-misses/v1", "confirmed misses", "", Lower, Count, Exact;
     LOST_HITS = "lost-hits/v1", "lost", "", Lower, Count, Exact;
     PAD_ULPS = "pad-ulps/v1", "pad", "ulp", Neither, Count, Exact;
+    SOUND_PAD = "sound-pad/v1", "smallest pad that loses no hit", "ulp", Lower, THREE, Exact;
     SELF_INTERSECTIONS = "self-intersections/v1", "self-intersections", "", Lower, Count, Exact;
     LEAKS = "leaks/v1", "leaks", "", Lower, Count, Exact;
+    BAD_BEGINS = "bad-begins/v1", "self-intersections and leaks", "", Lower, Count, Exact;
     FARTHEST_BEGIN = "farthest-begin/v1", "farthest begin", "bounds of the point's error", Lower, THREE, Exact;
     TEST_BYTES = "test-bytes/v1", "bytes", "", Lower, Count, Exact;
     NS_PER_TEST = "ns-per-test/v1", "ns per test", "", Lower, THREE, Single;
@@ -285,6 +300,7 @@ figures! {
     TESTS_PER_RAY = "tests-per-ray/v1", "tests per ray", "", Lower, THREE, Exact;
     NUMERICS = "numerics/v1", "value", "", Lower, THREE, Single;
     ALARM = "alarm/v1", "alarm", "", Neither, THREE, Exact;
+    ALARMS = "alarms/v1", "figures beyond their alarm level", "", Lower, Count, Exact;
 }
 
 /// The figure of this program with this id.

@@ -34,8 +34,6 @@ pub mod axis {
     pub const PEER: &str = Axis::Peer.name();
     /// In which workgroups kernels trace; absent where none does.
     pub const WORKGROUP: &str = Axis::Workgroup.name();
-    /// Family of hard scenes and rays.
-    pub const FAMILY: &str = "family";
     /// Mesh that is shot at.
     pub const MESH: &str = "mesh";
     /// Scale and translation of a mesh.
@@ -53,7 +51,7 @@ pub mod axis {
     /// Any other thing that figures are of.
     pub const SUBJECT: &str = "subject";
     /// All of them.
-    pub const ALL: [&str; 21] = [
+    pub const ALL: [&str; 20] = [
         SCENE,
         ACCEL,
         INTEGRATOR,
@@ -66,7 +64,6 @@ pub mod axis {
         ORGANISATION,
         PEER,
         WORKGROUP,
-        FAMILY,
         MESH,
         PLACE,
         AIM,

@@ -32,10 +32,9 @@ pub use paths::PathsRecord;
 pub use peer::{PeerRecord, PeerTiming};
 pub use pictures::{IMAGE_AXES, Pictures, SPREAD};
 pub use read::{
-    PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
-    records_file, text_of,
+    PARTIAL, RECORDS_FILE, RecordError, Records, read_lines, read_records, records_file, text_of,
 };
-pub use reading::{MeasuredRecord, Reading, Samples};
+pub use reading::{MeasuredRecord, Note, Reading, Samples};
 pub use run::*;
 pub use sound::{Sound, fault_of};
 pub use stream::*;

@@ -74,6 +74,7 @@ impl Compaction {
         let measured = MeasuredRecord {
             measurement: "compaction".to_owned(),
             failure: self.failure,
+            notes: Vec::new(),
         };
         (measured, readings)
     }
@@ -125,7 +126,7 @@ impl SamplerCost {
     fn measured(self) -> (MeasuredRecord, Vec<Reading>) {
         let measured = MeasuredRecord {
             measurement: "sampler-cost".to_owned(),
-            failure: None,
+            ..MeasuredRecord::default()
         };
         let readings = [
             Reading::new(&figure::NS_PER_SAMPLE, self.ns_per_sample),

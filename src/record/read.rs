@@ -17,9 +17,6 @@ const PACKED_FILE: &str = "records.jsonl.gz";
 /// The first bytes of what gzip packed (RFC 1952).
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// Name of the records in the folder of the stress suite.
-pub const STRESS_FILE: &str = "stress.jsonl";
-
 /// Folder, below that of a run, that holds records and images until the run ends; what a killed run
 /// leaves.
 pub const PARTIAL: &str = "partial";

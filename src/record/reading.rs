@@ -115,4 +115,19 @@ pub struct MeasuredRecord {
     /// Why there are no readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
+    /// What figures cannot say.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<Note>,
+}
+
+/// Something that was found, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Note {
+    /// What it is of beyond the key of its line.
+    #[serde(default, skip_serializing_if = "Key::is_empty")]
+    pub at: Key,
+    /// What kind of thing it is.
+    pub what: String,
+    /// The words: a reason, or a command that shows it.
+    pub text: String,
 }

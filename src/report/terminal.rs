@@ -4,8 +4,8 @@ use super::data::RunData;
 use super::document::{Check, Table, TableCell, Tone};
 use super::samplers::Metric;
 use super::sections::{
-    animation, belief, compactions, kernels, measured, rendering, run, samplers, structures,
-    verdict,
+    animation, belief, compactions, kernels, measured, rendering, run, samplers, stress,
+    structures, verdict,
 };
 use super::values::{of_structures, of_view};
 use raystone_core::text::escape::visible;
@@ -138,6 +138,7 @@ fn tables(data: &RunData) -> Vec<Table> {
     let values = compactions::values(data);
     tables.push(compactions::growth_table(data, &values));
     tables.push(compactions::table(data, &values));
+    tables.extend(stress::tables(data));
     tables.extend(measured::tables(data));
     tables
 }

@@ -1,22 +1,25 @@
 //! Box tests, ray offsets and the cost of triangle tests.
 
-use super::StressError;
-use super::bench::{self, Expected};
-use super::case::{self};
+use super::bench::Expected;
+use super::case;
 use super::families::Family;
+use super::measurement::{Results, Scope};
 use super::placement::Placement;
-use super::record::{Findings, Line, Record, Worst, line};
 use super::shapes::{Mesh, cube, sphere};
-use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
+use super::suite::{BRUTE_FORCE, Kind, PLAIN, Suite};
+use super::tally::Worst;
+use super::{Found, StressError};
 use glam::Vec3;
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{
     BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
     Query, Ray, RayBatch, Traced, TriangleSoup,
 };
+use raystone_config::{Axis, Cell};
+use raystone_core::params::Variant;
 use raystone_core::random::Pcg32;
 use raystone_gpu::Gpu;
-use raystone_record::figure;
+use raystone_record::figure::{self, Figure};
 use raystone_record::{Key, axis};
 use raystone_render::offset::{TransformError, position_error};
 use raystone_render::{OffsetRegistry, RayOffset, Stage};
@@ -49,76 +52,154 @@ const COST_ROUNDS: usize = 5;
 /// The test that costs are compared with.
 const PLAIN_TEST: &str = "moeller-trumbore";
 
-impl Suite<'_> {
-    /// How many hits each box test loses, with the default triangle test.
-    ///
-    /// # Errors
-    /// The device is lost or hangs.
-    pub(crate) fn box_tests(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
-        progress("box tests");
-        let structures = match self.settings.quick {
-            true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
-            false => &BOX_STRUCTURES[..],
-        };
-        let column = || BoxTest::ALL.iter().map(|test| empty_record(*test));
-        let mut columns: Vec<(Kind, Vec<Findings>)> = (self.kinds.iter())
-            .filter(|kind| structures.contains(&kind.name()))
-            .map(|kind| (*kind, column().collect()))
-            .collect();
-        for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
-            let settings = self.settings;
-            for case in family.cases(settings.seed, true, BOX_RAYS * settings.rays) {
-                let soup = TriangleSoup::new(&case.scene);
-                let expected = Expected::new(&soup, &case.rays);
-                self.on_devices(&mut columns, |gpu, (kind, column)| {
-                    self.box_case(gpu, &case, &expected, *kind, column)
-                })?;
-            }
-        }
-        let mut lines = Vec::new();
-        for (place, test) in BoxTest::ALL.iter().enumerate() {
-            for (kind, column) in &columns {
-                let key = Key::default().with(axis::BOX_TEST, test.name);
-                let key = key.with(axis::ACCEL, kind.name());
-                lines.push(line(key, Record::BoxTest(column[place].clone())));
-            }
-        }
-        Ok(lines)
-    }
+/// Whether the box tests are tried through the structure of a cell.
+pub(crate) fn has_box_tests(scope: &Scope, cell: &Cell) -> bool {
+    let most = (scope.settings).either([BOX_STRUCTURES.len(), BOX_STRUCTURES_IF_QUICK]);
+    BOX_STRUCTURES[..most].contains(&&*cell[Axis::Accel].name)
+}
 
+/// What a box test loses.
+#[derive(Clone, Default)]
+struct Lost {
+    rays: usize,
+    hits: usize,
+    worst: Option<Worst>,
+}
+
+/// How many hits each box test loses, with the default triangle test.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub(crate) fn box_tests(suite: &Suite, cells: &[Cell]) -> Results {
+    let column = |cell| Ok((suite.kind(cell)?, vec![Lost::default(); BoxTest::ALL.len()]));
+    let columns = cells.iter().map(column);
+    let mut columns = columns.collect::<Result<Vec<_>, StressError>>()?;
+    let rays = BOX_RAYS * suite.scope.settings.rays_of_a_case();
+    for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
+        for case in family.cases(suite.seed, true, rays) {
+            let soup = TriangleSoup::new(&case.scene);
+            let expected = Expected::new(&soup, &case.rays);
+            suite.on_devices(&mut columns, |gpu, (kind, column)| {
+                suite.box_case(gpu, &case, &expected, *kind, column)
+            })?;
+        }
+    }
+    Ok(columns
+        .into_iter()
+        .map(|(_, column)| losses(column))
+        .collect())
+}
+
+/// What the box tests lose through one structure. Without a pad and a finite reciprocal, what WGSL leaves open decides.
+fn losses(column: Vec<Lost>) -> Found {
+    let mut found = Found::default();
+    let tests = || BoxTest::ALL.iter().zip(&column);
+    let padded = tests().filter(|(test, _)| test.name != "plain");
+    let padded = padded.map(|(test, lost)| [test.pad_ulps as usize, lost.hits]);
+    let pad = smallest_sound_pad(padded).map_or(f64::MAX, |pad| pad as f64);
+    found.add(&Key::default(), [(&figure::SOUND_PAD, pad)]);
+    for (test, lost) in tests() {
+        let at = Key::default().with(axis::BOX_TEST, test.name);
+        let counts = [
+            (&figure::PAD_ULPS, f64::from(test.pad_ulps)),
+            (&figure::RAYS, lost.rays as f64),
+            (&figure::LOST_HITS, lost.hits as f64),
+        ];
+        found.add(&at, counts);
+        found.look_at(&at, lost.worst.clone());
+    }
+    found
+}
+
+/// What each offset does to chains of mirror bounces in closed meshes, by the twins on the host.
+///
+/// # Errors
+/// The tree cannot be built, in words.
+pub(crate) fn offsets(suite: &Suite, cells: &[Cell]) -> Results {
+    let mut found = Found::default();
+    let rays = OFFSET_RAYS * suite.scope.settings.rays_of_a_case();
+    let places = [1e-6, 1.0, 1e6].map(|scale| Placement { scale, shift: 0.0 });
+    for place in places.into_iter().chain([
+        Placement {
+            scale: 1.0,
+            shift: 1e4,
+        },
+        Placement::FAR,
+    ]) {
+        for (name, mesh) in closed_meshes(&place) {
+            for &offset in OffsetRegistry::default().iter() {
+                let triangle = Intersection::default().triangle.name();
+                let at = Key::default().with(axis::OFFSET, offset.name);
+                let at = at.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
+                let at = at.with(axis::PLACE, place);
+                found.add(&at, bounce(&mesh, offset, suite.seed, rays)?);
+            }
+        }
+    }
+    Ok(vec![found; cells.len()])
+}
+
+/// What triangle tests cost, alone and in a traversal, by rounds in turns.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub(crate) fn costs(suite: &Suite, cells: &[Cell]) -> Results {
+    let tests = cells.iter().map(|cell| suite.test(cell));
+    let tests = tests.collect::<Result<Vec<_>, _>>()?;
+    let all = suite.times(&tests, BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
+    let some = suite.times(&tests, PLAIN, COST_BANDS.1, COST_RAYS.1)?;
+    let plain_ms = (tests.iter().zip(&some))
+        .find(|(test, _)| test.name() == PLAIN_TEST)
+        .map(|(_, timed)| timed.ms);
+    let found = |((test, all), some): ((&AnyTriangleTest, &Timed), &Timed)| {
+        let mut found = Found::default();
+        let at = Key::default();
+        let ns = all.ms * 1e6 / (all.tests_per_ray * all.rays as f64);
+        let figures = [
+            (&figure::TEST_BYTES, f64::from(test.bytes())),
+            (&figure::NS_PER_TEST, ns),
+            (&figure::TESTS_PER_RAY, some.tests_per_ray),
+        ];
+        found.add(&at, figures);
+        let ratio = plain_ms.map(|plain| (&figure::TRAVERSAL_RATIO, some.ms / plain));
+        found.add(&at, ratio);
+        found
+    };
+    Ok(tests.iter().zip(&all).zip(&some).map(found).collect())
+}
+
+impl Suite<'_> {
     fn box_case(
         &self,
         gpu: &Gpu,
         case: &case::Case,
         expected: &Expected,
         kind: Kind,
-        column: &mut [Findings],
+        column: &mut [Lost],
     ) -> Result<(), StressError> {
         let mut stage = Stage::new(gpu, case.scene.clone(), Intersection::default())?;
-        let Ok(built) = bench::build(kind, &stage.soup) else {
+        let Ok(built) = kind.build(&stage.soup) else {
             return Ok(());
         };
         let traced = Traced::upload(&stage.gpu, &*built)?;
-        for (box_test, record) in BoxTest::ALL.iter().zip(column) {
+        for (box_test, sum) in BoxTest::ALL.iter().zip(column) {
             stage.set_tests(Intersection {
                 box_test: *box_test,
                 ..Intersection::default()
             });
             let found = stage.closest(&traced, &case.rays)?;
-            record.add(&figure::RAYS, case.rays.len() as f64);
+            sum.rays += case.rays.len();
             let pairs = found.answers.iter().zip(expected.of(built.space()));
             let lost = pairs
                 .enumerate()
                 .filter(|(_, (hit, truth))| !hit.same_bits(truth));
             for (index, _) in lost {
-                record.add(&figure::LOST_HITS, 1.0);
-                record.worst.get_or_insert_with(|| {
+                sum.hits += 1;
+                sum.worst.get_or_insert_with(|| {
                     let test = Intersection::default().triangle;
-                    let replay = self.replay(
-                        [case.family, &case.label],
-                        [kind.name(), test.name()],
-                        &case.rays[index],
-                    );
+                    let names = [kind.label(), test.name()];
+                    let ray = &case.rays[index];
+                    let replay = self.replay([case.family, &case.label], names, ray);
                     Worst {
                         what: "lost hit".into(),
                         replay: format!("{replay} --box-test {}", box_test.name),
@@ -129,82 +210,24 @@ impl Suite<'_> {
         Ok(())
     }
 
-    /// What each offset does to chains of mirror bounces in closed meshes, by the twins on the host.
-    ///
-    /// # Errors
-    /// The tree cannot be built, in words.
-    pub(crate) fn offsets(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
-        progress("ray offsets");
-        let mut records = Vec::new();
-        let rays = OFFSET_RAYS * self.settings.rays;
-        let places = [1e-6, 1.0, 1e6].map(|scale| Placement { scale, shift: 0.0 });
-        for place in places.into_iter().chain([
-            Placement {
-                scale: 1.0,
-                shift: 1e4,
-            },
-            Placement::FAR,
-        ]) {
-            for (name, mesh) in closed_meshes(&place) {
-                for &offset in OffsetRegistry::default().iter() {
-                    let found = bounce(&mesh, offset, self.settings.seed, rays)?;
-                    let triangle = Intersection::default().triangle.name();
-                    let key = Key::default().with(axis::OFFSET, offset.name);
-                    let key = key.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
-                    let key = key.with(axis::PLACE, place);
-                    records.push(line(key, Record::Offset(found)));
-                }
-            }
-        }
-        Ok(records)
-    }
-
-    /// What triangle tests cost, alone and in a traversal, by rounds in turns.
-    ///
-    /// # Errors
-    /// The device is lost or hangs.
-    pub(crate) fn costs(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
-        progress("cost of triangle tests");
-        let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
-        let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
-        let plain = some.iter().find(|t| t.test.name() == PLAIN_TEST);
-        let plain_ms = plain.map_or(f64::NAN, |t| t.ms);
-        let pairs = all.iter().zip(&some);
-        let record = |(all, some): (&Timed, &Timed)| {
-            let found = Findings::of([
-                (&figure::TEST_BYTES, f64::from(all.test.bytes())),
-                (
-                    &figure::NS_PER_TEST,
-                    all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
-                ),
-                (&figure::TRAVERSAL_RATIO, some.ms / plain_ms),
-                (&figure::TESTS_PER_RAY, some.tests_per_ray),
-            ]);
-            let key = Key::default().with(axis::TRIANGLE, all.test.name());
-            line(key, Record::Cost(found))
-        };
-        Ok(match plain_ms.is_nan() {
-            true => Vec::new(),
-            false => pairs.map(record).collect(),
-        })
-    }
-
     /// Least time of each triangle test through a structure over a sphere.
-    fn times(&self, accel: &str, bands: usize, count: usize) -> Result<Vec<Timed>, StressError> {
+    fn times(
+        &self,
+        tests: &[AnyTriangleTest],
+        accel: &str,
+        bands: usize,
+        count: usize,
+    ) -> Result<Vec<Timed>, StressError> {
         let scene = Arc::new(case::scene(sphere(bands, &Placement::ORDINARY), None));
-        let registry = raystone_accel::AccelRegistry::default();
-        let Some(kind) = registry.get(accel) else {
-            return Ok(Vec::new());
-        };
-        let mut random = Pcg32::with_stream(self.settings.seed, 79);
+        let cell = Cell::default().with(Axis::Accel, &Variant::plain(accel));
+        let kind = self.kind(&cell)?;
+        let mut random = Pcg32::with_stream(self.seed, 79);
         let mut one = || Ray::new(random.in_cube().as_vec3(), random.direction().as_vec3());
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
         let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
-        for test in &self.tests {
+        for test in tests {
             let stage = Stage::new(self.gpu(), Arc::clone(&scene), Self::with(*test))?;
-            let Ok(built) = bench::build(kind, &stage.soup) else {
-                continue;
-            };
+            let built = kind.build(&stage.soup).map_err(StressError::Unknown)?;
             let traced = Traced::upload(&stage.gpu, &*built)?;
             let work = stage.count_work(&traced, Query::Closest, &rays)?;
             let work = work.unwrap_or_default();
@@ -216,7 +239,6 @@ impl Suite<'_> {
                 tests
             };
             let timed = Timed {
-                test: *test,
                 ms: f64::INFINITY,
                 tests_per_ray: tests as f64 / count as f64,
                 rays: count,
@@ -236,29 +258,15 @@ impl Suite<'_> {
 
 /// A triangle test that was timed.
 struct Timed {
-    test: AnyTriangleTest,
     ms: f64,
     tests_per_ray: f64,
     rays: usize,
 }
 
-fn empty_record(test: BoxTest) -> Findings {
-    let pad = f64::from(test.pad_ulps);
-    Findings::of([
-        (&figure::PAD_ULPS, pad),
-        (&figure::RAYS, 0.0),
-        (&figure::LOST_HITS, 0.0),
-    ])
-}
-
-/// The smallest pad that loses no hit, nor does any greater one.
-pub(crate) fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Option<usize> {
-    let padded: Vec<[usize; 2]> = tests
-        .map(|t| [&figure::PAD_ULPS, &figure::LOST_HITS].map(|id| t.count(id)))
-        .collect();
-    let lossy = padded.iter().filter(|t| t[1] > 0).map(|t| t[0]).max();
-    let sound = padded.iter().map(|t| t[0]);
-    sound.filter(|pad| Some(*pad) > lossy).min()
+/// The smallest pad that loses no hit, nor does any greater one; each pad is beside the hits that it loses.
+fn smallest_sound_pad(padded: impl Iterator<Item = [usize; 2]> + Clone) -> Option<usize> {
+    let lossy = padded.clone().filter(|t| t[1] > 0).map(|t| t[0]).max();
+    padded.map(|t| t[0]).filter(|pad| Some(*pad) > lossy).min()
 }
 
 /// A sphere, a box, the box with faces in the planes of the axes, where coordinates are 0, and that one
@@ -286,7 +294,12 @@ fn closed_meshes(place: &Placement) -> [(&'static str, Mesh); 4] {
 
 /// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
 /// closed mesh cannot be left: chains that do either begin anew.
-fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Findings, StressError> {
+fn bounce(
+    mesh: &Mesh,
+    offset: RayOffset,
+    seed: u64,
+    rays: usize,
+) -> Result<[(&'static Figure, f64); 5], StressError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
     let built = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default())?;
     let twin = built.twin(&soup);
@@ -316,12 +329,13 @@ fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Find
             next = mirrored;
         }
     }
-    Ok(Findings::of([
+    Ok([
         (&figure::RAYS, traced as f64),
         (&figure::SELF_INTERSECTIONS, f64::from(self_intersections)),
         (&figure::LEAKS, f64::from(leaks)),
+        (&figure::BAD_BEGINS, f64::from(self_intersections + leaks)),
         (&figure::FARTHEST_BEGIN, farthest),
-    ]))
+    ])
 }
 
 /// The mirrored ray, begun as integrators begin it, and how many bounds of the point's error it was moved;
@@ -358,23 +372,22 @@ mod tests {
         for (name, mesh) in closed_meshes(&Placement::ORDINARY) {
             let count = |offset: RayOffset| {
                 let found = bounce(&mesh, offset, 1, 3000).unwrap();
-                found.count(&figure::SELF_INTERSECTIONS) + found.count(&figure::LEAKS)
+                let bad = found.iter().find(|(id, _)| id.id == figure::BAD_BEGINS.id);
+                bad.unwrap().1
             };
             let none = count(offset::NONE);
-            assert!(none > 30, "{name}: {none:?}");
-            assert_eq!(count(offset::ERROR_BOUND), 0, "{name}");
+            assert!(none > 30.0, "{name}: {none:?}");
+            assert_eq!(count(offset::ERROR_BOUND), 0.0, "{name}");
         }
     }
 
     #[test]
     fn the_smallest_sound_pad_is_above_every_pad_that_loses_hits() {
-        let test = |pad, lost| Findings::of([(&figure::PAD_ULPS, pad), (&figure::LOST_HITS, lost)]);
-        let mut records = [(0.0, 7.0), (2.0, 0.0), (3.0, 1.0), (4.0, 0.0)]
-            .map(|(pad, lost)| test(pad, lost))
-            .to_vec();
-        assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        records.push(test(16.0, 0.0));
-        assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        assert_eq!(smallest_sound_pad([test(0.0, 1.0)].iter()), None);
+        let smallest = |pads: &[[usize; 2]]| smallest_sound_pad(pads.iter().copied());
+        let mut pads = vec![[0, 7], [2, 0], [3, 1], [4, 0]];
+        assert_eq!(smallest(&pads), Some(4));
+        pads.push([16, 0]);
+        assert_eq!(smallest(&pads), Some(4));
+        assert_eq!(smallest(&[[0, 1]]), None);
     }
 }

@@ -10,21 +10,10 @@ use raystone_core::random::Pcg32;
 use raystone_gpu::{GpuError, kernel_errors};
 use raystone_render::Stage;
 
-/// Builds a structure with its default parameters and checks its invariants.
+/// Builds a structure and checks its invariants.
 ///
 /// # Errors
 /// What it refuses or violates, in words.
-pub(crate) fn build(
-    kind: &dyn AccelKind,
-    soup: &TriangleSoup,
-) -> Result<Box<dyn BuiltAccel>, String> {
-    build_with(kind, &Params::default(), soup)
-}
-
-/// The same with these parameters.
-///
-/// # Errors
-/// As for [`build`].
 pub(crate) fn build_with(
     kind: &dyn AccelKind,
     params: &Params,

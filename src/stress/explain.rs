@@ -137,7 +137,7 @@ mod tests {
         let soup = TriangleSoup::new(&case.scene);
         for kind in AccelRegistry::default().iter() {
             for ray in &case.rays {
-                let built = bench::build(kind, &soup).unwrap();
+                let built = bench::build_with(kind, &Params::default(), &soup).unwrap();
                 let mut counters = Counters::default();
                 let twin = built.cpu_twin(&soup).unwrap();
                 let (_, events) = watch(|| twin.closest_hit(ray, &mut counters));

@@ -1,13 +1,12 @@
 //! Where a mesh stands: the ladder of scales and translations that every swept family climbs.
 
 use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
 /// Direction of translations, by the position of Embree's watertightness test.
 const AWAY: DVec3 = DVec3::new(148_376.0 / 223_423.0, 1234.0 / 223_423.0, -1.0);
 
 /// A scale and a translation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     /// Factor on all coordinates.
     pub scale: f64,

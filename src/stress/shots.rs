@@ -1,15 +1,16 @@
 //! A million shots at closed meshes from inside, where they are modelled and at Embree's far position:
 //! every miss is a crack.
 
-use super::bench;
+use super::measurement::Results;
 use super::placement::Placement;
-use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
-use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
-use super::{StressError, case};
+use super::suite::{Kind, Suite};
+use super::tally::Worst;
+use super::{Found, StressError, bench, case};
 use raystone_accel::oracle::exact_truths;
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{NO_HIT, Ray, Traced};
+use raystone_config::Cell;
 use raystone_record::figure;
 use raystone_record::{Key, axis};
 use raystone_render::Stage;
@@ -20,132 +21,107 @@ const CHUNK: usize = 1 << 17;
 /// Misses that are looked up in the oracle, a series.
 const LOOKED_UP: usize = 64;
 
-impl Suite<'_> {
-    /// Shoots at every mesh, through every structure with the default test and through the plain one
-    /// with the others.
-    ///
-    /// # Errors
-    /// The device is lost or hangs.
-    pub(crate) fn shots(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
-        let mut records = Vec::new();
-        let model = self.settings.model.as_ref();
-        let model = model.map(|path| path.to_string_lossy().into_owned());
-        let model = model.unwrap_or_default();
-        if model.is_empty() {
-            records.push(skipped(
-                Key::default(),
-                "shots at a model".into(),
-                "none was given",
-            ));
-        }
-        for place in [Placement::ORDINARY, Placement::FAR] {
-            for name in [SPHERE, PLANE, &model]
-                .into_iter()
-                .filter(|name| !name.is_empty())
-            {
-                if self.settings.quick && name == model && place != Placement::ORDINARY {
-                    continue;
-                }
-                match ShotMesh::named(name, place, self.settings.seed) {
-                    Ok(target) => self.shoot_at(&target, &mut records, progress)?,
-                    Err(reason) => {
-                        let what = format!("shots at {name}, {place}");
-                        records.push(skipped(Key::default(), what, reason));
+/// What shoots at the meshes, and what came of it.
+type Shooter<'a> = (Kind<'a>, AnyTriangleTest, Found);
+
+/// Shoots at every mesh through the structures of the cells with their triangle tests.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub(crate) fn shots(suite: &Suite, cells: &[Cell]) -> Results {
+    let shooter = |cell| Ok((suite.kind(cell)?, suite.test(cell)?, Found::default()));
+    let shooters = cells.iter().map(shooter);
+    let mut shooters = shooters.collect::<Result<Vec<Shooter>, StressError>>()?;
+    let settings = &suite.scope.settings;
+    let model = settings.model.as_ref();
+    let model = model.map(|path| path.to_string_lossy().into_owned());
+    for place in [Placement::ORDINARY, Placement::FAR] {
+        let model = model.as_deref();
+        let model = model.filter(|_| !settings.quick || place == Placement::ORDINARY);
+        for name in [SPHERE, PLANE].into_iter().chain(model) {
+            match ShotMesh::named(name, place, suite.seed) {
+                Ok(target) => suite.shoot_at(&target, &mut shooters)?,
+                Err(reason) => {
+                    let at = Key::default()
+                        .with(axis::MESH, name)
+                        .with(axis::PLACE, place);
+                    for (.., found) in &mut shooters {
+                        found.note(&at, "left out", &*reason);
                     }
                 }
             }
         }
-        Ok(records)
     }
+    Ok(shooters.into_iter().map(|(.., found)| found).collect())
+}
 
-    fn shoot_at(
-        &self,
-        target: &ShotMesh,
-        records: &mut Vec<Line>,
-        progress: &Progress,
-    ) -> Result<(), StressError> {
+impl Suite<'_> {
+    fn shoot_at(&self, target: &ShotMesh, shooters: &mut [Shooter]) -> Result<(), StressError> {
         let scene = Arc::new(case::scene(target.mesh.clone(), None));
-        let (mesh, place) = (target.short_name(), target.place);
-        let mut series: Vec<(AnyTriangleTest, Kind, Vec<Line>)> = Vec::new();
-        for (row, test) in self.tests.iter().enumerate() {
-            let kinds = self.kinds.iter().filter(|kind| match row {
-                0 => kind.name() != BRUTE_FORCE,
-                _ => kind.name() == PLAIN,
-            });
-            series.extend(kinds.map(|kind| (*test, *kind, Vec::new())));
-        }
-        self.on_devices(&mut series, |gpu, (test, kind, records)| {
-            let name = (test.name(), kind.name());
-            progress(&format!("shots: {mesh}, {place}, {}, {}", name.0, name.1));
+        let at = Key::default().with(axis::MESH, target.short_name());
+        let at = at.with(axis::PLACE, target.place);
+        self.on_devices(shooters, |gpu, (kind, test, found)| {
             let stage = Stage::new(gpu, Arc::clone(&scene), Self::with(*test))?;
-            match bench::build(*kind, &stage.soup) {
+            match kind.build(&stage.soup) {
                 Ok(built) => {
                     let traced = Traced::upload(&stage.gpu, &*built)?;
+                    let names = [kind.label(), test.name()];
                     for (aim, aimed_at) in AIMS.iter().enumerate() {
-                        let series = self.series(target, &stage, &traced, name, aim)?;
-                        let key = key(*test, *kind).with(axis::MESH, mesh);
-                        let key = key.with(axis::PLACE, place).with(axis::AIM, aimed_at);
-                        records.push(line(key, Record::Shots(series)));
+                        let at = at.clone().with(axis::AIM, aimed_at);
+                        self.series(target, (&stage, &traced), names, aim, (&at, found))?;
                     }
                 }
-                Err(reason) => {
-                    let what = format!("{}, {}, {mesh}, {place}", name.0, name.1);
-                    records.push(skipped(Key::default(), what, reason));
-                }
+                Err(reason) => found.note(&at, "left out", reason),
             }
             Ok(())
-        })?;
-        records.extend(series.into_iter().flat_map(|(.., records)| records));
-        Ok(())
+        })
     }
 
-    /// One series: as many shots as the settings want, in chunks.
+    /// One series: as many shots as the settings want, in chunks. Shots that a kernel's error ended tell nothing of the mesh.
     fn series(
         &self,
         target: &ShotMesh,
-        stage: &Stage,
-        traced: &Traced,
-        (triangle, accel): (&str, &str),
+        (stage, traced): (&Stage, &Traced),
+        names: [&str; 2],
         aim: usize,
-    ) -> Result<Findings, StressError> {
+        (at, found): (&Key, &mut Found),
+    ) -> Result<(), StressError> {
         let mut failures = Vec::new();
         let mut looked_up: Vec<Ray> = Vec::new();
         let (mut shot, mut misses, mut chunk) = (0, 0, 0);
-        while shot < self.settings.shots {
-            let count = CHUNK.min(self.settings.shots - shot);
+        let wanted = self.scope.settings.shots_at_a_mesh();
+        while shot < wanted && failures.is_empty() {
+            let count = CHUNK.min(wanted - shot);
             let stream = (aim as u64) << 32 | chunk;
-            let rays = target.shots(aim, self.settings.seed, stream, count);
-            let found = stage.closest(traced, &rays)?;
+            let rays = target.shots(aim, self.seed, stream, count);
+            let traced = stage.closest(traced, &rays)?;
             shot += count;
             chunk += 1;
-            let answers = found.answers.iter().zip(&rays);
+            let answers = traced.answers.iter().zip(&rays);
             let missed: Vec<Ray> = answers
                 .filter(|(hit, _)| hit.triangle == NO_HIT)
                 .map(|(_, ray)| *ray)
                 .collect();
             misses += missed.len();
             looked_up.extend(missed.iter().take(LOOKED_UP - looked_up.len()));
-            failures.extend(bench::error_text(found.errors));
-            if !failures.is_empty() {
-                break;
-            }
+            failures.extend(bench::error_text(traced.errors));
         }
         let truths = exact_truths(&target.mesh, &looked_up);
         let confirmed = truths.iter().filter(|truth| !truth.hits.is_empty()).count();
+        found.add(at, [(&figure::RAYS, shot as f64)]);
+        let counts = [
+            (&figure::TRIANGLES, target.mesh.len() as f64),
+            (&figure::MISSES, misses as f64),
+            (&figure::MISS_SHARE, misses as f64 / shot.max(1) as f64),
+            (&figure::CONFIRMED_MISSES, confirmed as f64),
+        ];
+        found.add(at, counts.into_iter().filter(|_| failures.is_empty()));
+        found.failures(at, failures);
         let worst = looked_up.first().map(|ray| Worst {
             what: format!("crack in the {}", target.label()),
-            replay: self.replay([FAMILY, &target.label()], [accel, triangle], ray),
+            replay: self.replay([FAMILY, &target.label()], names, ray),
         });
-        let counts = [
-            (&figure::TRIANGLES, target.mesh.len()),
-            (&figure::RAYS, shot),
-            (&figure::MISSES, misses),
-            (&figure::CONFIRMED_MISSES, confirmed),
-        ];
-        Ok(Findings {
-            failures,
-            worst,
-            ..Findings::of(counts.map(|(id, count)| (id, count as f64)))
-        })
+        found.look_at(at, worst);
+        Ok(())
     }
 }

@@ -2,81 +2,137 @@
 
 use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth};
-use super::families::{FAMILIES, Family};
+use super::families::Family;
+use super::measurement::{Results, Scope, part_of};
 use super::placement::Placement;
-use super::record::{Findings, Line, Record, Rung, line, skipped};
 use super::tally::{CaseJudge, Outcome, Tally};
-use super::{StressError, StressOptions};
+use super::{Found, StressError};
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
+use raystone_bench::run::Registries;
+use raystone_config::{Axis, Cell};
+use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::figure;
-use raystone_record::{Key, RayClass, axis};
+use raystone_record::{Key, RayClass};
 use raystone_render::Stage;
 use raystone_verify::gate;
 use raystone_verify::rays::RaySet;
-
-/// Is told what is being done, by any thread.
-pub(crate) type Progress<'a> = dyn Fn(&str) + Sync + 'a;
-
-/// A structure under test.
-pub(crate) type Kind = &'static dyn AccelKind;
 
 /// The structure that every other one is compared with.
 pub(crate) const BRUTE_FORCE: &str = "brute-force";
 /// The structure that stands for all where not all are tried.
 pub(crate) const PLAIN: &str = "bvh";
+/// Rays of a timed comparison.
+const TIMED_RAYS: [usize; 2] = [16_384, 8192];
 /// Cases that are timed if it has to be quick.
 const TIMED_IF_QUICK: usize = 3;
 
 /// What the suite runs on and with.
 pub(crate) struct Suite<'a> {
     /// Devices of the adapter, one at least, which work at once where nothing is timed.
-    pub gpus: &'a [Gpu],
+    pub gpus: Vec<Gpu>,
     /// Whether it computes like the host.
     pub exact: bool,
     /// What to do.
-    pub settings: &'a StressOptions,
-    /// Structures, brute force among them if asked for.
-    pub kinds: Vec<Kind>,
-    /// Triangle tests, the default first.
-    pub tests: Vec<AnyTriangleTest>,
+    pub scope: Scope,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Everything that can be named.
+    pub registries: &'a Registries,
 }
 
-/// What everything through a structure with a triangle test has in common.
-pub(super) fn key(test: AnyTriangleTest, kind: Kind) -> Key {
-    let key = Key::default().with(axis::TRIANGLE, test.name());
-    key.with(axis::ACCEL, kind.name())
+/// A structure under test, with its parameters.
+#[derive(Clone, Copy)]
+pub(crate) struct Kind<'a> {
+    accel: &'static dyn AccelKind,
+    variant: &'a Variant,
+}
+
+impl Kind<'_> {
+    /// What it is called, with its parameters.
+    pub(crate) fn label(&self) -> &str {
+        &self.variant.label
+    }
+
+    fn is(&self, name: &str) -> bool {
+        self.variant.name == name
+    }
+
+    /// The structure, valid.
+    ///
+    /// # Errors
+    /// What it refuses or violates, in words.
+    pub(crate) fn build(&self, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
+        bench::build_with(self.accel, &self.variant.params, soup)
+    }
+}
+
+/// Whether any case of a family goes through this structure with this triangle test.
+pub(crate) fn has_cell(scope: &Scope, cell: &Cell) -> bool {
+    scope.leads(cell) || stands_for_all(&cell[Axis::Accel].name) || !scope.settings.quick
+}
+
+fn stands_for_all(accel: &str) -> bool {
+    accel == PLAIN || accel == BRUTE_FORCE
 }
 
 /// A cell while its cases are traced.
-#[derive(Default)]
-struct OpenCell {
+struct OpenCell<'a> {
+    kind: Kind<'a>,
+    test: AnyTriangleTest,
+    /// Whether its test is the one that is tried everywhere.
+    leads: bool,
     tally: Tally,
-    rungs: Vec<Rung>,
     slowdown: Option<f64>,
     failures: Vec<String>,
     asked_any: bool,
+    found: Found,
 }
 
-impl OpenCell {
-    fn findings(self) -> Findings {
-        let mut found = self.tally.findings(self.asked_any);
-        if let Some(slowdown) = self.slowdown {
-            found.add(&figure::SLOWDOWN, slowdown);
-        }
-        Findings {
-            failures: self.failures,
-            rungs: self.rungs,
-            ..found
-        }
+impl<'a> OpenCell<'a> {
+    fn new(suite: &Suite, cell: &'a Cell) -> Result<Self, StressError> {
+        Ok(Self {
+            kind: suite.kind(cell)?,
+            test: suite.test(cell)?,
+            leads: suite.scope.leads(cell),
+            tally: Tally::default(),
+            slowdown: None,
+            failures: Vec::new(),
+            asked_any: false,
+            found: Found::default(),
+        })
+    }
+
+    /// Other tests than the one that leads climb few rungs through structures other than the plain one.
+    fn takes(&self, case: &Case, quick: bool) -> bool {
+        let coarse = Placement::ladder(true).contains(&case.place);
+        self.leads || stands_for_all(&self.kind.variant.name) || (coarse && !quick)
+    }
+
+    /// Whether any hit is asked for: through the plain structure only if it has to be quick, since every kernel has to be
+    /// compiled.
+    fn asks_any(&self, quick: bool) -> bool {
+        self.leads && (!quick || self.kind.is(PLAIN))
+    }
+
+    fn found(self) -> Found {
+        let mut found = self.found;
+        let is_brute_force = self.kind.is(BRUTE_FORCE);
+        let at = Key::default();
+        let slowdown = self.slowdown.map(|ratio| (&figure::SLOWDOWN, ratio));
+        self.tally
+            .tell(&mut found, &at, self.asked_any, is_brute_force);
+        found.add(&at, slowdown);
+        found.failures(&at, self.failures);
+        found
     }
 }
 
 impl Suite<'_> {
-    /// The default triangle test with the default box test.
+    /// The default box test with a triangle test.
     pub(crate) fn with(triangle: AnyTriangleTest) -> Intersection {
         Intersection {
             triangle,
@@ -87,6 +143,28 @@ impl Suite<'_> {
     /// The device that times are measured on.
     pub(super) fn gpu(&self) -> &Gpu {
         &self.gpus[0]
+    }
+
+    /// The structure of a cell.
+    ///
+    /// # Errors
+    /// It is not registered.
+    pub(crate) fn kind<'c>(&self, cell: &'c Cell) -> Result<Kind<'c>, StressError> {
+        let variant = &cell[Axis::Accel];
+        let accel = self.registries.accel.get(&variant.name);
+        let unknown = || StressError::Unknown(format!("there is no structure {variant}"));
+        let accel = accel.ok_or_else(unknown)?;
+        Ok(Kind { accel, variant })
+    }
+
+    /// The triangle test of a cell.
+    ///
+    /// # Errors
+    /// It is not registered.
+    pub(crate) fn test(&self, cell: &Cell) -> Result<AnyTriangleTest, StressError> {
+        let name = &cell[Axis::Triangle].name;
+        let test = self.registries.triangles.named("triangle test", name);
+        test.map_err(StressError::Unknown)
     }
 
     /// Deals the items out to the devices, which work at once.
@@ -109,98 +187,40 @@ impl Suite<'_> {
         })
     }
 
-    /// Runs every family; `progress` is told what is being done.
-    ///
-    /// # Errors
-    /// The device is lost or hangs.
-    pub(crate) fn cells(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
-        let chosen = |family: &&Family| self.settings.wants_family(family.name);
-        let mut records = Vec::new();
-        for family in FAMILIES.iter().filter(chosen) {
-            progress(family.name);
-            records.extend(self.family(family)?);
-        }
-        Ok(records)
-    }
-
-    fn family(&self, family: &Family) -> Result<Vec<Line>, StressError> {
-        let settings = self.settings;
-        let cases = family.cases(settings.seed, settings.quick, settings.rays);
-        let row = || self.kinds.iter().map(|kind| (*kind, OpenCell::default()));
-        let mut cells: Vec<Vec<(Kind, OpenCell)>> =
-            (self.tests.iter()).map(|_| row().collect()).collect();
-        let mut timed = 0;
-        for case in &cases {
-            let judge = CaseJudge::new(case);
-            for (test, row) in self.tests.iter().zip(&mut cells) {
-                self.case(case, &judge, *test, row)?;
-            }
-            if let Some(row) = cells.first_mut().filter(|_| self.is_timed(case, timed)) {
-                timed += 1;
-                self.time(case, row)?;
-            }
-        }
-        let mut records = Vec::new();
-        for (test, row) in self.tests.iter().zip(cells) {
-            for (kind, cell) in row {
-                let key = key(*test, kind).with(axis::FAMILY, family.name);
-                records.push(match cell.rungs.is_empty() && cell.failures.is_empty() {
-                    true => {
-                        let what = format!("{}, {}, {}", test.name(), kind.name(), family.name);
-                        skipped(key, what, "every case of it is left to other cells")
-                    }
-                    false => line(key, Record::Cell(cell.findings())),
-                });
-            }
-        }
-        Ok(records)
-    }
-
     /// Whether this case is timed against ordinary rays: the first of a family, and all whose rays are not
     /// numbers; of these a few if it has to be quick.
     fn is_timed(&self, case: &Case, timed: usize) -> bool {
         let strange = case.family == "non-finite";
-        match self.settings.quick {
-            true => strange && timed < TIMED_IF_QUICK,
-            false => strange || timed == 0,
+        if self.scope.settings.quick {
+            strange && timed < TIMED_IF_QUICK
+        } else {
+            strange || timed == 0
         }
     }
 
-    /// Other tests than the default one climb few rungs through structures other than the plain one.
-    fn takes(&self, case: &Case, test: AnyTriangleTest, kind: Kind) -> bool {
-        let is_default = Some(&test) == self.tests.first();
-        let stands_for_all = kind.name() == PLAIN || kind.name() == BRUTE_FORCE;
-        let coarse = Placement::ladder(true).contains(&case.place);
-        is_default || stands_for_all || (coarse && !self.settings.quick)
-    }
-
-    /// Whether any hit is asked for: with the default test; through the plain structure only if it has to
-    /// be quick, since every kernel has to be compiled.
-    fn asks_any(&self, test: AnyTriangleTest, kind: Kind) -> bool {
-        let is_default = Some(&test) == self.tests.first();
-        is_default && (!self.settings.quick || kind.name() == PLAIN)
-    }
-
+    /// One case through all structures with one triangle test.
     fn case(
         &self,
         case: &Case,
         judge: &CaseJudge,
-        test: AnyTriangleTest,
-        cells: &mut [(Kind, OpenCell)],
+        cells: &mut [OpenCell],
     ) -> Result<(), StressError> {
+        let test = cells[0].test;
+        let quick = self.scope.settings.quick;
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
         let expected = Expected::new(&soup, &case.rays);
         // Structures mostly answer what brute force does: its answers are judged once.
         let known = expected.of(Space::World);
         let outcomes = judge.judge_all(known);
-        self.on_devices(cells, |gpu, (kind, cell)| {
-            if !self.takes(case, test, *kind) {
+        self.on_devices(cells, |gpu, cell| {
+            if !cell.takes(case, quick) {
                 return Ok(());
             }
-            let built = match bench::build(*kind, &soup) {
+            let built = match cell.kind.build(&soup) {
                 Ok(built) => built,
                 Err(reason) => {
-                    cell.failures.push(format!("{}: {reason}", case.label));
+                    let text = format!("{}: {reason}", case.label);
+                    cell.found.note(&Key::default(), "left out", text);
                     return Ok(());
                 }
             };
@@ -212,9 +232,8 @@ impl Suite<'_> {
                 stage: &stage,
                 expected: &expected,
                 judged: known.iter().zip(&outcomes).collect(),
-                test,
             };
-            match trace.run(*kind, &*built, cell) {
+            match trace.run(&*built, cell) {
                 Err(error @ (GpuError::Lost(_) | GpuError::Timeout { .. })) => Err(error.into()),
                 Err(error) => {
                     cell.failures.push(format!("{}: {error}", case.label));
@@ -225,22 +244,19 @@ impl Suite<'_> {
         })
     }
 
-    /// Times the case with the default test through every structure that can be built; not through brute
+    /// Times the case with the test that leads through every structure that can be built; not through brute
     /// force, which does the same whatever the rays, if it has to be quick.
-    fn time(&self, case: &Case, cells: &mut [(Kind, OpenCell)]) -> Result<(), StressError> {
+    fn time(&self, case: &Case, cells: &mut [OpenCell]) -> Result<(), StressError> {
         let stage = Stage::new(self.gpu(), case.scene.clone(), Intersection::default())?;
-        let count = self.settings.timed_rays();
-        let ordinary = bench::ordinary_rays(case, self.settings.seed, count);
+        let count = self.scope.settings.either(TIMED_RAYS);
+        let ordinary = bench::ordinary_rays(case, self.seed, count);
         let rays = bench::repeated(&case.rays, count);
-        let takes = |kind: Kind| !self.settings.quick || kind.name() != BRUTE_FORCE;
-        for (kind, cell) in cells.iter_mut().filter(|(kind, _)| takes(*kind)) {
-            if let Ok(built) = bench::build(*kind, &stage.soup) {
-                let ratio = bench::ratio(
-                    &stage,
-                    &Traced::upload(&stage.gpu, &*built)?,
-                    &rays,
-                    &ordinary,
-                )?;
+        let quick = self.scope.settings.quick;
+        let cells = cells.iter_mut().filter(|cell| cell.leads);
+        for cell in cells.filter(|cell| !quick || !cell.kind.is(BRUTE_FORCE)) {
+            if let Ok(built) = cell.kind.build(&stage.soup) {
+                let traced = Traced::upload(&stage.gpu, &*built)?;
+                let ratio = bench::ratio(&stage, &traced, &rays, &ordinary)?;
                 cell.slowdown = Some(cell.slowdown.map_or(ratio, |s: f64| s.max(ratio)));
             }
         }
@@ -257,10 +273,36 @@ impl Suite<'_> {
         let address = Address {
             family: family.to_owned(),
             label: label.to_owned(),
-            seed: self.settings.seed,
+            seed: self.seed,
         };
         format!("raystone trace --scene '{address}' --accel {kind} --triangle {test} --ray '{ray}'")
     }
+}
+
+/// One family through the structures of the cells with their triangle tests.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub(crate) fn families(suite: &Suite, cells: &[Cell]) -> Results {
+    let Some(family) = cells.first().and_then(|cell| Family::named(part_of(cell))) else {
+        return Ok(Vec::new());
+    };
+    let settings = &suite.scope.settings;
+    let cases = family.cases(suite.seed, settings.quick, settings.rays_of_a_case());
+    let open = cells.iter().map(|cell| OpenCell::new(suite, cell));
+    let mut open = open.collect::<Result<Vec<_>, _>>()?;
+    let mut timed = 0;
+    for case in &cases {
+        let judge = CaseJudge::new(case);
+        for row in open.chunk_by_mut(|a, b| a.test == b.test) {
+            suite.case(case, &judge, row)?;
+        }
+        if suite.is_timed(case, timed) {
+            timed += 1;
+            suite.time(case, &mut open)?;
+        }
+    }
+    Ok(open.into_iter().map(OpenCell::found).collect())
 }
 
 /// One case through one structure with one triangle test.
@@ -272,18 +314,18 @@ struct Trace<'a> {
     expected: &'a Expected,
     /// Answers whose outcomes are known.
     judged: Vec<(&'a Hit, &'a Outcome)>,
-    test: AnyTriangleTest,
 }
 
 impl Trace<'_> {
-    fn run(&self, kind: Kind, built: &dyn BuiltAccel, cell: &mut OpenCell) -> Result<(), GpuError> {
+    fn run(&self, built: &dyn BuiltAccel, cell: &mut OpenCell) -> Result<(), GpuError> {
         let case = self.case;
         let traced = Traced::upload(&self.stage.gpu, built)?;
         let found = self.stage.closest(&traced, &case.rays)?;
         let expected = self.expected.of(built.space());
+        let (kind, test) = (cell.kind, cell.test);
         let replay = |index: usize| {
             let ray = &case.rays[index];
-            let names = [kind.name(), self.test.name()];
+            let names = [kind.label(), test.name()];
             self.suite.replay([case.family, &case.label], names, ray)
         };
         let mut errors = found.errors;
@@ -291,9 +333,10 @@ impl Trace<'_> {
         let closed = matches!(case.truth, Truth::Closed | Truth::Hit);
         for (index, hit) in found.answers.iter().enumerate() {
             let (known, known_outcome) = self.judged[index];
-            let outcome = match hit.same_bits(known) {
-                true => *known_outcome,
-                false => self.judge.judge(index, hit),
+            let outcome = if hit.same_bits(known) {
+                *known_outcome
+            } else {
+                self.judge.judge(index, hit)
             };
             tally.add(&outcome, closed, || replay(index));
             if !hit.same_bits(&expected[index]) {
@@ -301,7 +344,7 @@ impl Trace<'_> {
             }
         }
         self.compare(built, &found.answers, &mut tally);
-        if self.suite.asks_any(self.test, kind) {
+        if cell.asks_any(self.suite.scope.settings.quick) {
             let any = self.stage.any(&traced, &case.rays)?;
             errors |= any.errors;
             for (index, (any, hit)) in any.answers.iter().zip(expected).enumerate() {
@@ -315,7 +358,9 @@ impl Trace<'_> {
         if let Some(text) = bench::error_text(errors) {
             cell.failures.push(format!("{}: {text}", case.label));
         }
-        cell.rungs.push(tally.rung(case));
+        if cell.kind.is(BRUTE_FORCE) {
+            tally.tell_rung(&mut cell.found, case);
+        }
         cell.tally.join(tally);
         Ok(())
     }

@@ -1,12 +1,13 @@
 //! What came of each ray, and the sum over a cell.
 
+use super::Found;
 use super::case::{Case, Truth};
-use super::record::{Findings, Quantiles, Rung, Worst};
 use rayon::prelude::*;
 use raystone_accel::oracle::{ExactTruth, ExactVerdict, exact_truths};
 use raystone_accel::{Hit, NO_HIT, Ray};
 use raystone_core::geometry::Triangle;
 use raystone_record::figure::{self, Figure};
+use raystone_record::{Key, axis};
 use std::collections::BTreeMap;
 
 /// Errors of right hits: of the distance, in ulp and relative, and of the hit point, in ulp of its greatest
@@ -122,6 +123,35 @@ const COUNTED: [&Figure; 12] = [
     &figure::TIES,
 ];
 
+/// Median, 99th percentile and greatest of each error.
+const ERRORS: Errors<[&Figure; 3]> = [
+    [
+        &figure::T_ULP_MEDIAN,
+        &figure::T_ULP_P99,
+        &figure::T_ULP_MOST,
+    ],
+    [&figure::T_MEDIAN, &figure::T_P99, &figure::T_MOST],
+    [
+        &figure::POINT_ULP_MEDIAN,
+        &figure::POINT_ULP_P99,
+        &figure::POINT_ULP_MOST,
+    ],
+    [
+        &figure::POINT_MEDIAN,
+        &figure::POINT_P99,
+        &figure::POINT_MOST,
+    ],
+];
+
+/// The ray to look at first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// What is bad about it.
+    pub what: String,
+    /// The command that shows it.
+    pub replay: String,
+}
+
 /// Counts over the rays of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
@@ -200,46 +230,53 @@ impl Tally {
         }
     }
 
-    /// Median, 99th percentile and maximum of each error; `None` without a right hit.
-    fn quantiles(&self) -> Option<Errors<Quantiles>> {
+    /// Median, 99th percentile and greatest of each error; `None` without a right hit.
+    fn quantiles(&self) -> Option<Errors<[f64; 3]>> {
         let last = self.errors.len().checked_sub(1)?;
         Some([0, 1, 2, 3].map(|which| {
             let mut errors: Vec<f64> = self.errors.iter().map(|e| e[which]).collect();
             errors.sort_by(f64::total_cmp);
-            let [median, p99, max] =
-                [0.5, 0.99, 1.0].map(|share| errors[(last as f64 * share).round() as usize]);
-            Quantiles { median, p99, max }
+            [0.5, 0.99, 1.0].map(|share| errors[(last as f64 * share).round() as usize])
         }))
     }
 
-    /// The rung that this tally is of.
-    pub(crate) fn rung(&self, case: &Case) -> Rung {
-        let errors = self.quantiles();
-        Rung {
-            label: case.label.clone(),
-            place: case.place,
-            rays: self.counted(&figure::RAYS),
-            false_misses: self.counted(&figure::FALSE_MISSES),
-            differing: self.counted(&figure::DIFFERING),
-            t_ulp: errors.map(|e| e[0]),
-            point_ulp: errors.map(|e| e[2]),
+    /// Tells what is counted of one case.
+    pub(crate) fn tell_rung(&self, found: &mut Found, case: &Case) {
+        let at = Key::default().with(axis::SUBJECT, &case.label);
+        let at = at.with(axis::PLACE, case.place);
+        let counts = [&figure::RAYS, &figure::FALSE_MISSES];
+        found.add(&at, counts.map(|id| (id, self.counted(id) as f64)));
+        if let Some([t, _, point, _]) = self.quantiles() {
+            let errors = [
+                (&figure::T_ULP_P99, t[1]),
+                (&figure::POINT_ULP_P99, point[1]),
+            ];
+            found.add(&at, errors);
         }
     }
 
-    /// All of it; any hits only if they were asked for.
-    pub fn findings(self, asked_any: bool) -> Findings {
+    /// Tells all of it; any hits only if they were asked for. The worst ray of a structure that answers what brute force does is
+    /// that of brute force.
+    pub(crate) fn tell(self, found: &mut Found, at: &Key, asked_any: bool, is_brute_force: bool) {
         let counted = COUNTED
             .iter()
             .filter(|figure| asked_any || figure.id != figure::ANY_DIFFERING.id);
-        let mut found = Findings::of(counted.map(|figure| (*figure, self.counted(figure) as f64)));
-        found.errors = self.quantiles();
-        if let Some([t, _, point, _]) = &found.errors {
-            let (t, point) = (t.p99, point.p99);
-            found.add(&figure::T_ULP_P99, t);
-            found.add(&figure::POINT_ULP_P99, point);
+        found.add(
+            at,
+            counted.map(|figure| (*figure, self.counted(figure) as f64)),
+        );
+        let [closest, any] = [&figure::DIFFERING, &figure::ANY_DIFFERING].map(|f| self.counted(f));
+        found.add(at, [(&figure::UNEQUAL, (closest + any) as f64)]);
+        if let Some(errors) = self.quantiles() {
+            let figures = ERRORS.iter().zip(errors);
+            found.add(
+                at,
+                figures.flat_map(|(figures, errors)| (*figures).into_iter().zip(errors)),
+            );
         }
-        found.worst = self.worst.map(|(_, worst)| worst);
-        found
+        if is_brute_force || closest + any > 0 {
+            found.look_at(at, self.worst.map(|(_, worst)| worst));
+        }
     }
 }
 
@@ -267,7 +304,7 @@ mod tests {
         let worst = |tally: &Tally| tally.worst.as_ref().map(|w| w.1.replay.clone());
         assert_eq!(worst(&tally).as_deref(), Some("ray 99"));
         let [t, ..] = tally.quantiles().unwrap();
-        assert_eq!((t.median, t.p99, t.max), (50.0, 98.0, 99.0));
+        assert_eq!(t, [50.0, 98.0, 99.0]);
         let mut other = Tally::default();
         let miss = Outcome {
             verdict: ExactVerdict::FalseMiss { explained: true },
@@ -277,11 +314,18 @@ mod tests {
         other.add(&miss, false, || "silhouette".into());
         tally.join(other);
         assert_eq!(worst(&tally).as_deref(), Some("crack"));
-        let found = tally.findings(false);
-        let counts =
-            [&figure::RAYS, &figure::FALSE_MISSES, &figure::CRACKS].map(|id| found.count(id));
-        assert_eq!(counts, [102, 2, 1]);
-        assert_eq!(found.get(&figure::UNEXPLAINED_MISSES), Some(0.0));
-        assert_eq!(found.get(&figure::ANY_DIFFERING), None);
+        let mut found = Found::default();
+        tally.tell(&mut found, &Key::default(), false, true);
+        let value = |figure: &Figure| {
+            let mut readings = found.readings.iter();
+            readings
+                .find(|r| r.figure == figure.id)
+                .map(|r| r.value.value)
+        };
+        let counts = [&figure::RAYS, &figure::FALSE_MISSES, &figure::CRACKS].map(value);
+        assert_eq!(counts, [102.0, 2.0, 1.0].map(Some));
+        assert_eq!(value(&figure::UNEXPLAINED_MISSES), Some(0.0));
+        assert_eq!(value(&figure::ANY_DIFFERING), None);
+        assert_eq!(found.notes[0].text, "crack");
     }
 }

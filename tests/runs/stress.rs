@@ -1,110 +1,156 @@
 //! The stress suite as a whole: its quick form on this adapter, planted faults that it must see, and the
 //! program's commands.
 
-use crate::support::{gpu, kernels_with, open};
-use raystone::accel::triangle::{MoellerTrumbore, TriangleTest as _};
-use raystone::gpu::{Gpu, probe_arithmetic};
-use raystone::measure::figure;
-use raystone::measure::record::{Key, axis};
+use crate::support::{self, gpu, kernels_with};
+use raystone::gpu::probe_arithmetic;
+use raystone::measure::figure::{self, Figure};
+use raystone::measure::record::{
+    CellRecord, Line, MeasuredRecord, Reading, Recorded, all_of, axis,
+};
 use raystone::report::terminal::Screen;
-use raystone::stress::record::{Line, read, write};
-use raystone::stress::report::{stress_tables, write_stress_page};
-use raystone::stress::targets::{cells, shots};
-use raystone::stress::{StressOptions, run};
+use raystone::stress::EXPERIMENT;
+use std::path::Path;
 use std::process::Command;
 
-/// A few families through a few structures with the default test and one other.
-fn small() -> StressOptions {
-    let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
-    StressOptions {
-        families: names(&["watertight", "edges", "coincident", "non-finite"]),
-        accels: names(&["bvh", "uniform-grid"]),
-        triangles: names(&["moeller-trumbore", "watertight"]),
-        rays: 64,
-        shots: 2048,
-        ..StressOptions::new(true)
-    }
+/// A few families and shots through a few structures with these tests and kernels, and the targets of the whole suite.
+fn run_small(out: &Path, tests: &[&str], kernels: &str) -> Vec<Line> {
+    let targets = EXPERIMENT.split_once("\n[[expect]]\n").expect("targets").1;
+    let text = format!(
+        "[axes]\nintegrator = [\"stress:watertight\", \"stress:edges\", \"stress:coincident\", \"stress:non-finite\", \
+         \"stress:shots\"]\ntriangle = {tests:?}\naccel = [\"brute-force\", \"bvh\", \"uniform-grid\"]\n\
+         kernels = {kernels:?}\n[stress]\nquick = true\nrays = 64\nshots = 2048\n[[expect]]\n{targets}"
+    );
+    let (summary, lines) = support::run(&text, &raystone::registries(), out, None);
+    assert_eq!(summary.failed, 0);
+    lines
 }
 
-fn run_small(gpu: &Gpu) -> Vec<Line> {
-    run(std::slice::from_ref(gpu), &small(), &|_| ()).expect("the suite runs")
+/// The cells of a measurement.
+fn cells<'a>(lines: &'a [Line], measurement: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
+    let measured = all_of::<MeasuredRecord>(lines);
+    measured
+        .filter(|cell| cell.measurement == measurement)
+        .collect()
+}
+
+fn count(cell: &Recorded<MeasuredRecord>, figure: &Figure) -> f64 {
+    let reading = cell.reading(&figure.id);
+    reading
+        .unwrap_or_else(|| panic!("{} has no {}", cell.key, figure.id))
+        .value
+        .value
+}
+
+/// The series of shots, by misses.
+fn misses(lines: &[Line]) -> Vec<&Reading> {
+    let readings = cells(lines, "stress:shots")
+        .into_iter()
+        .flat_map(|cell| cell.readings);
+    readings
+        .filter(|reading| reading.figure == figure::MISSES.id)
+        .collect()
 }
 
 #[test]
 fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_and_a_page() {
-    let records = run_small(gpu());
-    let cells: Vec<_> = cells(&records).collect();
-    let family = |key: &Key| key.label(axis::FAMILY).to_owned();
+    let folder = tempfile::tempdir().expect("a folder");
+    let records = run_small(folder.path(), &["watertight", "moeller-trumbore"], "");
+    let families = cells(&records, "stress:families");
+    let family = |cell: &Recorded<MeasuredRecord>| cell.key.label(axis::INTEGRATOR).to_owned();
     // Four families: the default test through three structures, the other one through two.
-    assert_eq!(cells.len(), 4 * (3 + 2));
+    assert_eq!(families.len(), 4 * (3 + 2));
     let exact = probe_arithmetic(gpu()).expect("the probe runs").is_exact();
-    for cell in &cells {
-        assert!(cell.count(&figure::RAYS) > 0 && !cell.rungs.is_empty());
-        if exact && family(cell.key) != "non-finite" {
-            assert_eq!(cell.differing(), 0, "{}: {:?}", cell.key, cell.worst);
+    for cell in &families {
+        assert!(count(cell, &figure::RAYS) > 0.0);
+        if exact && family(cell) != "stress:non-finite" {
+            assert_eq!(
+                count(cell, &figure::UNEQUAL),
+                0.0,
+                "{}: {:?}",
+                cell.key,
+                cell.notes
+            );
         }
-        assert!(cell.failures.is_empty(), "{:?}", cell.failures);
+        assert_eq!(count(cell, &figure::FAILED_CASES), 0.0, "{:?}", cell.notes);
     }
-    let edges = cells
-        .iter()
-        .find(|c| family(c.key) == "edges")
-        .expect("a cell");
+    let edges = families.iter().find(|cell| family(cell) == "stress:edges");
+    let edges = edges.expect("a cell");
+    let [median, p99, most] = [
+        &figure::T_ULP_MEDIAN,
+        &figure::T_ULP_P99,
+        &figure::T_ULP_MOST,
+    ]
+    .map(|id| count(edges, id));
+    assert!(median <= p99 && p99 <= most && most > 0.0);
     assert!(
         edges
-            .errors
-            .is_some_and(|[q, ..]| q.median <= q.p99 && q.p99 <= q.max && q.max > 0.0)
+            .readings
+            .iter()
+            .any(|reading| !reading.at.label(axis::PLACE).is_empty())
     );
-    assert!(shots(&records).count() >= 12);
-
-    let folder = tempfile::tempdir().expect("a folder");
-    write(folder.path(), &records).expect("records");
-    assert_eq!(read(folder.path()).expect("records"), records);
-    let page = write_stress_page(folder.path(), &records).expect("a page");
-    let html = std::fs::read_to_string(page).expect("a page");
+    assert!(misses(&records).len() >= 12);
+    let html = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
     for text in [
-        "Targets of the default configuration",
         "Where hits are lost",
+        "cracks from inside closed meshes",
+        "raystone trace",
         "uniform-grid",
         "<svg",
     ] {
         assert!(html.contains(text), "{text}");
     }
-    let tables = stress_tables(&records, Screen::default());
+    let tables = Screen::default().tables(&records);
     assert!(
-        tables.contains("brute-force") && tables.contains("PASS"),
+        tables.contains("brute-force") && tables.contains("PASS  cracks from inside"),
         "{tables}"
     );
+    // What kernels every cell was made of is known.
+    let cells: Vec<_> = all_of::<CellRecord>(&records).collect();
+    assert!(cells.iter().all(|cell| !cell.inputs.kernels.is_empty()));
 }
 
 #[test]
 fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     // Zero no longer counts as inside.
     let leaky = [("u >= 0.0", "u > 1e-3 * area")];
-    let gpu = open(kernels_with("accel/triangle/moeller_trumbore", &leaky));
-    let settings = StressOptions {
-        triangles: vec![MoellerTrumbore.name().into()],
-        ..small()
-    };
-    let records = run(&[gpu], &settings, &|_| ()).expect("the suite runs");
-    let leaks: usize = shots(&records).map(|s| s.count(&figure::MISSES)).sum();
-    assert!(
-        leaks > 0,
-        "no crack was seen in {} series",
-        shots(&records).count()
-    );
-    for series in shots(&records).filter(|s| s.count(&figure::MISSES) > 0) {
-        assert!(
-            series.count(&figure::CONFIRMED_MISSES) > 0 && series.worst.is_some(),
-            "{series:?}"
-        );
+    let module = "accel/triangle/moeller_trumbore";
+    let folder = tempfile::tempdir().expect("a folder");
+    let kernels = folder.path().join("kernels");
+    let file = kernels.join(module).with_extension("wesl");
+    std::fs::create_dir_all(file.parent().expect("a parent")).expect("a folder");
+    let text = kernels_with(module, &leaky)
+        .text(module)
+        .expect("a kernel")
+        .to_owned();
+    std::fs::write(&file, text).expect("a kernel");
+    let out = folder.path().join("run");
+    let kernels = kernels.to_str().expect("UTF-8");
+    let records = run_small(&out, &["moeller-trumbore"], kernels);
+    let misses = misses(&records);
+    let leaks: f64 = misses.iter().map(|misses| misses.value.value).sum();
+    assert!(leaks > 0.0, "no crack was seen in {} series", misses.len());
+    for cell in cells(&records, "stress:shots") {
+        for series in cell
+            .readings
+            .iter()
+            .filter(|r| r.figure == figure::MISSES.id && r.value.value > 0.0)
+        {
+            let is_its =
+                |r: &&Reading| r.figure == figure::CONFIRMED_MISSES.id && r.at == series.at;
+            let confirmed = cell.readings.iter().find(is_its);
+            assert!(confirmed.is_some_and(|r| r.value.value > 0.0), "{series:?}");
+            assert!(
+                cell.notes.iter().any(|note| note.at == series.at),
+                "{series:?}"
+            );
+        }
     }
-    let edges = cells(&records)
-        .find(|c| c.key.label(axis::FAMILY) == "edges" && c.key.label(axis::ACCEL) == "bvh")
-        .expect("a cell");
-    assert!(
-        edges.count(&figure::CRACKS) > 0 && edges.differing() > 0,
-        "{edges:?}"
-    );
+    let families = cells(&records, "stress:families");
+    let is_edges = |cell: &&Recorded<MeasuredRecord>| {
+        [axis::INTEGRATOR, axis::ACCEL].map(|axis| cell.key.label(axis)) == ["stress:edges", "bvh"]
+    };
+    let edges = families.iter().find(is_edges).expect("a cell");
+    assert!(count(edges, &figure::CRACKS) > 0.0 && count(edges, &figure::UNEQUAL) > 0.0);
 }
 
 /// The program with the words of a line, and one more argument; its exit status and all that it says.

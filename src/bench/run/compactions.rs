@@ -4,7 +4,7 @@ use super::cost::{Cost, Work};
 use super::measurement::{Absent, At, Measurement, Preparation, Prepared};
 use crate::compaction::{Bench, Inputs, Load, benched, stream};
 use crate::timing::{Measured, Samples, millions_per_second};
-use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_config::{Axis, COMPACTIONS, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError, Player};
 use raystone_record::figure::{
     COMPACTION_GB_PER_S, COMPACTION_KEPT, COMPACTION_LEAST_BYTES, COMPACTION_MELEMENTS_PER_S,
@@ -27,7 +27,9 @@ impl Measurement for Compactions {
     }
 
     fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
-        plan.compactions.clone()
+        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Kernels]);
+        cells.retain(|cell| cell[Axis::Integrator].name.starts_with(COMPACTIONS));
+        cells
     }
 
     fn unit_name(&self, cell: &Cell) -> String {

@@ -7,7 +7,7 @@ use super::session::{End, Session};
 use crate::timing::{Measured, Samples, interleave};
 use raystone_config::{Axis, Cell};
 use raystone_gpu::GpuError;
-use raystone_record::{Body, Key, Line, MeasuredRecord, Ran, Reading, fault_of};
+use raystone_record::{Body, Key, Line, MeasuredRecord, Note, Ran, Reading, fault_of};
 
 /// A cell that is ready.
 struct Ready<'a> {
@@ -37,7 +37,11 @@ pub(super) fn run(
         session.say(format!("{name}: preparing"));
         session.lose_device_on_request(&at.device.gpu, &name);
         let prepared = session.clock.time("gate", || preparation.next());
-        session.recorder.note_kernels(&name);
+        session.recorder.note_kernels(if measurement.is_shared() {
+            measurement.name()
+        } else {
+            &name
+        });
         match prepared {
             Some(Ok(item)) => ready.push(Ready { cell, item }),
             Some(Err(Absent::Refused(reason))) => session.write_refused(name, reason)?,
@@ -74,8 +78,8 @@ pub(super) fn run(
             Err(Absent::Failed(reason)) => Err(reason),
             Ok(samples) => Ok(samples),
         };
-        let readings = samples.and_then(|samples| sound(item.readings(samples)?));
-        write(session, measurement, at, (cell, readings))?;
+        let found = samples.and_then(|samples| Ok((sound(item.readings(samples)?)?, item.notes())));
+        write(session, measurement, at, (cell, found))?;
     }
     Ok(())
 }
@@ -138,11 +142,11 @@ fn write(
     session: &mut Session,
     measurement: &dyn Measurement,
     at: &At,
-    (cell, readings): (&Cell, Result<Vec<Reading>, String>),
+    (cell, found): (&Cell, Result<(Vec<Reading>, Vec<Note>), String>),
 ) -> Result<(), RunError> {
-    let (readings, failure) = match readings {
-        Ok(readings) => (readings, None),
-        Err(reason) => (Vec::new(), Some(reason)),
+    let (readings, notes, failure) = match found {
+        Ok((readings, notes)) => (readings, notes, None),
+        Err(reason) => (Vec::new(), Vec::new(), Some(reason)),
     };
     let ran = Ran {
         unchecked: at.stage.is_some() && !session.experiment.run.runtime_checks,
@@ -151,6 +155,7 @@ fn write(
     let body = MeasuredRecord {
         measurement: measurement.name().to_owned(),
         failure: failure.clone(),
+        notes,
     };
     let line = Line::new(Key::from(cell), ran, Body::Measured(body)).with_readings(readings);
     let scene = at.stage.map_or("", |stage| &stage.scene.hash);
@@ -158,6 +163,7 @@ fn write(
         failure,
         scene,
         of: &[("what", measurement.name())],
+        shared: &[measurement.name()],
         ..End::default()
     };
     session.conclude(&measurement.unit_name(cell), line, end)

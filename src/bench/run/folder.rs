@@ -10,8 +10,8 @@ use super::error::RunError;
 use raystone_core::atomic::write_atomic;
 use raystone_core::text::slug;
 use raystone_record::{
-    Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, STRESS_FILE, read_records,
-    records_file, text_of,
+    Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, read_records, records_file,
+    text_of,
 };
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
@@ -125,7 +125,7 @@ impl Folder {
         let is_left_over = meta(&partial).is_ok_and(|folder| folder.is_dir())
             && meta(&left_over).is_ok_and(|file| file.is_file() && file.len() > 0);
         let records = out.join(RECORDS_FILE);
-        let results = [records_file(out), out.join(STRESS_FILE)];
+        let results = [records_file(out)];
         let results = results.into_iter().filter(|path| is_there(path));
         let replaces = matches!(existing, Existing::Replace | Existing::Resume);
         if !replaces && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {

@@ -53,7 +53,7 @@ impl Kernels {
             (kernels.clone(), gpu.with_kernels(library.clone()))
         };
         let views = self.folders.iter().map(view).collect();
-        Ok(Device::new(gpu, views))
+        Ok(Device::new(gpu, views, options.adapter.clone()))
     }
 
     /// Why kernels that were made of these modules are others now; `None` if they are not.

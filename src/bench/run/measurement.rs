@@ -6,13 +6,14 @@
 
 use super::cost::{Cost, Work};
 use super::device::Device;
+use super::progress::Progress;
 use super::registries::Registries;
 use crate::timing::{Measured, Samples};
 use raystone_accel::Traced;
-use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
-use raystone_record::Reading;
 use raystone_record::figure::Figure;
+use raystone_record::{Note, Reading};
 use raystone_render::Stage;
 
 /// One kind of measurement.
@@ -28,6 +29,9 @@ pub trait Measurement: Send + Sync {
         &[]
     }
 
+    /// Adds what experiments may say of it: entries of axes, sections of settings.
+    fn declare(&self, _catalogue: &mut Catalogue) {}
+
     /// The cells of a plan that it measures, in the order of the plan.
     fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell>;
 
@@ -40,6 +44,11 @@ pub trait Measurement: Send + Sync {
     /// the cell.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
+    }
+
+    /// Whether what is done for one cell serves others as well: what kernels that took counts for all of its cells.
+    fn is_shared(&self) -> bool {
+        false
     }
 
     /// Whether clocks speak, so that figures of different machines must not meet.
@@ -97,6 +106,11 @@ pub trait Prepared {
     /// # Errors
     /// What is wrong with them, in words: the cell fails.
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String>;
+
+    /// What figures cannot say.
+    fn notes(&self) -> Vec<Note> {
+        Vec::new()
+    }
 }
 
 /// Why a cell is not timed.
@@ -131,6 +145,7 @@ pub struct At<'a> {
     pub(super) traced: Vec<(&'a Cell, &'a Traced)>,
     /// Structures that the driver refused, each with the reason.
     pub(super) refused: Vec<(Cell, String)>,
+    pub(super) progress: Progress,
 }
 
 impl At<'_> {
@@ -141,6 +156,20 @@ impl At<'_> {
     pub fn gpu(&self, cell: &Cell) -> Result<&Gpu, Absent> {
         let gpu = self.device.of(&cell[Axis::Kernels]);
         gpu.map_err(|error| Absent::Failed(error.to_string()))
+    }
+
+    /// Devices with the kernels of a cell that may work at once, where nothing is timed: one, or two of a software adapter.
+    ///
+    /// # Errors
+    /// The plan was made for other kernels.
+    pub fn gpus(&self, cell: &Cell) -> Result<Vec<Gpu>, Absent> {
+        let gpus = self.device.hands(&cell[Axis::Kernels]);
+        gpus.map_err(|error| Absent::Failed(error.to_string()))
+    }
+
+    /// Says what is being done.
+    pub fn say(&self, what: String) {
+        self.progress.say(what);
     }
 
     /// The structure of a cell on the device.

@@ -211,6 +211,7 @@ fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
         device,
         traced: Vec::new(),
         refused: Vec::new(),
+        progress: session.progress.clone(),
     };
     for measurement in session.registries.measurements.iter() {
         match run_of(measurement) {
@@ -289,6 +290,7 @@ fn run_world(
         device,
         traced: gated.iter().map(|g| (&g.cell, &g.traced)).collect(),
         refused: session.ledger.refused_structures(session.plan),
+        progress: session.progress.clone(),
     };
     for measurement in session.registries.measurements.iter() {
         session.go_on()?;

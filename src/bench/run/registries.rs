@@ -64,6 +64,9 @@ impl Registries {
         catalogue[Axis::Organisation] = self.organisations.0.entries();
         catalogue[Axis::Peer] = self.peers.entries();
         catalogue[Axis::Workgroup] = self.workgroups.entries();
+        self.measurements
+            .iter()
+            .for_each(|m| m.declare(&mut catalogue));
         catalogue
     }
 

@@ -10,7 +10,7 @@ use crate::sampler_cost::sampler_cost;
 use crate::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
 use crate::words::{compare, dump_stream, kernel_hash};
 use rayon::prelude::*;
-use raystone_config::{Axis, Cell, Experiment, Plan, is_compaction};
+use raystone_config::{Axis, Cell, Experiment, Plan, is_bench};
 use raystone_discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use raystone_gpu::Gpu;
 use raystone_record::{
@@ -72,9 +72,7 @@ impl Measurement for Streams {
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
         let e = experiment;
         // The worst pair of dimensions is looked for among those of all integrators.
-        let drawn = e.axes[Axis::Integrator]
-            .iter()
-            .filter(|i| !is_compaction(i));
+        let drawn = e.axes[Axis::Integrator].iter().filter(|i| !is_bench(i));
         let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
         format!(
             "{:?}",
@@ -125,7 +123,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
                 Ok((readings, kernel)) => {
                     let cost = MeasuredRecord {
                         measurement: "sampler-cost".to_owned(),
-                        failure: None,
+                        ..MeasuredRecord::default()
                     };
                     let line = line(&cell, kernel, "cost", Body::Measured(cost));
                     written.line(session, &line.with_readings(readings.into()))?;
@@ -216,7 +214,7 @@ fn worst_pair(
 ) -> Result<Option<([u32; 2], usize)>, String> {
     let mut drawn = BTreeSet::new();
     let integrators = session.experiment.axes[Axis::Integrator].iter();
-    for variant in integrators.filter(|variant| !is_compaction(variant)) {
+    for variant in integrators.filter(|variant| !is_bench(variant)) {
         let integrator = session.registries.integrators.configured(variant);
         let integrator = integrator.map_err(|e| e.to_string())?;
         drawn.extend(integrator.facts.dimension_pairs());

@@ -5,7 +5,7 @@ use crate::commands::output::{print, print_json};
 use anyhow::{Result, bail};
 use raystone::config::{Axis, Cell};
 use raystone::measure::record::{CellRecord, Outcome};
-use raystone::run::{Inventory, Registries, RunOptions, State};
+use raystone::run::{Inventory, RunOptions, State};
 use raystone::text::{nearest, shell_word};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 pub(super) fn inspect(command: &Inspect, name: &str) -> Result<ExitCode> {
-    let registries = Registries::default();
+    let registries = raystone::registries();
     let inventory = Inventory::read(&command.path, &registries)?;
     let state = find(&inventory, &command.path, name)?;
     let options = RunOptions {

@@ -4,14 +4,14 @@ use super::Inspect;
 use crate::commands::failure::FAILED;
 use crate::commands::output::{print, print_json, warn};
 use anyhow::Result;
-use raystone::run::{Inventory, Registries};
+use raystone::run::Inventory;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
-    let inventory = Inventory::read(&command.path, &Registries::default())?;
+    let inventory = Inventory::read(&command.path, &raystone::registries())?;
     for warning in &inventory.warnings {
         warn(warning);
     }

@@ -5,7 +5,7 @@ use crate::commands::arguments::plan;
 use crate::commands::output::{print, print_json};
 use anyhow::Result;
 use raystone::config::{Axis, Experiment, Plan as Cells, Skipped};
-use raystone::run::{Cost, Registries, Unit, shards};
+use raystone::run::{Cost, Unit, shards};
 use raystone::text::shell_word;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
-    let registries = Registries::default();
+    let registries = raystone::registries();
     let overrides = &command.experiment.values.set;
     let experiment = Experiment::load(&command.path, overrides, &registries.catalogue())?;
     let cells = plan(&experiment, &command.experiment.only, &registries)?;

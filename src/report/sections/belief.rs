@@ -1,5 +1,6 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
+use super::targets;
 use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, without_repeats};
 use crate::document::*;
 use crate::format::{self, count, plural};
@@ -32,9 +33,15 @@ const NOTHING: &str = "nothing to test.";
 /// Reasons why cells were left out that a check names.
 const MOST_REASONS: usize = 3;
 
-/// Every check.
+/// Every check: the experiment's own targets, and what its figures rest on.
 pub fn checks(data: &RunData) -> Vec<Check> {
-    let mut checks: Vec<Check> = data.scenes.iter().map(gate).collect();
+    let mut checks = targets::checks(data);
+    if data.scenes.is_empty() && !data.measured.is_empty() {
+        // Nothing was traced or rendered that the others look at.
+        checks.push(complete(data));
+        return checks;
+    }
+    checks.extend(data.scenes.iter().map(gate));
     checks.push(judge(data, "The judge against brute force", |gate| {
         &gate.brute_force
     }));

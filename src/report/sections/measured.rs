@@ -1,6 +1,6 @@
 //! Measurements that have no section of their own: a table of all their figures.
 
-use super::{compactions, streams};
+use super::{compactions, streams, stress};
 use crate::data::{RunData, without_repeats};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Rows};
@@ -12,7 +12,8 @@ use raystone_record::figure::Figure;
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
     let names = data.measured.iter().map(|cell| cell.measurement.clone());
     let names = without_repeats(names.collect()).into_iter();
-    let others = names.filter(|name| ![compactions::NAME, streams::COST].contains(&name.as_str()));
+    let own = [compactions::NAME, streams::COST];
+    let others = names.filter(|name| !own.contains(&name.as_str()) && !stress::is_shown(name));
     others.map(|name| table(data, &name)).collect()
 }
 

@@ -20,7 +20,9 @@ pub(crate) mod sampler_plots;
 pub mod samplers;
 pub mod spectrum;
 pub(crate) mod streams;
+pub(crate) mod stress;
 pub mod structures;
+pub(crate) mod targets;
 pub(crate) mod trade_off;
 pub mod verdict;
 
@@ -48,6 +50,7 @@ pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
     sections.extend(compactions::section(data));
+    sections.extend(stress::section(data));
     sections.extend(measured::section(data));
     sections.extend(cells.section(data));
     sections.extend(run::sections(data));

@@ -1,7 +1,7 @@
 //! What was asked, who wins, what failed, whether to believe it.
 
 use super::kernels::{self, is_repeat};
-use super::{belief, compactions, rendering, run};
+use super::{belief, compactions, rendering, run, targets};
 use crate::data::{Measured, RAYS, RunData, SceneGroup, View, without_repeats};
 use crate::document::*;
 use crate::ruling::{Contender, Ruling, judge};
@@ -56,8 +56,8 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     let text = match (data.scenes.is_empty(), data.measured.is_empty()) {
         (true, true) => "Nothing was measured.",
         (true, false) => {
-            "No structure and no sampler was measured. How the methods of compaction compare stands in their own \
-             section."
+            "No structure and no sampler was measured on a scene. What was measured without one stands in sections of its \
+             own."
         }
         (false, _) => {
             let how = vec![Block::Paragraph(rule(data))];
@@ -183,7 +183,13 @@ fn summary(data: &RunData) -> Check {
         "{passed} of {} passed",
         format::plural(checks.len(), "check")
     );
+    let targets: Vec<String> = { targets::checks(data) }
+        .into_iter()
+        .map(|t| t.title)
+        .collect();
+    let is_target = |title: &&str| targets.iter().any(|target| target == title);
     let (verdict, title) = match (failed.is_empty(), open.is_empty()) {
+        (false, _) if failed.iter().all(is_target) => (Verdict::Fail, "A target is missed"),
         (false, _) => (Verdict::Fail, "Do not believe all of it"),
         (true, false) => (Verdict::Open, "Not all could be checked"),
         (true, true) => (Verdict::Pass, "The figures can be believed"),
@@ -194,7 +200,7 @@ fn summary(data: &RunData) -> Check {
             detail += &format!("; {what}: {}", titles.join(", "));
         }
     }
-    if verdict == Verdict::Fail {
+    if title == "Do not believe all of it" {
         detail += ". Questions that a failed check is about have no winner";
         if data.run.is_some_and(|run| run.lenient) {
             detail += "; the run was told to end with exit code 0 all the same (--lenient)";

@@ -11,14 +11,16 @@ mod mappings;
 mod rig;
 mod sums;
 
+use super::suite::Suite;
+use super::{Found, StressError};
 use raystone_gpu::{Gpu, GpuError};
+use raystone_record::{Key, axis, figure};
 use raystone_render::{IntegratorError, StageError};
 use raystone_sampling::SamplerError;
 use raystone_scene::SceneError;
-use serde::{Deserialize, Serialize};
 
 /// One thing measured on an adapter, with the level from which it is an alarm.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Gauge {
     /// What was measured.
     pub name: String,
@@ -98,6 +100,29 @@ pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     figures.extend(energy::figures(gpu, quick)?);
     figures.extend(determinism::figures(gpu)?);
     Ok(figures)
+}
+
+/// All figures with their notes, and how many are beyond their level. What is no number is an alarm without a figure.
+pub(crate) fn found(suite: &Suite) -> Result<Found, StressError> {
+    let mut found = Found::default();
+    let gauges = run(suite.gpu(), suite.scope.settings.quick)?;
+    for gauge in &gauges {
+        let unit = if gauge.unit.is_empty() { "" } else { ", " };
+        let subject = format!("{}{unit}{}", gauge.name, gauge.unit);
+        let at = Key::default().with(axis::SUBJECT, subject);
+        let value = Some(gauge.value).filter(|value| value.is_finite());
+        found.add(&at, value.map(|value| (&figure::NUMERICS, value)));
+        found.add(&at, gauge.alarm.map(|alarm| (&figure::ALARM, alarm)));
+        let what = if gauge.passed { "numerics" } else { "ALARM" };
+        found.note(&at, what, gauge.note.clone());
+    }
+    let alarms = gauges.iter().filter(|gauge| !gauge.passed);
+    let alarms: Vec<&str> = alarms.map(|gauge| &*gauge.name).collect();
+    found.add(&Key::default(), [(&figure::ALARMS, alarms.len() as f64)]);
+    if !alarms.is_empty() {
+        found.note(&Key::default(), "beyond their level", alarms.join(", "));
+    }
+    Ok(found)
 }
 
 /// Half the distance from 1 to the next f32, the unit of rounding errors.

@@ -55,12 +55,12 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     let (_, plan) = plan(EXPERIMENT, &registries);
     assert!(plan.structures.is_empty() && plan.times.is_empty() && plan.streams.is_empty());
     // The default block stands in two tables.
-    assert_eq!(plan.compactions.len(), 5 + 3 + 5 + 1);
+    assert_eq!(plan.benches.len(), 5 + 3 + 5 + 1);
     let folder = tempfile::tempdir().expect("a folder");
     let (summary, lines) = run(EXPERIMENT, &registries, folder.path(), None);
     assert_eq!(summary.failed, 0);
     let found = compactions(&lines);
-    assert_eq!(found.len() + summary.skipped, plan.compactions.len());
+    assert_eq!(found.len() + summary.skipped, plan.benches.len());
     let exact = |cell: &Recorded<MeasuredRecord>, figure: &Figure| {
         let reading = cell.reading(&figure.id).expect("a reading");
         assert_eq!(reading.value, Interval::exact(reading.value.value));
