@@ -1,5 +1,5 @@
-//! Sines that are equal to the bit on every platform: the standard library's
-//! `sin` is whatever the system's mathematics library says.
+//! Bit-exact sines on every platform: the standard library's `sin` depends on the system's math
+//! library.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ const SERIES: [[f64; 2]; 10] = {
     series
 };
 
-/// Sine and cosine of `turns` full turns, error below 1e-15. Only IEEE additions and
+/// Sine and cosine of `turns` full turns, error below 1e-15, using only IEEE additions and
 /// multiplications in a fixed order.
 pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let turns = turns - turns.floor();
