@@ -229,9 +229,10 @@ impl Thesis {
     fn check(&self, file: &str) -> Result<(), ConfigError> {
         let mut ids = BTreeSet::new();
         for expect in &self.expects {
-            let complaint = match ids.insert(&expect.id) {
-                false => Some("another one has this id".to_owned()),
-                true => expect.complaint(&self.substitutes),
+            let complaint = if ids.insert(&expect.id) {
+                expect.complaint(&self.substitutes)
+            } else {
+                Some("another one has this id".to_owned())
             };
             if let Some(complaint) = complaint {
                 let problem = format!("[[expect]] id = \"{}\": {complaint}", expect.id);

@@ -137,13 +137,14 @@ pub(super) fn excluded(
 
 /// That an include fits a cell: if not, it is likely misspelt.
 pub(super) fn included(include: &CellSet, full: &[Point]) -> Result<(), ConfigError> {
-    match include.lenient || full.iter().any(|point| include.covers(point)) {
-        true => Ok(()),
-        false => Err(ConfigError::UselessExclude {
+    if include.lenient || full.iter().any(|point| include.covers(point)) {
+        Ok(())
+    } else {
+        Err(ConfigError::UselessExclude {
             at: include.at.clone(),
             section: "include",
             exclude: include.to_string(),
-        }),
+        })
     }
 }
 

@@ -154,9 +154,10 @@ pub(super) fn shorten_labels(scenes: &mut [Variant]) {
         .map(|scene| {
             let mut parts = scene.label.split(['/', '\\']);
             let last = parts.rfind(|part| !part.is_empty());
-            match scene.label.is_empty() {
-                true => EMBEDDED.to_owned(),
-                false => last.unwrap_or(&scene.label).to_owned(),
+            if scene.label.is_empty() {
+                EMBEDDED.to_owned()
+            } else {
+                last.unwrap_or(&scene.label).to_owned()
             }
         })
         .collect();
