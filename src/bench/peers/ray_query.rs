@@ -1,4 +1,4 @@
-//! The driver's own ray tracing, through wgpu's ray queries, on a device of its own on the same adapter.
+//! The driver's ray tracing through wgpu's ray queries, on a separate device of the same adapter.
 
 use super::{BuiltPeer, Peer, PeerBatch};
 use raystone_accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
@@ -8,9 +8,10 @@ use std::cell::RefCell;
 use std::num::NonZeroU64;
 use wgpu::util::DeviceExt as _;
 
-/// A workgroup of the kernel.
+/// Workgroup size of the kernel.
 const LANES: u32 = 64;
-/// Rays of a dispatch: software adapters take some microseconds for one, and a dispatch of seconds looks like a hang.
+/// Rays per dispatch: software adapters take microseconds per ray, and a dispatch of seconds looks
+/// like a hang.
 const SLICE: usize = 1 << 16;
 const KERNEL: &str = include_str!("ray_query.wgsl");
 
@@ -20,7 +21,7 @@ pub(super) struct RayQuery;
 struct Built {
     raw: RawDevice,
     tlas: wgpu::Tlas,
-    /// What the tree refers to.
+    /// Referenced by the tree.
     _blas: wgpu::Blas,
     pipelines: [wgpu::ComputePipeline; 2],
     build_ms: f64,
@@ -30,7 +31,7 @@ struct Batch<'a> {
     built: &'a Built,
     rays: &'a [Ray],
     pipeline: &'a wgpu::ComputePipeline,
-    /// Of each slice, with its number of rays.
+    /// Bind group and number of rays of each slice.
     slices: Vec<(wgpu::BindGroup, u32)>,
     answers: wgpu::Buffer,
     staging: wgpu::Buffer,
@@ -166,7 +167,7 @@ impl BuiltPeer for Built {
                 2 * bytes
             ));
         }
-        // What is no ray has no direction; the kernel must not be asked.
+        // An invalid ray has no direction; the kernel must not trace it.
         let words = rays.iter().map(|ray| match ray.is_ray() {
             true => [
                 ray.origin,
@@ -263,7 +264,7 @@ impl PeerBatch for Batch<'_> {
         let elapsed = watch.elapsed();
         let words = self.answers()?;
         let hit = |(ray, [kind, t, id, _]): (&Ray, &[u32; 4])| match kind {
-            // 1 is what the kernel writes for a miss; 0 stands where it wrote nothing, and is no answer.
+            // The kernel writes 1 for a miss; 0 means it wrote nothing, and is no answer.
             1 => Hit::miss(ray),
             _ => Hit {
                 t: f32::from_bits(*t),

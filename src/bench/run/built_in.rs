@@ -16,16 +16,16 @@ use super::times;
 use super::units::MeasurementRegistry;
 use super::world::World;
 
-/// How the cells of a measurement are run.
+/// How a measurement's cells are run.
 #[derive(Clone, Copy)]
 pub(super) enum Run {
     /// One by one, by the driver.
     CellByCell,
-    /// Before all others of a world, which they serve.
+    /// Before all others of a world, which depend on them.
     First,
-    /// All of a world, after its structures.
+    /// All cells of a world, after its structures.
     OfWorld(fn(&mut Session, &World, &[Gated]) -> Result<(), RunError>),
-    /// All of the plan, behind the scenes.
+    /// All cells of the plan, after the scenes.
     Alone(fn(&mut Session, &Device) -> Result<(), RunError>),
 }
 

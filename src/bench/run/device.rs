@@ -4,9 +4,9 @@ use super::error::RunError;
 use raystone_core::params::Variant;
 use raystone_gpu::Gpu;
 
-/// An open device, which composes kernels from every library of a run.
+/// An open device that composes kernels from every library of a run.
 pub(super) struct Device {
-    /// With the embedded kernels.
+    /// Uses the embedded kernels.
     pub gpu: Gpu,
     views: Vec<(Variant, Gpu)>,
 }
@@ -16,7 +16,7 @@ impl Device {
         Self { gpu, views }
     }
 
-    /// The device with these kernels; an error if the plan was made for others.
+    /// The device with these kernels; an error if they are not in the plan.
     pub(super) fn of(&self, kernels: &Variant) -> Result<&Gpu, RunError> {
         if kernels.name.is_empty() {
             return Ok(&self.gpu);

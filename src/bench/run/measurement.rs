@@ -15,43 +15,43 @@ use raystone_record::Reading;
 use raystone_record::figure::Figure;
 use raystone_render::Stage;
 
-/// One kind of measurement.
+/// A kind of measurement.
 pub trait Measurement: Send + Sync {
-    /// Its name in records and lists, for instance `compaction`.
+    /// Name in records and lists, for instance `compaction`.
     fn name(&self) -> &'static str;
 
-    /// What several of its cells are called.
+    /// Plural name of its cells.
     fn plural(&self) -> &'static str;
 
-    /// Its figures, beside those of [`raystone_record::figure::FIGURES`].
+    /// Its figures, in addition to [`raystone_record::figure::FIGURES`].
     fn figures(&self) -> &'static [Figure] {
         &[]
     }
 
-    /// The cells of a plan that it measures, in the order of the plan.
+    /// The cells of a plan that it measures, in plan order.
     fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell>;
 
-    /// The name of a cell in records: unique among those of all measurements.
+    /// Name of a cell in records, unique among all measurements.
     fn unit_name(&self, cell: &Cell) -> String {
         format!("{} of {cell}", self.name())
     }
 
-    /// What cells have in common that are measured in the same rounds, and so stay in one shard: a measurement, and the part of
-    /// the cell.
+    /// Key of cells measured in the same rounds, which stay in one shard: a measurement, and a part
+    /// of the cell.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
     }
 
-    /// Whether clocks speak, so that figures of different machines must not meet.
+    /// True if it reads clocks, so figures of different machines must not be mixed.
     fn is_timed(&self) -> bool {
         true
     }
 
-    /// The settings of the experiment that its figures depend on, as a text that differs where they do. `reference_file` is the
-    /// hash of the image that errors are measured against; empty if that is rendered.
+    /// Text of the experiment settings that its figures depend on. `reference_file` is the hash of
+    /// the reference image; empty if it is rendered.
     fn settings(&self, experiment: &Experiment, reference_file: &str) -> String;
 
-    /// The work of a cell, without what several share.
+    /// Work of a cell, without shared work.
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work;
 
     /// Work that several cells share, done once for all that lie on the returned cell.
@@ -64,7 +64,8 @@ pub trait Measurement: Send + Sync {
         Through::Own
     }
 
-    /// Makes cells ready and checks them, one by one, in their order; the driver times them together and writes their readings.
+    /// Prepares and checks cells one by one, in order; the driver times them together and writes
+    /// their readings.
     fn prepare<'a>(&'a self, _at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let unfit = || Absent::Failed(format!("{} are not measured cell by cell", self.plural()));
         Box::new(cells.iter().map(move |_| Err(unfit())))
@@ -82,29 +83,29 @@ pub enum Through {
     None,
 }
 
-/// Cells on their way to be timed: one item for each.
+/// Cells being prepared, one item each.
 pub type Preparation<'a> = Box<dyn Iterator<Item = Result<Box<dyn Prepared + 'a>, Absent>> + 'a>;
 
-/// A cell that is ready, and passed its checks.
+/// A cell that is ready and has passed its checks.
 pub trait Prepared {
-    /// What is timed of it, in the rounds of all cells; nothing where no clock is read.
+    /// Items to time in the rounds of all cells; empty if no clock is read.
     fn timed(&self) -> Vec<&dyn Measured> {
         Vec::new()
     }
 
-    /// Its figures, from the samples of each thing that was timed.
+    /// Its figures, from the samples of each timed item.
     ///
     /// # Errors
-    /// What is wrong with them, in words: the cell fails.
+    /// The problem with them: the cell fails.
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String>;
 }
 
 /// Why a cell is not timed.
 #[derive(Debug)]
 pub enum Absent {
-    /// It cannot be measured here, for this reason: the cell is left out.
+    /// It cannot be measured here, for this reason: the cell is skipped.
     Refused(String),
-    /// It is wrong: the cell fails.
+    /// Its result is wrong: the cell fails.
     Failed(String),
 }
 
@@ -118,35 +119,35 @@ impl From<raystone_gpu::GpuError> for Absent {
     }
 }
 
-/// Where a measurement is carried out.
+/// Context of a measurement.
 pub struct At<'a> {
     /// The experiment.
     pub experiment: &'a Experiment,
-    /// Everything that can be named.
+    /// All registries.
     pub registries: &'a Registries,
     /// The scene with its tests; `None` for cells without a scene.
     pub stage: Option<&'a Stage>,
     pub(super) device: &'a Device,
     /// The structures that passed their gate, by cell.
     pub(super) traced: Vec<(&'a Cell, &'a Traced)>,
-    /// Structures that the driver refused, each with the reason.
+    /// Structures refused by the driver, with the reason.
     pub(super) refused: Vec<(Cell, String)>,
 }
 
 impl At<'_> {
-    /// The device with the kernels of a cell.
+    /// The device with a cell's kernels.
     ///
     /// # Errors
-    /// The plan was made for other kernels.
+    /// The kernels are not in the plan.
     pub fn gpu(&self, cell: &Cell) -> Result<&Gpu, Absent> {
         let gpu = self.device.of(&cell[Axis::Kernels]);
         gpu.map_err(|error| Absent::Failed(error.to_string()))
     }
 
-    /// The structure of a cell on the device.
+    /// A cell's structure on the device.
     ///
     /// # Errors
-    /// The driver refused it, or it did not pass its gate.
+    /// The driver refused it, or it failed its correctness check.
     pub fn traced(&self, cell: &Cell) -> Result<&Traced, Absent> {
         let mut structures = self.traced.iter();
         let structure = structures.find(|(structure, _)| cell.is_on(structure));
