@@ -135,9 +135,10 @@ impl Frame<'_> {
         let verdict = gate(gpu, triangles, soup, traced, self.judge, self.probe, checks);
         let verdict = verdict.map_err(|e| e.to_string())?;
         let judge = self.judge.of(traced.space);
-        match verdict.passed {
-            true => Ok(judge.sets.iter().map(|set| set.rays.len()).sum()),
-            false => Err(fault_text(&verdict, judge.first_wrong.as_deref())),
+        if verdict.passed {
+            Ok(judge.sets.iter().map(|set| set.rays.len()).sum())
+        } else {
+            Err(fault_text(&verdict, judge.first_wrong.as_deref()))
         }
     }
 

@@ -99,9 +99,10 @@ pub fn groups_of(
         (pixel[0] < size[0] && pixel[1] < size[1]).then_some(pixel)
     };
     let pixels = |number| (0..warp[0] * warp[1]).map(|l| lane(number, l)).collect();
-    let first = |group: u32| match u64::from(groups) * u64::from(warps) >= u64::from(all) {
-        true => group.saturating_mul(warps).min(all),
-        false => {
+    let first = |group: u32| {
+        if u64::from(groups) * u64::from(warps) >= u64::from(all) {
+            group.saturating_mul(warps).min(all)
+        } else {
             let share =
                 |fraction: u32, of: u32| ((u64::from(fraction) * u64::from(of)) >> 32) as u32;
             let column = share(group.wrapping_mul(GOLDEN).wrapping_add(HALF), blocks[0]);

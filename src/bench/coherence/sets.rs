@@ -45,9 +45,12 @@ pub fn of_rays(
 fn first_warps(all: usize, settings: &Coherence) -> Vec<usize> {
     let [groups, warps] = [settings.groups, settings.warps].map(|n| n as usize);
     let whole = all.div_ceil(warps);
-    let place = |group: usize| match groups < whole {
-        true => group * whole / groups * warps,
-        false => group * warps,
+    let place = |group: usize| {
+        if groups < whole {
+            group * whole / groups * warps
+        } else {
+            group * warps
+        }
     };
     (0..groups.min(whole)).map(place).collect()
 }

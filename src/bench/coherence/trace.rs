@@ -93,12 +93,13 @@ pub fn trace_of(
     }
     let told = [Kind::Node, Kind::Triangle].map(|kind| trace.count(kind));
     let counted = [counters.nodes, counters.triangle_tests];
-    match told == counted {
-        true => Ok(trace),
-        false => Err(format!(
+    if told == counted {
+        Ok(trace)
+    } else {
+        Err(format!(
             "its twin counts {} visits and {} tests of one ray, and tells {} and {}",
             counted[0], counted[1], told[0], told[1]
-        )),
+        ))
     }
 }
 

@@ -23,9 +23,12 @@ pub(crate) fn elements(count: u32, bytes: u32) -> Vec<u32> {
 /// its bucket.
 pub fn flags(count: u32, valid: f64, buckets: u32, seed: u64) -> Vec<u32> {
     let mut random = Pcg32::new(seed);
-    let mut flag = || match random.uniform() < valid {
-        true => 1 + random.below(buckets as usize) as u32,
-        false => 0,
+    let mut flag = || {
+        if random.uniform() < valid {
+            1 + random.below(buckets as usize) as u32
+        } else {
+            0
+        }
     };
     (0..count).map(|_| flag()).collect()
 }

@@ -64,9 +64,12 @@ impl<C: Caster> PeerBatch for NativeBatch<'_, C> {
         let watch = Stopwatch::start();
         let chunks = self.rays.par_iter().with_min_len(CHUNK);
         chunks
-            .map(|ray| match ray.is_ray() {
-                true => caster.cast(query, ray),
-                false => Hit::miss(ray),
+            .map(|ray| {
+                if ray.is_ray() {
+                    caster.cast(query, ray)
+                } else {
+                    Hit::miss(ray)
+                }
             })
             .collect_into_vec(&mut hits);
         Ok(watch.elapsed())

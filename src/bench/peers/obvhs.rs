@@ -93,9 +93,10 @@ impl Built<'_> {
         // Its weights belong to the second and third vertices.
         let weights = self.triangles[place].compute_barycentric(ray);
         let record = &self.soup.records[self.ids[place] as usize];
-        match is_cut_out(Some(masks), record, weights.x, weights.y) {
-            true => f32::INFINITY,
-            false => t,
+        if is_cut_out(Some(masks), record, weights.x, weights.y) {
+            f32::INFINITY
+        } else {
+            t
         }
     }
 }

@@ -168,14 +168,17 @@ impl BuiltPeer for Built {
             ));
         }
         // An invalid ray has no direction; the kernel must not trace it.
-        let words = rays.iter().map(|ray| match ray.is_ray() {
-            true => [
-                ray.origin,
-                [ray.t_min, 0.0, 0.0],
-                ray.direction,
-                [ray.t_max.min(f32::MAX), 0.0, 0.0],
-            ],
-            false => [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]],
+        let words = rays.iter().map(|ray| {
+            if ray.is_ray() {
+                [
+                    ray.origin,
+                    [ray.t_min, 0.0, 0.0],
+                    ray.direction,
+                    [ray.t_max.min(f32::MAX), 0.0, 0.0],
+                ]
+            } else {
+                [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]
+            }
         });
         let words: Vec<[f32; 8]> = words
             .map(|[o, a, d, b]| [o[0], o[1], o[2], a[0], d[0], d[1], d[2], b[0]])

@@ -119,13 +119,14 @@ fn further(
     if !blocks.is_empty() {
         pass.renderer.add_samples(done, spp - done, seed)?;
     }
-    match blocks.is_empty() {
-        true => Ok(Image {
+    if blocks.is_empty() {
+        Ok(Image {
             width: tiles.size[0],
             height: tiles.size[1],
             pixels: vec![[0.0; 3]; (tiles.size[0] * tiles.size[1]) as usize],
-        }),
-        false => pass.renderer.image(),
+        })
+    } else {
+        pass.renderer.image()
     }
 }
 

@@ -32,9 +32,12 @@ pub(super) fn attributes(
 ) -> Vec<Attribute<'static>> {
     let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
     let changed = program.dirty == Some(true);
-    let commit = program.commit.map(|commit| match changed {
-        true => format!("{commit} with uncommitted changes"),
-        false => commit.to_owned(),
+    let commit = program.commit.map(|commit| {
+        if changed {
+            format!("{commit} with uncommitted changes")
+        } else {
+            commit.to_owned()
+        }
     });
     let software = format!("raystone {}", program.version);
     let known = [

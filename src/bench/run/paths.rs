@@ -213,9 +213,10 @@ fn of_trial(
     let listed: Result<Vec<_>, _> = listed.collect();
     let listed = listed.map_err(|e| e.to_string())?;
     let own = [integrator];
-    let integrators: Vec<&ConfiguredIntegrator> = match trial.trials.is_empty() {
-        true => own.to_vec(),
-        false => listed.iter().collect(),
+    let integrators: Vec<&ConfiguredIntegrator> = if trial.trials.is_empty() {
+        own.to_vec()
+    } else {
+        listed.iter().collect()
     };
     let mut all = PathsRecord::default();
     if integrators.is_empty() {

@@ -61,9 +61,10 @@ impl Progress {
             done_s: 0.0,
             told: Instant::now(),
         }));
-        let bar = match options.progress {
-            true => ProgressBar::new(STEPS),
-            false => ProgressBar::hidden(),
+        let bar = if options.progress {
+            ProgressBar::new(STEPS)
+        } else {
+            ProgressBar::hidden()
         };
         let template = "{bar:32} {percent}% · {elapsed} · about {left} left · {wide_msg}";
         let style = ProgressStyle::with_template(template);

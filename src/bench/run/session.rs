@@ -408,9 +408,10 @@ impl<'a> Session<'a> {
 
     /// Ends the run here if interrupted.
     pub(super) fn go_on(&self) -> Result<(), RunError> {
-        match self.options.interrupt.is_asked() {
-            true => Err(RunError::Interrupted),
-            false => Ok(()),
+        if self.options.interrupt.is_asked() {
+            Err(RunError::Interrupted)
+        } else {
+            Ok(())
         }
     }
 
