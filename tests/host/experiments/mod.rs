@@ -1,5 +1,5 @@
-//! Experiment files, through the public interface: what is accepted, and what every kind of
-//! mistake is answered with.
+//! Experiment files through the public interface: accepted input, and the answer to every kind of
+//! mistake.
 
 mod mistakes;
 
@@ -30,7 +30,7 @@ fn parameter(name: &'static str, default: ParamValue, range: ParamRange) -> Para
     }
 }
 
-/// A catalogue of its own, so that these tests do not depend on what the registries hold.
+/// A separate catalogue, so that these tests do not depend on the registries.
 fn catalogue() -> Catalogue {
     let lambda = ParamRange::Number {
         min: 0.1,
@@ -83,7 +83,7 @@ fn parse_with(text: &str, overrides: &[&str]) -> Result<Experiment, ConfigError>
     Experiment::parse(text, "dir/trial.toml", &overrides, &catalogue())
 }
 
-/// The experiment of [`AXES`] and some more lines, which start on line 5.
+/// The experiment of [`AXES`] with additional lines, which start on line 5.
 fn parse(more: &str) -> Result<Experiment, ConfigError> {
     parse_with(&format!("{AXES}{more}"), &[])
 }
@@ -360,7 +360,8 @@ fn tests_and_offsets_are_swept_where_they_matter() {
     let exclude = "[[exclude]]\ntriangle = \"pluecker\"\nbox_test = \"plain\"\n";
     let experiment = parse_with(&format!("{text}{exclude}"), &[]).expect("a good sweep");
     let whole = plan(&experiment, &[]).expect("a plan");
-    // Three pairs of tests; 2 structures, which are the same with every offset; 2 sequences; 2 offsets.
+    // Three pairs of tests; 2 structures, which are the same with every offset; 2 sequences; 2
+    // offsets.
     assert_eq!(whole.structures.len(), 3 * 2);
     assert_eq!(whole.samplers.len(), 3 * 2 * 2);
     assert_eq!(whole.times.len(), 3 * 2 * 2 * 2);
@@ -384,7 +385,7 @@ fn tests_and_offsets_are_swept_where_they_matter() {
             "cornell-box, triangle pluecker"
         ]
     );
-    // What differs from the default stands behind the names, and no two cells are called the same.
+    // Non-default values follow the names, and cell names are unique.
     let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
     assert_eq!(names.len(), whole.times.len());
     assert!(
@@ -457,7 +458,7 @@ fn filters_and_excludes_that_fit_nothing_are_mistakes() {
         plan(&parse_with(&all, &[]).expect("parses"), &[]),
         &["nothing is left"],
     );
-    // The same leftover exclude is no mistake where the command line replaced its axis.
+    // The same leftover exclude is allowed if the command line replaced its axis.
     let other = parse_with(SWEEP, &["axes.scene=a/b.obj"]).expect("a replaced axis");
     assert_eq!(plan(&other, &[]).unwrap().structures.len(), 3);
     let narrowed = parse_with(SWEEP, &["axes.sequence=sobol"]).expect("a replaced axis");
@@ -525,7 +526,7 @@ fn committed_experiments_parse_and_plan() {
                 .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             let renders = !plan.times.is_empty() && !plan.streams.is_empty();
             assert!(renders || !plan.compactions.is_empty());
-            // The saving is in what no image depends on.
+            // The saving comes from axes that images do not depend on.
             let unseen = [Axis::Accel, Axis::Organisation, Axis::Workgroup];
             match unseen.map(|axis| experiment.axes[axis].len()) {
                 [1, 1, 1] => assert_eq!(plan.renders_planned(), plan.renders_full_product()),

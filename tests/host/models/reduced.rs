@@ -1,4 +1,5 @@
-//! Textures and maps that are larger than what an adapter binds: what is left stands for the same light.
+//! Textures and maps that exceed the adapter's binding limit: the reduced ones represent the same
+//! light.
 
 use super::variant;
 use raystone::params::ParamValue;
@@ -97,7 +98,8 @@ fn what_is_cut_out_lends_no_colour() {
 fn textures_and_maps_are_as_large_as_the_adapter_binds() {
     let folder = tempfile::tempdir().unwrap();
     let file = model(folder.path(), 64, [WHITE, BLACK]);
-    // Beside 8 MiB for materials and lights: four images of 64 × 64 texels and a triangle, or less.
+    // Next to 8 MiB for materials and lights: four images of 64 × 64 texels and a triangle, or
+    // less.
     let needed = (8 << 20) + 4 * (4 * 64 * 64 + 9);
     let sizes = |bytes| {
         let scene = loaded(&file, 1024, bytes);

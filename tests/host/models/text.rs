@@ -1,4 +1,4 @@
-//! Text models as the wild has them, and files that models name.
+//! Text models as found in practice, and files that models name.
 
 use super::*;
 
@@ -93,7 +93,7 @@ fn absolute_paths_of_an_obj_model_are_not_read() {
     );
 }
 
-/// A triangle whose buffer and image are at these places.
+/// A triangle with its buffer and image at these paths.
 fn gltf(buffer: &str, image: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
@@ -107,7 +107,7 @@ fn gltf(buffer: &str, image: &str) -> String {
     )
 }
 
-/// A folder `models` with buffers and images in it and beside it, and links both ways.
+/// A folder `models` with buffers and images inside and beside it, and links both ways.
 #[cfg(unix)]
 fn models_and_links() -> TempDir {
     use std::os::unix::fs::symlink;
