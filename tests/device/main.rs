@@ -1,4 +1,5 @@
-//! How a device is used: kernels, recordings, passes, organisations of kernels, and what users add of all these.
+//! Tests of the device: kernels, recordings, passes, kernel organisations, and user additions to
+//! all of these.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! A path tracer leaves room among the eight storage buffers that WebGPU promises.
+//! A path tracer uses fewer than the eight storage buffers that WebGPU guarantees.
 
 use crate::support::*;
 

@@ -1,4 +1,4 @@
-//! Compactions in a run like any other: records, figures, report.
+//! Compactions in an ordinary run: records, figures, report.
 
 use crate::support::{plan, run};
 use raystone::measure::figure::{
@@ -40,7 +40,7 @@ fn compactions(lines: &[Line]) -> Vec<Recorded<'_, MeasuredRecord>> {
         .collect()
 }
 
-/// Elements and bytes of an element, as the label of a cell says.
+/// A parameter such as elements or bytes, from the cell's label.
 fn parameter(cell: &Recorded<MeasuredRecord>, name: &str) -> f64 {
     let variant = cell.key.get(axis::INTEGRATOR).expect("a compaction");
     match &variant.params.0[name] {
@@ -54,7 +54,7 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     let registries = Registries::default();
     let (_, plan) = plan(EXPERIMENT, &registries);
     assert!(plan.structures.is_empty() && plan.times.is_empty() && plan.streams.is_empty());
-    // The default block stands in two tables.
+    // The default block is in two tables.
     assert_eq!(plan.compactions.len(), 5 + 3 + 5 + 1);
     let folder = tempfile::tempdir().expect("a folder");
     let (summary, lines) = run(EXPERIMENT, &registries, folder.path(), None);
@@ -105,7 +105,8 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     }
 }
 
-/// Kernels that count one too few: their cells have no figure, those of the embedded kernels beside them have.
+/// Kernels that count one too few: their cells have no figure, while those of the embedded kernels
+/// do.
 #[test]
 fn a_method_that_is_wrong_has_no_figure() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,5 +1,5 @@
-//! The gate: right structures pass it, and every planted fault turns it red, with the right count and
-//! a ray that can be replayed.
+//! The correctness check: right structures pass, and every planted fault fails, with the right
+//! count and a replayable ray.
 
 mod compare;
 mod faults;
@@ -15,12 +15,11 @@ use raystone::gpu::Gpu;
 use raystone::measure::gate::{Checks, Judge};
 use raystone::measure::record::GateVerdict;
 
-/// The judge of a scene with `rays` rays of each class.
+/// The reference of a scene with `rays` rays of each class.
 fn judge(stage: &Stage, rays: u32) -> Judge {
     stage.judge(Checks::Repeated, [rays, 20_000_000, 512])
 }
 
-/// The verdict on one structure.
 fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> GateVerdict {
     let traced = stage.traced(gpu, kind);
     let verdict = stage.verdict(gpu, &traced, judge);

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 const HEIGHT: f64 = 2.0;
 const STRENGTH: f64 = 10.0;
 
-/// Places on the floor: below the lamp, beside it, far off.
+/// Places on the floor: below the lamp, next to it, far away.
 pub const PLACES: [[f64; 2]; 3] = [[0.0, 0.0], [0.7, 0.3], [-1.6, 1.1]];
 
 /// Kinds of lamps.
@@ -20,8 +20,9 @@ pub const LAMPS: [&str; 6] = [
     "directional",
 ];
 
-/// Irradiance of a plane with the normal +y by an even polygon above it that faces it (J. Lambert, "Photometria",
-/// 1760): half the sum over edges of the angle that each fills times the cosine of the plane through it.
+/// Irradiance of a plane with normal +y by a uniform polygon above and facing it (J. Lambert,
+/// "Photometria", 1760): half the sum over edges of the subtended angle times the cosine of the
+/// plane through it.
 fn polygon(corners: &[DVec3], place: DVec3) -> f64 {
     let count = corners.len();
     let edge = |k: usize| {

@@ -1,12 +1,12 @@
-//! Faults that are planted in the kernels of lights, and the checks that must see them.
+//! Faults planted in the kernels of lights, and the checks that must detect them.
 
 use super::{density, environment, files, irradiance, means};
 use crate::support::*;
 use density::probing;
 
-/// What sees a fault.
+/// The check that detects a fault.
 enum Seen {
-    /// Irradiance below this lamp, by this strategy.
+    /// Irradiance below this lamp, with this strategy.
     Irradiance(&'static str, &'static str),
     /// Densities in this scene.
     Density(&'static str),

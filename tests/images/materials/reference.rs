@@ -1,10 +1,11 @@
-//! Reflection in f64, from the formulas of `docs/shading.md` and in angles, which is not how the kernels compute it.
+//! Reflection in f64, from the formulas of `docs/shading.md` in terms of angles, unlike the
+//! kernels.
 
 use glam::{DVec3, Vec3};
 use raystone::scene::{CookTorrance, Fresnel, Masking, Material};
 use std::f64::consts::PI;
 
-/// A material as its constructor takes it.
+/// A material's constructor arguments.
 #[derive(Debug, Clone, Copy)]
 pub enum Model {
     Diffuse {
@@ -28,7 +29,7 @@ fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.212671, 0.715160, 0.072169))
 }
 
-/// Reflectance by the sines and tangents of both angles (Fresnel 1823), or Schlick's polynomial.
+/// Reflectance by sines and tangents of both angles (Fresnel 1823), or Schlick's polynomial.
 fn fresnel(kind: Fresnel, cosine: f64, eta: f64) -> f64 {
     let straight = ((eta - 1.0) / (eta + 1.0)).powi(2);
     if kind == Fresnel::Schlick {
@@ -45,7 +46,7 @@ fn fresnel(kind: Fresnel, cosine: f64, eta: f64) -> f64 {
     0.5 * (perpendicular + parallel)
 }
 
-/// The part of Beckmann facets that is seen, by Walter's approximation.
+/// Visible fraction of Beckmann facets, by Walter's approximation.
 fn smith(cosine: f64, roughness: f64) -> f64 {
     let a = 1.0 / (roughness * cosine.min(1.0).acos().tan());
     if a < 1.6 {
