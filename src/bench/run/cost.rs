@@ -1,4 +1,5 @@
-//! What a plan is expected to take: the one model behind `--dry-run`, the time that is left, and shards of equal length.
+//! Cost estimate of a plan, the common model behind `--dry-run`, the remaining time, and balanced
+//! shards.
 
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_core::params::Variant;
@@ -70,7 +71,7 @@ impl Work {
             + self.other_s
     }
 
-    /// In words, for `--dry-run`.
+    /// Describes the work for `--dry-run`.
     pub fn describe(&self) -> String {
         format!(
             "estimate: about {} on a software adapter with two cores, from {} million rays at \

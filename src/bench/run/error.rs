@@ -1,4 +1,4 @@
-//! Why a run, or one of its cells, cannot go on.
+//! Errors of a run or one of its cells.
 
 use raystone_gpu::GpuError;
 use std::path::PathBuf;

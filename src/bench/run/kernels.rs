@@ -1,4 +1,4 @@
-//! The kernels of a run: a library for each folder on the axis, and a device that composes from each.
+//! Kernels of a run: a library per folder on the axis, and a device that composes from each.
 
 use super::device::Device;
 use super::error::RunError;
@@ -46,7 +46,7 @@ impl Kernels {
         })
     }
 
-    /// Opens the adapter of the options, with a device for each library.
+    /// Opens the chosen adapter, with a device for each library.
     pub(super) fn open(&self, options: &RunOptions) -> Result<Device, RunError> {
         let gpu = gpu::open(&options.adapter, self.embedded.clone())?;
         let gpu = gpu.compiled_apart(options.compilations);

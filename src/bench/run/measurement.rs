@@ -1,8 +1,9 @@
-//! Measurements: what is measured of a plan, what that costs, and how.
+//! Measurements of a plan and their cost.
 //!
-//! A measurement is one entry of the [`MeasurementRegistry`]. Plans, shards, expected times, resumed runs and records know it by
-//! that entry alone. One that is measured cell by cell (see [`Measurement::prepare`]) writes [readings](Reading), which stand in
-//! pages, comparisons and exports without another line of code; the others bring a loop of their own.
+//! A measurement is one entry of the [`MeasurementRegistry`]; plans, shards, expected times,
+//! resumed runs and records use only that entry. Cell-by-cell measurements (see
+//! [`Measurement::prepare`]) write [readings](Reading), which appear in pages, comparisons and
+//! exports without further code; the others have their own loop.
 
 use super::cost::{Cost, Work};
 use super::device::Device;
@@ -54,12 +55,12 @@ pub trait Measurement: Send + Sync {
     /// Work of a cell, without shared work.
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work;
 
-    /// Work that several cells share, done once for all that lie on the returned cell.
+    /// Work shared by several cells, done once for all of them on the returned cell.
     fn shared_cost(&self, _cell: &Cell, _cost: &Cost) -> Option<(Cell, Work)> {
         None
     }
 
-    /// The structures that a cell is measured through.
+    /// The structures through which a cell is measured.
     fn through(&self) -> Through {
         Through::Own
     }
@@ -72,12 +73,12 @@ pub trait Measurement: Send + Sync {
     }
 }
 
-/// The structures that a cell is measured through.
+/// The structures through which a cell is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Through {
-    /// That of the cell.
+    /// The cell's own.
     Own,
-    /// Any of its scene with its kernels: what it measures does not depend on the structure.
+    /// Any of its scene with its kernels: the result does not depend on the structure.
     Any,
     /// None.
     None,
@@ -128,7 +129,7 @@ pub struct At<'a> {
     /// The scene with its tests; `None` for cells without a scene.
     pub stage: Option<&'a Stage>,
     pub(super) device: &'a Device,
-    /// The structures that passed their gate, by cell.
+    /// The structures that passed the correctness check, by cell.
     pub(super) traced: Vec<(&'a Cell, &'a Traced)>,
     /// Structures refused by the driver, with the reason.
     pub(super) refused: Vec<(Cell, String)>,

@@ -308,7 +308,7 @@ fn run_world(
 /// find them. Returns the number of rendered parts, and the references that have none.
 ///
 /// # Errors
-/// No adapter, or no cache. No adapter, or no cache.
+/// No adapter, or no cache.
 pub fn render_references(
     experiment: &Experiment,
     plan: &Plan,

@@ -1,4 +1,4 @@
-//! What is said of a run beside its experiment, and how it ended.
+//! Options of a run besides its experiment, and its outcome.
 
 use super::folder::{Existing, Interrupt};
 use raystone_config::Shard;

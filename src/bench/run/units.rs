@@ -1,4 +1,4 @@
-//! The registry of measurements, and what they make of a plan: its units.
+//! The registry of measurements, and a plan's units.
 
 use super::cost::{Cost, Work};
 use super::measurement::Measurement;
@@ -112,7 +112,7 @@ impl Cost<'_> {
         unit.measurement.cost(&unit.cell, self).seconds()
     }
 
-    /// The work of these units, with the scenes and what else several of them need.
+    /// Work of these units, including their scenes and shared parts.
     pub fn whole<'u>(&self, units: impl IntoIterator<Item = &'u Unit>) -> Work {
         let mut whole = Work::default();
         let (mut worlds, mut several) = (BTreeSet::new(), BTreeSet::new());
