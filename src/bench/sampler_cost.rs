@@ -24,7 +24,6 @@ const TURNS_PER_DRAW: u32 = 33;
 const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
 
-/// The two kernels and their inputs.
 struct Loop<'a> {
     gpu: &'a Gpu,
     bindings: Bindings,

@@ -94,7 +94,6 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
     found
 }
 
-/// Sums of power by distance from frequency 0.
 struct Rings {
     /// Sums of frequency and power, and counts.
     sums: Vec<[f64; 3]>,

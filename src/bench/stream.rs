@@ -26,7 +26,6 @@ pub(crate) struct SeedFigures {
     star: Vec<f64>,
     /// Square roots; shorter than `star` if N goes beyond [`MOST_QUADRATIC`].
     l2_star: Vec<f64>,
-    /// Squares.
     centered: Vec<f64>,
     /// By function, then by number of points.
     squared_errors: Vec<Vec<f64>>,

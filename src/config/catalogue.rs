@@ -18,7 +18,6 @@ pub struct Catalogue {
     sections: Vec<Section>,
 }
 
-/// No entries, and the sections common to all experiments.
 impl Default for Catalogue {
     fn default() -> Self {
         Self {

@@ -9,10 +9,8 @@ use super::settings::Section;
 use super::tree::{Item, Table, Value};
 use super::{Catalogue, variants};
 
-/// The section of varied axes.
 pub(super) const AXES: &str = "axes";
 
-/// Sections of tables that select cells.
 const CELL_SETS: [&str; 2] = ["exclude", "include"];
 
 /// Checks that every section, key and entry is known.
@@ -82,7 +80,6 @@ fn unknown_section(name: &str, item: &Item, catalogue: &Catalogue) -> ConfigErro
     ConfigError::unknown(&item.at, what, name, known)
 }
 
-/// A key of a section, for messages.
 pub(super) fn key_in(section: &str) -> String {
     format!("key in [{section}]")
 }
@@ -99,7 +96,6 @@ pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<()
     }
 }
 
-/// The tables of a section that selects cells.
 pub(super) fn cell_tables<'t>(
     section: &str,
     item: &'t Item,

@@ -12,7 +12,6 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Sections read here.
 const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "software"];
 
 /// Printed results of a thesis, and the tests of them.

@@ -87,7 +87,6 @@ fn file_stem(file: &str) -> String {
     stem.map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into())
 }
 
-/// Reads sections of the merged tree.
 struct Reader<'t> {
     tree: &'t Table,
     /// The `[axes]` section, and defaults of the other axes.
@@ -134,7 +133,6 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// The section of entry parameters of an axis.
     fn parameters(&self, axis: Axis) -> Result<Option<&'t Table>, ConfigError> {
         let item = self.tree.get(axis.name());
         item.map(|item| item.table(axis.name(), "sections"))
@@ -191,7 +189,6 @@ impl<'t> Reader<'t> {
         Ok(variants)
     }
 
-    /// Excluded or included cells.
     fn cell_sets(&self, section: &str, axes: &Axes) -> Result<Vec<CellSet>, ConfigError> {
         let Some(item) = self.tree.get(section) else {
             return Ok(Vec::new());
@@ -202,7 +199,6 @@ impl<'t> Reader<'t> {
             .collect()
     }
 
-    /// The patterns of a table, by axis.
     fn cell_set(
         &self,
         section: &str,
@@ -233,7 +229,6 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// The `when` conditions in parameter tables.
     fn conditions(&self, axes: &Axes) -> Result<Vec<Condition>, ConfigError> {
         let mut conditions = Vec::new();
         for axis in Axis::ALL {
@@ -280,7 +275,6 @@ impl<'t> Reader<'t> {
         self.cell_set(&key, (&item.at, table), axes)
     }
 
-    /// The parameter tables of an entry on an axis.
     fn tables_of(&self, axis: Axis, name: &str) -> Result<Vec<&'t Table>, ConfigError> {
         match self.parameters(axis)?.and_then(|entries| entries.get(name)) {
             Some(item) => parameter_tables(axis, name, item),

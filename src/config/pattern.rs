@@ -87,7 +87,6 @@ impl Selector {
         Ok(selector)
     }
 
-    /// The patterns of an axis.
     fn of(&mut self, axis: &'static str) -> &mut Vec<Pattern> {
         let place = self.0.iter().position(|(other, _)| *other == axis);
         let place = place.unwrap_or_else(|| {
@@ -131,7 +130,6 @@ impl Selector {
     }
 }
 
-/// Finds an axis by name.
 fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     let found = axes.iter().find(|axis| **axis == name).copied();
     found.ok_or_else(|| {

@@ -50,7 +50,6 @@ pub(super) fn asked_once(is_randomised: impl IsRandomised) -> impl IsRandomised 
 #[derive(Clone)]
 pub(super) struct Point<'a>(AxisMap<Option<&'a Arc<Variant>>>);
 
-/// The variants of each axis, shared by cells.
 pub(super) type Shared = AxisMap<Vec<Arc<Variant>>>;
 
 pub(super) fn shared(axes: &Axes) -> Shared {

@@ -49,9 +49,7 @@ impl Bounded for SppCounts {
 
 /// Largest number of samples per pixel for errors.
 const MOST_SPP: u32 = 1 << 16;
-/// Range of image edges, pixels.
 const EDGES: RangeInclusive<u32> = 16..=8192;
-/// Default sample counts.
 const FEW: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
 parameters! {

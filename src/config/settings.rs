@@ -122,7 +122,6 @@ pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
 /// The settings of all sections present.
 pub(super) type Read = BTreeMap<String, Params>;
 
-/// Reads and checks all sections.
 pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, ConfigError> {
     let read = sections.iter().filter_map(|section| {
         let params = section.read(tree).transpose()?;

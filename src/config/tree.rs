@@ -10,7 +10,6 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
-/// A value and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Item {
     pub at: Place,
@@ -46,7 +45,6 @@ impl Item {
         }
     }
 
-    /// The error for an empty list.
     pub(crate) fn empty(&self, key: &str) -> ConfigError {
         ConfigError::Empty {
             at: self.at.clone(),

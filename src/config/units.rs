@@ -28,7 +28,6 @@ pub struct Shard {
     pub of: usize,
 }
 
-/// Limit on the number of parts.
 const MOST_SHARDS: usize = 10_000;
 
 impl FromStr for Shard {

@@ -64,7 +64,6 @@ fn is_path(text: &str) -> bool {
         || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
 }
 
-/// Label of the embedded kernels.
 const EMBEDDED: &str = "embedded";
 
 /// Key in a parameter table that restricts its variants to certain cells.
@@ -110,7 +109,6 @@ pub(super) fn expand(
         .collect())
 }
 
-/// Limit on the variants of an axis.
 const MAX_VARIANTS: usize = 1024;
 
 /// Checks the number of variants on an axis; `item` is the place for the error.

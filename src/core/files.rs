@@ -30,7 +30,6 @@ pub trait Files: Send + Sync {
     fn real(&self, path: &Path) -> io::Result<PathBuf>;
 }
 
-/// The machine's file system.
 struct Disk;
 
 impl Files for Disk {

@@ -47,7 +47,6 @@ pub fn categorical(index: usize) -> [u8; 3] {
     OKABE_ITO[index % OKABE_ITO.len()]
 }
 
-/// Formats as `#rrggbb`.
 pub(crate) fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

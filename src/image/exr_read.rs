@@ -54,7 +54,6 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
 
 type FlatLayer = Layer<AnyChannels<FlatSamples>>;
 
-/// The colour channels of a layer.
 struct Colours<'a> {
     /// Layer name, empty if it has none.
     name: String,
@@ -62,7 +61,6 @@ struct Colours<'a> {
     samples: [&'a FlatSamples; 3],
 }
 
-/// Splits a channel name into layer and channel.
 fn split(name: &str) -> (&str, &str) {
     name.rsplit_once('.').unwrap_or(("", name))
 }
@@ -100,7 +98,6 @@ fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
     prefixes.into_iter().filter_map(of_prefix).collect()
 }
 
-/// Chooses the main image among the candidates.
 fn chosen<'a, 'b>(candidates: &'b [Colours<'a>]) -> Option<&'b Colours<'a>> {
     let called = |wanted: &&str| {
         let is_it = |c: &&Colours| split(&c.name).1.eq_ignore_ascii_case(wanted);

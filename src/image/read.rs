@@ -55,7 +55,6 @@ pub fn read_linear(path: &Path) -> Result<Image, ImageError> {
     })
 }
 
-/// Checks the size of an image.
 pub(super) fn checked_size(width: u64, height: u64) -> Result<[u32; 2], String> {
     let pixels = width.checked_mul(height);
     match (u32::try_from(width), u32::try_from(height)) {

@@ -46,7 +46,6 @@ pub(super) struct SceneBuilder {
     normals: Vec<[u32; 3]>,
     /// Empty until a vertex has a colour other than white.
     colors: Vec<[[u32; 2]; 3]>,
-    /// Empty until a triangle is mirrored.
     mirrored: Vec<bool>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
@@ -77,7 +76,6 @@ impl SceneBuilder {
         self.uvs.reserve(if self.keep_uvs { more } else { 0 });
     }
 
-    /// Adds a triangle without texture coordinates.
     pub(crate) fn push(&mut self, vertices: [Vec3; 3], material: u32) {
         self.push_corners(vertices, [Vec2::ZERO; 3], None, material);
     }
@@ -207,7 +205,6 @@ impl SceneBuilder {
         }
     }
 
-    /// The triangles alone.
     pub(crate) fn into_triangles(self) -> Vec<Triangle> {
         self.triangles
     }

@@ -6,7 +6,6 @@ use glam::{DVec3, Vec3};
 /// The encoding of white, which leaves the base colour unchanged.
 pub const WHITE: [u32; 2] = [0xffff_ffff, 0xffff];
 
-/// The largest 16-bit number.
 const LARGEST: f32 = 65_535.0;
 
 /// Packs a linear colour in 0 to 1: red in the low and green in the high half of the first word,

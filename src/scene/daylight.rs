@@ -34,7 +34,6 @@ impl Daylight {
         }
     }
 
-    /// Text for the load report.
     pub(super) fn note(&self) -> String {
         let mut note = "the scene has no light: lit by a grey sky with a key light".to_owned();
         if self.reach < f32::MAX {

@@ -148,7 +148,6 @@ pub(super) fn open(path: &Path) -> Result<(Box<dyn Read + Send>, u64), SceneErro
     Ok((file, bytes))
 }
 
-/// Reads a whole model into memory.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     let mut bytes = Vec::new();
     let read = open(path)?.0.read_to_end(&mut bytes);

@@ -116,7 +116,6 @@ impl Framing {
         [Vec3::X, self.up, front]
     }
 
-    /// Shortest edge of the scene's box.
     pub(super) fn least_extent(&self) -> f32 {
         (self.bounds.max - self.bounds.min).min_element()
     }
@@ -149,7 +148,6 @@ fn sphere_around(bounds: &Bounds) -> (Vec3, f32) {
     (center, bounds.radius().max(least).max(1e-6))
 }
 
-/// Maps the sphere to the unit sphere.
 fn to_unit(v: Vec3, center: Vec3, radius: f32) -> Vec3 {
     ((v.as_dvec3() - center.as_dvec3()) / f64::from(radius)).as_vec3()
 }
@@ -200,7 +198,6 @@ fn basis(forward: Vec3, up: Vec3) -> [Vec3; 3] {
     [forward, right, right.cross(forward)]
 }
 
-/// The scene moved to the unit sphere.
 struct UnitScene {
     bounds: Bounds,
     up: Vec3,
@@ -208,7 +205,6 @@ struct UnitScene {
     bvh: Bvh2,
 }
 
-/// Result of a ray.
 #[derive(Clone, Copy, PartialEq)]
 enum Seen {
     Nothing,
@@ -479,7 +475,6 @@ impl UnitScene {
     }
 }
 
-/// Statistics of what an image sees.
 struct Look {
     /// Fraction of hits on back faces.
     backs: f32,

@@ -188,7 +188,6 @@ struct Geometry<'a> {
     unread: Unread,
 }
 
-/// Meshes used by several nodes, which become objects.
 struct Copies {
     /// Number of nodes using each mesh.
     uses: Vec<usize>,

@@ -5,7 +5,6 @@ const HEADER_BYTES: usize = 12;
 const JSON: &[u8] = b"JSON";
 const BINARY: &[u8] = b"BIN\0";
 
-/// JSON text and binary chunk.
 type Chunks<'a> = (&'a [u8], Option<&'a [u8]>);
 
 /// Returns the JSON text and the optional binary chunk. A file without a GLB header is all text.

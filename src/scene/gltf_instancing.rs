@@ -10,10 +10,8 @@ const VISIBILITY: &str = "KHR_node_visibility";
 /// Extensions read here that the crate does not know.
 pub(super) const OF_NODES: [&str; 2] = [INSTANCING, VISIBILITY];
 
-/// Supported instance attributes.
 const READ: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
 
-/// True if the node and its descendants are shown.
 pub(super) fn is_visible(node: &gltf::Node<'_>) -> bool {
     let extension = node.extension_value(VISIBILITY);
     let visible = extension.and_then(|value| value.get("visible"));

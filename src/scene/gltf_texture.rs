@@ -16,7 +16,6 @@ pub(super) struct Images<'a> {
     pub used: Vec<ImageSource<'a>>,
 }
 
-/// A texture and its coordinate set.
 pub(super) struct Placed {
     pub set: u32,
     pub place: TextureUse,

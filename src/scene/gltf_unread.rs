@@ -18,7 +18,6 @@ const READ: [&str; 8] = [
     "KHR_texture_transform",
 ];
 
-/// Ignored features found so far.
 pub(super) struct Unread {
     extensions: BTreeSet<String>,
     pub attributes: BTreeSet<String>,

@@ -323,7 +323,6 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
     }
 }
 
-/// The file extension in lower case.
 fn extension(path: &Path) -> String {
     let extension = path.extension().unwrap_or_default();
     extension

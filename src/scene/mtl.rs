@@ -25,7 +25,6 @@ pub(super) struct Library {
     loaded: RefCell<HashSet<PathBuf>>,
 }
 
-/// Content of the libraries.
 #[derive(Default)]
 pub(super) struct Contents {
     pub materials: Vec<Material>,
@@ -123,7 +122,6 @@ impl Library {
 }
 
 impl Contents {
-    /// Adds a material of the library `file`.
     fn add(&mut self, material: &tobj::Material, file: &Path, options: &LoadOptions) {
         let folder = file.parent().unwrap_or(Path::new(""));
         // The standard shows textures unscaled by default.
@@ -217,7 +215,6 @@ impl Contents {
     }
 }
 
-/// Replaces folder separators by `/`.
 fn plain(name: &str) -> String {
     name.replace('\\', "/")
 }

@@ -7,7 +7,6 @@ use raystone_core::geometry::Triangle;
 /// Marks a corner that uses the triangle's normal. No encoded normal has these bits.
 pub const GEOMETRIC: u32 = 0x8000_8000;
 
-/// Largest signed 16-bit number.
 const LARGEST: f64 = 32_767.0;
 /// Vertex normals with a larger cosine to the face normal are dropped: within a tenth of a degree.
 const FLAT: f64 = 1.0 - 1e-6;

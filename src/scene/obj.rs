@@ -59,7 +59,6 @@ pub(super) fn load(
     })
 }
 
-/// Statements being turned into a scene.
 struct Model {
     read: Statements,
     builder: SceneBuilder,
@@ -92,7 +91,6 @@ impl Model {
         }
     }
 
-    /// Adds the triangles of all faces in file order.
     fn push_faces(&mut self) -> Result<(), (u32, String)> {
         let faces = std::mem::take(&mut self.read.faces);
         let mut first = 0;

@@ -56,7 +56,6 @@ pub(super) struct Statements {
     pub warnings: Vec<String>,
 }
 
-/// Parser state.
 #[derive(Default)]
 struct Reader {
     numbers: HashMap<String, u32>,
@@ -279,7 +278,6 @@ impl Reader {
 /// Limit on the kinds of unread statements recorded: a file in another format has any number.
 const MOST_UNREAD: usize = 64;
 
-/// Names of a corner's indices.
 const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 /// One warning for everything in a file that is not read; `None` if there is nothing.

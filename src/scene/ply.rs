@@ -153,7 +153,6 @@ fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) 
     })
 }
 
-/// Names of colour components.
 const COLORS: [[&str; 3]; 3] = [
     ["red", "green", "blue"],
     ["r", "g", "b"],
@@ -223,7 +222,6 @@ fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum LineEnd {
-    /// End of file.
     None,
     /// `\r`.
     Return,
@@ -316,7 +314,6 @@ fn check_element(
     ))
 }
 
-/// The part after the header.
 struct Body<'a, S> {
     path: &'a Path,
     encoding: Encoding,

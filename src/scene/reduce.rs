@@ -10,7 +10,6 @@ pub(super) enum Texels {
     Colours,
     /// Directions 2c − 1 of length 1.
     Normals,
-    /// Plain numbers.
     Numbers,
 }
 
@@ -58,7 +57,6 @@ pub(super) fn area_means(
     means
 }
 
-/// A smaller 8-bit image.
 pub(super) fn reduced(
     texels: &[[u8; 4]],
     from: [u32; 2],

@@ -154,7 +154,6 @@ fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     Ok((width, height))
 }
 
-/// An image's bytes and size.
 fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String> {
     let bytes = match &source.encoded {
         Encoded::File(path) => Cow::Owned(

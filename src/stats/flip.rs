@@ -27,7 +27,6 @@ const SENSITIVITY: [&[[f64; 2]]; 3] = [
 /// XYZ of white, mapped to 1.
 const WHITE: [f64; 3] = [0.950428545, 1.0, 1.088900371];
 
-/// One number per pixel, row by row.
 struct Plane {
     width: usize,
     values: Vec<f64>,
@@ -37,7 +36,6 @@ struct Plane {
 pub struct Seen {
     /// Hunt-adjusted L*a*b* after contrast sensitivity.
     colours: Vec<[f64; 3]>,
-    /// Strength of edges and points.
     features: Vec<[f64; 2]>,
 }
 

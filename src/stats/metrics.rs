@@ -119,7 +119,6 @@ impl Reference {
     }
 }
 
-/// One channel of one pixel.
 pub(super) struct Sample {
     channel: usize,
     value: f64,
@@ -222,7 +221,6 @@ pub const METRICS: &[Metric] = &[
 /// Fraction of terms that the trimmed metric omits.
 const TRIMMED: f64 = 1e-3;
 
-/// Two finite images of one size.
 struct Comparison<'a> {
     image: &'a Image,
     reference: &'a Reference,

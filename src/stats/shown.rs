@@ -10,7 +10,6 @@ const SSIM_REACH: usize = 5;
 /// Stabilisers of SSIM's quotients: (0.01)² and (0.03)² of the range, which is 1.
 const SSIM_CONSTANTS: [f64; 2] = [1e-4, 9e-4];
 
-/// A picture and its compared features.
 pub(super) struct Shown {
     width: usize,
     pixels: Vec<[f64; 3]>,

@@ -14,7 +14,6 @@ pub(crate) const MOST_EXACT: usize = 60;
 pub struct SignedRank {
     /// Walsh averages, sorted.
     walsh: Vec<f64>,
-    /// Number of differences.
     count: usize,
     /// Probability of each rank sum if both signs are equally likely; empty beyond [`MOST_EXACT`].
     chances: Vec<f64>,

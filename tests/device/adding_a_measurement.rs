@@ -120,7 +120,6 @@ fn raystone(arguments: &[&str]) -> String {
     String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
 }
 
-/// The cells of a measurement.
 fn cells<'a>(lines: &'a [Line], measurement: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
     let measured = all_of::<MeasuredRecord>(lines);
     measured

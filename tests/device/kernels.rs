@@ -53,7 +53,6 @@ fn compose_within_limits(library: &KernelLibrary, kernel: &Composition) -> Strin
     wgsl
 }
 
-/// True if a kernel contains counters.
 fn counts(wgsl: &str) -> bool {
     ["count_", "counters", "ray_counts"]
         .iter()

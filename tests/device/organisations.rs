@@ -19,7 +19,6 @@ use raystone::scene::SceneData;
 const SIZE: [u32; 2] = [37, 29];
 const SPPS: [u32; 2] = [1, 3];
 
-/// An organisation of this name with these parameters.
 fn organisation(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
     let changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone()));
     Variant {

@@ -189,7 +189,6 @@ fn a_run_times_counts_and_reports_it_and_leaves_out_single_kernel_integrators() 
     assert!(page.contains("sorted-rays") && page.contains("uncounted-rays"));
 }
 
-/// Initial value of answers.
 const NO_ANSWER: [u32; 4] = [0xffff_dead; 4];
 /// Rays in a buffer, and how many of them are live.
 const RAYS: u32 = 900;

@@ -39,7 +39,6 @@ fn expected(keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     (keys, values)
 }
 
-/// Keys of several kinds, by name.
 fn kinds(random: &mut Pcg, count: u32) -> Vec<(&'static str, Vec<u32>)> {
     let mut of = |key: &mut dyn FnMut(&mut Pcg, u32) -> u32| -> Vec<u32> {
         (0..count).map(|place| key(random, place)).collect()

@@ -18,7 +18,6 @@ const GROUPS: [&str; 7] = [
     "transforms",
 ];
 
-/// Parameters of `path` by name.
 type Changes<'a> = Vec<(&'a str, ParamValue)>;
 
 fn word<'a>(key: &'a str, value: &str) -> (&'a str, ParamValue) {

@@ -2,10 +2,8 @@
 
 use crate::support::*;
 
-/// Most storage buffers of a path tracer.
 const MOST: usize = 6;
 
-/// Storage buffers of a composed kernel.
 fn storage_buffers(kernel: &str) -> usize {
     kernel.matches("var<storage").count()
 }

@@ -15,7 +15,6 @@ const SIZE: [u32; 2] = [37, 29];
 /// Nor these rays: with the slices of a batch (64, 512, …) every kernel has a partial group.
 const RAYS: usize = 5003;
 
-/// The workgroup of this name.
 fn workgroup(name: &str) -> Workgroup {
     *WorkgroupRegistry::default()
         .named("workgroup", name)
@@ -113,7 +112,6 @@ fn organisation(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
     }
 }
 
-/// Bits of an image of some samples.
 fn pixels(
     stage: &Stage,
     traced: &Traced,

@@ -146,7 +146,6 @@ fn every_structure_over_a_tree_or_objects_is_taken_to_a_frame_and_passes_its_gat
     assert!(taken >= 4 * 3 * 2 + 2 * 2, "{taken}");
 }
 
-/// The tree produced by a way.
 fn tree(gpu: &Gpu, actor: &Actor, way: Way, soup: &TriangleSoup) -> Result<Tree, String> {
     let mut log = BuildLog::with_gpu(gpu);
     let from = actor.start(way, soup).map_err(|e| e.to_string())?;

@@ -136,7 +136,6 @@ const SIZE: [u32; 2] = [24, 16];
 /// Size of the image whose rays are compared: neighbours are close together.
 const LARGE: [u32; 2] = [240, 160];
 
-/// Source of rays.
 struct Setting {
     scene: SceneData,
     integrator: ConfiguredIntegrator,
@@ -175,7 +174,6 @@ impl Setting {
         }
     }
 
-    /// Rays of the whole image.
     fn rays(&self, samples: &[u32]) -> Rays {
         let stride = self.sampler.stride();
         let groups = groups_of(self.size, [8, 4], self.groups, stride);

@@ -44,7 +44,6 @@ fn models() -> Vec<PathBuf> {
     taken.iter().map(|m| folder.join(m)).collect()
 }
 
-/// Outcome of a structure on a stage.
 enum Outcome {
     Passed,
     /// The model exceeds a limit of the structure or the adapter.

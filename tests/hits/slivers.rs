@@ -37,7 +37,6 @@ fn sliver(aspect: f64, scale: f64, far: f64, rng: &mut Pcg) -> [Vec3; 3] {
     corners.map(|v| (centre + turn * (scale * v)).as_vec3())
 }
 
-/// Unit normal and corners in f64.
 fn plane(corners: [Vec3; 3]) -> Option<(DVec3, DVec3)> {
     let [a, b, c] = corners.map(|v| v.as_dvec3());
     let normal = (b - a).cross(c - a).try_normalize()?;

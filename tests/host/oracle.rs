@@ -6,7 +6,6 @@ use raystone::geometry::{Ray, Triangle};
 use raystone::oracle::{ClosestHit, Fault, Verdict, judge, judge_any_hits, judge_closest_hits};
 use raystone::random::Pcg32;
 
-/// Source of random rays and triangles.
 struct Random(Pcg32);
 
 impl Random {
@@ -52,7 +51,6 @@ fn towards(x: f32, y: f32) -> Ray {
     ray(Vec3::new(x, y, -1.0), Vec3::Z)
 }
 
-/// A test of one triangle and one ray in f32.
 type Test32 = fn(&Triangle, &Ray) -> Option<f32>;
 
 /// Normal first: det = d·n, t = c·n / det, u and v from d×c.
@@ -117,7 +115,6 @@ fn closest(test: Test32, triangles: &[Triangle], ray: &Ray) -> ClosestHit {
     best
 }
 
-/// True if a fault is the expected one.
 type IsFault = fn(&Fault) -> bool;
 
 #[track_caller]

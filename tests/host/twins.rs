@@ -524,7 +524,6 @@ fn twin_and_shared_text(kernel: &str) -> String {
     twin_text(kernel) + &shared
 }
 
-/// True if this is the name of a kernel, or of its folder.
 fn is_named(kernel: &str, name: &str) -> bool {
     kernel == name || (name.ends_with('/') && kernel.starts_with(name))
 }

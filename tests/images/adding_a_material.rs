@@ -90,7 +90,6 @@ fn organisation(name: &str, changes: &[(&str, &str)]) -> Variant {
     }
 }
 
-/// The verdict on single paths.
 pub fn verdict(
     gpu: &Gpu,
     scene: &SceneData,

@@ -69,7 +69,6 @@ fn found(stage: &Stage) -> Vec<u32> {
     hits.iter().map(|hit| hit.triangle).collect()
 }
 
-/// Difference of rasterised and traced paths.
 #[derive(Debug)]
 struct Difference {
     /// Pixels that see another triangle.

@@ -28,7 +28,6 @@ pub struct Actor<'a> {
 
 /// State reused in every frame.
 enum First<'a> {
-    /// A tree, and its layout.
     Tree(&'a dyn OverTree, Tree),
     /// Unchanged objects of a structure that updates transforms.
     Objects,

@@ -40,7 +40,6 @@ pub(crate) struct Frame<'a> {
     pub seed: u64,
 }
 
-/// Refitted and rebuilt structures, both checked.
 struct Pair {
     traced: [Traced; 2],
     sah: [Option<f64>; 2],
@@ -224,7 +223,6 @@ impl Frame<'_> {
     }
 }
 
-/// Work repeated in every round.
 enum Work<'a> {
     /// A structure follows a frame.
     Take(&'a Actor<'a>, Way, &'a Frame<'a>, &'a Gpu),

@@ -6,7 +6,6 @@ use raystone_core::random::Pcg32;
 use raystone_scene::{Assembly, SceneData, Transform};
 use std::f64::consts::TAU;
 
-/// Seed of the instances' directions.
 const SEED: u64 = 1;
 
 /// The scene in a frame; the first is bit-identical to the scene itself.

@@ -37,7 +37,6 @@ struct Part {
 /// The arrays that traversals of a structure read, in one address space.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// Names and addresses, in order.
     arrays: Vec<(&'static str, u64)>,
     parts: Vec<Part>,
 }

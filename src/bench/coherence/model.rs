@@ -42,7 +42,6 @@ pub struct Warp {
     pub passes: Vec<Pass>,
 }
 
-/// A warp and its pending issues.
 struct Queue {
     lanes: u64,
     issues: VecDeque<(u32, Issue)>,

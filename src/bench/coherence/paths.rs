@@ -217,7 +217,6 @@ fn of_group(view: &View, warps: &[Pixels]) -> Vec<Vec<RayPass>> {
     rays.into_iter().map(of_warp).collect()
 }
 
-/// All rays of a pixel.
 fn of_pixel(view: &View, pixel: [u32; 2]) -> Vec<(Place, RayClass, Ray)> {
     let mut rays = Vec::new();
     for (number, &sample) in (0..).zip(view.samples) {

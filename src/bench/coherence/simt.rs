@@ -22,7 +22,6 @@ pub(crate) struct Issue {
     pub lines: Vec<u64>,
 }
 
-/// Progress of a warp's lanes.
 struct Lanes<'a> {
     traces: &'a [Option<Trace>],
     at: Vec<usize>,

@@ -227,7 +227,6 @@ fn look(gpu: &Gpu, stream: &Stream) -> Result<Recording, GpuError> {
 }
 
 impl Measured for Bench {
-    /// Time of the method alone.
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.player.play(&self.prepare)?;
         let elapsed = self.player.play(&self.compact)?.elapsed();

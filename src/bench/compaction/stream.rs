@@ -13,7 +13,6 @@ pub fn word(element: u32, word: u32) -> u32 {
     }
 }
 
-/// Words of `count` elements.
 pub(crate) fn elements(count: u32, bytes: u32) -> Vec<u32> {
     let of = |element| (0..bytes / 4).map(move |w| word(element, w));
     (0..count).flat_map(of).collect()

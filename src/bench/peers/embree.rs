@@ -110,7 +110,6 @@ enum Cast {
     },
 }
 
-/// The registry entry `embree`.
 pub(super) struct Embree;
 
 struct Built<'a> {

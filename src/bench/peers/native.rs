@@ -48,7 +48,6 @@ impl<C: Caster> BuiltPeer for C {
     }
 }
 
-/// A batch of rays and answers.
 struct NativeBatch<'a, C> {
     caster: &'a C,
     query: Query,

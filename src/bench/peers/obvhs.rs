@@ -15,9 +15,7 @@ use raystone_core::clock::Instant;
 use raystone_gpu::Gpu;
 use std::time::Duration;
 
-/// The tree type.
 pub(super) enum Obvhs {
-    /// A binary tree.
     Binary,
     /// Eight compressed children per node.
     Wide,

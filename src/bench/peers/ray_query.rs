@@ -8,14 +8,12 @@ use std::cell::RefCell;
 use std::num::NonZeroU64;
 use wgpu::util::DeviceExt as _;
 
-/// Workgroup size of the kernel.
 const LANES: u32 = 64;
 /// Rays per dispatch: software adapters take microseconds per ray, and a dispatch of seconds looks
 /// like a hang.
 const SLICE: usize = 1 << 16;
 const KERNEL: &str = include_str!("ray_query.wgsl");
 
-/// The registry entry `ray-query`.
 pub(super) struct RayQuery;
 
 struct Built {

@@ -9,7 +9,6 @@ use raystone_gpu::Gpu;
 /// Everything nameable on the `peer` axis.
 pub type PeerRegistry = Kinds<dyn Peer>;
 
-/// The registry entry `none`.
 struct NoPeer;
 
 impl Peer for NoPeer {

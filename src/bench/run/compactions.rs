@@ -115,7 +115,6 @@ impl Prepared for Ready {
 /// Streams of equal kind are prefixes of one: share of survivors, buckets, bytes per element.
 type Kind = (u64, u32, u32);
 
-/// Streams on the device.
 struct Streams<'a> {
     at: &'a At<'a>,
     cells: &'a [Cell],

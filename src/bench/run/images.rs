@@ -130,7 +130,6 @@ impl Estimator {
         })
     }
 
-    /// An image of the experiment's size.
     pub(super) fn job(
         &self,
         session: &Session,

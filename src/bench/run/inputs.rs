@@ -45,7 +45,6 @@ pub fn place(environment: &Environment) -> String {
 
 /// Current inputs of a run's cells.
 pub(super) struct Current<'a> {
-    /// Settings by measurement name.
     settings: BTreeMap<&'static str, String>,
     kernels: &'a Kernels,
     /// Label of a scene → hash of its content, or why it has none.

@@ -76,7 +76,6 @@ impl Kernels {
         (!names.is_empty()).then(|| format!("kernels changed: {}", names.join(", ")))
     }
 
-    /// Records of the folders.
     pub(super) fn folders(&self) -> Vec<KernelFolder> {
         let folder = |(kernels, library): &(Variant, KernelLibrary)| KernelFolder {
             label: kernels.label.clone(),

@@ -18,7 +18,6 @@ use raystone_verify::trial_scenes::{TrialScene, trial_scenes_of, trials_of};
 /// Size of the checked frame: not square, and not a multiple of a workgroup.
 const SIZE: [u32; 2] = [26, 19];
 
-/// Structure used for trial scenes.
 const STRUCTURE: &str = "bvh";
 
 /// Axes besides the world that affect the outcome: the first sampler of each suffices.
@@ -135,7 +134,6 @@ fn judge_and_record(
     Ok(record)
 }
 
-/// A scene on the device with a cell's kernels, for checking.
 struct Subject<'a> {
     stage: &'a Stage,
     gpu: &'a Gpu,
@@ -248,7 +246,6 @@ fn of_trial(
     Ok(all)
 }
 
-/// The verdict on an integrator.
 fn judged(
     session: &mut Session,
     subject: &Subject,

@@ -54,7 +54,6 @@ pub(super) fn of_cell(
 
 /// Results and times of rasteriser and rays.
 struct Turns {
-    /// By pixel.
     other_triangle: Vec<bool>,
     raster_ms: Vec<f64>,
     traced_ms: Vec<f64>,

@@ -11,7 +11,6 @@ use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Steps of the bar.
 const STEPS: u64 = 1000;
 /// Interval of progress lines without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
@@ -24,7 +23,6 @@ struct Shared {
     /// Expected seconds in total, and of finished steps.
     expected_s: f64,
     done_s: f64,
-    /// Time of the last line.
     told: Instant,
 }
 
@@ -103,7 +101,6 @@ impl Progress {
         self.bar.set_position(position);
     }
 
-    /// Shows the current activity.
     pub(super) fn say(&self, message: String) {
         if let Some(tell) = self.tell {
             let mut shared = lock(&self.shared);
@@ -125,7 +122,6 @@ fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A time in human-readable form.
 fn duration(seconds: f64) -> String {
     let seconds = seconds.round() as u64;
     match seconds {

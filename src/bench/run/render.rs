@@ -168,7 +168,6 @@ fn input(error: impl ToString) -> RunError {
     RunError::Input(error.to_string())
 }
 
-/// Builds the experiment's structure over the stage's scene.
 fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, RunError> {
     let kind = session.registries.accel.get(&accel.name);
     let kind = kind.ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;

@@ -58,7 +58,6 @@ impl Clock {
     }
 }
 
-/// The state of a run.
 pub(super) struct Session<'a> {
     pub experiment: &'a Experiment,
     pub plan: &'a Plan,
@@ -190,7 +189,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Adopts valid results of an earlier run.
     fn take_over(&mut self, kept: Kept) -> Result<(), RunError> {
         self.recorder.take_over(&kept.lines)?;
         for cell in kept.cells {
@@ -319,7 +317,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Writes the first record.
     fn write_start(
         &mut self,
         environment: Environment,
@@ -355,7 +352,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Records skipped cells.
     pub(super) fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
         self.ledger.skipped += skipped.cells;
         let record = SkippedRecord {
@@ -436,7 +432,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Shows the current activity.
     pub(super) fn say(&self, message: impl Into<String>) {
         let message = message.into();
         self.recorder.log(&message);

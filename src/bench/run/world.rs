@@ -41,7 +41,6 @@ impl std::ops::Deref for World<'_> {
     }
 }
 
-/// Why there is no world.
 pub(super) enum NoWorld {
     /// The scene is invalid.
     BadInput(String),

@@ -23,7 +23,6 @@ const PLOT: usize = 14;
 /// Width of a street in columns.
 const STREET: usize = 3;
 
-/// Material indices.
 const PAVING: u32 = 0;
 const GRASS: u32 = 1;
 const WALL: u32 = 2;
@@ -56,11 +55,9 @@ impl BuiltinScene for City {
 /// The cubes on a square of the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Column {
-    /// Number of cubes.
     height: i32,
     /// Cubes below this one belong to the wall.
     wall: i32,
-    /// Material of the top.
     top: u32,
 }
 
@@ -73,13 +70,11 @@ impl Column {
         }
     }
 
-    /// Side material of a cube.
     fn side(&self, cube: i32) -> u32 {
         if cube < self.wall { WALL } else { self.top }
     }
 }
 
-/// Layout of a plot.
 #[derive(Debug, Clone, Copy)]
 struct Plot {
     /// First column of the house in each direction, and one past its last.
@@ -117,7 +112,6 @@ impl Plot {
         }
     }
 
-    /// The column at a place of the plot.
     fn column(&self, at: [i32; 2]) -> Column {
         let is_inside =
             |axis: usize| (self.house[axis][0]..self.house[axis][1]).contains(&at[axis]);
@@ -209,7 +203,6 @@ impl Town {
         (0..edge).flat_map(move |row| (0..edge).map(move |column| (row, column)))
     }
 
-    /// Number of visible triangles.
     fn triangles(&self) -> usize {
         let faces = |(row, column): (usize, usize)| {
             let height = self.columns[row * self.stored + column].height;

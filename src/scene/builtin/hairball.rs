@@ -63,7 +63,6 @@ impl BuiltinScene for Hairball {
     }
 }
 
-/// A curve around a straight line from the centre.
 struct Strand {
     /// Along the line, and across it.
     axes: [DVec3; 3],

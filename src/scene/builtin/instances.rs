@@ -11,7 +11,6 @@ use raystone_core::geometry::Triangle;
 use raystone_core::parameters;
 use raystone_core::random::Pcg32;
 
-/// Number of distinct objects.
 const OBJECTS: u32 = 4;
 /// Bound on the distance of an object's points from its centre.
 const OBJECT_RADIUS: f64 = 1.3;
@@ -140,7 +139,6 @@ mod tests {
         )
     }
 
-    /// World boxes of all copies.
     fn boxes(scene: &SceneData) -> Vec<Bounds> {
         let assembly = scene.assembly.as_ref().unwrap();
         let copies = assembly.instances().iter();

@@ -87,7 +87,6 @@ fn on_floor(half: f32, lights: Vec<Light>) -> (SceneBuilder, Look) {
     (builder, look)
 }
 
-/// Height of the lamps of `lamp`.
 const HEIGHT: f32 = 2.0;
 
 impl BuiltinScene for LampScene {
@@ -165,7 +164,6 @@ impl Luminaire {
         }
     }
 
-    /// Multiplier of a profile's intensities.
     fn scale(&self, profile: &IesProfile) -> f32 {
         let wanted = if self.watts > 0.0 {
             LUMENS_PER_WATT * self.watts

@@ -33,7 +33,6 @@ trait BuiltinScene: Parameters {
     fn build(&self) -> (SceneBuilder, Look);
 }
 
-/// A registry entry.
 struct Builtin {
     name: &'static str,
     description: &'static str,

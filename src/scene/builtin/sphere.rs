@@ -29,7 +29,6 @@ impl SphereGrid {
         }
     }
 
-    /// Number of triangles.
     pub(super) fn triangles(&self) -> usize {
         2 * self.sectors * (self.bands - 1)
     }

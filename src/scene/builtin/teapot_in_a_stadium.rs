@@ -23,7 +23,6 @@ const ROWS: [u32; 2] = [2, 3];
 
 /// Edge of the field, units; the teapot is about 6.4 long.
 const FIELD_EDGE: f32 = 10_000.0;
-/// Cells along an edge of the field.
 const FIELD_CELLS: usize = 96;
 /// Rows of seats, and straight segments per row.
 const ROW_COUNT: usize = 24;

@@ -9,7 +9,6 @@
 use crate::statistics::{median, variance};
 use raystone_image::{Image, luminance};
 
-/// Edge of a block of pixels with a common weight.
 const BLOCK: usize = 4;
 /// Lower bound on a block's relative variance, as a fraction of the median over blocks, so that a
 /// few blocks that look even by chance do not dominate the mean.

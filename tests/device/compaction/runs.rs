@@ -32,7 +32,6 @@ min_warmup_ms = 0
 max_warmup_ms = 1
 "#;
 
-/// The compactions among some lines.
 fn compactions(lines: &[Line]) -> Vec<Recorded<'_, MeasuredRecord>> {
     let measured = all_of::<MeasuredRecord>(lines);
     measured

@@ -34,7 +34,6 @@ fn settings() -> Vec<Settings> {
     METHODS.into_iter().flat_map(both).collect()
 }
 
-/// The tree of the device, or its error.
 fn on_device(gpu: &Gpu, soup: &TriangleSoup, settings: &Settings) -> Result<LinkedTree, String> {
     device::build(soup, settings, &mut BuildLog::with_gpu(gpu)).map_err(|e| e.to_string())
 }

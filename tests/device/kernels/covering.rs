@@ -5,7 +5,6 @@
 use crate::support::Pcg;
 use std::collections::BTreeSet;
 
-/// A choice: factor and level.
 pub type Choice = (usize, usize);
 
 /// Rows with one level per factor, such that any two levels of two factors that do not clash share
@@ -47,7 +46,6 @@ pub fn pairwise(levels: &[usize], clash: impl Fn(Choice, Choice) -> bool) -> Vec
     rows
 }
 
-/// All pairs of levels that do not clash.
 pub fn pairs(
     levels: &[usize],
     clash: impl Fn(Choice, Choice) -> bool,

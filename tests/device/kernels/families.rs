@@ -52,7 +52,6 @@ impl Factor {
         Self::new(name, [part(), part().feature(name, true)])
     }
 
-    /// The kernel's entry point.
     fn entry(entries: &[&str]) -> Self {
         let parts = entries.iter().map(|entry| Part::new(entry));
         Self::new("entry", parts)
@@ -145,7 +144,6 @@ impl Family {
         modules.map(String::as_str).collect()
     }
 
-    /// Number of levels of each factor.
     pub fn levels(&self) -> Vec<(&'static str, usize)> {
         let factors = self.factors.iter();
         factors.map(|f| (f.name, f.levels.len())).collect()
@@ -159,7 +157,6 @@ pub struct Chosen {
     pub choice: &'static str,
 }
 
-/// Adds a part to a kernel.
 fn lay(part: &Part, kernel: &mut Composition) {
     if !part.entry.is_empty() {
         kernel.entry.clone_from(&part.entry);
@@ -214,7 +211,6 @@ fn intersections() -> [Factor; 2] {
     ]
 }
 
-/// Workgroup shapes, by name.
 fn workgroups() -> Factor {
     let named = Workgroup::ALL.iter().filter(|group| group.name != "auto");
     let parts = named.map(|group| {
@@ -227,7 +223,6 @@ fn workgroups() -> Factor {
     Factor::new("workgroup", parts)
 }
 
-/// Every entry with its parameters.
 fn variants(entries: &[Entry]) -> Vec<Variant> {
     let mut out = Vec::new();
     for entry in entries {

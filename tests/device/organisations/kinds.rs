@@ -10,7 +10,6 @@ fn per_material(more: &[(&str, ParamValue)]) -> Variant {
     small(&[&[("shading", word("per-material"))], more].concat())
 }
 
-/// A repeating picture.
 fn picture() -> Texture {
     let texel = |i: u8| [40 * i, 255 - 30 * i, 90 + 20 * i, 255];
     Texture {

@@ -54,7 +54,6 @@ fn with_builder(name: &str, changes: &[&str]) -> Params {
     params(&[&[builder.as_str()], changes].concat())
 }
 
-/// The tree parameters among those of `bvh`.
 fn tree(params: &Params) -> TreeParameters {
     BvhParameters::from_params(params)
         .expect("parameters of bvh")
@@ -112,7 +111,6 @@ fn sticks(rng: &mut Pcg, count: usize, tilt: f32) -> TriangleSoup {
     scenes::soup((0..count).map(stick).collect::<Vec<_>>())
 }
 
-/// Small triangles throughout a cube.
 fn clutter(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let mut random = |size: f32| size * Vec3::new(rng.signed(), rng.signed(), rng.signed());
     let triangle = |_| {

@@ -66,7 +66,6 @@ fn steep_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
-/// Long thin triangles of all kinds.
 fn split_soup(rng: &mut Pcg, seed: u64) -> TriangleSoup {
     match seed % 3 {
         0 => lattice_soup(rng, 80, 6),
@@ -112,7 +111,6 @@ fn hits_are_exact_where_triangles_are_split() {
     assert!(clipped < 5);
 }
 
-/// Every structure over binary trees, on clipped triangles.
 #[test]
 fn structures_over_clipped_triangles_pass_the_gate() {
     let gpu = support::gpu();

@@ -52,7 +52,6 @@ fn set() -> RaySet {
     }
 }
 
-/// Compares with the first hit changed.
 fn with(change: impl Fn(&mut Hit), exact: bool) -> ClassVerdict {
     let set = set();
     let mut hits = set.truth.clone();

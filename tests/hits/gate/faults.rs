@@ -39,7 +39,6 @@ fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     }
 }
 
-/// Number of rays whose nearest hit is `triangle`.
 fn hits_of(judge: &Judge, triangle: u32) -> usize {
     let truth = judge.sets.iter().flat_map(|set| &set.truth);
     truth.filter(|hit| hit.triangle == triangle).count()

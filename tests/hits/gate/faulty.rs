@@ -6,20 +6,16 @@ use raystone::accel::{
 };
 use raystone::params::{ParameterSchema, Params};
 
-/// The planted fault.
 #[derive(Clone, Copy)]
 pub enum Fault {
     /// The leaf with this triangle uses an invalid index for it.
     TriangleIndex(u32),
     /// A kernel constant has another value.
     Constant(&'static str, u32),
-    /// `validate` fails; hits are right.
     Structural,
-    /// `build` fails.
     Build,
 }
 
-/// A structure with a fault.
 pub struct Faulty {
     pub name: &'static str,
     pub inner: &'static dyn AccelKind,

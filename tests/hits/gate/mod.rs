@@ -15,7 +15,6 @@ use raystone::gpu::Gpu;
 use raystone::measure::gate::{Checks, Judge};
 use raystone::measure::record::GateVerdict;
 
-/// The reference of a scene with `rays` rays of each class.
 fn judge(stage: &Stage, rays: u32) -> Judge {
     stage.judge(Checks::Repeated, [rays, 20_000_000, 512])
 }
@@ -26,7 +25,6 @@ fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Gat
     verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
 }
 
-/// Wrong rays of all classes.
 fn wrong(verdict: &GateVerdict) -> usize {
     verdict.classes.iter().map(|class| class.wrong).sum()
 }

@@ -34,7 +34,6 @@ const FAULTS: [(&str, &str); 5] = [
     ),
 ];
 
-/// Writes the faulty kernel to a folder.
 fn plant(folder: &Path, fault: &str) {
     let library = KernelLibrary::default();
     let text = library.text(KERNEL).expect("the kernel");

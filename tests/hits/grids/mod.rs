@@ -180,7 +180,6 @@ fn moved(soup: &TriangleSoup, scale: f32, shift: Vec3) -> TriangleSoup {
     scenes::soup(corners.map(|c| c.map(|v| v * scale + shift)))
 }
 
-/// Named scenes.
 fn cases(rng: &mut Pcg) -> Vec<(&'static str, TriangleSoup)> {
     let base = slanted(rng, 400);
     let mut cases = vec![

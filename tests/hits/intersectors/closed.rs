@@ -93,7 +93,6 @@ pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<R
     (0..count).into_par_iter().map(one).collect()
 }
 
-/// Rays that leak through a closed surface.
 fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
     let params = BvhParameters::default();
     let built = BuiltBvh::build(soup, &params, &mut BuildLog::default()).expect("a small scene");

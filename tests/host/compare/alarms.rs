@@ -7,7 +7,6 @@ use raystone::compare::judge::Verdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
 
-/// Repetitions of every A/A test.
 const REPEATED: u64 = 120;
 /// At the 5 % level, more false alarms than this occur once in a thousand times.
 const MOST: usize = 14;
@@ -16,7 +15,6 @@ fn alarms(found: &Comparison) -> usize {
     found.count(Verdict::Worse) + found.count(Verdict::Better)
 }
 
-/// Number of repetitions with any alarm.
 fn with_alarm(pair: impl Fn(u64) -> [Side; 2]) -> usize {
     let ends = (0..REPEATED).map(|i| {
         let [base, candidate] = pair(i);

@@ -247,7 +247,6 @@ fn drift_is_of_the_figure_and_its_own_cell_alone_is_left_out() {
     );
 }
 
-/// The comparison with records changed only by `change`.
 fn with(change: impl Fn(&mut Line)) -> raystone::compare::Comparison {
     let base = Made::default();
     let mut lines = base.lines();

@@ -15,7 +15,6 @@ fn with(change: impl Fn(&mut Vec<Line>)) -> Comparison {
     compared(&base.side(), &Side::new("made", lines, Vec::new()))
 }
 
-/// Changes the record of the fourth structure.
 fn with_structure(change: impl Fn(&mut raystone::measure::record::StructureRecord)) -> Comparison {
     with(|lines| {
         let records = lines.iter_mut().filter_map(|line| match &mut line.body {
@@ -206,7 +205,6 @@ fn records_that_contradict_themselves_are_named() {
     assert_eq!(twice.verdict(), Verdict::Same);
 }
 
-/// Number of findings of a figure.
 fn of(found: &Comparison, figure: &str) -> usize {
     let is_it = |f: &&raystone::compare::Finding| f.figure.id == figure;
     found.findings.iter().filter(is_it).count()

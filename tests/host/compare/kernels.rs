@@ -35,7 +35,6 @@ fn idea_is_slower(structure: usize) -> f64 {
     if structure == 5 { 1.2 } else { 1.0 }
 }
 
-/// The lines of the table with this caption.
 fn table(tables: &str, caption: &str) -> Vec<String> {
     let from = tables.lines().skip_while(|line| !line.starts_with(caption));
     from.take_while(|line| !line.is_empty())

@@ -34,7 +34,6 @@ fn quiet(slower: fn(usize) -> f64) -> [Made; 2] {
     [base, candidate]
 }
 
-/// Times of a structure.
 fn times<'f>(found: &'f [Finding], structure: &str) -> Vec<&'f Finding> {
     let of = |f: &&Finding| f.is_time && f.key.label("accel") == structure;
     found.iter().filter(of).collect()
@@ -229,7 +228,6 @@ fn what_was_measured_once_is_told_and_decides_nothing() {
     assert_eq!(found.verdict(), Verdict::Same);
 }
 
-/// Evidence of eight seeds from `first` on.
 fn seeds(first: u32, values: [f64; 8]) -> Evidence {
     Evidence::Seeds {
         values: (first..).zip(values).collect(),

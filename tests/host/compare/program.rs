@@ -47,7 +47,6 @@ impl Runs {
         (output.status.code(), text)
     }
 
-    /// Message of a command that fails as bad input.
     fn refusal(&self, arguments: &[&str]) -> String {
         let output = self.compare(arguments);
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -58,14 +57,12 @@ impl Runs {
     }
 }
 
-/// The synthetic run with changed lines.
 fn changed(change: impl Fn(&mut Vec<Line>)) -> Vec<Line> {
     let mut lines = Made::default().lines();
     change(&mut lines);
     lines
 }
 
-/// Sets the SAH costs of all structures.
 fn with_cost(cost: f64) -> Vec<Line> {
     changed(|lines| {
         for line in lines {

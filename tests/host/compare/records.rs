@@ -38,7 +38,6 @@ pub const QUIET: Noise = Noise {
     compilation: 0.0,
 };
 
-/// A synthetic run.
 #[derive(Clone)]
 pub struct Made {
     /// Structures; in the candidate, the second half has other kernels.
@@ -46,17 +45,13 @@ pub struct Made {
     pub rounds: usize,
     pub replicates: u32,
     pub noise: Noise,
-    /// Random sample.
     pub seed: u64,
     /// Seed of the noise shared by both sides of one process, in rounds.
     pub machine: u64,
-    /// Compilations of each kernel, in turns over the rounds.
     pub compilations: usize,
     /// True if kernels of the second half differ.
     pub candidate: bool,
-    /// Relative time of structures.
     pub slower: fn(usize) -> f64,
-    /// Relative error of samplers.
     pub worse: fn(usize) -> f64,
     /// True if errors are another draw of the image noise, as with another sample pattern.
     pub other_images: bool,
@@ -91,7 +86,6 @@ impl Random {
         (self.0.below(1 << 30) as f64 + 0.5) / (1u64 << 30) as f64
     }
 
-    /// Standard normal (Box and Muller).
     pub fn normal(&mut self) -> f64 {
         (-2.0 * self.unit().ln()).sqrt() * (std::f64::consts::TAU * self.unit()).cos()
     }
@@ -165,7 +159,6 @@ impl Made {
         Side::new("made", self.lines(), Vec::new())
     }
 
-    /// Times of a cell, round by round.
     fn times(&self, structure: usize, class: usize, hour: f64, random: &mut Random) -> Vec<f64> {
         let Noise { cell, round, .. } = self.noise;
         let base = 1.0 + structure as f64 + 0.3 * class as f64;

@@ -9,7 +9,6 @@ use raystone::measure::record::{Body, Line, RunRecord};
 use std::path::Path;
 use std::process::Command;
 
-/// The synthetic run with this experiment text.
 fn of_text(text: &str, lines: Vec<Line>) -> Side {
     let with = |mut line: Line| {
         if let Body::Run(run) = &mut line.body {

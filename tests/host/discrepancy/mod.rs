@@ -15,7 +15,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Output, Stdio};
 
-/// Runs the program with these arguments and standard input.
 fn run(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .arg("discrepancy")
@@ -39,7 +38,6 @@ fn results(arguments: &[&str], input: &str) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// The `error: …` sentence of bad input.
 fn refusal(arguments: &[&str], input: &str) -> String {
     let output = run(arguments, input);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();

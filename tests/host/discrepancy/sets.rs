@@ -3,12 +3,10 @@
 use raystone::discrepancy::{Budget, PointSet};
 use raystone::random::Pcg32;
 
-/// Enough time for any small set.
 pub fn ample() -> Budget {
     Budget::seconds(600.0)
 }
 
-/// The points of a two-dimensional set.
 pub fn pairs(points: &PointSet) -> Vec<[f64; 2]> {
     points.points().map(|p| [p[0], p[1]]).collect()
 }

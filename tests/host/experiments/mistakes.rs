@@ -14,7 +14,6 @@ use std::path::Path;
 
 const CASES: &str = include_str!("mistakes.txt");
 
-/// All error kinds.
 const ERRORS: [&str; 16] = [
     "Duplicate",
     "Empty",
@@ -100,7 +99,6 @@ fn settings(e: &Experiment) -> String {
     .join("\n")
 }
 
-/// The cases by name, in order.
 fn cases() -> Vec<(&'static str, Case)> {
     let mut cases: Vec<(&str, Case)> = Vec::new();
     for line in CASES.lines() {

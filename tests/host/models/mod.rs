@@ -32,7 +32,6 @@ fn load_path(path: &Path) -> Result<SceneData, SceneError> {
     load(&variant(path.to_str().unwrap()), &LoadOptions::default())
 }
 
-/// Loads `file` from a folder that contains all of `files`.
 fn load_files(file: &str, files: &[(&str, &[u8])]) -> Result<SceneData, SceneError> {
     let folder = TempDir::new().unwrap();
     for (name, bytes) in files {
@@ -61,7 +60,6 @@ fn png() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// A GLB file of this JSON and binary chunk.
 fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     let chunk = |kind: &[u8; 4], data: &[u8], pad: u8| {
         let mut data = data.to_vec();

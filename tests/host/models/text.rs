@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// A square with a lamp, and its materials.
 const LIT: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\n";
 const MTL: &str = "newmtl lamp\nKe 3 2 1\nnewmtl wall\nKd 0.5 0.25 0.75\n";
 

@@ -13,7 +13,6 @@ use serde_json::json;
 const RAYS: [u64; 6] = [64, 64, 32, 64, 48, 64];
 const HARD: [f64; 6] = [1.0, 4.0, 0.5, 2.0, 1.5, 0.25];
 
-/// Cycles of an issue.
 const ISSUE: u64 = COST[0];
 
 /// Cycles of each group: common cycles per ray times its own factor.

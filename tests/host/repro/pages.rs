@@ -183,7 +183,6 @@ fn finished() -> Line {
     line(Key::default(), body)
 }
 
-/// Records of a run with these settings.
 fn lines(settings: &Settings, software: bool) -> Vec<Line> {
     let prepared = prepare(&source(), settings, &Registries::default().catalogue()).expect("sound");
     let at = |scene| Sitting { scene, ..HERE };

@@ -12,7 +12,6 @@ const STRUCTURES: [(&str, &str); 5] = [
     ("irregular-grid*", "Irregular grid"),
 ];
 
-/// A table of a digest.
 struct Printed {
     columns: Vec<String>,
     rows: Vec<Vec<String>>,

@@ -13,11 +13,9 @@ use serde_json::json;
 
 /// The machine in each of eight rounds: three of them at half speed.
 const DRIFT: [f64; 8] = [1.0, 1.02, 2.0, 1.9, 1.01, 2.1, 0.99, 1.0];
-/// Noise of each side alone.
 pub const A: [f64; 8] = [2.0, 2.01, 1.99, 2.02, 2.0, 1.98, 2.01, 1.99];
 pub const B: [f64; 8] = [1.0, 0.99, 1.01, 1.0, 1.01, 0.99, 1.0, 1.0];
 
-/// When, where and in which rounds a cell was timed.
 #[derive(Clone, Copy)]
 pub struct Sitting {
     pub began: u64,
@@ -295,7 +293,6 @@ fn a_time_per_sample_is_paired_as_such() {
     );
 }
 
-/// The row of a question in a run's tables.
 fn answer(lines: &[Line], question: &str) -> String {
     let tables = raystone::report::terminal_tables(lines);
     let row = tables.lines().find(|line| line.starts_with(question));

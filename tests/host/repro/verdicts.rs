@@ -397,7 +397,6 @@ fn absent(cells: &[(&[(&str, &str)], &str)]) -> Context {
     }
 }
 
-/// Point sets of two sequences.
 fn discrepancies() -> Vec<Value<'static>> {
     let of = |sequence: &str, points: u32| {
         let key = Key::default()

@@ -5,7 +5,6 @@ use raystone::measure::bias::{BiasCheck, BiasOptions, BiasVerdict, check_bias};
 use raystone::random::Pcg32;
 
 const SIZE: [u32; 2] = [32, 24];
-/// The default.
 const REPLICATES: usize = 16;
 /// Samples of a reference part relative to a replicate.
 const PART: f64 = 18.0;

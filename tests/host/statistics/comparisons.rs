@@ -37,7 +37,6 @@ fn times(median: f64, g: &mut Pcg32) -> Vec<f64> {
     (0..7).map(|_| draw()).collect()
 }
 
-/// Error × time.
 fn efficiency(error: LogFigure, time: &LogFigure) -> LogFigure {
     error.with_noise_of(time, 1.0).scaled(time.log.exp())
 }
@@ -160,7 +159,6 @@ fn intervals_of_times_and_of_errors_per_second_cover_the_truth() {
     assert!(narrowed < trials * 85 / 100, "{narrowed}");
 }
 
-/// A figure with this value and relative standard error.
 fn known(value: f64, error: f64) -> LogFigure {
     LogFigure::exact(value).with_noise(Some(Spread {
         variance: error * error,

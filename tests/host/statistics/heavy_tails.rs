@@ -36,7 +36,6 @@ fn image(lamp: f64, spp: u32, g: &mut Pcg32) -> Image {
     Image::new(SIZE[0], SIZE[1], values).expect("an image")
 }
 
-/// The expected relMSE.
 fn truth(lamp: f64) -> f64 {
     let term =
         |mean: f64, variance: f64| variance / f64::from(SPP) / (mean * mean + RELATIVE_EPSILON);

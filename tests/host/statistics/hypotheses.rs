@@ -42,7 +42,6 @@ fn student_t_has_its_closed_forms_and_tabled_values() {
     }
 }
 
-/// p of Welch's test without a cap.
 fn welch(a: &[f64], b: &[f64]) -> f64 {
     let both = Spread::together(&[a, b].map(|x| Spread::of_mean(x).unwrap()));
     both.p(mean(a).unwrap() - mean(b).unwrap())

@@ -151,7 +151,6 @@ impl Errors {
     }
 }
 
-/// Leave-one-out estimates of `estimator`.
 fn estimates(samples: &[f64], estimator: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     leave_one_out(samples)
         .map(|rest| estimator(&rest))

@@ -7,11 +7,9 @@ use raystone::gpu::{
 };
 use std::path::Path;
 
-/// Tint of the kernel's material.
 const TINT: f64 = 0.5;
 const IORS: [f64; 5] = [1.0, 1.1, 1.33, 1.5, 2.4];
 
-/// An incident ray.
 #[derive(Debug, Clone, Copy)]
 struct Arrival {
     cosine: f32,
@@ -132,7 +130,6 @@ fn reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (perpendicular.powi(2) + parallel.powi(2))
 }
 
-/// Faults of a departing ray.
 fn faults(a: &Arrival, d: &Departure) -> Vec<&'static str> {
     let (cosine, eta) = (f64::from(a.cosine), a.eta());
     let sine = (1.0 - cosine * cosine).sqrt();

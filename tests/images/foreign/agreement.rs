@@ -3,7 +3,6 @@
 use raystone::image::{Image, luminance};
 use raystone::measure::hypothesis::student_t_two_sided;
 
-/// Images of one scene with different seeds.
 pub struct Replicates(pub Vec<Image>);
 
 /// Mean luminances with the variances of these means, and the number of replicates.
@@ -72,7 +71,6 @@ impl Moments {
         }
     }
 
-    /// The mean over all pixels.
     pub fn total(&self) -> f64 {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
     }

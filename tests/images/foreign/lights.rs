@@ -10,7 +10,6 @@ use std::f64::consts::{PI, TAU};
 const SIZE: [u32; 2] = [8, 8];
 const ALBEDO: f64 = 0.6;
 const RADIANCE: f64 = 5.0;
-/// Height of the lights over the plane y = 0.
 const HEIGHT: f64 = 1.5;
 /// Tolerance of an image's mean beyond five standard errors.
 const TOLERANCE: f64 = 0.001;

@@ -13,7 +13,6 @@ use std::sync::Arc;
 const SIZE: [u32; 2] = [12, 12];
 const ALBEDO: f32 = 0.6;
 const HEIGHT: f32 = 2.0;
-/// The candela multiplier of the file.
 const MULTIPLIER: f64 = 2.5;
 
 /// Candela at an angle from the nadir and one around it, degrees, before the multiplier.

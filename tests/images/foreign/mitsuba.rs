@@ -13,7 +13,6 @@ const RATIO: f64 = 0.001;
 const ACCEPTED: f64 = 0.9975;
 const SPP: u32 = 128;
 const REPLICATES: u32 = 8;
-/// Number of replicates of the stored image.
 const STORED_REPLICATES: usize = 16;
 
 /// The pixels of a portable float map of [`EDGE`] × [`EDGE`] pixels, from the top.
@@ -100,7 +99,6 @@ const SAMPLERS: [(&str, &str); 12] = [
     ("sobol", "blue-noise"),
     ("owen-sobol", "none"),
 ];
-/// Pixels along the edge of a tile.
 const TILE: u32 = 8;
 
 #[test]

@@ -56,7 +56,6 @@ fn long(depth: i64) -> Variant {
     integrator_variant("path", &changes)
 }
 
-/// Minimum, mean and maximum pixel.
 fn seen(gpu: &Gpu, scene: SceneData, depth: i64, spp: u32) -> [f64; 3] {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));

@@ -11,7 +11,6 @@ use raystone::scene::{Light, Material, SceneData, Texture, TextureUse, Transform
 use std::path::Path;
 
 const SIZE: [u32; 2] = [8, 8];
-/// Radiance of lamps.
 const RADIANCE: f64 = 5.0;
 
 /// A node around mesh 0: scales from the outermost one on, and the resulting z side of the mesh's
@@ -345,7 +344,6 @@ fn bumps_in_mirrored_nodes_are_mirrored_and_not_turned_inside_out() {
     }
 }
 
-/// The front of a triangle.
 fn front(scene: &SceneData, id: usize) -> Vec3 {
     let [a, b, c] = scene.outward(id);
     (b - a).cross(c - a).normalize()

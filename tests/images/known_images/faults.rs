@@ -65,7 +65,6 @@ const SOME: [Fault; 5] = [
     ),
 ];
 
-/// All others.
 const OTHERS: [Fault; 38] = [
     fault(
         PATH,

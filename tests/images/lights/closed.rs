@@ -10,7 +10,6 @@ const STRENGTH: f64 = 10.0;
 /// Places on the floor: below the lamp, next to it, far away.
 pub const PLACES: [[f64; 2]; 3] = [[0.0, 0.0], [0.7, 0.3], [-1.6, 1.1]];
 
-/// Kinds of lamps.
 pub const LAMPS: [&str; 6] = [
     "rectangle",
     "disk",
@@ -33,7 +32,6 @@ fn polygon(corners: &[DVec3], place: DVec3) -> f64 {
     (STRENGTH * 0.5 * (0..count).map(edge).sum::<f64>()).abs()
 }
 
-/// Irradiance of the floor.
 pub fn irradiance(lamp: &str, [x, z]: [f64; 2]) -> f64 {
     let place = DVec3::new(x, 0.0, z);
     let towards = DVec3::new(0.0, HEIGHT, 0.0) - place;

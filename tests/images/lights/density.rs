@@ -206,7 +206,6 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
     all
 }
 
-/// The fault in the densities of this scene, if any.
 pub fn fault(gpu: &Gpu, wanted: &str) -> Option<String> {
     for (name, scene) in scenes() {
         if wanted != name {

@@ -8,11 +8,8 @@ use density::probing;
 enum Seen {
     /// Irradiance below this lamp, with this strategy.
     Irradiance(&'static str, &'static str),
-    /// Densities in this scene.
     Density(&'static str),
-    /// Irradiance below a map.
     Environment,
-    /// Flux of luminaires.
     Flux,
     /// The mean with this choice of lights.
     Mean(&'static str, &'static str),

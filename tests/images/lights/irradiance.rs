@@ -8,7 +8,6 @@ use raystone::gpu::Gpu;
 use raystone::scene::{Light, SceneData};
 use std::f64::consts::PI;
 
-/// The fault in the irradiance of this lamp, if any.
 pub fn fault(gpu: &Gpu, kind: &str, strategy: &str) -> Option<String> {
     let scene = lamp(kind);
     let what = path_with(1, &[("strategy", strategy)]);

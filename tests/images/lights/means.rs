@@ -43,7 +43,6 @@ fn image(gpu: &Gpu, scene: &SceneData, choice: &str, lights: &str) -> Estimate {
     estimate(gpu, scene, scene.camera.expect("a camera"), &what, 384)
 }
 
-/// The fault in the mean of this choice, if any.
 pub fn fault(gpu: &Gpu, choice: &str, lights: &str, right: &Estimate) -> Option<String> {
     let found = image(gpu, &mixed(), choice, lights);
     let difference = found.minus(right);

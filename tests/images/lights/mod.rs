@@ -17,7 +17,6 @@ use raystone::gpu::Gpu;
 use raystone::params::{ParamValue, Variant};
 use raystone::scene::SceneData;
 
-/// The scene `lamp` with this kind of lamp.
 fn lamp(kind: &str) -> SceneData {
     builtin("lamp", &[("kind", ParamValue::Name(kind.to_owned()))])
 }

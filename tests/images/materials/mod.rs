@@ -103,7 +103,6 @@ fn is_consistent(answer: &Answer, model: &Model, o: DVec3) -> bool {
         && (i.length() - 1.0).abs() < 1e-5
 }
 
-/// Extent of the search for faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Seen {
     First,

@@ -179,7 +179,6 @@ impl Model {
         }
     }
 
-    /// f · cos.
     pub fn value(&self, o: DVec3, i: DVec3) -> DVec3 {
         match i.z > 0.0 {
             true => self.lobes(o, i).value,
@@ -187,7 +186,6 @@ impl Model {
         }
     }
 
-    /// Density of sampled directions.
     pub fn pdf(&self, o: DVec3, i: DVec3) -> f64 {
         if i.z <= 0.0 {
             return 0.0;

@@ -250,7 +250,6 @@ fn bent(scene: &SceneData, used: &TextureUse, triangle: usize, uv: DVec2, normal
     (scale * (mapped.x * x + mapped.y * y) + mapped.z * normal).normalize()
 }
 
-/// Faults of an answer.
 fn faults_at(scene: &SceneData, p: &Point, answer: &[f32; 20]) -> Vec<&'static str> {
     let id = p.triangle as usize;
     let [a, b, c] = scene.triangles[id].vertices.map(|v| v.as_dvec3());

@@ -18,7 +18,6 @@ fn chi_squared(values: impl Iterator<Item = u32>) -> f64 {
 
 const ACCIDENT: f64 = 130.0;
 
-/// One sample and dimension in many pixels.
 fn over_pixels(sampler: &Sampler, sample: u32, dimension: u32) -> impl Iterator<Item = u32> {
     (0..1 << 16).map(move |pixel| {
         sampler.sample_u32(Coordinate {

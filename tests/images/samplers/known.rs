@@ -201,7 +201,6 @@ fn exact_inverse(n: u32, base: u32, digits: &[u32]) -> u32 {
     u32::try_from((mirrored << 32) / power).expect("a fraction")
 }
 
-/// Indices of all sizes.
 fn indices() -> Vec<u32> {
     let mut rng = Pcg::new(7);
     let random = (0..1500).map(|i| rng.next_u32() >> (i % 32));

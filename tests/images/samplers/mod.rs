@@ -18,7 +18,6 @@ use raystone::sampling::{
 };
 use std::path::{Path, PathBuf};
 
-/// Image width for pixels.
 const WIDTH: u32 = 192;
 
 /// External tables for comparison; reports if they are missing.
@@ -66,7 +65,6 @@ fn variant(entries: &[Entry], name: &str, changes: &[(&str, ParamValue)]) -> Var
 
 type Changes<'a> = &'a [(&'a str, ParamValue)];
 
-/// A sampler, or why there is none.
 fn try_sampler(
     (sequence, sequence_changes): (&str, Changes),
     (decorrelation, changes): (&str, Changes),
@@ -99,7 +97,6 @@ fn unit(x: u32) -> f64 {
     f64::from(x) * 2.0_f64.powi(-32)
 }
 
-/// The first points of a pixel.
 fn points_of(sampler: &Sampler, count: u32, [x, y]: [u32; 2], pixel: u32) -> Vec<[u32; 2]> {
     let one = |sample, dimension| {
         sampler.sample_u32(Coordinate {

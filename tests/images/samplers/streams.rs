@@ -82,7 +82,6 @@ fn coordinates(sampler: &Sampler, count: usize, seed: u64) -> Vec<Coordinate> {
     (0..count).map(coordinate).collect()
 }
 
-/// The kernel's words.
 fn dump(sampler: &Sampler, coordinates: &[Coordinate]) -> Vec<u32> {
     dump_stream(support::gpu(), sampler, coordinates)
         .unwrap_or_else(|e| panic!("{}: {e}", sampler.label()))
