@@ -1,9 +1,7 @@
-//! Cost of sampling in nanoseconds per two-dimensional sample, to attribute differences in Mrays/s
-//! between samplers.
+//! Cost of sampling in nanoseconds per two-dimensional sample, to explain Mrays/s of samplers.
 //!
 //! One kernel draws in a loop and does nothing else; another runs the same loop without drawing.
-//! They alternate, and the difference is the cost: a throughput over all units of the adapter, not
-//! a latency.
+//! They alternate; the difference is the cost: throughput of the adapter, not latency.
 
 use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
 use raystone_record::Reading;

@@ -35,11 +35,9 @@ pub struct ErrorSpectrum {
     /// Maximum power of any frequency but 0; n pixels of white noise have about ln(n/2) + 0.58.
     /// Repetition and uniformity raise it.
     pub loudest: Option<f64>,
-    /// Correlation of the error with that of the pixel to the right or below, −1 to 1; white noise
-    /// has 0.
+    /// Correlation with the error of the pixel to the right or below, −1 to 1; 0 for white noise.
     pub autocorrelation: Option<f64>,
-    /// Root mean square of the error after a Gaussian filter of each of `SIGMAS`, including the
-    /// mean error.
+    /// Root mean square error, with the mean, after a Gaussian filter of each of `SIGMAS`.
     pub filtered: Vec<f64>,
 }
 
@@ -237,8 +235,7 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Quantile `q` by linear interpolation between the sorted values (Hyndman and Fan's type 7, as in
-/// NumPy).
+/// Quantile `q` by linear interpolation between sorted values (Hyndman and Fan's type 7; NumPy).
 fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);

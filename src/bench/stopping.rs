@@ -25,8 +25,7 @@ pub fn is_met(rule: &StopRule, error: &LogFigure, looks: usize) -> bool {
 }
 
 /// True if the mean error of these replicates at `spp` is below the target. Never true for a single
-/// replicate, whose spread is unknown, for an error below the reference's resolution, or for an
-/// unreliable interval.
+/// replicate, whose spread is unknown, an unresolved error, or an unreliable interval.
 pub(crate) fn is_met_by(
     rule: &StopRule,
     replicates: &[&ErrorRecord],

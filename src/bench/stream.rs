@@ -57,8 +57,7 @@ impl SeedFigures {
     }
 }
 
-/// Squared error of the mean of a function over the first `n` points, for each `n` in `counts`,
-/// ascending.
+/// Squared error of a function's mean over the first `n` points, for ascending `counts`.
 pub(crate) fn squared_errors(
     function: &Function,
     points: &[[f64; 2]],
@@ -115,8 +114,7 @@ fn curve(counts: &[usize], values: &[f64]) -> Vec<(f64, f64)> {
 
 /// RMSE over seeds of every function, and its slope. The slope is half that of the mean square,
 /// hence that of the RMSE and not of a mean absolute error. It ignores an N at which at least half
-/// of the seeds are exact to the resolution of the coordinates (16 points often halve the square
-/// exactly).
+/// of the seeds are exact to coordinate resolution (16 points often halve the square).
 fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> {
     let figures = |(k, (name, function)): (usize, (&str, Function))| {
         let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
@@ -159,8 +157,7 @@ pub fn cosine_direction([u, v]: [f64; 2]) -> [f64; 3] {
 }
 
 /// Mean angle between the directions of neighbouring pixels (right and below) at the same sample
-/// index, radians. `points` are those of a tile of `width` pixels per row, pixel by pixel,
-/// `samples` each.
+/// index, radians. `points`: `samples` of each pixel, in rows of `width`.
 pub(crate) fn neighbour_angle(points: &[[f64; 2]], width: usize, samples: usize) -> Option<f64> {
     let directions: Vec<_> = points.iter().map(|&p| cosine_direction(p)).collect();
     let pixels = points.len().checked_div(samples)?;
@@ -184,8 +181,7 @@ fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     2.0 * difference.atan2(sum)
 }
 
-/// Fraction of the cells of a square grid that contain a point. The grid has (4 √n)² cells for n
-/// points per pixel.
+/// Fraction of cells with a point in a square grid of (4 √n)² cells for n points per pixel.
 pub(crate) fn coverage(points: &[[f64; 2]], n: usize) -> f64 {
     let side = ((n as f64).sqrt() * CELLS as f64).round().max(1.0) as usize;
     let mut hit = vec![false; side * side];

@@ -36,8 +36,7 @@ impl<M: Measured + ?Sized> Measured for &M {
     }
 }
 
-/// Answers of a measurement in every turn, which must agree: otherwise the time is that of
-/// something else.
+/// Answers of a measurement in every turn, which must agree for its time to be valid.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     first: OnceCell<blake3::Hash>,
@@ -78,8 +77,7 @@ pub struct Samples {
 /// Measures everything `rounds` times in rounds of random order; failures keep their error.
 ///
 /// # Errors
-/// The device is lost: the index of the measurement, and the error. The others are unmeasured, not
-/// failed.
+/// The device is lost: the index of the measurement, and the error; others are unmeasured.
 pub(crate) fn interleave<M: Measured>(
     measured: &[M],
     timing: &Timing,
@@ -130,8 +128,7 @@ fn take_turn(measured: &impl Measured, round: usize) {
 /// Attempts at a turn in which a clock runs backwards.
 const TRIES: usize = 3;
 
-/// One turn, repeated if a clock ran backwards, as times of different clocks must not be mixed in a
-/// round.
+/// One turn, repeated if a clock ran backwards, as a round must not mix clocks.
 fn turn(measured: &impl Measured) -> Result<Elapsed, GpuError> {
     let mut last = Err(GpuError::Clock);
     for _ in 0..TRIES {
@@ -166,8 +163,8 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
     }
 }
 
-/// `samples` minus the cost of an empty measurement; never below a hundredth of the original, so
-/// that a rate stays finite.
+/// `samples` minus the cost of an empty measurement; at least a hundredth of it, so rates are
+/// finite.
 pub(crate) fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
     samples
         .iter()

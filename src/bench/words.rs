@@ -2,8 +2,7 @@
 //! run: every dimension, samples and seeds from first to last, pixels from corner to corner.
 //!
 //! The words come from the kernel `sampling/dump_stream`, which reads coordinates (pixel, sample,
-//! dimension, seed) from a buffer and imports the same modules as the renderer, with the same
-//! constants and table.
+//! dimension, seed) from a buffer and uses the renderer's modules, constants and table.
 
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Composition, Gpu, UniformValues, groups_for};
@@ -136,8 +135,7 @@ pub(crate) fn kernel_hash(gpu: &Gpu, sampler: &Sampler) -> Result<String, String
     Ok(pipeline.map_err(|e| e.to_string())?.kernel.hash())
 }
 
-/// Compares the kernel's words with the twin's over the range of a run, in one dispatch; returns
-/// their number.
+/// Compares the kernel's words with the twin's over a run's range; returns their number.
 ///
 /// # Errors
 /// A word differs, or the kernel does not run.

@@ -110,8 +110,7 @@ pub(super) fn cell_tables<'t>(
     }
 }
 
-/// The parameter tables of an entry: one `[axis.NAME]`, or several `[[axis.NAME]]`, each with its
-/// own variants.
+/// The parameter tables of an entry: one `[axis.NAME]`, or several separate `[[axis.NAME]]`.
 pub(super) fn parameter_tables<'t>(
     axis: Axis,
     entry: &str,

@@ -208,8 +208,7 @@ impl Thesis {
     /// Reads these sections of an experiment; `None` without `[thesis]`.
     ///
     /// # Errors
-    /// An unknown key (with the nearest known one), a wrong type, or an expectation that cannot be
-    /// tested.
+    /// An unknown key (with the nearest known one), a wrong type, or an untestable expectation.
     pub fn parse(text: &str, file: &str) -> Result<Option<Self>, ConfigError> {
         let parsed: File = toml::from_str(text).map_err(|error| fault(text, file, &error))?;
         let Some(mut thesis) = parsed.thesis else {

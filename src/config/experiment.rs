@@ -14,8 +14,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-/// A checked experiment. Keys, ranges and defaults are in the settings structs and
-/// `docs/experiments.md`.
+/// A checked experiment. For keys, ranges and defaults see `docs/experiments.md`.
 // Many fields: one for each section of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
@@ -168,8 +167,7 @@ impl Experiment {
     }
 
     /// Render seeds, modulo 2³²: consecutive integers from `run.seed` on for replicates, and from a
-    /// hash of `reference.seed` on for reference parts, so that neighbouring numbers in the file do
-    /// not collide.
+    /// hash of `reference.seed` on for reference parts, so neighbouring numbers do not collide.
     pub fn seeds(&self) -> Seeds {
         let from = |first: u32, count| (0..count).map(|i| first.wrapping_add(i)).collect();
         Seeds {

@@ -63,8 +63,7 @@ impl Plan {
     ///
     /// # Errors
     /// A filter with an unknown axis or without `=`, a filter or exclude that matches nothing,
-    /// filters that leave nothing to run, an incompatible reference sampler, or only incompatible
-    /// pairs.
+    /// filters that leave nothing, an incompatible reference sampler, or no compatible pair.
     pub fn new(
         experiment: &Experiment,
         only: &[String],

@@ -29,8 +29,8 @@ pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
     })
 }
 
-/// Returns whether each seed of a sequence and decorrelation gives another sample set, or why the
-/// two are incompatible.
+/// Whether each seed of a sequence and decorrelation gives new samples, or why they are
+/// incompatible.
 pub(super) trait IsRandomised: Fn(&Variant, &Variant) -> Result<bool, String> {}
 impl<F: Fn(&Variant, &Variant) -> Result<bool, String>> IsRandomised for F {}
 

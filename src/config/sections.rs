@@ -1,6 +1,5 @@
-//! Sections of experiment settings: a key is a field with meaning, type, default and range. These
-//! declarations define the parser, its messages, the defaults and the table in
-//! `docs/experiments.md`.
+//! Sections of experiment settings: a key is a field with meaning, type, default and range, used by
+//! the parser, its messages, and the table in `docs/experiments.md`.
 
 use super::settings::{Contradiction, Settings};
 use raystone_core::geometry::Camera;

@@ -8,8 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 impl Plan {
-    /// Full cells with modelled coherence: the model has its own organisations and ignores
-    /// workgroups.
+    /// Full cells with modelled coherence; the model ignores organisations and workgroups.
     pub fn modelled(&self, experiment: &Experiment) -> Vec<Cell> {
         let is_first = |cell: &Cell, axis| cell.get(axis) == experiment.axes[axis].first();
         let cells = self.times.iter();

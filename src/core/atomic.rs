@@ -29,8 +29,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     })
 }
 
-/// Creates a new file in the folder of `path`, with a short name, as that of `path` may have the
-/// maximum length.
+/// Creates a file in the folder of `path`, with a short name, as `path` may have maximum length.
 fn new_file_beside(path: &Path) -> io::Result<(File, PathBuf)> {
     static COUNTER: AtomicU32 = AtomicU32::new(0);
     loop {

@@ -84,8 +84,7 @@ impl fmt::Display for Ray {
     }
 }
 
-/// Parses eight numbers, or six as in [`Ray::new`]; the error names the invalid number or the
-/// count.
+/// Parses eight numbers, or six as in [`Ray::new`]; errors name the invalid number or the count.
 impl FromStr for Ray {
     type Err = String;
 
@@ -126,8 +125,7 @@ pub struct Camera {
     pub vertical_fov_degrees: f32,
 }
 
-/// A direction needs a component of at least 2⁻⁵⁶: raising a shorter one would add more than
-/// rounding.
+/// A direction needs a component of at least 2⁻⁵⁶: raising a shorter one exceeds rounding.
 pub const SMALLEST_DIRECTION: f32 = 1.387_778_8e-17;
 
 impl Ray {
@@ -157,8 +155,7 @@ impl Camera {
 }
 
 impl Camera {
-    /// Unit viewing direction, and the half extents of the image plane at distance 1, to the right
-    /// and up.
+    /// Unit viewing direction, and half extents of the image plane at distance 1, right and up.
     pub fn basis(&self, [width, height]: [u32; 2]) -> [Vec3; 3] {
         let forward = (self.target - self.eye).normalize();
         let right = forward.cross(self.up).normalize();

@@ -1,5 +1,4 @@
-//! Text utilities: decoding of text files, escaping, file names, content hashes, and the known name
-//! nearest to a misspelt one.
+//! Text utilities: decoding, escaping, file names, content hashes, and nearest known names.
 
 pub mod escape;
 

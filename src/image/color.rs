@@ -13,8 +13,7 @@ const VIRIDIS: [[u8; 3]; 9] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// The colour-blind safe palette of Okabe and Ito (2008), dark colours first; yellow, hard to see
-/// on white, is last.
+/// The colour-blind safe palette of Okabe and Ito (2008), dark colours first; faint yellow last.
 const OKABE_ITO: [[u8; 3]; 8] = [
     [0x00, 0x72, 0xb2],
     [0xd5, 0x5e, 0x00],
@@ -41,8 +40,7 @@ pub fn viridis(t: f32) -> [u8; 3] {
     })
 }
 
-/// Colour (sRGB) of a category index; repeats after eight, so markers or labels must also
-/// distinguish categories.
+/// Colour (sRGB) of a category index; repeats after eight, so markers must also distinguish them.
 pub fn categorical(index: usize) -> [u8; 3] {
     OKABE_ITO[index % OKABE_ITO.len()]
 }

@@ -1,5 +1,4 @@
-//! Image file formats. The file extension decides: PNG is for viewing, the others store the linear
-//! radiance of every pixel.
+//! Image file formats. By extension: PNG is for viewing, the others store linear radiance.
 
 use super::exr_file::encode_exr;
 use super::read::{Decode, read_hdr, read_npy, read_pfm};
@@ -79,8 +78,7 @@ impl FileFormat {
     }
 
     /// Writes an image atomically. Radiance is stored unchanged, including NaN, except by RGBE,
-    /// which replaces NaN and negative numbers by 0. EXR stores the attributes; the other formats
-    /// omit them.
+    /// which replaces NaN and negative numbers by 0. Only EXR stores the attributes.
     ///
     /// # Errors
     /// [`ImageError::Encode`], [`ImageError::Write`].

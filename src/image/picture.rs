@@ -21,8 +21,7 @@ pub struct Picture {
 
 /// Exposure that maps the log-average luminance of the finite, non-black pixels to 0.36 (Reinhard
 /// et al. 2002, equation 2, with twice their key: white skies look dull at 0.18); 1 if there are no
-/// such pixels. Use the reference's exposure for all images of a scene, so that they can be
-/// compared by eye.
+/// such pixels. Use the reference's exposure for all images of a scene.
 pub fn automatic_exposure(image: &Image) -> f32 {
     let lit = |p: &&[f32; 3]| is_finite(p) && luminance(p) > 1e-6;
     let (sum, count) = image
@@ -47,8 +46,7 @@ pub fn displayed(pixel: &[f32; 3], exposure: f32) -> [f64; 3] {
     pixel.map(|v| encode_srgb(f64::from(v) * scale))
 }
 
-/// Tone-mapped picture: every pixel as [`displayed`] in 8 bits. Non-finite pixels become
-/// [`NON_FINITE_COLOUR`].
+/// Tone-maps every pixel as [`displayed`]; non-finite ones become [`NON_FINITE_COLOUR`].
 pub fn tone_map(image: &Image, exposure: f32) -> Picture {
     let map = |pixel: &[f32; 3]| {
         if is_finite(pixel) {

@@ -145,8 +145,7 @@ impl SceneBuilder {
         }
     }
 
-    /// Marks the triangles from `first` on as mirrored by a transform: from the front, their
-    /// corners turn clockwise.
+    /// Marks the triangles from `first` on as mirrored: their corners turn clockwise.
     pub(crate) fn mirror_from(&mut self, first: usize) {
         self.mirrored.resize(first, false);
         self.mirrored.resize(self.triangles.len(), true);
@@ -224,8 +223,7 @@ impl SceneBuilder {
         (whole && !assembly.instances().is_empty()).then_some(assembly)
     }
 
-    /// Validates the scene, adds a sky if it has no light, frames it if it has no camera, and
-    /// hashes it.
+    /// Validates the scene, adds a sky and framing if it has no light or camera, and hashes it.
     ///
     /// # Errors
     /// The error in `refused`, [`SceneError::NoTriangles`], [`SceneError::TooLarge`],

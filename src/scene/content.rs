@@ -126,8 +126,7 @@ impl SceneData {
         self
     }
 
-    /// Total size of the scene's arrays in bytes: triangles, per-corner and per-triangle data,
-    /// texels.
+    /// Size of the scene's arrays in bytes: triangles, per-corner and per-triangle data, texels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])

@@ -8,8 +8,7 @@ use raystone_core::geometry::{Camera, Triangle};
 use raystone_core::random::Pcg32;
 use std::collections::{HashMap, HashSet};
 
-/// Triangle limit for a scene of copies: each takes 36 bytes, and as much again in the reference
-/// tracer.
+/// Triangle limit of a scene of copies: 36 bytes each, and as much in the reference tracer.
 const MOST_TRIANGLES: usize = 100_000_000;
 /// Spacing of the copies relative to touching, and their height above the plane.
 const APART: f32 = 1.02;
@@ -105,8 +104,7 @@ fn clustered(scene: &SceneData, cells: u32) -> Vec<(Triangle, u32)> {
     kept
 }
 
-/// Places `copies` copies of a scene on a plane, apart and turned about the vertical. Drops vertex
-/// normals.
+/// Places `copies` copies of a scene apart on a plane, with random turns. Drops vertex normals.
 ///
 /// # Errors
 /// [`SceneError::TooManyCopies`], or a transform error.
@@ -186,8 +184,7 @@ fn ground(half: f32) -> Vec<Triangle> {
     ]
 }
 
-/// Moves everything but the triangles into a new scene, including the load report. The default sky
-/// is rebuilt.
+/// Moves everything but the triangles into a new scene, and rebuilds the default sky.
 fn taken_apart(
     scene: SceneData,
     builder: &mut SceneBuilder,

@@ -121,8 +121,7 @@ impl EnvironmentMap {
         2.0 * PI / f64::from(self.width) * (cosine(row) - cosine(row + 1))
     }
 
-    /// Sampling weights, row by row: mean luminance of the bilinear function over the texel, times
-    /// its solid angle.
+    /// Sampling weights, row by row: mean luminance over the (bilinear) texel times solid angle.
     pub fn weights(&self) -> Vec<f64> {
         let [w, h] = [self.width, self.height];
         let light: Vec<f64> = self.texels.iter().map(|t| luminance(*t)).collect();
@@ -142,8 +141,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Bytes of a map of this size in `shading_tables`: one `vec4` per texel, plus alias tables with
-/// power-of-two sizes.
+/// Bytes of a map of this size in `shading_tables`: texels and alias tables.
 fn table_bytes([width, height]: [u32; 2]) -> u64 {
     let [w, h] = [width, height].map(u64::from);
     16 + 16 * w * h + 8 * (h.next_power_of_two() + h * w.next_power_of_two())
@@ -205,8 +203,7 @@ mod tests {
         assert!((light(&half) / before - 1.0).abs() < 1e-6);
         let least = map.within(0, &mut warnings);
         assert!(least.texels.len() == 1 && (light(&least) / before - 1.0).abs() < 1e-6);
-        // The tables must fit the binding limit of software adapters just as before, not twice
-        // over.
+        // Software adapters still bind a map of 2048 × 1024, but not of twice that size.
         let all = crate::LEAST_BINDING - (8 << 20);
         assert!(table_bytes([2048, 1024]) <= all && table_bytes([4096, 2048]) > all);
     }

@@ -20,8 +20,7 @@ const INSIDE_FOV: f32 = 60.0;
 const FILL: f32 = 0.9;
 /// Maximum number of triangles to cast rays against; larger scenes use the largest ones.
 const MOST_TRIANGLES: usize = 1 << 14;
-/// No rays are cast if a random ray would meet more boxes than this, as when thousands of triangles
-/// share one place.
+/// No rays are cast if a random one would meet more boxes: thousands of triangles in one place.
 const MOST_BOXES: f32 = 2000.0;
 /// A point is inside a room if this fraction of directions hits a front face.
 const ENCLOSED: f32 = 0.7;
@@ -163,8 +162,7 @@ fn three_quarter(up: Vec3, right: f32, front: f32) -> Vec3 {
     direction.normalize()
 }
 
-/// The closest eye in direction `towards_eye` that has all vertices in its image, and its distance
-/// from the origin.
+/// The closest eye towards `towards_eye` that sees all vertices, and its distance.
 ///
 /// With a, b, c the coordinates of a vertex to the right, up and ahead, the eye must satisfy
 /// |a − aₑ| ≤ k (c − cₑ), and the same for b: four planes that touch the vertices.
@@ -375,8 +373,7 @@ impl UnitScene {
         out.count() as f32 / points.len().max(1) as f32
     }
 
-    /// True if a building's open roof is at the end of the z axis. A missing wall is more open
-    /// still.
+    /// True if the z axis ends in an open roof. A missing wall is more open still.
     fn is_open_to_z(&self, points: &[Vec3]) -> bool {
         let roof = self.openness(points, Vec3::Z);
         (0.2..OPEN_SIDE).contains(&roof) && self.openness(points, Vec3::Y) < 0.02

@@ -378,8 +378,7 @@ impl<'a> Geometry<'a> {
         Some(found)
     }
 
-    /// Adds a primitive's triangles, and their mesh-space versions to `own` if nodes share the
-    /// mesh.
+    /// Adds a primitive's triangles, also in mesh space to `own` if nodes share the mesh.
     fn read_primitive(
         &mut self,
         primitive: &gltf::Primitive<'a>,

@@ -1,5 +1,5 @@
-//! Checks of glTF accessors. The crate's readers assume valid types, strides, offsets and counts,
-//! and panic otherwise.
+//! Checks of glTF accessors. The crate's readers panic on invalid types, strides, offsets and
+//! counts.
 
 use gltf::Semantic;
 use gltf::accessor::{Accessor, DataType, Dimensions};

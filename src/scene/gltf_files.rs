@@ -57,8 +57,7 @@ impl Files {
                 "`{uri}` lies outside the model's folder; --allow-outside reads it all the same"
             )
         };
-        // Compare with links resolved. The reader reports missing files, unless the name leads
-        // outside.
+        // With links resolved. The reader reports missing files, unless the name leads outside.
         let real = |path: &Path| raystone_core::files::files().real(path);
         let inside = match (real(&file), real(&self.folder)) {
             (Ok(file), Ok(folder)) => file.starts_with(folder),

@@ -1,9 +1,7 @@
-//! Objects and instances: scenes whose triangles are copies of a few objects, each placed by an
-//! affine transform.
+//! Objects and instances: scenes of copies of a few objects, placed by affine transforms.
 //!
 //! The triangles of [`super::SceneData`] remain a flat world-space list: the copies of all
-//! instances in order. An [`Assembly`] additionally records which objects they are copies of, for
-//! two-level structures.
+//! instances in order. An [`Assembly`] records their objects, for two-level structures.
 
 use glam::{DMat3, DVec3, Mat4, Vec3};
 use raystone_core::geometry::Triangle;
@@ -82,8 +80,7 @@ impl Transform {
     }
 
     /// True if the transform mirrors: counter-clockwise corners turn clockwise, and the front is
-    /// the other side (glTF 2.0, 3.7.4). Computed in f64, so that a small scale does not make the
-    /// determinant 0.
+    /// the other side (glTF 2.0, 3.7.4). In f64, so that small scales do not give 0.
     pub fn is_mirrored(&self) -> bool {
         self.parts().0.determinant() < 0.0
     }
@@ -205,8 +202,8 @@ impl Assembly {
     /// Appends an instance.
     ///
     /// # Errors
-    /// The object does not exist, the transform is singular or not finite, or the scene exceeds the
-    /// triangle limit.
+    /// The object does not exist, the transform is singular or not finite, or there are too many
+    /// triangles.
     pub fn place(&mut self, object: u32, to_world: Transform) -> Result<Instance, InstanceError> {
         let instance = self.instances.len();
         let triangles = self.objects.get(object as usize);

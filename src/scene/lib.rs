@@ -1,5 +1,4 @@
-//! Scenes: loaders for OBJ, glTF, PLY and Nori's XML, built-in procedural scenes, cameras,
-//! materials and emitters.
+//! Scenes: OBJ, glTF, PLY and Nori XML loaders, procedural scenes, cameras, materials, emitters.
 //!
 //! A scene is a flat triangle soup in world space with per-triangle material indices. Structures
 //! see only [`Triangle`]s, two-level ones also the [`Assembly`]; shading sees the rest.
@@ -98,8 +97,7 @@ pub struct SceneData {
     pub uvs: Vec<[Vec2; 3]>,
     /// Corner normals, encoded by [`encode_normal`]; empty if all are face normals.
     pub normals: Vec<[u32; 3]>,
-    /// Corner colours, encoded by [`encode_color`], which multiply the base colour; empty if all
-    /// are white.
+    /// Corner colours ([`encode_color`]), which multiply the base colour; empty if all white.
     pub colors: Vec<[[u32; 2]; 3]>,
     /// True for mirrored triangles, whose corners turn clockwise seen from the front: copies keep
     /// the object's corner order, on which u and v of hits depend. Empty if there are none.

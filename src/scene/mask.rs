@@ -73,8 +73,7 @@ impl AlphaMask {
         }
     }
 
-    /// The lowest image value at which the surface exists, in units of 1/(255 · 65536); `u32::MAX`
-    /// if there is none.
+    /// The lowest image value of the surface, in units of 1/(255 · 65536); `u32::MAX` for none.
     pub fn threshold(&self) -> u32 {
         let (factor, cutoff) = (f64::from(self.factor), f64::from(self.cutoff));
         if cutoff <= 0.0 {

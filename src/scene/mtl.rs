@@ -100,8 +100,7 @@ impl Library {
             .collect()
     }
 
-    /// All materials in library order, their textures, and one warning for everything drawn
-    /// differently from the file.
+    /// All materials in library order, their textures, and a warning for deviations from the file.
     pub(crate) fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
         let approximated = contents
@@ -260,8 +259,7 @@ fn source(material: &tobj::Material) -> MaterialSource {
     }
 }
 
-/// Statements that are read, irrelevant (empty lines, ambient colour), or reported with their
-/// materials.
+/// Statements that are read, irrelevant (empty, ambient), or reported with their materials.
 const READ: [&str; 25] = [
     "", "newmtl", "Ka", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "Tf", "illum", "Pr", "Pm",
     "map_Kd", "map_Ks", "map_Ke", "map_Ns", "map_ns", "map_NS", "map_d", "map_Bump", "map_bump",

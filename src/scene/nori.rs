@@ -2,8 +2,7 @@
 //! here also PLY): transforms, the perspective camera, area emitters and its materials.
 //!
 //! Nori's camera may be mirrored (a scale of −1 in its transform); ours cannot. The scene is
-//! mirrored instead, at the plane through the eye that is vertical in the image, which gives the
-//! same picture.
+//! mirrored instead, at the vertical plane through the eye, for the same picture.
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
@@ -144,8 +143,7 @@ impl Reader<'_> {
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());
-        // Any reflection, of camera or mesh, reverses the corners, which define the sides of
-        // emitters and glass.
+        // Reflections reverse the corners, which define the sides of emitters and glass.
         let mirrored = to_world.determinant() < 0.0;
         let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
         let normals = |index: usize| -> Option<[Vec3; 3]> {

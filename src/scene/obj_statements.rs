@@ -48,8 +48,7 @@ pub(super) struct Statements {
     pub normals: Vec<Vec3>,
     pub corners: Vec<Corner>,
     pub faces: Vec<Face>,
-    /// The material before any `usemtl`, then that of each `usemtl`; `None` if no library defines
-    /// it.
+    /// The material before any `usemtl`, then of each `usemtl`; `None` if undefined.
     pub materials: Vec<Option<u32>>,
     /// Names of objects and groups.
     pub objects: Vec<String>,
@@ -153,8 +152,7 @@ impl Statements {
         Ok(())
     }
 
-    /// Reads three coordinates, optionally followed by a weight that divides them, or a colour with
-    /// optional alpha.
+    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha.
     fn vertex(
         &mut self,
         reader: &mut Reader,
@@ -294,8 +292,7 @@ pub(super) fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default()
 }
 
-/// Parses a statement's numbers, of which `least` are required; missing ones are 0, and those
-/// beyond `N` ignored.
+/// Parses at least `least` numbers; missing ones are 0, and those beyond `N` ignored.
 fn numbers<const N: usize>(
     keyword: &str,
     words: SplitWhitespace<'_>,
@@ -314,8 +311,7 @@ fn numbers<const N: usize>(
     }
 }
 
-/// Parses a number as C, C++ and Fortran write it: NaN may be `-1.#IND` or `nan(ind)`, an exponent
-/// `1.0D+00`.
+/// Parses numbers of C, C++ and Fortran: NaN as `-1.#IND` or `nan(ind)`, exponents as `1.0D+00`.
 pub(super) fn number(word: &str) -> Option<f32> {
     word.parse().ok().or_else(|| {
         let word = word.to_ascii_lowercase();

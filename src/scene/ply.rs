@@ -1,5 +1,4 @@
-//! Stanford PLY with `ply-rs-bw`, ASCII and binary, read element by element: faces go straight into
-//! the scene's arrays.
+//! Stanford PLY with `ply-rs-bw`, ASCII and binary: faces go straight into the scene's arrays.
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
 use super::colors::linear;
@@ -268,8 +267,7 @@ fn header_error(path: &Path, error: &ParseError) -> SceneError {
     SceneError::malformed(path, place, error.to_string().trim().to_owned())
 }
 
-/// Minimum size of an element in bytes: a digit and a separator per property in text, an empty list
-/// for every list.
+/// Minimum bytes of an element: a digit and a separator per property in text, empty lists.
 fn least_bytes(definition: &ElementDef, encoding: Encoding) -> u64 {
     let least = |property: &PropertyDef| match (encoding, &property.data_type) {
         (Encoding::Ascii, _) => 2,

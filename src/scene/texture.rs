@@ -35,8 +35,7 @@ pub(super) fn texel_room(table_bytes: u64, triangles: usize) -> u64 {
 }
 
 /// Decodes `sources` in parallel. Images wider or higher than `max_size` are reduced, and all of
-/// them further until they fit into `room` words. The materials' use of an image decides how it is
-/// reduced.
+/// them further until they fit into `room` words. Their use decides how.
 ///
 /// `materials` refer to `sources` on entry and to the returned list on exit. An image that cannot
 /// be decoded is a warning, and its materials keep their constant.
@@ -114,8 +113,7 @@ fn kinds(count: usize, materials: &[Material]) -> Vec<Texels> {
 
 type Size = (u32, u32);
 
-/// Largest ratio of texel bytes to file bytes: deflate expands at most 1032 times, and a texel of
-/// four bytes may take one.
+/// Largest ratio of texel bytes to file bytes: deflate expands at most 1032 times.
 const MOST_TEXEL_BYTES: u64 = 4 * 1032;
 
 /// Texel bytes that are always allowed.
@@ -137,8 +135,7 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
     limit
 }
 
-/// The size of an image. Refuses one that claims more texels than its bytes can hold, before any
-/// memory is allocated.
+/// The size of an image, refused before allocation if its bytes cannot hold so many texels.
 fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|e| e.to_string())?;

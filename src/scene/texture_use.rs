@@ -14,8 +14,7 @@ pub enum Wrap {
     Clamp,
 }
 
-/// A texture and its placement. Its purpose defines its encoding: colours are sRGB, all else is
-/// linear.
+/// A texture and its placement. Colours are sRGB, all else is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureUse {
     /// Index into [`super::SceneData::textures`].

@@ -1,10 +1,9 @@
-//! Two-stage choice of the samples that each tile of an image needs for a requested error (C.
-//! Stein, "A two-sample test for a linear hypothesis whose power is independent of the variance",
-//! 1945).
+//! Two-stage choice of the samples per tile for a requested error (C. Stein, "A two-sample test for
+//! a linear hypothesis whose power is independent of the variance", 1945).
 //!
-//! Stopping where an estimate looks good is biased: an image that missed its fireflies is too dark
-//! and has little variance, too. Here the replicates form two groups. The first samples of each
-//! group determine, once and per tile, how many the *other* group takes. A group's samples are
+//! Stopping where an estimate looks good is biased: an image without its fireflies is too dark,
+//! with little variance. Here the replicates form two groups. The first samples of each group
+//! determine, once and per tile, how many the *other* group takes. A group's samples are
 //! independent of their number, so the mean of its images is unbiased, and so is the mean of both
 //! groups.
 
@@ -97,8 +96,7 @@ fn relative_variance(images: &[&Image], pixels: &[usize]) -> f64 {
 
 /// Samples that a tile needs: the smallest of `counts` (ascending) for which its relMSE is below
 /// `target` with this confidence, assuming it falls as 1/samples from `error` at the first count.
-/// The largest if none suffices or nothing is known. The error of good samplers falls faster, so
-/// they need fewer.
+/// The largest if none suffices or nothing is known. Good samplers need fewer.
 pub fn samples_needed(
     error: Option<&LogFigure>,
     counts: &[u32],

@@ -109,8 +109,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 impl Plane {
-    /// Separable convolution, `across` in x and `down` in y, both of odd length; border pixels are
-    /// repeated.
+    /// Separable convolution, `across` in x and `down` in y, of odd lengths; repeats border pixels.
     fn filtered(&self, across: &[f64], down: &[f64]) -> Self {
         let (width, height) = (self.width, self.values.len() / self.width);
         let clamped = |at: usize, k: usize, taps: usize, size: usize| {
@@ -270,8 +269,7 @@ mod tests {
     }
 
     /// Values of the PyPI package `flip-evaluator` 1.7, the authors' program in single precision:
-    /// its features of a flat picture are not quite 0, and their root raises the difference by
-    /// 2·10⁻⁵.
+    /// features of a flat picture are not quite 0, which raises the difference by 2·10⁻⁵.
     #[test]
     fn known_pictures_differ_as_the_authors_program_says() {
         let black_and_white = difference(&flat([0.0; 3]), &flat([1.0; 3]));

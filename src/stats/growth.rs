@@ -12,8 +12,7 @@ use crate::statistics::{LEAST_FOR_MEDIAN, ROUNDING, median, median_interval};
 
 /// Minimum number of sizes to distinguish two models of two constants.
 pub(crate) const LEAST_SIZES: usize = 5;
-/// Criteria differing by less than this support both models (Burnham and Anderson 2002, section
-/// 2.6).
+/// Criteria closer than this support both models (Burnham and Anderson 2002, section 2.6).
 const NO_DIFFERENCE: f64 = 2.0;
 
 /// A model of growth.
@@ -70,8 +69,7 @@ pub struct Growth {
     pub linear: f64,
     /// Median over rounds of the relative residuals of t = a + b·n·log₂ n.
     pub linearithmic: f64,
-    /// Criterion of n minus that of n log n, positive if n log n fits better: median over rounds
-    /// with interval.
+    /// Criterion of n minus that of n log n, positive if n log n fits better, over rounds.
     pub difference: Interval,
     /// The model supported by the interval.
     pub better: Option<Model>,

@@ -27,8 +27,7 @@ pub struct Tail {
 /// in 93 to 97 % of cases, and larger where they do not.
 const MOST_SHARE: f64 = 0.035;
 
-/// Largest missed error of one pixel, as a fraction of the distance to the upper end of the
-/// interval.
+/// Largest missed error of one pixel, relative to the upper half of the interval.
 const MOST_MISSED: f64 = 0.5;
 
 /// True if a single pixel makes the interval of a mean relMSE unreliable.
@@ -44,8 +43,7 @@ pub struct PixelErrors {
     /// True if some replicate is at least as bright as the reference there.
     reached: Vec<bool>,
     replicates: u32,
-    /// Variance of each pixel between reference parts, summed over channels, over r² + 0.01; empty
-    /// without parts.
+    /// Channel sum of each pixel's variance between reference parts, over r² + 0.01; or empty.
     of_parts: Vec<f64>,
 }
 
@@ -83,8 +81,7 @@ impl PixelErrors {
         Ok(())
     }
 
-    /// Effect of single pixels on the mean at `spp` samples per pixel, for reference parts of
-    /// `part_spp` each.
+    /// Effect of single pixels on the mean at `spp` samples, for reference parts of `part_spp`.
     ///
     /// A pixel's expected variance is that of independent samples, σ² / spp, with σ² / `part_spp`
     /// between the parts. A better sampler shows in replicates on both sides of the reference: the

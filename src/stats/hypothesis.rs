@@ -1,5 +1,4 @@
-//! Hypothesis tests: Welch's t, and the corrections of Holm and of Benjamini and Hochberg for many
-//! tests.
+//! Hypothesis tests: Welch's t, and the corrections of Holm, and of Benjamini and Hochberg.
 
 use crate::interval::Spread;
 use crate::statistics::mean;
@@ -19,8 +18,7 @@ pub struct WelchTest {
 }
 
 /// Welch's t-test (1947) of means that may differ by `margin ≥ 0` (in the samples' unit): the
-/// difference is first reduced by the margin. The degrees of freedom are capped at those of `a`
-/// alone.
+/// difference is first reduced by the margin. Degrees of freedom are capped at `a`'s.
 ///
 /// A few samples of `a` may lie close together by chance. Welch and Satterthwaite then take their
 /// variance for small and use the degrees of freedom of `b`: for two samples against eight that are
@@ -141,8 +139,7 @@ pub fn benjamini_hochberg(p_values: &[f64], alpha: f64) -> Vec<bool> {
     p_values.iter().map(|&p| p <= threshold).collect()
 }
 
-/// The smallest `alpha` at which [`benjamini_hochberg`] rejects any of these hypotheses; 1 if there
-/// are none.
+/// The smallest `alpha` at which [`benjamini_hochberg`] rejects any hypothesis, or 1.
 pub(crate) fn least_rate(p_values: &[f64]) -> f64 {
     let mut sorted = p_values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -154,8 +151,8 @@ pub(crate) fn least_rate(p_values: &[f64]) -> f64 {
 }
 
 /// Corrected p-values, in order: rejecting those of at most `alpha` rejects any true hypothesis
-/// with probability at most `alpha`, however the tests depend on each other (Holm 1979, step-down).
-/// NaN counts as 1.
+/// with probability at most `alpha`, however dependent the tests (Holm 1979, step-down). NaN counts
+/// as 1.
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let p = |i: usize| {
         if p_values[i].is_nan() {

@@ -45,8 +45,7 @@ impl Interval {
     }
 }
 
-/// Effect of one source of noise on an estimate, assumed to have Student's distribution about the
-/// truth.
+/// Effect of a source of noise on an estimate, with Student's distribution about the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Variance of the estimate.

@@ -1,5 +1,4 @@
-//! Positive figures as logarithms, with all sources of uncertainty, and quantities derived from
-//! them.
+//! Positive figures as logarithms with their uncertainty, and quantities derived from them.
 //!
 //! Errors and times are positive, skewed, and compared by ratio, hence logarithms; that of an error
 //! per second is the sum of those of error and time, and so is its variance. [`LogFigure::product`]
@@ -148,9 +147,8 @@ impl LogFigure {
         }
     }
 
-    /// From the logarithm, and logarithms that leave out each part of each source of noise: its own
-    /// ones, such as replicates, and shared ones, such as the halves of a reference, in the same
-    /// order for all figures.
+    /// From the logarithm, and logarithms that leave out each part of each source of noise: its
+    /// own, such as replicates, and shared ones, such as reference halves, in equal order.
     ///
     /// `None` if anything is not finite, except for figures that stay 0 whatever is left out.
     pub fn new(log: f64, own: &[Vec<f64>], shared: Vec<Vec<f64>>) -> Option<Self> {
@@ -184,8 +182,7 @@ impl LogFigure {
     /// measured in the same rounds, so the machine's variation in a round does not affect their
     /// ratio. An empty text means no sitting.
     ///
-    /// `None` if the trimmed mean would leave fewer than two samples, or if a sample is not
-    /// positive and finite.
+    /// `None` if fewer than two samples remain, or if one is not positive and finite.
     pub fn of_rounds(sitting: &str, figures: &[f64]) -> Option<Self> {
         if !figures.iter().all(|x| *x > 0.0 && x.is_finite()) {
             return None;
@@ -322,9 +319,8 @@ impl LogFigure {
         !self.noise.is_empty()
     }
 
-    /// Exponent of a power law through points `(x, y)`, by least squares of logarithms, returned as
-    /// the figure's logarithm; `None` with fewer than two different x, or if a value is not
-    /// positive.
+    /// Exponent of a power law through points `(x, y)`, by least squares of logarithms, as the
+    /// figure's logarithm; `None` for fewer than two different x or non-positive values.
     pub fn exponent(points: &[(f64, Self)]) -> Option<Self> {
         if !points.iter().all(|(_, y)| y.log.is_finite()) {
             return None;
@@ -385,8 +381,7 @@ impl LogFigure {
     }
 
     /// Bound that the figure exceeds with probability at most `chance`: the upper end of the
-    /// interval with that two-sided error probability. Intervals of skewed figures almost only fail
-    /// by being too low.
+    /// interval with that two-sided error probability. Intervals of skewed figures mostly fail low.
     pub fn upper(&self, chance: f64) -> f64 {
         let [_, up] = self.spreads();
         if self.is_exact(up) {

@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Added to the squared reference in relative metrics, so that dark pixels do not dominate the
-/// mean.
+/// Added to the squared reference in relative metrics, against dominance of dark pixels.
 pub const RELATIVE_EPSILON: f64 = 1e-2;
 
 /// A reference: its mean image, and its independent parts and their two halves if available.
@@ -78,8 +77,7 @@ impl Reference {
         &self.parts
     }
 
-    /// Number of estimates of [`ErrorReport::without_part`]; halves of one part cannot leave it
-    /// out.
+    /// Number of [`ErrorReport::without_part`] estimates; halves of one part have none.
     fn estimates(&self) -> usize {
         if self.parts.len() < 4 {
             0
@@ -306,8 +304,8 @@ pub struct ErrorReport {
     pub non_finite_pixels: usize,
 }
 
-/// Evaluates every metric of `image` against `reference`. If pixels are not finite, metrics of
-/// whole images are absent.
+/// Evaluates every metric of `image` against `reference`. Non-finite pixels exclude whole-image
+/// metrics.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].

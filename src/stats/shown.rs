@@ -45,8 +45,7 @@ impl Shown {
     }
 
     /// Mean structural similarity of luma over all windows inside the picture (Wang, Bovik, Sheikh,
-    /// Simoncelli 2004, equation 13, with their Gaussian window and constants); `None` if none
-    /// fits.
+    /// Simoncelli 2004, equation 13, their Gaussian window and constants); `None` if none fits.
     pub(crate) fn ssim(&self, other: &Self) -> Option<f64> {
         let luma = |shown: &Self| -> Vec<f64> {
             let weighted = |p: &[f64; 3]| (0..3).map(|c| LUMINANCE[c] * p[c]).sum();

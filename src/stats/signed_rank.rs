@@ -104,8 +104,7 @@ mod tests {
 
     #[test]
     fn it_agrees_with_the_published_table() {
-        // Hollander and Wolfe, table A.4: P(T+ ≥ 38) for n = 9 is 0.037, P(T+ ≥ 15) for n = 5 is
-        // 1/32.
+        // Hollander and Wolfe, table A.4: P(T+ ≥ 38) is 0.037 for n = 9, P(T+ ≥ 15) 1/32 for n = 5.
         let of = |n: usize| SignedRank::new(&vec![1.0; n]).unwrap();
         assert!((of(9).at_least(38) - 0.037).abs() < 5e-4);
         assert!((of(5).at_least(15) - 1.0 / 32.0).abs() < 1e-12);

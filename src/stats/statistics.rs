@@ -88,8 +88,7 @@ pub fn positive_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     })
 }
 
-/// The samples without the first, without the second, …, for [`jackknife_interval`]. Empty for a
-/// single sample.
+/// The samples without the first, the second, …, for [`jackknife_interval`]; empty for one.
 pub fn leave_one_out<T: Clone>(samples: &[T]) -> impl Iterator<Item = Vec<T>> {
     let count = if samples.len() > 1 { samples.len() } else { 0 };
     (0..count).map(|left_out| [&samples[..left_out], &samples[left_out + 1..]].concat())
@@ -106,8 +105,8 @@ pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
     interval_of(samples, raw_mean)
 }
 
-/// Root mean square with its 95 % interval on logarithms ([`positive_interval`]); not below 0, zero
-/// width for one square.
+/// Root mean square with its 95 % interval on logarithms ([`positive_interval`]); zero width for
+/// one.
 pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
     let root = |squares: &[f64]| raw_mean(squares).sqrt();
     let estimates = leave_one_out(squares).map(|rest| root(&rest)).collect();

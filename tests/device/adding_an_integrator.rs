@@ -1,6 +1,5 @@
 //! A sequence, a decorrelation and integrators from outside the program, with their own kernels, in
-//! an ordinary run; and a multi-pass integrator whose image is bit-identical to that of a single
-//! kernel.
+//! an ordinary run; and a multi-pass integrator bit-identical to a single kernel.
 
 mod deferred;
 mod facing;

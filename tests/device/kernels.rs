@@ -1,6 +1,6 @@
 //! Every kernel that an experiment can request composes and validates, stays within WebGPU's
-//! default limits, contains counters only on request, and has structs laid out like Rust's. No
-//! adapter is needed.
+//! default limits, contains counters only on request, and has Rust's struct layout. Needs no
+//! adapter.
 
 mod covering;
 mod families;
@@ -21,8 +21,7 @@ static FAMILIES: LazyLock<[Family; 3]> = LazyLock::new(|| [batches(), renderers(
 /// Storage buffers that WebGPU promises.
 const BUFFERS: usize = 8;
 
-/// The WebGPU default limit that the kernel exceeds, if any, with `buffers` storage buffers
-/// allowed.
+/// The WebGPU default limit exceeded by the kernel, if any, allowing `buffers` storage buffers.
 fn broken_limit(wgsl: &str, buffers: usize) -> Option<String> {
     let count = |what: &str| wgsl.matches(what).count();
     let storage = count("var<storage");
@@ -69,8 +68,7 @@ fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Opt
     let asked = ["counters", "ray_counts"]
         .iter()
         .any(|f| kernel.features.contains(*f));
-    // Ordered shading uses one more buffer if the scene is not in textures: adapters without it
-    // refuse that organisation.
+    // Ordered shading uses one more buffer if the scene is not in textures, or is refused.
     let has = |feature: &str| kernel.features.contains(feature);
     let in_order = has("sorted_hits") || has("by_kind");
     let has_more = kernel.entry == "organisation/shade" && in_order && !has("scene_texels");

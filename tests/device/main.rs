@@ -1,5 +1,4 @@
-//! Tests of the device: kernels, recordings, passes, kernel organisations, and user additions to
-//! all of these.
+//! Tests of the device: kernels, recordings, passes, organisations, and user additions.
 
 #[path = "../support/mod.rs"]
 mod support;

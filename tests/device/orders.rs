@@ -1,5 +1,4 @@
-//! Pixel orders: in any order the image is bit-identical to that of one pass, and the first picture
-//! has no gaps.
+//! Pixel orders: images are bit-identical to a single pass, and the first picture has no gaps.
 
 use crate::support;
 use crate::support::{Stage, sampler_of, variant};
@@ -15,8 +14,8 @@ use raystone::params::Choice as _;
 const SIZE: [u32; 2] = [53, 38];
 const SPP: u32 = 3;
 
-/// The image of three samples in an order, with kernels of a library, the sums after the first
-/// pass, and the passes.
+/// The image of three samples in an order, with a kernel library, sums of the first pass, and
+/// passes.
 fn in_order(
     order: Order,
     kernels: Option<KernelLibrary>,

@@ -232,8 +232,7 @@ fn fault_on(
 
 #[test]
 fn a_tree_of_lights_knows_the_surface_that_a_ray_has_left() {
-    // A shining wall next to the lamp: rays find lights that a tree would have selected by the
-    // surface they come from.
+    // A shining wall next to the lamp: rays find lights that a tree selects by surface.
     let lamps = || {
         let mut scene = builtin("cornell-box", &[]);
         scene.materials[0].emission = Vec3::splat(0.5);

@@ -141,7 +141,7 @@ fn every_structure_over_a_tree_or_objects_is_taken_to_a_frame_and_passes_its_gat
             }
         }
     }
-    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh and object-list in two on
+    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh, object-list in two on
     // one.
     assert!(taken >= 4 * 3 * 2 + 2 * 2, "{taken}");
 }
@@ -270,8 +270,7 @@ fn faults_of_a_refitted_tree_fail_validation_or_the_gate() {
             let valid = built.validate(&stage.soup);
             assert!(valid.is_err(), "{name}: {what}");
         }
-        // Vertices that lag one frame are right for the frame before: only this frame's triangles
-        // reveal it.
+        // Vertices that lag one frame fit the previous one: only this frame's triangles reveal it.
         let late = TriangleSoup::new(&frame(&scene, &WAVE, 1));
         let late = tree(gpu(), &actor, Way::Device, &late).expect("a tree");
         let built = actor.built(Taken::Tree(late), &stage.soup);

@@ -1,5 +1,4 @@
-//! The coherence model matches the kernels: reads of twins, rays of integrators, device counters;
-//! and runs record it.
+//! The coherence model matches twins' reads, integrators' rays and device counters, in runs, too.
 
 use crate::support;
 use crate::support::{Pcg, build, param_variants, scenes, trace, variant};
@@ -75,8 +74,7 @@ fn what_a_twin_reads_is_what_the_device_has_and_as_often_as_its_counters_say() {
     });
 }
 
-/// Checks that a triangle test reads its 48 bytes, at a multiple of 48, and that no trace consists
-/// of tests only.
+/// Checks that a triangle test reads its 48 bytes, aligned, and that no trace has only tests.
 fn check_fetches(what: &str, found: &Trace, memory: &Memory) {
     for step in 0..found.steps.len() {
         if found.steps[step].kind == Kind::Triangle {

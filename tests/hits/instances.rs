@@ -99,8 +99,7 @@ fn random_assembly(
     assembly
 }
 
-/// All kinds of rays for a scene of about this extent, and the answers of brute force over
-/// instances.
+/// All kinds of rays for a scene of this extent, with brute-force answers over instances.
 fn rays_and_hits(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> (Vec<Ray>, Vec<Hit>) {
     let placed = soup.placed.as_ref().expect("instances");
     let mut rays = scenes::aimed_rays(rng, soup, count);
@@ -112,8 +111,7 @@ fn rays_and_hits(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> (Vec<Ray>,
     (rays, hits)
 }
 
-/// Checks twin and kernel of a structure against the expected closest and any hits; returns the
-/// counters of both.
+/// Checks closest and any hits of a structure's twin and kernel; returns their counters.
 fn check(what: &str, kind: &dyn AccelKind, soup: &TriangleSoup, rays: &[Ray], expected: &[Hit]) {
     for params in variants(kind) {
         let built = build(kind, soup, &params);

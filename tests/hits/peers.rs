@@ -346,8 +346,7 @@ fn a_run_shows_peers_apart_and_goes_on_without_one() {
     let out = TempDir::new().expect("a folder");
     let ran = run(&out, &[]);
     let text = String::from_utf8_lossy(&ran.stderr);
-    // The reference of two samples is too noisy for such an image, which fails a check; a missing
-    // or wrong peer does not.
+    // The two-sample reference is too noisy, which fails a check; a missing or wrong peer does not.
     let checks: Vec<&str> = text.lines().filter(|l| l.starts_with("failed:")).collect();
     assert!(
         checks.iter().all(|l| l.contains("Reference noise")),

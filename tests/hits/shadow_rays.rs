@@ -1,5 +1,4 @@
-//! Reversed and light-by-light shadow rays: the same segments, and every structure matches the
-//! reference.
+//! Reversed and light-by-light shadow rays: the same segments, and structures match.
 
 use crate::support;
 use crate::support::Stage;
@@ -71,8 +70,7 @@ fn all_orders_hold_the_same_segments_and_those_of_a_light_lie_side_by_side() {
             }
             assert!(share(set, &judge.sets) < 2e-3, "{class:?}");
         }
-        // A ray from a light begins on it: the lamp changes along the clustered set once less than
-        // there are lamps.
+        // A ray from a light begins on it: the lamp changes once less than there are lamps.
         let reversed = of(&judge, RayClass::ShadowReversedClustered);
         let lamp = |ray: &Ray| {
             let on = |t: &raystone::geometry::Triangle| {

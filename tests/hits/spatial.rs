@@ -63,8 +63,7 @@ fn by_boxes() -> Vec<(&'static str, Params)> {
     out
 }
 
-/// Checks twin and kernel of variants against brute force, and any hit against closest; returns the
-/// number of hits.
+/// Checks twin and kernel against brute force, and any hit against closest; returns the hits.
 fn check(
     what: &str,
     variants: &[(&str, Params)],
@@ -91,8 +90,7 @@ fn check(
     blocked.iter().filter(|b| **b).count()
 }
 
-/// Walls, floors and tilted panels with integer corners in the box 0..16: halving the box puts cell
-/// planes into them.
+/// Walls, floors and tilted panels with integer corners in 0..16, where cell planes lie.
 fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let mut triangles = vec![
         [Vec3::ZERO, Vec3::X * 16.0, Vec3::Y * 16.0],
@@ -120,8 +118,7 @@ fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
     scenes::soup(triangles)
 }
 
-/// Rays from lattice points in and around the box 0..16, along axes and diagonals, with zeros of
-/// both signs.
+/// Rays from lattice points around the box 0..16, along axes and diagonals, zeros of both signs.
 fn rays_in_planes(rng: &mut Pcg, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let origin = [0; 3].map(|_| rng.between(-4, 36) as f32 * 0.5);

@@ -80,8 +80,7 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     if !support::is_exact(&gpu) {
         return;
     }
-    // The canonical triangles are split into parts; those of the leaves, at least as many, are in
-    // one texture.
+    // The canonical triangles are split into parts; those of leaves are in one texture.
     let bytes = 48 * soup.records.len() as u64;
     gpu.limits.max_storage_buffer_binding_size = bytes / 3;
     let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");

@@ -1,6 +1,5 @@
 //! Alpha masks: closest and any hits of every structure and triangle test with masked surfaces, the
-//! correctness check with planted faults, estimators under a masked lamp, and an independently
-//! known answer.
+//! correctness check with planted faults, masked lamps, and a known answer.
 
 use crate::support::*;
 use raystone::accel::{AccelRegistry, Intersection, NO_HIT, Ray, TriangleRegistry, TriangleSoup};

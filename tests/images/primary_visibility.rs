@@ -105,8 +105,7 @@ fn difference(stage: &Stage) -> Result<Difference, GpuError> {
     })
 }
 
-/// Scenes viewed from outside, from inside with triangles on all sides and behind, and from very
-/// close up.
+/// Scenes viewed from outside, from inside with triangles all around, and from very close.
 fn stages(gpu: &Gpu) -> Vec<(&'static str, Stage)> {
     let sphere = [("triangles", ParamValue::Integer(2000))];
     let mut all = vec![

@@ -1,6 +1,5 @@
-//! Moving scenes: structures of the first frame are refitted or updated to each further frame,
-//! against a rebuild. Each frame has its own reference tracer, which the refitted structure must
-//! match bit for bit.
+//! Moving scenes: structures of the first frame are refitted or updated to each further one,
+//! against a rebuild. Each frame has a reference tracer, which they must match bit by bit.
 
 mod actor;
 mod motion;

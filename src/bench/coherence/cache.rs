@@ -49,8 +49,7 @@ impl Cache {
         }
     }
 
-    /// Accesses a line; returns true for a hit. A miss replaces the least recently used line of its
-    /// set.
+    /// Accesses a line; true for a hit. A miss replaces the least recently used line of the set.
     pub(crate) fn access(&mut self, line: u64) -> bool {
         self.time += 1;
         let set = (line % self.sets.len() as u64) as usize;

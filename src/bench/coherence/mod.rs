@@ -1,12 +1,10 @@
-//! Coherence of the rays of neighbouring lanes, and its effect on a processor: a model without a
-//! GPU.
+//! Coherence of rays in neighbouring lanes, and its effect on a processor: a model without a GPU.
 //!
 //! The rays of an integrator and sampler ([`paths`]) traverse a structure's host twin, which
 //! reports every node visit and triangle test with its memory reads ([`trace`]). The lanes of a
 //! warp execute these steps in lock step (`simt`), and the cache lines of each step pass through
 //! the caches of a machine ([`cache`]). Everything is counted in integers, in an order that depends
-//! only on the input ([`model`]): equal rays give equal figures on every machine and with any
-//! number of threads.
+//! only on the input ([`model`]): equal rays give equal figures on any machine.
 //!
 //! Not modelled: latency, the order of warps chosen by a scheduler, loads of shading and samplers,
 //! mask words. `docs/coherence.md` states the rules and their meaning.

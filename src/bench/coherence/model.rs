@@ -195,11 +195,11 @@ mod tests {
                 vec![lane(&[(Node, 0), (Node, 8)]), None, None, None],
             )],
         };
-        // Lines of 16 bytes; an L1 holds two, the L2 three. Turn 1: the first group visits: lines 0
-        // and 2, both from memory. The second: line 0, from the L2. Turn 2: a triangle, line 4,
-        // replaces line 0 in the first L1. The second group: line 0, L1 hit. Turn 3: line 1
-        // replaces line 2 in L1 and L2, where 0 was used more recently. Turn 4: line 2, no longer
-        // in either.
+        // Lines of 16 bytes; an L1 holds two, the L2 three.
+        // Turn 1: the first group visits: lines 0 and 2, both from memory. The second: line 0, from the L2.
+        // Turn 2: a triangle, line 4, replaces line 0 in the first L1. Second group: line 0, L1 hit.
+        // Turn 3: line 1 replaces line 2 in L1 and L2, where 0 was used more recently.
+        // Turn 4: line 2, no longer in either.
         let tallies = run(&machine(16, [2, 3]), &[vec![first], vec![second]]);
         let expected = [
             Tally {

@@ -12,11 +12,9 @@ use raystone_render::CountedRays;
 pub enum Organisation {
     /// Megakernel: a lane keeps its pixel, and idles once its path has ended (Dufay 2017, Alg. 2).
     SingleKernel,
-    /// One kernel per bounce: remaining rays refill warps in pixel order (stable compaction) within
-    /// a group.
+    /// One kernel per bounce: remaining rays refill a group's warps in pixel order (stable).
     Compacted,
-    /// As `Compacted`, but with each warp's rays in random order of warps, as left by a scan or a
-    /// ballot with one atomic.
+    /// As `Compacted`, but with warps in random order, as after a scan or ballot with one atomic.
     CompactedByWarps,
     /// As `Compacted`, but with rays in random order, the worst case of one atomic per ray.
     CompactedByRays,

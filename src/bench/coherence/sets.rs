@@ -40,8 +40,7 @@ pub fn of_rays(
     Ok(run_groups(&Machine::new(settings), &groups))
 }
 
-/// First warp of each group among `all`: adjacent groups if they cover everything, else evenly
-/// spread.
+/// First warp of each group among `all`: adjacent if they cover all, else evenly spread.
 fn first_warps(all: usize, settings: &Coherence) -> Vec<usize> {
     let [groups, warps] = [settings.groups, settings.warps].map(|n| n as usize);
     let whole = all.div_ceil(warps);

@@ -2,8 +2,7 @@
 //!
 //! There are no hand-written expected results per method: the flags determine the surviving
 //! elements. Before each turn the count is set to a wrong value and the survivors are erased; after
-//! it, outside the timed part, two checksums over the survivors are computed on the device and
-//! compared with the host's.
+//! it, outside the timed part, the device computes two checksums of the survivors to compare.
 
 pub mod stream;
 

@@ -4,8 +4,7 @@ use raystone_core::random::Pcg32;
 use raystone_gpu::compaction::{Compaction, Order};
 use raystone_sampling::hash::pcg_hash;
 
-/// A word of an element. The first is its number, from 1, to identify survivors; the others are a
-/// hash of it.
+/// A word of an element. The first is its number, from 1, the others a hash of it.
 pub fn word(element: u32, word: u32) -> u32 {
     match word {
         0 => element + 1,
@@ -18,8 +17,7 @@ pub(crate) fn elements(count: u32, bytes: u32) -> Vec<u32> {
     (0..count).flat_map(of).collect()
 }
 
-/// Flags of `count` elements, of which a share `valid` survives: each is drawn independently, as is
-/// its bucket.
+/// Flags of `count` elements, of which a share `valid` survives, in random buckets.
 pub fn flags(count: u32, valid: f64, buckets: u32, seed: u64) -> Vec<u32> {
     let mut random = Pcg32::new(seed);
     let mut flag = || {

@@ -281,8 +281,7 @@ impl Caster for Built<'_> {
             filter: null(),
             instance: [INVALID; 2],
         };
-        // SAFETY: the scene is committed, and the ray is a valid `RTCRayHit`, which begins with an
-        // `RTCRay`.
+        // SAFETY: the scene is committed, and `RTCRayHit` is valid and begins with an `RTCRay`.
         unsafe {
             match (self.cast, query) {
                 (Cast::Three { nearest, .. }, Query::Closest) => {

@@ -9,8 +9,7 @@ use std::num::NonZeroU64;
 use wgpu::util::DeviceExt as _;
 
 const LANES: u32 = 64;
-/// Rays per dispatch: software adapters take microseconds per ray, and a dispatch of seconds looks
-/// like a hang.
+/// Rays per dispatch: at microseconds per ray in software, longer dispatches look like a hang.
 const SLICE: usize = 1 << 16;
 const KERNEL: &str = include_str!("ray_query.wgsl");
 

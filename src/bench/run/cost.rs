@@ -1,5 +1,4 @@
-//! Cost estimate of a plan, the common model behind `--dry-run`, the remaining time, and balanced
-//! shards.
+//! Cost estimate of a plan, used by `--dry-run`, the remaining time, and balanced shards.
 
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_core::params::Variant;
@@ -12,15 +11,13 @@ use std::ops::{Add, AddAssign, Mul};
 const RAYS_PER_SECOND: f64 = 2e6;
 /// Seconds for the driver to compile a new kernel, including composition and the first run.
 const SECONDS_PER_KERNEL: f64 = 0.3;
-/// Elements per second that such an adapter compacts, including all passes and the check: a round
-/// figure.
+/// Elements per second compacted by such an adapter, with passes and check: a round figure.
 const ELEMENTS_PER_SECOND: f64 = 3e7;
 /// Number of timed classes of recorded rays, without and with other shadow ray orders.
 const RAY_CLASSES: [f64; 2] = [5.0, 8.0];
 /// Bounces of a typical path: in a closed room paths take four to six rays, under a sky mostly two.
 const USUAL_BOUNCES: u32 = 2;
-/// Seconds to load a scene and check the reference tracer on it, and per megabyte of the model's
-/// file.
+/// Seconds to load a scene and check its reference tracer, and per megabyte of the model.
 const SECONDS_PER_WORLD: [f64; 2] = [1.0, 0.3];
 /// Seconds to build a structure, per megabyte of the model's file.
 const BUILD_SECONDS: f64 = 0.15;

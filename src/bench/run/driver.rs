@@ -15,8 +15,7 @@ struct Ready<'a> {
 }
 
 /// Runs the open cells of a measurement on `world`, the scene and tests of [`At::stage`]; without
-/// one, those without a scene. Ends early when the device is lost; the remaining cells are measured
-/// on another one.
+/// one, those without a scene. Ends early when the device is lost; another continues.
 pub(super) fn run(
     session: &mut Session,
     measurement: &'static dyn Measurement,

@@ -167,8 +167,7 @@ impl Estimator {
         compiled.map_err(|e| e.to_string())
     }
 
-    /// Compiles the image of a world, after comparing the sampler's words with its twin's for all
-    /// `seeds`.
+    /// Compiles the image of a world, after checking the sampler's words for all `seeds`.
     ///
     /// # Errors
     /// A word differs, or the kernel does not compile.

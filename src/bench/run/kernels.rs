@@ -9,8 +9,7 @@ use raystone_gpu::{self as gpu, KernelLibrary};
 use raystone_record::{KernelFile, KernelFolder, KernelSetRecord};
 use std::path::Path;
 
-/// The embedded kernels overlaid with those of `folder`, checked as far as possible without
-/// composing.
+/// The embedded kernels overlaid with those of `folder`, checked without composing.
 ///
 /// # Errors
 /// The folder cannot be read, a file is not WESL, or no kernel could be composed with it.

@@ -37,8 +37,8 @@ pub trait Measurement: Send + Sync {
         format!("{} of {cell}", self.name())
     }
 
-    /// Key of cells measured in the same rounds, which stay in one shard: a measurement, and a part
-    /// of the cell.
+    /// Key of cells measured in the same rounds, which stay in one shard: measurement and part of
+    /// cell.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
     }
@@ -65,8 +65,7 @@ pub trait Measurement: Send + Sync {
         Through::Own
     }
 
-    /// Prepares and checks cells one by one, in order; the driver times them together and writes
-    /// their readings.
+    /// Prepares and checks cells in order; the driver times them together and writes readings.
     fn prepare<'a>(&'a self, _at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let unfit = || Absent::Failed(format!("{} are not measured cell by cell", self.plural()));
         Box::new(cells.iter().map(move |_| Err(unfit())))

@@ -1,7 +1,6 @@
 //! Runs an experiment: the one place where all parts meet.
 //!
-//! config → scene → accel → gpu → integrator → measure → records. Reports are made elsewhere, from
-//! the records alone.
+//! config → scene → accel → gpu → integrator → measure → records. Reports use only records.
 
 mod adaptive;
 mod animation;
@@ -95,8 +94,8 @@ pub struct Verified {
 /// Earlier results stay there until the run has ended.
 ///
 /// # Errors
-/// No adapter, unreadable kernels, or a folder that cannot be written or holds results; the records
-/// so far are preserved.
+/// No adapter, unreadable kernels, or a folder that is not writable or holds results; records are
+/// preserved.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,

@@ -1,5 +1,4 @@
-//! Correctness check of integrators: single paths against the image oracle, before rendering with
-//! them.
+//! Correctness check of integrators before rendering: single paths against the image oracle.
 
 use super::error::{Fault, RunError};
 use super::session::{Session, content_hash};
@@ -73,8 +72,7 @@ pub(super) fn check(
     }
 }
 
-/// Checks all unchecked integrators of a plan on a world, through a cell's structure with its
-/// kernels.
+/// Checks all unchecked integrators of a plan on a world, with a cell's structure and kernels.
 pub(super) fn verify(
     session: &mut Session,
     world: &World,
@@ -188,8 +186,7 @@ fn made(
     Ok((record, ran))
 }
 
-/// Checks this integrator's trials on a trial scene, or the integrator itself if the scene lists
-/// none.
+/// Checks this integrator's trials on a trial scene, or itself if the scene lists none.
 fn of_trial(
     session: &mut Session,
     subject: &Subject,

@@ -1,5 +1,4 @@
-//! Rasterised primary visibility against rays: pixels with different triangles, the effect on the
-//! image, and the times.
+//! Rasterised primary visibility against rays: different pixels, effect on the image, times.
 
 use super::images::Estimator;
 use super::session::Session;
@@ -19,8 +18,7 @@ use raystone_verify::rays::{primary_pixels, primary_rays};
 /// directions of host and kernels differ by rounding.
 const UNEXPLAINED: u64 = 10_000;
 
-/// Compares a cell whose paths begin at rasterised triangles, after its last timed image; `None`
-/// for others.
+/// Compares a cell with rasterised first hits, after its last timed image; `None` for others.
 ///
 /// # Errors
 /// A kernel does not compile, the device is lost, or pixels differ that see the same triangle.

@@ -131,8 +131,7 @@ impl<'a> Session<'a> {
             .count()
     }
 
-    /// Adopts valid results of an earlier run on this device, and writes the first line of this
-    /// one, with their number.
+    /// Adopts valid results of an earlier run on this device; the first line tells their number.
     pub(super) fn begin(
         &mut self,
         device: &Device,

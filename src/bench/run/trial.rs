@@ -14,8 +14,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 const SCENE: &str = "far-corners";
-/// Its rays: per class, compared with brute force, and decided in double precision (besides the
-/// hard ones).
+/// Its rays: per class, against brute force, and in double precision (besides hard ones).
 const GATE: Gate = Gate {
     rays: 1024,
     brute_force_tests: 1,
@@ -27,8 +26,7 @@ const GATE: Gate = Gate {
 /// Brute force checks one ray in this many.
 const EVERY: usize = 8;
 
-/// The scene with its reference tracers, prepared once per run, and the results of structures on
-/// it.
+/// The scene with its reference tracers, prepared once per run, and its results.
 #[derive(Default)]
 pub(super) struct Trial {
     /// By the tests used for checking.

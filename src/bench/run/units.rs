@@ -52,8 +52,7 @@ impl MeasurementRegistry {
         self.iter().flat_map(Measurement::figures)
     }
 
-    /// All units of a plan, in the order of a run without shards: scene by scene, then those
-    /// without a scene.
+    /// All units of a plan, in run order: scene by scene, then those without a scene.
     pub fn units(&self, experiment: &Experiment, plan: &Plan) -> Vec<Unit> {
         let cells: Vec<_> = (self.iter().map(|m| (m, m.cells(experiment, plan)))).collect();
         let scenes = plan.scenes.iter().map(Some).chain([None]);

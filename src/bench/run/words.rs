@@ -5,8 +5,7 @@ use crate::words::{Used, check_words, kernel_hash};
 use raystone_gpu::Gpu;
 use raystone_sampling::Sampler;
 
-/// Compares a sampler's kernel with its twin over everything that a run draws; once per kernel,
-/// table and seeds.
+/// Compares a sampler's kernel with its twin over all draws; once per kernel, table and seeds.
 ///
 /// # Errors
 /// A word differs, or the kernel does not run.

@@ -3,8 +3,7 @@
 use super::{Bounded, ParamError, ParamValue, Parameter, ParameterSchema, ParameterType, Params};
 use std::ops::RangeInclusive;
 
-/// A parameter struct declared by [`parameters!`](crate::parameters). Its default uses each
-/// parameter's default.
+/// A parameter struct declared by [`parameters!`](crate::parameters), with defaults.
 pub trait Parameters: Default + Sized {
     /// Its doc comment on one line, shown by registries.
     const ABOUT: &'static str;
@@ -27,8 +26,7 @@ pub trait Parameters: Default + Sized {
         Self::read(&params.completed(&Self::schema())?)
     }
 
-    /// [`Self::from_params`] for parameters already checked; defaults throughout if they do not
-    /// fit.
+    /// [`Self::from_params`] for checked parameters; all defaults if they do not fit.
     fn from_checked(params: &Params) -> Self {
         Self::from_params(params).unwrap_or_default()
     }

@@ -37,8 +37,7 @@ pub enum ParamRange {
     Filled,
     /// A list of values of this range.
     List(Box<ParamRange>, Length),
-    /// A non-empty ascending list of integers from 1 to this one; files may write `{ pow2 = [lo,
-    /// hi] }`.
+    /// Ascending integers from 1 to this one, at least one; in files also `{ pow2 = [lo, hi] }`.
     Ascending(i64),
 }
 

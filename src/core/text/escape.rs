@@ -25,8 +25,7 @@ fn number(out: &mut String, c: char, [open, close]: [&str; 2]) {
     let _ = write!(out, "{open}U+{:04X}{close}", u32::from(c));
 }
 
-/// Escapes a line of Markdown, also for forges: no markup, tags, links, or mentions of people or
-/// issues.
+/// Escapes a line of Markdown, also for forges: no markup, tags, links, or mentions.
 pub fn markdown(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     // Pages turn addresses into links.
@@ -44,8 +43,7 @@ pub fn markdown(text: &str) -> String {
     out
 }
 
-/// Escapes text or an attribute of XML 1.0, and so SVG; unrepresentable control characters are
-/// shown as numbers.
+/// Escapes text or an attribute of XML 1.0, and so SVG; control characters are shown as numbers.
 pub fn xml(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

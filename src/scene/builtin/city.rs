@@ -214,8 +214,7 @@ impl Town {
         2 * self.places().map(faces).sum::<usize>()
     }
 
-    /// Adds the visible triangles, counter-clockwise from outside, with the town centred at the
-    /// origin.
+    /// Adds the visible triangles, counter-clockwise from outside, centred at the origin.
     fn push(&self, builder: &mut SceneBuilder) {
         let half = self.edge as i32 / 2;
         for (row, column) in self.places() {

@@ -100,8 +100,7 @@ const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     ),
 ];
 
-/// Centre and radius of the ball, clear of floor and walls and without visible facets at usual
-/// sizes.
+/// Centre and radius of the ball, clear of floor and walls, without visible facets.
 const BALL: ([f64; 3], f64) = ([186.0, 91.0, 169.0], 90.0);
 const BALL_GRID: SphereGrid = SphereGrid {
     bands: 96,

@@ -29,8 +29,7 @@ impl BuiltinScene for FurnaceBox {
     fn build(&self) -> (SceneBuilder, Look) {
         let albedo = self.albedo;
         let mut builder = SceneBuilder::default();
-        // The bits of k are the coordinates of corner k; faces are counter-clockwise seen from
-        // inside.
+        // The bits of k are the coordinates of corner k; faces are counter-clockwise from inside.
         let faces = [
             [0, 2, 6, 4],
             [1, 5, 7, 3],

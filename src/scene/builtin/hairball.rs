@@ -1,6 +1,5 @@
-//! Curling strands that grow out of a ball in all directions: normals change from pixel to pixel,
-//! so secondary rays are incoherent (Laine's hairball, where Dufay 2017 expects no gain, in closed
-//! form).
+//! Curling strands around a ball, with normals that change from pixel to pixel, so secondary rays
+//! are incoherent (Laine's hairball in closed form; Dufay 2017 expects no gain there).
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};

@@ -75,8 +75,7 @@ fn object(index: u32, detail: usize) -> Vec<Triangle> {
     builder.into_triangles()
 }
 
-/// Placement of a copy in its cell of the unit cube, with rotation and scale; one in eight is
-/// mirrored.
+/// Random placement of a copy in its cell of the unit cube; one in eight is mirrored.
 fn transform(pcg: &mut Pcg32, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
     let mut uniform = || f64::from(pcg.uniform_f32());
     let edge = 1.0 / cells as f64;

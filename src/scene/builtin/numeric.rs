@@ -1,5 +1,4 @@
-//! Bit-exact sines on every platform: the standard library's `sin` depends on the system's math
-//! library.
+//! Bit-exact sines on every platform: `sin` of the standard library depends on the system.
 
 use std::f64::consts::TAU;
 

@@ -12,8 +12,7 @@ pub(super) struct SphereGrid {
 }
 
 impl SphereGrid {
-    /// The largest grid of at most `triangles` triangles, at least 8 (the octahedron), with nearly
-    /// square cells.
+    /// The largest nearly square grid of at most `triangles` triangles, at least 8 (octahedron).
     pub(super) fn with_at_most(triangles: usize) -> Self {
         let half = triangles.max(8) / 2;
         // Twice as many sectors as bands give square cells: half = sectors * (bands - 1).

@@ -6,8 +6,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-/// Control points (radius, height) of the swept parts, top to bottom: rim, upper body, lower body,
-/// knob, lid, bottom.
+/// Control points (radius, height) of rim, upper body, lower body, knob, lid, bottom.
 const PROFILES: [[[f64; 2]; 4]; 6] = [
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
     [[1.5, 2.4], [1.75, 1.875], [2.0, 1.35], [2.0, 0.9]],
@@ -55,8 +54,7 @@ const HALVES: [[HalfRow; 4]; 4] = [
 type Patch = [[DVec3; 4]; 4];
 
 /// The teapot's triangles, y up, standing on y = 0, about 6.4 units long: `subdivision` squared
-/// quadrilaterals per patch, with single triangles at the poles. Below 2, handle and spout are
-/// flat.
+/// quadrilaterals per patch, single triangles at poles. Below 2, handle and spout are flat.
 pub(super) fn tessellate(subdivision: usize) -> Vec<[Vec3; 3]> {
     let n = subdivision.max(1);
     let mut triangles = Vec::new();
@@ -114,8 +112,7 @@ fn evaluate(patch: &Patch, u: f64, v: f64) -> Vec3 {
     de_casteljau(patch.map(|row| de_casteljau(row, v)), u).as_vec3()
 }
 
-/// Interpolates in f64, so that patches meet in equal f32 points, and equal control points yield
-/// that very point.
+/// In f64, so that patches meet in equal f32 points, and equal control points are preserved.
 fn de_casteljau([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {
     let [ab, bc, cd] = [a.lerp(b, t), b.lerp(c, t), c.lerp(d, t)];
     ab.lerp(bc, t).lerp(bc.lerp(cd, t), t)

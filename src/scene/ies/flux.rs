@@ -7,8 +7,7 @@ use std::f64::consts::TAU;
 /// Tolerance beyond the last angle, degrees: rounding of the kernel's f32.
 const SLACK: f64 = 1e-3;
 
-/// The interval of ascending values that contains `x`, and the fraction along it; `None` if
-/// outside.
+/// The interval of ascending values around `x`, and the fraction along it; `None` outside.
 fn bracket(values: &[f32], x: f64) -> Option<(usize, f64)> {
     let [first, last] = [values.first()?, values.last()?].map(|v| f64::from(*v));
     if x < first - SLACK || x > last + SLACK {

@@ -185,8 +185,7 @@ fn year(labels: &[&str]) -> u32 {
 }
 
 /// First year in which the number between ballast factor and watts is not the ballast-lamp factor.
-/// LM-63-1995 and LM-63-2002 reserve it; in LM-63-2019 it states how the file was made (1.1 is a
-/// laboratory's).
+/// LM-63-1995 and LM-63-2002 reserve it; in LM-63-2019 it states the origin (1.1: laboratory).
 const NO_LAMP_FACTOR: u32 = 1995;
 /// First year in which it states how the file was made.
 const GENERATION_TYPE: u32 = 2019;
@@ -455,8 +454,7 @@ mod tests {
 
     #[test]
     fn the_first_line_says_what_the_numbers_of_the_ballast_mean() {
-        // Candela multiplier 2, ballast factor 0.5, then 0.9; intensities of 100 straight down, 50
-        // at 45 degrees.
+        // Candela multiplier 2, ballast factor 0.5, then 0.9; 100 straight down, 50 at 45 degrees.
         let read = |labels: &str| {
             let text = format!(
                 "{labels}TILT=NONE\n1 1000 2 3 1 1 2 0 0 0\n0.5 0.9 40\n0 45 90\n0\n100 50 0\n"

@@ -77,8 +77,8 @@ pub enum Light {
         /// Irradiance of a surface facing it.
         irradiance: Vec3,
     },
-    /// A point light of a kind from outside the program, invisible to rays. For light selection it
-    /// counts as isotropic.
+    /// A point light of a kind from outside the program, invisible to rays; isotropic for light
+    /// selection.
     Other {
         /// The kind.
         kind: &'static LightKind,
@@ -141,8 +141,7 @@ impl Light {
         self.place().is_none()
     }
 
-    /// The light rotated about the origin, then translated. Maps rotate about one axis only and
-    /// stay unchanged.
+    /// The light rotated about the origin, then translated; maps stay unchanged.
     #[must_use]
     pub fn moved(mut self, turn: Quat, by: Vec3) -> Self {
         match &mut self {

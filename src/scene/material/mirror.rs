@@ -41,8 +41,7 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
     is_mirror.then(|| Look::plain(base_color))
 }
 
-/// True for a mirroring illumination model whose specular part outshines a nearly black diffuse
-/// one.
+/// True for a mirroring illumination model with a specular part over a nearly black diffuse one.
 fn outshines(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
     illum.is_some_and(|illum| ILLUM.contains(&illum))
         && specular.max_element() > 0.0

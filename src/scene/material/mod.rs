@@ -51,13 +51,11 @@ pub struct MaterialKind {
     pub lobes: Lobes,
     /// Kernel modules of a kind from outside the program; kernels import `shading/bsdf/<feature>`.
     pub sources: Sources,
-    /// Converts a file's material to this kind, if it is one. Materials that no kind recognises are
-    /// diffuse.
+    /// Converts a file's material to this kind, if it is one; unrecognised ones are diffuse.
     pub recognise: fn(&Description<'_>) -> Option<Look>,
 }
 
-/// All kinds; the index is the number in `kernels/shading/bsdf.wesl`. If a file's material fits
-/// several, the last wins.
+/// All kinds by their number in `kernels/shading/bsdf.wesl`. The last matching kind wins.
 pub static MATERIAL_KINDS: [&MaterialKind; 6] = [
     &DIFFUSE,
     &PHONG,
@@ -187,8 +185,7 @@ impl Material {
         }
     }
 
-    /// The material emitting `radiance` (linear RGB) only from the side on which the corners turn
-    /// counter-clockwise.
+    /// The material emitting `radiance` (linear RGB) from the counter-clockwise side only.
     pub fn emitting_from_front(self, radiance: Vec3) -> Self {
         Self {
             emission: radiance,
@@ -241,8 +238,7 @@ pub struct Description<'a> {
     pub format: Format,
     /// MTL `Kd`, glTF base or diffuse colour.
     pub base_color: Vec3,
-    /// True if a texture scales metalness, roughness or transmission, so the numbers alone are
-    /// inconclusive.
+    /// True if a texture scales metalness, roughness or transmission.
     pub is_varied: bool,
     /// True if the metalness and roughness texture will be present.
     pub is_followed: bool,

@@ -1,7 +1,6 @@
 //! Normalised Phong: a diffuse lobe and a power of the cosine about the mirror direction.
 //!
-//! MTL: illumination model 2 with `Kd`, `Ks` and `Ns`. `Kd` and `Ks` together reflect at most what
-//! arrives.
+//! MTL: illumination model 2 with `Kd`, `Ks` and `Ns`; `Kd` and `Ks` sum to at most 1.
 
 use super::{Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;

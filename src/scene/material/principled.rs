@@ -1,8 +1,7 @@
 //! The metallic-roughness model of glTF 2.0.
 //!
 //! * glTF: all materials that are neither mirror nor glass. `KHR_materials_pbrSpecularGlossiness`
-//!   is converted like Khronos's own converter: the metalness is solved for from the brightness of
-//!   both colours.
+//!   is converted like Khronos's converter, solving for metalness from both colours' brightness.
 //! * MTL: if `Pm`, a later addition to the format, is stated; with `Pr`, `Kd` and `Ni`.
 
 use super::{DEFAULT_IOR, Description, Format, Lobes, Look, Material, MaterialKind, within};

@@ -9,8 +9,7 @@
 //! * a mean that weights noisy places less (`weights`), which detects a small bias shared by all
 //!   pixels: on the Cornell box, where most noise comes from the edges of the lamp, its standard
 //!   error is a fifth of the plain mean's;
-//! * per tile, for local bias: the Benjamini–Hochberg procedure over all tiles bounds the share of
-//!   false alarms.
+//! * per tile, for local bias: the Benjamini–Hochberg procedure bounds the share of false alarms.
 //!
 //! An unbiased sampler is thus called biased with at most the total probability.
 //!
@@ -107,8 +106,7 @@ pub struct BiasCheck {
     /// Histogram of tile p-values in ten equal bins of `[0, 1]`, without those whose difference is
     /// explained by rounding (p = 1 by definition): flat if there is no bias.
     pub p_histogram: [usize; 10],
-    /// Test of the whole image's mean luminance, with the difference reduced by the rounding;
-    /// absent if not testable.
+    /// Test of the image's mean luminance, reduced by the rounding; absent if not testable.
     pub whole: Option<WelchTest>,
     /// Test of the mean that weights noisy places less, relative to that mean; absent if not
     /// testable, below four parts of the reference, or without noise.
@@ -262,8 +260,7 @@ fn has_noise(images: &[Image]) -> bool {
     images.iter().any(|image| image.pixels != images[0].pixels)
 }
 
-/// Ratio of variances of a replicate and a reference part: the median over tiles in which both have
-/// noise.
+/// Variance of replicates over reference parts: the median over tiles with noise in both.
 fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
     let ratio = |(a, b): (&Vec<f64>, &Vec<f64>)| Some(variance(a)? / variance(b)?);
     let ratios = ours.iter().zip(theirs).filter_map(ratio);
@@ -271,7 +268,7 @@ fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
     median(&ratios).unwrap_or(0.0)
 }
 
-/// Tests one mean. `noisier` is [`noise_ratio`], absent if no pixel has noise; the means are then
+/// Tests one mean. `noisier` is [`noise_ratio`], absent if no pixel has noise: means are then
 /// compared directly.
 ///
 /// If the replicates' variance is below [`LEAST_NOISE`] of the reference's times `noisier`, they

@@ -15,8 +15,8 @@ const BLOCK: usize = 4;
 const LEAST_VARIANCE: f64 = 0.25;
 
 /// Weighted means of the replicates and reference parts, relative to the image's own: about 1.
-/// `None` below two parts per half, or if a half has no noise. All images have one size and are
-/// finite.
+/// `None` below two parts per half, or if a half has no noise. All images are finite and of one
+/// size.
 pub(super) fn weighted_means(replicates: &[Image], parts: &[Image]) -> Option<[Vec<f64>; 2]> {
     let half = parts.len() / 2;
     let (a, b) = (parts.get(..half)?, parts.get(half..2 * half)?);

@@ -40,8 +40,7 @@ const FAULTS: [Fault; 24] = [
     // A bucket is omitted, or two are merged.
     ("scatter", ["bucket < BUCKETS", "bucket + 1u < BUCKETS"], "bucket-sort", &[]),
     ("reduce", ["sums[bucket * tiling.tiles + tile]", "sums[tile]"], "bucket-sort", &[]),
-    // Holes are sorted first, places are those of other elements, the count is one short or one for
-    // all.
+    // Holes are sorted first, places of other elements, the count one short or one for all.
     ("keys", ["select(flag - 1u, HOLE, flag == 0u)", "flag"], "radix-sort", &[]),
     ("keys", ["places[element] = element", "places[element] = element ^ 1u"], "radix-sort", &[]),
     ("follow", ["kept_count[0] = slot + 1u", "kept_count[0] = slot"], "radix-sort", &[]),

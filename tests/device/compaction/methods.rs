@@ -22,8 +22,7 @@ pub fn method(name: &str, params: &[(&str, i64)]) -> Arc<dyn Compaction> {
     made.unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Each method with default parameters, and some with others; reports those that this adapter
-/// cannot run.
+/// Each method with default parameters, and some with others; reports those that cannot run.
 fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
     let registry = CompactionRegistry::default();
     let mut variants: Vec<Variant> =

@@ -104,8 +104,7 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     }
 }
 
-/// Kernels that count one too few: their cells have no figure, while those of the embedded kernels
-/// do.
+/// Kernels that count one too few have no figure, while the embedded ones do.
 #[test]
 fn a_method_that_is_wrong_has_no_figure() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -384,8 +384,7 @@ fn faults_in_the_passes_are_seen() {
             let host = build(soup, settings).expect("a tree");
             match on_device(&gpu, soup, settings) {
                 Ok(device) => difference(&host, &device).is_some(),
-                // Faults may end the build with an error, but not by a kernel that does not
-                // compile.
+                // Faults may fail the build, but not by a kernel that does not compile.
                 Err(error) => !error.contains(".wesl"),
             }
         };

@@ -51,8 +51,7 @@ fn materials() -> Vec<Material> {
     ]
 }
 
-/// Triangles of all kinds side by side below a white sky, some of them shining, and a ball of light
-/// that rays can hit.
+/// Triangles of all kinds below a white sky, some shining, and a ball of light rays can hit.
 fn all_kinds() -> SceneData {
     let mut scene = builtin(
         "triangle-soup",

@@ -13,8 +13,7 @@ use raystone::integrator::Traced;
 use raystone::measure::gate::Checks;
 use raystone::params::{ParamValue, Params};
 
-/// Rays nearly in the plane of some triangle, through its box: rounding may give them a hit
-/// anywhere in the box.
+/// Rays nearly in the plane of a triangle: rounding may hit anywhere in its box.
 fn grazing_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let record = &soup.records[rng.below(soup.records.len() as u32) as usize];

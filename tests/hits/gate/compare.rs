@@ -8,8 +8,7 @@ use raystone::measure::gate::compare;
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::{ClassVerdict, RayClass};
 
-/// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 next to them in the same plane, and
-/// triangle 3 far behind.
+/// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 next to them, triangle 3 far behind.
 fn soup() -> TriangleSoup {
     let triangle = |x: f32, z: f32| Triangle {
         vertices: [

@@ -23,8 +23,7 @@ fn parse_ray(text: &str) -> Ray {
     ray.expect("a ray").parse().expect("eight numbers")
 }
 
-/// Checks that the first wrong ray reports the reference's answer, and that tracing every triangle
-/// reproduces it.
+/// Checks that the first wrong ray reports the reference's answer, as does tracing every triangle.
 fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     let told = verdict.classes.iter().filter(|c| c.first_wrong.is_some());
     assert!(told.clone().count() > 0, "{verdict:?}");

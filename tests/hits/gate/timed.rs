@@ -45,8 +45,7 @@ fn plant(folder: &Path, fault: &str) {
     std::fs::write(file, import.to_owned() + &text).expect("a kernel");
 }
 
-/// Runs the experiment with the kernels of `folder`; returns the failure and the number of timings
-/// of the structure.
+/// Runs the experiment with the kernels of `folder`; returns the failure and the number of timings.
 fn run(folder: &Path) -> (Option<String>, usize) {
     let experiment = folder.join("timed.toml");
     std::fs::write(&experiment, SMALL).expect("an experiment");

@@ -72,8 +72,7 @@ pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<R
             1 => triangle[rng.below(3) as usize] - origin,
             2 => triangle[0] + rng.unit() * (triangle[1] - triangle[0]) - origin,
             _ => {
-                // From a coordinate of a vertex, so that the ray runs through vertices and along
-                // edges.
+                // From a vertex coordinate, so that the ray runs through vertices and edges.
                 let axis = rng.below(3) as usize;
                 let other = (axis + 1 + rng.below(2) as usize) % 3;
                 let near = triangle[0][other] as f64 - centre[other];

@@ -94,8 +94,7 @@ fn intervals_without_samples_are_tested_by_their_widths() {
     let interval = |value, low, high| Evidence::Summary(Interval { value, low, high }, 8.0);
     let base = interval(10.0, 9.0, 11.0);
     let both = tested(outcome(ERROR, &base, &interval(11.0, 9.0, 13.0)));
-    // Variances are as 1 to 4; Welch's freedom would be 25 / (1/8 + 16/8), but is capped at either
-    // side's.
+    // Variances are as 1 to 4; Welch's freedom, 25 / (1/8 + 16/8), is capped at either side's.
     let half = 0.1 * 5f64.sqrt();
     assert!((both.change.value - 0.1).abs() < 1e-12, "{both:?}");
     assert!(

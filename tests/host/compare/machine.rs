@@ -13,8 +13,7 @@ fn side(lines: Vec<Line>) -> Side {
     Side::new("made", lines, Vec::new())
 }
 
-/// Two runs; kernels differ in the second half of the structures, one of which takes this many
-/// times as long.
+/// Two runs; kernels differ in the second half of the structures, one slower by this factor.
 fn pair(noise: super::records::Noise, slower: fn(usize) -> f64) -> [Made; 2] {
     let base = Made {
         rounds: 21,

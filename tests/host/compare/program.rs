@@ -140,8 +140,7 @@ fn flags_say_which_differences_count() {
     }
 }
 
-/// Two runs of a quiet machine with other kernels in half of the structures, one of them half as
-/// long again.
+/// Two runs of a quiet machine with other kernels in half of the structures, one slower.
 fn slower() -> Runs {
     let base = Made {
         rounds: 21,

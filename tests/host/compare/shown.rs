@@ -136,8 +136,7 @@ fn a_comment_holds_the_verdict_and_the_worst_however_much_there_is_to_say() {
         }
     }
     let mut found = compared(&base.side(), &other);
-    // Both folded sections are full, every reason and note is long, and the worse findings come
-    // last.
+    // Both folded sections are full, reasons and notes are long, and worse findings come last.
     let mut same = found.findings.clone();
     for (index, finding) in same.iter_mut().enumerate() {
         finding.verdict = [Verdict::Same, Verdict::Undecided][index % 2];

@@ -75,8 +75,7 @@ fn sets_small_enough_to_know_by_hand() {
         let of = |coordinates: Vec<f64>| exact(&PointSet::new(dim, coordinates).unwrap());
         assert_close(of(vec![0.0; dim]), 1.0);
         assert_close(of(vec![1.0; dim]), 1.0);
-        // The closed box up to the middle holds all; the open one that excludes it is half the
-        // cube.
+        // The closed box up to the middle holds all; the open one without it is half the cube.
         assert_close(of(vec![0.5; dim * 7]), (1.0 - power(0.5)).max(0.5));
     }
     // A point on the right border is in no open box: too few points left of it, up to area 1.
@@ -219,8 +218,7 @@ fn the_extreme_discrepancy_agrees_with_the_definition() {
 
 #[test]
 fn the_cost_of_many_points_grows_hardly_faster_than_their_number() {
-    /// For sixteen times as many points: 21 times the work if it is N log N, 256 times if
-    /// quadratic.
+    /// For sixteen times as many points: 21 times the work if N log N, 256 times if N².
     const MOST_GROWTH: f64 = 90.0;
     let growth = |few: u32, cost: fn(&[[f64; 2]]) -> f64| {
         let [few, many] = [few, 16 * few].map(|n| {

@@ -1,5 +1,4 @@
-//! The O(N²) sweep for the exact star discrepancy in two dimensions, simple enough to serve as
-//! reference.
+//! The O(N²) sweep for the exact star discrepancy in two dimensions, a simple reference.
 
 /// Sweeps a vertical line over the distinct x, keeping the y of the points passed in sorted order.
 ///
@@ -23,8 +22,7 @@ pub(super) fn sweep(points: &[[f64; 2]]) -> f64 {
             passed.insert(passed.partition_point(|&y| y < p[1]), p[1]);
         }
         start += length;
-        // The points passed are those of the closed boxes at this x and of the open ones at the
-        // next.
+        // Points passed are those of closed boxes at this x and of open ones at the next.
         let next_x = by_x.get(start).map_or(1.0, |p| p[0]);
         let strip = Strip {
             closed: x * n,

@@ -1,5 +1,4 @@
-//! Experiment files through the public interface: accepted input, and the answer to every kind of
-//! mistake.
+//! Experiment files through the public interface: accepted input, and answers to mistakes.
 
 mod mistakes;
 
@@ -360,8 +359,7 @@ fn tests_and_offsets_are_swept_where_they_matter() {
     let exclude = "[[exclude]]\ntriangle = \"pluecker\"\nbox_test = \"plain\"\n";
     let experiment = parse_with(&format!("{text}{exclude}"), &[]).expect("a good sweep");
     let whole = plan(&experiment, &[]).expect("a plan");
-    // Three pairs of tests; 2 structures, which are the same with every offset; 2 sequences; 2
-    // offsets.
+    // Three pairs of tests; 2 structures, shared by offsets; 2 sequences; 2 offsets.
     assert_eq!(whole.structures.len(), 3 * 2);
     assert_eq!(whole.samplers.len(), 3 * 2 * 2);
     assert_eq!(whole.times.len(), 3 * 2 * 2 * 2);

@@ -1,5 +1,4 @@
-//! Textures and maps that exceed the adapter's binding limit: the reduced ones represent the same
-//! light.
+//! Textures and maps beyond the adapter's binding limit are reduced to the same light.
 
 use super::variant;
 use raystone::params::ParamValue;
@@ -98,8 +97,7 @@ fn what_is_cut_out_lends_no_colour() {
 fn textures_and_maps_are_as_large_as_the_adapter_binds() {
     let folder = tempfile::tempdir().unwrap();
     let file = model(folder.path(), 64, [WHITE, BLACK]);
-    // Next to 8 MiB for materials and lights: four images of 64 × 64 texels and a triangle, or
-    // less.
+    // Next to 8 MiB for materials and lights: at most four 64 × 64 images and a triangle.
     let needed = (8 << 20) + 4 * (4 * 64 * 64 + 9);
     let sizes = |bytes| {
         let scene = loaded(&file, 1024, bytes);

@@ -1,13 +1,11 @@
-//! File content is drawn or reported: vertex colours, instances, visibility, polygons, and
-//! everything not read.
+//! Content is drawn or reported: vertex colours, instances, visibility, polygons, unread parts.
 
 use super::*;
 use base64::Engine;
 use raystone::scene::decode_color;
 
 /// A glTF of a square without a material. `attributes` are additional ones, with their accessors in
-/// `more`: component type, type, normalised flag and bytes. `nodes` are those of the scene, the
-/// first being its root.
+/// `more`: component type, type, normalised flag and bytes. `nodes` begin with the root.
 fn gltf(attributes: &str, nodes: &str, head: &str, more: &[(u32, &str, usize, Vec<u8>)]) -> String {
     let corners = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let positions = corners.iter().flat_map(|[x, y]| [*x, *y, 0.0]);

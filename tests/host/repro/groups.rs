@@ -1,5 +1,4 @@
-//! Ratios of predicted cycles: the variation between groups of pixels is noise; their shared part
-//! is not.
+//! Ratios of predicted cycles: variation between pixel groups is noise; the shared part is not.
 
 use super::verdicts::expect;
 use raystone::measure::record::{COST, Interval, Key, Line, Ran, Tally};

@@ -1,6 +1,5 @@
 //! Thesis numbers match the digests' tables: each is looked up by what it measures (scene,
-//! structure, method, samples), to detect a swapped row or column, or another scene, unit or side
-//! of a ratio.
+//! structure, method, samples), to detect swapped rows or columns, scenes, units or ratios.
 
 use super::printed::Place;
 use super::{digest, theses};

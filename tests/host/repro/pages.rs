@@ -1,5 +1,4 @@
-//! From a folder of records to verdicts and pages: relevant records, substituted scenes, and the
-//! beginning of a page.
+//! From a folder of records to verdicts and pages: relevant records, scenes, page headers.
 
 use super::root;
 use super::rounds::{A, B, HERE, Sitting, drifted, timed};
@@ -286,8 +285,7 @@ fn records_of_another_experiment_of_a_killed_run_or_of_other_sizes_are_not_judge
     };
     assert!(judged(&quick, &own).is_none());
     assert!(judged(&whole, &lines(&quick, false)).is_none());
-    // Those of a software adapter's smaller sizes apply wherever they are evaluated; the page says
-    // so.
+    // Those of a software adapter's sizes apply wherever they are evaluated; the page says so.
     let small = Settings {
         software: true,
         ..whole.clone()

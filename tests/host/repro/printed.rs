@@ -1,5 +1,4 @@
-//! Printed digest values for the places of an experiment, looked up by scene, structure, method and
-//! samples.
+//! Printed digest values by scene, structure, method and samples.
 
 use raystone::config::expect::{At, Compare, Expect, Pick};
 

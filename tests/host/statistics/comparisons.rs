@@ -21,8 +21,7 @@ fn of_mean(samples: &[f64]) -> LogFigure {
     LogFigure::new(mean_of(samples).ln(), &[logs.collect()], Vec::new()).unwrap()
 }
 
-/// The mean error of replicates: log-normal, with a standard deviation of about `spread` times the
-/// mean.
+/// The mean error of replicates: log-normal, standard deviation about `spread` times the mean.
 fn error(mean: f64, spread: f64, replicates: usize, g: &mut Pcg32) -> LogFigure {
     let mut draw = || mean * (spread * normal(g) - 0.5 * spread * spread).exp();
     of_mean(&(0..replicates).map(|_| draw()).collect::<Vec<_>>())
@@ -316,8 +315,7 @@ fn a_ratio_of_intervals_has_its_side_up_and_the_spread_of_both_sides() {
         .compared_with(&summary(0.9, 1.0, 1.1))
         .ratio;
     assert!((r.value - 2.0).abs() < 1e-12);
-    // Each side alone has a lower end 10 % down; together √2 of that in logarithms (Zou and Donner
-    // 2008).
+    // Each side alone has a lower end 10 % down; together √2 of that (Zou and Donner 2008).
     let down = (f64::ln(2.0 / 1.8).powi(2) + f64::ln(1.1f64).powi(2)).sqrt();
     assert!((r.low - (2f64.ln() - down).exp()).abs() < 1e-12, "{r:?}");
     assert!(r.low > 1.8 / 1.1 && r.low < 1.8 && r.high > 2.2);
@@ -440,8 +438,7 @@ fn intervals_of_paired_rounds_cover_the_truth_and_equals_differ_as_rarely_as_pro
         found_apart += usize::from(compare(1.1, ["one", "two"], g).p <= 0.05);
     }
     println!("{covered} covered, {alarms} alarms, {found} and {found_apart} found of {trials}");
-    // 5 % is 200, and the standard deviation 14. The trimmed t of the remaining five is within a
-    // percent of its level.
+    // 5 % is 200, and the standard deviation 14. The trimmed t of five is within 1 % of its level.
     assert!((140..=260).contains(&alarms), "{alarms}");
     assert_eq!(
         covered + alarms,
@@ -455,8 +452,7 @@ fn intervals_of_paired_rounds_cover_the_truth_and_equals_differ_as_rarely_as_pro
 
 #[test]
 fn two_replicates_against_sixteen_are_no_surer_than_two() {
-    // Two samples of normal noise and an exact side: Student's t with one degree of freedom is
-    // Cauchy, in closed form.
+    // Two normal samples and an exact side: Student's t with one degree of freedom is Cauchy.
     let known = Spread {
         variance: 0.01,
         freedom: 1.0,

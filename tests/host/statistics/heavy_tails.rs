@@ -44,8 +44,7 @@ fn truth(lamp: f64) -> f64 {
     (sliver + (pixels() - 1) as f64 * plain) / pixels() as f64
 }
 
-/// Over many runs: intervals that contain the truth, intervals flagged as unreliable, and how many
-/// of the others contain it.
+/// Over many runs: intervals with the truth, flagged intervals, and others with the truth.
 struct Counts {
     trials: usize,
     covered: usize,

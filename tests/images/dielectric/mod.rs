@@ -112,8 +112,7 @@ fn scatter(gpu: &Gpu, arrivals: &[Arrival]) -> Vec<Departure> {
     words.iter().map(departure).collect()
 }
 
-/// Reflectance for unpolarised light by sines and tangents of the angles (Fresnel 1823), unlike in
-/// the kernel.
+/// Reflectance for unpolarised light by sines and tangents (Fresnel 1823), unlike the kernel.
 fn reflectance(cosine: f64, eta: f64) -> f64 {
     let arriving = cosine.clamp(0.0, 1.0).acos();
     let sine = arriving.sin() / eta;

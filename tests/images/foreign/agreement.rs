@@ -75,8 +75,7 @@ impl Moments {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
     }
 
-    /// The share of pixels whose difference Welch's test accepts at the Šidák level `alpha` of all
-    /// of them.
+    /// The share of pixels whose difference Welch's test accepts at the joint Šidák level `alpha`.
     pub fn accepted(&self, other: &Self, alpha: f64) -> f64 {
         let level = 1.0 - (1.0 - alpha).powf(1.0 / self.mean.len() as f64);
         let accepted = (0..self.mean.len()).filter(|&i| self.p(other, i) >= level);

@@ -283,8 +283,7 @@ fn a_written_map_shines_from_where_mitsuba_looks_it_up() {
     let angle: f32 = angle.split('"').next().unwrap().parse().unwrap();
     let file = folder.path().join("textures/environment.exr");
     let written = raystone::image::read_linear(&file).unwrap();
-    // Mitsuba 3, `envmap`: u = atan2(x, −z)/2π of the direction in the emitter's axes, texel ⌊u ·
-    // width⌋.
+    // Mitsuba 3, `envmap`: u = atan2(x, −z)/2π in the emitter's axes, texel ⌊u · width⌋.
     let seen = |direction: Vec3| {
         let local = glam::Quat::from_rotation_y(-angle.to_radians()) * direction;
         let u = (local.x.atan2(-local.z) / std::f32::consts::TAU).rem_euclid(1.0);

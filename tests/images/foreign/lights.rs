@@ -14,8 +14,7 @@ const HEIGHT: f64 = 1.5;
 /// Tolerance of an image's mean beyond five standard errors.
 const TOLERANCE: f64 = 0.001;
 
-/// Compares the mean of an image of a plane under a light, viewed obliquely, with the light
-/// reflected by its points.
+/// Compares the mean of an oblique image of a lit plane with the light reflected by its points.
 fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) -> f64 {
     let camera = Camera::upright(Vec3::new(2.5, 1.0, -2.0), Vec3::new(0.2, 0.0, 0.3), 12.0);
     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z);

@@ -71,8 +71,7 @@ fn image_under(horizontal: &[f64]) -> Image {
     replicates(scene, 1, SIZE, 256, 1).0.remove(0)
 }
 
-/// Relative differences of its mean and worst pixel from those of an intensity by angles in
-/// degrees.
+/// Relative differences of mean and worst pixel from those of an intensity by angles (degrees).
 fn compare(image: &Image, of: impl Fn(f64, f64) -> f64) -> [f64; 2] {
     let camera = camera();
     // Points within a pixel: the centres of 8 × 8 parts.

@@ -24,8 +24,8 @@ fn loaded(xml: &str) -> Result<SceneData, SceneError> {
     load(&variant, &LoadOptions::default())
 }
 
-/// A scene with one mesh, whose element contains `inside`, seen by a camera whose transform begins
-/// with `first`.
+/// A scene with one mesh, whose element contains `inside`, with a camera transform beginning with
+/// `first`.
 fn scene(inside: &str, first: &str) -> String {
     format!(
         r#"<?xml version="1.0"?>

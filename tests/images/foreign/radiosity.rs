@@ -24,8 +24,7 @@ const LAMP: usize = 3;
 /// Tolerance beyond five standard errors, due to the patches.
 const TOLERANCE: f64 = 0.003;
 
-/// A wall of the unit cube that is open at z = 0: a corner and two edges, whose cross product
-/// points inwards.
+/// A wall of the unit cube that is open at z = 0: corner and edges, cross product inwards.
 struct Wall {
     corner: DVec3,
     edges: [DVec3; 2],
@@ -168,8 +167,7 @@ fn polygons() -> Vec<(Vec<Vec3>, u32)> {
 }
 
 /// The largest relative difference between paths and radiosity, beyond five standard errors, over
-/// small places in the middle of floor, back, left and right wall. `albedos` are those of the path
-/// tracer.
+/// small places in the middle of the walls. `albedos` are the path tracer's.
 fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 {
     const SIZE: [u32; 2] = [8, 8];
     let mut worst = f64::NEG_INFINITY;
@@ -222,8 +220,7 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
 #[test]
 fn a_box_without_blocks_is_as_bright_as_radiosity_says_and_a_grey_too_dark_is_found() {
     let patches = patches();
-    // From the floor all directions lead to a wall or through the open side, whose factor is that
-    // of the back wall.
+    // From the floor all directions lead to a wall or the open side, with the back wall's factor.
     let seen = |wall: usize| -> f64 {
         let of_wall = patches.iter().filter(|p| p.wall == wall);
         let middle = DVec3::new(0.5, 0.0, 0.5);

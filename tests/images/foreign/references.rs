@@ -14,8 +14,7 @@ const FOLDER: &str = "../shared/scenes/mitsuba-refs";
 /// Samples per pixel: few enough for the reference's noise to be small in comparison.
 const SPP: u32 = 64;
 const REPLICATES: u32 = 4;
-/// Minimum variance of a sample, as there: noiseless pixels differ by rounding and by filters of
-/// one sample.
+/// Minimum variance of a sample, as there: noiseless pixels differ by rounding and filters.
 const LEAST_VARIANCE: f64 = 1e-4;
 const ACCEPTED: f64 = 0.9975;
 const RATIO: f64 = 0.002;

@@ -1,5 +1,4 @@
-//! The correctness check of integrators: kernels match the image oracle path by path, and planted
-//! faults do not.
+//! Correctness check of integrators: kernels match the image oracle per path, faults do not.
 
 mod real;
 
@@ -407,8 +406,7 @@ fn measure_scenes() {
 }
 
 /// Finds the faults of a list that the trial scenes reveal: lines `name | module | text |
-/// replacement` of the file named by the variable `FAULTS`, to test guesses at undetected faults
-/// without a build.
+/// replacement` of the file named by the variable `FAULTS`, to test guesses without a build.
 #[test]
 #[ignore = "no check but a measurement: `FAULTS=list cargo test --release --test images -- --ignored --nocapture hunt`"]
 fn hunt_faults() {

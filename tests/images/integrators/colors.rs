@@ -1,5 +1,4 @@
-//! Vertex colours, from file to picture: under a white sky a square has the radiance of its
-//! reflectance.
+//! Vertex colours, from file to picture: under a white sky, radiance is reflectance.
 
 use crate::support::*;
 use glam::Vec3;

@@ -1,5 +1,4 @@
-//! Coarse balls with smooth vertex normals in the white furnace: a shading normal must send no
-//! light behind the surface.
+//! Coarse balls with vertex normals in the white furnace: no light is sent behind the surface.
 
 use crate::support::*;
 use glam::Vec3;

@@ -19,8 +19,7 @@ const DETERMINISTIC_BOUND: f64 = 0.05;
 const FIXED_SPP: u32 = 1024;
 const RANDOM_SPP: u32 = 4;
 
-/// True if the mean over seeds is right at any number of samples: a rotated disc preserves its
-/// radii.
+/// True if the mean over seeds is right at any sample count: a rotated disc preserves radii.
 fn is_unbiased(sampler: &Sampler) -> bool {
     sampler.is_random() && sampler.decorrelation_variant.name != "disc-rotation"
 }
@@ -143,8 +142,7 @@ const TRAPPED: f64 = 0.01;
 fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
     let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
     let pane = Material::thin_dielectric("pane", Vec3::ONE, 1.5);
-    // Most samples are right to the last bits, and roulette ends so few that there may be no error
-    // except rounding.
+    // Most samples are right to the last bits, and roulette ends so few that rounding may dominate.
     let is = |found: Estimate, right: f64, trapped: f64| {
         println!("{found:?} for {right}");
         let margin = 5.0 * found.error + 1e-5 * right;

@@ -9,8 +9,8 @@ use std::path::Path;
 
 const SIZE: u32 = 16;
 
-/// Looks down at the origin from z = 2; x to the right, y up. The square from −1 to 1 in the plane
-/// z = 0 fills the image.
+/// Looks down at the origin from z = 2; x to the right, y up. The square [−1, 1]² at z = 0 fills
+/// the image.
 fn camera() -> Camera {
     Camera {
         eye: Vec3::new(0.0, 0.0, 2.0),

@@ -13,16 +13,14 @@ use std::path::Path;
 const SIZE: [u32; 2] = [8, 8];
 const RADIANCE: f64 = 5.0;
 
-/// A node around mesh 0: scales from the outermost one on, and the resulting z side of the mesh's
-/// +z.
+/// A node around mesh 0: scales from the outermost on, and the resulting z side of +z.
 struct Placed {
     scales: &'static [[f32; 3]],
     front: f32,
 }
 
 /// Odd and even numbers of negative axes, in one node and in nested ones. Mirroring at a plane
-/// through its normal keeps the front of a square; mirroring along the normal flips it; flipping
-/// twice does not.
+/// through its normal keeps the front of a square; along the normal flips it; twice does not.
 const PLACES: [Placed; 9] = [
     Placed {
         scales: &[[1.0, 1.0, 1.0]],
@@ -62,8 +60,7 @@ const PLACES: [Placed; 9] = [
     },
 ];
 
-/// A glTF model of a mesh of these triangles under nested nodes, with a distant second instance if
-/// `shared`.
+/// A glTF mesh of these triangles under nested nodes, with a distant second instance if `shared`.
 fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     use base64::Engine;
     let bytes: Vec<u8> = corners
@@ -111,8 +108,7 @@ fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     scene
 }
 
-/// The square from −0.5 to 0.5 facing +z, of two triangles that form one light, or of four that
-/// form four.
+/// The square from −0.5 to 0.5 facing +z, of two triangles (one light) or four (four lights).
 fn square(triangles: usize) -> Vec<Vec3> {
     let [a, b, c, d] =
         [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| Vec3::new(x, y, 0.0));
@@ -255,8 +251,7 @@ fn slab() -> Vec<Vec3> {
 
 #[test]
 fn glass_in_mirrored_nodes_has_its_inside_inside() {
-    // Seen at 60 degrees: R = 0.0892 at each surface. With sides swapped everything would be
-    // reflected.
+    // Seen at 60 degrees: R = 0.0892 at each surface. Swapped sides would reflect everything.
     let (index, cos) = (1.5_f64, 0.5_f64);
     let beyond = (1.0 - (1.0 - cos * cos) / (index * index)).sqrt();
     let [along, across] = [

@@ -20,8 +20,7 @@ pub const LAMPS: [&str; 6] = [
 ];
 
 /// Irradiance of a plane with normal +y by a uniform polygon above and facing it (J. Lambert,
-/// "Photometria", 1760): half the sum over edges of the subtended angle times the cosine of the
-/// plane through it.
+/// "Photometria", 1760): half the sum over edges of subtended angle times the plane's cosine.
 fn polygon(corners: &[DVec3], place: DVec3) -> f64 {
     let count = corners.len();
     let edge = |k: usize| {

@@ -1,5 +1,4 @@
-//! Reflection in f64, from the formulas of `docs/shading.md` in terms of angles, unlike the
-//! kernels.
+//! Reflection in f64, from the formulas of `docs/shading.md` in angles, unlike the kernels.
 
 use glam::{DVec3, Vec3};
 use raystone::scene::{CookTorrance, Fresnel, Masking, Material};

@@ -390,8 +390,7 @@ fn random_samplers() -> Vec<Sampler> {
 
 #[test]
 fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
-    // With hash(pixel + hash(seed)), an expected 3.4 of these pairs of seeds would share a run of
-    // pixels.
+    // With hash(pixel + hash(seed)), an expected 3.4 of these pairs would share a run of pixels.
     let seeds =
         (0..1800_u32).chain((0..900_u32).map(|i| (1 << 31) + 0x9e37_79b9_u32.wrapping_mul(i)));
     for sampler in random_samplers() {

@@ -1,5 +1,4 @@
-//! Projections on every dimension and pair of dimensions, and correlations between pixels and
-//! seeds.
+//! Projections on every dimension and pair, and correlations between pixels and seeds.
 
 use super::*;
 use raystone::discrepancy::star_2d;
@@ -7,8 +6,7 @@ use raystone::discrepancy::star_2d;
 /// Dimensions whose pairs are tested: a path's pixel position and its first three bounces.
 const DIMENSIONS: u32 = 20;
 const POINTS: u32 = 1024;
-/// Bounds of every pair: 1024 random points have a D* of about 0.04, and 0.25 ± 0.014 of them in a
-/// quadrant.
+/// Bounds of every pair: 1024 random points have D* ≈ 0.04, and 0.25 ± 0.014 in a quadrant.
 const MOST_STAR: f64 = 0.12;
 const LEAST_QUADRANT: f64 = 0.10;
 /// Pixels and seeds: first and last pixels, rows and columns, large numbers.
@@ -73,8 +71,7 @@ fn columns(sampler: &Sampler, [pixel, seed]: [u32; 2], samples: u32) -> Vec<Vec<
     (0..sampler.demand.dimensions).map(column).collect()
 }
 
-/// D* if it exceeds `bound`, which a grid of 64 × 64 cells decides for most sets: it misses less
-/// than two cells.
+/// D* if it exceeds `bound`, which a 64 × 64 grid mostly decides, within two cells.
 fn star_beyond(xs: &[u32], ys: &[u32], bound: f64) -> Option<f64> {
     const CELLS: usize = 64;
     let n = xs.len() as f64;
@@ -174,8 +171,7 @@ fn no_pair_of_dimensions_is_locked_together_in_any_sampler() {
 
 #[test]
 fn quadrants_and_stars_of_sets_that_are_locked_together_are_seen() {
-    // Two of the generator's sets in the generator's order: the quarter follows from the index
-    // modulo 4.
+    // Two of the generator's sets in the generator's order: the index modulo 4 gives the quarter.
     let random = sampler("pixel-hash", "none", &demand(POINTS, 4));
     let quarter = |i: usize, d: usize| [[0, 0], [1, 1], [1, 0], [0, 1]][i % 4][d % 2] << 31;
     let mut locked = columns(&random, [0, 0], POINTS);
