@@ -101,7 +101,7 @@ impl Plan {
             });
             points.iter().map(|p| p.cell(&is_randomised)).collect()
         };
-        // Cells that render; axes shared by all integrators require only one that renders.
+        // Cells that render; on axes shared by all integrators, those of any that renders.
         let rendering = |which: &[Axis]| -> Vec<Cell> {
             let mut cells = cells(which);
             cells.retain(|cell| renders && !is_compaction(&cell[Axis::Integrator]));

@@ -402,7 +402,7 @@ impl UnitScene {
         place
     }
 
-    /// What a 4:3 image sees on a grid of pixels.
+    /// Samples the view on a pixel grid of a 4:3 image.
     fn look(&self, eye: Vec3, forward: Vec3, fov: f32) -> Look {
         const EDGE: usize = 7;
         let [forward, right, up] = basis(forward, self.up);

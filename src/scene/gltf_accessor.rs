@@ -40,7 +40,7 @@ pub(super) fn check_accessors(
     Ok(())
 }
 
-/// Whether the primitive's normals can be read; `None` if it has none.
+/// `true` if the primitive's normals can be read; `None` if it has none.
 pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
     let normals = primitive.get(&Semantic::Normals)?;
     let kind = (normals.dimensions(), normals.data_type());
@@ -48,7 +48,7 @@ pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) 
     Some(is_known && check_data(&normals, buffers).is_ok())
 }
 
-/// Whether the primitive's first vertex colours can be read; `None` if it has none.
+/// `true` if the primitive's first vertex colours can be read; `None` if it has none.
 pub(super) fn has_colors(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
     let colors = primitive.get(&Semantic::Colors(0))?;
     let is_known = matches!(colors.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)

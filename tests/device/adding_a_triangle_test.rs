@@ -85,7 +85,7 @@ fn run(registries: &Registries, axes: &str) -> Vec<Line> {
     support::run(&text, registries, folder.path(), None).1
 }
 
-/// Whether the structures passed, by triangle test and structure.
+/// Verdicts by structure, for a triangle test.
 fn verdicts<'a>(lines: &'a [Line], test: &str) -> Vec<(&'a str, bool)> {
     let structures = all_of::<StructureRecord>(lines);
     let of_test = structures.filter(|s| s.key.name(axis::TRIANGLE) == test);

@@ -49,7 +49,7 @@ fn every_structure_answers_as_brute_force_does_where_surfaces_are_cut_out() {
     let ignored = brute_force(&whole, &rays);
     let changed = differences(&expected, &ignored).len();
     assert!(changed > 400, "masks change {changed} of 4000 rays");
-    // Transformed instances have their own reference in the check.
+    // Instance transforms round differently: they have their own reference.
     let flat = TriangleSoup {
         placed: None,
         ..soup

@@ -44,7 +44,7 @@ impl RayClass {
         CountedRays::Ao,
     ];
 
-    /// Encodes the class as a pass index; earlier passes have lower words.
+    /// Encodes the class, as a mark of passes; classes traced earlier have lower words.
     pub fn word(self) -> u32 {
         let kind = Self::KINDS.iter().position(|kind| *kind == self.rays);
         self.depth * 4 + kind.unwrap_or_default() as u32

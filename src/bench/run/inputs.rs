@@ -105,7 +105,7 @@ impl<'a> Current<'a> {
         }
     }
 
-    /// What changed in each set of kernel modules, by id; `None` if nothing did.
+    /// Change in each set of kernel modules, by id; `None` if there is none.
     pub(super) fn changed<'s>(
         &self,
         sets: &HashMap<&'s str, &KernelSetRecord>,

@@ -1,4 +1,4 @@
-//! What lives as long as a run: records, clock, progress, cells already done.
+//! State of a run: records, clock, progress, finished cells.
 
 use super::cost::Cost;
 use super::device::Device;

@@ -91,7 +91,7 @@ pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> 
     Some(built.and_then(|(builder, look)| builder.finish(&variant.name, look)))
 }
 
-/// What to type instead of `name`: the nearest built-in name, or all of them.
+/// Suggestions for `name`: the nearest built-in name, or all of them.
 pub(super) fn hint(name: &str) -> String {
     let nearest = BUILTINS
         .iter()

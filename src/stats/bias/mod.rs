@@ -193,7 +193,7 @@ pub fn check_bias(
     Ok(check)
 }
 
-/// Why so many replicates of a noisy sampler are inconclusive at this level; `None` if they suffice.
+/// Why this number of noisy replicates is inconclusive at this level; `None` if it suffices.
 fn too_few(replicates: usize, alpha: f64) -> Option<String> {
     let needed = replicates_needed(alpha);
     ((replicates as u64) < u64::from(needed)).then(|| {
