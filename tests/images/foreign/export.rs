@@ -158,7 +158,6 @@ fn textures_keep_their_factor_and_skies_are_written() {
     );
 }
 
-/// What the script ends with where Mitsuba cannot be installed.
 /// A light over a floor, as XML; or why it is refused.
 fn light(light: Light) -> Result<String, String> {
     let mut scene = builtin("lamp", &[]);
