@@ -37,8 +37,8 @@ pub struct StructureStats {
 }
 
 impl StructureStats {
-    /// Leaves, references and histogram from the number of triangles per leaf or cell; the rest is
-    /// 0. Empty ones are not leaves.
+    /// Leaves, references and histogram from the number of triangles per non-empty leaf or cell;
+    /// other fields are 0.
     pub fn of_leaves(counts: impl Iterator<Item = usize>) -> Self {
         let mut stats = Self::default();
         let histogram = &mut stats.leaf_histogram;

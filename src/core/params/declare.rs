@@ -26,7 +26,7 @@ pub trait Parameters: Default + Sized {
         Self::read(&params.completed(&Self::schema())?)
     }
 
-    /// [`Self::from_params`] for checked parameters; all defaults if they do not fit.
+    /// [`Parameters::from_params`] for checked parameters; all defaults if they do not fit.
     fn from_checked(params: &Params) -> Self {
         Self::from_params(params).unwrap_or_default()
     }

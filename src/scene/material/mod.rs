@@ -30,7 +30,7 @@ pub enum Lobes {
     /// `<feature>_sample(surface, u)` and `<feature>_scattering(surface, direction)`. Samples below
     /// the surface, due to the shading normal, are lost.
     Diffuse,
-    /// As [`Self::Diffuse`], but samples below the surface are mirrored at it.
+    /// As [`Lobes::Diffuse`], but samples below the surface are mirrored at it.
     Glossy,
     /// Only `<feature>_sample(surface, u)`: directions are discrete, and light sampling is useless.
     Delta,
