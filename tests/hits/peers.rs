@@ -303,16 +303,18 @@ impl BuiltPeer for TiredBuilt<'_> {
 impl PeerBatch for TiredBatch<'_> {
     fn trace(&self) -> Result<Elapsed, GpuError> {
         self.3.set(self.3.get() + 1);
-        match self.3.get() > self.2 {
-            true => Ok(Stopwatch::start().elapsed()),
-            false => self.0.trace(),
+        if self.3.get() > self.2 {
+            Ok(Stopwatch::start().elapsed())
+        } else {
+            self.0.trace()
         }
     }
 
     fn hits(&self) -> Result<Vec<Hit>, GpuError> {
-        match self.3.get() > self.2 {
-            true => Ok(self.1.iter().map(Hit::miss).collect()),
-            false => self.0.hits(),
+        if self.3.get() > self.2 {
+            Ok(self.1.iter().map(Hit::miss).collect())
+        } else {
+            self.0.hits()
         }
     }
 }

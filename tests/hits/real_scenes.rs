@@ -37,9 +37,10 @@ fn rays_by_flag() -> Option<u32> {
 
 fn models() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let taken = match rays_by_flag().is_some() || is_full() {
-        true => MODELS.to_vec(),
-        false => in_turn("real models", MODELS[..SMALL_ONES].iter().copied()),
+    let taken = if rays_by_flag().is_some() || is_full() {
+        MODELS.to_vec()
+    } else {
+        in_turn("real models", MODELS[..SMALL_ONES].iter().copied())
     };
     taken.iter().map(|m| folder.join(m)).collect()
 }

@@ -65,9 +65,10 @@ fn tolerance(test: AnyTriangleTest, record: &TriangleRecord, ray: &Ray, t: f64) 
         .vertices()
         .map(|v| (v[longest] - ray.origin[longest]).abs());
     let far = f64::from(far.into_iter().fold(0.0, f32::max) / size[longest]);
-    let reach = match is_exact(test) {
-        true => t.abs(),
-        false => t.abs().max(far),
+    let reach = if is_exact(test) {
+        t.abs()
+    } else {
+        t.abs().max(far)
     };
     reach * 2.0_f64.powi(-21)
 }

@@ -511,9 +511,10 @@ fn twin_text(kernel: &str) -> String {
 fn twin_and_shared_text(kernel: &str) -> String {
     let shared = twin_path(kernel).with_file_name("mod.rs");
     // A separate crate begins with its root.
-    let shared = match shared.exists() {
-        true => shared,
-        false => shared.with_file_name("lib.rs"),
+    let shared = if shared.exists() {
+        shared
+    } else {
+        shared.with_file_name("lib.rs")
     };
     let in_folder = kernel.matches('/').count() > 1;
     let shared = if in_folder {

@@ -69,9 +69,10 @@ impl<'a> View<'a> {
     /// product of the differences from its two halves.
     fn error(&self, gpu: &Gpu, (sequence, decorrelation): (&str, &str)) -> f64 {
         let sampler = sampler_of(sequence, decorrelation, SPP);
-        let seeds: Vec<u32> = match sampler.is_random() {
-            true => (1..=SEEDS).collect(),
-            false => vec![1],
+        let seeds: Vec<u32> = if sampler.is_random() {
+            (1..=SEEDS).collect()
+        } else {
+            vec![1]
         };
         let images = self.images(gpu, &sampler, SPP, &seeds);
         let mut sum = 0.0;

@@ -57,9 +57,10 @@ fn loaded(file: &Path, max_texture_size: u32, table_bytes: u64) -> SceneData {
 /// Linear light of an sRGB byte (IEC 61966-2-1).
 fn light(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 

@@ -51,9 +51,10 @@ fn faults(name: &str, thesis: &Thesis, text: &str) -> (Vec<String>, usize) {
                 Some(_) => {}
             }
             let unit = UNITS.iter().find(|(column, _)| *column == place.column());
-            let own = match expect.unit.is_empty() {
-                true => figure(&expect.figure).unit.to_string(),
-                false => expect.unit.clone(),
+            let own = if expect.unit.is_empty() {
+                figure(&expect.figure).unit.to_string()
+            } else {
+                expect.unit.clone()
             };
             if unit.is_some_and(|(_, unit)| expect.compare == Compare::Shown && *unit != own) {
                 faults.push(format!("{at}: {ours} in {own}"));

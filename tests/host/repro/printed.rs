@@ -97,9 +97,10 @@ impl<'e> Place<'e> {
     }
 
     pub fn column(&self) -> &str {
-        match self.at.column.is_empty() {
-            true => &self.expect.column,
-            false => &self.at.column,
+        if self.at.column.is_empty() {
+            &self.expect.column
+        } else {
+            &self.at.column
         }
     }
 

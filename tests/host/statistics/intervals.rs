@@ -139,10 +139,13 @@ impl Errors {
                 (0..n).map(|_| normal(generator).powi(2)).sum::<f64>() / f64::from(n)
             }
             Self::LogNormal(sigma) => (sigma * normal(generator) - 0.5 * sigma * sigma).exp(),
-            Self::Fireflies => match generator.uniform() < 0.1 {
-                true => 5.0,
-                false => 5.0 / 9.0 + 0.01 * normal(generator),
-            },
+            Self::Fireflies => {
+                if generator.uniform() < 0.1 {
+                    5.0
+                } else {
+                    5.0 / 9.0 + 0.01 * normal(generator)
+                }
+            }
         }
     }
 

@@ -117,16 +117,22 @@ fn gathered(
 
 /// Radiance of every patch after a number of bounces.
 fn solved(patches: &[Patch], bounces: usize) -> Vec<DVec3> {
-    let emitted = |patch: &Patch| match patch.material == LAMP {
-        true => DVec3::from(EMISSION),
-        false => DVec3::ZERO,
+    let emitted = |patch: &Patch| {
+        if patch.material == LAMP {
+            DVec3::from(EMISSION)
+        } else {
+            DVec3::ZERO
+        }
     };
     let factors: Vec<Vec<f64>> = patches
         .iter()
         .map(|to| {
-            let factor = |from: &Patch| match from.wall == to.wall {
-                true => 0.0,
-                false => polygon(to.centre, to.normal, &from.corners) / PI,
+            let factor = |from: &Patch| {
+                if from.wall == to.wall {
+                    0.0
+                } else {
+                    polygon(to.centre, to.normal, &from.corners) / PI
+                }
             };
             patches.iter().map(factor).collect()
         })
@@ -183,9 +189,10 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
         let color = |c: [f64; 3]| DVec3::from(c).as_vec3();
         let material = |(k, c): (usize, &[f64; 3])| {
             let plain = Material::diffuse("wall", color(*c));
-            match k == LAMP {
-                true => plain.emitting(color(EMISSION)),
-                false => plain,
+            if k == LAMP {
+                plain.emitting(color(EMISSION))
+            } else {
+                plain
             }
         };
         let materials = albedos.iter().enumerate().map(material).collect();

@@ -388,9 +388,10 @@ fn a_run_gives_no_error_figure_for_an_integrator_whose_paths_are_wrong() {
 fn measure_scenes() {
     let names = std::env::var("SCENES").unwrap_or_else(|_| "cornell-box".to_owned());
     for name in names.split(',') {
-        let scene = match name.contains('/') {
-            true => from_file(name.as_ref()),
-            false => builtin(name, &[]),
+        let scene = if name.contains('/') {
+            from_file(name.as_ref())
+        } else {
+            builtin(name, &[])
         };
         let occlusion = integrator_variant("ao", &[("radius", ParamValue::Number(0.2))]);
         for what in [integrator_variant("primary", &[]), occlusion, path(6)] {

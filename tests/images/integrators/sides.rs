@@ -75,9 +75,10 @@ fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     };
     let inner = scales.len() - 1;
     let node = |(index, scale): (usize, &[f32; 3])| {
-        let what = match index == inner {
-            true => "\"mesh\":0".to_owned(),
-            false => format!("\"children\":[{}]", index + 1),
+        let what = if index == inner {
+            "\"mesh\":0".to_owned()
+        } else {
+            format!("\"children\":[{}]", index + 1)
         };
         format!("{{{what},\"scale\":{scale:?}}}")
     };
@@ -145,9 +146,10 @@ fn looked(
 }
 
 fn tracers(shared: bool) -> &'static [&'static str] {
-    match shared {
-        true => &["bvh", "meta-bvh"],
-        false => &["bvh"],
+    if shared {
+        &["bvh", "meta-bvh"]
+    } else {
+        &["bvh"]
     }
 }
 

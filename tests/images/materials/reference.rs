@@ -167,9 +167,10 @@ impl Model {
         let f = (1.0 - metallic) * mixed + metallic * schlick(base, cosine) * specular;
         let found = (1.0 - metallic) * coat(o.z) + metallic * luminance(schlick(base, o.z));
         let through = (1.0 - metallic) * (1.0 - coat(o.z)) * luminance(base);
-        let share = match metallic < 1.0 && luminance(base) > 0.0 {
-            true => (through / (found + through)).clamp(0.1, 0.9),
-            false => 0.0,
+        let share = if metallic < 1.0 && luminance(base) > 0.0 {
+            (through / (found + through)).clamp(0.1, 0.9)
+        } else {
+            0.0
         };
         Lobes {
             share,
@@ -179,9 +180,10 @@ impl Model {
     }
 
     pub fn value(&self, o: DVec3, i: DVec3) -> DVec3 {
-        match i.z > 0.0 {
-            true => self.lobes(o, i).value,
-            false => DVec3::ZERO,
+        if i.z > 0.0 {
+            self.lobes(o, i).value
+        } else {
+            DVec3::ZERO
         }
     }
 

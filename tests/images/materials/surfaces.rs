@@ -66,12 +66,13 @@ fn scene() -> SceneData {
         let face = (b - a).cross(c - a).normalize();
         // On either side; one corner in four has none.
         let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
-        scene
-            .normals
-            .push([(); 3].map(|()| match random.unit() < 0.25 {
-                true => GEOMETRIC,
-                false => encode_normal(sign * (face + 0.8 * random.direction())),
-            }));
+        scene.normals.push([(); 3].map(|()| {
+            if random.unit() < 0.25 {
+                GEOMETRIC
+            } else {
+                encode_normal(sign * (face + 0.8 * random.direction()))
+            }
+        }));
         let uv =
             |random: &mut Random| Vec2::new(5.0 * random.unit() - 2.0, 5.0 * random.unit() - 2.0);
         scene.uvs.push([(); 3].map(|()| uv(&mut random)));
@@ -191,9 +192,10 @@ fn frame(library: &KernelLibrary, buffers: &SceneBuffers) -> UniformValues {
 }
 
 fn linear(c: f64) -> f64 {
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 
