@@ -163,8 +163,7 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
     }
 }
 
-/// `samples` minus the cost of an empty measurement; at least a hundredth of it, so rates are
-/// finite.
+/// `samples` minus the cost of an empty measurement; at least a hundredth of it, for finite rates.
 pub(crate) fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
     samples
         .iter()

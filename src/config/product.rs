@@ -29,8 +29,7 @@ pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
     })
 }
 
-/// Whether each seed of a sequence and decorrelation gives new samples, or why they are
-/// incompatible.
+/// True if each seed of a sequence and decorrelation gives new samples, or their conflict.
 pub(super) trait IsRandomised: Fn(&Variant, &Variant) -> Result<bool, String> {}
 impl<F: Fn(&Variant, &Variant) -> Result<bool, String>> IsRandomised for F {}
 

@@ -144,8 +144,7 @@ fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>,
     }
 }
 
-/// Shortens path labels to the last component if it is unique. The empty path of the embedded
-/// kernels becomes [`EMBEDDED`].
+/// Shortens path labels to a unique last component; the empty path becomes [`EMBEDDED`].
 pub(super) fn shorten_labels(scenes: &mut [Variant]) {
     let short: Vec<String> = scenes
         .iter()

@@ -7,8 +7,7 @@ use std::sync::OnceLock;
 
 /// A source of files.
 pub trait Files: Send + Sync {
-    /// Opens a regular file and returns its length in bytes. Folders, devices and pipes are
-    /// refused.
+    /// Opens a regular file (no folder, device or pipe) and returns its length in bytes.
     ///
     /// # Errors
     /// The file does not exist, is not regular, or cannot be read.

@@ -1,5 +1,4 @@
-//! Checks of glTF accessors. The crate's readers panic on invalid types, strides, offsets and
-//! counts.
+//! Checks of glTF accessors, as the crate's readers panic on invalid ones.
 
 use gltf::Semantic;
 use gltf::accessor::{Accessor, DataType, Dimensions};

@@ -56,8 +56,7 @@ impl Unread {
         }
     }
 
-    /// One line for extensions, one for the rest. `named` material extensions are covered
-    /// elsewhere.
+    /// One line for extensions, one for the rest; `named` extensions are covered elsewhere.
     pub(crate) fn warnings(&self, named: &[&str]) -> impl Iterator<Item = String> {
         let extensions = self.extensions.iter();
         let extensions = extensions.filter(|name| !named.contains(&name.as_str()));

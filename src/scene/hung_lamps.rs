@@ -13,8 +13,7 @@ const INNER: f32 = 0.2;
 const RADIANCE: f32 = 2000.0;
 
 /// Adds `lamps` square lamps of equal power at random places of the inner box. A scene without
-/// lights loses its default sky; instances are flattened. The first lamps do not depend on the
-/// count.
+/// lights loses its default sky; instances are flattened. The first lamps are always the same.
 pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
     let bounds = scene.bounds();
     let (center, half) = (bounds.center(), 0.5 * (bounds.max - bounds.min));

@@ -202,8 +202,7 @@ impl Assembly {
     /// Appends an instance.
     ///
     /// # Errors
-    /// The object does not exist, the transform is singular or not finite, or there are too many
-    /// triangles.
+    /// The object does not exist, the transform is invalid, or there are too many triangles.
     pub fn place(&mut self, object: u32, to_world: Transform) -> Result<Instance, InstanceError> {
         let instance = self.instances.len();
         let triangles = self.objects.get(object as usize);

@@ -48,8 +48,8 @@ impl Library {
     }
 
     /// Loads the libraries of a statement: a single file whose name may contain blanks, if it
-    /// exists, or several. Returns the indices of their materials by name. A missing or broken
-    /// library is a warning.
+    /// exists, or several. Returns the indices of their materials by name. Broken libraries are
+    /// warnings.
     pub(crate) fn load(&self, names: &str) -> Vec<(String, u32)> {
         let cut = without_comment(names).trim();
         let is_there = |name: &&str| self.folder.join(plain(name)).is_file();
@@ -269,8 +269,8 @@ const READ: [&str; 25] = [
 /// Limit on the kinds of unread statements recorded: a file in another format has any number.
 const MOST_UNREAD: usize = 64;
 
-/// The text without lines that would make `tobj` reject the whole library or panic; a colour given
-/// as one number becomes three.
+/// The text without lines that make `tobj` reject the library or panic; single-number colours
+/// become three.
 fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut unread: BTreeMap<String, usize> = BTreeMap::new();

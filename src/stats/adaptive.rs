@@ -4,8 +4,7 @@
 //! Stopping where an estimate looks good is biased: an image without its fireflies is too dark,
 //! with little variance. Here the replicates form two groups. The first samples of each group
 //! determine, once and per tile, how many the *other* group takes. A group's samples are
-//! independent of their number, so the mean of its images is unbiased, and so is the mean of both
-//! groups.
+//! independent of their number, so means of its images, or of both groups, are unbiased.
 
 use crate::comparison::LogFigure;
 use crate::metrics::RELATIVE_EPSILON;

@@ -1,5 +1,4 @@
-//! Detects intervals of a mean error that are unreliable because it is dominated by a single pixel
-//! that replicates seldom hit.
+//! Detects unreliable intervals of a mean error dominated by a pixel that replicates seldom hit.
 //!
 //! The relMSE of an image is a mean over pixels. If a pixel contains a sliver of a lamp, one image
 //! in a hundred hits it, with many times the error of the others. A few replicates then contain no

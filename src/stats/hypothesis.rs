@@ -151,8 +151,7 @@ pub(crate) fn least_rate(p_values: &[f64]) -> f64 {
 }
 
 /// Corrected p-values, in order: rejecting those of at most `alpha` rejects any true hypothesis
-/// with probability at most `alpha`, however dependent the tests (Holm 1979, step-down). NaN counts
-/// as 1.
+/// with probability at most `alpha`, however dependent (Holm 1979, step-down). NaN counts as 1.
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let p = |i: usize| {
         if p_values[i].is_nan() {

@@ -93,9 +93,9 @@ impl Noise {
     }
 }
 
-/// Mean of log times without the smallest and largest fifth, robust to single interruptions. Its
-/// variance is that of the winsorised sample (Tukey and McLaughlin 1963, Yuen 1974). `None` if
-/// fewer than two remain.
+/// Mean of log times without the smallest and largest fifth, robust to interruptions. Its variance
+/// is that of the winsorised sample (Tukey and McLaughlin 1963, Yuen 1974). `None` if fewer than
+/// two remain.
 fn trimmed(logs: &[f64]) -> Option<(f64, Spread)> {
     let mut sorted = logs.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -395,8 +395,7 @@ impl LogFigure {
     }
 
     /// Ratio to another figure, with Welch's test of their difference over all sources of noise.
-    /// The level holds for figures with equally many rounds or replicates; for others see
-    /// [`Spread::of_difference`].
+    /// The level holds for equally many rounds or replicates; else see [`Spread::of_difference`].
     pub fn compared_with(&self, other: &Self) -> Difference {
         let ratio = Self::product(&[(self, 1.0), (other, -1.0)]);
         let spreads = ratio.spreads();

@@ -304,8 +304,7 @@ pub struct ErrorReport {
     pub non_finite_pixels: usize,
 }
 
-/// Evaluates every metric of `image` against `reference`. Non-finite pixels exclude whole-image
-/// metrics.
+/// Evaluates every metric of `image`. Non-finite pixels exclude whole-image metrics.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].

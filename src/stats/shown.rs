@@ -1,5 +1,4 @@
-//! Metrics of displayed images: tone-mapped with the reference's exposure, sRGB encoded, in [0, 1]
-//! without rounding to 8 bits.
+//! Metrics of displayed images: the reference's exposure, sRGB in [0, 1], not rounded to 8 bits.
 
 use crate::flip::Seen;
 use raystone_image::{Image, LUMINANCE, displayed};

@@ -48,16 +48,14 @@ impl SignedRank {
         0.5 * (self.walsh[(n - 1) / 2] + self.walsh[n / 2])
     }
 
-    /// Two-sided p-value of the hypothesis that the differences are symmetric about zero. Averages
-    /// of zero support the hypothesis.
+    /// Two-sided p-value of symmetry about zero; averages of zero support it.
     pub fn p(&self) -> f64 {
         let above = self.walsh.iter().filter(|x| **x > 0.0).count();
         let below = self.walsh.iter().filter(|x| **x < 0.0).count();
         (2.0 * self.at_least(above.max(below))).min(1.0)
     }
 
-    /// Interval of the points that the test at level `alpha` does not reject; unbounded if so few
-    /// differences cannot reject any.
+    /// Interval of the points not rejected at level `alpha`; unbounded for too few differences.
     pub fn interval(&self, alpha: f64) -> [f64; 2] {
         let n = self.walsh.len();
         // Largest number of averages that may be omitted at an end.

@@ -1,5 +1,5 @@
-//! Statistics of samples: location, spread, intervals, slopes and Pareto fronts. Hypothesis tests
-//! are in [`crate::hypothesis`].
+//! Statistics of samples: location, spread, intervals, slopes, Pareto fronts; see also
+//! [`crate::hypothesis`].
 //!
 //! An undefined figure is `None`, never NaN: every function here returns `None` for an empty slice
 //! or non-finite samples. Intervals use Student's t and order statistics, because replicates are
@@ -19,7 +19,7 @@ pub const LEAST_FOR_MEDIAN: usize = 6;
 pub(crate) const LEAST_FOR_SLOPE: usize = 3;
 
 /// Relative difference attributed to rounding alone. Sums of 4,000 f64 numbers err by less, and no
-/// measured noise is so small: radiance has 24 bits, and times of up to ten seconds are whole
+/// measured noise is so small: radiance has 24 bits, and times up to ten seconds are whole
 /// nanoseconds.
 pub const ROUNDING: f64 = 1e-12;
 
@@ -44,8 +44,8 @@ pub fn variance(samples: &[f64]) -> Option<f64> {
 /// the estimates that leave out one of its parts, see `jackknife` and [`Spread::together`]. Noise
 /// from the interaction of two sources counts for both, so the interval is rather too wide.
 ///
-/// A source of fewer than two estimates is ignored; without any the interval has no width. `None`
-/// if something is not finite.
+/// Sources of fewer than two estimates are ignored; without any, the width is 0. `None` if not
+/// finite.
 pub fn jackknife_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     if !value.is_finite() || !sources.iter().flatten().all(|x| x.is_finite()) {
         return None;
@@ -105,8 +105,7 @@ pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
     interval_of(samples, raw_mean)
 }
 
-/// Root mean square with its 95 % interval on logarithms ([`positive_interval`]); zero width for
-/// one.
+/// Root mean square with its 95 % [`positive_interval`]; zero width for one square.
 pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
     let root = |squares: &[f64]| raw_mean(squares).sqrt();
     let estimates = leave_one_out(squares).map(|rest| root(&rest)).collect();
@@ -149,12 +148,11 @@ pub fn median_interval(samples: &[f64]) -> Option<Interval> {
 }
 
 /// Slope of the least-squares line through (ln x, ln ȳ), where ȳ is the mean over replicates of y
-/// at x, with its 95 % interval from a jackknife over whole replicates. An RMSE under plain Monte
-/// Carlo has slope −0.5.
+/// at x, with its 95 % interval from a jackknife over whole replicates. Plain Monte Carlo RMSE has
+/// slope −0.5.
 ///
 /// Each curve is one replicate as (x, y) pairs. Points where x or y is not positive and finite are
-/// ignored. `None` if fewer than `LEAST_FOR_SLOPE` different x remain. A single curve gives an
-/// interval of zero width.
+/// ignored. `None` below `LEAST_FOR_SLOPE` different x. A single curve gives zero width.
 pub fn log_log_slope(curves: &[Vec<(f64, f64)>]) -> Option<Interval> {
     let all: Vec<&[(f64, f64)]> = curves.iter().map(Vec::as_slice).collect();
     let slope = slope_of_mean_curve(&all)?;

@@ -1,6 +1,5 @@
 //! A ray-triangle test from outside the crate: one type, one kernel and one registry line;
-//! structures, the reference tracer, checks, sweeps and records use it. Also sweeps over tests and
-//! offsets.
+//! structures, the reference tracer, checks, sweeps and records use it.
 
 use crate::support;
 use raystone::accel::triangle::{APART, Meeting, TriangleRecord, TriangleTest, plane_error};

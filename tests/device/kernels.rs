@@ -1,6 +1,5 @@
 //! Every kernel that an experiment can request composes and validates, stays within WebGPU's
-//! default limits, contains counters only on request, and has Rust's struct layout. Needs no
-//! adapter.
+//! default limits, contains counters only on request, and has Rust's struct layout. No adapter.
 
 mod covering;
 mod families;

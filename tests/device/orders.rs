@@ -14,8 +14,7 @@ use raystone::params::Choice as _;
 const SIZE: [u32; 2] = [53, 38];
 const SPP: u32 = 3;
 
-/// The image of three samples in an order, with a kernel library, sums of the first pass, and
-/// passes.
+/// The image of three samples in an order, with a kernel library, first sums, and passes.
 fn in_order(
     order: Order,
     kernels: Option<KernelLibrary>,

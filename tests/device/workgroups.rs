@@ -231,8 +231,7 @@ fn no_dispatch_takes_long_however_slow_what_it_does() {
         renderer.render(&[4], 1).expect("an image");
         (renderer.longest_slice_ms(), renderer.spent().ms())
     };
-    // A slice is sized by earlier ones; other programs occasionally lengthen it. One that is not
-    // limited is too long every time.
+    // Slices are sized by earlier ones; other load may lengthen some, but not all.
     const TRIES: usize = 10;
     for (what, run) in [
         ("rays", &trace as &dyn Fn() -> (f64, f64)),

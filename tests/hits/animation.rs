@@ -141,8 +141,7 @@ fn every_structure_over_a_tree_or_objects_is_taken_to_a_frame_and_passes_its_gat
             }
         }
     }
-    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh, object-list in two on
-    // one.
+    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh, object-list: two on one.
     assert!(taken >= 4 * 3 * 2 + 2 * 2, "{taken}");
 }
 

@@ -1,5 +1,4 @@
-//! External tracers: those of this crate's registry are right, a wrong one is detected, and a run
-//! continues without a missing one.
+//! External tracers: registered ones are right, wrong ones detected, missing ones tolerated.
 
 use crate::support;
 use crate::support::{Stage, brute_force, builtin, from_file, gpu};

@@ -1,5 +1,4 @@
-//! Maps the reads of a host twin to device memory: its arrays have the device's layout, so a host
-//! address determines array and byte.
+//! Maps reads of a host twin, whose arrays have the device's layout, to device memory.
 
 use raystone_accel::watch::Read;
 use raystone_accel::{BuiltAccel, TriangleSoup};

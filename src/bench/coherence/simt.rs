@@ -113,8 +113,7 @@ mod tests {
 
     #[test]
     fn lanes_visit_together_and_wait_for_those_that_test() {
-        // Lane 0 tests two triangles after its first node, lane 1 none; lane 2 has no ray, 3 ends
-        // early.
+        // Lane 0 tests two triangles after its first node, lane 1 none; 2 has no ray, 3 ends early.
         let warp = [
             lane(&[(Node, 0), (Triangle, 64), (Triangle, 80), (Node, 16)]),
             lane(&[(Node, 0), (Node, 36)]),

@@ -62,8 +62,7 @@ impl Trace {
     }
 }
 
-/// Traces a ray through the structure of this twin. Reads before a visit or test belong to it,
-/// trailing reads to the last one.
+/// Traces a ray through this twin's structure. Reads belong to the next visit or test, or the last.
 ///
 /// # Errors
 /// The twin reads memory that the device lacks, or reports fewer steps than it counts.

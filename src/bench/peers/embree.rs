@@ -1,6 +1,6 @@
-//! Intel's Embree, version 3 or 4, if its library is found at run time. The required part of its
-//! binary interface is declared here: `rtcore_ray.h`, `rtcore_scene.h`, `rtcore_geometry.h`. Scenes
-//! are robust (`RTC_SCENE_FLAG_ROBUST`).
+//! Intel's Embree, version 3 or 4, if its library is found at run time, with the required
+//! declarations of `rtcore_ray.h`, `rtcore_scene.h`, `rtcore_geometry.h`. Scenes are robust
+//! (`RTC_SCENE_FLAG_ROBUST`).
 
 use super::native::Caster;
 use super::{BuiltPeer, Peer};

@@ -55,8 +55,7 @@ pub(super) fn attributes(
         .collect()
 }
 
-/// Writes the mean over all replicates and the variance of one of them, by pixel and channel, if
-/// the run was asked for images.
+/// Writes mean and single variance over all replicates, by pixel and channel, on request.
 pub(super) fn write_spread(
     session: &Session,
     cell: &Cell,

@@ -54,8 +54,7 @@ pub(super) struct Current<'a> {
 }
 
 impl<'a> Current<'a> {
-    /// Inputs of an experiment with these kernels; `reference_file` is the hash of the reference
-    /// image, if read from a file.
+    /// Inputs of an experiment with these kernels; `reference_file` is the hash of that image.
     pub(super) fn new(
         experiment: &Experiment,
         reference_file: &str,

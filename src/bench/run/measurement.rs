@@ -37,8 +37,7 @@ pub trait Measurement: Send + Sync {
         format!("{} of {cell}", self.name())
     }
 
-    /// Key of cells measured in the same rounds, which stay in one shard: measurement and part of
-    /// cell.
+    /// Key (measurement and part of the cell) of cells in the same rounds, and so in one shard.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
     }

@@ -94,8 +94,7 @@ pub struct Verified {
 /// Earlier results stay there until the run has ended.
 ///
 /// # Errors
-/// No adapter, unreadable kernels, or a folder that is not writable or holds results; records are
-/// preserved.
+/// No adapter, unreadable kernels, or a folder not writable or with results; records stay.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
@@ -179,8 +178,7 @@ fn measure(
 ) -> Result<PathBuf, RunError> {
     let (plan, options) = (session.plan, session.options);
     for scene in &plan.scenes {
-        // A lost device fails the cell that lost it; the rest continues with a new one. Every
-        // iteration finishes at least one cell.
+        // A lost device fails its cell; a new one continues. Every iteration finishes a cell.
         loop {
             run_scene(session, &device, scene)?;
             if device.gpu.lost().is_none() {

@@ -11,8 +11,7 @@ pub trait Parameters: Default + Sized {
     /// Names, meanings, defaults and ranges, in order of declaration.
     fn schema() -> ParameterSchema;
 
-    /// Reads the values of all parameters, which must all be present. Callers use
-    /// [`Parameters::from_params`].
+    /// Reads the values of all parameters. Callers use [`Parameters::from_params`].
     ///
     /// # Errors
     /// A value is missing or has another type.

@@ -15,8 +15,8 @@ const SERIES: [[f64; 2]; 10] = {
     series
 };
 
-/// Sine and cosine of `turns` full turns, error below 1e-15, using only IEEE additions and
-/// multiplications in a fixed order.
+/// Sine and cosine of `turns` full turns, error below 1e-15, by IEEE additions and multiplications
+/// in fixed order.
 pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let turns = turns - turns.floor();
     // Within an eighth of a turn of a quarter point, where the series converges fast.

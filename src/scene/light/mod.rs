@@ -77,8 +77,7 @@ pub enum Light {
         /// Irradiance of a surface facing it.
         irradiance: Vec3,
     },
-    /// A point light of a kind from outside the program, invisible to rays; isotropic for light
-    /// selection.
+    /// A point light of an outside kind, invisible to rays; isotropic for light selection.
     Other {
         /// The kind.
         kind: &'static LightKind,

@@ -100,8 +100,7 @@ pub struct BiasCheck {
     pub alpha: f64,
     /// Smallest p-value of a tile; 1 if not testable.
     pub min_p: f64,
-    /// Combined p-value of the three tests: the smallest `alpha` at which one of them rejects. 1 if
-    /// not testable.
+    /// Combined p-value: the smallest `alpha` at which a test rejects; 1 if not testable.
     pub p: f64,
     /// Histogram of tile p-values in ten equal bins of `[0, 1]`, without those whose difference is
     /// explained by rounding (p = 1 by definition): flat if there is no bias.
@@ -268,14 +267,13 @@ fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
     median(&ratios).unwrap_or(0.0)
 }
 
-/// Tests one mean. `noisier` is [`noise_ratio`], absent if no pixel has noise: means are then
-/// compared directly.
+/// Tests one mean. `noisier` is [`noise_ratio`], absent if no pixel has noise: then compares
+/// directly.
 ///
 /// If the replicates' variance is below [`LEAST_NOISE`] of the reference's times `noisier`, they
 /// have missed the source of the noise there, and the predicted variance is used. And n replicates
 /// that agree (up to rounding) weigh no more than they would with the reference's mean as an
-/// additional one, which makes |t| = n. rounding) speak no louder than they would with the
-/// reference's mean as one more of them, which makes |t| = n.
+/// additional one, which makes |t| = n.
 fn careful_test(
     ours: &[f64],
     theirs: &[f64],

@@ -3,8 +3,7 @@
 //! Of all weighted means, weights of expected radiance over its variance give the least relative
 //! error (as in weighted least squares). Both are estimated from the reference, in blocks of
 //! pixels. A weight that depends on the values it multiplies would itself cause bias, since noise
-//! is skewed: so each half of the reference is weighted by the other half, and the replicates by
-//! the mean of both.
+//! is skewed: so each half of the reference is weighted by the other, and the replicates by both.
 
 use crate::statistics::{median, variance};
 use raystone_image::{Image, luminance};
@@ -15,8 +14,7 @@ const BLOCK: usize = 4;
 const LEAST_VARIANCE: f64 = 0.25;
 
 /// Weighted means of the replicates and reference parts, relative to the image's own: about 1.
-/// `None` below two parts per half, or if a half has no noise. All images are finite and of one
-/// size.
+/// `None` below two parts per half, or if a half has no noise. Images are finite and of one size.
 pub(super) fn weighted_means(replicates: &[Image], parts: &[Image]) -> Option<[Vec<f64>; 2]> {
     let half = parts.len() / 2;
     let (a, b) = (parts.get(..half)?, parts.get(half..2 * half)?);

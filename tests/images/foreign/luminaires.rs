@@ -1,6 +1,6 @@
 //! Irradiance of a plane by an IES luminaire: I(θ, φ) cos³θ / h², with intensities that are a
-//! product of two linear functions, so that values between the file's angles are known, too.
-//! Mitsuba does not read such files.
+//! product of two linear functions, so values between the file's angles are known. Mitsuba does not
+//! read such files.
 
 use super::{replicates, scene_of};
 use glam::{DVec3, Mat3, Quat, Vec3};

@@ -1,5 +1,4 @@
-//! Images against other programs and independent formulas: closed forms, radiosity, stored figures
-//! of Mitsuba 3, Nori's scenes.
+//! Images against other programs and formulas: radiosity, figures of Mitsuba 3, Nori's scenes.
 
 mod agreement;
 mod cook_torrance;

@@ -24,7 +24,7 @@ fn loaded(xml: &str) -> Result<SceneData, SceneError> {
     load(&variant, &LoadOptions::default())
 }
 
-/// A scene with one mesh, whose element contains `inside`, with a camera transform beginning with
+/// A scene with one mesh, whose element contains `inside`, and a camera transform that begins with
 /// `first`.
 fn scene(inside: &str, first: &str) -> String {
     format!(

@@ -1,5 +1,4 @@
-//! Sums and checks of a renderer: sample blocks, row bands, the samples of every pixel, and the
-//! error word. took, and the error word.
+//! Sums and checks of a renderer: sample blocks, row bands, samples per pixel, error word.
 
 use super::MAX_DEPTH;
 use crate::support::*;

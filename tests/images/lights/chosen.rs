@@ -1,5 +1,4 @@
-//! Selection frequency of lights, and of map rows and columns, over all possible draws, against the
-//! probability used as divisor.
+//! Selection frequency of lights and map texels over all draws, against their probability.
 
 use super::density::{CHOSEN, images, probing};
 use super::lamp;

@@ -32,8 +32,7 @@ const BY_NATURE: [(&str, f64, &str); 2] = [
     ),
 ];
 
-/// Every valid pair of a sequence and a decorrelation, with each of their parameters at its default
-/// and in turn at other values.
+/// Every valid pair of a sequence and a decorrelation, with each parameter at all its values.
 fn all_samplers(samples: u32, dimensions: u32) -> Vec<Sampler> {
     let registry = SamplerRegistry::default();
     let all = |entries: &[Entry]| -> Vec<Variant> { entries.iter().flat_map(variants).collect() };

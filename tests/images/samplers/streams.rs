@@ -228,8 +228,8 @@ fn the_cost_of_a_sampler_is_measured_without_its_loop() {
         .filter(|d| d.name() != "none");
     costs.extend(moved.map(|d| cost("sobol", d.name())));
     assert!(costs.len() >= 14);
-    // Divisions in a loop cost more than one product on any adapter. Other load may hide that, but
-    // not always.
+    // Divisions in a loop cost more than one product on any adapter. Other load hides that only
+    // sometimes.
     let is_dearer = |_| cost("halton", "none").low > cost("rank1-lattice", "none").value;
     assert!((0..10).any(is_dearer), "halton is never dearer");
     let flat = sampler("van-der-corput", "none", &demand(256, 1));
