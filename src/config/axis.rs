@@ -115,6 +115,7 @@ impl<T> AxisMap<T> {
         Ok(map)
     }
 
+    /// All axes with their values.
     pub fn iter(&self) -> impl Iterator<Item = (Axis, &T)> {
         Axis::ALL.into_iter().zip(&self.0)
     }

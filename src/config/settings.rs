@@ -46,6 +46,7 @@ impl Section {
         }
     }
 
+    /// Section name.
     pub fn name(&self) -> &str {
         &self.entry.name
     }

@@ -3,6 +3,7 @@
 use super::{Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
+/// Beckmann microfacets over a diffuse lobe.
 pub static COOK_TORRANCE: MaterialKind = MaterialKind {
     name: "cook-torrance",
     feature: "cook_torrance",

@@ -11,6 +11,7 @@
 use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
+/// Smooth dielectrics.
 pub static DIELECTRIC: MaterialKind = MaterialKind {
     name: "dielectric",
     feature: "dielectric",

@@ -3,6 +3,7 @@
 use super::{Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
+/// Lambertian surfaces.
 pub static DIFFUSE: MaterialKind = MaterialKind {
     name: "diffuse",
     feature: "diffuse",

@@ -3,6 +3,7 @@
 use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
+/// Perfect mirrors.
 pub static MIRROR: MaterialKind = MaterialKind {
     name: "mirror",
     feature: "mirror",

@@ -5,6 +5,7 @@
 use super::{Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
+/// Normalised Phong.
 pub static PHONG: MaterialKind = MaterialKind {
     name: "phong",
     feature: "phong",

@@ -7,6 +7,7 @@
 use super::{DEFAULT_IOR, Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
+/// The metallic-roughness model of glTF 2.0.
 pub static PRINCIPLED: MaterialKind = MaterialKind {
     name: "principled",
     feature: "principled",
