@@ -1,5 +1,5 @@
-//! Notes a hash of the sources on the host that figures depend on: those of this crate and of every crate of the
-//! workspace below it. What only shows or judges records is none of them.
+//! Hashes the host sources that figures depend on: this crate and the workspace crates below it.
+//! Code that only displays or compares records is not included.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -19,8 +19,8 @@ fn collect(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// The folders of the crates that the manifest in `folder` depends on, each beside it, and of those below them.
-/// The kernels are none: runs hash them by themselves.
+/// Collects the folders of the crates that the manifest in `folder` depends on, recursively.
+/// Kernels are excluded, as runs hash them separately.
 fn below(folder: &Path, found: &mut BTreeSet<PathBuf>) {
     if !found.insert(folder.to_owned()) {
         return;
@@ -51,7 +51,7 @@ fn main() {
         collect(folder, &mut files);
         println!("cargo::rerun-if-changed={}", folder.display());
     }
-    // What of the workspace reaches every crate: profiles and versions. A published package lacks them.
+    // Workspace files that affect every crate (profiles, versions); absent in a published package.
     for name in ["Cargo.toml", "Cargo.lock"] {
         let file = root.join("../..").join(name);
         if file.exists() {
@@ -60,7 +60,7 @@ fn main() {
         }
     }
     files.sort();
-    // It changes with the toolchain, too, as the hasher of the standard library is not fixed.
+    // Also changes with the toolchain, as the standard hasher is not fixed.
     let mut hasher = DefaultHasher::new();
     let above = root.parent().unwrap_or(&root);
     for file in files {

@@ -1,11 +1,11 @@
-//! Where a run happens.
+//! The environment of a run.
 
 use raystone_core::program::Program;
 use raystone_gpu::{Gpu, device_type, probe_arithmetic};
 use raystone_record::{Environment, MachineLoad};
 use std::collections::BTreeMap;
 
-/// The machine as it is now; nothing where the system does not tell.
+/// Current load of the machine, as far as the system reports it.
 pub(crate) fn machine_load() -> MachineLoad {
     let text = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let cpus = text("/proc/cpuinfo");
@@ -34,7 +34,7 @@ fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Memory of the host, where the system tells.
+/// Host memory, if the system reports it.
 fn memory_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
@@ -42,14 +42,14 @@ fn memory_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// How the clock of the first processor is governed, where the system tells.
+/// Frequency governor of the first processor, if the system reports it.
 fn governor() -> Option<String> {
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor";
     let text = std::fs::read_to_string(path).ok()?;
     Some(text.trim().to_owned()).filter(|text| !text.is_empty())
 }
 
-/// Limits that runs may meet.
+/// Adapter limits that runs may reach.
 fn limits(limits: &wgpu::Limits) -> BTreeMap<String, u64> {
     let found = [
         ("max_buffer_size", limits.max_buffer_size),
@@ -84,7 +84,7 @@ fn limits(limits: &wgpu::Limits) -> BTreeMap<String, u64> {
         .collect()
 }
 
-/// Machine, adapter, driver and program.
+/// Captures machine, adapter, driver and program.
 pub fn capture(gpu: &Gpu, program: &Program) -> Environment {
     Environment {
         adapter: gpu.info.name.clone(),
@@ -113,7 +113,7 @@ pub fn capture(gpu: &Gpu, program: &Program) -> Environment {
     }
 }
 
-/// The processor's model name where the system tells, else its architecture.
+/// The processor's model name if the system reports it, else its architecture.
 pub fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|l| {

@@ -1,14 +1,14 @@
-//! Figures of built structures that are registered from outside.
+//! Registry of additional figures of built structures.
 
 use raystone_accel::{BuiltAccel, TriangleSoup};
 use raystone_record::Interval;
 use raystone_record::figure::{FIGURES, Figure};
 use std::collections::BTreeMap;
 
-/// Measures a built structure; `None` where the figure makes no sense.
+/// Measures a built structure; `None` if the figure does not apply.
 pub(crate) type OfStructure = fn(&dyn BuiltAccel, &TriangleSoup) -> Option<f64>;
 
-/// Figures from outside the crate, each with the code that measures it.
+/// Figures from outside the crate, with the code that measures them.
 #[derive(Debug, Clone, Default)]
 pub struct FigureRegistry(Vec<(Figure, OfStructure)>);
 
@@ -16,7 +16,7 @@ impl FigureRegistry {
     /// Adds a figure of built structures.
     ///
     /// # Errors
-    /// Another figure has its id, or the id has no version.
+    /// The id is taken, or has no version.
     pub fn add(&mut self, figure: Figure, measure: OfStructure) -> Result<(), String> {
         let id = &figure.id;
         if !id.contains("/v") {
@@ -37,12 +37,12 @@ impl FigureRegistry {
         Ok(())
     }
 
-    /// The rows of the table that it adds.
+    /// The added table rows.
     pub fn rows(&self) -> impl Iterator<Item = &Figure> {
         self.0.iter().map(|(figure, _)| figure)
     }
 
-    /// Every figure that makes sense of a structure, by id.
+    /// All applicable figures of a structure, by id.
     pub fn of_structure(
         &self,
         built: &dyn BuiltAccel,

@@ -1,4 +1,4 @@
-//! Runs: what experiments measure, how often, in which order, and the records of it.
+//! Runs: executes the measurements of experiments and records them.
 #![warn(missing_docs)]
 
 pub mod animation;

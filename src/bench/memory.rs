@@ -1,9 +1,9 @@
-//! How much host memory a piece of work needs at most.
+//! Peak host memory of a piece of work.
 
 use peak_alloc::PeakAlloc;
 
-/// Runs `work`; also returns the most bytes that were allocated above what was allocated before, on
-/// all threads. Absent if the program was not started with `PeakAlloc` as its global allocator.
+/// Runs `work`; also returns the peak of additionally allocated bytes, over all threads. Absent if
+/// `PeakAlloc` is not the global allocator.
 pub fn peak_bytes<T>(work: impl FnOnce() -> T) -> (T, Option<u64>) {
     let before = PeakAlloc.current_usage();
     PeakAlloc.reset_peak_usage();

@@ -1,9 +1,7 @@
-//! What drawing costs: nanoseconds per two-dimensional sample, so that a difference of Mrays/s between
-//! samplers can be attributed.
+//! Cost of sampling in nanoseconds per two-dimensional sample, to explain Mrays/s of samplers.
 //!
-//! A kernel draws in a loop and does nothing else; a second one runs the same loop without drawing.
-//! Both run by turns, and the difference is what counts: a throughput over all units of the adapter,
-//! not a latency.
+//! One kernel draws in a loop and does nothing else; another runs the same loop without drawing.
+//! They alternate; the difference is the cost: throughput of the adapter, not latency.
 
 use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
 use raystone_record::Reading;
@@ -12,19 +10,18 @@ use raystone_render::with_sampler;
 use raystone_sampling::Sampler;
 use raystone_stats::statistics::median_interval;
 
-/// Invocations; each is a pixel.
+/// Invocations, one per pixel.
 const PIXELS: u32 = 1 << 14;
-/// Pairs of dimensions that a sample draws, if the sampler has so many: a bounce of a path or two.
+/// Dimension pairs drawn per sample, if available: one or two bounces of a path.
 const MOST_PAIRS: u32 = 4;
-/// Samples of a pixel in one dispatch, if the sampler has so many.
+/// Samples per pixel in one dispatch, if available.
 const MOST_SAMPLES: u32 = 1 << 12;
-/// Turns of loops that drawing one number takes at most: a digit each of a word.
+/// Maximum loop iterations per drawn number: one per digit of a word.
 const TURNS_PER_DRAW: u32 = 33;
-/// A dispatch should take about so long, milliseconds.
+/// Target time of a dispatch, milliseconds.
 const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
 
-/// The two kernels with what they read.
 struct Loop<'a> {
     gpu: &'a Gpu,
     bindings: Bindings,
@@ -32,7 +29,7 @@ struct Loop<'a> {
 }
 
 impl Loop<'_> {
-    /// Milliseconds of one dispatch that draws `samples` samples per pixel, or does not.
+    /// Milliseconds of one dispatch that draws `samples` samples per pixel, or none.
     fn run(&self, kernel: &Composition, samples: u32) -> Result<f64, GpuError> {
         let mut bindings = self.bindings.clone();
         let values = UniformValues::new()
@@ -48,13 +45,13 @@ impl Loop<'_> {
     }
 }
 
-/// Measures what a sampler costs on this adapter: nanoseconds of adapter time per two-dimensional sample, the empty loop taken off (near zero
-/// it may be negative), and those of the empty loop, medians of the rounds. Also returns the BLAKE3 of the kernel that draws. Samples are those that it was made for, from the
-/// first on; dimensions the first eight of them.
+/// Measures a sampler's cost on this adapter: nanoseconds of adapter time per two-dimensional
+/// sample minus the empty loop (near zero it may be negative), and those of the empty loop, as
+/// medians of the rounds. Also returns the BLAKE3 hash of the drawing kernel. Uses the sampler's
+/// first samples and first eight dimensions.
 ///
 /// # Errors
-/// The sampler was made for less than two dimensions, its kernel does not run, or its table is too
-/// large.
+/// The sampler has fewer than two dimensions, its kernel does not run, or its table is too large.
 pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], String), GpuError> {
     let pairs = (sampler.demand.dimensions / 2).min(MOST_PAIRS);
     if pairs == 0 {

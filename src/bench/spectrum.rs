@@ -1,10 +1,11 @@
-//! What the error of an image looks like, beyond its size: how it is spread over spatial frequencies,
-//! and what a blur leaves of it. Decorrelation changes these and leaves the RMSE as it is.
+//! Structure of an image's error beyond its size: its distribution over spatial frequencies, and
+//! the error after blurring. Decorrelation changes these but not the RMSE.
 //!
-//! The error is signed luminance, image minus reference. Over replicates, the spectra of single images are an
-//! ensemble: its outliers show what a mean hides (fireflies raise all frequencies of a few images). Sources: Celarek, Jakob, Wimmer & Lehtinen,
-//! "Quantifying the error of light transport algorithms", EGSR 2019 (the error spectrum ensemble);
-//! Georgiev & Fajardo 2016 and the filter curves of OpenQMC (error after a Gaussian).
+//! The error is signed luminance, image minus reference. Over replicates, the spectra of single
+//! images form an ensemble, whose outliers show what a mean hides (fireflies raise all frequencies
+//! of a few images). Sources: Celarek, Jakob, Wimmer & Lehtinen, "Quantifying the error of light
+//! transport algorithms", EGSR 2019 (the error spectrum ensemble); Georgiev & Fajardo 2016 and the
+//! filter curves of OpenQMC (error after a Gaussian).
 
 use raystone_image::{Image, ImageError, luminance};
 use raystone_record::{FilteredError, OUTLIER_QUANTILES, PowerAt};
@@ -13,30 +14,30 @@ use std::f64::consts::TAU;
 
 /// Standard deviations of the Gaussian filters, pixels; 0 is no filter.
 pub(crate) const SIGMAS: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0];
-/// Frequencies up to this one count as low, cycles per pixel: waves of eight pixels and longer.
+/// Upper limit of low frequencies, cycles per pixel: waves of eight pixels and longer.
 pub(crate) const LOW_FREQUENCY: f64 = 0.125;
-/// Most points of a radial spectrum.
+/// Maximum points of a radial spectrum.
 const MOST_RINGS: usize = 48;
-/// A variance below this part of the squared mean is rounding: the error is one constant.
+/// A variance below this fraction of the squared mean is rounding: the error is constant.
 const CONSTANT: f64 = 1e-20;
 
 /// The error of one image in space and frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorSpectrum {
-    /// `(frequency, power)` by growing frequency, cycles per pixel up to 1/2: mean over a ring, in units
-    /// of the mean over all frequencies but 0, so that white noise has power 1 everywhere. Empty for an
-    /// error that is the same in all pixels.
+    /// `(frequency, power)` by increasing frequency, cycles per pixel up to 1/2: mean over a ring,
+    /// relative to the mean over all frequencies but 0, so that white noise has power 1 everywhere.
+    /// Empty for a constant error.
     pub power: Vec<(f64, f64)>,
     /// Variance of the error over the pixels: the unit of `power`.
     pub variance: f64,
     /// Mean power up to `LOW_FREQUENCY`; white noise has 1.
     pub low_frequency: Option<f64>,
-    /// Power of the loudest wave, any frequency but 0; n pixels of white noise have about ln(n/2) + 0.58. What repeats
-    /// itself, or is the same everywhere, is loud.
+    /// Maximum power of any frequency but 0; n pixels of white noise have about ln(n/2) + 0.58.
+    /// Repetition and uniformity raise it.
     pub loudest: Option<f64>,
-    /// Correlation of the error with that of the pixel to the right or below, −1 to 1; white noise has 0.
+    /// Correlation with the error of the pixel to the right or below, −1 to 1; 0 for white noise.
     pub autocorrelation: Option<f64>,
-    /// Root mean square of the error after a Gaussian filter of each of `SIGMAS`, mean error included.
+    /// Root mean square error, with the mean, after a Gaussian filter of each of `SIGMAS`.
     pub filtered: Vec<f64>,
 }
 
@@ -53,7 +54,7 @@ pub(crate) fn luminance_error(image: &Image, reference: &Image) -> Result<Vec<f6
 /// Analyses errors of `width * height` pixels, row by row.
 ///
 /// # Panics
-/// If there are not so many errors, or none.
+/// If the number of errors does not match, or is 0.
 pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectrum {
     assert!(error.len() == width * height && !error.is_empty());
     let n = error.len() as f64;
@@ -91,16 +92,15 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
     found
 }
 
-/// Sums of power by distance from frequency 0.
 struct Rings {
-    /// Sums of frequency, of power, and how many.
+    /// Sums of frequency and power, and counts.
     sums: Vec<[f64; 3]>,
-    /// Sum and number up to [`LOW_FREQUENCY`].
+    /// Sum and count up to [`LOW_FREQUENCY`].
     low: [f64; 2],
 }
 
 impl Rings {
-    /// Rings as wide as the coarser spacing of frequencies, or a little wider.
+    /// Rings at least as wide as the coarser frequency spacing.
     fn new(shorter_edge: usize) -> Self {
         let count = (shorter_edge / 2).clamp(1, MOST_RINGS);
         Self {
@@ -125,14 +125,13 @@ impl Rings {
     }
 }
 
-/// A complex number.
 type Complex = [f64; 2];
 
 fn product([a, b]: Complex, [c, d]: Complex) -> Complex {
     [a * c - b * d, a * d + b * c]
 }
 
-/// Discrete Fourier transform in both directions, not scaled.
+/// Unscaled 2D discrete Fourier transform.
 fn fourier(values: &[f64], width: usize) -> Vec<Complex> {
     let height = values.len() / width;
     let lines = |values: Vec<Complex>, length: usize| -> Vec<Complex> {
@@ -158,8 +157,8 @@ fn roots_of_one(n: usize) -> Vec<Complex> {
     (0..n).map(root).collect()
 }
 
-/// Transform of one line (Cooley & Tukey 1965, any length): split by the least prime factor p into p
-/// lines of every p-th value. `roots` are those of the whole line or of a multiple of its length.
+/// Transforms one line (Cooley & Tukey 1965, any length): splits by the smallest prime factor p
+/// into p lines of every p-th value. `roots` are those of the line or of a multiple of its length.
 fn transform(line: &[Complex], roots: &[Complex]) -> Vec<Complex> {
     let n = line.len();
     let p = (2..=n).find(|p| n.is_multiple_of(*p)).unwrap_or(1);
@@ -194,8 +193,8 @@ fn autocorrelation(rest: &[f64], width: usize, variance: f64) -> Option<f64> {
     (count > 0.0).then(|| sum / count / variance)
 }
 
-/// Convolution with a Gaussian cut off at 4 σ. At the border the weights inside the image are scaled to
-/// the sum 1, so that a constant stays what it is.
+/// Convolution with a Gaussian truncated at 4 σ. At the border the weights inside the image are
+/// normalised, which preserves constants.
 fn gaussian(values: &[f64], width: usize, sigma: f64) -> Vec<f64> {
     if sigma == 0.0 {
         return values.to_vec();
@@ -205,7 +204,7 @@ fn gaussian(values: &[f64], width: usize, sigma: f64) -> Vec<f64> {
     filter_lines(&across, sigma, (width, height), (1, width))
 }
 
-/// Filters `lines` lines of `length` values; steps from line to line and from value to value.
+/// Filters `lines` lines of `length` values; the steps are those between lines and values.
 fn filter_lines(
     values: &[f64],
     sigma: f64,
@@ -236,8 +235,7 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Quantile `q` by linear interpolation between the values in their order (Hyndman and Fan's type 7), which is
-/// what NumPy does.
+/// Quantile `q` by linear interpolation between sorted values (Hyndman and Fan's type 7; NumPy).
 fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -247,8 +245,8 @@ fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[below] + (sorted[above] - sorted[below]) * (place - below as f64)
 }
 
-/// Means of the spectra over replicates with their intervals: power by frequency; and quantiles of the power of
-/// single images. Replicates that have none are left out.
+/// Means of the spectra over replicates with intervals, by frequency, and quantiles of single
+/// images. Replicates without a spectrum are ignored.
 pub(crate) fn mean_power(spectra: &[ErrorSpectrum]) -> Vec<PowerAt> {
     let with_power: Vec<_> = spectra.iter().filter(|s| !s.power.is_empty()).collect();
     let Some(first) = with_power.first() else {
@@ -313,11 +311,11 @@ mod tests {
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         assert!((mean(&low) - 1.0).abs() < 0.06, "{low:?}");
         assert!(mean(&lag).abs() < 0.01, "{lag:?}");
-        // The greatest of n/2 exponential variates.
+        // The maximum of n/2 exponential variates.
         let loudest: Vec<f64> = spectra.iter().filter_map(|s| s.loudest).collect();
         let expected = (0.5 * (SIZE[0] * SIZE[1]) as f64).ln() + 0.5772;
         assert!((mean(&loudest) - expected).abs() < 1.0, "{loudest:?}");
-        // A Gaussian leaves 1 / (2 σ √π) of white noise, but for borders.
+        // A Gaussian leaves 1 / (2 σ √π) of white noise, except at borders.
         let filtered = mean_filtered(&spectra);
         let share = filtered[3].rmse.value / filtered[0].rmse.value;
         let theory = 1.0 / (4.0 * std::f64::consts::PI.sqrt());
@@ -376,7 +374,7 @@ mod tests {
                 .loudest
                 .is_some_and(|loudest| (loudest / all - 1.0).abs() < 1e-9)
         );
-        // Noise that repeats itself every eight pixels: 63 waves share it.
+        // Noise with a period of eight pixels: 63 waves share the power.
         let noise = white(&mut Pcg32::new(9));
         let tiled: Vec<f64> = (0..96 * 64)
             .map(|i| noise[i / 96 % 8 * 8 + i % 8])
@@ -415,7 +413,7 @@ mod tests {
 
     #[test]
     fn powers_of_all_frequencies_have_the_mean_one() {
-        // Odd sizes: no symmetry helps.
+        // Odd sizes, without symmetry.
         let values: Vec<f64> = white(&mut Pcg32::new(5))[..35 * 21].to_vec();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let rest: Vec<f64> = values.iter().map(|v| v - mean).collect();

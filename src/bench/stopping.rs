@@ -1,12 +1,13 @@
-//! When a sampler has taken enough samples for an error that was asked for.
+//! Decides when a sampler has enough samples for a requested error.
 //!
-//! A rule that looks at an estimate again and again and stops when it is small stops when it is small by chance: the
-//! error that it then reports is too small, and the claim is wrong more often than one look would have it. Two
-//! things bound that. It looks only at the powers of two of an experiment, a handful of times, and at the upper end of
-//! an interval whose chance to miss is shared out among the looks (Bonferroni): whatever the looks have in
-//! common, a cell is ended with its true error above the target with a probability of at most 1 − confidence. The error figure of the
-//! cell itself is the mean over its replicates as always: where the target is met with room, stopping tells nothing
-//! of it; where it is met by a hair, it is too small by at most about the half width of that interval.
+//! A rule that repeatedly checks an estimate and stops when it is small stops when it is small by
+//! chance: the reported error is too small, and the claim is wrong more often than after a single
+//! check. Two measures bound that. It checks only at the powers of two of an experiment, a handful
+//! of times, and uses the upper end of an interval whose error probability is divided among the
+//! checks (Bonferroni): however they depend on each other, a cell ends with its true error above
+//! the target with a probability of at most 1 − confidence. The cell's error figure is the mean
+//! over its replicates as always: if the target is met with room, stopping has no effect on it; if
+//! barely, it is too small by at most about half the width of that interval.
 
 use raystone_config::StopRule;
 use raystone_record::ErrorRecord;
@@ -14,17 +15,17 @@ use raystone_record::replicates::Replicates;
 use raystone_stats::comparison::LogFigure;
 use raystone_stats::heavy_tails::is_heavy;
 
-/// What the metric that the rule looks at begins with.
+/// Prefix of the metric used by the rule.
 const METRIC: &str = "relmse-unbiased/";
 
-/// Whether an error is below the target of a rule, looked at `looks` times at most.
+/// True if an error is below the target of a rule that checks at most `looks` times.
 pub fn is_met(rule: &StopRule, error: &LogFigure, looks: usize) -> bool {
     let chance = (1.0 - rule.confidence) / looks.max(1) as f64;
     error.upper(chance) <= rule.relmse
 }
 
-/// Whether the mean error of these replicates at `spp` is. That of a single one never is: of its spread nothing is
-/// known; nor is an error that the reference does not resolve, or one whose interval is not to be trusted.
+/// True if the mean error of these replicates at `spp` is below the target. Never true for a single
+/// replicate, whose spread is unknown, an unresolved error, or an unreliable interval.
 pub(crate) fn is_met_by(
     rule: &StopRule,
     replicates: &[&ErrorRecord],

@@ -1,5 +1,5 @@
-//! Figures of the points that a pair of dimensions really drew: discrepancies, errors of analytic
-//! integrands, coherence between pixels and coverage by many pixels.
+//! Figures of the points drawn by a pair of dimensions: discrepancies, errors of analytic
+//! integrands, coherence between pixels and joint coverage by many pixels.
 
 use raystone_discrepancy::{
     Budget, DiscrepancyError, PointSet, Quadratic, quadratic, star_2d_prefixes,
@@ -9,24 +9,23 @@ use raystone_render::integrand::{Function, functions};
 use raystone_stats::statistics::{log_log_slope, mean_interval, root_mean_interval};
 use std::f64::consts::TAU;
 
-/// Discrepancies in the mean square cost N², so they are taken up to this N.
+/// Limit on N for mean-square discrepancies, which cost N².
 pub(crate) const MOST_QUADRATIC: usize = 1 << 13;
-/// Seconds that one such sum may take before something is wrong.
+/// Time limit of one such sum in seconds.
 const SUM_SECONDS: f64 = 600.0;
-/// Copies that are superposed for the coverage, as in Dufay 2017, Fig. 5.13.
+/// Copies superposed for the coverage, as in Dufay 2017, Fig. 5.13.
 pub(crate) const COPIES: u32 = 150;
-/// Coordinates are multiples of this: errors below it are theirs and not the points'.
+/// Resolution of coordinates: smaller errors are not due to the points.
 const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
-/// Cells along a side of the coverage's grid, per √N.
+/// Cells along a side of the coverage grid, per √N.
 const CELLS: usize = 4;
 
-/// What the points of one seed have at each number of points.
+/// Figures of one seed's points at each number of points.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SeedFigures {
     star: Vec<f64>,
     /// Square roots; shorter than `star` if N goes beyond [`MOST_QUADRATIC`].
     l2_star: Vec<f64>,
-    /// Squares.
     centered: Vec<f64>,
     /// By function, then by number of points.
     squared_errors: Vec<Vec<f64>>,
@@ -58,8 +57,7 @@ impl SeedFigures {
     }
 }
 
-/// Squared error of the mean of a function over the first `n` points, for each `n` in `counts`,
-/// ascending.
+/// Squared error of a function's mean over the first `n` points, for ascending `counts`.
 pub(crate) fn squared_errors(
     function: &Function,
     points: &[[f64; 2]],
@@ -77,7 +75,7 @@ pub(crate) fn squared_errors(
     counts.iter().map(&mut error).collect()
 }
 
-/// D* and all other figures over seeds. One seed has intervals of no width.
+/// D* and all other figures over seeds. One seed gives intervals of zero width.
 pub(crate) fn over_seeds(
     counts: &[usize],
     seeds: &[SeedFigures],
@@ -114,10 +112,9 @@ fn curve(counts: &[usize], values: &[f64]) -> Vec<(f64, f64)> {
     points.map(|(&n, &value)| (n as f64, value)).collect()
 }
 
-/// RMSE over seeds of every function, and its slope. The slope is half that of the mean square, so that
-/// it is the slope of the RMSE and not of a mean of absolute errors. An N at which half of the seeds or
-/// more are right to the resolution of the coordinates (16 points often halve the square exactly) says
-/// nothing of a slope and is left out of it.
+/// RMSE over seeds of every function, and its slope. The slope is half that of the mean square,
+/// hence that of the RMSE and not of a mean absolute error. It ignores an N at which at least half
+/// of the seeds are exact to coordinate resolution (16 points often halve the square).
 fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> {
     let figures = |(k, (name, function)): (usize, (&str, Function))| {
         let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
@@ -151,16 +148,16 @@ fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> 
     functions().into_iter().enumerate().map(figures).collect()
 }
 
-/// Cosine-distributed direction around the z axis; twin of `sample_cosine` in
-/// `kernels/shading/hemisphere.wesl`, in double precision.
+/// Cosine-distributed direction around the z axis; double-precision twin of `sample_cosine` in
+/// `kernels/shading/hemisphere.wesl`.
 pub fn cosine_direction([u, v]: [f64; 2]) -> [f64; 3] {
     let (sin, cos) = (TAU * v).sin_cos();
     let radius = u.sqrt();
     [radius * cos, radius * sin, (1.0 - u).sqrt()]
 }
 
-/// Mean angle between the directions of neighbouring pixels (right and below) at the same sample index,
-/// radians. `points` are those of a tile of `width` pixels a row, pixel by pixel, `samples` of each.
+/// Mean angle between the directions of neighbouring pixels (right and below) at the same sample
+/// index, radians. `points`: `samples` of each pixel, in rows of `width`.
 pub(crate) fn neighbour_angle(points: &[[f64; 2]], width: usize, samples: usize) -> Option<f64> {
     let directions: Vec<_> = points.iter().map(|&p| cosine_direction(p)).collect();
     let pixels = points.len().checked_div(samples)?;
@@ -176,7 +173,7 @@ pub(crate) fn neighbour_angle(points: &[[f64; 2]], width: usize, samples: usize)
     raystone_stats::statistics::mean(&angles)
 }
 
-/// Accurate for small angles too, where an arc cosine is not.
+/// Accurate for small angles, unlike an arc cosine.
 fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference = length([0, 1, 2].map(|k| a[k] - b[k]));
@@ -184,8 +181,7 @@ fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     2.0 * difference.atan2(sum)
 }
 
-/// Share of the cells of a square grid that at least one of the points falls into. The grid has
-/// (4 √n)² cells, n being the points of one pixel.
+/// Fraction of cells with a point in a square grid of (4 √n)² cells for n points per pixel.
 pub(crate) fn coverage(points: &[[f64; 2]], n: usize) -> f64 {
     let side = ((n as f64).sqrt() * CELLS as f64).round().max(1.0) as usize;
     let mut hit = vec![false; side * side];
@@ -203,7 +199,7 @@ mod tests {
 
     #[test]
     fn errors_of_a_midpoint_grid_have_the_slope_of_its_theory() {
-        // The midpoint rule with N points errs by about N^(-1) where the function is smooth in 2-D.
+        // The midpoint rule with N points errs by about N^(-1) for smooth 2-D functions.
         let grid = |n: usize| -> Vec<[f64; 2]> {
             let side = (n as f64).sqrt() as usize;
             let at = |k: usize| (k as f64 + 0.5) / side as f64;
@@ -216,7 +212,7 @@ mod tests {
         }
         let (star, figures) = over_seeds(&counts, &[seed]);
         assert_eq!(star.len(), 4);
-        // Half a cell along an edge is too much: D* = 1/√N − 1/(4N).
+        // Half a cell along an edge is in excess: D* = 1/√N − 1/(4N).
         let expected = |n: f64| 1.0 / n.sqrt() - 0.25 / n;
         for at in &star {
             assert!(

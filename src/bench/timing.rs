@@ -1,5 +1,5 @@
-//! The timing protocol: warm-up until the rate is stable, then all measured things in rounds of
-//! random order, so that drift of the machine hits all alike.
+//! The timing protocol: warm-up until the rate is stable, then interleaved rounds in random order,
+//! so that machine drift affects all measurements alike.
 
 use raystone_config::Timing;
 use raystone_core::random::Pcg32;
@@ -9,18 +9,18 @@ use raystone_stats::statistics::{median, median_interval};
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 
-/// Two warm-up runs within this fraction of each other are stable.
+/// Two warm-up runs within this relative difference are stable.
 const STABLE: f64 = 0.05;
 
-/// Something that is measured again and again.
+/// A repeatable measurement.
 pub trait Measured {
-    /// One measurement.
+    /// Measures once.
     ///
     /// # Errors
     /// It failed; it is not measured again.
     fn measure(&self) -> Result<Elapsed, GpuError>;
 
-    /// The device whose compilations of kernels take turns, round by round: see [`Gpu::compiled_apart`].
+    /// The device whose kernel compilations alternate by round: see [`Gpu::compiled_apart`].
     fn device(&self) -> Option<&Gpu> {
         None
     }
@@ -36,8 +36,7 @@ impl<M: Measured + ?Sized> Measured for &M {
     }
 }
 
-/// What a measured thing answered, turn by turn: it must be the same each time, or the time is that of
-/// something else.
+/// Answers of a measurement in every turn, which must agree for its time to be valid.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     first: OnceCell<blake3::Hash>,
@@ -46,7 +45,7 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Takes the hash of one turn's answers.
+    /// Records the hash of one turn's answers.
     pub(crate) fn note(&self, answers: blake3::Hash) {
         self.turns.set(self.turns.get() + 1);
         if *self.first.get_or_init(|| answers) != answers {
@@ -54,7 +53,7 @@ impl Watch {
         }
     }
 
-    /// The first turn that differed from the first of all, in words.
+    /// Describes the first turn that differed from the very first.
     pub(crate) fn fault(&self) -> Option<String> {
         let turn = self.differed.get()?;
         Some(format!(
@@ -64,22 +63,21 @@ impl Watch {
     }
 }
 
-/// Samples of one measured thing.
+/// Samples of one measurement.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
-    /// Milliseconds on the GPU clock (wall clock where there is none).
+    /// Milliseconds on the GPU clock (wall clock if there is none).
     pub ms: Vec<f64>,
     /// Milliseconds on the wall clock.
     pub wall_ms: Vec<f64>,
-    /// Milliseconds of all processors, where they are counted.
+    /// Milliseconds of all processors, if counted.
     pub cpu_ms: Vec<f64>,
 }
 
-/// Measures everything `rounds` times in rounds of random order; what fails keeps its error.
+/// Measures everything `rounds` times in rounds of random order; failures keep their error.
 ///
 /// # Errors
-/// The device is gone: the index of what was being measured, and the error. The others are as yet
-/// unmeasured, not failed.
+/// The device is lost: the index of the measurement, and the error; others are unmeasured.
 pub(crate) fn interleave<M: Measured>(
     measured: &[M],
     timing: &Timing,
@@ -127,10 +125,10 @@ fn take_turn(measured: &impl Measured, round: usize) {
     }
 }
 
-/// So often a turn is taken in which a clock runs backwards.
+/// Attempts at a turn in which a clock runs backwards.
 const TRIES: usize = 3;
 
-/// One turn. Where a clock ran backwards it is taken again: a time by another clock is none of this round's.
+/// One turn, repeated if a clock ran backwards, as a round must not mix clocks.
 fn turn(measured: &impl Measured) -> Result<Elapsed, GpuError> {
     let mut last = Err(GpuError::Clock);
     for _ in 0..TRIES {
@@ -142,10 +140,10 @@ fn turn(measured: &impl Measured) -> Result<Elapsed, GpuError> {
     last
 }
 
-/// Runs until two runs in a row agree, for at least `min_warmup_ms` and at most `max_warmup_ms`. The
-/// first run does not count: it includes the driver's compiler.
+/// Runs until two consecutive runs agree, for at least `min_warmup_ms` and at most `max_warmup_ms`.
+/// The first run does not count: it includes the driver's compiler.
 fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
-    // Each compilation is made before it is timed.
+    // Make each compilation before it is timed.
     for compilation in (0..measured.device().map_or(1, Gpu::compilations)).rev() {
         take_turn(measured, compilation);
         measured.measure()?;
@@ -165,8 +163,7 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
     }
 }
 
-/// `samples` with the cost of an empty measurement taken off; never below a hundredth of what was
-/// measured, so that a rate stays finite.
+/// `samples` minus the cost of an empty measurement; at least a hundredth of it, for finite rates.
 pub(crate) fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
     samples
         .iter()

@@ -1,28 +1,27 @@
-//! The words that a sampler's kernel draws, and their comparison with the scalar twin over all that a run
-//! uses: every dimension, samples and seeds from the first to the last, pixels from corner to corner.
+//! Compares the words drawn by a sampler's kernel with the scalar twin over the whole range of a
+//! run: every dimension, samples and seeds from first to last, pixels from corner to corner.
 //!
-//! Tapped is the kernel `sampling/dump_stream`, which reads coordinates (pixel, sample, dimension, seed)
-//! from a buffer and imports the same modules as the renderer, under the same constants and with the same
-//! table.
+//! The words come from the kernel `sampling/dump_stream`, which reads coordinates (pixel, sample,
+//! dimension, seed) from a buffer and uses the renderer's modules, constants and table.
 
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Composition, Gpu, UniformValues, groups_for};
 use raystone_render::with_sampler;
 use raystone_sampling::{Coordinate, Sampler};
 
-/// Coordinates that are compared in all: those on borders, and random ones for the rest.
+/// Total number of coordinates compared: those at boundaries, and random ones for the rest.
 pub const WORDS: usize = 1 << 16;
-/// Masks and tiles of decorrelations have edges of a multiple of this, pixels.
+/// Edges of decorrelation masks and tiles are multiples of this, pixels.
 const TILE: u32 = 64;
 /// Pixels and seeds at which every sample is compared in every dimension.
 const PLACES: usize = 6;
 
-/// What a run draws from one sampler.
+/// The range that a run draws from one sampler.
 #[derive(Debug, Clone)]
 pub struct Used {
     /// Samples per pixel.
     pub samples: u32,
-    /// Dimensions.
+    /// Number of dimensions.
     pub dimensions: u32,
     /// Width and height of the image.
     pub size: [u32; 2],
@@ -30,8 +29,8 @@ pub struct Used {
     pub seeds: Vec<u32>,
 }
 
-/// The numbers below `end` at which something may change: the first ones, those around powers of two and
-/// halfway between, and the last ones.
+/// Numbers below `end` at which something may change: the first ones, those around powers of two
+/// and halfway between, and the last ones.
 fn borders(end: u32) -> Vec<u32> {
     let last = end.saturating_sub(1);
     let powers = (1..32).map(|k| 1_u32 << k);
@@ -45,7 +44,7 @@ fn borders(end: u32) -> Vec<u32> {
 }
 
 impl Used {
-    /// Pixels at the ends of rows and columns, and beside the borders of tiles.
+    /// Pixels at the ends of rows and columns, and next to tile borders.
     fn pixels(&self) -> Vec<u32> {
         let places = |edge: u32| {
             let tiles = [TILE, 2 * TILE].into_iter().flat_map(|t| [t - 1, t]);
@@ -65,8 +64,8 @@ impl Used {
         out
     }
 
-    /// The coordinates that are compared: every border of the samples in every dimension, every one of the
-    /// pixels with every seed, and random ones.
+    /// The coordinates to compare: every boundary sample in every dimension, every boundary pixel
+    /// with every seed, and random ones.
     pub fn coordinates(&self) -> Vec<Coordinate> {
         let mut random = Pcg32::new(u64::from(self.samples));
         let mut below = |end: usize| random.below(end.max(1));
@@ -104,10 +103,10 @@ impl Used {
     }
 }
 
-/// The first of the kernel's words that is not the twin's, in words, with the number of them.
+/// Compares the kernel's words with the twin's.
 ///
 /// # Errors
-/// Words differ.
+/// Words differ: the first one and their number.
 pub fn compare(sampler: &Sampler, at: &[Coordinate], words: &[u32]) -> Result<(), String> {
     let differs = |(at, word): &(&Coordinate, &u32)| sampler.sample_u32(**at) != **word;
     let mut wrong = at.iter().zip(words).filter(differs);
@@ -127,7 +126,7 @@ fn composition(sampler: &Sampler) -> Composition {
     with_sampler(Composition::new("sampling/dump_stream"), sampler)
 }
 
-/// Hash of the kernel that is tapped.
+/// Hash of the `dump_stream` kernel.
 ///
 /// # Errors
 /// It does not compose or compile.
@@ -136,7 +135,7 @@ pub(crate) fn kernel_hash(gpu: &Gpu, sampler: &Sampler) -> Result<String, String
     Ok(pipeline.map_err(|e| e.to_string())?.kernel.hash())
 }
 
-/// Compares the kernel's words with the twin's in all that a run uses, by one dispatch; returns how many.
+/// Compares the kernel's words with the twin's over a run's range; returns their number.
 ///
 /// # Errors
 /// A word differs, or the kernel does not run.
@@ -147,10 +146,10 @@ pub fn check_words(gpu: &Gpu, sampler: &Sampler, used: &Used) -> Result<usize, S
     Ok(words.len())
 }
 
-/// The u32 of every coordinate, as the kernel computes it.
+/// The u32 of every coordinate, as computed by the kernel.
 ///
 /// # Errors
-/// A dimension beyond those that the sampler was made for, or the kernel does not run.
+/// A dimension beyond those of the sampler, or the kernel does not run.
 pub fn dump_stream(
     gpu: &Gpu,
     sampler: &Sampler,

@@ -1,4 +1,4 @@
-//! The axes of the product of cells, each declared once: its name, what stands on it by default, what it means.
+//! The axes of the product of cells, each declared once with name, default and meaning.
 
 use std::fmt;
 use std::ops::{Index, IndexMut};
@@ -15,21 +15,21 @@ macro_rules! axes {
             /// All axes, in the order of tables and plans.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$axis),+];
 
-            /// The key under `[axes]`, and the name of the section with parameters.
+            /// The key under `[axes]`, and the name of its parameter section.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$axis => $name,)+
                 }
             }
 
-            /// What stands on the axis where an experiment says nothing of it; nothing if it has to.
+            /// The default; `None` if the experiment must name one.
             pub fn default_name(self) -> Option<&'static str> {
                 match self {
                     $(Self::$axis => None$(.or(Some($default)))?,)+
                 }
             }
 
-            /// What is on it, for the table of keys.
+            /// The meaning, for the table of keys.
             pub(crate) fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$axis => concat!($($doc),+).trim_ascii(),)+
@@ -71,12 +71,12 @@ axes! {
 }
 
 impl Axis {
-    /// The axis of this name.
+    /// Finds an axis by name.
     pub fn from_name(name: &str) -> Option<Axis> {
         Self::ALL.into_iter().find(|axis| axis.name() == name)
     }
 
-    /// What may stand on it, in words.
+    /// Describes the allowed values.
     pub(crate) fn expected(self) -> String {
         match self {
             Self::Scene => "a list of built-in scenes and paths of models".to_owned(),
@@ -94,15 +94,15 @@ impl fmt::Display for Axis {
     }
 }
 
-/// A value for each axis, read as `map[axis]`.
+/// A value per axis, indexed as `map[axis]`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct AxisMap<T>([T; Axis::ALL.len()]);
 
 impl<T> AxisMap<T> {
-    /// The value of each axis by `make`, in their order.
+    /// Creates each axis' value with `make`, in order.
     ///
     /// # Errors
-    /// The first one of `make`.
+    /// The first error of `make`.
     pub(crate) fn try_new<E>(make: impl FnMut(Axis) -> Result<T, E>) -> Result<Self, E>
     where
         T: Default,
@@ -115,7 +115,7 @@ impl<T> AxisMap<T> {
         Ok(map)
     }
 
-    /// Each axis with its value.
+    /// All axes with their values.
     pub fn iter(&self) -> impl Iterator<Item = (Axis, &T)> {
         Axis::ALL.into_iter().zip(&self.0)
     }

@@ -1,4 +1,4 @@
-//! Everything that an experiment may say: the entries of each axis, and sections of settings.
+//! Everything an experiment may contain: the entries of each axis, and sections of settings.
 
 use super::axis::{Axis, AxisMap};
 use super::sections::{
@@ -9,16 +9,15 @@ use raystone_core::params::{Entry, ParamValue, Parameter};
 use std::fmt::Write as _;
 use std::ops::{Index, IndexMut};
 
-/// Every name that an experiment may use, by axis, and every section of settings. Built from the registries, so that a new
-/// entry is known to the parser, `raystone list` and the docs without another edit. Scenes may be paths besides, kernels are
-/// nothing else.
+/// Every name an experiment may use, by axis, and every section of settings. Built from the
+/// registries, so a new entry reaches the parser, `raystone list` and the docs without another
+/// edit. Scenes may also be paths; kernels always are.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     entries: AxisMap<Vec<Entry>>,
     sections: Vec<Section>,
 }
 
-/// No entries, and the sections that every experiment has.
 impl Default for Catalogue {
     fn default() -> Self {
         Self {
@@ -53,7 +52,7 @@ impl IndexMut<Axis> for Catalogue {
 }
 
 impl Catalogue {
-    /// The sections of settings.
+    /// All sections of settings.
     pub fn sections(&self) -> &[Section] {
         &self.sections
     }
@@ -64,7 +63,7 @@ impl Catalogue {
         self.sections.push(Section::of::<S>());
     }
 
-    /// What may stand in a section of settings: its keys, and the tables within it.
+    /// Allowed keys of a section of settings, and the tables within it.
     pub(super) fn keys_of(&self, section: &str) -> Vec<&str> {
         let mut keys = Vec::new();
         for known in &self.sections {
@@ -79,7 +78,7 @@ impl Catalogue {
         keys
     }
 
-    /// The table of all keys in Markdown, as `docs/experiments.md` holds it.
+    /// Markdown table of all keys, as in `docs/experiments.md`.
     pub fn table(&self) -> String {
         let mut text = String::from("| Key | Value | Default | Meaning |\n|---|---|---|---|\n");
         axes(&mut text);
@@ -106,7 +105,7 @@ impl Catalogue {
     }
 }
 
-/// The default of a key as a file would say it.
+/// Default of a key, as written in a file.
 fn default(section: &Section, key: &Parameter) -> String {
     match key.default_written() {
         None if section.required.contains(&key.name) => NEEDED.to_owned(),
@@ -116,7 +115,7 @@ fn default(section: &Section, key: &Parameter) -> String {
     }
 }
 
-/// What stands in the table for the default of a key that must be given.
+/// Table entry in place of a default for a required key.
 const NEEDED: &str = "needed";
 
 fn axes(text: &mut String) {

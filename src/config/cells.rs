@@ -7,32 +7,32 @@ use std::fmt;
 use std::ops::Index;
 use std::sync::Arc;
 
-/// What is run together, and recorded under one key: a variant on each axis that matters to it.
+/// A unit of work recorded under one key: a variant on each axis that matters to it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cell {
-    /// Shared: a sweep has many cells and few variants.
+    /// Shared, as a sweep has many cells and few variants.
     variants: AxisMap<Option<Arc<Variant>>>,
-    /// Whether each seed makes its sampler draw other numbers; no without one.
+    /// True if each seed makes its sampler draw other numbers; false without a sampler.
     pub randomised: bool,
 }
 
-/// How names begin on the axis of integrators that are compactions of streams, which render nothing.
+/// Name prefix of integrators that are stream compactions, which render nothing.
 pub const COMPACTIONS: &str = "compaction:";
 
-/// The name on the axis of peers that stands for none.
+/// The peer name for none.
 pub const NO_PEER: &str = "none";
 
-/// How names begin on the axis of integrators that are parts of the numerical stress suite, which render nothing either.
+/// Name prefix of integrators that are parts of the numerical stress suite, which render nothing either.
 pub const STRESS: &str = "stress:";
 
-/// Whether an integrator renders nothing and needs no scene: it names a measurement of something else.
+/// True if an integrator renders nothing and needs no scene: it names a measurement of something else.
 pub fn is_bench(integrator: &Variant) -> bool {
     [COMPACTIONS, STRESS]
         .iter()
         .any(|of| integrator.name.starts_with(of))
 }
 
-/// What stands on an axis that does not matter.
+/// The value of an axis that does not matter.
 static NOTHING: Variant = Variant {
     name: String::new(),
     params: Params(BTreeMap::new()),
@@ -40,7 +40,7 @@ static NOTHING: Variant = Variant {
 };
 
 impl Cell {
-    /// What builds, gate and timings of a structure depend on.
+    /// Axes that build, correctness check and timings of a structure depend on.
     pub const STRUCTURE: [Axis; 6] = [
         Axis::Scene,
         Axis::Triangle,
@@ -49,7 +49,7 @@ impl Cell {
         Axis::Workgroup,
         Axis::Kernels,
     ];
-    /// What the error of a sampler depends on: not the structure, as hits are equal to the bit.
+    /// Axes that a sampler's error depends on: not the structure, as hits are bit-identical.
     pub const SAMPLER: [Axis; 8] = [
         Axis::Scene,
         Axis::Triangle,
@@ -60,9 +60,9 @@ impl Cell {
         Axis::Offset,
         Axis::Kernels,
     ];
-    /// What the times of a ray caster of others depend on.
+    /// Axes that the times of an external tracer depend on.
     pub const PEER: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Peer];
-    /// What an image and its time depend on.
+    /// Axes that an image and its time depend on.
     pub(crate) const FULL: [Axis; 11] = [
         Axis::Scene,
         Axis::Accel,
@@ -76,33 +76,33 @@ impl Cell {
         Axis::Workgroup,
         Axis::Kernels,
     ];
-    /// What may matter to a measurement that needs no scene.
+    /// Axes that a measurement without a scene depends on.
     pub(crate) const BENCH: [Axis; 4] =
         [Axis::Integrator, Axis::Kernels, Axis::Triangle, Axis::Accel];
-    /// What the words that a sampler draws depend on.
+    /// Axes that a sampler's random words depend on.
     pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
-    /// What is loaded, uploaded and judged once for all cells on it.
+    /// Axes of scene data loaded, uploaded and checked once for all cells.
     pub const WORLD: [Axis; 3] = [Axis::Scene, Axis::Triangle, Axis::BoxTest];
 
-    /// The variant on an axis, if that matters.
+    /// The variant on an axis, if it matters.
     pub fn get(&self, axis: Axis) -> Option<&Variant> {
         self.variants[axis].as_deref()
     }
 
-    /// The same cell with this variant on an axis.
+    /// The cell with this variant on an axis.
     #[must_use]
     pub fn with(self, axis: Axis, variant: &Variant) -> Self {
         self.sharing(axis, &Arc::new(variant.clone()))
     }
 
-    /// The same cell with a variant on an axis that other cells have as well.
+    /// [`Self::with`] for a variant shared with other cells.
     #[must_use]
     pub(super) fn sharing(mut self, axis: Axis, variant: &Arc<Variant>) -> Self {
         self.variants[axis] = Some(Arc::clone(variant));
         self
     }
 
-    /// Everything that stands on its axes, as a text that no other cell of the experiment has.
+    /// Text of all axes, unique within the experiment.
     pub fn identity(&self) -> String {
         let labels = self.variants.iter().map(|(_, variant)| match variant {
             Some(variant) => variant.label.as_str(),
@@ -111,7 +111,7 @@ impl Cell {
         labels.collect::<Vec<_>>().join("\u{1f}")
     }
 
-    /// The part of the cell on these axes.
+    /// The cell restricted to these axes.
     #[must_use]
     pub fn on(&self, axes: &[Axis]) -> Self {
         let variants = axes
@@ -122,20 +122,20 @@ impl Cell {
         })
     }
 
-    /// Whether `part` is this cell on the axes that matter to `part`.
+    /// True if `part` equals this cell on the axes that matter to `part`.
     pub fn is_on(&self, part: &Cell) -> bool {
         let mut axes = part.variants.iter();
         axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
     }
 
-    /// Labels on these axes, and behind them tests, offset, organisation, workgroup and kernels (`offset none`, `@idea`) where they
-    /// are not the default ones: what tells cells of a run apart.
+    /// Labels on these axes, followed by non-default tests, offset, organisation, workgroup and
+    /// kernels (`offset none`, `@idea`), to distinguish the cells of a run.
     pub fn labels(&self, axes: &[Axis]) -> Vec<String> {
         let named = axes.iter().map(|&axis| self[axis].label.clone());
         named.chain(self.unusual()).collect()
     }
 
-    /// Whether something else than the default stands on an axis.
+    /// True if an axis has a non-default value.
     pub fn is_unusual(&self, axis: Axis) -> bool {
         self.get(axis).is_some_and(|variant| {
             !variant.name.is_empty() && Some(variant.label.as_str()) != axis.default_name()
@@ -161,7 +161,7 @@ impl Cell {
     }
 }
 
-/// The variant on an axis; one of an empty name where it does not matter.
+/// The variant on an axis; one with an empty name if the axis does not matter.
 impl Index<Axis> for Cell {
     type Output = Variant;
 

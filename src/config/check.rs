@@ -1,5 +1,5 @@
-//! Checks of the merged tree that need no typed reading: is every section, key and name known, and
-//! does every section and pattern concern something that is on an axis.
+//! Checks of the merged tree that need no typed reading: unknown sections, keys and names, and
+//! sections and patterns that concern nothing on an axis.
 
 use super::axis::Axis;
 use super::error::{ConfigError, Place};
@@ -9,13 +9,11 @@ use super::settings::Section;
 use super::tree::{Item, Table, Value};
 use super::{Catalogue, variants};
 
-/// The section of what is varied.
 pub(super) const AXES: &str = "axes";
 
-/// The sections of tables that each name cells.
 const CELL_SETS: [&str; 2] = ["exclude", "include"];
 
-/// Every section, key and entry that is written must be known.
+/// Checks that every section, key and entry is known.
 pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), ConfigError> {
     let axes = Axis::ALL.map(Axis::name);
     for (name, item) in tree {
@@ -40,7 +38,7 @@ pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), 
     Ok(())
 }
 
-/// Keys of a section of settings, and of the tables within it.
+/// Checks the keys of a section of settings, and of the tables within it.
 fn check_settings(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), ConfigError> {
     let keys = catalogue.keys_of(name);
     let expected = if name.contains('.') {
@@ -82,12 +80,11 @@ fn unknown_section(name: &str, item: &Item, catalogue: &Catalogue) -> ConfigErro
     ConfigError::unknown(&item.at, what, name, known)
 }
 
-/// What messages call a key of a section.
 pub(super) fn key_in(section: &str) -> String {
     format!("key in [{section}]")
 }
 
-/// Keys that are written must be among those known; `what` is what messages call them.
+/// Checks that keys are among those known; `what` describes them in messages.
 pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<(), ConfigError> {
     let is_known = |name: &String| known.contains(&name.as_str());
     match table.iter().find(|(name, _)| !is_known(name)) {
@@ -99,7 +96,6 @@ pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<()
     }
 }
 
-/// The tables of a section that names cells.
 pub(super) fn cell_tables<'t>(
     section: &str,
     item: &'t Item,
@@ -114,8 +110,7 @@ pub(super) fn cell_tables<'t>(
     }
 }
 
-/// The parameter tables of an entry: one `[axis.NAME]`, or several `[[axis.NAME]]`, each of which
-/// makes variants of its own.
+/// The parameter tables of an entry: one `[axis.NAME]`, or several separate `[[axis.NAME]]`.
 pub(super) fn parameter_tables<'t>(
     axis: Axis,
     entry: &str,
@@ -132,8 +127,8 @@ pub(super) fn parameter_tables<'t>(
     }
 }
 
-/// Sections with parameters are for entries on the axis. Where the command line replaced the axis,
-/// the file's sections for other entries are left over, not wrong.
+/// Checks that parameter sections are for entries on the axis. If the command line replaced the
+/// axis, the file's sections for other entries are allowed.
 pub(super) fn check_on_axis(
     axis: Axis,
     parameters: &Table,
@@ -154,7 +149,7 @@ pub(super) fn check_on_axis(
     Ok(())
 }
 
-/// Patterns that each fit a variant of their axis, unless `lenient`.
+/// Patterns that each match a variant of their axis, unless `lenient`.
 pub(super) fn pattern_list(
     axis: Axis,
     texts: &[(&Item, &str)],
@@ -178,7 +173,7 @@ pub(super) fn pattern_list(
     patterns.collect()
 }
 
-/// The texts of a list that is not empty; a text alone is a list of one.
+/// The texts of a non-empty list; a single text is a list of one.
 pub(super) fn texts<'t>(
     key: &str,
     item: &'t Item,

@@ -1,4 +1,4 @@
-//! What can be wrong with an experiment, said with the key, the place and what to do.
+//! Errors of experiment files, with key, place and remedy.
 
 use raystone_core::text::nearest;
 use std::fmt;
@@ -6,24 +6,24 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Where a value was written.
+/// The place where a value was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// In the experiment file.
     File {
-        /// The file as the user named it.
+        /// The file as named by the user.
         file: Arc<str>,
-        /// Line, counted from 1.
+        /// Line, from 1.
         line: usize,
     },
     /// On the command line, as `--set TEXT`.
     Override(Arc<str>),
-    /// Nowhere: the value is the default of its key.
+    /// Nowhere: the value is its key's default.
     Default,
 }
 
 impl Place {
-    /// The first line of a file, for what is missing from it.
+    /// The first line of a file, for anything missing from it.
     pub(super) fn start_of(file: &str) -> Self {
         Self::File {
             file: file.into(),
@@ -42,7 +42,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What can be wrong with an experiment file, its overrides, or a filter of its cells.
+/// Errors of an experiment file, its overrides, or a filter of its cells.
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
@@ -50,129 +50,129 @@ pub enum ConfigError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// The text is not TOML (a key written twice is one such fault).
+    /// The text is not TOML (for instance, a key is written twice).
     #[error("{at}: not valid TOML: {message}")]
     Syntax {
-        /// Where.
+        /// The place.
         at: Place,
-        /// The TOML parser's words.
+        /// The TOML parser's message.
         message: String,
     },
-    /// A section, key or name that nobody knows.
+    /// An unknown section, key or name.
     #[error("{at}: unknown {what} `{name}`{}", suggestion(name, known))]
     Unknown {
-        /// Where.
+        /// The place.
         at: Place,
-        /// What was expected: `section`, `key in [run]`, `accel`, …
+        /// The kind expected: `section`, `key in [run]`, `accel`, …
         what: String,
-        /// What was written.
+        /// The text written.
         name: String,
-        /// Everything that could have been written.
+        /// All allowed names.
         known: Vec<String>,
     },
     /// A value of the wrong type.
     #[error("{at}: `{key}` must be {expected}, not {found}")]
     WrongType {
-        /// Where.
+        /// The place.
         at: Place,
         /// Full key.
         key: String,
-        /// The type and range of the key.
+        /// Type and range of the key.
         expected: String,
-        /// What was written.
+        /// The value written.
         found: String,
     },
     /// A value of the right type that is not allowed.
     #[error("{at}: `{key}` = {value} is not allowed; it must be {expected}")]
     OutOfRange {
-        /// Where.
+        /// The place.
         at: Place,
         /// Full key.
         key: String,
-        /// What was written.
+        /// The value written.
         value: String,
-        /// What is allowed.
+        /// The allowed values.
         expected: String,
     },
-    /// A key without a default is absent.
+    /// A required key is missing.
     #[error("{at}: `{key}` is missing; add it, as {expected}")]
     Missing {
         /// The file or section.
         at: Place,
         /// Full key.
         key: String,
-        /// The type and range of the key.
+        /// Type and range of the key.
         expected: String,
     },
-    /// An axis or a list of parameter values without an element.
+    /// An axis or list of parameter values is empty.
     #[error("{at}: `{key}` is empty; list at least one value, or leave the key out")]
     Empty {
-        /// Where.
+        /// The place.
         at: Place,
         /// Full key.
         key: String,
     },
-    /// The same value twice in one list.
+    /// A list contains the same value twice.
     #[error("{at}: `{key}` lists {value} twice; remove one")]
     Duplicate {
-        /// Where.
+        /// The place.
         at: Place,
         /// Full key.
         key: String,
         /// The repeated value.
         value: String,
     },
-    /// More variants or cells than anybody can want to run.
+    /// Too many variants or cells to run.
     #[error("{at}: {what} make {count} or more, the limit is {limit}; list fewer values")]
     TooMany {
-        /// Where.
+        /// The place.
         at: Place,
-        /// What is multiplied.
+        /// The factors.
         what: String,
-        /// How many there would be, or a part of them.
+        /// Their number, or a lower bound.
         count: usize,
-        /// How many there may be.
+        /// The limit.
         limit: usize,
     },
-    /// Parameters for an entry that the experiment does not use.
+    /// Parameters are set for an entry that the experiment does not use.
     #[error(
         "{at}: [{axis}.{name}] sets parameters, but `{name}` is not in axes.{axis} ({}); \
          add it there or remove the section",
         quoted(used)
     )]
     NotOnAxis {
-        /// Where.
+        /// The place.
         at: Place,
         /// The axis.
         axis: &'static str,
         /// The entry.
         name: String,
-        /// The names that are on the axis.
+        /// The names on the axis.
         used: Vec<String>,
     },
-    /// An override that is not of the form `key=value`.
+    /// An override does not have the form `key=value`.
     #[error("--set {text}: {problem}; write --set section.key=value")]
     Override {
         /// The argument.
         text: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// A filter that is not of the form `axis=pattern`.
+    /// A filter does not have the form `axis=pattern`.
     #[error("--only {text}: {problem}; write --only axis=pattern, for instance accel=bvh*")]
     Only {
         /// The argument.
         text: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// A pattern of an exclude or a filter that fits no variant of its axis.
+    /// A pattern of an exclude or filter matches no variant of its axis.
     #[error("{at}: no {axis} fits `{pattern}`{}", suggestion(pattern, known))]
     NoMatch {
-        /// Where: a place in the file, or the filter.
+        /// A place in the file, or the filter.
         at: String,
         /// The axis.
         axis: &'static str,
@@ -181,36 +181,36 @@ pub enum ConfigError {
         /// Labels of the variants on the axis.
         known: Vec<String>,
     },
-    /// An exclude whose patterns all fit something, but never the same cell.
+    /// The patterns of an exclude each match something, but never the same cell.
     #[error("{at}: this [[{section}]] ({exclude}) fits no cell; correct or remove it")]
     UselessExclude {
-        /// Where.
+        /// The place.
         at: Place,
         /// Its patterns.
         exclude: String,
         /// `exclude` or `include`.
         section: &'static str,
     },
-    /// A sequence and a decorrelation that make no sense together.
+    /// A sequence and a decorrelation are incompatible.
     #[error("{at}: {reason}")]
     Refused {
         /// File and section.
         at: String,
-        /// The pair, and why.
+        /// The pair and the reason.
         reason: String,
     },
-    /// Excludes and filters leave nothing.
+    /// Excludes and filters remove every cell.
     #[error("{file}: nothing is left to run: {reason}")]
     NothingLeft {
         /// The experiment file.
         file: String,
-        /// What removed the last cell.
+        /// The rule that removed the last cell.
         reason: String,
     },
 }
 
 impl ConfigError {
-    /// The error for a name that is not among those known.
+    /// The error for an unknown name.
     pub(super) fn unknown<'n>(
         at: &Place,
         what: impl Into<String>,
@@ -226,7 +226,7 @@ impl ConfigError {
     }
 }
 
-/// Longest list of known names that an error message spells out.
+/// Maximum number of known names in an error message.
 const LIST_LIMIT: usize = 16;
 
 fn suggestion(name: &str, known: &[String]) -> String {

@@ -1,4 +1,4 @@
-//! What an experiment should show: the numbers and claims of a thesis, beside the experiment that tests them.
+//! Expected results: the numbers and claims of a thesis, next to the experiment that tests them.
 //!
 //! An experiment file of a thesis has more sections, which change nothing that is measured: `[thesis]` says what is
 //! reproduced, `[[substitute]]` which scene stands for which, `[[expect]]` what is claimed, `[quick]` what a short run
@@ -12,51 +12,50 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// The sections of this module.
 const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "software"];
 
-/// What a thesis printed, and how the experiment tests it.
+/// Printed results of a thesis, or targets of an experiment, and the tests of them.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thesis {
     /// What is reproduced; empty where an experiment has targets of its own.
     pub title: String,
-    /// Stem of the digest's file, for instance `dufay-2017`.
+    /// File stem of the digest, for instance `dufay-2017`.
     pub source: String,
-    /// How an ambiguous text was read, what differs, and why.
+    /// Interpretation of ambiguous text, differences, and reasons.
     #[serde(default)]
     pub reading: String,
-    /// Scenes in the place of the thesis's.
+    /// Scenes used instead of the thesis' own.
     #[serde(skip)]
     pub substitutes: Vec<Substitute>,
-    /// What is expected.
+    /// Expected results.
     #[serde(skip)]
     pub expects: Vec<Expect>,
-    /// Overrides (`section.key=value`) that make a run short and built-in.
+    /// Overrides (`section.key=value`) for a short run with built-in scenes.
     #[serde(skip)]
     pub quick: Vec<String>,
-    /// Overrides of a whole run on a software adapter, where sizes of a GPU would take hours.
+    /// Overrides for a full run on a software adapter, where GPU sizes would take hours.
     #[serde(skip)]
     pub software: Vec<String>,
 }
 
-/// A scene in the place of the thesis's.
+/// A scene used instead of one of the thesis.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Substitute {
-    /// What the thesis calls its scene.
+    /// The thesis' name of its scene.
     pub original: String,
-    /// Its triangles there.
+    /// Its number of triangles.
     #[serde(default)]
     pub triangles: Option<u64>,
-    /// Ours: a built-in scene (of which a pattern can choose a variant: `instances(*count=8*`), or a path below the scene
-    /// directory; none if nothing fits.
+    /// Our scene: built-in (a pattern can select a variant: `instances(*count=8*`), or a path below
+    /// the scene directory; `None` if nothing is suitable.
     #[serde(default)]
     pub scene: Option<String>,
-    /// The same for short runs, built in; none leaves it out of them.
+    /// The built-in scene for short runs; `None` omits it from them.
     #[serde(default)]
     pub quick: Option<String>,
-    /// How they differ.
+    /// How the scenes differ.
     #[serde(default)]
     pub why: String,
 }
@@ -65,30 +64,30 @@ pub struct Substitute {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Compare {
-    /// Not at all: both are shown.
+    /// Not compared: both are shown.
     Shown,
-    /// The value itself against bounds.
+    /// The value against bounds.
     Bound,
-    /// The value over another one against bounds.
+    /// The ratio of two values against bounds.
     Ratio,
-    /// Values of several selections, or their ratios to others, ascend in the order given.
+    /// Values of several selections, or their ratios to others, ascend in the given order.
     Order,
     /// The exponent of a power law along an axis against bounds.
     Slope,
 }
 
-/// On which devices a figure speaks.
+/// Devices on which a figure is meaningful.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Speaks {
-    /// Counts, errors, times of the host: wherever it was measured.
+    /// Any device: counts, errors, host times.
     #[default]
     Any,
-    /// Times of a device: not on a software adapter.
+    /// Not a software adapter: device times.
     Gpu,
 }
 
-/// Axis → pattern (see [`super::Pattern`]) that its label has to fit.
+/// Axis → pattern (see [`super::Pattern`]) for its label.
 pub type Pick = BTreeMap<String, String>;
 
 /// An expectation.
@@ -98,88 +97,88 @@ pub type Pick = BTreeMap<String, String>;
 pub struct Expect {
     /// Name, unique in its file.
     pub id: String,
-    /// What the thesis claims, or prints.
+    /// The thesis' claim or printed value.
     pub says: String,
-    /// Hypotheses of the digest that it tests, for instance `H5`.
+    /// The digest's hypotheses that it tests, for instance `H5`.
     #[serde(default)]
     pub claims: Vec<String>,
     /// The figure, see `measure`'s table of figures.
     pub figure: String,
     /// How values are compared.
     pub compare: Compare,
-    /// What is compared.
+    /// The selection compared.
     #[serde(default)]
     pub of: Pick,
-    /// What it is divided by; of an order, what each of its parts is divided by.
+    /// Divisor; for an order, the divisor of each part.
     #[serde(default)]
     pub over: Pick,
     /// Selections whose values should ascend.
     #[serde(default)]
     pub order: Vec<Pick>,
-    /// Axis of numbers that a slope is taken along.
+    /// Numeric axis for a slope.
     #[serde(default)]
     pub along: Option<String>,
-    /// Least value (ratio, exponent) that agrees.
+    /// Minimum value (ratio, exponent) that agrees.
     #[serde(default)]
     pub least: Option<f64>,
-    /// Greatest one.
+    /// Maximum value that agrees.
     #[serde(default)]
     pub most: Option<f64>,
-    /// Factor about the thesis's value within which ours agrees.
+    /// Agrees within this factor of the thesis' value.
     #[serde(default)]
     pub within: Option<f64>,
-    /// Distance from the thesis's value within which ours agrees.
+    /// Agrees within this distance of the thesis' value.
     #[serde(default)]
     pub off_by: Option<f64>,
-    /// Unit of the thesis's values, where they are values of the figure; empty: that of the figure.
+    /// Unit of the thesis' values, if they are values of the figure; empty for the figure's unit.
     #[serde(default)]
     pub unit: String,
-    /// On which devices it speaks.
+    /// Devices on which it is meaningful.
     #[serde(default)]
     pub device: Speaks,
-    /// Column of the original's table.
+    /// Column of the original table.
     #[serde(default)]
     pub column: String,
-    /// How an ambiguous text was read.
+    /// Interpretation of ambiguous text.
     #[serde(default)]
     pub reading: String,
-    /// Counted figures that explain, compared or shown in the same way.
+    /// Counted figures that explain it, compared or shown in the same way.
     #[serde(default)]
     pub explain: Vec<String>,
-    /// The places of the original's table; without any, wherever the selections fit.
+    /// Places in the original table; if empty, wherever the selections match.
     #[serde(default)]
     pub at: Vec<At>,
 }
 
-/// A place of the original's table.
+/// A place in the original table.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct At {
-    /// Row of the original's table.
+    /// Row of the original table.
     #[serde(default)]
     pub row: String,
-    /// Column, if another than that of the expectation.
+    /// Column, if it differs from the expectation's.
     #[serde(default)]
     pub column: String,
     /// Original scene, see [`Substitute::original`].
     #[serde(default)]
     pub on: Option<String>,
-    /// What the thesis prints.
+    /// The printed value.
     #[serde(default)]
     pub thesis: Option<f64>,
-    /// More of [`Expect::of`].
+    /// Additions to [`Expect::of`].
     #[serde(default)]
     pub of: Pick,
-    /// More of [`Expect::over`].
+    /// Additions to [`Expect::over`].
     #[serde(default)]
     pub over: Pick,
-    /// In the place of [`Expect::least`].
+    /// Replaces [`Expect::least`].
     #[serde(default)]
     pub least: Option<f64>,
-    /// In the place of [`Expect::most`].
+    /// Replaces [`Expect::most`].
     #[serde(default)]
     pub most: Option<f64>,
-    /// Whether a short run leaves it out.
+    /// True to omit it from short runs.
     #[serde(default)]
     pub full_only: bool,
 }
@@ -197,7 +196,7 @@ struct File {
     software: Changes,
 }
 
-/// What a kind of run changes.
+/// Overrides of a kind of run.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Changes {
@@ -209,7 +208,7 @@ impl Thesis {
     /// Reads these sections of an experiment; `None` without `[thesis]` and `[[expect]]`.
     ///
     /// # Errors
-    /// An unknown key (with the nearest known one), a wrong type, an expectation that cannot be judged.
+    /// An unknown key (with the nearest known one), a wrong type, or an untestable expectation.
     pub fn parse(text: &str, file: &str) -> Result<Option<Self>, ConfigError> {
         let parsed: File = toml::from_str(text).map_err(|error| fault(text, file, &error))?;
         if parsed.thesis.is_none() && parsed.expect.is_empty() {
@@ -227,9 +226,10 @@ impl Thesis {
     fn check(&self, file: &str) -> Result<(), ConfigError> {
         let mut ids = BTreeSet::new();
         for expect in &self.expects {
-            let complaint = match ids.insert(&expect.id) {
-                false => Some("another one has this id".to_owned()),
-                true => expect.complaint(&self.substitutes),
+            let complaint = if ids.insert(&expect.id) {
+                expect.complaint(&self.substitutes)
+            } else {
+                Some("another one has this id".to_owned())
             };
             if let Some(complaint) = complaint {
                 let problem = format!("[[expect]] id = \"{}\": {complaint}", expect.id);
@@ -241,7 +241,7 @@ impl Thesis {
 }
 
 impl Expect {
-    /// What is wrong with it, if anything is.
+    /// The problem with the expectation, if any.
     fn complaint(&self, substitutes: &[Substitute]) -> Option<String> {
         let bounds = [self.least, self.most, self.within, self.off_by];
         let at_bounds = |at: &At| at.least.or(at.most).is_some();
@@ -292,7 +292,7 @@ fn refused(file: &str, reason: String) -> ConfigError {
     }
 }
 
-/// A fault of one of these sections, with the nearest known key where one is unknown.
+/// An error in one of these sections, with the nearest known key for an unknown one.
 fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let offset = error.span().map_or(0, |span| span.start);
     let line = 1 + text[..offset.min(text.len())].matches('\n').count();
@@ -315,7 +315,7 @@ fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     }
 }
 
-/// Takes these sections out of an experiment's tree, which has no use for them: whether there were any.
+/// Removes these sections from an experiment's tree. Returns true if there were any.
 pub(super) fn take(tree: &mut Table) -> bool {
     let mut any = false;
     for section in SECTIONS {
@@ -324,8 +324,8 @@ pub(super) fn take(tree: &mut Table) -> bool {
     any
 }
 
-/// Whether two texts are the same experiment: equal but for comments and these sections, with the same overrides
-/// behind them (as `# --set …`).
+/// True if two texts are the same experiment: equal except for comments and these sections, with
+/// the same overrides appended (as `# --set …`).
 pub fn same_experiment(a: &str, b: &str) -> bool {
     let read = |text: &str| {
         let mut table: toml::Table = toml::from_str(text).ok()?;

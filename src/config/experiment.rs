@@ -14,50 +14,50 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-/// What is run. Keys, ranges and defaults of settings stand in their structs, and in `docs/experiments.md`.
+/// A checked experiment. For keys, ranges and defaults see `docs/experiments.md`.
 // Many fields: one for each section of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Name of the run.
     pub name: String,
-    /// The file as the user named it.
+    /// The file as named by the user.
     pub source: String,
-    /// The file's text, with the overrides appended as comments.
+    /// The file's text with the overrides appended as comments.
     pub text: String,
     /// The overrides.
     pub overrides: Vec<String>,
-    /// What all measurements share.
+    /// Settings shared by all measurements.
     pub run: Run,
-    /// When a sampler is ended before the most samples.
+    /// Rule for stopping a sampler early.
     pub stop: Option<StopRule>,
-    /// Camera for all scenes; `None` leaves it to each scene.
+    /// Camera for all scenes; `None` uses each scene's own.
     pub camera: Option<Camera>,
-    /// What is varied.
+    /// The varied axes.
     pub axes: Axes,
-    /// Cells left out …
+    /// Excluded cells.
     pub excludes: Vec<CellSet>,
-    /// … but these.
+    /// Exceptions from the excludes.
     pub includes: Vec<CellSet>,
-    /// Variants that go with some cells only.
+    /// Variants restricted to some cells.
     pub conditions: Vec<Condition>,
-    /// The image that errors are taken against.
+    /// The reference image for errors.
     pub reference: Reference,
     /// The timing protocol.
     pub timing: Timing,
-    /// The gate.
+    /// Settings of the correctness check.
     pub gate: Gate,
-    /// Star discrepancy of the streams.
+    /// Settings of the streams' star discrepancy.
     pub discrepancy: Discrepancy,
-    /// The model of coherence; `None` if nothing is to be modelled.
+    /// The coherence model; `None` without one.
     pub coherence: Option<Coherence>,
-    /// What moves; `None` if nothing does.
+    /// Animation settings; `None` without motion.
     pub animation: Option<Animation>,
-    /// What is written of sections that others added to the catalogue, see [`Experiment::settings`].
+    /// Values of sections added to the catalogue by others, see [`Experiment::settings`].
     pub further: BTreeMap<String, Params>,
 }
 
 impl Experiment {
-    /// Width of an image over its height.
+    /// Aspect ratio of an image, width over height.
     pub fn aspect(&self) -> f32 {
         let [width, height] = self.run.resolution;
         width as f32 / height as f32
@@ -67,7 +67,7 @@ impl Experiment {
 /// The axes of the product, each with at least one variant.
 pub type Axes = AxisMap<Vec<Variant>>;
 
-/// A variant that goes with some cells only.
+/// A variant restricted to some cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
     /// Its axis.
@@ -78,15 +78,14 @@ pub struct Condition {
     pub cells: Vec<CellSet>,
 }
 
-/// Cells that fit a pattern on every axis named.
+/// Cells that match a pattern on every axis named.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellSet {
-    /// Where it was written.
+    /// The place in the file.
     pub at: Place,
-    /// Patterns by axis: any one of an axis' patterns has to fit. Never empty.
+    /// Patterns by axis, of which one per axis must match. Never empty.
     pub patterns: Vec<(Axis, Vec<Pattern>)>,
-    /// Whether it may fit nothing without being a mistake: an axis that it names was replaced on
-    /// the command line.
+    /// True if matching nothing is allowed, because the command line replaced one of its axes.
     pub lenient: bool,
 }
 
@@ -101,21 +100,21 @@ impl fmt::Display for CellSet {
     }
 }
 
-/// A reference is rendered in this many independent parts: its halves make error estimates
-/// unbiased, its parts are the other side of the bias check.
+/// Number of independent parts of a reference: its halves make error estimates unbiased, and the
+/// bias check compares against the parts.
 pub const REFERENCE_PARTS: u32 = 8;
 
-/// Every seed that images of an experiment are rendered with.
+/// All image seeds of an experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds {
-    /// Of the replicates, in their order.
+    /// Seeds of the replicates, in order.
     pub replicates: Vec<u32>,
-    /// Of the parts of every reference, in their order.
+    /// Seeds of each reference's parts, in order.
     pub reference_parts: Vec<u32>,
 }
 
 impl Seeds {
-    /// The first seed that a replicate shares with a part of the reference.
+    /// The first seed shared by a replicate and a reference part.
     pub fn shared(&self) -> Option<u32> {
         let shared = |seed: &&u32| self.reference_parts.contains(seed);
         self.replicates.iter().find(shared).copied()
@@ -127,8 +126,8 @@ impl Experiment {
     /// key wins) and checks the result against `catalogue`.
     ///
     /// # Errors
-    /// Everything that [`ConfigError`] lists; messages name the key, the file and line or the
-    /// override, and for unknown names the nearest known one.
+    /// Any [`ConfigError`]; messages name the key, the file and line or the override, and for
+    /// unknown names the nearest known one.
     pub fn load(
         path: &Path,
         overrides: &[String],
@@ -149,7 +148,7 @@ impl Experiment {
         Self::parse(&text, &file, overrides, catalogue)
     }
 
-    /// The same as [`Experiment::load`] for a text; `file` is what messages call it.
+    /// [`Experiment::load`] for a text; `file` is its name in messages.
     ///
     /// # Errors
     /// As [`Experiment::load`].
@@ -162,14 +161,13 @@ impl Experiment {
         parse::parse(text, file, overrides, catalogue)
     }
 
-    /// The settings of a section that was added to the catalogue; `None` where the experiment does not write it.
+    /// Settings of a section added to the catalogue; `None` if the experiment does not contain it.
     pub fn settings<S: Settings>(&self) -> Option<S> {
         self.further.get(S::SECTION).map(S::from_checked)
     }
 
-    /// The seeds that renders use, modulo 2³²: consecutive integers from `run.seed` on for replicates,
-    /// from a hash of `reference.seed` on for the parts of a reference, so that neighbouring numbers in
-    /// the file do not meet.
+    /// Render seeds, modulo 2³²: consecutive integers from `run.seed` on for replicates, and from a
+    /// hash of `reference.seed` on for reference parts, so neighbouring numbers do not collide.
     pub fn seeds(&self) -> Seeds {
         let from = |first: u32, count| (0..count).map(|i| first.wrapping_add(i)).collect();
         Seeds {

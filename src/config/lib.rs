@@ -1,8 +1,9 @@
 //! Experiment files: parse, validate, expand axes into cells.
 //!
-//! [`Experiment::load`] reads a file, lays the overrides of the command line over it, and checks every key and every name
-//! against a [`Catalogue`]: settings are structs ([`Settings`]), which say all there is to a key. [`Plan::new`] turns the axes into the cells that have to be run, and
-//! [`cell_hash`](raystone_core::text::cell_hash) gives each its content hash.
+//! [`Experiment::load`] reads a file, applies command-line overrides, and checks every key and name
+//! against a [`Catalogue`]; settings are fully declared by structs ([`Settings`]). [`Plan::new`]
+//! expands the axes into the cells to run, and [`cell_hash`](raystone_core::text::cell_hash) hashes
+//! the content of each.
 #![warn(missing_docs)]
 
 mod axis;

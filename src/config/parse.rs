@@ -1,4 +1,4 @@
-//! The walk from the merged tree to a checked [`Experiment`].
+//! Converts the merged tree to a checked [`Experiment`].
 
 use super::axis::Axis;
 use super::cells::{COMPACTIONS, STRESS};
@@ -58,10 +58,10 @@ pub(super) fn parse(
     Ok(experiment)
 }
 
-/// File and overrides in one tree.
+/// Merges file and overrides into one tree.
 fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
     let mut tree = tree::parse_file(text, file)?;
-    // What a thesis says changes nothing that is measured; a fault in it is an error all the same.
+    // The thesis sections do not affect measurements, but an error in them is still an error.
     if expect::take(&mut tree) {
         expect::Thesis::parse(text, file)?;
     }
@@ -87,10 +87,9 @@ fn file_stem(file: &str) -> String {
     stem.map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into())
 }
 
-/// Reads sections of the merged tree.
 struct Reader<'t> {
     tree: &'t Table,
-    /// What is written under `[axes]`, and what stands on the others.
+    /// The `[axes]` section, and defaults of the other axes.
     axes: Table,
     file: &'t str,
     catalogue: &'t Catalogue,
@@ -134,7 +133,6 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// The section of parameters of entries on an axis.
     fn parameters(&self, axis: Axis) -> Result<Option<&'t Table>, ConfigError> {
         let item = self.tree.get(axis.name());
         item.map(|item| item.table(axis.name(), "sections"))
@@ -153,7 +151,7 @@ impl<'t> Reader<'t> {
         self.axes.get(axis.name()).ok_or_else(missing)
     }
 
-    /// The variants of one axis, in the order of the file.
+    /// The variants of one axis, in file order.
     fn axis(&self, axis: Axis) -> Result<Vec<Variant>, ConfigError> {
         let key = format!("{AXES}.{axis}");
         let list = self.names(axis)?;
@@ -175,7 +173,7 @@ impl<'t> Reader<'t> {
             };
             for table in tables {
                 for variant in variants::expand(axis, &entry, table)? {
-                    // Tables may meet, most often in the defaults.
+                    // Tables may overlap, most often in the defaults.
                     if !variants.contains(&variant) {
                         variants.push(variant);
                     }
@@ -191,7 +189,6 @@ impl<'t> Reader<'t> {
         Ok(variants)
     }
 
-    /// Cells that are left out, or kept.
     fn cell_sets(&self, section: &str, axes: &Axes) -> Result<Vec<CellSet>, ConfigError> {
         let Some(item) = self.tree.get(section) else {
             return Ok(Vec::new());
@@ -202,7 +199,6 @@ impl<'t> Reader<'t> {
             .collect()
     }
 
-    /// The patterns of a table, by axis.
     fn cell_set(
         &self,
         section: &str,
@@ -233,7 +229,6 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// What `when` says in tables of parameters.
     fn conditions(&self, axes: &Axes) -> Result<Vec<Condition>, ConfigError> {
         let mut conditions = Vec::new();
         for axis in Axis::ALL {
@@ -252,7 +247,7 @@ impl<'t> Reader<'t> {
                         None => None,
                     });
                 }
-                // A table without a condition makes the variant whatever others say.
+                // A table without a condition allows the variant everywhere.
                 let cells: Option<Vec<CellSet>> = cells.into_iter().collect();
                 if let Some(cells) = cells.filter(|cells| !cells.is_empty()) {
                     conditions.push(Condition {
@@ -280,7 +275,6 @@ impl<'t> Reader<'t> {
         self.cell_set(&key, (&item.at, table), axes)
     }
 
-    /// The tables of parameters of an entry on an axis.
     fn tables_of(&self, axis: Axis, name: &str) -> Result<Vec<&'t Table>, ConfigError> {
         match self.parameters(axis)?.and_then(|entries| entries.get(name)) {
             Some(item) => parameter_tables(axis, name, item),
@@ -292,14 +286,14 @@ impl<'t> Reader<'t> {
         variants::resolve(axis, &Place::Default, name, self.catalogue)
     }
 
-    /// Whether the command line changed the names or the parameters of an axis.
+    /// True if the command line changed the names or parameters of an axis.
     fn is_overridden(&self, axis: Axis) -> Result<bool, ConfigError> {
         let parameters = self.tree.get(axis.name());
         let changed = parameters.is_some_and(Item::has_override);
         Ok(changed || matches!(self.names(axis)?.at, Place::Override(_)))
     }
 
-    /// The reference with its sampler as the catalogue knows it.
+    /// The reference, with its sampler resolved in the catalogue.
     fn reference(&self, mut reference: Reference, axes: &Axes) -> Result<Reference, ConfigError> {
         let places = [
             (Axis::Sequence, &mut reference.sequence),
@@ -311,7 +305,7 @@ impl<'t> Reader<'t> {
             let entry = variants::resolve(axis, at, &variant.name, self.catalogue)?;
             *variant = entry.default_variant();
         }
-        // One image cannot be what several scenes should look like.
+        // A single image cannot be the reference of several scenes.
         let scenes = axes[Axis::Scene].len();
         if reference.file.is_some() && scenes > 1 {
             let expected =
@@ -321,7 +315,7 @@ impl<'t> Reader<'t> {
         Ok(reference)
     }
 
-    /// No replicate may share its seed with a part of the reference: their errors would be correlated,
+    /// Checks that no replicate shares its seed with a reference part: errors would be correlated,
     /// and a hash sampler would compare an image with itself.
     fn check_reference_seed(&self, experiment: &Experiment) -> Result<(), ConfigError> {
         let seeds = experiment.seeds();

@@ -1,22 +1,21 @@
-//! Patterns that choose variants (names with `*`, optionally negated), and what `--only` chooses by them.
+//! Patterns that select variants (names with `*`, optionally negated), and their use by `--only`.
 
 use super::ConfigError;
 use raystone_core::params::Variant;
 use raystone_core::text::nearest;
 use std::fmt;
 
-/// Chooses variants of one axis: a name, a label, or either with `*` for any text; a leading `!`
-/// turns the choice round.
+/// Selects variants of one axis by name or label, with `*` for any text; a leading `!` negates.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(String);
 
 impl Pattern {
-    /// A pattern from its text; every text is a pattern.
+    /// Creates a pattern; every text is valid.
     pub fn new(text: impl Into<String>) -> Self {
         Self(text.into())
     }
 
-    /// Whether the pattern chooses `variant`, by its name or by its label.
+    /// True if the pattern matches the name or label of `variant`.
     pub fn matches(&self, variant: &Variant) -> bool {
         let (positive, glob) = match self.0.strip_prefix('!') {
             Some(rest) => (false, rest),
@@ -26,7 +25,7 @@ impl Pattern {
         fits == positive
     }
 
-    /// Whether the pattern chooses a plain text.
+    /// True if the pattern matches a plain text.
     pub fn fits_text(&self, text: &str) -> bool {
         match self.0.strip_prefix('!') {
             Some(rest) => !glob_matches(rest, text),
@@ -34,7 +33,7 @@ impl Pattern {
         }
     }
 
-    /// The pattern without its negation: what must exist for the pattern to make sense.
+    /// The pattern without its negation, which must match something to make sense.
     pub(super) fn without_negation(&self) -> Pattern {
         Pattern(self.0.trim_start_matches('!').to_owned())
     }
@@ -46,17 +45,18 @@ impl fmt::Display for Pattern {
     }
 }
 
-/// What `--only` of any command chooses: patterns by axis. Those of one axis are alternatives, different axes must all fit.
+/// The selection of `--only`: patterns by axis. One pattern per axis must match, on all axes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Selector(Vec<(&'static str, Vec<Pattern>)>);
 
 impl Selector {
-    /// Reads texts `axis=pattern`, several of them in one text behind commas: `accel=*bvh,grid(a=1,b=2),scene=cornell-box` has two
-    /// patterns of `accel` and one of `scene`. Commas separate nothing in round brackets, nor before a blank, as labels have them
-    /// (`rays=shadow, reversed`), unless an axis follows.
+    /// Parses texts `axis=pattern`, several per text if separated by commas:
+    /// `accel=*bvh,grid(a=1,b=2),scene=cornell-box` has two patterns of `accel` and one of `scene`.
+    /// Commas in parentheses or before a blank, as in labels (`rays=shadow, reversed`), do not
+    /// separate, unless an axis follows.
     ///
     /// # Errors
-    /// [`ConfigError::Only`]: a text that begins without an axis, or with none of `axes`.
+    /// [`ConfigError::Only`]: a text without an axis, or with one not in `axes`.
     pub fn parse(only: &[String], axes: &[&'static str]) -> Result<Self, ConfigError> {
         let mut selector = Self::default();
         for text in only {
@@ -87,7 +87,6 @@ impl Selector {
         Ok(selector)
     }
 
-    /// The patterns of an axis.
     fn of(&mut self, axis: &'static str) -> &mut Vec<Pattern> {
         let place = self.0.iter().position(|(other, _)| *other == axis);
         let place = place.unwrap_or_else(|| {
@@ -97,7 +96,7 @@ impl Selector {
         &mut self.0[place].1
     }
 
-    /// That every pattern fits, or leaves out, one of the variants that there are on its axis.
+    /// Checks that every pattern matches, or if negated excludes, a variant on its axis.
     ///
     /// # Errors
     /// [`ConfigError::NoMatch`].
@@ -122,7 +121,7 @@ impl Selector {
         Ok(())
     }
 
-    /// Whether every axis fits: `on` is asked for each whether what it has there fits.
+    /// True if every axis matches, as decided by `on`.
     pub fn fits(&self, on: impl Fn(&str, &dyn Fn(&Variant) -> bool) -> bool) -> bool {
         let mut axes = self.0.iter();
         axes.all(|(axis, patterns)| {
@@ -131,7 +130,6 @@ impl Selector {
     }
 }
 
-/// The axis of this name.
 fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     let found = axes.iter().find(|axis| **axis == name).copied();
     found.ok_or_else(|| {
@@ -141,7 +139,7 @@ fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     })
 }
 
-/// Parts between separators, except those in round brackets: labels such as `grid(a=1,b=2)` have them.
+/// Splits at separators outside parentheses, as labels such as `grid(a=1,b=2)` contain them.
 fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let mut depth = 0usize;
     text.split(move |c| {
@@ -154,7 +152,7 @@ fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &
     })
 }
 
-/// Whether `text` fits `glob`, in which `*` stands for any text, the empty one included.
+/// True if `text` matches `glob`, in which `*` stands for any text, including none.
 fn glob_matches(glob: &str, text: &str) -> bool {
     let Some((head, rest)) = glob.split_once('*') else {
         return glob == text;
@@ -165,7 +163,7 @@ fn glob_matches(glob: &str, text: &str) -> bool {
     let mut parts: Vec<&str> = rest.split('*').collect();
     let tail = parts.pop().unwrap_or_default();
     for part in parts {
-        // The leftmost fit leaves the most text for what follows.
+        // The leftmost match leaves the most text for the rest.
         let Some(found) = text.find(part) else {
             return false;
         };
@@ -253,7 +251,7 @@ mod tests {
             let error = parsed(&[wrong]).expect_err(wrong).to_string();
             assert!(error.contains(told), "{error}");
         }
-        // What a second text is of is said in it.
+        // Every text must name its axis.
         assert!(parsed(&["accel=a", "b"]).is_err());
     }
 }

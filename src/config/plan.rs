@@ -1,8 +1,8 @@
-//! From axes to the cells that have to be run.
+//! Expands axes into the cells to run.
 //!
-//! Hits are equal to the bit in every structure, so an image does not depend on the structure: its
-//! error is measured once per scene, integrator and sampler, with all replicates. Time is measured
-//! for every full cell, at few samples per pixel. The plan counts what this saves.
+//! Hits are bit-identical in every structure, so images do not depend on it: the error is measured
+//! once per scene, integrator and sampler, with all replicates. Time is measured for every full
+//! cell, at few samples per pixel. The plan counts the renders saved.
 
 use super::ConfigError;
 use super::axis::Axis;
@@ -16,54 +16,54 @@ use raystone_core::params::Variant;
 use std::collections::HashSet;
 use std::fmt::{self, Write as _};
 
-/// Cells left out, with the reason.
+/// Omitted cells, with the reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Skipped {
-    /// The cells, in words.
+    /// Description of the cells.
     pub cell: String,
-    /// Why they are left out.
+    /// The reason.
     pub reason: String,
-    /// How many they are (full cells for an exclude).
+    /// Their number (full cells for an exclude).
     pub cells: usize,
 }
 
-/// What has to be run, in the order of the axes.
+/// The work of a run, in axis order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Scenes that at least one cell needs.
+    /// Scenes that some cell needs.
     pub scenes: Vec<Variant>,
-    /// Kernels that at least one cell needs.
+    /// Kernels that some cell needs.
     pub kernels: Vec<Variant>,
-    /// Structures to build, gate and trace: see [`Cell::STRUCTURE`].
+    /// Structures to build, check and trace: see [`Cell::STRUCTURE`].
     pub structures: Vec<Cell>,
     /// Samplers whose error is measured: see [`Cell::SAMPLER`].
     pub samplers: Vec<Cell>,
     /// Full cells whose time is measured: see `FULL`.
     pub times: Vec<Cell>,
-    /// Ray casters of others that are timed: see [`Cell::PEER`].
+    /// External tracers to time: see [`Cell::PEER`].
     pub peers: Vec<Cell>,
     /// Streams whose discrepancy is measured: see [`Cell::STREAM`].
     pub streams: Vec<Cell>,
-    /// What is measured without a scene, compactions of streams and the stress suite, on all axes that may matter to it.
+    /// Cells that need no scene (stream compactions, the stress suite), on all axes that may matter to them.
     pub benches: Vec<Cell>,
-    /// What is left out.
+    /// Omitted cells.
     pub skipped: Vec<Skipped>,
-    /// Seeds that the error of a randomised sampler is measured with.
+    /// Number of seeds for the error of a randomised sampler.
     pub replicates: u32,
-    /// The filters that it was made with.
+    /// The filters applied.
     pub only: Vec<String>,
 }
 
 impl Plan {
     /// Expands the axes of `experiment` into cells, without its excludes.
     ///
-    /// `only` holds filters as [`Selector`] reads them. `is_randomised` says of a sequence
-    /// and a decorrelation whether each seed gives another image (only then are replicates needed),
-    /// or why the two make no sense together: such pairs are left out with the reason.
+    /// `only` holds [`Selector`] filters. `is_randomised` returns whether each seed of a sequence
+    /// and decorrelation gives another image (only then are replicates needed), or why the two are
+    /// incompatible: such pairs are skipped with the reason.
     ///
     /// # Errors
-    /// A filter of an unknown axis or without `=`, a filter or an exclude that fits nothing, filters
-    /// that leave nothing to run, a reference or a whole product of pairs that make no sense.
+    /// A filter with an unknown axis or without `=`, a filter or exclude that matches nothing,
+    /// filters that leave nothing, an incompatible reference sampler, or no compatible pair.
     pub fn new(
         experiment: &Experiment,
         only: &[String],
@@ -101,7 +101,7 @@ impl Plan {
             });
             points.iter().map(|p| p.cell(&is_randomised)).collect()
         };
-        // Cells that render, and those of the axes that all integrators share if some do.
+        // Cells that render; on axes shared by all integrators, those of any that renders.
         let rendering = |which: &[Axis]| -> Vec<Cell> {
             let mut cells = cells(which);
             cells.retain(|cell| renders && !is_bench(&cell[Axis::Integrator]));
@@ -134,7 +134,7 @@ impl Plan {
         plan.finished(experiment, refused, only)
     }
 
-    /// The plan with its kernels and the pairs that make no sense.
+    /// Adds the kernels and the incompatible pairs.
     fn finished(
         mut self,
         experiment: &Experiment,
@@ -163,7 +163,7 @@ impl Plan {
         Ok(self)
     }
 
-    /// Renders (image × replicate) that measuring the error of this sampler needs.
+    /// Number of renders (image × replicate) for this sampler's error.
     pub fn renders(&self, sampler: &Cell) -> u32 {
         if sampler.randomised {
             self.replicates
@@ -172,17 +172,17 @@ impl Plan {
         }
     }
 
-    /// Renders that measuring the error once per sampler needs.
+    /// Number of renders with one error measurement per sampler.
     pub fn renders_planned(&self) -> usize {
         self.samplers.iter().map(|s| self.renders(s) as usize).sum()
     }
 
-    /// Renders that measuring the error of every full cell would need.
+    /// Number of renders with one error measurement per full cell.
     pub fn renders_full_product(&self) -> usize {
         self.times.iter().map(|c| self.renders(c) as usize).sum()
     }
 
-    /// Scene and tests of the structures on a scene, each once: see [`Cell::WORLD`].
+    /// Distinct combinations of scene and tests of a scene's structures: see [`Cell::WORLD`].
     pub fn worlds(&self, scene: &Variant) -> Vec<Cell> {
         let mut worlds: Vec<Cell> = Vec::new();
         for cell in self.structures.iter().filter(|c| c[Axis::Scene] == *scene) {
@@ -212,7 +212,7 @@ impl Plan {
         }
     }
 
-    /// The plan in words, for `--dry-run`.
+    /// Description of the plan for `--dry-run`.
     pub fn describe(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -275,18 +275,18 @@ impl Plan {
     }
 }
 
-/// Whether a point passes the filters and no exclude takes it out.
+/// True if a point passes the filters and no exclude applies.
 fn is_wanted(experiment: &Experiment, filter: &Selector, point: &Point) -> bool {
     point.fits(filter) && experiment.keeps(point)
 }
 
-/// The variants of an axis that some of these cells need.
+/// The variants of an axis used by these cells.
 fn needed(variants: &[Variant], axis: Axis, users: [&[Cell]; 3]) -> Vec<Variant> {
     let is_used = |v: &&Variant| users.iter().copied().flatten().any(|c| c[axis] == **v);
     variants.iter().filter(is_used).cloned().collect()
 }
 
-/// A sampler that stays visible although no structure is left for its scene.
+/// A sampler listed although its scene has no structure left.
 fn no_structure(cell: &Cell) -> Skipped {
     Skipped {
         cell: cell.to_string(),

@@ -1,4 +1,4 @@
-//! The product of the axes: its points, filters and excludes.
+//! The product of the axes: points, filters and excludes.
 
 use super::ConfigError;
 use super::axis::{Axis, AxisMap};
@@ -12,7 +12,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Cells of the full product, before anything is left out.
+/// Limit on the cells of the full product, before excludes.
 const MAX_CELLS: usize = 1 << 20;
 
 pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
@@ -29,12 +29,11 @@ pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
     })
 }
 
-/// What seeds mean to a sequence and a decorrelation: whether each gives another set of samples, or why
-/// the two make no sense together.
+/// True if each seed of a sequence and decorrelation gives new samples, or their conflict.
 pub(super) trait IsRandomised: Fn(&Variant, &Variant) -> Result<bool, String> {}
 impl<F: Fn(&Variant, &Variant) -> Result<bool, String>> IsRandomised for F {}
 
-/// The same, asked once for each pair of variants that live as long as the answer is used.
+/// Caches the answer for each pair of variants.
 pub(super) fn asked_once(is_randomised: impl IsRandomised) -> impl IsRandomised {
     let known: RefCell<HashMap<[*const Variant; 2], Result<bool, String>>> = RefCell::default();
     move |sequence: &Variant, decorrelation: &Variant| {
@@ -47,14 +46,11 @@ pub(super) fn asked_once(is_randomised: impl IsRandomised) -> impl IsRandomised 
     }
 }
 
-/// A point of the product of some axes.
 #[derive(Clone)]
 pub(super) struct Point<'a>(AxisMap<Option<&'a Arc<Variant>>>);
 
-/// The variants of each axis, to be shared by cells.
 pub(super) type Shared = AxisMap<Vec<Arc<Variant>>>;
 
-/// The axes of an experiment, to be shared.
 pub(super) fn shared(axes: &Axes) -> Shared {
     let mut shared = Shared::default();
     for (axis, variants) in axes.iter() {
@@ -68,7 +64,7 @@ impl Point<'_> {
         self.0[axis].map(|variant| &**variant)
     }
 
-    /// Why its sequence and decorrelation make no sense together, if it has both and they do not.
+    /// The reason why its sequence and decorrelation are incompatible, if they are.
     pub(crate) fn refusal(&self, is_randomised: &impl IsRandomised) -> Option<String> {
         let sequence = self.get(Axis::Sequence)?;
         is_randomised(sequence, self.get(Axis::Decorrelation)?).err()
@@ -90,7 +86,7 @@ impl Point<'_> {
     }
 }
 
-/// Pairs of a sequence and a decorrelation that make no sense, with the full cells that they cost.
+/// Incompatible pairs of sequence and decorrelation, with the number of full cells lost.
 pub(super) fn refused(full: &[Point], is_randomised: &impl IsRandomised) -> Vec<Skipped> {
     let mut out: Vec<Skipped> = Vec::new();
     for point in full {
@@ -109,7 +105,7 @@ pub(super) fn refused(full: &[Point], is_randomised: &impl IsRandomised) -> Vec<
     out
 }
 
-/// What one exclude takes out of the filtered product.
+/// The cells that one exclude removes from the filtered product.
 pub(super) fn excluded(
     exclude: &CellSet,
     experiment: &Experiment,
@@ -135,19 +131,20 @@ pub(super) fn excluded(
     }))
 }
 
-/// That an include fits a cell: if not, it is likely misspelt.
+/// Checks that an include matches a cell; otherwise it is probably misspelt.
 pub(super) fn included(include: &CellSet, full: &[Point]) -> Result<(), ConfigError> {
-    match include.lenient || full.iter().any(|point| include.covers(point)) {
-        true => Ok(()),
-        false => Err(ConfigError::UselessExclude {
+    if include.lenient || full.iter().any(|point| include.covers(point)) {
+        Ok(())
+    } else {
+        Err(ConfigError::UselessExclude {
             at: include.at.clone(),
             section: "include",
             exclude: include.to_string(),
-        }),
+        })
     }
 }
 
-/// What conditions of variants take out of the filtered product.
+/// The cells that variant conditions remove from the filtered product.
 pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Selector) -> Vec<Skipped> {
     let skipped = experiment.conditions.iter().filter_map(|condition| {
         let is_out = |point: &&Point| point.fits(filter) && !condition.allows(point);
@@ -162,7 +159,7 @@ pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Selector) 
     skipped.collect()
 }
 
-/// All points of the product of the axes in `which`, the last one running fastest.
+/// All points of the product of the axes in `which`, the last one varying fastest.
 pub(super) fn product<'a>(axes: &'a Shared, which: &[Axis]) -> Vec<Point<'a>> {
     let mut points = vec![Point(AxisMap::default())];
     for &axis in which {
@@ -181,7 +178,7 @@ pub(super) fn product<'a>(axes: &'a Shared, which: &[Axis]) -> Vec<Point<'a>> {
 }
 
 impl CellSet {
-    /// Whether the point has every axis that the exclude names, and fits on each.
+    /// True if the point has every axis that the exclude names, and matches on each.
     pub(super) fn covers(&self, point: &Point) -> bool {
         self.patterns.iter().all(|(axis, patterns)| {
             let variant = point.get(*axis);
@@ -189,7 +186,7 @@ impl CellSet {
         })
     }
 
-    /// Whether the point fits on each axis that it has of those named.
+    /// True if the point matches on each named axis that it has.
     pub(super) fn touches(&self, point: &Point) -> bool {
         self.patterns.iter().all(|(axis, patterns)| {
             let variant = point.get(*axis);
@@ -199,7 +196,7 @@ impl CellSet {
 }
 
 impl Condition {
-    /// Whether the point has another variant, or fits.
+    /// True if the point has another variant, or matches.
     pub(super) fn allows(&self, point: &Point) -> bool {
         let is_its = |variant: &Variant| variant.label == self.label;
         !point.get(self.axis).is_some_and(is_its) || self.cells.iter().any(|c| c.touches(point))
@@ -207,7 +204,7 @@ impl Condition {
 }
 
 impl Experiment {
-    /// Whether nothing of the experiment leaves a point out.
+    /// True if no rule of the experiment excludes a point.
     pub(super) fn keeps(&self, point: &Point) -> bool {
         let is_excluded = self.excludes.iter().any(|e| e.covers(point));
         (!is_excluded || self.includes.iter().any(|i| i.touches(point)))
@@ -215,7 +212,7 @@ impl Experiment {
     }
 }
 
-/// What `--only` asks for: each pattern fits a variant of the experiment.
+/// Parses `--only`; each pattern must match a variant of the experiment.
 pub(super) fn filter(only: &[String], axes: &Axes) -> Result<Selector, ConfigError> {
     let filter = Selector::parse(only, &Axis::ALL.map(Axis::name))?;
     filter.check(|axis| {
@@ -225,7 +222,7 @@ pub(super) fn filter(only: &[String], axes: &Axes) -> Result<Selector, ConfigErr
 }
 
 impl Point<'_> {
-    /// Whether the point fits on every filtered axis that it has.
+    /// True if the point matches on every filtered axis that it has.
     pub(super) fn fits(&self, filter: &Selector) -> bool {
         filter.fits(|axis, fits| {
             let variant = Axis::from_name(axis).and_then(|axis| self.get(axis));

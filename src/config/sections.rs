@@ -1,5 +1,5 @@
-//! The sections of settings that experiments have: a key is a field, with its meaning, type, default and range.
-//! From these declarations come the parser, its messages, the defaults and the table in `docs/experiments.md`.
+//! Sections of experiment settings: a key is a field with meaning, type, default and range, used by
+//! the parser, its messages, and the table in `docs/experiments.md`.
 
 use super::settings::{Contradiction, Settings};
 use raystone_core::geometry::Camera;
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-/// Numbers of samples per pixel: at least one, ascending.
+/// Ascending sample counts per pixel, at least one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SppCounts(Vec<u32>);
 
 impl SppCounts {
-    /// The numbers of samples per pixel, ascending.
+    /// The sample counts, ascending.
     pub fn counts(&self) -> impl Iterator<Item = u32> {
         self.0.iter().copied()
     }
 
-    /// The greatest number of samples per pixel: what one render takes.
+    /// The largest sample count, that of one render.
     pub fn max(&self) -> u32 {
         self.0.last().copied().unwrap_or(1)
     }
@@ -46,11 +46,9 @@ impl Bounded for SppCounts {
     }
 }
 
-/// Greatest number of samples per pixel at which errors are taken.
+/// Largest number of samples per pixel for errors.
 const MOST_SPP: u32 = 1 << 16;
-/// Edges of images, pixels.
 const EDGES: RangeInclusive<u32> = 16..=8192;
-/// Numbers of samples per pixel where an experiment says nothing.
 const FEW: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
 parameters! {
@@ -298,7 +296,7 @@ impl Settings for Coherence {
 }
 
 impl Coherence {
-    /// What is not written is as in the run.
+    /// Fills unset values from the run's.
     pub(super) fn complete(&mut self, run: &Run) {
         if self.spp.is_empty() {
             self.spp = run.spp.counts().collect();
@@ -314,7 +312,7 @@ impl Settings for Animation {
 }
 
 impl Animation {
-    /// Time of a frame: 0 of the first, 1 of the last.
+    /// Time of a frame, 0 for the first, 1 for the last.
     pub fn time(&self, frame: u32) -> f64 {
         f64::from(frame) / f64::from(self.frames - 1)
     }

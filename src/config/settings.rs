@@ -1,4 +1,4 @@
-//! Sections of settings, which are declared as structs: what is known of them, and how they are read.
+//! Sections of settings, declared as structs, and their reading.
 
 use super::error::{ConfigError, Place};
 use super::tree::{Item, Table, Value};
@@ -6,23 +6,23 @@ use super::values;
 use raystone_core::params::{Entry, ParamError, Parameters, Params};
 use std::collections::BTreeMap;
 
-/// A key whose value others forbid, and what it must be.
+/// A key whose value conflicts with others, and the allowed values.
 pub type Contradiction = (&'static str, String);
 
-/// A section of settings of an experiment, declared by [`parameters!`](raystone_core::parameters).
+/// A section of experiment settings, declared by [`parameters!`](raystone_core::parameters).
 pub trait Settings: Parameters {
-    /// Name of the section; behind a dot, of a table within a section.
+    /// Section name; after a dot, that of a table within a section.
     const SECTION: &'static str;
-    /// Keys that must be given where the section is. Their defaults are not in their ranges.
+    /// Required keys, whose defaults lie outside their ranges.
     const REQUIRED: &'static [&'static str] = &[];
 
-    /// What two of its values must not say together.
+    /// A conflict between two of its values.
     fn contradiction(&self) -> Option<Contradiction> {
         None
     }
 }
 
-/// What the parser knows of a section of settings.
+/// The parser's description of a section of settings.
 #[derive(Debug, Clone)]
 pub struct Section {
     /// Name, meaning and keys.
@@ -33,7 +33,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// The section that `S` declares.
+    /// The section declared by `S`.
     pub fn of<S: Settings>() -> Self {
         Self {
             entry: Entry {
@@ -46,12 +46,12 @@ impl Section {
         }
     }
 
-    /// Its name.
+    /// Section name.
     pub fn name(&self) -> &str {
         &self.entry.name
     }
 
-    /// Its values where it is written in a tree.
+    /// Its values, if present in a tree.
     fn read(&self, tree: &Table) -> Result<Option<Params>, ConfigError> {
         let name = self.name();
         let Some(item) = find(tree, name) else {
@@ -93,7 +93,7 @@ impl Section {
     }
 }
 
-/// The error for a value that its own range allows and another key forbids.
+/// The error for a value in range but forbidden by another key.
 pub(super) fn not_allowed(
     tree: &Table,
     key: &str,
@@ -109,7 +109,7 @@ pub(super) fn not_allowed(
     find(tree, key).map_or_else(unwritten, |item| item.out_of_range(key, &expected))
 }
 
-/// The item of a section, or behind dots of what is within.
+/// The item of a section, or of a table within it, named with dots.
 pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
     match name.split_once('.') {
         None => tree.get(name),
@@ -120,10 +120,9 @@ pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
     }
 }
 
-/// The settings of all sections that are written.
+/// The settings of all sections present.
 pub(super) type Read = BTreeMap<String, Params>;
 
-/// Reads and checks the values of all sections.
 pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, ConfigError> {
     let read = sections.iter().filter_map(|section| {
         let params = section.read(tree).transpose()?;
@@ -132,7 +131,7 @@ pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, Confi
     read.collect()
 }
 
-/// Takes the settings of a section, which were checked.
+/// Takes the checked settings of a section.
 pub(super) fn take<S: Settings>(read: &mut Read) -> Option<S> {
     read.remove(S::SECTION)
         .map(|params| S::from_checked(&params))

@@ -1,7 +1,7 @@
-//! TOML values that remember where they were written, and layers of them.
+//! TOML values with their source places, and layers of them.
 //!
-//! The file and the overrides of the command line are merged into one tree. Since every item keeps its [`Place`], one walk
-//! of it checks both and still says where a fault was written.
+//! The file and the command-line overrides are merged into one tree. Since every item has its
+//! [`Place`], a single pass checks both and can still locate an error.
 
 use super::error::{ConfigError, Place};
 use std::collections::BTreeMap;
@@ -10,7 +10,6 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
-/// A value and where it was written.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Item {
     pub at: Place,
@@ -18,7 +17,7 @@ pub(super) struct Item {
 }
 
 impl Item {
-    /// The table that it has to be; messages call it `key`, and say what is expected.
+    /// The item as a table; `key` and `expected` are used in the error message.
     pub(crate) fn table(&self, key: &str, expected: &str) -> Result<&Table, ConfigError> {
         match &self.value {
             Value::Table(table) => Ok(table),
@@ -26,7 +25,7 @@ impl Item {
         }
     }
 
-    /// The error for a value of a type that `key` does not have.
+    /// The error for a value of the wrong type for `key`.
     pub(crate) fn wrong_type(&self, key: &str, expected: impl ToString) -> ConfigError {
         ConfigError::WrongType {
             at: self.at.clone(),
@@ -36,7 +35,7 @@ impl Item {
         }
     }
 
-    /// The error for a value that `key` must not have.
+    /// The error for a disallowed value of `key`.
     pub(crate) fn out_of_range(&self, key: &str, expected: impl ToString) -> ConfigError {
         ConfigError::OutOfRange {
             at: self.at.clone(),
@@ -46,7 +45,6 @@ impl Item {
         }
     }
 
-    /// The error for a list without a value.
     pub(crate) fn empty(&self, key: &str) -> ConfigError {
         ConfigError::Empty {
             at: self.at.clone(),
@@ -54,7 +52,7 @@ impl Item {
         }
     }
 
-    /// The error for a value that stands before it in a list.
+    /// The error for a repeated list value.
     pub(crate) fn duplicate(&self, key: &str) -> ConfigError {
         ConfigError::Duplicate {
             at: self.at.clone(),
@@ -63,7 +61,7 @@ impl Item {
         }
     }
 
-    /// A text that nobody wrote.
+    /// A text from a default.
     pub(crate) fn default_text(text: &str) -> Self {
         Self {
             at: Place::Default,
@@ -71,7 +69,7 @@ impl Item {
         }
     }
 
-    /// Whether any part of the item was written on the command line.
+    /// True if any part of the item comes from the command line.
     pub(crate) fn has_override(&self) -> bool {
         let inside = match &self.value {
             Value::Table(table) => table.values().any(Item::has_override),
@@ -84,21 +82,21 @@ impl Item {
 /// Named items, in alphabetical order.
 pub(super) type Table = BTreeMap<String, Item>;
 
-/// A TOML value, as far as an experiment uses TOML.
+/// A TOML value, as far as experiments use TOML.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Value {
     Text(String),
     Integer(i64),
     Number(f64),
     Flag(bool),
-    /// Dates and integers beyond 64 bits, as written: never what a key wants.
+    /// Dates and integers beyond 64 bits, as written; never valid.
     Other(String),
     List(Vec<Item>),
     Table(Table),
 }
 
 impl Value {
-    /// The value in words, for "must be …, not …".
+    /// Describes the value for "must be …, not …".
     pub(crate) fn describe(&self) -> String {
         match self {
             Self::Text(text) => format!("the text \"{text}\""),
@@ -112,7 +110,7 @@ impl Value {
     }
 }
 
-/// The value as a file would say it.
+/// Formats the value as written in a file.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -154,7 +152,7 @@ pub(super) fn parse_file(text: &str, file: &str) -> Result<Table, ConfigError> {
     Ok(convert_table(table.get_ref(), &place))
 }
 
-/// Where the key that stands again at `again` was given first: the last key of that name before it.
+/// First position of the key repeated at `again`: the last key of that name before it.
 fn first_of(text: &str, again: &Range<usize>) -> Option<usize> {
     let name = text.get(again.clone())?;
     let line = text[..again.start].rfind('\n').map_or(0, |end| end + 1);
@@ -177,8 +175,8 @@ fn key_starts(table: &DeTable<'_>, name: &str, starts: &mut Vec<usize>) {
 
 /// Parses one `section.key=value` override into a tree with a single leaf.
 ///
-/// A value that is not TOML is a text; commas in it make a list, whose elements are TOML or texts
-/// again. A value that starts as TOML structure (`[`, `{`, a quote) must be TOML.
+/// A value that is not TOML is a text; commas make it a list, whose elements are again TOML or
+/// texts. A value that starts as TOML structure (`[`, `{`, a quote) must be TOML.
 pub(super) fn parse_override(text: &str) -> Result<Table, ConfigError> {
     let at = Place::Override(text.into());
     let fault = |problem: String| ConfigError::Override {
@@ -188,7 +186,7 @@ pub(super) fn parse_override(text: &str) -> Result<Table, ConfigError> {
     let (key, value) = text
         .split_once('=')
         .ok_or_else(|| fault("no `=` in it".into()))?;
-    // A TOML document with this one key takes care of dots and quotes.
+    // A TOML document with this one key handles dots and quotes.
     let document = format!("{} = 0", key.trim());
     let keys = DeTable::parse(&document)
         .map_err(|error| fault(format!("bad key: {}", one_line(error.message()))))?;
@@ -221,7 +219,7 @@ fn parse_override_value(text: &str, at: &Place) -> Result<Value, String> {
         .map(Value::List)
 }
 
-/// The leaf of a tree that has one branch only.
+/// The leaf of a tree with a single branch.
 fn sole_leaf(table: &mut Table) -> Option<&mut Item> {
     let mut item = table.values_mut().next()?;
     loop {
@@ -235,7 +233,7 @@ fn sole_leaf(table: &mut Table) -> Option<&mut Item> {
     }
 }
 
-/// Lays `over` on `base`: tables merge key by key, everything else is replaced.
+/// Merges `over` into `base`: tables merge key by key, everything else is replaced.
 pub(super) fn merge(base: &mut Table, over: Table) {
     for (key, item) in over {
         match (base.get_mut(&key), item) {
@@ -293,7 +291,7 @@ fn convert(value: &DeValue<'_>, place: &dyn Fn(usize) -> Place) -> Value {
     }
 }
 
-/// The TOML parser's message on one line.
+/// Joins the TOML parser's message into one line.
 fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }

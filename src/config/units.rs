@@ -1,4 +1,4 @@
-//! Parts that a plan is divided into.
+//! Parts of a plan.
 
 use super::axis::Axis;
 use super::cells::Cell;
@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 impl Plan {
-    /// Full cells whose coherence is modelled: the model has organisations of its own, and knows no workgroups.
+    /// Full cells with modelled coherence; the model ignores organisations and workgroups.
     pub fn modelled(&self, experiment: &Experiment) -> Vec<Cell> {
         let is_first = |cell: &Cell, axis| cell.get(axis) == experiment.axes[axis].first();
         let cells = self.times.iter();
@@ -18,22 +18,21 @@ impl Plan {
     }
 }
 
-/// One of several parts that a plan is divided into.
+/// One of several parts of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     /// Its number, from 1.
     pub number: usize,
-    /// How many there are.
+    /// Number of parts.
     pub of: usize,
 }
 
-/// Parts that a plan may be divided into.
 const MOST_SHARDS: usize = 10_000;
 
 impl FromStr for Shard {
     type Err = String;
 
-    /// `3/8`: the third of eight.
+    /// Parses `3/8`: the third of eight.
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/');
         let numbers = numbers.and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));

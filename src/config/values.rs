@@ -1,4 +1,4 @@
-//! From what is written to the value of a parameter or a key.
+//! Reads the value of a parameter or key.
 
 use super::check::{check_keys, key_in};
 use super::error::ConfigError;
@@ -7,15 +7,15 @@ use raystone_core::params::{
     Bounded as _, Length, ParamRange, ParamValue, ParameterType as _, repeated,
 };
 
-/// The value that is written, if `range` allows it. `key` is what messages call it.
+/// Reads a value allowed by `range`. `key` is its name in messages.
 ///
 /// # Errors
-/// A value of another type, or out of the range, with the line on which that part of it stands.
+/// A value of another type or out of range, with the line of the invalid part.
 pub(super) fn value(key: &str, item: &Item, range: &ParamRange) -> Result<ParamValue, ConfigError> {
     Wanted { key, range }.value(item, range)
 }
 
-/// What is read: messages say what the whole of it must be.
+/// A value being read, with the overall range for messages.
 struct Wanted<'a> {
     key: &'a str,
     range: &'a ParamRange,
@@ -42,7 +42,7 @@ impl Wanted<'_> {
             }
             (ParamRange::Ascending(max), Value::List(items)) => {
                 let count = ParamRange::Integer { min: 1, max: *max };
-                // Repetition is a matter of order here.
+                // Repeated values are caught by the order here.
                 self.list(items, &count, Length::Exactly(items.len()))?
             }
             (ParamRange::Ascending(max), Value::Table(table)) => self.powers(item, table, *max)?,
@@ -73,7 +73,7 @@ impl Wanted<'_> {
         }
     }
 
-    /// The powers of two that `{ pow2 = [lo, hi] }` stands for.
+    /// The powers of two of `{ pow2 = [lo, hi] }`.
     fn powers(&self, item: &Item, table: &Table, max: i64) -> Result<ParamValue, ConfigError> {
         check_keys(&key_in(self.key), table, &["pow2"])?;
         let item = table

@@ -1,4 +1,4 @@
-//! From names and parameter lists to the variants of an axis.
+//! Expands names and parameter lists into the variants of an axis.
 
 use super::Catalogue;
 use super::axis::Axis;
@@ -10,10 +10,10 @@ use raystone_core::params::{
 };
 use std::path::Path;
 
-/// Ends of file names that make a scene name a path.
+/// File extensions that make a scene name a path.
 const MODEL_EXTENSIONS: [&str; 5] = ["obj", "gltf", "glb", "ply", "xml"];
 
-/// The entry called `name`; also one made up for the path of a model or a folder of kernels.
+/// The entry called `name`; for a model path or kernel folder, a generated one.
 pub(super) fn resolve(
     axis: Axis,
     at: &Place,
@@ -46,7 +46,7 @@ pub(super) fn resolve(
     Err(ConfigError::unknown(at, what, text, known))
 }
 
-/// Parameters that all entries of an axis have: files have them, too.
+/// Parameters shared by all entries of an axis, including files.
 fn shared_parameters(entries: &[Entry]) -> ParameterSchema {
     let Some((first, others)) = entries.split_first() else {
         return Vec::new();
@@ -64,13 +64,12 @@ fn is_path(text: &str) -> bool {
         || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
 }
 
-/// Label of the embedded kernels on their axis.
 const EMBEDDED: &str = "embedded";
 
-/// Key of a table of parameters that says with what its variants go.
+/// Key in a parameter table that restricts its variants to certain cells.
 pub(super) const WHEN: &str = "when";
 
-/// All variants of `entry`: the product of the values that `section` (one `[axis.NAME]`) lists.
+/// All variants of `entry`: the product of the value lists in `section` (one `[axis.NAME]`).
 pub(super) fn expand(
     axis: Axis,
     entry: &Entry,
@@ -110,10 +109,9 @@ pub(super) fn expand(
         .collect())
 }
 
-/// Variants that one axis may have.
 const MAX_VARIANTS: usize = 1024;
 
-/// Refuses more variants of an axis than it may have; `item` is what asks for them.
+/// Checks the number of variants on an axis; `item` is the place for the error.
 pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), ConfigError> {
     if count <= MAX_VARIANTS {
         return Ok(());
@@ -126,10 +124,10 @@ pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), C
     })
 }
 
-/// The values that an experiment gives to one parameter: one, or a list of different ones.
+/// The values given for one parameter: one, or a list of distinct ones.
 fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>, ConfigError> {
     let items = match &item.value {
-        // A list is one value of a parameter that takes lists.
+        // For a parameter that takes lists, a list is one value.
         Value::List(items) if !matches!(range, ParamRange::List(..) | ParamRange::Ascending(_)) => {
             items
         }
@@ -146,17 +144,17 @@ fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>,
     }
 }
 
-/// Shortens labels that are paths to the last part of the path where that part is told apart from all
-/// other labels. The empty path, that of the embedded kernels, is called [`EMBEDDED`].
+/// Shortens path labels to a unique last component; the empty path becomes [`EMBEDDED`].
 pub(super) fn shorten_labels(scenes: &mut [Variant]) {
     let short: Vec<String> = scenes
         .iter()
         .map(|scene| {
             let mut parts = scene.label.split(['/', '\\']);
             let last = parts.rfind(|part| !part.is_empty());
-            match scene.label.is_empty() {
-                true => EMBEDDED.to_owned(),
-                false => last.unwrap_or(&scene.label).to_owned(),
+            if scene.label.is_empty() {
+                EMBEDDED.to_owned()
+            } else {
+                last.unwrap_or(&scene.label).to_owned()
             }
         })
         .collect();

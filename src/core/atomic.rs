@@ -1,13 +1,13 @@
-//! Files that are whole or not there.
+//! Atomic file writes.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Writes a file whole or not at all: temporary file in the same folder, sync, rename. A file that
-/// was there keeps its content if anything fails; a link that was there is replaced, not followed.
-/// What is no file but takes bytes, such as `/dev/null` or a pipe, is written to.
+/// Writes a file atomically: temporary file in the same folder, sync, rename. On failure an
+/// existing file keeps its content; an existing link is replaced, not followed. Targets that are
+/// not files but accept bytes, such as `/dev/null` or a pipe, are written to.
 ///
 /// # Errors
 /// Those of the file system; the temporary file is removed.
@@ -24,13 +24,12 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
         fs::rename(&temporary, path)
     };
     write().inspect_err(|_| {
-        // The first error is the one to tell; a leftover is only litter.
+        // Report the first error; a leftover file is only litter.
         let _ = fs::remove_file(&temporary);
     })
 }
 
-/// A file that was not there before, in the folder of `path`. Its name is short: that of `path` may be
-/// as long as names can be.
+/// Creates a file in the folder of `path`, with a short name, as `path` may have maximum length.
 fn new_file_beside(path: &Path) -> io::Result<(File, PathBuf)> {
     static COUNTER: AtomicU32 = AtomicU32::new(0);
     loop {
@@ -56,7 +55,7 @@ mod tests {
         write_atomic(&path, b"first, longer").unwrap();
         write_atomic(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
-        // A folder cannot be replaced by a file: the write fails after the temporary file was made.
+        // A file cannot replace a folder: the write fails after creating the temporary file.
         let occupied = folder.path().join("occupied");
         fs::create_dir(&occupied).unwrap();
         fs::write(occupied.join("kept"), b"kept").unwrap();

@@ -1,35 +1,34 @@
-//! Files that models, kernels and tables are read from. The crates below runs read them here, and nowhere else: a host
-//! without a file system, as a browser is, hands in its own.
+//! Reads files of models, kernels and tables. The crates below runs read them only here, so that a
+//! host without a file system, such as a browser, can supply its own.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Where files are read from.
+/// A source of files.
 pub trait Files: Send + Sync {
-    /// A regular file and its length in bytes. Folders are none, nor are devices and pipes, which may have no end.
+    /// Opens a regular file (no folder, device or pipe) and returns its length in bytes.
     ///
     /// # Errors
-    /// It is not there, no regular file, or cannot be read.
+    /// The file does not exist, is not regular, or cannot be read.
     fn open(&self, path: &Path) -> io::Result<(Box<dyn Read + Send>, u64)>;
 
-    /// What lies in a folder.
+    /// Lists a folder.
     ///
     /// # Errors
-    /// It is not there, no folder, or cannot be read.
+    /// It does not exist, is not a folder, or cannot be read.
     fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>>;
 
-    /// Whether there is a folder of this path.
+    /// True if this is a folder.
     fn is_folder(&self, path: &Path) -> bool;
 
-    /// The path without links and `..`.
+    /// Resolves links and `..`.
     ///
     /// # Errors
-    /// Nothing is there.
+    /// The path does not exist.
     fn real(&self, path: &Path) -> io::Result<PathBuf>;
 }
 
-/// The file system of the machine.
 struct Disk;
 
 impl Files for Disk {
@@ -61,21 +60,21 @@ impl Files for Disk {
 
 static HOST: OnceLock<&'static dyn Files> = OnceLock::new();
 
-/// Has all files be read from `files` in place of the machine's file system.
+/// Replaces the machine's file system by `files` for all reads.
 ///
 /// # Errors
-/// Files were read already: hand them in before anything else.
+/// Files were already read: call this first.
 pub fn read_from(files: &'static dyn Files) -> Result<(), &'static str> {
     HOST.set(files)
         .map_err(|_| "files were read already; hand them in before anything else")
 }
 
-/// Where files are read from.
+/// The current source of files.
 pub fn files() -> &'static dyn Files {
     *HOST.get_or_init(|| &Disk)
 }
 
-/// The bytes of a regular file.
+/// Reads a regular file.
 ///
 /// # Errors
 /// As [`Files::open`].

@@ -1,11 +1,11 @@
-//! Triangles, rays and the camera: what experiments, scenes, structures and the oracle have in common.
+//! Triangles, rays and the camera, shared by experiments, scenes, structures and the oracle.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// One triangle in world space, vertices in the order of the file (f32, scene units).
+/// A triangle in world space, vertices in file order (f32, scene units).
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Triangle {
@@ -14,13 +14,13 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// The triangle whose corners are what `to` makes of this one's.
+    /// Applies `to` to each corner.
     pub fn map(self, to: impl FnMut(Vec3) -> Vec3) -> Self {
         self.vertices.map(to).into()
     }
 
-    /// Whether no ray can hit the triangle. Differences and products of f32 are formed in f64, so
-    /// the answer does not depend on where the triangle lies.
+    /// True if no ray can hit the triangle. Differences and products of f32 are computed in f64, so
+    /// the answer does not depend on the triangle's position.
     pub fn has_zero_area(&self) -> bool {
         let [a, b, c] = self.vertices.map(Vec3::as_dvec3);
         (b - a).cross(c - a) == DVec3::ZERO
@@ -33,25 +33,25 @@ impl From<[Vec3; 3]> for Triangle {
     }
 }
 
-/// A ray segment, 32 bytes, the layout of the ray buffers.
+/// A ray segment of 32 bytes, with the layout of the ray buffers.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Ray {
     /// Origin, scene units.
     pub origin: [f32; 3],
-    /// Least distance of a hit, ≥ 0, in units of the direction's length.
+    /// Minimum hit distance, ≥ 0, in units of the direction's length.
     pub t_min: f32,
     /// Direction; need not be normalised.
     pub direction: [f32; 3],
-    /// Greatest distance of a hit; the oracle also takes infinity.
+    /// Maximum hit distance; the oracle also accepts infinity.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// End of rays that have none; a kernel multiplies it by pads without overflow.
+    /// `t_max` of unbounded rays; a kernel can multiply it by pads without overflow.
     pub const FAR: f32 = 1e30;
 
-    /// The ray from distance 0 to [`Ray::FAR`].
+    /// Ray from distance 0 to [`Ray::FAR`].
     pub fn new(origin: impl Into<[f32; 3]>, direction: impl Into<[f32; 3]>) -> Self {
         Self {
             origin: origin.into(),
@@ -61,7 +61,7 @@ impl Ray {
         }
     }
 
-    /// The same ray with other ends.
+    /// The ray with other ends.
     #[must_use]
     pub fn between(self, t_min: f32, t_max: f32) -> Self {
         Self {
@@ -72,7 +72,7 @@ impl Ray {
     }
 }
 
-/// Eight numbers, which read back to the same bits: origin, direction, t_min, t_max.
+/// Prints eight numbers that parse to the same bits: origin, direction, t_min, t_max.
 impl fmt::Display for Ray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
@@ -84,8 +84,7 @@ impl fmt::Display for Ray {
     }
 }
 
-/// Reads eight numbers, or six and takes [`Ray::new`]; an error says in words what is not a number, or how many
-/// there are.
+/// Parses eight numbers, or six as in [`Ray::new`]; errors name the invalid number or the count.
 impl FromStr for Ray {
     type Err = String;
 
@@ -126,14 +125,13 @@ pub struct Camera {
     pub vertical_fov_degrees: f32,
 }
 
-/// A direction needs a component of this length, 2⁻⁵⁶: what raising a shorter one adds to it
-/// would be more than rounding.
+/// A direction needs a component of at least 2⁻⁵⁶: raising a shorter one exceeds rounding.
 pub const SMALLEST_DIRECTION: f32 = 1.387_778_8e-17;
 
 impl Ray {
-    /// Whether it is a ray at all: origin and direction finite, a component of the direction at least
-    /// [`SMALLEST_DIRECTION`], ends that are numbers. Anything else hits nothing. Twin: `is_ray` in
-    /// `kernels/integrator/trace_rays.wesl`.
+    /// True for a valid ray: finite origin and direction, a direction component of at least
+    /// [`SMALLEST_DIRECTION`], and ends that are not NaN. Invalid rays hit nothing. Twin: `is_ray`
+    /// in `kernels/integrator/trace_rays.wesl`.
     pub fn is_ray(&self) -> bool {
         let greatest = |x: [f32; 3]| x.map(f32::abs).into_iter().fold(0.0, f32::max);
         let finite = self.origin.iter().chain(&self.direction);
@@ -145,7 +143,7 @@ impl Ray {
 }
 
 impl Camera {
-    /// A camera for which y is up.
+    /// A camera with y up.
     pub fn upright(eye: Vec3, target: Vec3, vertical_fov_degrees: f32) -> Self {
         Self {
             eye,
@@ -157,8 +155,7 @@ impl Camera {
 }
 
 impl Camera {
-    /// Unit viewing direction, and half the plane of an image of so many pixels at distance 1, to the right
-    /// and upwards.
+    /// Unit viewing direction, and half extents of the image plane at distance 1, right and up.
     pub fn basis(&self, [width, height]: [u32; 2]) -> [Vec3; 3] {
         let forward = (self.target - self.eye).normalize();
         let right = forward.cross(self.up).normalize();

@@ -1,4 +1,4 @@
-//! What all crates of Raystone share: parameters, geometry, random numbers, texts and files that are whole or not there.
+//! Shared by all crates of Raystone: parameters, geometry, random numbers, text and atomic files.
 #![warn(missing_docs)]
 
 pub mod atomic;

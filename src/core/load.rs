@@ -1,4 +1,4 @@
-//! What loading a scene has to say.
+//! Report of loading a scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub struct LoadReport {
 }
 
 impl LoadReport {
-    /// Everything that makes the scene differ from its file, a line each, for people.
+    /// Every deviation of the scene from its file, one readable line each.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = match self.dropped_non_finite {
             0 => Vec::new(),

@@ -1,17 +1,17 @@
-//! Which program measures.
+//! Identity of the measuring program.
 
-/// Version and commit of a program, as records and files keep them.
+/// Version and commit of a program, as stored in records and files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Program {
-    /// Version of the package.
+    /// Package version.
     pub version: &'static str,
-    /// Commit that it was built from, when known.
+    /// Commit it was built from, if known.
     pub commit: Option<&'static str>,
-    /// Whether the working tree had uncommitted changes when it was built.
+    /// True if the working tree had uncommitted changes at build time.
     pub dirty: Option<bool>,
 }
 
-/// The library alone, built from who knows which commit: programs give their own.
+/// The library alone, from an unknown commit; programs supply their own.
 impl Default for Program {
     fn default() -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The generators behind everything that is drawn at random on the host.
+//! Random number generators of the host.
 
 use glam::DVec3;
 use rand_pcg::rand_core::Rng;
@@ -8,7 +8,7 @@ use rand_pcg::rand_core::Rng;
 pub struct Pcg32(rand_pcg::Pcg32);
 
 impl Pcg32 {
-    /// The stream of the author's default increment; scenes are drawn from it.
+    /// The stream of the author's default increment, used for scenes.
     pub const DEFAULT_STREAM: u64 = 1_442_695_040_888_963_407 >> 1;
 
     /// A generator; equal seeds give equal numbers.
@@ -26,7 +26,7 @@ impl Pcg32 {
         self.0.next_u32()
     }
 
-    /// An index below `n`, `1 ≤ n ≤ 2³²`; its bias of at most `n·2⁻³²` does not matter here.
+    /// An index below `n`, `1 ≤ n ≤ 2³²`, with a negligible bias of at most `n·2⁻³²`.
     pub fn below(&mut self, n: usize) -> usize {
         ((u64::from(self.next_u32()) * n as u64) >> 32) as usize
     }
@@ -36,7 +36,7 @@ impl Pcg32 {
         f64::from(self.next_u32()) / 2f64.powi(32)
     }
 
-    /// One of them.
+    /// A random element of `of`.
     pub fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
         of[self.below(of.len())]
     }
@@ -65,8 +65,8 @@ impl Pcg32 {
     }
 }
 
-/// SplitMix64 (G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", 2014): as small,
-/// with 64 bits at a time and any seed as good as another.
+/// SplitMix64 (G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators",
+/// 2014): as small, with 64 bits at a time and no weak seeds.
 #[derive(Debug, Clone)]
 pub struct SplitMix64(pub u64);
 

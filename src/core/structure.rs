@@ -1,4 +1,4 @@
-//! What is known of a built structure and of the work in it: what records keep.
+//! Recorded properties of a built structure and of the work in it.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,8 +37,8 @@ pub struct StructureStats {
 }
 
 impl StructureStats {
-    /// Leaves, references and histogram of leaves or cells that list so many triangles; all else is left 0.
-    /// Those that list none are no leaves.
+    /// Leaves, references and histogram from the number of triangles per non-empty leaf or cell;
+    /// other fields are 0.
     pub fn of_leaves(counts: impl Iterator<Item = usize>) -> Self {
         let mut stats = Self::default();
         let histogram = &mut stats.leaf_histogram;
@@ -93,13 +93,13 @@ pub enum Space {
     Instances,
 }
 
-/// Longest entry of a leaf histogram; more references than this are counted there.
+/// Last index of a leaf histogram, which also counts larger leaves.
 pub const LEAF_HISTOGRAM_END: usize = 32;
 
-/// Under which the times of passes that answer rays are told: nearest hits, any hits.
+/// Names of ray-query passes in records: nearest hits, any hits.
 pub const RAY_QUERIES: [&str; 2] = ["closest hits", "any hits"];
 
-/// Names of the classes of rays that integrators count in records, in their order.
+/// Names of the ray classes that integrators count in records, in order.
 pub const RAY_COUNT_CLASSES: [&str; 5] = ["primary", "shadow", "ao", "bounce", "skipped"];
-/// How many of them, from the first on, are traced.
+/// Number of traced classes, which come first.
 pub const TRACED_CLASSES: usize = 4;

@@ -1,21 +1,20 @@
-//! Texts that all parts deal in: what files of text hold, how texts stand in other languages, names of files, content hashes, and the known
-//! name nearest to a misspelt one.
+//! Text utilities: decoding, escaping, file names, content hashes, and nearest known names.
 
 pub mod escape;
 
-/// Bytes that are no text in UTF-8.
+/// Bytes that are not UTF-8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotUtf8 {
-    /// The first line with such bytes, from 1.
+    /// First line with such bytes, from 1.
     pub line: usize,
 }
 
-/// The text of a file as any editor may have written it, in UTF-8 without a byte order mark and with `\n` at the end of lines.
-/// UTF-16 is told by its byte order mark; lines may end in `\r\n` or in `\r` alone, and DOS's end of file (Ctrl-Z) may
-/// stand behind the last one.
+/// Decodes a text file from any editor to UTF-8 without a byte order mark and with `\n` line ends.
+/// UTF-16 is detected by its byte order mark; lines may end in `\r\n` or `\r`, and DOS's
+/// end-of-file mark (Ctrl-Z) may follow the last one.
 ///
 /// # Errors
-/// Bytes that are no UTF-8, with their line.
+/// Invalid UTF-8, with its line.
 pub fn plain_text(bytes: Vec<u8>) -> Result<String, NotUtf8> {
     String::from_utf8(plain_bytes(bytes)).map_err(|error| {
         let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
@@ -26,7 +25,8 @@ pub fn plain_text(bytes: Vec<u8>) -> Result<String, NotUtf8> {
     })
 }
 
-/// The same for formats older than UTF-8: what is none counts as Latin-1, byte by byte, so that different names stay so.
+/// [`plain_text`] for formats older than UTF-8: invalid UTF-8 is read as Latin-1, byte by byte, so
+/// different names stay different.
 pub fn plain_text_or_latin1(bytes: Vec<u8>) -> String {
     String::from_utf8(plain_bytes(bytes)).unwrap_or_else(|error| {
         let mut text = String::with_capacity(error.as_bytes().len());
@@ -38,7 +38,7 @@ pub fn plain_text_or_latin1(bytes: Vec<u8>) -> String {
     })
 }
 
-/// What [`plain_text`] does, for bytes that may be no UTF-8.
+/// [`plain_text`] for bytes that may not be UTF-8.
 fn plain_bytes(mut bytes: Vec<u8>) -> Vec<u8> {
     let utf_16 = |from: fn([u8; 2]) -> u16| {
         let units = bytes[2..].as_chunks::<2>().0.iter().map(|pair| from(*pair));
@@ -57,7 +57,7 @@ fn plain_bytes(mut bytes: Vec<u8>) -> Vec<u8> {
     }
     if bytes.contains(&b'\r') {
         let mut before = 0;
-        // What is left is no longer than what was there.
+        // The result is no longer than the input.
         bytes.retain_mut(|byte| {
             let is_second = before == b'\r' && *byte == b'\n';
             before = *byte;
@@ -70,13 +70,13 @@ fn plain_bytes(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Ctrl-Z, the end of texts of CP/M and DOS.
+/// Ctrl-Z, the end-of-text mark of CP/M and DOS.
 const DOS_END: u8 = 0x1a;
 
-/// Hash of named parts as 64 hexadecimal digits (BLAKE3).
+/// BLAKE3 hash of named parts as 64 hexadecimal digits.
 ///
-/// Every name and text goes in behind its length, so that parts cannot run together: moving a
-/// character from one part to the next changes the hash. The order of the parts counts.
+/// Every name and text is preceded by its length, so parts cannot run together: moving a character
+/// from one part to the next changes the hash. The order of the parts matters.
 pub fn cell_hash(parts: &[(&str, &str)]) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&(parts.len() as u64).to_le_bytes());
@@ -89,20 +89,21 @@ pub fn cell_hash(parts: &[(&str, &str)]) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// A text as one word of a POSIX shell, whatever characters are in it.
+/// Quotes a text as one word of a POSIX shell.
 pub fn shell_word(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text.to_owned(),
-        false => format!("'{}'", text.replace('\'', "'\\''")),
+    if !text.is_empty() && text.chars().all(is_plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 
-/// Longest readable part of a file's name, characters.
+/// Maximum length of the readable part of a file name, characters.
 const SLUG_CHARACTERS: usize = 80;
 
-/// A file name for what `parts` name: readable, and told apart from others by a hash, also where case
-/// is ignored or the readable part is cut.
+/// A file name for `parts`: readable, and made unique by a hash, even if case is ignored or the
+/// readable part is truncated.
 pub fn slug(parts: &[&str]) -> String {
     let plain = |c: char| match c {
         '.' => '.',
@@ -115,13 +116,13 @@ pub fn slug(parts: &[&str]) -> String {
     format!("{readable}-{}", &hash[..10])
 }
 
-/// Characters of names that are compared: the time and the memory that it takes are their product.
+/// Compared characters of a name; time and memory grow with the product of both.
 const COMPARED: usize = 64;
 
-/// The known name nearest to `name`, if any are known.
+/// The known name nearest to `name`; `None` if none are known.
 ///
-/// Nearness is the normalised Damerau–Levenshtein similarity; a name that contains the other one
-/// counts as a near one, so that `grid` finds `uniform-grid`.
+/// Uses the normalised Damerau–Levenshtein similarity; a name that contains the other is also near,
+/// so `grid` finds `uniform-grid`.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let beginning = |text: &str| text.chars().take(COMPARED).collect::<String>();
     let name = beginning(name).to_lowercase();

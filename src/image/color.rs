@@ -1,4 +1,4 @@
-//! Colours: one map for quantities, one palette for categories.
+//! Colour maps: one for quantities, one palette for categories.
 
 /// Nine equidistant colours of matplotlib's `viridis` (van der Walt and Smith 2015, CC0).
 const VIRIDIS: [[u8; 3]; 9] = [
@@ -13,8 +13,7 @@ const VIRIDIS: [[u8; 3]; 9] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// The colour-blind safe palette of Okabe and Ito (2008), dark colours first; yellow, which is hard
-/// to see on white, comes last.
+/// The colour-blind safe palette of Okabe and Ito (2008), dark colours first; faint yellow last.
 const OKABE_ITO: [[u8; 3]; 8] = [
     [0x00, 0x72, 0xb2],
     [0xd5, 0x5e, 0x00],
@@ -27,8 +26,7 @@ const OKABE_ITO: [[u8; 3]; 8] = [
 ];
 
 /// Perceptually uniform colour (sRGB) for `t` in [0, 1], dark violet to yellow: `viridis`,
-/// piecewise linear between nine of its colours. Outside values are clamped; NaN gives the colour
-/// of 0.
+/// piecewise linear between nine of its colours. `t` is clamped; NaN counts as 0.
 pub fn viridis(t: f32) -> [u8; 3] {
     let last = VIRIDIS.len() - 1;
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
@@ -42,13 +40,11 @@ pub fn viridis(t: f32) -> [u8; 3] {
     })
 }
 
-/// Colour (sRGB) of the category with this index; repeats after eight, so marker or label must tell
-/// categories apart too.
+/// Colour (sRGB) of a category index; repeats after eight, so markers must also distinguish them.
 pub fn categorical(index: usize) -> [u8; 3] {
     OKABE_ITO[index % OKABE_ITO.len()]
 }
 
-/// `#rrggbb`.
 pub(crate) fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

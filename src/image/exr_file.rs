@@ -1,16 +1,17 @@
-//! OpenEXR files ("OpenEXR File Layout" of the Academy Software Foundation). What is written is one part of uncompressed scan lines, made here: the crate `exr`, which reads them, writes attributes in the order of a
-//! hash map, so that equal images would not be equal files.
+//! Writes OpenEXR files ("OpenEXR File Layout" of the Academy Software Foundation) with one part of
+//! uncompressed scan lines. The `exr` crate, used for reading, writes attributes in hash map order,
+//! so equal images would give different files.
 
 use super::Image;
 
-/// A name and a value that a file holds beside its pixels; formats without a place for them leave them out.
+/// Name and value of metadata; formats that cannot store it omit it.
 pub type Attribute<'a> = (&'a str, String);
 
-/// The file of an image, with attributes of the type `string`.
+/// Encodes an image, with attributes of type `string`.
 pub(super) fn encode_exr(image: &Image, own: &[Attribute]) -> Vec<u8> {
     const MAGIC_AND_VERSION: [u8; 8] = [0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
     const FLOAT: u8 = 2;
-    // Channels in the order of the alphabet, and where they are in a pixel.
+    // Channels in alphabetical order, with their index in a pixel.
     const CHANNELS: [(u8, usize); 3] = [(b'B', 2), (b'G', 1), (b'R', 0)];
     let [right, bottom] = [image.width - 1, image.height - 1];
     let window: Vec<u8> = [0, 0, right, bottom]
@@ -44,7 +45,7 @@ pub(super) fn encode_exr(image: &Image, own: &[Attribute]) -> Vec<u8> {
         bytes.extend_from_slice(value);
     }
     bytes.push(0);
-    // Where each row begins, then the rows: number, bytes, one channel after the other.
+    // Offset of each row, then the rows: number, size, one channel after the other.
     let row_bytes = 12 * image.width;
     let first_row = bytes.len() as u64 + 8 * u64::from(image.height);
     for row in 0..u64::from(image.height) {

@@ -1,4 +1,4 @@
-//! OpenEXR files, read by the crate `exr`.
+//! Reads OpenEXR files with the `exr` crate.
 
 use super::Image;
 use super::read::checked_size;
@@ -7,12 +7,12 @@ use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use std::io::Cursor;
 
-/// Layers whose colours are taken before those of others: what renderers call the picture itself.
+/// Preferred layers: names that renderers use for the main image.
 const PICTURE_LAYERS: [&str; 6] = ["", "rgba", "rgb", "color", "combined", "beauty"];
 
-/// The picture in a file; see [`super::read_linear`].
+/// Decodes the main image of a file; see [`super::read_linear`].
 pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
-    // Sizes first: the crate makes room for all pixels that a header promises.
+    // Check sizes first: the crate allocates all pixels that a header claims.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false);
     for header in &meta.map_err(|e| e.to_string())?.headers {
         checked_size(header.layer_size.x() as u64, header.layer_size.y() as u64)?;
@@ -54,20 +54,18 @@ pub(super) fn read_exr(bytes: &[u8]) -> Result<Image, String> {
 
 type FlatLayer = Layer<AnyChannels<FlatSamples>>;
 
-/// The channels of a layer that make a picture.
 struct Colours<'a> {
-    /// Name of the layer, empty if it has none.
+    /// Layer name, empty if it has none.
     name: String,
     layer: &'a FlatLayer,
     samples: [&'a FlatSamples; 3],
 }
 
-/// A channel's layer and its own name.
 fn split(name: &str) -> (&str, &str) {
     name.rsplit_once('.').unwrap_or(("", name))
 }
 
-/// The pictures in a part of a file. Of several parts, the name of a part counts as well.
+/// The images in a part of a file. If there are several parts, part names count as well.
 fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
     let list = &layer.channel_data.list;
     let names: Vec<String> = list.iter().map(|c| c.name.to_string()).collect();
@@ -85,7 +83,7 @@ fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
             (samples.len() == layer.size.area()).then_some(samples)
         };
         let rgb = || Some([channel("R")?, channel("G")?, channel("B")?]);
-        // With any of these, Y is not grey: XYZ, or chroma of half the size.
+        // With any of these, Y is not grey: XYZ, or subsampled chroma.
         let coloured = || ["X", "Z", "RY", "BY"].iter().any(|c| channel(c).is_some());
         let grey = || channel("Y").filter(|_| !coloured()).map(|y| [y; 3]);
         let samples = rgb().or_else(grey)?;
@@ -100,7 +98,6 @@ fn colours(layer: &FlatLayer, several: bool) -> Vec<Colours<'_>> {
     prefixes.into_iter().filter_map(of_prefix).collect()
 }
 
-/// The picture itself among those of a file.
 fn chosen<'a, 'b>(candidates: &'b [Colours<'a>]) -> Option<&'b Colours<'a>> {
     let called = |wanted: &&str| {
         let is_it = |c: &&Colours| split(&c.name).1.eq_ignore_ascii_case(wanted);
@@ -131,7 +128,7 @@ mod tests {
     use exr::meta::header::{ImageAttributes, LayerAttributes};
     use exr::prelude::{WritableImage, f16};
 
-    /// A part of 2 × 1 pixels, of which each channel has one value.
+    /// A part of 2 × 1 pixels with one value per channel.
     fn part(name: Option<&str>, channels: &[(&str, f32)]) -> FlatLayer {
         let channel = |(name, value): &(&str, f32)| {
             let samples = match name.len() % 2 {
@@ -251,7 +248,7 @@ mod tests {
             .position(|w| w == b"dataWindow\0")
             .unwrap();
         let mut huge = bytes;
-        // The right end of the window, behind names, size and left upper corner.
+        // Right end of the window, after names, size and the upper left corner.
         let right = at + b"dataWindow\0box2i\0".len() + 4 + 8;
         huge[right..right + 4].copy_from_slice(&0x3fff_ffff_u32.to_le_bytes());
         let message = read_exr(&huge).unwrap_err();

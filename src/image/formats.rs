@@ -1,5 +1,4 @@
-//! Files for rendered images. The ending of the file name decides: PNG is a picture to look at, the
-//! others keep the linear radiance of every pixel.
+//! Image file formats. By extension: PNG is for viewing, the others store linear radiance.
 
 use super::exr_file::encode_exr;
 use super::read::{Decode, read_hdr, read_npy, read_pfm};
@@ -9,12 +8,12 @@ use raystone_core::atomic::write_atomic;
 use std::io::Cursor;
 use std::path::Path;
 
-/// A kind of file that an image can be written to and, if it keeps linear values, read from.
+/// A file format that images can be written to and, if it stores linear values, read from.
 #[derive(Debug)]
 pub struct FileFormat {
-    /// Ending of the file name, lower case, without the dot.
+    /// File extension, lower case, without the dot.
     pub ending: &'static str,
-    /// One line: what the file holds.
+    /// One line: the content of the file.
     pub description: &'static str,
     encode: fn(&Image, &[Attribute]) -> Result<Vec<u8>, image::ImageError>,
     pub(super) decode: Option<Decode>,
@@ -25,7 +24,7 @@ const READ_EXR: Option<Decode> = Some(super::exr_read::read_exr);
 #[cfg(not(feature = "exr"))]
 const READ_EXR: Option<Decode> = None;
 
-/// Every format, in the order in which messages name them.
+/// All formats, in the order of messages.
 pub(crate) const FILE_FORMATS: [FileFormat; 5] = [
     FileFormat {
         ending: "png",
@@ -60,7 +59,7 @@ pub(crate) const FILE_FORMATS: [FileFormat; 5] = [
 ];
 
 impl FileFormat {
-    /// The format of a file of this name; upper and lower case are the same.
+    /// The format of a file by its extension, ignoring case.
     ///
     /// # Errors
     /// [`ImageError::UnknownFormat`] with the known endings.
@@ -73,14 +72,13 @@ impl FileFormat {
         })
     }
 
-    /// Those that keep linear values.
+    /// Formats that store linear values.
     pub fn linear() -> impl Iterator<Item = &'static Self> {
         FILE_FORMATS.iter().filter(|format| format.decode.is_some())
     }
 
-    /// Writes an image, whole or not at all. Radiance is kept as it is, NaN too, except by RGBE,
-    /// which has neither that nor negative numbers: it takes 0. EXR keeps the attributes, the others have no
-    /// place for them.
+    /// Writes an image atomically. Radiance is stored unchanged, including NaN, except by RGBE,
+    /// which replaces NaN and negative numbers by 0. Only EXR stores the attributes.
     ///
     /// # Errors
     /// [`ImageError::Encode`], [`ImageError::Write`].
@@ -94,7 +92,7 @@ impl FileFormat {
     }
 }
 
-/// Writes an encoded picture, whole or not at all.
+/// Writes an encoded picture atomically.
 pub(super) fn save(
     path: &Path,
     encoded: Result<Vec<u8>, image::ImageError>,
@@ -124,16 +122,17 @@ fn encode_hdr(image: &Image) -> Result<Vec<u8>, image::ImageError> {
     Ok(bytes.into_inner())
 }
 
-/// What a shared exponent of eight bits can express (Ward 1991): outside of it the encoder of the
-/// library wraps around. NaN becomes 0.
+/// Limits a value to the range of an eight-bit shared exponent (Ward 1991), outside of which the
+/// library's encoder wraps around. NaN becomes 0.
 fn in_range_of_rgbe(value: f32) -> f32 {
-    match value > 1e-32 {
-        true => value.min(1.6e38),
-        false => 0.0,
+    if value > 1e-32 {
+        value.min(1.6e38)
+    } else {
+        0.0
     }
 }
 
-/// Portable float map: rows from the bottom up; the negative scale says little endian.
+/// Portable float map: rows from bottom to top; a negative scale means little endian.
 fn encode_pfm(image: &Image) -> Vec<u8> {
     let mut bytes = format!("PF\n{} {}\n-1.0\n", image.width, image.height).into_bytes();
     for row in image.pixels.rchunks(image.width as usize) {
@@ -142,8 +141,8 @@ fn encode_pfm(image: &Image) -> Vec<u8> {
     bytes
 }
 
-/// NumPy's format 1.0: magic, length of the header, a Python literal padded so that the data begins
-/// at a multiple of 64, then the array in C order, rows from the top.
+/// NumPy's format 1.0: magic, header length, a Python literal padded so that the data begins at a
+/// multiple of 64, then the array in C order, rows from the top.
 fn encode_npy(image: &Image) -> Vec<u8> {
     const PREFIX: usize = 10;
     let shape = format!("({}, {}, 3)", image.height, image.width);
@@ -165,7 +164,7 @@ fn push_floats(bytes: &mut Vec<u8>, pixels: &[[f32; 3]]) {
 mod tests {
     use super::*;
 
-    /// Odd sizes, no symmetry: a flip or a swap of axes or channels changes something.
+    /// Odd sizes without symmetry, to detect flips and swaps of axes or channels.
     fn sample() -> Image {
         let value = |i: usize| match i {
             4 => 1.5e5,
@@ -188,7 +187,6 @@ mod tests {
         std::fs::read(&path).unwrap()
     }
 
-    /// The value of an attribute of an EXR header.
     fn attribute<'a>(bytes: &'a [u8], name: &str, kind: &str) -> &'a [u8] {
         let key = format!("{name}\0{kind}\0").into_bytes();
         let at = bytes.windows(key.len()).position(|w| w == key).unwrap() + key.len();
@@ -214,7 +212,7 @@ mod tests {
         assert_eq!(attribute(&bytes, "spp", "string"), b"64");
         let sampler = "sobol × none".as_bytes();
         assert_eq!(attribute(&bytes, "sampler", "string"), sampler);
-        // The table of rows follows the header: its last attribute, and a zero.
+        // The row table follows the header, which ends in the last attribute and a zero.
         let table = bytes.len() - 3 * (8 + 60) - 3 * 8;
         assert!(bytes[..table].ends_with(&[sampler, &[0]].concat()));
         for (y, row) in image.pixels.chunks(5).enumerate() {

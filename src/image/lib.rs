@@ -1,4 +1,4 @@
-//! Linear RGB images, pictures of them to look at, colour maps, and the files that they are written to and read from.
+//! Linear RGB images, displayable pictures, colour maps, and image file formats.
 #![warn(missing_docs)]
 
 mod color;
@@ -19,48 +19,48 @@ use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Weights of linear RGB (Rec. 709 primaries) in luminance.
+/// Luminance weights of linear RGB (Rec. 709 primaries).
 pub const LUMINANCE: [f64; 3] = [0.212671, 0.715160, 0.072169];
 
-/// What can be wrong with an image.
+/// Errors of images.
 #[derive(Debug, Error)]
 pub enum ImageError {
-    /// The pixels do not fill the rectangle.
+    /// The number of pixels does not match the size.
     #[error(
         "an image of {width} × {height} needs that many pixels, and at least one, but got {pixels}"
     )]
     WrongPixelCount {
-        /// Pixels in x.
+        /// Width in pixels.
         width: u32,
-        /// Pixels in y.
+        /// Height in pixels.
         height: u32,
         /// Pixels given.
         pixels: usize,
     },
-    /// Two images that belong together differ in size.
+    /// Two images differ in size.
     #[error("{what} is {}×{} pixels, expected {}×{}: render both at one resolution",
         actual[0], actual[1], expected[0], expected[1])]
     SizeMismatch {
-        /// Which image is at fault.
+        /// The image at fault.
         what: &'static str,
         /// Size of the first image.
         expected: [u32; 2],
         /// Size of the image at fault.
         actual: [u32; 2],
     },
-    /// No image where at least one is needed.
+    /// Too few images.
     #[error("no image was given where at least {needed} are needed")]
     TooFew {
-        /// Least number of images.
+        /// Minimum number of images.
         needed: usize,
     },
-    /// A reference with NaN or infinite pixels measures nothing.
+    /// The reference has NaN or infinite pixels.
     #[error(
         "the reference image has {count} NaN or infinite pixels, the first at ({x}, {y}): \
         find the path that produced it before measuring against this image"
     )]
     NonFiniteReference {
-        /// Pixels at fault.
+        /// Number of invalid pixels.
         count: usize,
         /// Column of the first.
         x: usize,
@@ -71,17 +71,17 @@ pub enum ImageError {
     #[error("cannot write {}: {source}; check that the folder exists, is writable and has space",
         path.display())]
     Write {
-        /// Where to.
+        /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: io::Error,
     },
-    /// The ending of a file name belongs to no format.
+    /// The file extension belongs to no format.
     #[error("{}: unknown kind of picture; the file name must end in one of {known}", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// Endings of all formats.
+        /// Extensions of all formats.
         known: String,
     },
     /// A file could not be read.
@@ -89,40 +89,40 @@ pub enum ImageError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: io::Error,
     },
-    /// A file is not what its ending says, or not an image that is read.
+    /// The file is not what its extension says, or not a supported image.
     #[error("cannot read {} as an image: {reason}", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
-    /// The encoder refused the picture.
+    /// The encoder refused the image.
     #[error("cannot encode {}: {source}", path.display())]
     Encode {
-        /// Where it was to go.
+        /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: ::image::ImageError,
     },
 }
 
-/// A linear RGB image, radiance units, row by row from the top left pixel.
+/// A linear RGB image in radiance units, row by row from the top left pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
-    /// Pixels in x.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels in y.
+    /// Height in pixels.
     pub height: u32,
     /// `width * height` pixels.
     pub pixels: Vec<[f32; 3]>,
 }
 
 impl Image {
-    /// An image of these pixels.
+    /// Creates an image.
     ///
     /// # Errors
     /// [`ImageError::WrongPixelCount`], also for an image without pixels.
@@ -163,8 +163,7 @@ impl Image {
         Self::new(first.width, first.height, pixels.collect())
     }
 
-    /// Variance over several images of one size, by pixel and channel, of one of them: the sum of squares about
-    /// the mean over one less than their number.
+    /// Sample variance over several images of one size, by pixel and channel (divided by n − 1).
     ///
     /// # Errors
     /// [`ImageError::TooFew`] below two, [`ImageError::SizeMismatch`].
@@ -191,29 +190,30 @@ impl Image {
         values.sum::<f64>() / (3 * self.pixels.len()) as f64
     }
 
-    /// Pixels of which a channel is NaN or infinite.
+    /// Number of pixels with a NaN or infinite channel.
     pub fn non_finite_pixels(&self) -> usize {
         self.pixels.iter().filter(|p| !is_finite(p)).count()
     }
 
-    /// Fails unless `other`, called `what` in the message, has the size of this image.
+    /// Checks that `other`, called `what` in the message, has the size of this image.
     ///
     /// # Errors
     /// [`ImageError::SizeMismatch`].
     pub fn check_size(&self, other: &Image, what: &'static str) -> Result<(), ImageError> {
         let (expected, actual) = ([self.width, self.height], [other.width, other.height]);
-        match expected == actual && self.pixels.len() == other.pixels.len() {
-            true => Ok(()),
-            false => Err(ImageError::SizeMismatch {
+        if expected == actual && self.pixels.len() == other.pixels.len() {
+            Ok(())
+        } else {
+            Err(ImageError::SizeMismatch {
                 what,
                 expected,
                 actual,
-            }),
+            })
         }
     }
 }
 
-/// Whether no channel is NaN or infinite.
+/// True if no channel is NaN or infinite.
 pub fn is_finite(pixel: &[f32; 3]) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }

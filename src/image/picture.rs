@@ -1,27 +1,27 @@
-//! Pictures to look at: tone mapping, error maps and PNG files.
+//! Displayable pictures: tone mapping, error maps and PNG files.
 
 use super::formats::save;
 use super::{Image, ImageError, is_finite, luminance};
 use std::io;
 use std::path::Path;
 
-/// Colour of a pixel that is NaN or infinite, in every picture.
+/// Colour of NaN and infinite pixels in every picture.
 pub const NON_FINITE_COLOUR: [u8; 3] = [255, 0, 255];
 
-/// A picture to look at: sRGB, 8 bits, row by row from the top left pixel.
+/// An 8-bit sRGB picture, row by row from the top left pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Pixels in x.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels in y.
+    /// Height in pixels.
     pub height: u32,
     /// `width * height` pixels.
     pub pixels: Vec<[u8; 3]>,
 }
 
-/// Exposure that brings the log-average luminance of the finite, non-black pixels to 0.36
-/// (Reinhard et al. 2002, equation 2, with twice their key: white skies look dull at 0.18); 1 for an image without such pixels. Take it from the
-/// reference and use it for all images of a scene, so that they can be compared by eye.
+/// Exposure that maps the log-average luminance of the finite, non-black pixels to 0.36 (Reinhard
+/// et al. 2002, equation 2, with twice their key: white skies look dull at 0.18); 1 if there are no
+/// such pixels. Use the reference's exposure for all images of a scene.
 pub fn automatic_exposure(image: &Image) -> f32 {
     let lit = |p: &&[f32; 3]| is_finite(p) && luminance(p) > 1e-6;
     let (sum, count) = image
@@ -37,20 +37,23 @@ pub fn automatic_exposure(image: &Image) -> f32 {
     }
 }
 
-/// A finite pixel as it is shown: exposure, then the luminance curve L (1 + L / 16) / (1 + L) that maps 4 to
-/// white and keeps the hue (Reinhard et al. 2002, equation 4), clamp, sRGB encoding (IEC 61966-2-1) to [0, 1].
+/// A finite pixel as displayed: exposure, then the luminance curve L (1 + L / 16) / (1 + L), which
+/// maps 4 to white and preserves hue (Reinhard et al. 2002, equation 4), clamp, sRGB encoding (IEC
+/// 61966-2-1) to [0, 1].
 pub fn displayed(pixel: &[f32; 3], exposure: f32) -> [f64; 3] {
     let bright = luminance(pixel).max(0.0) * f64::from(exposure);
     let scale = f64::from(exposure) * (1.0 + bright / 16.0) / (1.0 + bright);
     pixel.map(|v| encode_srgb(f64::from(v) * scale))
 }
 
-/// Tone-mapped picture: every pixel as [`displayed`] in 8 bits. Pixels that are not finite get
-/// [`NON_FINITE_COLOUR`].
+/// Tone-maps every pixel as [`displayed`]; non-finite ones become [`NON_FINITE_COLOUR`].
 pub fn tone_map(image: &Image, exposure: f32) -> Picture {
-    let map = |pixel: &[f32; 3]| match is_finite(pixel) {
-        true => displayed(pixel, exposure).map(|v| (v * 255.0).round() as u8),
-        false => NON_FINITE_COLOUR,
+    let map = |pixel: &[f32; 3]| {
+        if is_finite(pixel) {
+            displayed(pixel, exposure).map(|v| (v * 255.0).round() as u8)
+        } else {
+            NON_FINITE_COLOUR
+        }
     };
     Picture {
         width: image.width,
@@ -59,7 +62,7 @@ pub fn tone_map(image: &Image, exposure: f32) -> Picture {
     }
 }
 
-/// Writes a picture as PNG, whole or not at all.
+/// Writes a picture as PNG, atomically.
 ///
 /// # Errors
 /// [`ImageError::Write`], [`ImageError::Encode`].
@@ -67,7 +70,7 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
     save(path, encode_png(picture))
 }
 
-/// The bytes of a PNG file.
+/// Encodes a PNG file.
 pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = io::Cursor::new(Vec::new());
     image::write_buffer_with_format(
@@ -81,12 +84,12 @@ pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, image::ImageError
     Ok(bytes.into_inner())
 }
 
-/// Clamp and encode.
 fn encode_srgb(linear: f64) -> f64 {
     let v = linear.clamp(0.0, 1.0);
-    match v <= 0.0031308 {
-        true => 12.92 * v,
-        false => 1.055 * v.powf(1.0 / 2.4) - 0.055,
+    if v <= 0.0031308 {
+        12.92 * v
+    } else {
+        1.055 * v.powf(1.0 / 2.4) - 0.055
     }
 }
 

@@ -1,4 +1,4 @@
-//! Reading linear images: references by other renderers, and environment maps.
+//! Reads linear images: references by other renderers, and environment maps.
 
 use super::{FileFormat, Image, ImageError};
 use ::image::ImageDecoder;
@@ -7,27 +7,27 @@ use half::f16;
 use std::io::{self, Cursor, ErrorKind};
 use std::path::Path;
 
-/// Pixels of the largest image that is read: 1.5 GiB as three floats.
+/// Pixel limit of images: 1.5 GiB as three floats.
 pub(super) const MOST_PIXELS: u64 = 1 << 27;
 
-/// How the bytes of a file are read; the error says what is wrong with them.
+/// Decoder of a file's bytes; the error describes the problem.
 pub(super) type Decode = fn(&[u8]) -> Result<Image, String>;
 
-/// Reads linear RGB from a file; its ending chooses the format, upper and lower case being the same.
+/// Reads linear RGB from a file, whose extension determines the format, ignoring case.
 ///
-/// * **EXR**: half, float or integer channels. What is taken is R, G and B without a layer's name; else those
-///   of a layer called `rgba`, `rgb`, `color`, `combined` or `beauty`; else those of the only layer that has
-///   some. Y alone is grey. Alpha is left out: EXR's colours are multiplied by it already. Pixels of the display
-///   window outside of the data window are 0.
-/// * **HDR**: Radiance RGBE, over `EXPOSURE` and `COLORCORR` where the header has them.
-/// * **PFM**: `PF` and grey `Pf`, of both byte orders; the scale's size is not applied.
-/// * **NPY**: `[height, width, 3]`, `[height, width, 4]` (the fourth left out), `[height, width, 1]` or
-///   `[height, width]` (grey), of 16-, 32- or 64-bit floats in C order.
+/// * **EXR**: half, float or integer channels. Uses R, G and B without a layer name, or those of a
+///   layer called `rgba`, `rgb`, `color`, `combined` or `beauty`, or those of the only layer that
+///   has any. Y alone is grey. Alpha is ignored: EXR colours are premultiplied. Pixels of the
+///   display window outside the data window are 0.
+/// * **HDR**: Radiance RGBE, divided by `EXPOSURE` and `COLORCORR` if present.
+/// * **PFM**: `PF` and grey `Pf`, of both byte orders; the magnitude of the scale is ignored.
+/// * **NPY**: `[height, width, 3]`, `[height, width, 4]` (the fourth ignored), `[height, width, 1]`
+///   or `[height, width]` (grey), of 16-, 32- or 64-bit floats in C order.
 ///
-/// Values are what the file says, NaN and infinity too.
+/// Values are unchanged, including NaN and infinity.
 ///
 /// # Errors
-/// [`ImageError::UnknownFormat`], [`ImageError::Read`], [`ImageError::Decode`] with what is wrong.
+/// [`ImageError::UnknownFormat`], [`ImageError::Read`], [`ImageError::Decode`] with the problem.
 pub fn read_linear(path: &Path) -> Result<Image, ImageError> {
     let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
     let format = FileFormat::linear().find(|format| ending == format.ending);
@@ -55,7 +55,6 @@ pub fn read_linear(path: &Path) -> Result<Image, ImageError> {
     })
 }
 
-/// The size of an image, if it is one that is read.
 pub(super) fn checked_size(width: u64, height: u64) -> Result<[u32; 2], String> {
     let pixels = width.checked_mul(height);
     match (u32::try_from(width), u32::try_from(height)) {
@@ -67,7 +66,7 @@ pub(super) fn checked_size(width: u64, height: u64) -> Result<[u32; 2], String> 
 }
 
 pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
-    // Some programs begin with the name of the encoding; the rest is the same.
+    // Some programs write the encoding's name first; the rest is the same.
     let strict = !bytes.starts_with(b"#?RGBE");
     let decoder = HdrDecoder::with_strictness(Cursor::new(bytes), strict);
     let decoder = decoder.map_err(|e| e.to_string())?;
@@ -90,7 +89,7 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     Image::new(width, height, pixels.collect()).map_err(|e| e.to_string())
 }
 
-/// The next word of a header, and what follows its one white space.
+/// The next word of a header, and the bytes after the single white space.
 fn word(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let start = bytes.iter().position(|b| !b.is_ascii_whitespace())?;
     let length = bytes[start..]
@@ -121,17 +120,18 @@ pub(super) fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
     let header = header().ok_or("the header is not `PF` or `Pf`, width, height and scale")?;
     let (channels, width, height, scale, data) = header;
     let [width, height] = checked_size(width, height)?;
-    let float = match scale < 0.0 {
-        true => f32::from_le_bytes,
-        false => f32::from_be_bytes,
+    let float = if scale < 0.0 {
+        f32::from_le_bytes
+    } else {
+        f32::from_be_bytes
     };
     let values = floats(data, [width, height], channels, float)?;
-    // Rows go from the bottom up.
+    // Rows go from bottom to top.
     let rows = values.rchunks(width as usize);
     Image::new(width, height, rows.flatten().copied().collect()).map_err(|e| e.to_string())
 }
 
-/// The pixels of an array [height, width, channels], each value made of `N` bytes.
+/// Pixels of an array [height, width, channels] of `N`-byte values.
 fn floats<const N: usize>(
     data: &[u8],
     [width, height]: [u32; 2],
@@ -163,7 +163,7 @@ pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
     let parts = || {
         let rest = bytes.strip_prefix(b"\x93NUMPY")?;
         let (version, rest) = rest.split_at_checked(2)?;
-        // The header's length has two bytes in version 1 and four since.
+        // The header length has two bytes in version 1 and four since.
         let (length, rest) = rest.split_at_checked(if version[0] == 1 { 2 } else { 4 })?;
         let length = length
             .iter()

@@ -7,15 +7,15 @@ use super::{
 use glam::{Vec2, Vec3};
 use raystone_core::geometry::{Camera, Triangle};
 
-/// Largest absolute coordinate. Triangle tests multiply three differences of coordinates, and WGSL
-/// promises nothing of what overflows: 8 · (2 · 1e12)³ stays below the largest f32. So do distances times
+/// Largest absolute coordinate. Triangle tests multiply three coordinate differences, and WGSL
+/// leaves overflow undefined: 8 · (2 · 1e12)³ stays below the largest f32. So do distances times
 /// 1e20, the largest reciprocal of a direction component in the kernels.
 pub const MAX_COORDINATE: f32 = 1e12;
 
-/// Reflectance of surfaces whose file says nothing of it.
+/// Reflectance of surfaces whose file gives none.
 pub const DEFAULT_ALBEDO: f32 = 0.7;
 
-/// What a loader knows of a scene besides its triangles.
+/// Everything a loader knows about a scene besides its triangles.
 #[derive(Default)]
 pub(super) struct Look {
     pub materials: Vec<Material>,
@@ -26,7 +26,7 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// Surfaces under a white sky, seen from `eye` with a vertical field of view of `fov` degrees.
+    /// A white sky, and a camera at `eye` with a vertical field of view of `fov` degrees.
     pub(crate) fn under_sky(materials: Vec<Material>, eye: Vec3, target: Vec3, fov: f32) -> Self {
         Self {
             materials,
@@ -37,30 +37,29 @@ impl Look {
     }
 }
 
-/// Collects triangles: drops what cannot be traced, counts what is odd.
+/// Collects triangles, drops those that cannot be traced and counts degenerate ones.
 #[derive(Default)]
 pub(super) struct SceneBuilder {
     triangles: Vec<Triangle>,
     uvs: Vec<[Vec2; 3]>,
-    /// Empty until a triangle has normals that are not its own.
+    /// Empty until a triangle has normals other than its own.
     normals: Vec<[u32; 3]>,
-    /// Empty until a vertex has a colour that is not white.
+    /// Empty until a vertex has a colour other than white.
     colors: Vec<[[u32; 2]; 3]>,
-    /// Empty until a triangle is mirrored.
     mirrored: Vec<bool>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
-    /// Objects and instances; given up if they do not account for every triangle.
+    /// Objects and instances; dropped if they do not cover every triangle.
     pub assembly: Assembly,
     /// The first instance that could not be placed.
     misplaced: Option<InstanceError>,
-    /// Why there can be no scene, found while it was built.
+    /// The reason to refuse the scene, if building found one.
     pub refused: Option<SceneError>,
     pub report: LoadReport,
 }
 
 impl SceneBuilder {
-    /// `keep_uvs` says whether texture coordinates will be of use.
+    /// `keep_uvs` is true if texture coordinates will be used.
     pub(crate) fn new(keep_uvs: bool, capacity: usize) -> Self {
         Self {
             triangles: Vec::with_capacity(capacity),
@@ -71,19 +70,18 @@ impl SceneBuilder {
         }
     }
 
-    /// Makes room for `more` triangles.
     pub(crate) fn reserve(&mut self, more: usize) {
         self.triangles.reserve(more);
         self.material_ids.reserve(more);
         self.uvs.reserve(if self.keep_uvs { more } else { 0 });
     }
 
-    /// Adds a triangle without texture coordinates.
     pub(crate) fn push(&mut self, vertices: [Vec3; 3], material: u32) {
         self.push_corners(vertices, [Vec2::ZERO; 3], None, material);
     }
 
-    /// Adds a triangle with texture coordinates and perhaps normals. A non-finite vertex drops it, a zero area is counted.
+    /// Adds a triangle with texture coordinates and optional normals. Drops it if a vertex is not
+    /// finite; counts it if its area is zero.
     pub(crate) fn push_corners(
         &mut self,
         vertices: [Vec3; 3],
@@ -94,7 +92,7 @@ impl SceneBuilder {
         self.push_colored(vertices, uvs, normals, None, material);
     }
 
-    /// The same with perhaps linear colours, which multiply the base colour.
+    /// [`Self::push_corners`] with optional linear vertex colours, which multiply the base colour.
     pub(crate) fn push_colored(
         &mut self,
         vertices: [Vec3; 3],
@@ -128,13 +126,13 @@ impl SceneBuilder {
         }
     }
 
-    /// Adds the quadrilateral a, b, c, d as the triangles abc and acd.
+    /// Adds the quadrilateral a, b, c, d as triangles abc and acd.
     pub(crate) fn push_quad(&mut self, [a, b, c, d]: [Vec3; 4], material: u32) {
         self.push([a, b, c], material);
         self.push([a, c, d], material);
     }
 
-    /// Adds `edge` by `edge` quadrilaterals between the points of a grid.
+    /// Adds `edge` × `edge` quadrilaterals between the points of a grid.
     pub(crate) fn push_grid(
         &mut self,
         edge: usize,
@@ -147,27 +145,26 @@ impl SceneBuilder {
         }
     }
 
-    /// Says that a transform has mirrored the triangles from number `first` on: their fronts are the sides from which their corners
-    /// turn clockwise.
+    /// Marks the triangles from `first` on as mirrored: their corners turn clockwise.
     pub(crate) fn mirror_from(&mut self, first: usize) {
         self.mirrored.resize(first, false);
         self.mirrored.resize(self.triangles.len(), true);
     }
 
-    /// Adds an object to the assembly. It is numbered by the order of addition.
+    /// Adds an object to the assembly; objects are numbered in order of addition.
     pub(crate) fn add_object(&mut self, triangles: Vec<Triangle>) {
         if let Err(error) = self.assembly.add_object(triangles) {
             self.misplaced.get_or_insert(error);
         }
     }
 
-    /// Adds an instance of an object of the assembly, all of one material. What cannot be placed
-    /// makes [`SceneBuilder::finish`] fail.
+    /// Adds an instance of an object with a single material. If it cannot be placed,
+    /// [`SceneBuilder::finish`] fails.
     pub(crate) fn place(&mut self, object: u32, to_world: Transform, material: u32) {
         self.place_textured(object, to_world, material, &[]);
     }
 
-    /// The same with texture coordinates of the object's triangles.
+    /// [`Self::place`] with texture coordinates for the object's triangles.
     pub(crate) fn place_textured(
         &mut self,
         object: u32,
@@ -178,7 +175,7 @@ impl SceneBuilder {
         self.place_looking(object, to_world, |_| material, uvs, &[]);
     }
 
-    /// The same with a material of each of its triangles, and colours of their vertices.
+    /// [`Self::place`] with a material per triangle and vertex colours.
     pub(crate) fn place_looking(
         &mut self,
         object: u32,
@@ -207,34 +204,30 @@ impl SceneBuilder {
         }
     }
 
-    /// The triangles alone.
     pub(crate) fn into_triangles(self) -> Vec<Triangle> {
         self.triangles
     }
 
-    /// The triangles so far.
     pub(crate) fn triangles(&self) -> &[Triangle] {
         &self.triangles
     }
 
-    /// How many triangles there are so far.
     pub(crate) fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// The assembly, if it accounts for every triangle.
+    /// The assembly, if it covers every triangle.
     fn take_assembly(&mut self) -> Option<Assembly> {
         let assembly = std::mem::take(&mut self.assembly);
         let whole = assembly.triangles() == self.triangles.len() as u64;
         (whole && !assembly.instances().is_empty()).then_some(assembly)
     }
 
-    /// Checks the whole, puts a sky over a scene without any light, finds a place to look from if there
-    /// is no camera, and hashes the scene.
+    /// Validates the scene, adds a sky and framing if it has no light or camera, and hashes it.
     ///
     /// # Errors
-    /// What `refused` says, [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
-    /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
+    /// The error in `refused`, [`SceneError::NoTriangles`], [`SceneError::TooLarge`],
+    /// [`SceneError::Instance`], and [`SceneError::Camera`] if the scene's own camera sees nothing.
     pub(crate) fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
         self.check(name)?;
         if let Some(camera) = &look.camera {

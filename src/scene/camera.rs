@@ -1,26 +1,26 @@
-//! Where the image is taken from: boxes around scenes, and cameras that see something.
+//! Bounding boxes and camera checks.
 
 use super::SceneError;
 use glam::Vec3;
 use raystone_core::geometry::{Camera, Triangle};
 
-/// An axis-aligned box, scene units.
+/// An axis-aligned box in scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Least corner.
+    /// Minimum corner.
     pub min: Vec3,
-    /// Greatest corner.
+    /// Maximum corner.
     pub max: Vec3,
 }
 
 impl Bounds {
-    /// The box that contains nothing; neutral to [`Bounds::extend`].
+    /// The empty box, the identity of [`Bounds::extend`].
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
     };
 
-    /// The box of `triangles`; [`Bounds::EMPTY`] if there are none.
+    /// Bounding box of `triangles`; [`Bounds::EMPTY`] if there are none.
     pub fn of(triangles: &[Triangle]) -> Self {
         triangles
             .iter()
@@ -28,7 +28,7 @@ impl Bounds {
             .fold(Self::EMPTY, Self::extend)
     }
 
-    /// The least box that contains `self` and `point`.
+    /// The smallest box that contains `self` and `point`.
     #[must_use]
     pub fn extend(self, point: Vec3) -> Self {
         Self {
@@ -37,17 +37,17 @@ impl Bounds {
         }
     }
 
-    /// Whether the box contains no point.
+    /// True if the box contains no point.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Middle of the box.
+    /// Centre of the box.
     pub fn center(&self) -> Vec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// Radius of the sphere through the corners.
+    /// Radius of the circumscribed sphere.
     pub fn radius(&self) -> f32 {
         0.5 * (self.max - self.min).length()
     }

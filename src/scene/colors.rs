@@ -1,15 +1,15 @@
-//! Colours of vertices, which multiply the base colour of the material: three 16-bit numbers each. Twin: `kernels/shading/colors.wesl`.
+//! Vertex colours, which multiply the material's base colour: three 16-bit numbers each. Twin:
+//! `kernels/shading/colors.wesl`.
 
 use glam::{DVec3, Vec3};
 
-/// The word pair of a vertex that leaves the base colour as it is.
+/// The encoding of white, which leaves the base colour unchanged.
 pub const WHITE: [u32; 2] = [0xffff_ffff, 0xffff];
 
-/// The largest 16-bit number.
 const LARGEST: f32 = 65_535.0;
 
-/// Red in the lower and green in the upper half of the first word, blue in the second: linear, 0 to 1. Eight and sixteen bits of a
-/// file come through as they are; NaN is 0.
+/// Packs a linear colour in 0 to 1: red in the low and green in the high half of the first word,
+/// blue in the second. 8- and 16-bit file values survive exactly; NaN becomes 0.
 pub fn encode_color(color: Vec3) -> [u32; 2] {
     let [r, g, b] = color
         .to_array()
@@ -17,17 +17,18 @@ pub fn encode_color(color: Vec3) -> [u32; 2] {
     [r | g << 16, b]
 }
 
-/// The linear colour of [`encode_color`]'s words.
+/// Inverse of [`encode_color`].
 pub fn decode_color([first, second]: [u32; 2]) -> DVec3 {
     let part = |bits: u32| f64::from(bits & 0xffff) / f64::from(LARGEST);
     DVec3::new(part(first), part(first >> 16), part(second))
 }
 
-/// The linear value of a component that a file means for a screen (sRGB, IEC 61966-2-1).
+/// Converts an sRGB component to linear (IEC 61966-2-1).
 pub(super) fn linear(encoded: f32) -> f32 {
-    match encoded <= 0.04045 {
-        true => encoded / 12.92,
-        false => ((encoded + 0.055) / 1.055).powf(2.4),
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
     }
 }
 
@@ -52,7 +53,7 @@ mod tests {
     #[test]
     fn what_is_meant_for_a_screen_becomes_light() {
         assert_eq!((linear(0.0), linear(1.0)), (0.0, 1.0));
-        // The grey of 188 of 255 has half the light of white.
+        // Grey 188 of 255 carries half the light of white.
         assert!((linear(188.0 / 255.0) - 0.502_886_5).abs() < 1e-5);
     }
 }

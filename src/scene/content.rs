@@ -1,4 +1,4 @@
-//! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
+//! Properties of a loaded scene: extent, size in bytes, emitters, content hash.
 
 use super::texture::texel_room;
 use super::{
@@ -11,19 +11,19 @@ use std::mem::size_of_val;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Changed whenever the order or meaning of the hashed bytes changes.
+/// Bump this when the order or meaning of the hashed bytes changes.
 const HASH_VERSION: &[u8] = b"raystone scene 2";
 
 impl SceneData {
-    /// The box of all triangles, scene units.
+    /// Bounding box of all triangles in scene units.
     pub fn bounds(&self) -> Bounds {
         Bounds::of(&self.triangles)
     }
 
-    /// Gives an instance another transform, moves its triangles, and hashes the scene anew.
+    /// Replaces an instance's transform, moves its triangles and rehashes the scene.
     ///
     /// # Errors
-    /// The scene has no such instance, or the transform is singular or not finite.
+    /// The instance does not exist, or the transform is singular or not finite.
     pub fn move_instance(
         &mut self,
         instance: usize,
@@ -59,8 +59,8 @@ impl SceneData {
         Ok(())
     }
 
-    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light; reduced until the
-    /// tables of the scene fit into so many bytes.
+    /// Lights the scene with an environment map instead of a constant radiance or the default sky.
+    /// The map is reduced until the scene's tables fit into `table_bytes`.
     ///
     /// # Errors
     /// The map cannot be read.
@@ -90,21 +90,23 @@ impl SceneData {
         Ok(self)
     }
 
-    /// Whether the front of a triangle is the side from which its corners turn clockwise.
+    /// True if the front of a triangle is the side from which its corners turn clockwise.
     pub fn is_mirrored(&self, triangle: usize) -> bool {
         self.mirrored.get(triangle).copied().unwrap_or(false)
     }
 
-    /// The corners of a triangle in the order in which they turn counter-clockwise seen from its front.
+    /// Corners of a triangle, counter-clockwise seen from its front.
     pub fn outward(&self, triangle: usize) -> [Vec3; 3] {
         let [a, b, c] = self.triangles[triangle].vertices;
-        match self.is_mirrored(triangle) {
-            true => [a, c, b],
-            false => [a, b, c],
+        if self.is_mirrored(triangle) {
+            [a, c, b]
+        } else {
+            [a, b, c]
         }
     }
 
-    /// The scene with all corners in that order. What was mirrored is no copy of an object any more.
+    /// The scene with all corners in [`Self::outward`] order. Drops the assembly if anything was
+    /// mirrored, as those triangles are no longer copies of an object.
     #[must_use]
     pub(super) fn turned_outward(mut self) -> Self {
         let mirrored = std::mem::take(&mut self.mirrored);
@@ -124,7 +126,7 @@ impl SceneData {
         self
     }
 
-    /// Bytes of the scene's arrays: triangles, what corners and triangles carry, material indices, texels.
+    /// Size of the scene's arrays in bytes: triangles, per-corner and per-triangle data, texels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
@@ -139,7 +141,7 @@ impl SceneData {
                 .sum::<usize>()
     }
 
-    /// Indices of the triangles that emit light and have an area, ascending.
+    /// Indices of emissive triangles with non-zero area, ascending.
     pub fn emitters(&self) -> Vec<u32> {
         let emits: Vec<bool> = self
             .materials
@@ -157,9 +159,9 @@ impl SceneData {
             .collect()
     }
 
-    /// BLAKE3 (hex) of vertices, texture coordinates, normals and colours of vertices, materials, textures, camera and environment.
-    /// Names are not part of it. Every list is preceded by its length, so that no two scenes share
-    /// their bytes.
+    /// BLAKE3 (hex) of vertices, texture coordinates, vertex normals and colours, materials,
+    /// textures, camera and environment; names are excluded. Every list is preceded by its length,
+    /// so that no two scenes hash the same bytes.
     pub(super) fn content_hash(&self) -> String {
         let mut hash = Hash(blake3::Hasher::new());
         hash.bytes(HASH_VERSION);
@@ -177,7 +179,7 @@ impl SceneData {
             if !material.emits_both_sides {
                 hash.bytes(b"one-sided");
             }
-            // The derived Debug text is a total, deterministic image of the plain fields.
+            // The derived Debug text is complete and deterministic for plain fields.
             hash.bytes(format!("{:?}", material.source).as_bytes());
         }
         for (id, material) in self.materials.iter().enumerate() {
@@ -214,7 +216,7 @@ impl SceneData {
         }
         hash.vectors(&[self.environment]);
         for light in &self.lights {
-            // As above: fields are plain, and their text has all their digits.
+            // As above: plain fields, printed with all digits.
             hash.bytes(format!("{light:?}").as_bytes());
         }
         if let Some(sky) = &self.daylight {

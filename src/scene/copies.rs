@@ -1,4 +1,4 @@
-//! Any scene with fewer triangles, and as copies on a plane: theses measure thousands of a scanned model.
+//! Simplifies any scene, or repeats it on a plane to reach large triangle counts.
 
 use super::builder::{Look, SceneBuilder};
 use super::builtin::numeric::sin_cos_turns;
@@ -8,20 +8,21 @@ use raystone_core::geometry::{Camera, Triangle};
 use raystone_core::random::Pcg32;
 use std::collections::{HashMap, HashSet};
 
-/// Most triangles of a scene of copies: all of them are stored, 36 bytes each and as many again where they are judged.
+/// Triangle limit of a scene of copies: 36 bytes each, and as much in the reference tracer.
 const MOST_TRIANGLES: usize = 100_000_000;
-/// Copies stand so much farther from each other than what lets them touch, and so much of their height above the plane.
+/// Spacing of the copies relative to touching, and their height above the plane.
 const APART: f32 = 1.02;
 const ABOVE: f32 = 1e-3;
-/// Cells along the longest edge of the finest grid that vertices are gathered in.
+/// Cells along the longest edge of the finest clustering grid.
 const FINEST: u32 = 1 << 16;
 
-/// The scene with at most so many triangles (vertex clustering: J. Rossignac, P. Borrel, "Multi-resolution 3D
-/// approximations for rendering complex scenes", 1993, with the mean of the vertices of a cell). Texture coordinates,
-/// normals and colours of vertices are lost. One that has no more stays as it is.
+/// Reduces the scene to at most `most` triangles (vertex clustering: J. Rossignac, P. Borrel,
+/// "Multi-resolution 3D approximations for rendering complex scenes", 1993, using the mean of a
+/// cell's vertices). Drops texture coordinates, normals and vertex colours. Returns the scene
+/// unchanged if it is small enough already.
 ///
 /// # Errors
-/// [`SceneError::NoTriangles`] if so few cannot be had.
+/// [`SceneError::NoTriangles`] if no grid gives so few triangles.
 pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneData, SceneError> {
     if scene.triangles.len() <= most {
         return Ok(scene);
@@ -32,9 +33,10 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
     while too_fine - fits > 1 {
         let cells = fits.midpoint(too_fine);
         let found = clustered(&scene, cells);
-        match found.len() <= most {
-            true => (fits, kept) = (cells, found),
-            false => too_fine = cells,
+        if found.len() <= most {
+            (fits, kept) = (cells, found);
+        } else {
+            too_fine = cells;
         }
     }
     for material in &mut scene.materials {
@@ -67,7 +69,7 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
     builder.finish(&name, look)
 }
 
-/// The triangles that are left when the vertices of a cell are one, with their materials.
+/// Triangles and materials that remain after merging the vertices of each cell.
 fn clustered(scene: &SceneData, cells: u32) -> Vec<(Triangle, u32)> {
     let bounds = scene.bounds();
     let edge = (bounds.max - bounds.min).max_element() / cells as f32;
@@ -102,10 +104,10 @@ fn clustered(scene: &SceneData, cells: u32) -> Vec<(Triangle, u32)> {
     kept
 }
 
-/// So many copies of a scene, turned about the vertical, that stand apart on a plane. Normals of vertices are lost.
+/// Places `copies` copies of a scene apart on a plane, with random turns. Drops vertex normals.
 ///
 /// # Errors
-/// [`SceneError::TooManyCopies`], and what a transform can be refused for.
+/// [`SceneError::TooManyCopies`], or a transform error.
 pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, SceneError> {
     let count = scene.triangles.len();
     let needed = count.saturating_mul(copies);
@@ -158,7 +160,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
     }
     let plane = scene.materials.len() as u32;
     builder.place(1, Transform::IDENTITY, plane);
-    // From above a corner, over all of them.
+    // From above one corner, looking over all copies.
     let far = spacing * row as f32;
     let eye = Vec3::new(0.35 * far, 0.35 * far + height, 0.75 * far + spacing);
     let camera = Camera::upright(eye, Vec3::new(0.0, 0.3 * height, 0.1 * far), 45.0);
@@ -168,7 +170,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
     builder.finish(&name, look)
 }
 
-/// A square of two triangles around the origin, facing upwards.
+/// A square of two triangles around the origin, facing up.
 fn ground(half: f32) -> Vec<Triangle> {
     let [a, b, c, d] = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
         .map(|(x, z)| half * Vec3::new(x, 0.0, z));
@@ -182,8 +184,7 @@ fn ground(half: f32) -> Vec<Triangle> {
     ]
 }
 
-/// What a scene has besides triangles, for a new one; what was said of it when it was loaded is said of the new one. The sky of
-/// scenes without a light is put up again.
+/// Moves everything but the triangles into a new scene, and rebuilds the default sky.
 fn taken_apart(
     scene: SceneData,
     builder: &mut SceneBuilder,

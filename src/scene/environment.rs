@@ -1,4 +1,4 @@
-//! Environment maps: equirectangular radiance from all around.
+//! Equirectangular environment maps.
 
 use super::SceneError;
 use super::light::luminance;
@@ -8,21 +8,22 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::path::Path;
 
-/// Radiance in all directions, bilinear between the centres of texels, linear RGB. Row 0 is the zenith, +y; column
-/// c has its centre in the direction (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width: columns grow to the right of who looks at the map from inside.
+/// Radiance in all directions, bilinear between texel centres, linear RGB. Row 0 is the zenith, +y;
+/// the centre of column c is at (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width: columns
+/// run to the right for a viewer inside.
 #[derive(Clone, PartialEq)]
 pub struct EnvironmentMap {
-    /// The file.
+    /// File name.
     pub name: String,
-    /// Texels around.
+    /// Number of columns.
     pub width: u32,
-    /// Texels from zenith to nadir.
+    /// Number of rows, from zenith to nadir.
     pub height: u32,
-    /// Row by row, finite and not negative.
+    /// Row by row, finite and non-negative.
     pub texels: Vec<Vec3>,
 }
 
-/// Name, size and a hash of the content.
+/// Prints name, size and a content hash.
 impl fmt::Debug for EnvironmentMap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let hash = blake3::hash(bytemuck::cast_slice::<Vec3, u8>(&self.texels));
@@ -32,10 +33,11 @@ impl fmt::Debug for EnvironmentMap {
 }
 
 impl EnvironmentMap {
-    /// Reads a linear image of any format that [`raystone_image::read_linear`] knows. Texels that are negative, infinite or NaN are taken as 0, with a warning.
+    /// Reads a linear image in any format that [`raystone_image::read_linear`] supports. Negative,
+    /// infinite and NaN texels become 0, with a warning.
     ///
     /// # Errors
-    /// The file cannot be read or is no picture.
+    /// The file cannot be read or is not an image.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
         let malformed = |problem: String| SceneError::malformed(path, "", problem);
         super::error::open(path)?;
@@ -51,10 +53,10 @@ impl EnvironmentMap {
         .map_err(malformed)
     }
 
-    /// A map of these texels, row by row, of which those that are negative, infinite or NaN become 0.
+    /// Builds a map from texels, row by row; negative, infinite and NaN texels become 0.
     ///
     /// # Errors
-    /// There are not `width · height` texels, or none.
+    /// There are not exactly `width · height` texels, or none.
     pub fn new(
         name: &str,
         [width, height]: [u32; 2],
@@ -86,8 +88,8 @@ impl EnvironmentMap {
         })
     }
 
-    /// The map with so many halvings of both sides that its tables have at most so many bytes, with a warning if there are any.
-    /// Texels count by their solid angle.
+    /// Halves both sides until the map's tables fit into `bytes`, with a warning if that was
+    /// needed. Texels are weighted by solid angle.
     #[must_use]
     pub fn within(self, bytes: u64, warnings: &mut Vec<String>) -> Self {
         let from = [self.width, self.height];
@@ -113,18 +115,18 @@ impl EnvironmentMap {
         }
     }
 
-    /// Solid angle of a texel of this row, steradian.
+    /// Solid angle of a texel in this row, in steradians.
     pub fn solid_angle(&self, row: u32) -> f64 {
         let cosine = |row: u32| (PI * f64::from(row) / f64::from(self.height)).cos();
         2.0 * PI / f64::from(self.width) * (cosine(row) - cosine(row + 1))
     }
 
-    /// What a texel is chosen by: the mean luminance of the bilinear function over it, times its solid angle; row by row.
+    /// Sampling weights, row by row: mean luminance over the (bilinear) texel times solid angle.
     pub fn weights(&self) -> Vec<f64> {
         let [w, h] = [self.width, self.height];
         let light: Vec<f64> = self.texels.iter().map(|t| luminance(*t)).collect();
         let at = |x: u32, y: u32| light[(y * w + x) as usize];
-        // The function falls linearly from centre to centre: 1/8, 3/4 and 1/8 of three neighbours.
+        // Linear from centre to centre, hence weights 1/8, 3/4 and 1/8 of three neighbours.
         let along = |x: u32, y: u32| {
             0.75 * at(x, y) + 0.125 * (at((x + w - 1) % w, y) + at((x + 1) % w, y))
         };
@@ -139,7 +141,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Bytes of a map of this size in `shading_tables`: a `vec4` a texel, and the parts of alias tables, which are powers of two.
+/// Bytes of a map of this size in `shading_tables`: texels and alias tables.
 fn table_bytes([width, height]: [u32; 2]) -> u64 {
     let [w, h] = [width, height].map(u64::from);
     16 + 16 * w * h + 8 * (h.next_power_of_two() + h * w.next_power_of_two())
@@ -201,7 +203,7 @@ mod tests {
         assert!((light(&half) / before - 1.0).abs() < 1e-6);
         let least = map.within(0, &mut warnings);
         assert!(least.texels.len() == 1 && (light(&least) / before - 1.0).abs() < 1e-6);
-        // What software adapters bind holds what it held before, and not twice that.
+        // Software adapters still bind a map of 2048 × 1024, but not of twice that size.
         let all = crate::LEAST_BINDING - (8 << 20);
         assert!(table_bytes([2048, 1024]) <= all && table_bytes([4096, 2048]) > all);
     }

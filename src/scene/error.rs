@@ -1,4 +1,4 @@
-//! What can go wrong between a scene's name and its triangles.
+//! Errors of loading a scene.
 
 use raystone_core::files::files;
 use raystone_core::params::ParamError;
@@ -7,24 +7,24 @@ use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-/// A scene could not be loaded: says which file, where in it, and what to do.
+/// A scene could not be loaded: names the file, the place in it, and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// Neither a built-in scene nor a file.
     #[error("unknown scene `{name}`: not a built-in scene and no such file; {hint}")]
     Unknown {
-        /// What the user typed.
+        /// The name as typed.
         name: String,
         /// The nearest built-in name, or all of them.
         hint: String,
     },
-    /// The file's extension names no format that can be read.
+    /// The file's extension is not a supported format.
     #[error("{}: unknown model format; give a .obj, .gltf, .glb, .ply or Nori .xml file", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// The operating system refused the file.
+    /// The operating system could not read the file.
     #[error("{}: cannot read the model ({source}); check the path and its permissions", path.display())]
     Read {
         /// The file.
@@ -38,22 +38,22 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
     },
-    /// The content breaks the rules of its format.
+    /// The content violates its format.
     #[error("{}{}: {problem}; repair the file or export it again", path.display(), at(place))]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Line or part of the file, empty if it is not known.
+        /// Line or part of the file; empty if unknown.
         place: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// The file is well formed and has no triangle to trace.
+    /// The file is well formed but has no triangle to trace.
     #[error("{name}: the scene has no triangles ({reason}); give a model with at least one face")]
     NoTriangles {
         /// The scene, as typed.
         name: String,
-        /// Why there are none.
+        /// The reason.
         reason: String,
     },
     /// Coordinates so large that f32 arithmetic on them overflows.
@@ -71,15 +71,15 @@ pub enum SceneError {
         /// Largest allowed.
         limit: f32,
     },
-    /// An object or instance that cannot be placed.
+    /// An object or instance cannot be placed.
     #[error("{name}: {source}")]
     Instance {
         /// The scene, as typed.
         name: String,
-        /// Which, and why.
+        /// The failing instance and the reason.
         source: super::InstanceError,
     },
-    /// More triangles than a machine can be expected to hold.
+    /// The copies exceed the triangle limit.
     #[error(
         "{name}: {copies} copies have {needed} triangles, the limit is {limit}; set `copies` lower, or \
          most_triangles = {most}"
@@ -87,27 +87,27 @@ pub enum SceneError {
     TooManyCopies {
         /// The scene, as typed.
         name: String,
-        /// Copies that were asked for.
+        /// Number of copies requested.
         copies: usize,
-        /// Their triangles.
+        /// Their total number of triangles.
         needed: usize,
-        /// Most triangles of all copies.
+        /// Limit on the total number of triangles.
         limit: usize,
-        /// Most triangles of one of so many.
+        /// Triangles allowed per copy at this number of copies.
         most: usize,
     },
-    /// The photometric file of a luminaire.
+    /// A luminaire's photometric file is invalid.
     #[error(transparent)]
     Photometry(#[from] super::IesError),
-    /// A parameter that the built-in scene does not have, or a value that it does not allow.
+    /// A parameter is unknown to the built-in scene or has a disallowed value.
     #[error(transparent)]
     Parameter(#[from] ParamError),
-    /// A camera that sees nothing.
+    /// The camera sees nothing.
     #[error("camera: {problem}; {advice}")]
     Camera {
-        /// What is wrong.
+        /// The problem.
         problem: String,
-        /// What to write instead.
+        /// The suggested fix.
         advice: &'static str,
     },
 }
@@ -120,7 +120,6 @@ fn at(place: &str) -> String {
 }
 
 impl SceneError {
-    /// A [`SceneError::Read`] of this file.
     pub(super) fn unreadable(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
         |source| Self::Read {
             path: path.to_owned(),
@@ -128,7 +127,7 @@ impl SceneError {
         }
     }
 
-    /// A [`SceneError::Malformed`].
+    /// Returns a [`SceneError::Malformed`].
     pub fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Malformed {
             path: path.to_owned(),
@@ -138,7 +137,7 @@ impl SceneError {
     }
 }
 
-/// Opens a model, telling a missing or empty file from a readable one, and its length in bytes.
+/// Opens a model and returns its length in bytes; missing and empty files are errors.
 pub(super) fn open(path: &Path) -> Result<(Box<dyn Read + Send>, u64), SceneError> {
     let (file, bytes) = files().open(path).map_err(SceneError::unreadable(path))?;
     if bytes == 0 {
@@ -149,14 +148,13 @@ pub(super) fn open(path: &Path) -> Result<(Box<dyn Read + Send>, u64), SceneErro
     Ok((file, bytes))
 }
 
-/// The bytes of a model that is read whole.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     let mut bytes = Vec::new();
     let read = open(path)?.0.read_to_end(&mut bytes);
     read.map(|_| bytes).map_err(SceneError::unreadable(path))
 }
 
-/// What a third-party parser said when it panicked.
+/// The message of a third-party parser's panic.
 pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
     let text = payload
         .downcast_ref::<String>()
@@ -166,8 +164,7 @@ pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
     format!("the parser gave up: {text}")
 }
 
-/// Runs a loader built on third-party parsers, which may panic on malformed files, and turns a
-/// panic into an error.
+/// Runs a loader that uses third-party parsers and turns their panics into errors.
 pub(super) fn guarded<T>(
     path: &Path,
     load: impl FnOnce() -> Result<T, SceneError>,

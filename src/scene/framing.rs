@@ -1,8 +1,8 @@
-//! Where a scene without a camera is looked at from: objects from outside, rooms from inside.
+//! Automatic framing of scenes without a camera: objects from outside, rooms from inside.
 //!
-//! A room is what surrounds most points in its box with surfaces that face them. (The inside of a
-//! closed object is surrounded, too, but by backs of surfaces.) Rays are cast on the host, among the
-//! largest triangles if there are many. The answer depends on the triangles alone.
+//! A scene is a room if surfaces facing them surround most points in its box. (The inside of a
+//! closed object is surrounded too, but by back faces.) Rays are cast on the host, against only the
+//! largest triangles if there are many. The result depends on the triangles alone.
 
 use super::{Bounds, SceneData};
 use glam::{DVec3, Vec3, Vec3A};
@@ -16,23 +16,22 @@ use std::borrow::Cow;
 const OUTSIDE_FOV: f32 = 35.0;
 /// Vertical field of view inside a room, degrees.
 const INSIDE_FOV: f32 = 60.0;
-/// Share of the image, in width or height, that an object takes.
+/// Fraction of the image's width or height that an object fills.
 const FILL: f32 = 0.9;
-/// Most triangles that rays are cast among; of more, the largest ones.
+/// Maximum number of triangles to cast rays against; larger scenes use the largest ones.
 const MOST_TRIANGLES: usize = 1 << 14;
-/// No rays are cast where a random ray through the scene would meet more boxes than this: thousands of
-/// triangles in one place.
+/// No rays are cast if a random one would meet more boxes: thousands of triangles in one place.
 const MOST_BOXES: f32 = 2000.0;
-/// A point is inside a room if this share of all directions meets the front of a surface.
+/// A point is inside a room if this fraction of directions hits a front face.
 const ENCLOSED: f32 = 0.7;
-/// A scene is a room if this share of the points in its box is inside one.
+/// A scene is a room if this fraction of the points in its box is inside one.
 const ROOM: f32 = 0.4;
-/// A side of a room is open if one leaves through it from this share of the points inside.
+/// A side of a room is open if it is unobstructed from this fraction of the inside points.
 const OPEN_SIDE: f32 = 0.6;
-/// An extent of a box below this share of the largest one is none.
+/// A box extent below this fraction of the largest one counts as zero.
 const FLAT: f32 = 0.01;
 
-/// How an automatic camera looks at a scene; the aspect of the image decides the rest.
+/// How an automatic camera views a scene, up to the aspect of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Framing {
     bounds: Bounds,
@@ -42,15 +41,15 @@ pub struct Framing {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Standpoint {
-    /// So far in this direction that everything is in the image.
+    /// From this direction, far enough away to see everything.
     Outside { towards_eye: Vec3, room: bool },
-    /// In a room.
+    /// From inside a room.
     Inside { eye: Vec3, forward: Vec3 },
 }
 
 impl SceneData {
-    /// The camera of the file; without one, a camera that shows the whole scene in an image of this
-    /// aspect (width over height), or the inside of a room.
+    /// The file's camera, or one that shows the whole scene, or the inside of a room, in an image
+    /// of this aspect (width over height).
     pub fn view(&self, aspect: f32) -> Camera {
         self.camera.unwrap_or_else(|| {
             let framing = self.framing.unwrap_or_else(|| Framing::of(self));
@@ -60,7 +59,7 @@ impl SceneData {
 }
 
 impl Default for Framing {
-    /// The view of an object around the origin that stands on the y axis.
+    /// The view of an object around the origin, standing on the y axis.
     fn default() -> Self {
         Self {
             bounds: Bounds {
@@ -77,7 +76,7 @@ impl Default for Framing {
 }
 
 impl Framing {
-    /// Looks for the best place. glTF says that y is up; elsewhere the triangles tell.
+    /// Finds the best viewpoint. In glTF, y is up; otherwise the triangles decide.
     pub(super) fn of(scene: &SceneData) -> Self {
         let name = scene.name.to_ascii_lowercase();
         let says_y = name.ends_with(".gltf") || name.ends_with(".glb");
@@ -85,27 +84,28 @@ impl Framing {
         if bounds.is_empty() {
             return Self::default();
         }
-        // Which surfaces turn their back decides whether it is a room.
-        let triangles: Cow<[Triangle]> = match scene.mirrored.is_empty() {
-            true => Cow::Borrowed(&scene.triangles),
-            false => (0..scene.triangles.len())
+        // Back faces decide whether it is a room.
+        let triangles: Cow<[Triangle]> = if scene.mirrored.is_empty() {
+            Cow::Borrowed(&scene.triangles)
+        } else {
+            (0..scene.triangles.len())
                 .map(|id| scene.outward(id).into())
-                .collect(),
+                .collect()
         };
         let stage = UnitScene::new(&triangles, &bounds);
-        let (up, place) = match stage.boxes_per_ray() <= MOST_BOXES {
-            true => stage.place(says_y),
-            false => (Vec3::Y, Self::default().place),
+        let (up, place) = if stage.boxes_per_ray() <= MOST_BOXES {
+            stage.place(says_y)
+        } else {
+            (Vec3::Y, Self::default().place)
         };
         Self { bounds, up, place }
     }
 
-    /// Whether the scene is a room.
     pub(crate) fn is_room(&self) -> bool {
         !matches!(self.place, Standpoint::Outside { room: false, .. })
     }
 
-    /// To the right, upwards and to the front of the scene: unit vectors.
+    /// Unit vectors to the right, up and front of the scene.
     pub fn axes(&self) -> [Vec3; 3] {
         let front = if self.up == Vec3::Z {
             -Vec3::Y
@@ -115,12 +115,11 @@ impl Framing {
         [Vec3::X, self.up, front]
     }
 
-    /// Least edge of the scene's box.
     pub(super) fn least_extent(&self) -> f32 {
         (self.bounds.max - self.bounds.min).min_element()
     }
 
-    /// The camera for an image of this aspect. `triangles` are those of the scene.
+    /// The camera for an image of this aspect, given the scene's triangles.
     fn camera(&self, triangles: &[Triangle], aspect: f32) -> Camera {
         let (center, radius) = sphere_around(&self.bounds);
         let (eye, forward, fov) = match self.place {
@@ -141,33 +140,32 @@ impl Framing {
     }
 }
 
-/// Centre and radius of a sphere around the box. Of a single point, too, it has an inside.
+/// Centre and radius of a sphere around the box; never of radius zero, even for a point.
 fn sphere_around(bounds: &Bounds) -> (Vec3, f32) {
     let center = bounds.center();
     let least = 1e-3 * center.abs().max_element();
     (center, bounds.radius().max(least).max(1e-6))
 }
 
-/// Moves the sphere to the unit sphere.
 fn to_unit(v: Vec3, center: Vec3, radius: f32) -> Vec3 {
     ((v.as_dvec3() - center.as_dvec3()) / f64::from(radius)).as_vec3()
 }
 
-/// From the front (or back), the right (or left) and above.
+/// Direction from the front (or back), the right (or left) and above.
 fn three_quarter(up: Vec3, right: f32, front: f32) -> Vec3 {
     let [x, above, z] = [0.55 * right, 0.4, 0.75 * front];
-    let direction = match up == Vec3::Z {
-        true => Vec3::new(x, -z, above),
-        false => Vec3::new(x, above, z),
+    let direction = if up == Vec3::Z {
+        Vec3::new(x, -z, above)
+    } else {
+        Vec3::new(x, above, z)
     };
     direction.normalize()
 }
 
-/// The eye nearest to the vertices that looks from `towards_eye` and has all in its image, and how far
-/// ahead the origin is.
+/// The closest eye towards `towards_eye` that sees all vertices, and its distance.
 ///
-/// With a, b, c the coordinates of a vertex to the right, upwards and ahead, those of the eye have to
-/// satisfy |a − aₑ| ≤ k (c − cₑ), and the same with b: four planes that touch the vertices.
+/// With a, b, c the coordinates of a vertex to the right, up and ahead, the eye must satisfy
+/// |a − aₑ| ≤ k (c − cₑ), and the same for b: four planes that touch the vertices.
 fn fit(
     vertices: impl Iterator<Item = Vec3>,
     towards_eye: Vec3,
@@ -187,18 +185,17 @@ fn fit(
     }
     let aside = [0, 1].map(|i| 0.5 * (high[i] - low[i]));
     let ahead = [0, 1].map(|i| -0.5 * (high[i] + low[i]) / slopes[i]);
-    // Never nearer than a small step, for points and flat scenes.
+    // Keep a small distance, for points and flat scenes.
     let ahead = ahead[0].min(ahead[1]).min(-0.05);
     (aside[0] * right + aside[1] * up + ahead * forward, -ahead)
 }
 
-/// Forward, right and up of an image.
+/// Forward, right and up vectors of an image.
 fn basis(forward: Vec3, up: Vec3) -> [Vec3; 3] {
     let right = forward.cross(up).normalize_or(Vec3::X);
     [forward, right, right.cross(forward)]
 }
 
-/// The scene moved to the unit sphere.
 struct UnitScene {
     bounds: Bounds,
     up: Vec3,
@@ -206,7 +203,6 @@ struct UnitScene {
     bvh: Bvh2,
 }
 
-/// What a ray meets.
 #[derive(Clone, Copy, PartialEq)]
 enum Seen {
     Nothing,
@@ -229,7 +225,7 @@ impl UnitScene {
                 let [v0, v1, v2] = t.vertices.map(local);
                 (v1 - v0).cross(v2 - v0).length()
             };
-            // The least area of the largest ones, from a sample.
+            // Estimate the area threshold of the largest ones from a sample.
             let step = triangles.len() / MOST_TRIANGLES;
             let mut sample: Vec<_> = triangles.iter().step_by(step).map(|t| area(&t)).collect();
             let rank = MOST_TRIANGLES / step;
@@ -257,17 +253,18 @@ impl UnitScene {
         }
     }
 
-    /// Boxes that a random ray through the scene meets: the SAH cost of the boxes alone.
+    /// Expected number of boxes that a random ray meets: the SAH cost of the boxes alone.
     fn boxes_per_ray(&self) -> f32 {
         let mut areas = self.bvh.nodes.iter().map(|node| node.aabb().half_area());
         let root = areas.next().unwrap_or(0.0);
-        match root > 0.0 {
-            true => areas.sum::<f32>() / root,
-            false => f32::INFINITY,
+        if root > 0.0 {
+            areas.sum::<f32>() / root
+        } else {
+            f32::INFINITY
         }
     }
 
-    /// What is up, and where to look from.
+    /// Up vector and viewpoint.
     fn place(mut self, says_y: bool) -> (Vec3, Standpoint) {
         if !says_y && self.stands_on_z() {
             self.up = Vec3::Z;
@@ -289,16 +286,16 @@ impl UnitScene {
         (self.up, place)
     }
 
-    /// The direction from which an object is looked at.
+    /// The direction to view an object from.
     fn side(&self) -> Vec3 {
         let flat = (self.bounds.max - self.bounds.min).cmplt(Vec3::splat(FLAT));
-        // A picture in a plane is looked at from the front.
+        // View a planar scene from the front.
         match (flat.x, flat.y, flat.z) {
             (false, false, true) => return Vec3::Z,
             (true, false, false) => return Vec3::X,
             _ => {}
         }
-        // Not at the backs of walls, if another side shows their fronts.
+        // Avoid back faces if another side shows fronts.
         let sides = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
         let sides = sides.map(|(right, front)| three_quarter(self.up, right, front));
         let backs = sides.map(|side| self.look(4.0 * side, -side, OUTSIDE_FOV).backs);
@@ -307,7 +304,7 @@ impl UnitScene {
         sides[chosen.unwrap_or(0)]
     }
 
-    /// Points in rooms, if the scene is one.
+    /// Points inside rooms, if the scene is a room.
     fn enclosed_points(&self) -> Option<Vec<Vec3>> {
         const EDGE: usize = 7;
         const HEIGHTS: [f32; 3] = [0.25, 0.4, 0.55];
@@ -319,9 +316,10 @@ impl UnitScene {
             for i in 0..EDGE * EDGE {
                 let at = |k: usize| (k as f32 + 0.5) / EDGE as f32;
                 let (u, v) = (at(i % EDGE), at(i / EDGE));
-                let share = match self.up == Vec3::Z {
-                    true => Vec3::new(u, v, height),
-                    false => Vec3::new(u, height, v),
+                let share = if self.up == Vec3::Z {
+                    Vec3::new(u, v, height)
+                } else {
+                    Vec3::new(u, height, v)
                 };
                 let point = self.bounds.min + share * size;
                 if self.is_enclosed(point) {
@@ -343,7 +341,7 @@ impl UnitScene {
         others.take(MOST_OTHERS + 1).count() <= MOST_OTHERS
     }
 
-    /// Horizontal directions, the four axes among them.
+    /// Horizontal directions, including the four axes.
     fn horizontal(&self, count: usize) -> impl Iterator<Item = Vec3> {
         let z_up = self.up == Vec3::Z;
         (0..count).map(move |k| {
@@ -356,7 +354,7 @@ impl UnitScene {
         })
     }
 
-    /// The view into a room without a wall on one side, such as the Cornell box.
+    /// The view into a room with one side open, such as the Cornell box.
     fn open_side(&self, points: &[Vec3]) -> Option<Standpoint> {
         let open = self
             .horizontal(4)
@@ -367,7 +365,7 @@ impl UnitScene {
         })
     }
 
-    /// Share of the points from which one leaves the scene in this direction.
+    /// Fraction of the points from which this direction leaves the scene.
     fn openness(&self, points: &[Vec3], direction: Vec3) -> f32 {
         let out = points
             .iter()
@@ -375,14 +373,13 @@ impl UnitScene {
         out.count() as f32 / points.len().max(1) as f32
     }
 
-    /// Whether the open roof of a building is at the end of the z axis. More open than a roof is a
-    /// missing wall.
+    /// True if the z axis ends in an open roof. A missing wall is more open still.
     fn is_open_to_z(&self, points: &[Vec3]) -> bool {
         let roof = self.openness(points, Vec3::Z);
         (0.2..OPEN_SIDE).contains(&roof) && self.openness(points, Vec3::Y) < 0.02
     }
 
-    /// The view from near a wall, or what else is behind, that sees farthest.
+    /// The viewpoint near a wall or other backdrop that sees farthest.
     fn inside(&self, points: &[Vec3]) -> Standpoint {
         let mut best = f32::NEG_INFINITY;
         let mut place = Standpoint::Outside {
@@ -405,7 +402,7 @@ impl UnitScene {
         place
     }
 
-    /// What is seen on a grid of pixels of an image of 4:3.
+    /// Samples the view on a pixel grid of a 4:3 image.
     fn look(&self, eye: Vec3, forward: Vec3, fov: f32) -> Look {
         const EDGE: usize = 7;
         let [forward, right, up] = basis(forward, self.up);
@@ -415,7 +412,7 @@ impl UnitScene {
             let ndc = |k: usize| (2 * k + 1) as f32 / EDGE as f32 - 1.0;
             let (x, y) = (4.0 / 3.0 * ndc(i % EDGE), ndc(i / EDGE));
             let direction = forward + tangent * (x * right + y * up);
-            // What is straight ahead counts most.
+            // The centre of the image counts most.
             let weight = (-2.0 * (x * x + y * y)).exp();
             let distance: f32 = match self.cast(eye, direction.normalize()) {
                 Seen::Front(t) => {
@@ -436,10 +433,10 @@ impl UnitScene {
         }
     }
 
-    /// Whether there is flat ground at the lower end of the z axis, and hardly any at that of the y axis.
+    /// True if there is flat ground at the low end of z and hardly any at the low end of y.
     fn stands_on_z(&self) -> bool {
         let size = self.bounds.max - self.bounds.min;
-        // Share of the lower face of the box that is covered by surfaces in it.
+        // Fraction of the box's bottom face covered by surfaces lying in it.
         let ground = |axis: usize| {
             let low = self.bounds.min[axis] + 0.02 * size[axis];
             let lies_low =
@@ -467,22 +464,22 @@ impl UnitScene {
         let id = self.bvh.primitive_indices[hit.primitive_id as usize];
         let triangle = &self.solid[id as usize];
         let normal = (triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0);
-        match normal.dot(Vec3A::from(direction)) < 0.0 {
-            true => Seen::Front(hit.t),
-            false => Seen::Back,
+        if normal.dot(Vec3A::from(direction)) < 0.0 {
+            Seen::Front(hit.t)
+        } else {
+            Seen::Back
         }
     }
 }
 
-/// What is seen in an image.
 struct Look {
-    /// Share of the surfaces that turn their back.
+    /// Fraction of hits on back faces.
     backs: f32,
-    /// Sum of the logarithms of distances: high where much is far away and nothing very near.
+    /// Sum of log distances: high if much is far away and nothing very near.
     depth: f32,
 }
 
-/// Unit vectors spread over the sphere: a Fibonacci lattice.
+/// Evenly spread unit vectors: a Fibonacci lattice.
 fn sphere(count: usize) -> impl Iterator<Item = Vec3> {
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     (0..count).map(move |k| {

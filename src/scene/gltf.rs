@@ -1,5 +1,5 @@
-//! glTF 2.0 and GLB by the `gltf` crate: nodes are flattened into world space. Where nodes share a
-//! mesh, the scene also says which triangles are copies of which object.
+//! Loads glTF 2.0 and GLB with the `gltf` crate, flattening nodes into world space. If nodes share
+//! a mesh, the scene also records which triangles are copies of which object.
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
@@ -18,13 +18,13 @@ use raystone_core::geometry::{Camera, Triangle};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Most triangles of the listed instances of a node: all of them are stored, and a small file can list many.
+/// Triangle limit for a node's instances: all are stored, and a small file can list many.
 const MOST_TRIANGLES: usize = 100_000_000;
 
-/// Loads a glTF or GLB model: its default scene, with the first camera of it.
+/// Loads the default scene of a glTF or GLB model, with its first camera.
 ///
 /// # Errors
-/// [`SceneError`] naming the mesh, node or buffer that breaks the rules.
+/// [`SceneError`] naming the invalid mesh, node or buffer.
 pub(super) fn load(
     path: &Path,
     name: &str,
@@ -44,8 +44,8 @@ pub(super) fn load(
     })
 }
 
-/// The validated document. The crate's validation looks up the accessors of attributes before it
-/// compares their indices with what there is, so that is done here.
+/// Parses and validates the document. The crate's validation looks up attribute accessors before
+/// checking their indices, so they are checked here first.
 fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
     let mut root = unchecked.document.into_json();
@@ -53,7 +53,7 @@ fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     if let Some(problem) = required.find_map(|name| compressed(name)) {
         return Err(problem);
     }
-    // The crate refuses what it does not know itself.
+    // The crate refuses required extensions that it does not know.
     let of_nodes = gltf_instancing::OF_NODES;
     root.extensions_required
         .retain(|name| !of_nodes.contains(&name.as_str()));
@@ -69,7 +69,7 @@ fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     gltf::Document::from_json(root).map_err(|e| e.to_string())
 }
 
-/// What to do about geometry in a coding that is not read here.
+/// Advice for unsupported geometry compression.
 fn compressed(extension: &str) -> Option<String> {
     let command = match extension {
         "EXT_meshopt_compression" | "KHR_meshopt_compression" | "MESHOPT_compression" => {
@@ -139,7 +139,7 @@ fn build(
     builder.finish(name, look)
 }
 
-/// The bytes of every buffer: the binary chunk, a data URI or a file beside the model.
+/// Bytes of every buffer: the binary chunk, a data URI or a separate file.
 fn read_buffers(
     path: &Path,
     files: &Files,
@@ -169,18 +169,18 @@ fn read_buffers(
         .collect()
 }
 
-/// Walks the nodes of a scene and gathers triangles and the first camera.
+/// Walks a scene's nodes, collecting triangles and the first camera.
 struct Geometry<'a> {
     path: &'a Path,
     buffers: &'a [Vec<u8>],
-    /// Of texture coordinates, for each material.
+    /// Texture coordinate set of each material.
     sets: &'a [Option<u32>],
     builder: SceneBuilder,
     camera: Option<Camera>,
     lights: Vec<Light>,
-    /// `None` where no nodes share a mesh, or once a node could not be made an instance.
+    /// `None` if no nodes share a mesh, or once a node could not become an instance.
     copies: Option<Copies>,
-    /// The material of primitives that name none and have colours, once there is one.
+    /// Material of primitives that have colours but name no material, once there is one.
     white: Option<usize>,
     lines_or_points: usize,
     deformed: usize,
@@ -188,11 +188,10 @@ struct Geometry<'a> {
     unread: Unread,
 }
 
-/// Meshes that several nodes use become objects.
 struct Copies {
-    /// Nodes that use each mesh.
+    /// Number of nodes using each mesh.
     uses: Vec<usize>,
-    /// The object that a mesh became.
+    /// Object made from each mesh.
     objects: Vec<Option<u32>>,
 }
 
@@ -201,7 +200,7 @@ impl Copies {
         let mut uses = vec![0; document.meshes().len()];
         for node in document.nodes() {
             if let Some(mesh) = node.mesh() {
-                // Of listed instances there may be one, which is an instance all the same.
+                // Even a single listed instance counts as one.
                 let listed = gltf_instancing::has_instances(&node);
                 uses[mesh.index()] += 1 + usize::from(listed);
             }
@@ -218,7 +217,7 @@ impl<'a> Geometry<'a> {
             .default_scene()
             .or_else(|| document.scenes().next());
         let roots = scene.ok_or_else(|| SceneError::malformed(self.path, "", "it has no scene"))?;
-        // An explicit stack and a mark per node: a cycle in a malformed file ends in an error.
+        // Explicit stack and visited marks: a cycle in a malformed file is an error.
         let mut visited = vec![false; document.nodes().len()];
         let roots = roots.nodes().map(|node| (node, Mat4::IDENTITY, true));
         let mut stack: Vec<_> = roots.collect();
@@ -246,7 +245,7 @@ impl<'a> Geometry<'a> {
         SceneError::malformed(self.path, place, problem)
     }
 
-    /// A camera sees from a node that is not shown, too.
+    /// Reads the node's camera; hidden nodes count too.
     fn read_camera_of(&mut self, node: &gltf::Node<'a>, world: Mat4) {
         if let (None, Some(camera)) = (self.camera, node.camera()) {
             self.camera = self.read_camera(&camera, world);
@@ -284,7 +283,7 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
-    /// Adds the triangles of a mesh with this transform, and the node as an instance of it.
+    /// Adds a mesh's triangles under this transform, and the node as an instance of it.
     fn read_mesh(
         &mut self,
         node: &gltf::Node<'a>,
@@ -314,8 +313,8 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
-    /// Makes the node an instance of its mesh with the triangles `own`, those of which in world space begin
-    /// at `before`. What cannot be one leaves the scene without instances.
+    /// Makes the node an instance of its mesh with triangles `own`, whose world-space copies begin
+    /// at `before`. If that fails, the scene has no instances.
     fn place(
         &mut self,
         node: &gltf::Node<'a>,
@@ -327,16 +326,15 @@ impl<'a> Geometry<'a> {
         let Some(copies) = &mut self.copies else {
             return;
         };
-        let (object, triangles, to_world) = match copies.uses[mesh] > 1 {
-            true => (
+        let (object, triangles, to_world) = if copies.uses[mesh] > 1 {
+            (
                 &mut copies.objects[mesh],
                 own,
                 Transform::from_matrix(world),
-            ),
-            false => {
-                let triangles = self.builder.triangles()[before..].to_vec();
-                (&mut None, triangles, Transform::IDENTITY)
-            }
+            )
+        } else {
+            let triangles = self.builder.triangles()[before..].to_vec();
+            (&mut None, triangles, Transform::IDENTITY)
         };
         let assembly = &mut self.builder.assembly;
         let known = object.map_or_else(|| assembly.add_object(triangles), Ok);
@@ -367,7 +365,7 @@ impl<'a> Geometry<'a> {
         let forward = world.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
         let found = Camera {
             eye,
-            // Far enough that rounding of the target does not turn the view.
+            // Far enough that rounding the target does not turn the view.
             target: eye + forward * eye.length().max(1.0),
             up: world.transform_vector3(Vec3::Y).normalize_or_zero(),
             vertical_fov_degrees: lens.yfov().to_degrees(),
@@ -380,7 +378,7 @@ impl<'a> Geometry<'a> {
         Some(found)
     }
 
-    /// Adds the triangles of a primitive, and to `own` those in the space of the mesh where nodes share one.
+    /// Adds a primitive's triangles, also in mesh space to `own` if nodes share the mesh.
     fn read_primitive(
         &mut self,
         primitive: &gltf::Primitive<'a>,
@@ -403,7 +401,7 @@ impl<'a> Geometry<'a> {
         let colors = self.read_colors(primitive);
         let material = match primitive.material().index() {
             Some(index) => index,
-            // By the standard it is white; grey is for what has no colour at all.
+            // The standard default is white; grey is for surfaces without any colour.
             None if !colors.is_empty() => *self.white.get_or_insert(last + 1),
             None => last,
         };
@@ -452,7 +450,7 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
-    /// Linear colours, by which the base colour is multiplied; none where the file has none that can be read.
+    /// Linear vertex colours, which multiply the base colour; empty if none can be read.
     fn read_colors(&mut self, primitive: &gltf::Primitive<'a>) -> Vec<Vec3> {
         match has_colors(primitive, self.buffers) {
             None => return Vec::new(),
@@ -479,7 +477,7 @@ impl<'a> Geometry<'a> {
         colors.iter().map(rgb).collect()
     }
 
-    /// Normals in world space; none where the file has none that can be read.
+    /// World-space normals; empty if none can be read.
     fn read_normals(&mut self, primitive: &gltf::Primitive<'a>, world: Mat4) -> Vec<Vec3> {
         match has_normals(primitive, self.buffers) {
             None => return Vec::new(),
@@ -491,7 +489,7 @@ impl<'a> Geometry<'a> {
         }
         let buffers = self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-        // In f64: a small scale must not make it singular.
+        // In f64, so that a small scale does not make it singular.
         let to_world = DMat3::from_mat4(world.as_dmat4()).inverse().transpose();
         let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
         let normals = reader.read_normals().into_iter().flatten();
@@ -536,7 +534,7 @@ fn for_each_face(mode: Mode, indices: &[u32], mut face: impl FnMut([u32; 3])) {
     }
 }
 
-/// Why a node cannot be an instance, without the number that only the built-in scenes know.
+/// Why a node cannot be an instance, without the index that only built-in scenes use.
 fn reason(error: &InstanceError) -> String {
     match error {
         InstanceError::NotFinite { .. } => "its transform is not finite".to_owned(),

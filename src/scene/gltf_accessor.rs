@@ -1,14 +1,13 @@
-//! Checks of glTF accessors. The crate's readers take for granted that types fit, that strides are
-//! wide enough and that offsets and counts stay within their buffers, and panic where they do not.
+//! Checks of glTF accessors, as the crate's readers panic on invalid ones.
 
 use gltf::Semantic;
 use gltf::accessor::{Accessor, DataType, Dimensions};
 use gltf::buffer::View;
 
-/// Checks everything that is going to be read of a primitive.
+/// Checks every accessor of a primitive that will be read.
 ///
 /// # Errors
-/// What cannot be read, and why.
+/// The unreadable accessor, and the reason.
 pub(super) fn check_accessors(
     primitive: &gltf::Primitive<'_>,
     buffers: &[Vec<u8>],
@@ -40,7 +39,7 @@ pub(super) fn check_accessors(
     Ok(())
 }
 
-/// Whether the normals of a primitive can be read, if it has any.
+/// `true` if the primitive's normals can be read; `None` if it has none.
 pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
     let normals = primitive.get(&Semantic::Normals)?;
     let kind = (normals.dimensions(), normals.data_type());
@@ -48,7 +47,7 @@ pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) 
     Some(is_known && check_data(&normals, buffers).is_ok())
 }
 
-/// Whether the first colours of the vertices of a primitive can be read, if it has any.
+/// `true` if the primitive's first vertex colours can be read; `None` if it has none.
 pub(super) fn has_colors(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
     let colors = primitive.get(&Semantic::Colors(0))?;
     let is_known = matches!(colors.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
@@ -59,7 +58,7 @@ pub(super) fn has_colors(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -
     Some(is_known && check_data(&colors, buffers).is_ok())
 }
 
-/// Checks that all elements of an accessor, and those that replace some of them, are there.
+/// Checks that all elements of an accessor, including sparse replacements, exist.
 pub(super) fn check_data(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
     let (count, size) = (accessor.count(), accessor.size());
     let view = accessor.view().ok_or("have no buffer view")?;

@@ -1,17 +1,16 @@
-//! The container of binary glTF (GLB): a header and chunks.
+//! The binary glTF (GLB) container: a header and chunks.
 
 const MAGIC: &[u8] = b"glTF";
 const HEADER_BYTES: usize = 12;
 const JSON: &[u8] = b"JSON";
 const BINARY: &[u8] = b"BIN\0";
 
-/// The JSON text and the binary chunk.
 type Chunks<'a> = (&'a [u8], Option<&'a [u8]>);
 
-/// The JSON text, and the binary chunk if there is one. A file that is no container is all text.
+/// Returns the JSON text and the optional binary chunk. A file without a GLB header is all text.
 ///
 /// # Errors
-/// The place of the fault (bytes from the beginning), and what it is.
+/// Byte offset and description of the fault.
 pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, (usize, String)> {
     if !bytes.starts_with(MAGIC) {
         return Ok((bytes, None));
@@ -46,7 +45,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, (usize, String)> {
         match kind {
             JSON if json.is_none() && !chunk.starts_with(MAGIC) => json = Some(chunk),
             BINARY if json.is_some() && binary.is_none() => binary = Some(chunk),
-            // Other kinds are to be passed over, but the first must be the text.
+            // Skip chunks of other types, but the first must be the text.
             _ if json.is_some() => {}
             _ => return Err((at + 4, "the first chunk is not JSON text".to_owned())),
         }

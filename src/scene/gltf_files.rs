@@ -4,16 +4,14 @@ use super::LoadOptions;
 use base64::Engine;
 use std::path::{Component, Path, PathBuf};
 
-/// Finds and reads the files of a model, inside its folder unless told otherwise.
+/// Finds and reads a model's files, by default only inside its folder.
 pub(super) struct Files {
-    /// The model.
     pub model: PathBuf,
     folder: PathBuf,
     allow_outside: bool,
 }
 
 impl Files {
-    /// The files of the model `model`.
     pub(crate) fn new(model: &Path, options: &LoadOptions) -> Self {
         let folder = match model.parent() {
             Some(folder) if folder != Path::new("") => folder,
@@ -26,10 +24,10 @@ impl Files {
         }
     }
 
-    /// Bytes of a data URI or of a file.
+    /// Reads a data URI or a file.
     ///
     /// # Errors
-    /// What is wrong, with the name of the file.
+    /// The problem, with the name of the file.
     pub(crate) fn read(&self, uri: &str) -> Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             let (_, encoded) = data
@@ -43,10 +41,10 @@ impl Files {
         raystone_core::files::read(&file).map_err(|error| format!("{}: {error}", file.display()))
     }
 
-    /// The file that a relative URI names, `%20` and the like decoded.
+    /// Resolves a relative URI, decoding `%20` and the like.
     ///
     /// # Errors
-    /// It lies outside the model's folder, by its name or by a link, and that is not allowed.
+    /// The file lies outside the model's folder, by name or by link, and that is not allowed.
     pub(crate) fn find(&self, uri: &str) -> Result<PathBuf, String> {
         let file = self
             .folder
@@ -59,7 +57,7 @@ impl Files {
                 "`{uri}` lies outside the model's folder; --allow-outside reads it all the same"
             )
         };
-        // Both with links resolved; what is not there is told by its reader, unless its name leads out.
+        // With links resolved. The reader reports missing files, unless the name leads outside.
         let real = |path: &Path| raystone_core::files::files().real(path);
         let inside = match (real(&file), real(&self.folder)) {
             (Ok(file), Ok(folder)) => file.starts_with(folder),

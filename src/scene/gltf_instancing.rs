@@ -1,5 +1,4 @@
-//! What extensions say of nodes: whether they are shown (`KHR_node_visibility`), and how often their mesh is there
-//! (`EXT_mesh_gpu_instancing`).
+//! Node extensions: visibility (`KHR_node_visibility`) and instancing (`EXT_mesh_gpu_instancing`).
 
 use super::gltf_accessor::check_data;
 use glam::{Mat4, Quat, Vec3, Vec4};
@@ -8,28 +7,26 @@ use gltf::accessor::{Accessor, DataType, Dimensions, Item, Iter};
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 const VISIBILITY: &str = "KHR_node_visibility";
 
-/// Extensions that are read here, which the crate knows nothing of.
+/// Extensions read here that the crate does not know.
 pub(super) const OF_NODES: [&str; 2] = [INSTANCING, VISIBILITY];
 
-/// Attributes of instances that are read.
 const READ: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
 
-/// Whether the node and what is below it is shown.
 pub(super) fn is_visible(node: &gltf::Node<'_>) -> bool {
     let extension = node.extension_value(VISIBILITY);
     let visible = extension.and_then(|value| value.get("visible"));
     visible.and_then(serde_json::Value::as_bool).unwrap_or(true)
 }
 
-/// Whether the mesh of the node is there for each instance that the extension lists.
+/// True if the extension lists instances of the node's mesh.
 pub(super) fn has_instances(node: &gltf::Node<'_>) -> bool {
     node.extension_value(INSTANCING).is_some()
 }
 
-/// From the space of the mesh to that of the node, for each time that it is there; and names of attributes that are not read.
+/// The transform from mesh to node space of each instance, and the names of unsupported attributes.
 ///
 /// # Errors
-/// What of the extension cannot be read, and why.
+/// The unreadable part of the extension, and the reason.
 pub(super) fn places(
     node: &gltf::Node<'_>,
     document: &gltf::Document,
@@ -86,7 +83,7 @@ pub(super) fn places(
     Ok((places.collect(), others.collect()))
 }
 
-/// Unit quaternions, in floats or in integers that stand for −1 to 1.
+/// Unit quaternions, as floats or as integers normalised to −1 to 1.
 fn rotations(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<Vec<Quat>, String> {
     let problem = || "ROTATION: its values are not four floats or signed integers".to_owned();
     if accessor.dimensions() != Dimensions::Vec4 {

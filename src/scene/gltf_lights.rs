@@ -4,9 +4,9 @@ use super::Light;
 use glam::{Mat4, Vec3};
 use gltf::khr_lights_punctual::{Kind, Light as Source};
 
-/// A light of a node with this transform. It shines along −z; scaling does not change its intensity, which is in
-/// candela (point, spot) or lux (directional), so that radiance is in nits. What is wrong with it is found out where lights
-/// are listed. Its range is no matter of physics and not honoured.
+/// Converts a node's light. It shines along −z; scaling leaves its intensity alone, in candela
+/// (point, spot) or lux (directional), so radiance is in nits. The light list validates it. Its
+/// range is not physical and is ignored.
 pub(super) fn read(light: &Source<'_>, world: Mat4) -> Light {
     let color = Vec3::from(light.color()) * light.intensity();
     let position = world.transform_point3(Vec3::ZERO);

@@ -12,10 +12,10 @@ use super::{
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use gltf::material::AlphaMode;
 
-/// Roughness from which glass looks frosted.
+/// Roughness above which glass looks frosted.
 const FROSTED: f32 = 0.1;
 
-/// What is said of surfaces beyond what is rendered.
+/// Surface extensions that are not rendered.
 const EXTENSIONS: [&str; 9] = [
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -28,20 +28,20 @@ const EXTENSIONS: [&str; 9] = [
     "KHR_materials_unlit",
 ];
 
-/// All materials of a document and the images that they need.
+/// All materials of a document and the images they need.
 pub(super) struct Palette<'a> {
     /// The document's materials in order, then the default one.
     pub materials: Vec<Material>,
-    /// Which set of texture coordinates each material takes, if it has textures; parallel to `materials`.
+    /// Texture coordinate set of each material that has textures; parallel to `materials`.
     pub sets: Vec<Option<u32>>,
-    /// Images that some material uses; materials index into it.
+    /// Images used by some material; materials index into it.
     pub images: Vec<ImageSource<'a>>,
     pub warnings: Vec<String>,
-    /// Extensions that a warning names.
+    /// Extensions named in a warning.
     pub named: Vec<&'static str>,
 }
 
-/// Reads all materials; images are found here and decoded later.
+/// Reads all materials; images are collected here and decoded later.
 pub(super) fn read<'a>(
     files: &'a Files,
     document: &gltf::Document,
@@ -80,8 +80,8 @@ pub(super) fn read<'a>(
     }
 }
 
-/// Gives `found` the textures of its material that it can use. Whether one was left out, because it takes another set of
-/// coordinates than those before it.
+/// Assigns `found` the usable textures of its material. Returns true if one was left out because it
+/// uses another coordinate set than those before it.
 fn textured(
     material: &gltf::Material<'_>,
     found: &mut Material,
@@ -112,7 +112,8 @@ fn textured(
     left_out
 }
 
-/// What `alphaMode` `MASK` cuts out: by the alpha of the base colour and of its texture, whose set of coordinates is the first.
+/// The mask of `alphaMode` `MASK`, from the alpha of the base colour and its texture, whose
+/// coordinate set comes first.
 fn mask(
     material: &gltf::Material<'_>,
     images: &mut Images<'_>,
@@ -135,8 +136,7 @@ fn mask(
     })
 }
 
-/// Linear base colour and texture: the diffuse ones where `KHR_materials_pbrSpecularGlossiness`
-/// gives them.
+/// Linear base colour and texture; from `KHR_materials_pbrSpecularGlossiness` if present.
 fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture::Info<'a>>) {
     match material.pbr_specular_glossiness() {
         Some(model) => (model.diffuse_factor().into(), model.diffuse_texture()),
@@ -158,7 +158,7 @@ fn convert(
     let gloss = material.pbr_specular_glossiness();
     let emission =
         emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-    // A texture can make any part of the surface dark: better no light than light everywhere.
+    // A texture may darken any part of the surface: better no light than light everywhere.
     let emission = match material.emissive_texture() {
         Some(_) if !options.textures => Vec3::ZERO,
         _ => emission,
@@ -177,7 +177,7 @@ fn convert(
         filter: None,
         thickness: material.volume().map(|v| v.thickness_factor()),
         opacity: Some(color.w),
-        // The names of the standard are the crate's in capitals.
+        // The standard's names are the crate's in capitals.
         alpha_mode: Some(format!("{:?}", material.alpha_mode()).to_uppercase()),
         illum: None,
     };
@@ -200,7 +200,7 @@ fn convert(
     }
 }
 
-/// Extensions of surfaces that some material has and [`warnings`] names.
+/// Surface extensions used by some material and named by [`warnings`].
 fn named(document: &gltf::Document) -> Vec<&'static str> {
     let has = |name: &&str| {
         document
@@ -210,9 +210,9 @@ fn named(document: &gltf::Document) -> Vec<&'static str> {
     EXTENSIONS.into_iter().filter(has).collect()
 }
 
-/// One warning per kind of appearance that is drawn otherwise than the file says.
+/// One warning per kind of appearance drawn differently from the file.
 fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
-    // The material as converted beside the one in the file; the last, default one is not in it.
+    // Pairs each converted material with its original; the final default one has none.
     let of = |wanted: &dyn Fn(&Material, &gltf::Material<'_>) -> bool| -> Vec<&str> {
         let pairs = materials.iter().zip(document.materials());
         let chosen = pairs.filter(|(converted, original)| wanted(converted, original));
@@ -225,7 +225,7 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
     let frosted =
         of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
     let blended = of(&|_, original| original.alpha_mode() == AlphaMode::Blend);
-    // Where a texture scales the metalness, the factor alone says nothing.
+    // A texture may scale the metalness, so the factor alone decides nothing.
     let metal = of(&|m, original| {
         let model = original.pbr_metallic_roughness();
         m.kind == &DIFFUSE

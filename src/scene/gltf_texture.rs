@@ -1,4 +1,4 @@
-//! Textures of glTF documents: images, places on the surface.
+//! Textures of glTF documents: images and texture transforms.
 
 use super::gltf_files::Files;
 use super::texture::{Encoded, ImageSource};
@@ -7,22 +7,21 @@ use glam::{Mat2, Vec2};
 use gltf::texture::WrappingMode;
 use std::borrow::Cow;
 
-/// Images that some material uses, each once, and what was left out.
+/// Images used by some material, without duplicates, and those left out.
 pub(super) struct Images<'a> {
     files: &'a Files,
     buffers: &'a [Vec<u8>],
-    /// Place of each of the document's images in `used`.
+    /// Index in `used` of each of the document's images.
     ids: Vec<Option<u32>>,
     pub used: Vec<ImageSource<'a>>,
 }
 
-/// A texture with the set of coordinates that it wants.
 pub(super) struct Placed {
     pub set: u32,
     pub place: TextureUse,
 }
 
-/// `KHR_texture_transform` as the file has it.
+/// `KHR_texture_transform` as given in the file.
 struct Given {
     offset: Vec2,
     rotation: f32,
@@ -90,7 +89,7 @@ impl<'a> Images<'a> {
     }
 }
 
-/// What is missing or no number is as if it were not stated.
+/// Missing and non-numeric values count as not given.
 fn given_by_json(value: &serde_json::Value) -> Given {
     let number = |value: Option<&serde_json::Value>| {
         let number = value.and_then(serde_json::Value::as_f64);

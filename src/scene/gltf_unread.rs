@@ -1,12 +1,12 @@
-//! What a glTF document says and nothing here reads: each is named once.
+//! Reports parts of a glTF document that are ignored, each once.
 
 use super::gltf_instancing::OF_NODES;
 use super::obj_statements::unread_warning;
 use gltf::Semantic;
 use std::collections::BTreeSet;
 
-/// Extensions that are read, by the crate or here, whether with the nodes, the materials or the textures that have them. Quantised
-/// data are read or refused attribute by attribute.
+/// Supported extensions of nodes, materials and textures, read here or by the crate. Quantised data
+/// is read or refused per attribute.
 const READ: [&str; 8] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -18,13 +18,12 @@ const READ: [&str; 8] = [
     "KHR_texture_transform",
 ];
 
-/// What was come across.
 pub(super) struct Unread {
     extensions: BTreeSet<String>,
     pub attributes: BTreeSet<String>,
 }
 
-/// What the document as a whole has: extensions and animations.
+/// Ignored features of the whole document: extensions and animations.
 pub(super) fn of_document(document: &gltf::Document) -> Unread {
     let is_read = |name: &&str| READ.contains(name) || OF_NODES.contains(name);
     let extensions = document.extensions_used().filter(|name| !is_read(name));
@@ -37,14 +36,14 @@ pub(super) fn of_document(document: &gltf::Document) -> Unread {
 }
 
 impl Unread {
-    /// Takes note of the attributes of a primitive that are not read. Skins and morph targets, and texture coordinates without
-    /// a texture, are a matter of their own: nothing is lost without the latter.
+    /// Records a primitive's ignored attributes. Skins and morph targets are handled elsewhere, and
+    /// unused texture coordinates lose nothing.
     pub(crate) fn see(&mut self, primitive: &gltf::Primitive<'_>, set: Option<u32>) {
         for (semantic, _) in primitive.attributes() {
             let name = match semantic {
                 Semantic::Positions | Semantic::Normals => continue,
                 Semantic::Tangents => "TANGENT".to_owned(),
-                // Named where they were not read.
+                // Reported by its reader.
                 Semantic::Colors(0) => continue,
                 Semantic::Colors(k) => format!("COLOR_{k}"),
                 Semantic::TexCoords(k) if k == 0 || set == Some(k) => continue,
@@ -57,7 +56,7 @@ impl Unread {
         }
     }
 
-    /// A line for extensions, and one for the rest. `named` are those that materials have and other lines name.
+    /// One line for extensions, one for the rest; `named` extensions are covered elsewhere.
     pub(crate) fn warnings(&self, named: &[&str]) -> impl Iterator<Item = String> {
         let extensions = self.extensions.iter();
         let extensions = extensions.filter(|name| !named.contains(&name.as_str()));

@@ -1,4 +1,4 @@
-//! Lamps that are hung into any scene, so that the number of its lights can be varied.
+//! Lamps added to any scene, to vary its number of lights.
 
 use super::{GEOMETRIC, Material, SceneData, WHITE};
 use glam::{Vec2, Vec3};
@@ -7,13 +7,13 @@ use raystone_core::random::Pcg32;
 
 /// Edge of a lamp as a fraction of the scene's diagonal.
 const EDGE: f32 = 0.003;
-/// Lamps hang within so much of the box, from its centre along each axis.
+/// Extent of the region with lamps relative to the box, along each axis.
 const INNER: f32 = 0.2;
-/// Radiance of all lamps together, if one alone had all.
+/// Radiance of a single lamp that carries the power of all.
 const RADIANCE: f32 = 2000.0;
 
-/// The scene with so many square lamps of equal power, at random places of the inner box. A scene that brings no light
-/// loses the sky that is put over such; one of instances becomes a flat one. The first lamps are the same however many follow.
+/// Adds `lamps` square lamps of equal power at random places of the inner box. A scene without
+/// lights loses its default sky; instances are flattened. The first lamps are always the same.
 pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
     let bounds = scene.bounds();
     let (center, half) = (bounds.center(), 0.5 * (bounds.max - bounds.min));

@@ -1,22 +1,20 @@
-//! Objects and instances: a scene whose triangles are copies of a few objects, each moved, rotated,
-//! scaled or mirrored by an affine transform.
+//! Objects and instances: scenes of copies of a few objects, placed by affine transforms.
 //!
-//! The triangles of [`super::SceneData`] stay what they are for every other scene, a flat list in
-//! world space: the copies of all instances, one after the other. An [`Assembly`] says in addition
-//! which objects they are copies of; two-level structures trace those.
+//! The triangles of [`super::SceneData`] remain a flat world-space list: the copies of all
+//! instances in order. An [`Assembly`] records their objects, for two-level structures.
 
 use glam::{DMat3, DVec3, Mat4, Vec3};
 use raystone_core::geometry::Triangle;
 use thiserror::Error;
 
-/// Transforms whose condition number (‖A‖ · ‖A⁻¹‖, greatest row sums) exceeds this are refused:
-/// f32 rounding alone would move what they place by its own thickness.
+/// Transforms with a larger condition number (‖A‖ · ‖A⁻¹‖, maximum row sums) are refused: f32
+/// rounding alone would move the geometry by its own thickness.
 pub(crate) const MAX_CONDITION: f64 = 1_048_576.0;
 
-/// Most triangles of a scene: indices are 32 bits wide and the last one means "no hit".
+/// Triangle limit of a scene: indices have 32 bits and the last one means "no hit".
 const MAX_TRIANGLES: u64 = u32::MAX as u64;
 
-/// An affine transform: three rows of a 3×4 matrix, the fourth column being the translation.
+/// An affine transform: three rows of a 3×4 matrix; the fourth column is the translation.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Transform {
@@ -25,7 +23,7 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// Leaves everything where it is.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         rows: [
             [1.0, 0.0, 0.0, 0.0],
@@ -34,7 +32,7 @@ impl Transform {
         ],
     };
 
-    /// The transform `linear · p + translation`, `linear` given by its columns.
+    /// Returns the transform `linear · p + translation`, with `linear` given by its columns.
     pub fn new(columns: [Vec3; 3], translation: Vec3) -> Self {
         let [x, y, z] = columns;
         Self {
@@ -48,14 +46,14 @@ impl Transform {
         Self::new([x, y, z], w)
     }
 
-    /// Where a point goes.
+    /// Transforms a point.
     pub fn point(&self, p: Vec3) -> Vec3 {
         self.rows
             .map(|[x, y, z, w]| x * p.x + y * p.y + z * p.z + w)
             .into()
     }
 
-    /// Whether every entry is finite.
+    /// True if every entry is finite.
     pub fn is_finite(&self) -> bool {
         self.rows.as_flattened().iter().all(|x| x.is_finite())
     }
@@ -73,7 +71,7 @@ impl Transform {
         )
     }
 
-    /// The inverse, computed in f64 and rounded to f32; not finite if there is none.
+    /// The inverse, computed in f64 and rounded to f32; not finite if it does not exist.
     pub fn inverse(&self) -> Self {
         let (linear, translation) = self.parts();
         let inverse = linear.inverse();
@@ -81,13 +79,13 @@ impl Transform {
         Self::new([x, y, z], (-(inverse * translation)).as_vec3())
     }
 
-    /// Whether it mirrors, so that corners that turned counter-clockwise turn clockwise. Where it is so, the front of what it
-    /// places is the other side (glTF 2.0, 3.7.4). In f64, so that no small scale makes the determinant 0.
+    /// True if the transform mirrors: counter-clockwise corners turn clockwise, and the front is
+    /// the other side (glTF 2.0, 3.7.4). In f64, so that small scales do not give 0.
     pub fn is_mirrored(&self) -> bool {
         self.parts().0.determinant() < 0.0
     }
 
-    /// ‖A‖ · ‖A⁻¹‖ of the linear part, norms being greatest absolute row sums; 1 for the identity,
+    /// ‖A‖ · ‖A⁻¹‖ of the linear part, with maximum absolute row sums as norms; 1 for the identity,
     /// at most 3 for a rotation, infinite or NaN if there is no inverse.
     pub fn condition(&self) -> f64 {
         let (linear, _) = self.parts();
@@ -95,7 +93,7 @@ impl Transform {
     }
 }
 
-/// Greatest sum of absolute values of a row: the norm that belongs to the greatest component.
+/// Maximum absolute row sum: the norm induced by the maximum norm.
 pub fn row_sum_norm(matrix: DMat3) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|column| matrix.col(column).abs());
     (x + y + z).max_element()
@@ -106,25 +104,25 @@ pub fn row_sum_norm(matrix: DMat3) -> f64 {
 pub struct Instance {
     /// Index of the object.
     pub object: u32,
-    /// Index in the scene of the copy's first triangle; the others follow in the object's order.
+    /// Scene index of the copy's first triangle; the others follow in the object's order.
     pub first: u32,
-    /// From the object's space to the world.
+    /// Object-to-world transform.
     pub to_world: Transform,
-    /// From the world to the object's space: what rays are traced with.
+    /// World-to-object transform, applied to rays.
     pub to_object: Transform,
 }
 
 impl Instance {
-    /// Whether the copy lies where the object does: rays need no transform.
+    /// True if the transform is the identity, so rays need no transform.
     pub fn is_identity(&self) -> bool {
         self.to_world == Transform::IDENTITY
     }
 }
 
-/// A transform or object that cannot be placed, with its place.
+/// An invalid transform or object, with its index.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum InstanceError {
-    /// An object without triangles.
+    /// The object has no triangles.
     #[error("object {object} has no triangles; leave it out")]
     EmptyObject {
         /// Index of the object.
@@ -135,7 +133,7 @@ pub enum InstanceError {
     NoSuchObject {
         /// Index of the instance.
         instance: usize,
-        /// Index that was asked for.
+        /// Index requested.
         object: u32,
         /// Number of objects.
         objects: usize,
@@ -143,18 +141,18 @@ pub enum InstanceError {
     /// The instance does not exist.
     #[error("instance {instance} does not exist: there are {instances}")]
     NoSuchInstance {
-        /// Index that was asked for.
+        /// Index requested.
         instance: usize,
         /// Number of instances.
         instances: usize,
     },
-    /// A number of the transform is NaN or infinite.
+    /// The transform has a NaN or infinite entry.
     #[error("instance {instance}: its transform has an entry that is not finite; correct it")]
     NotFinite {
         /// Index of the instance.
         instance: usize,
     },
-    /// The transform flattens space, or nearly so.
+    /// The transform is singular, or nearly so.
     #[error(
         "instance {instance}: its transform cannot be inverted (condition number {condition:.3e}, \
          the limit is {MAX_CONDITION:.3e}); give it a scale that flattens nothing"
@@ -162,10 +160,10 @@ pub enum InstanceError {
     Singular {
         /// Index of the instance.
         instance: usize,
-        /// What was found.
+        /// Its condition number.
         condition: f64,
     },
-    /// More triangles than can be numbered.
+    /// The scene exceeds the triangle limit.
     #[error(
         "instance {instance}: the scene needs {needed} triangles, the limit is {MAX_TRIANGLES}; \
          use fewer instances or a coarser object"
@@ -173,13 +171,13 @@ pub enum InstanceError {
     TooManyTriangles {
         /// Index of the instance.
         instance: usize,
-        /// Triangles with this instance.
+        /// Number of triangles including this instance.
         needed: u64,
     },
 }
 
-/// Objects in their own space, and where they stand. All triangles of the scene belong to an
-/// instance; what is there once is an instance with the identity.
+/// Objects in their own space, and their instances. Every triangle of the scene belongs to an
+/// instance; a single object is an instance with the identity.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Assembly {
     objects: Vec<Vec<Triangle>>,
@@ -201,11 +199,10 @@ impl Assembly {
         Ok(object as u32)
     }
 
-    /// Adds an instance behind all others.
+    /// Appends an instance.
     ///
     /// # Errors
-    /// The object does not exist, the transform is singular or not finite, or there are too many
-    /// triangles.
+    /// The object does not exist, the transform is invalid, or there are too many triangles.
     pub fn place(&mut self, object: u32, to_world: Transform) -> Result<Instance, InstanceError> {
         let instance = self.instances.len();
         let triangles = self.objects.get(object as usize);
@@ -229,7 +226,7 @@ impl Assembly {
         Ok(placed)
     }
 
-    /// Gives an instance another transform.
+    /// Replaces an instance's transform.
     ///
     /// # Errors
     /// The instance does not exist, or the transform is singular or not finite.
@@ -255,12 +252,12 @@ impl Assembly {
         &self.instances
     }
 
-    /// Triangles of all instances together.
+    /// Total number of triangles of all instances.
     pub fn triangles(&self) -> u64 {
         self.triangles
     }
 
-    /// The triangles of an instance in world space.
+    /// World-space triangles of an instance.
     pub fn copy(&self, instance: &Instance) -> impl Iterator<Item = Triangle> + '_ {
         let to_world = instance.to_world;
         let triangles = self.objects[instance.object as usize].iter();
@@ -322,7 +319,7 @@ mod tests {
         let singular = |t| matches!(t, Err(InstanceError::Singular { instance: 1, .. }));
         assert!(singular(assembly.place(0, scaled(1.0, 0.0, 1.0))));
         assert!(singular(assembly.place(0, scaled(1.0, 1e-7, 1.0))));
-        // Invertible, but the inverse is beyond the range of f32.
+        // Invertible, but the inverse exceeds the range of f32.
         assert!(singular(assembly.place(0, scaled(1e-40, 1e-40, 1e-40))));
         let not_finite = assembly.place(0, scaled(f32::NAN, 1.0, 1.0));
         assert_eq!(not_finite, Err(InstanceError::NotFinite { instance: 1 }));

@@ -1,7 +1,6 @@
-//! Scenes: what is traced. Loaders for OBJ, glTF, PLY and Nori's XML, built-in procedural scenes, cameras,
-//! materials and emitters.
+//! Scenes: OBJ, glTF, PLY and Nori XML loaders, procedural scenes, cameras, materials, emitters.
 //!
-//! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
+//! A scene is a flat triangle soup in world space with per-triangle material indices. Structures
 //! see only [`Triangle`]s, two-level ones also the [`Assembly`]; shading sees the rest.
 #![warn(missing_docs)]
 
@@ -70,47 +69,48 @@ use raystone_core::params::{ParamRange, ParamValue, Parameter, ParameterSchema, 
 use std::io::Read as _;
 use std::path::Path;
 
-/// An 8-bit texture, row by row from the top. What it is used for says how it is encoded: [`TextureUse`].
+/// An 8-bit texture, row by row from the top. [`TextureUse`] determines its encoding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// File or embedded name, for messages.
     pub name: String,
-    /// Texels in x.
+    /// Width in texels.
     pub width: u32,
-    /// Texels in y.
+    /// Height in texels.
     pub height: u32,
     /// `width * height` texels, RGBA8.
     pub texels: Vec<[u8; 4]>,
 }
 
-/// A loaded scene: flat world-space triangles and what shading needs.
+/// A loaded scene: flat world-space triangles and the shading data.
 ///
-/// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is
+/// empty if no material is textured.
 // Many fields: parallel arrays are what builders and kernels read.
 #[derive(Debug, Clone)]
 pub struct SceneData {
-    /// Name as the user typed it.
+    /// Name as typed.
     pub name: String,
     /// The triangle soup.
     pub triangles: Vec<Triangle>,
     /// Texture coordinates per corner, `v` pointing down (glTF convention); empty if unused.
     pub uvs: Vec<[Vec2; 3]>,
-    /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
+    /// Corner normals, encoded by [`encode_normal`]; empty if all are face normals.
     pub normals: Vec<[u32; 3]>,
-    /// Colours of the corners, as [`encode_color`] has them, by which the base colour is multiplied; empty where all are white.
+    /// Corner colours ([`encode_color`]), which multiply the base colour; empty if all white.
     pub colors: Vec<[[u32; 2]; 3]>,
-    /// Of which triangles the front is the side from which the corners turn clockwise, because a transform has mirrored them:
-    /// copies of an object keep the order of its corners, on which u and v of hits depend. Empty if none is.
+    /// True for mirrored triangles, whose corners turn clockwise seen from the front: copies keep
+    /// the object's corner order, on which u and v of hits depend. Empty if there are none.
     pub mirrored: Vec<bool>,
-    /// Index into `materials` for each triangle.
+    /// Index into `materials` of each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.
     pub materials: Vec<Material>,
     /// Textures.
     pub textures: Vec<Texture>,
-    /// What the triangles are copies of, if the scene consists of instances.
+    /// Objects and instances, if the scene consists of instances.
     pub assembly: Option<Assembly>,
-    /// The camera of the file or of the built-in scene; `None` means "frame automatically".
+    /// The camera of the file or built-in scene; `None` for automatic framing.
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
@@ -118,37 +118,38 @@ pub struct SceneData {
     pub lights: Vec<Light>,
     /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
     pub daylight: Option<Daylight>,
-    /// Where to look from, if the scene brings no camera.
+    /// Automatic framing, if the scene has no camera.
     pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
     pub hash: String,
-    /// What was dropped or approximated.
+    /// Dropped and approximated content.
     pub report: LoadReport,
 }
 
-/// How a scene is loaded.
+/// Options for loading a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Whether textures are decoded. Without them textured surfaces show their constant colour, and no texture coordinates are kept.
-    /// Masks are there in any case: they say what rays hit.
+    /// Decode textures. If false, textured surfaces show their constant colour and texture
+    /// coordinates are dropped. Masks are always read, as they affect hits.
     pub textures: bool,
-    /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
+    /// Largest width and height of a texture in texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
-    /// Bytes that the tables of the scene may have: what the adapter binds as one buffer. Textures and maps are reduced until they
-    /// fit, with a warning.
+    /// Size limit in bytes of the scene's tables, which the adapter binds as one buffer. Textures
+    /// and maps are reduced until they fit, with a warning.
     pub table_bytes: u64,
-    /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
-    /// from elsewhere could read any file of this machine.
+    /// Allow a glTF model to name files outside its folder, and an OBJ model absolute paths; an
+    /// untrusted model could read any file of this machine.
     pub allow_outside: bool,
-    /// Kinds that a file's materials are looked for among; where one fits several, the last counts.
+    /// Material kinds to match a file's materials against; if several match, the last wins.
     pub kinds: &'static [&'static MaterialKind],
 }
 
-/// What every adapter binds as one storage buffer, bytes (WebGPU's `maxStorageBufferBindingSize`).
+/// Storage buffer binding size that every adapter supports, bytes (WebGPU's
+/// `maxStorageBufferBindingSize`).
 pub const LEAST_BINDING: u64 = 128 << 20;
 
 impl LoadOptions {
-    /// The greatest size of a texture beside so many triangles, and words for all of them.
+    /// The largest texture size and total number of words next to `triangles` triangles.
     fn texture_limits(&self, triangles: usize) -> [u64; 2] {
         let room = texture::texel_room(self.table_bytes, triangles);
         [self.max_texture_size.into(), room]
@@ -167,7 +168,7 @@ impl Default for LoadOptions {
     }
 }
 
-/// A built-in scene with its default parameters, or a model file.
+/// Loads a built-in scene with default parameters, or a model file.
 ///
 /// # Errors
 /// As [`load`].
@@ -182,8 +183,8 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
     load(&variant, &LoadOptions::default())
 }
 
-/// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB, PLY
-/// or Nori XML file (relative to the working directory, extension in any case).
+/// Loads the scene named by `variant`: a built-in one, or the path of an OBJ, glTF, GLB, PLY or
+/// Nori XML file (relative to the working directory, extension in any case).
 ///
 /// # Errors
 /// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
@@ -216,19 +217,19 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
     }
 }
 
-/// The parameter of every scene that names an environment map.
+/// Common parameter: environment map.
 const ENVIRONMENT: &str = "environment";
 
-/// The parameter of every scene that says how many lamps are hung into it.
+/// Common parameter: number of added lamps.
 const HUNG_LAMPS: &str = "hung_lamps";
 
-/// The parameter of every scene that says how many triangles may be left of it.
+/// Common parameter: maximum number of triangles.
 const MOST_TRIANGLES: &str = "most_triangles";
 
-/// The parameter of every scene that says how many copies of it stand on a plane.
+/// Common parameter: number of copies on a plane.
 const COPIES: &str = "copies";
 
-/// What every scene has as parameters, built in or not.
+/// Parameters of every scene, built-in or not.
 pub(crate) fn common_parameters() -> ParameterSchema {
     vec![
         Parameter {
@@ -264,7 +265,7 @@ pub(crate) fn common_parameters() -> ParameterSchema {
     ]
 }
 
-/// The scene of a variant without its environment map.
+/// Loads a variant's scene without its environment map.
 fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     if let Some(scene) = builtin::build(variant) {
         return scene;
@@ -286,11 +287,10 @@ fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Sce
     }
 }
 
-/// Looks at the file of a model without loading it: whether its format is known, whether it is a file with
-/// something in it, and whether that begins as the format does.
+/// Checks a model file without loading it: known format, not empty, and a plausible beginning.
 ///
 /// # Errors
-/// [`SceneError`]: an unknown format, or a file that cannot be read or cannot be a model.
+/// [`SceneError`]: unknown format, or a file that cannot be read or cannot be a model.
 pub fn check_model(path: &Path) -> Result<(), SceneError> {
     let mut start = Vec::new();
     let read = error::open(path)?
@@ -314,13 +314,13 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
             return Err(SceneError::UnknownFormat { path });
         }
     };
-    match begins_well {
-        true => Ok(()),
-        false => Err(SceneError::malformed(path, "", expected)),
+    if begins_well {
+        Ok(())
+    } else {
+        Err(SceneError::malformed(path, "", expected))
     }
 }
 
-/// The ending of a file's name in lower case.
 fn extension(path: &Path) -> String {
     let extension = path.extension().unwrap_or_default();
     extension
@@ -329,13 +329,13 @@ fn extension(path: &Path) -> String {
         .into_owned()
 }
 
-/// Bytes of a model that [`check_model`] looks at.
+/// Number of bytes that [`check_model`] inspects.
 const MODEL_START: u64 = 512;
 
-/// How many materials a warning names.
+/// Number of materials that a warning names.
 const NAMES_IN_WARNING: usize = 4;
 
-/// One line for all materials that are `what` but drawn as `drawn`; nothing if there are none.
+/// One warning for all materials that are `what` but drawn as `drawn`; `None` if there are none.
 fn approximation_warning(what: &str, drawn: &str, names: Vec<&str>) -> Option<String> {
     if names.is_empty() {
         return None;

@@ -1,28 +1,28 @@
-//! Alpha masks: what of a surface is there at all. Where the alpha is below a threshold, rays pass.
+//! Alpha masks: rays pass where the alpha is below a threshold.
 
 use super::{Material, Texture, TextureUse};
 
-/// The number that an image gives for an alpha.
+/// The image channel that gives the alpha.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum AlphaChannel {
-    /// The alpha of its texels.
+    /// Alpha.
     #[default]
     Alpha,
-    /// Their red.
+    /// Red.
     Red,
-    /// Their green.
+    /// Green.
     Green,
-    /// Their blue.
+    /// Blue.
     Blue,
-    /// The weighted sum of red, green and blue of Rec. 709, as encoded.
+    /// Luminance of the encoded red, green and blue (Rec. 709).
     Luminance,
-    /// Their alpha if some texel is not opaque, else the luminance (MTL `map_d` without `-imfchan`: images with and without an
-    /// alpha are both in use).
+    /// Alpha if some texel is not opaque, otherwise luminance (MTL `map_d` without `-imfchan`: both
+    /// kinds of images are in use).
     AlphaOrLuminance,
 }
 
 impl AlphaChannel {
-    /// What is read of this image.
+    /// The channel to read from this image.
     fn of(self, texture: &Texture) -> Self {
         match self {
             Self::AlphaOrLuminance if texture.texels.iter().any(|t| t[3] < 255) => Self::Alpha,
@@ -31,7 +31,7 @@ impl AlphaChannel {
         }
     }
 
-    /// The alpha of a texel, in units of 1/255.
+    /// Alpha of a texel, in units of 1/255.
     pub fn value(self, [r, g, b, a]: [u8; 4]) -> u8 {
         match self {
             Self::Alpha => a,
@@ -46,21 +46,21 @@ impl AlphaChannel {
     }
 }
 
-/// An alpha and the least one at which the surface is there (glTF 2.0, 3.9.4: a fragment is drawn if its alpha is not below the cutoff).
+/// Alpha and cutoff; the surface exists where alpha is not below the cutoff (glTF 2.0, 3.9.4).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlphaMask {
-    /// The image; without it the factor is the alpha.
+    /// The image; without one, the factor is the alpha.
     pub texture: Option<TextureUse>,
-    /// What of the image.
+    /// The image's channel.
     pub channel: AlphaChannel,
-    /// What the image is multiplied by.
+    /// Multiplier of the image.
     pub factor: f32,
-    /// The least alpha of the surface.
+    /// The lowest alpha at which the surface exists.
     pub cutoff: f32,
 }
 
 impl AlphaMask {
-    /// The cutoff where a file says nothing of it.
+    /// Cutoff if the file gives none.
     pub(crate) const CUTOFF: f32 = 0.5;
 
     /// The mask of an image, with this cutoff.
@@ -73,21 +73,22 @@ impl AlphaMask {
         }
     }
 
-    /// The least value of an image at which the surface is there, in units of 1/(255 · 65536); `u32::MAX` if none suffices.
+    /// The lowest image value of the surface, in units of 1/(255 · 65536); `u32::MAX` for none.
     pub fn threshold(&self) -> u32 {
         let (factor, cutoff) = (f64::from(self.factor), f64::from(self.cutoff));
         if cutoff <= 0.0 {
             return 0;
         }
         let least = (cutoff / factor * 255.0 * 65536.0).ceil();
-        // Not above it where the factor is 0, negative or NaN.
-        match factor > 0.0 && least <= 255.0 * 65536.0 {
-            true => least as u32,
-            false => u32::MAX,
+        // False if the factor is 0, negative or NaN.
+        if factor > 0.0 && least <= 255.0 * 65536.0 {
+            least as u32
+        } else {
+            u32::MAX
         }
     }
 
-    /// Whether some point of the surface may be missing, given the images.
+    /// True if some point of the surface may be missing, given the images.
     fn cuts(&self, textures: &[Texture]) -> bool {
         let threshold = self.threshold();
         let Some(used) = self.texture else {
@@ -98,7 +99,7 @@ impl AlphaMask {
     }
 }
 
-/// Takes away the masks that cut nothing: kernels have none then. Says of the others what of the image they read.
+/// Removes masks that cut nothing, so kernels have none, and resolves the channel of the others.
 pub(super) fn settle(materials: &mut [Material], textures: &[Texture]) {
     for material in materials {
         if let Some(mask) = &mut material.mask

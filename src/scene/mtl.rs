@@ -16,29 +16,28 @@ use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// Gathers the materials of all `mtllib` statements while the OBJ file is read.
+/// Collects the materials of all `mtllib` statements while the OBJ file is read.
 pub(super) struct Library {
     folder: PathBuf,
     options: LoadOptions,
     contents: RefCell<Contents>,
-    /// The libraries so far: each is read once, however often the model names it.
+    /// Libraries loaded so far; each is read once.
     loaded: RefCell<HashSet<PathBuf>>,
 }
 
-/// What the libraries defined.
 #[derive(Default)]
 pub(super) struct Contents {
     pub materials: Vec<Material>,
     pub textures: Vec<ImageSource<'static>>,
     pub warnings: Vec<String>,
-    /// What statements say that is not rendered, with the materials.
+    /// Statements that are not rendered, with their materials.
     unused: BTreeMap<&'static str, Vec<String>>,
-    /// Places of the textures' paths in `textures`.
+    /// Index in `textures` by path.
     texture_ids: HashMap<PathBuf, u32>,
 }
 
 impl Library {
-    /// Libraries are looked for beside the OBJ file `obj`.
+    /// Looks for libraries next to the OBJ file `obj`.
     pub(crate) fn new(obj: &Path, options: &LoadOptions) -> Self {
         Self {
             folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
@@ -48,8 +47,9 @@ impl Library {
         }
     }
 
-    /// Loads the libraries that a statement names: one whose name may have blanks in it, if there is such a file, or several. The
-    /// numbers of their materials by name. A missing or broken library is a warning.
+    /// Loads the libraries of a statement: a single file whose name may contain blanks, if it
+    /// exists, or several. Returns the indices of their materials by name. Broken libraries are
+    /// warnings.
     pub(crate) fn load(&self, names: &str) -> Vec<(String, u32)> {
         let cut = without_comment(names).trim();
         let is_there = |name: &&str| self.folder.join(plain(name)).is_file();
@@ -100,8 +100,7 @@ impl Library {
             .collect()
     }
 
-    /// All materials in the order of the libraries, the textures they refer to, and one warning for all that
-    /// is drawn otherwise than the file says.
+    /// All materials in library order, their textures, and a warning for deviations from the file.
     pub(crate) fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
         let approximated = contents
@@ -122,10 +121,9 @@ impl Library {
 }
 
 impl Contents {
-    /// Adds a material of the library `file`.
     fn add(&mut self, material: &tobj::Material, file: &Path, options: &LoadOptions) {
         let folder = file.parent().unwrap_or(Path::new(""));
-        // The standard's default for a surface with a texture is to show it as it is.
+        // The standard shows textures unscaled by default.
         let unstated = if material.diffuse_texture.is_some() {
             1.0
         } else {
@@ -174,7 +172,7 @@ impl Contents {
         self.materials.push(textured);
     }
 
-    /// The texture that a statement names, each file once.
+    /// The texture named by a statement; each file is added once.
     fn texture(&mut self, folder: &Path, text: &str, options: &LoadOptions) -> Statement {
         let Statement {
             file,
@@ -200,7 +198,7 @@ impl Contents {
         }
     }
 
-    /// The texture of the opacity as a mask: what MTL blends is there or not, by half.
+    /// The opacity texture as a mask with cutoff one half, in place of MTL's blending.
     fn mask(
         &mut self,
         material: &tobj::Material,
@@ -216,19 +214,19 @@ impl Contents {
     }
 }
 
-/// A path with `/` between folders.
 fn plain(name: &str) -> String {
     name.replace('\\', "/")
 }
 
-/// Refuses an absolute path: it belongs to the machine that wrote the file. Relative ones may leave the
-/// folder, as textures in `../textures` do in many models.
+/// Refuses absolute paths, which belong to the machine that wrote the file. Relative ones may leave
+/// the folder: many models keep textures in `../textures`.
 fn relative(file: &Path, options: &LoadOptions) -> std::io::Result<()> {
-    match file.has_root() && !options.allow_outside {
-        true => Err(std::io::Error::other(
+    if file.has_root() && !options.allow_outside {
+        Err(std::io::Error::other(
             "an absolute path, which is read with --allow-outside only",
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 
@@ -239,7 +237,7 @@ fn source(material: &tobj::Material) -> MaterialSource {
         words.map_while(|word| word.parse().ok()).collect()
     };
     let extra = |key: &str| numbers(key).first().copied();
-    // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007), and glTF's
+    // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007); glTF's
     // roughness is the square root of alpha.
     let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
     MaterialSource {
@@ -261,19 +259,18 @@ fn source(material: &tobj::Material) -> MaterialSource {
     }
 }
 
-/// Statements that are read, or that tell nothing (an empty line; the colour of ambient light, which paths bring), or named with
-/// the materials that have them.
+/// Statements that are read, irrelevant (empty, ambient), or reported with their materials.
 const READ: [&str; 25] = [
     "", "newmtl", "Ka", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "Tf", "illum", "Pr", "Pm",
     "map_Kd", "map_Ks", "map_Ke", "map_Ns", "map_ns", "map_NS", "map_d", "map_Bump", "map_bump",
     "bump", "norm",
 ];
 
-/// Kinds of statements that are taken note of: a file that is none has any number.
+/// Limit on the kinds of unread statements recorded: a file in another format has any number.
 const MOST_UNREAD: usize = 64;
 
-/// The text without the lines that would make `tobj` reject (or panic on) the whole library; a
-/// colour given as one number becomes three.
+/// The text without lines that make `tobj` reject the library or panic; single-number colours
+/// become three.
 fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut unread: BTreeMap<String, usize> = BTreeMap::new();

@@ -3,17 +3,17 @@
 use super::{AlphaChannel, TextureUse, Wrap};
 use glam::{Mat2, Vec2};
 
-/// What a statement such as `-s 2 2 -clamp on wall.png` says.
+/// A parsed statement such as `-s 2 2 -clamp on wall.png`.
 pub(super) struct Statement {
-    /// With `/` between folders.
+    /// Path with `/` between folders.
     pub file: String,
-    /// Of a texture still to be numbered, for coordinates whose v points down.
+    /// Its use, with a placeholder texture index, for coordinates with v pointing down.
     pub place: TextureUse,
-    /// What of the image counts as one number (`-imfchan`), if the statement says so.
+    /// The channel used as a scalar (`-imfchan`), if given.
     pub channel: Option<AlphaChannel>,
 }
 
-/// Reads the options `-s`, `-o`, `-clamp`, `-bm` and `-imfchan`, and skips the others.
+/// Reads the options `-s`, `-o`, `-clamp`, `-bm` and `-imfchan` and skips the others.
 pub(super) fn statement(text: &str) -> Statement {
     let mut place = TextureUse::plain(0);
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
@@ -55,7 +55,7 @@ pub(super) fn statement(text: &str) -> Statement {
             _ => {}
         }
     }
-    // v' = s v + o upwards is v' = s v + 1 - s - o downwards.
+    // v' = s v + o pointing up is v' = s v + 1 - s - o pointing down.
     place.linear = Mat2::from_diagonal(scale);
     place.offset = Vec2::new(offset.x, 1.0 - scale.y - offset.y);
     Statement {
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!((masked.file.as_str(), found.channel), ("leaf.png", None));
         let place = found.place;
         assert_eq!((place.wrap, place.scale), ([Wrap::Clamp; 2], 0.5));
-        // The upper left corner of the surface, v = 0 downwards, is v = 1 upwards.
+        // The surface's upper left corner, v = 0 pointing down, is v = 1 pointing up.
         let corner = place.linear * Vec2::ZERO + place.offset;
         assert_eq!(corner, Vec2::new(0.5, 1.0 - (4.0 + 0.25)));
         assert_eq!(

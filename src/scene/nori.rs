@@ -1,8 +1,8 @@
-//! Scenes of the educational renderer [Nori](https://wjakob.github.io/nori/) (XML with OBJ meshes, here also PLY): transforms, the perspective
-//! camera, area emitters, and its materials.
+//! Scenes of the educational renderer [Nori](https://wjakob.github.io/nori/) (XML with OBJ meshes,
+//! here also PLY): transforms, the perspective camera, area emitters and its materials.
 //!
-//! Nori's camera may be mirrored (a scale of −1 in its transform), which ours cannot. The scene is mirrored instead, at
-//! the plane through the eye that is vertical in the image: the picture is the same.
+//! Nori's camera may be mirrored (a scale of −1 in its transform); ours cannot. The scene is
+//! mirrored instead, at the vertical plane through the eye, for the same picture.
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
@@ -17,19 +17,20 @@ use raystone_core::text::plain_text;
 use roxmltree::{Document, Node};
 use std::path::Path;
 
-/// What Nori takes where a file says nothing: albedo of `diffuse`, roughness of `microfacet`, indices of BK7 glass and of air.
+/// Nori's defaults: albedo of `diffuse`, roughness of `microfacet`, indices of BK7 glass and air.
 const ALBEDO: f32 = 0.5;
 const ALPHA: f32 = 0.1;
 const INSIDE_IOR: f32 = 1.5046;
 const OUTSIDE_IOR: f32 = 1.000277;
-/// Field of view in x, degrees, and size of the image.
+/// Horizontal field of view in degrees, and image size.
 const FOV: f64 = 30.0;
 const SIZE: [f64; 2] = [1280.0, 720.0];
 
-/// Loads a Nori scene. Integrator and sampler of the file are not looked at.
+/// Loads a Nori scene, ignoring the file's integrator and sampler.
 ///
 /// # Errors
-/// [`SceneError`]: XML that is broken (with its line), no `<scene>` at its root, a number that is none, a mesh that does not load.
+/// [`SceneError`]: malformed XML (with its line), a root other than `<scene>`, an invalid number,
+/// or a mesh that does not load.
 pub(super) fn load(
     path: &Path,
     name: &str,
@@ -69,7 +70,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn read(&mut self, root: Node<'_, '_>) -> Result<(), SceneError> {
         let camera = root.children().find(|node| node.has_tag_name("camera"));
-        // Comes first: a mirrored camera moves the meshes.
+        // First, as a mirrored camera moves the meshes.
         let mirror = camera.map(|node| self.camera(node)).transpose()?.flatten();
         for node in root.children().filter(Node::is_element) {
             match node.tag_name().name() {
@@ -88,7 +89,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Sets the camera; the reflection that stands for a mirrored one.
+    /// Sets the camera; returns the reflection to apply to the scene if it is mirrored.
     fn camera(&mut self, node: Node<'_, '_>) -> Result<Option<DMat4>, SceneError> {
         let to_world = self.to_world(node)?;
         let [width, height] = ["width", "height"].map(|name| self.number(node, name));
@@ -142,7 +143,7 @@ impl Reader<'_> {
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());
-        // A reflection turns corners, whether it is the camera's or the mesh's own; emitters and glass tell their sides by them.
+        // Reflections reverse the corners, which define the sides of emitters and glass.
         let mirrored = to_world.determinant() < 0.0;
         let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
         let normals = |index: usize| -> Option<[Vec3; 3]> {
@@ -153,10 +154,7 @@ impl Reader<'_> {
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             let moved = |v: Vec3| to_world.transform_point3(v.as_dvec3()).as_vec3();
             let [a, b, c] = triangle.vertices.map(moved);
-            let turn = |[a, b, c]: [Vec3; 3]| match mirrored {
-                true => [a, c, b],
-                false => [a, b, c],
-            };
+            let turn = |[a, b, c]: [Vec3; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
             let normals = normals(index).map(turn);
             let uvs = [Vec2::ZERO; 3];
             self.builder.push_corners(turn([a, b, c]), uvs, normals, id);
@@ -231,7 +229,7 @@ impl Reader<'_> {
         })
     }
 
-    /// The transform named `toWorld` of a node; what stands first in it acts first.
+    /// A node's `toWorld` transform; its first entry applies first.
     fn to_world(&self, node: Node<'_, '_>) -> Result<DMat4, SceneError> {
         let is_it = |n: &Node<'_, '_>| {
             n.has_tag_name("transform") && n.attribute("name").is_none_or(|name| name == "toWorld")
@@ -319,7 +317,7 @@ fn line_of(node: Node<'_, '_>) -> u32 {
     node.document().text_pos_at(node.range().start).row
 }
 
-/// The value of the property `name` among the children of a node: `<float name="fov" value="30"/>`.
+/// The value of property `name` among a node's children: `<float name="fov" value="30"/>`.
 fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     let mut properties = node
         .children()
@@ -327,7 +325,7 @@ fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     properties.find_map(|n| n.attribute("value"))
 }
 
-/// Numbers between commas or spaces; nothing if one of them is none or not finite.
+/// Numbers separated by commas or spaces; `None` if one is invalid or not finite.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let words = text.split(|c: char| c == ',' || c.is_whitespace());
     let words = words.filter(|word| !word.is_empty());
@@ -336,7 +334,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
         .collect()
 }
 
-/// Columns to the left, upwards and forwards, and the eye.
+/// The matrix with columns left, up, forward and eye.
 fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> DMat4 {
     let forward = (target - origin).normalize_or_zero();
     let left = up.normalize_or_zero().cross(forward).normalize_or_zero();

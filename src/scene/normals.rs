@@ -1,20 +1,19 @@
-//! Vertex normals: two 16-bit numbers each, on an octahedron. Twin: `kernels/shading/normals.wesl`.
+//! Vertex normals: two 16-bit numbers each, octahedral. Twin: `kernels/shading/normals.wesl`.
 
 use super::Transform;
 use glam::{DVec3, Vec3};
 use raystone_core::geometry::Triangle;
 
-/// In place of a normal: that of the triangle. No encoded normal has these bits.
+/// Marks a corner that uses the triangle's normal. No encoded normal has these bits.
 pub const GEOMETRIC: u32 = 0x8000_8000;
 
-/// The largest 16-bit number with sign.
 const LARGEST: f64 = 32_767.0;
-/// Cosine to the normal of the triangle from which a vertex normal tells nothing new: within a tenth of a degree.
+/// Vertex normals with a larger cosine to the face normal are dropped: within a tenth of a degree.
 const FLAT: f64 = 1.0 - 1e-6;
 
-/// Two 16-bit numbers, x in the lower half: the direction divided by the sum of its absolute components, the lower half of the
-/// octahedron folded over the upper one (Q. Meyer et al., "On floating-point normal vectors", 2010). [`GEOMETRIC`] for
-/// what is no direction.
+/// Two 16-bit numbers, x in the lower half: the direction divided by the sum of its absolute
+/// components, with the lower half of the octahedron folded over the upper one (Q. Meyer et al.,
+/// "On floating-point normal vectors", 2010). [`GEOMETRIC`] if `normal` is not a direction.
 pub fn encode_normal(normal: Vec3) -> u32 {
     let n = normal.as_dvec3();
     let sum = n.abs().element_sum();
@@ -22,36 +21,38 @@ pub fn encode_normal(normal: Vec3) -> u32 {
         return GEOMETRIC;
     }
     let (x, y) = (n.x / sum, n.y / sum);
-    let (x, y) = match n.z < 0.0 {
-        true => (
+    let (x, y) = if n.z < 0.0 {
+        (
             (1.0 - y.abs()) * 1.0_f64.copysign(x),
             (1.0 - x.abs()) * 1.0_f64.copysign(y),
-        ),
-        false => (x, y),
+        )
+    } else {
+        (x, y)
     };
     let part = |x: f64| u32::from(((x * LARGEST).round() as i16).cast_unsigned());
     part(x) | part(y) << 16
 }
 
-/// The unit direction of [`encode_normal`]'s word; `None` for [`GEOMETRIC`].
+/// Unit direction of [`encode_normal`]'s word; `None` for [`GEOMETRIC`].
 pub fn decode_normal(word: u32) -> Option<DVec3> {
     if word == GEOMETRIC {
         return None;
     }
     let part = |bits: u32| f64::from((bits as u16).cast_signed());
-    // Whole numbers: what lies in the plane z = 0 stays there.
+    // In integers, so that points of the plane z = 0 stay there.
     let (x, y) = (part(word), part(word >> 16));
     let z = LARGEST - x.abs() - y.abs();
     let sign = |x: f64| if x >= 0.0 { 1.0 } else { -1.0 };
-    let (x, y) = match z < 0.0 {
-        true => ((LARGEST - y.abs()) * sign(x), (LARGEST - x.abs()) * sign(y)),
-        false => (x, y),
+    let (x, y) = if z < 0.0 {
+        ((LARGEST - y.abs()) * sign(x), (LARGEST - x.abs()) * sign(y))
+    } else {
+        (x, y)
     };
     Some(DVec3::new(x, y, z).normalize())
 }
 
-/// The words of a triangle's corners; [`GEOMETRIC`] where a normal has no length, and for all three where they tell nothing that
-/// the triangle itself does not.
+/// Encodes a triangle's corner normals; [`GEOMETRIC`] for a normal of zero length, and for all
+/// three if they match the face normal.
 pub(super) fn encode_corners(triangle: &Triangle, normals: [Vec3; 3]) -> [u32; 3] {
     let [a, b, c] = triangle.vertices.map(Vec3::as_dvec3);
     let face = (b - a).cross(c - a).normalize_or_zero();
@@ -65,9 +66,9 @@ pub(super) fn encode_corners(triangle: &Triangle, normals: [Vec3; 3]) -> [u32; 3
     normals.map(encode_normal)
 }
 
-/// The words after a body has moved.
+/// Re-encodes normals after a body has moved.
 pub(super) fn moved(words: [u32; 3], from: &Transform, to: &Transform) -> [u32; 3] {
-    // Normals go by the inverse transpose: back by the transpose, and on.
+    // Normals transform by the inverse transpose: back by the transpose, then forward.
     let back = from.parts().0.transpose();
     let on = to.parts().0.inverse().transpose();
     words.map(|word| {

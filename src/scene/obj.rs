@@ -11,11 +11,11 @@ use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
-/// Loads an OBJ model: relative indices, polygons as triangles, `v` of texture coordinates turned down. Colours of vertices are
-/// those of a screen (sRGB), as Blender and three.js have them.
+/// Loads an OBJ model: relative indices, polygons as triangles, `v` of texture coordinates flipped
+/// to point down. Vertex colours are sRGB, as in Blender and three.js.
 ///
 /// # Errors
-/// [`SceneError`] with the line of the first broken statement.
+/// [`SceneError`] with the line of the first malformed statement.
 pub(super) fn load(
     path: &Path,
     name: &str,
@@ -59,21 +59,20 @@ pub(super) fn load(
     })
 }
 
-/// Statements that become a scene.
 struct Model {
     read: Statements,
     builder: SceneBuilder,
-    /// Materials of the libraries.
+    /// Number of library materials.
     known: u32,
-    /// Materials of faces without one: their numbers follow those of the libraries.
+    /// Materials of faces without one, numbered after those of the libraries.
     without: Vec<Material>,
     grey: Option<u32>,
     white: Option<u32>,
-    /// Triangles without a material, and the object of the first.
+    /// Number of triangles without a material, and the object of the first.
     drawn_grey: (usize, Option<String>),
-    /// Polygons that cross themselves, and the line of the first.
+    /// Number of self-intersecting polygons, and the line of the first.
     crossing: (usize, u32),
-    /// Colours beyond 0 to 1, or no numbers.
+    /// Number of colours outside 0 to 1 or not numeric.
     odd_colors: usize,
 }
 
@@ -92,7 +91,6 @@ impl Model {
         }
     }
 
-    /// Adds the triangles of all faces in the order of the file.
     fn push_faces(&mut self) -> Result<(), (u32, String)> {
         let faces = std::mem::take(&mut self.read.faces);
         let mut first = 0;
@@ -129,9 +127,10 @@ impl Model {
             Some(id) => id,
             None => {
                 let next = self.known + self.without.len() as u32;
-                let (id, albedo) = match colors.is_empty() {
-                    true => (&mut self.grey, DEFAULT_ALBEDO),
-                    false => (&mut self.white, 1.0),
+                let (id, albedo) = if colors.is_empty() {
+                    (&mut self.grey, DEFAULT_ALBEDO)
+                } else {
+                    (&mut self.white, 1.0)
                 };
                 *id.get_or_insert_with(|| {
                     let default = Material::diffuse("default", Vec3::splat(albedo));
@@ -149,7 +148,7 @@ impl Model {
             let uv = c.uv().map(|i| self.read.uvs[i]);
             uv.map_or(Vec2::ZERO, |uv| Vec2::new(uv.x, 1.0 - uv.y))
         };
-        // A corner without a normal has that of the triangle.
+        // A corner without a normal uses the triangle's.
         let normal = |c: &Corner| c.normal().map_or(Vec3::ZERO, |i| self.read.normals[i]);
         let has_normals = corners.iter().any(|c| c.normal().is_some());
         let builder = &mut self.builder;
@@ -166,7 +165,7 @@ impl Model {
         }
     }
 
-    /// What is drawn otherwise than the file says.
+    /// Warns about everything drawn differently from the file.
     fn tell(&mut self) {
         let warnings = &mut self.builder.report.warnings;
         let (count, line) = self.crossing;

@@ -1,4 +1,4 @@
-//! The statements of OBJ files, line by line.
+//! Parser for the statements of OBJ files.
 
 use super::mtl::Library;
 use glam::{Vec2, Vec3};
@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::str::SplitWhitespace;
 
-/// In place of an index: the corner has none.
+/// Marks a missing index of a corner.
 const NONE: u32 = u32::MAX;
 
-/// A corner of a face: indices from 0 of its vertex, texture coordinates and normal.
+/// A corner of a face: zero-based indices of vertex, texture coordinates and normal.
 #[derive(Clone, Copy)]
 pub(super) struct Corner([u32; 3]);
 
@@ -27,53 +27,52 @@ impl Corner {
     }
 }
 
-/// A face of three corners or more, which follow those of the face before.
+/// A face of three or more corners, which follow those of the previous face.
 pub(super) struct Face {
     pub corners: u32,
-    /// Of the file, from 1.
+    /// Line in the file, from 1.
     pub line: u32,
-    /// Place in [`Statements::materials`].
+    /// Index into [`Statements::materials`].
     pub material: u32,
-    /// Place in [`Statements::objects`].
+    /// Index into [`Statements::objects`].
     pub object: u32,
 }
 
-/// A file as it is, and what deserves a line.
+/// The content of a file, with warnings.
 pub(super) struct Statements {
     pub positions: Vec<Vec3>,
     /// Empty, or as long as `positions` up to the last vertex with a colour.
     pub colors: Vec<Option<Vec3>>,
-    /// With v upwards.
+    /// With v pointing up.
     pub uvs: Vec<Vec2>,
     pub normals: Vec<Vec3>,
     pub corners: Vec<Corner>,
     pub faces: Vec<Face>,
-    /// The material of each `usemtl`, behind that of faces before all of them; nothing where no library defines it.
+    /// The material before any `usemtl`, then of each `usemtl`; `None` if undefined.
     pub materials: Vec<Option<u32>>,
     /// Names of objects and groups.
     pub objects: Vec<String>,
     pub warnings: Vec<String>,
 }
 
-/// What reading takes note of.
 #[derive(Default)]
 struct Reader {
     numbers: HashMap<String, u32>,
-    /// Names of `usemtl` that no library before has defined.
+    /// Names of `usemtl` that no library has defined so far.
     pending: Vec<(usize, String)>,
-    /// Faces with fewer than three corners, and the line of the first.
+    /// Number of faces with fewer than three corners, and the line of the first.
     short: (usize, u32),
-    /// A smoothing group is on.
+    /// True while a smoothing group is on.
     is_smooth: bool,
-    /// Statements that are not read, with the line of the first of each.
+    /// Unread statements, with the line of the first of each.
     unread: BTreeMap<String, u32>,
 }
 
 impl Statements {
-    /// Reads a text; libraries are loaded as they come up.
+    /// Parses a text and loads libraries as they are named.
     ///
     /// # Errors
-    /// The line of the first broken statement, and what is wrong with it.
+    /// The line of the first malformed statement, and the problem.
     pub(crate) fn read(text: &str, library: &Library) -> Result<Self, (u32, String)> {
         let mut found = Self {
             positions: Vec::new(),
@@ -89,7 +88,7 @@ impl Statements {
         let mut reader = Reader::default();
         for (line, content) in (1..).zip(text.lines()) {
             let statement = content.trim();
-            // Names may have a `#` in them; see those who take `rest`.
+            // Names may contain `#`; their readers use `rest`.
             let mut words = without_comment(statement).split_whitespace();
             let Some(keyword) = words.next() else {
                 continue;
@@ -153,7 +152,7 @@ impl Statements {
         Ok(())
     }
 
-    /// Three coordinates, then perhaps a weight that divides them, or a colour and perhaps its alpha.
+    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha.
     fn vertex(
         &mut self,
         reader: &mut Reader,
@@ -219,10 +218,10 @@ impl Statements {
         Ok(())
     }
 
-    /// Whether these corners have what they refer to.
+    /// Checks that everything these corners refer to exists.
     ///
     /// # Errors
-    /// What is missing.
+    /// The missing item.
     pub(crate) fn check(&self, corners: Range<usize>) -> Result<(), String> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         for Corner(indices) in &self.corners[corners] {
@@ -267,20 +266,19 @@ impl Statements {
 }
 
 impl Reader {
-    /// The material of this name, behind which a comment may stand.
+    /// The material of this name; a comment may follow.
     fn material(&self, name: &str) -> Option<u32> {
         let known = |name: &str| self.numbers.get(name).copied();
         known(name).or_else(|| known(without_comment(name).trim()))
     }
 }
 
-/// Kinds of statements that are taken note of: a file that is none has any number.
+/// Limit on the kinds of unread statements recorded: a file in another format has any number.
 const MOST_UNREAD: usize = 64;
 
-/// What the indices of a corner are of.
 const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// One line for all that a file says and that is not read; nothing if there is none of it.
+/// One warning for everything in a file that is not read; `None` if there is nothing.
 pub(super) fn unread_warning(what: impl Iterator<Item = String>) -> Option<String> {
     const SHOWN: usize = 12;
     let what: Vec<String> = what.collect();
@@ -294,7 +292,7 @@ pub(super) fn without_comment(line: &str) -> &str {
     line.split('#').next().unwrap_or_default()
 }
 
-/// The numbers of a statement that needs so many of them, 0 for those that are not there. More than `N` are passed over.
+/// Parses at least `least` numbers; missing ones are 0, and those beyond `N` ignored.
 fn numbers<const N: usize>(
     keyword: &str,
     words: SplitWhitespace<'_>,
@@ -306,25 +304,27 @@ fn numbers<const N: usize>(
         *place = number(word).ok_or_else(|| format!("`{word}` is not a number"))?;
         count += 1;
     }
-    match count >= least {
-        true => Ok(found),
-        false => Err(format!("`{keyword}` with {count} numbers")),
+    if count >= least {
+        Ok(found)
+    } else {
+        Err(format!("`{keyword}` with {count} numbers"))
     }
 }
 
-/// A number as C, C++ and Fortran write it: NaN may be `-1.#IND` and `nan(ind)`, an exponent `1.0D+00`.
+/// Parses numbers of C, C++ and Fortran: NaN as `-1.#IND` or `nan(ind)`, exponents as `1.0D+00`.
 pub(super) fn number(word: &str) -> Option<f32> {
     word.parse().ok().or_else(|| {
         let word = word.to_ascii_lowercase();
         let begins_as_none = ["nan", "+nan", "-nan"].iter().any(|w| word.starts_with(w));
-        match begins_as_none || word.contains(".#ind") || word.contains(".#qnan") {
-            true => Some(f32::NAN),
-            false => word.replace('d', "e").parse().ok(),
+        if begins_as_none || word.contains(".#ind") || word.contains(".#qnan") {
+            Some(f32::NAN)
+        } else {
+            word.replace('d', "e").parse().ok()
         }
     })
 }
 
-/// A corner `v`, `v/vt`, `v//vn` or `v/vt/vn` where there are so many of each before.
+/// Parses a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, given the number of each so far.
 fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
     let none = || format!("`{word}` is not a face corner");
     let mut corner = [NONE; 3];
@@ -353,8 +353,8 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
     }
 }
 
-/// A file that ends within a statement lacks the end of its last line. A number that lacks its last
-/// digits is a number, so that is all there is to see.
+/// Detects a file that ends within a statement by its missing final line break. A number without
+/// its last digits is still a number, so there is no other sign.
 fn cut_off(text: &str) -> Option<String> {
     let last = text.lines().next_back().filter(|_| !text.ends_with('\n'))?;
     let keyword = last.split_ascii_whitespace().next()?;

@@ -1,5 +1,4 @@
-//! Stanford PLY by `ply-rs-bw`, ASCII and binary, read element by element: faces go straight into
-//! the scene's arrays.
+//! Stanford PLY with `ply-rs-bw`, ASCII and binary: faces go straight into the scene's arrays.
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
 use super::colors::linear;
@@ -17,11 +16,11 @@ use raystone_core::text::plain_text_or_latin1;
 use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
 
-/// Loads a PLY model. Polygons become triangles; there are no materials: every surface is grey, or has the colours of its vertices,
-/// which are those of a screen (sRGB) whatever their type, as MeshLab, Blender and three.js have them.
+/// Loads a PLY model. Polygons become triangles. There are no materials: surfaces are grey or have
+/// vertex colours, which are sRGB whatever their type, as in MeshLab, Blender and three.js.
 ///
 /// # Errors
-/// [`SceneError`] naming the element that could not be read.
+/// [`SceneError`] naming the unreadable element.
 pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     let (file, bytes) = open(path)?;
     guarded(path, || {
@@ -36,7 +35,7 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     })
 }
 
-/// The triangles, and whether vertices have colours.
+/// Reads the triangles; the flag is true if vertices have colours.
 fn read(
     path: &Path,
     bytes: u64,
@@ -93,14 +92,14 @@ fn read(
     Ok((builder, is_colored))
 }
 
-/// What of faces and vertices deserves a line.
+/// Counts of odd faces and vertices, for warnings.
 #[derive(Default)]
 struct Odd {
     /// Faces with fewer than three corners.
     flat: usize,
-    /// Polygons that cross themselves, and the first of them.
+    /// Self-intersecting polygons, and the first of them.
     crossing: (usize, usize),
-    /// Vertices whose colour is beyond 0 to 1.
+    /// Vertices with a colour outside 0 to 1.
     colors: usize,
 }
 
@@ -134,7 +133,7 @@ impl Odd {
     }
 }
 
-/// Adds the triangles of a polygon; whether it crosses itself.
+/// Adds a polygon's triangles. Returns true if it intersects itself.
 fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) -> bool {
     let places: Vec<Vec3> = corners.iter().map(|c| c.position).collect();
     let light = |k: usize| {
@@ -153,14 +152,13 @@ fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) 
     })
 }
 
-/// Names of the components of a colour.
 const COLORS: [[&str; 3]; 3] = [
     ["red", "green", "blue"],
     ["r", "g", "b"],
     ["diffuse_red", "diffuse_green", "diffuse_blue"],
 ];
 
-/// Whether vertices have a colour that can be read.
+/// True if vertices have a colour that can be read.
 fn has_colors(vertex: &ElementDef) -> bool {
     let is_read = |name: &&str| {
         let property = vertex.properties.get(*name);
@@ -173,7 +171,7 @@ fn has_colors(vertex: &ElementDef) -> bool {
     COLORS.iter().any(|names| names.iter().all(&is_read))
 }
 
-/// What an element says that is not read.
+/// The properties of an element that are not read.
 fn unread(element: &ElementDef, is_colored: bool) -> Vec<String> {
     let name = element.name.as_str();
     if element.count == 0 {
@@ -195,7 +193,7 @@ fn unread(element: &ElementDef, is_colored: bool) -> Vec<String> {
     }
 }
 
-/// The header as plain text, in which lines may end in any way; what follows is left in the source.
+/// Reads the header with any kind of line ends; the rest stays in the source.
 fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
     let mut text = Vec::new();
     let mut line = Vec::new();
@@ -206,7 +204,7 @@ fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
             if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
                 return Err("it is UTF-16 text; save it as UTF-8".to_owned());
             }
-            // Behind a header whose lines end in \r alone, \n is the first byte of the data.
+            // After a header with \r line ends, \n is the first byte of the data.
             pairs = end != LineEnd::Return;
         }
         let plain = plain_text_or_latin1(std::mem::take(&mut line));
@@ -223,7 +221,6 @@ fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum LineEnd {
-    /// The file ends.
     None,
     /// `\r`.
     Return,
@@ -231,7 +228,7 @@ enum LineEnd {
     Other,
 }
 
-/// Appends a line without its end, which may be `\n`, `\r`, or with `pairs` both.
+/// Appends a line without its end: `\n`, `\r`, or with `pairs` also both.
 fn read_line(
     source: &mut impl BufRead,
     line: &mut Vec<u8>,
@@ -255,9 +252,10 @@ fn read_line(
         if is_pair {
             source.consume(1);
         }
-        return Ok(match is_return && !is_pair {
-            true => LineEnd::Return,
-            false => LineEnd::Other,
+        return Ok(if is_return && !is_pair {
+            LineEnd::Return
+        } else {
+            LineEnd::Other
         });
     }
 }
@@ -269,8 +267,7 @@ fn header_error(path: &Path, error: &ParseError) -> SceneError {
     SceneError::malformed(path, place, error.to_string().trim().to_owned())
 }
 
-/// Bytes that an element takes at least: a digit and a gap per property in text, and an empty list
-/// for every list.
+/// Minimum bytes of an element: a digit and a separator per property in text, empty lists.
 fn least_bytes(definition: &ElementDef, encoding: Encoding) -> u64 {
     let least = |property: &PropertyDef| match (encoding, &property.data_type) {
         (Encoding::Ascii, _) => 2,
@@ -284,8 +281,8 @@ fn least_bytes(definition: &ElementDef, encoding: Encoding) -> u64 {
     definition.properties.values().map(least).sum()
 }
 
-/// Refuses elements that cannot be in a file of `bytes` bytes, before memory is reserved for them,
-/// and elements that lack what is needed.
+/// Refuses elements that cannot fit into a file of `bytes` bytes, before memory is reserved, and
+/// elements that lack required properties.
 fn check_element(
     path: &Path,
     definition: &ElementDef,
@@ -315,7 +312,6 @@ fn check_element(
     ))
 }
 
-/// The part after the header.
 struct Body<'a, S> {
     path: &'a Path,
     encoding: Encoding,
@@ -324,7 +320,7 @@ struct Body<'a, S> {
 }
 
 impl<S: BufRead> Body<'_, S> {
-    /// Reads all elements of one kind, handing each on with its index.
+    /// Reads all elements of one kind and passes each on with its index.
     fn each<E: PropertyAccess>(
         &mut self,
         definition: &ElementDef,
@@ -374,7 +370,7 @@ impl<S: BufRead> Body<'_, S> {
 #[derive(Clone, Copy)]
 struct Vertex {
     position: Vec3,
-    /// As shown on a screen, 0 to 1.
+    /// sRGB, 0 to 1.
     color: Vec3,
 }
 
@@ -410,7 +406,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// A component of a colour, 0 to 1.
+/// A colour component, 0 to 1.
 fn shade(value: &Property) -> Option<f32> {
     Some(match value {
         Property::UChar(x) => f32::from(*x) / f32::from(u8::MAX),
@@ -421,10 +417,10 @@ fn shade(value: &Property) -> Option<f32> {
     })
 }
 
-/// Both names of the list of corners are in use.
+/// Both names of the corner list are in use.
 const FACE_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// The corner list, in the type of the file.
+/// The corner list, in the file's type.
 struct Face(Option<Property>);
 
 impl PropertyAccess for Face {
@@ -464,7 +460,7 @@ impl Face {
     }
 }
 
-/// An element nobody needs.
+/// An ignored element.
 struct Skipped;
 
 impl PropertyAccess for Skipped {

@@ -1,16 +1,16 @@
-//! Polygons of files as triangles.
+//! Triangulation of polygons.
 
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::TAU;
 
-/// Triangles that lie the wrong way round by less than this part of the largest are flat but for rounding.
+/// Reversed triangles smaller than this fraction of the largest count as flat (rounding).
 const FLAT: f64 = 1e-6;
 /// Rounding of a sum of angles, radians.
 const ANGLE: f64 = 1e-6;
 
-/// Hands on the triangles of a polygon by the numbers of its corners, in the sense in which these turn: the fan around the first
-/// corner where that covers the polygon, as it does for every convex one, and ears where it does not. Whether the polygon crosses
-/// itself: then it is drawn as the fan, since nobody knows what is inside.
+/// Triangulates a polygon, keeping its orientation, and passes on corner indices: the fan around
+/// the first corner if that covers the polygon, as for every convex one, otherwise ears. Returns
+/// true if the polygon intersects itself; it is then drawn as the fan, as its inside is undefined.
 pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])) -> bool {
     let fan = (2..corners.len()).map(|k| [0, k - 1, k]);
     if corners.len() <= 3 || !corners.iter().all(|c| c.is_finite()) {
@@ -32,15 +32,16 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
     let flat: Vec<DVec2> = corners.iter().map(|c| flat(c.as_dvec3())).collect();
     let crosses = crosses(&flat);
     let ears = if crosses { Vec::new() } else { ears(&flat) };
-    match ears.is_empty() {
-        true => fan.for_each(&mut triangle),
-        false => ears.into_iter().for_each(&mut triangle),
+    if ears.is_empty() {
+        fan.for_each(&mut triangle)
+    } else {
+        ears.into_iter().for_each(&mut triangle)
     }
     crosses
 }
 
-/// The unit normal of the side from which the corners turn counter-clockwise (M. Newell), that of the largest triangle of the fan
-/// where both sides weigh the same; nothing if all triangles are flat.
+/// Unit normal of the side from which the corners turn counter-clockwise (M. Newell). If both sides
+/// weigh the same, that of the fan's largest triangle; `None` if all triangles are flat.
 fn normal(corners: &[Vec3]) -> Option<DVec3> {
     let (sum, largest) =
         fan_areas(corners).fold((DVec3::ZERO, DVec3::ZERO), |(sum, largest), area| {
@@ -52,19 +53,19 @@ fn normal(corners: &[Vec3]) -> Option<DVec3> {
     normal.try_normalize()
 }
 
-/// The two sides from the first corner of each triangle of the fan.
+/// The two edges from the first corner of each fan triangle.
 fn fan_sides(corners: &[Vec3]) -> impl Iterator<Item = [DVec3; 2]> + '_ {
     let first = corners[0].as_dvec3();
     let pairs = corners[1..].windows(2);
     pairs.map(move |pair| [pair[0], pair[1]].map(|c| c.as_dvec3() - first))
 }
 
-/// Twice the areas of these triangles, as vectors.
+/// Twice the area vector of each fan triangle.
 fn fan_areas(corners: &[Vec3]) -> impl Iterator<Item = DVec3> + '_ {
     fan_sides(corners).map(|[a, b]| a.cross(b))
 }
 
-/// Whether no triangle of the fan lies the wrong way round, and all are sectors of one turn: then they do not overlap.
+/// True if no fan triangle is reversed and all are sectors of one turn, so they do not overlap.
 fn fan_covers(corners: &[Vec3], normal: DVec3) -> bool {
     let areas = || fan_areas(corners).map(|area| area.dot(normal));
     let largest = areas().fold(0.0, f64::max);
@@ -75,7 +76,7 @@ fn fan_covers(corners: &[Vec3], normal: DVec3) -> bool {
     fan_sides(corners).map(angle).sum::<f64>() < TAU - ANGLE
 }
 
-/// Whether two sides cross, as opposed to touch or lie in each other, which is how polygons are given holes.
+/// True if two sides cross, as opposed to touching or overlapping, which polygons with holes use.
 fn crosses(corners: &[DVec2]) -> bool {
     let count = corners.len();
     let side = |k: usize| [corners[k], corners[(k + 1) % count]];
@@ -85,7 +86,7 @@ fn crosses(corners: &[DVec2]) -> bool {
     order.sort_by(|a, b| low(*a).total_cmp(&low(*b)));
     let turn = |[a, b]: [DVec2; 2], c: DVec2| {
         let area = (b - a).perp_dot(c - a);
-        // What is not clear of the line touches it.
+        // Points not clear of the line touch it.
         let scale = (b - a).length() * (c - a).length().max((c - b).length());
         if area.abs() <= FLAT * scale {
             0.0
@@ -104,7 +105,7 @@ fn crosses(corners: &[DVec2]) -> bool {
     })
 }
 
-/// The triangles of a simple polygon whose corners turn counter-clockwise, in the same sense; none if it has no area.
+/// Ear-clips a simple counter-clockwise polygon, keeping its orientation; empty if it has no area.
 fn ears(corners: &[DVec2]) -> Vec<[usize; 3]> {
     let mut indices: Vec<u32> = Vec::new();
     let plain: Vec<[f64; 2]> = corners.iter().map(|c| c.to_array()).collect();
@@ -121,7 +122,7 @@ fn ears(corners: &[DVec2]) -> Vec<[usize; 3]> {
 mod tests {
     use super::*;
 
-    /// The triangles of a polygon in the plane z = x / 2, and whether it crosses itself.
+    /// Triangulates a polygon in the plane z = x / 2; also whether it intersects itself.
     fn cut(corners: &[[f32; 2]]) -> (Vec<[usize; 3]>, bool) {
         let corners: Vec<Vec3> = corners.iter().map(|[x, y]| slanted(*x, *y)).collect();
         let mut found = Vec::new();
@@ -133,7 +134,7 @@ mod tests {
         Vec3::new(x, y, 0.5 * x)
     }
 
-    /// How many of the triangles hold a point of the plane, by the sense in which their corners turn.
+    /// Signed number of triangles that contain a point of the plane.
     fn covered(corners: &[[f32; 2]], triangles: &[[usize; 3]], [x, y]: [f32; 2]) -> i32 {
         let inside = |t: &[usize; 3]| {
             let [a, b, c] = t.map(|k| corners[k]);
@@ -146,7 +147,7 @@ mod tests {
         triangles.iter().map(inside).sum()
     }
 
-    /// Even-odd, for simple polygons.
+    /// Even-odd rule, for simple polygons.
     fn is_inside(corners: &[[f32; 2]], [x, y]: [f32; 2]) -> bool {
         let sides = (0..corners.len()).map(|k| (corners[k], corners[(k + 1) % corners.len()]));
         let crossed = sides.filter(|([ax, ay], [bx, by])| {

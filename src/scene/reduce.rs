@@ -1,20 +1,19 @@
-//! Images made smaller by means over areas, of what texels stand for: linear light, numbers, directions; never of encoded
-//! colours.
+//! Downscales images by area averages of what texels represent: linear light, numbers or
+//! directions, never encoded colours.
 
 use glam::Vec4;
 
-/// What the texels of an image stand for.
+/// Meaning of an image's texels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Texels {
-    /// Colours in sRGB (IEC 61966-2-1) and an alpha, which they are weighted by.
+    /// sRGB colours (IEC 61966-2-1) weighted by alpha.
     Colours,
-    /// Directions: 2c − 1, of length 1.
+    /// Directions 2c − 1 of length 1.
     Normals,
-    /// Numbers as they are.
     Numbers,
 }
 
-/// What of one row or column lies in a new one: places and weights, which add up to 1.
+/// The old rows or columns that overlap each new one: indices and weights, which add up to 1.
 fn shares(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
     let scale = f64::from(from) / f64::from(to);
     let of = |at: u32| {
@@ -29,7 +28,7 @@ fn shares(from: u32, to: u32) -> Vec<Vec<(usize, f32)>> {
     (0..to).map(of).collect()
 }
 
-/// Means over the areas of the texels of a smaller image, row by row; each row of the old one counts by `weight`.
+/// Area averages for the texels of a smaller image, row by row; old rows are scaled by `weight`.
 pub(super) fn area_means(
     [width, height]: [u32; 2],
     [columns, rows]: [u32; 2],
@@ -58,7 +57,6 @@ pub(super) fn area_means(
     means
 }
 
-/// A smaller image of 8 bits.
 pub(super) fn reduced(
     texels: &[[u8; 4]],
     from: [u32; 2],
@@ -98,7 +96,7 @@ pub(super) fn reduced(
                 Vec4::new(r, g, b, 0.0)
             };
             let means = area_means(from, to, light, even);
-            // Where nothing is there, colours count alike.
+            // Where alpha is 0, colours have equal weight.
             let nothing = means.iter().any(|mean| mean.w == 0.0);
             let others = nothing.then(|| area_means(from, to, plain, even));
             let encoded = |(at, mean): (usize, Vec4)| {
@@ -115,16 +113,18 @@ pub(super) fn reduced(
 }
 
 fn decoded(c: f32) -> f32 {
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 
 fn encode(c: f32) -> f32 {
-    match c <= 0.003_130_8 {
-        true => c * 12.92,
-        false => 1.055 * c.powf(1.0 / 2.4) - 0.055,
+    if c <= 0.003_130_8 {
+        c * 12.92
+    } else {
+        1.055 * c.powf(1.0 / 2.4) - 0.055
     }
 }
 
@@ -162,7 +162,7 @@ mod tests {
                 assert!((light(r) - 0.5).abs() < 0.004, "{r}");
             }
         }
-        // Uneven: five texels to two are 2½ each, here 1½ of 2½ white along each axis.
+        // Five texels to two: each takes 2½, of which 1½ are white along each axis.
         let stripes: Vec<[u8; 4]> = (0..5).map(|k| [WHITE, BLACK][k % 2]).collect();
         let small = reduced(&stripes, [5, 1], [2, 1], Texels::Colours);
         assert!(small.iter().all(|t| (light(t[0]) - 0.6).abs() < 0.004));

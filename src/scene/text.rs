@@ -1,13 +1,12 @@
-//! Texts of the formats of Wavefront: a line goes on after a `\`.
+//! Line continuation (`\`) of the Wavefront formats.
 
 use raystone_core::text::plain_text_or_latin1;
 
-/// The plain text of a file. A line that ends in
-/// `\`, unless it is a comment, goes on in the next; empty lines in place of the joined ones keep the
-/// numbers of all others.
+/// The plain text of a file. A line that ends in `\`, unless it is a comment, continues on the
+/// next; empty lines replace the joined ones, to preserve line numbers.
 pub(super) fn normalised(bytes: Vec<u8>) -> String {
     let mut bytes = plain_text_or_latin1(bytes).into_bytes();
-    // Writing never overtakes reading: what is written is at most as long as what was read.
+    // Writing never overtakes reading, as the output is at most as long as the input.
     let (mut from, mut to, mut line, mut joined) = (0, 0, 0, 0);
     while from < bytes.len() {
         match bytes[from] {
@@ -31,7 +30,7 @@ pub(super) fn normalised(bytes: Vec<u8>) -> String {
         }
     }
     bytes.truncate(to);
-    // Whole letters were copied, and none was added but blanks and line ends.
+    // Only whole characters were copied, and only blanks and line ends added.
     String::from_utf8(bytes).unwrap_or_default()
 }
 

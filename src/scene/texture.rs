@@ -1,4 +1,4 @@
-//! Decoding of textures, all of a scene in parallel.
+//! Decodes all textures of a scene in parallel.
 
 use super::reduce::{Texels, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
@@ -8,35 +8,34 @@ use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::PathBuf;
 
-/// Where the encoded image lies.
+/// Source of the encoded image.
 pub(super) enum Encoded<'a> {
     /// A PNG or JPEG file.
     File(PathBuf),
-    /// The same, in memory.
+    /// A PNG or JPEG in memory.
     Memory(Cow<'a, [u8]>),
-    /// It could not be found; the text says why.
+    /// Not found, with the reason.
     Missing(String),
 }
 
-/// An image still to be decoded.
 pub(super) struct ImageSource<'a> {
     pub name: String,
     pub encoded: Encoded<'a>,
 }
 
-/// Bytes of what an adapter binds that are left to materials and lights.
+/// Part of the adapter's binding reserved for materials and lights, bytes.
 const OTHER_BYTES: u64 = 8 << 20;
-/// Words of texture coordinates and normals of a triangle.
+/// Words of a triangle's texture coordinates and normals.
 const TRIANGLE_WORDS: u64 = 9;
 
-/// Words that textures may have beside those of so many triangles, in tables of so many bytes.
+/// Words left for textures in tables of `table_bytes` bytes, next to `triangles` triangles.
 pub(super) fn texel_room(table_bytes: u64, triangles: usize) -> u64 {
     let words = table_bytes.saturating_sub(OTHER_BYTES) / 4;
     words.saturating_sub(TRIANGLE_WORDS * triangles as u64)
 }
 
-/// Decodes `sources` in parallel; images wider or higher than `max_size` are reduced, and all of them further until they fit into
-/// `room` words. What materials use an image for says what it is reduced as.
+/// Decodes `sources` in parallel. Images wider or higher than `max_size` are reduced, and all of
+/// them further until they fit into `room` words. Their use decides how.
 ///
 /// `materials` refer to `sources` on entry and to the returned list on exit. An image that cannot
 /// be decoded is a warning, and its materials keep their constant.
@@ -74,9 +73,10 @@ pub(super) fn decode_all(
             Err(problem) => {
                 let is_it = |used: TextureUse| used.texture as usize == new_index.len();
                 let mut masks = materials.iter().filter_map(|m| m.mask?.texture);
-                let uncut = match masks.any(is_it) {
-                    true => "; surfaces that it cuts out are whole",
-                    false => "",
+                let uncut = if masks.any(is_it) {
+                    "; surfaces that it cuts out are whole"
+                } else {
+                    ""
                 };
                 report.warnings.push(format!(
                     "texture {}: {problem}; drawn with the constant{uncut}",
@@ -95,7 +95,7 @@ pub(super) fn decode_all(
     textures
 }
 
-/// What the texels of each image stand for: colours where some material shows them, else normals, else numbers.
+/// Meaning of each image's texels: colours if some material shows them, else normals, else numbers.
 fn kinds(count: usize, materials: &[Material]) -> Vec<Texels> {
     let mut kinds = vec![Texels::Numbers; count];
     for (slot, kind) in [
@@ -113,14 +113,13 @@ fn kinds(count: usize, materials: &[Material]) -> Vec<Texels> {
 
 type Size = (u32, u32);
 
-/// Bytes of texels that one byte of an image can stand for: deflate shrinks at most 1032 times, and
-/// a texel of four bytes may take one.
+/// Largest ratio of texel bytes to file bytes: deflate expands at most 1032 times.
 const MOST_TEXEL_BYTES: u64 = 4 * 1032;
 
-/// Bytes of texels that are always allowed.
+/// Texel bytes that are always allowed.
 const FREE_TEXEL_BYTES: u64 = 1 << 20;
 
-/// The greatest size up to `max_size`, halved so often that all texels have room, one word each.
+/// The largest size up to `max_size`, halved until all texels fit, at one word each.
 fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
     let needed = |limit: u32| -> u64 {
         let one = |(width, height): &Size| {
@@ -136,8 +135,7 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
     limit
 }
 
-/// The size of an image; refuses one that announces more texels than its bytes can hold, before there is memory for
-/// them.
+/// The size of an image, refused before allocation if its bytes cannot hold so many texels.
 fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|e| e.to_string())?;
@@ -153,7 +151,6 @@ fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     Ok((width, height))
 }
 
-/// The bytes of an image and its size.
 fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String> {
     let bytes = match &source.encoded {
         Encoded::File(path) => Cow::Owned(
@@ -166,7 +163,7 @@ fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String
     Ok((bytes, size))
 }
 
-/// The texture, and its size in the file if that was larger.
+/// The texture, and its original size if it was reduced.
 fn decode(
     source: &ImageSource<'_>,
     bytes: &[u8],
@@ -179,17 +176,19 @@ fn decode(
     let texels = image.as_raw().as_chunks::<4>().0;
     let larger = size.0.max(size.1) > max_size;
     let scale = f64::from(max_size) / f64::from(size.0.max(size.1));
-    let to = match larger {
-        true => <[u32; 2]>::from(size).map(|n| ((f64::from(n) * scale).round() as u32).max(1)),
-        false => size.into(),
+    let to = if larger {
+        <[u32; 2]>::from(size).map(|n| ((f64::from(n) * scale).round() as u32).max(1))
+    } else {
+        size.into()
     };
     let texture = Texture {
         name: source.name.clone(),
         width: to[0],
         height: to[1],
-        texels: match larger {
-            true => reduced(texels, size.into(), to, kind),
-            false => texels.to_vec(),
+        texels: if larger {
+            reduced(texels, size.into(), to, kind)
+        } else {
+            texels.to_vec()
         },
     };
     Ok((texture, larger.then_some(size)))

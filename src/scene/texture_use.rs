@@ -2,35 +2,35 @@
 
 use glam::{Mat2, Vec2};
 
-/// What is beyond a texture's edge.
+/// Addressing beyond a texture's edge.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The texture again.
+    /// Repeats.
     #[default]
     Repeat,
-    /// The texture again, every other time mirrored.
+    /// Repeats, mirrored every other time.
     Mirrored,
-    /// The texels of the edge.
+    /// Clamps to the edge texels.
     Clamp,
 }
 
-/// A texture with its place on the surface. What it is used for says how it is encoded: colours are sRGB, all else is linear.
+/// A texture and its placement. Colours are sRGB, all else is linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureUse {
     /// Index into [`super::SceneData::textures`].
     pub texture: u32,
-    /// In u and v.
+    /// Addressing in u and v.
     pub wrap: [Wrap; 2],
-    /// What the coordinates of the mesh are multiplied by (`KHR_texture_transform`, MTL `-s`), …
+    /// Multiplies the mesh's coordinates (`KHR_texture_transform`, MTL `-s`).
     pub linear: Mat2,
-    /// … and what is added then (MTL `-o`).
+    /// Added after `linear` (MTL `-o`).
     pub offset: Vec2,
-    /// What x and y of a normal map's vectors are multiplied by.
+    /// Scale of x and y of a normal map's vectors.
     pub scale: f32,
 }
 
 impl TextureUse {
-    /// A texture that repeats at the coordinates of the mesh.
+    /// A repeating texture at the mesh's coordinates.
     pub fn plain(texture: u32) -> Self {
         Self {
             texture,
@@ -41,7 +41,7 @@ impl TextureUse {
         }
     }
 
-    /// Whether the texture repeats, and takes the coordinates of the mesh as they are.
+    /// True if the texture repeats and uses the mesh's coordinates unchanged.
     pub fn is_plain(&self) -> bool {
         let plain = Self::plain(self.texture);
         (self.wrap, self.linear, self.offset) == (plain.wrap, plain.linear, plain.offset)

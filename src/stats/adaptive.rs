@@ -1,20 +1,19 @@
-//! How many samples each tile of an image needs for an error that was asked for: in two stages (C. Stein, "A two-sample
-//! test for a linear hypothesis whose power is independent of the variance", 1945).
+//! Two-stage choice of the samples per tile for a requested error (C. Stein, "A two-sample test for
+//! a linear hypothesis whose power is independent of the variance", 1945).
 //!
-//! Whoever stops where an estimate looks good stops where it is too dark by chance, since an image that has missed its
-//! fireflies has little variance, too: adaptive images are biased by that. Here the replicates are two groups. The first samples of
-//! each group say how many the *other* group takes, tile by tile, and nothing is looked at again. What a group
-//! draws is independent of how many samples it takes, so that the mean of its images is the integral, exactly, and the mean of both
-//! groups, too.
+//! Stopping where an estimate looks good is biased: an image without its fireflies is too dark,
+//! with little variance. Here the replicates form two groups. The first samples of each group
+//! determine, once and per tile, how many the *other* group takes. A group's samples are
+//! independent of their number, so means of its images, or of both groups, are unbiased.
 
 use crate::comparison::LogFigure;
 use crate::metrics::RELATIVE_EPSILON;
 use raystone_image::Image;
 
-/// Fewest replicates of a group that say anything of their spread.
+/// Minimum number of replicates in a group to estimate their spread.
 pub const LEAST_GROUP: usize = 4;
 
-/// The tiles of an image: squares, cut off at the right and lower edge.
+/// Square tiles of an image, cropped at the right and lower edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tiles {
     /// Width and height of the image, pixels.
@@ -24,30 +23,30 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Columns and rows of tiles.
+    /// Number of columns and rows of tiles.
     pub fn counts(self) -> [u32; 2] {
         self.size.map(|pixels| pixels.div_ceil(self.edge))
     }
 
-    /// How many there are.
+    /// Number of tiles.
     pub fn len(self) -> usize {
         let [columns, rows] = self.counts();
         columns as usize * rows as usize
     }
 
-    /// Whether there is none.
+    /// True if there are no tiles.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
 
-    /// The number of the tile that holds a pixel, by the number of the pixel.
+    /// Index of the tile that contains a pixel index.
     pub fn of_pixel(self, pixel: usize) -> usize {
         let (width, edge) = (self.size[0] as usize, self.edge as usize);
         let [x, y] = [pixel % width, pixel / width].map(|at| at / edge);
         y * self.counts()[0] as usize + x
     }
 
-    /// Its pixels.
+    /// Pixel indices of a tile.
     pub fn pixels(self, tile: usize) -> Vec<usize> {
         let [width, height] = self.size.map(|edge| edge as usize);
         let (columns, edge) = (self.counts()[0] as usize, self.edge as usize);
@@ -58,10 +57,11 @@ impl Tiles {
     }
 }
 
-/// The relMSE of a tile of one replicate, from what the replicates differ by, without a reference: the mean over its pixels and
-/// channels of variance / (mean² + 0.01). A jackknife over the replicates says how well it is known. The noise of the mean below
-/// the fraction makes it too high, by 4 · variance / (n · mean²) to first order: on the safe side. `None` below [`LEAST_GROUP`]
-/// images, and where something is not finite.
+/// relMSE of a tile of one replicate, estimated without a reference from the differences between
+/// replicates: the mean over pixels and channels of variance / (mean² + 0.01). A jackknife over the
+/// replicates gives its uncertainty. Noise in the denominator biases it upwards, by 4 · variance /
+/// (n · mean²) to first order: on the safe side. `None` below [`LEAST_GROUP`] images, or if a value
+/// is not finite.
 pub fn tile_error(images: &[&Image], pixels: &[usize]) -> Option<LogFigure> {
     if images.len() < LEAST_GROUP {
         return None;
@@ -93,9 +93,9 @@ fn relative_variance(images: &[&Image], pixels: &[usize]) -> f64 {
     all.sum::<f64>() / (3 * pixels.len()).max(1) as f64
 }
 
-/// The samples that a tile needs: the fewest of `counts` (ascending) with which its relMSE is below `target` with this
-/// confidence, if it falls as one over the samples, from `error` at the first of them; the most where none is enough or nothing is
-/// known. Errors of good samplers fall faster, so that they then need fewer.
+/// Samples that a tile needs: the smallest of `counts` (ascending) for which its relMSE is below
+/// `target` with this confidence, assuming it falls as 1/samples from `error` at the first count.
+/// The largest if none suffices or nothing is known. Good samplers need fewer.
 pub fn samples_needed(
     error: Option<&LogFigure>,
     counts: &[u32],
@@ -106,7 +106,7 @@ pub fn samples_needed(
     let Some(((error, first), most)) = error.zip(first).zip(most) else {
         return most.copied().unwrap_or(0);
     };
-    // One side of the interval: twice its chance to miss is that of both.
+    // One side of the interval, so twice its error probability.
     let worst = error.upper(2.0 * (1.0 - confidence));
     let is_enough = |count: &&u32| worst * f64::from(*first) / f64::from(**count) <= target;
     counts.iter().find(is_enough).copied().unwrap_or(*most)
@@ -157,7 +157,7 @@ mod tests {
         let mut rng = Pcg32::new(3);
         let pixels: Vec<usize> = (0..64).collect();
         let (mut sum, mut too_low) = (0.0, 0);
-        // So little noise that the mean of the quotient is no more than 0.1 % too high.
+        // Low noise, so that the mean of the quotient is at most 0.1 % too high.
         let variance = 0.0025;
         let truth = variance / (1.0 + RELATIVE_EPSILON);
         for _ in 0..400 {

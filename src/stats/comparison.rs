@@ -1,15 +1,15 @@
-//! Comparisons of positive figures: by a test of their difference, which knows how well each is known, and not by
-//! whether their intervals overlap.
+//! Compares positive figures by a test of their difference, which accounts for the uncertainty of
+//! each, not by overlap of their intervals.
 
 use crate::hypothesis::holm;
 use crate::interval::ALPHA;
 pub use crate::log_figure::{Difference, LogFigure};
 
-/// Probability with which a comparison of several figures may name any difference that there is not.
+/// Probability of a false difference in a comparison of several figures.
 pub const LEVEL: f64 = ALPHA;
 
-/// All pairs of some figures, with p-values corrected for their number by Holm's method: the probability that any
-/// two equal figures are said to differ is at most [`LEVEL`].
+/// All pairs of some figures, with p-values corrected by Holm's method: the probability of calling
+/// any two equal figures different is at most [`LEVEL`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pairs {
     figures: usize,
@@ -32,19 +32,20 @@ impl Pairs {
         }
     }
 
-    /// How many comparisons were made.
+    /// Number of comparisons.
     pub fn count(&self) -> usize {
         self.corrected.len()
     }
 
-    /// Whether two different figures differ.
+    /// True if two figures differ.
     pub fn differ(&self, i: usize, j: usize) -> bool {
         let p = self.corrected.get(self.place(i, j));
         p.is_some_and(|p| *p <= LEVEL)
     }
 
-    /// The figure that is less than every other by what the pairs say, which need not be the least by itself: what was measured in
-    /// the same rounds is known better against each other. Where pairs go round in a circle, the one that is less most often.
+    /// The figure that is smaller than every other by the pairwise comparisons, not necessarily the
+    /// smallest by itself: figures measured in the same rounds are compared more precisely. If the
+    /// pairs are cyclic, the one that is smaller most often.
     pub fn least(&self) -> Option<usize> {
         let wins = |i: &usize| {
             let others = (0..self.figures).filter(|j| j != i);
@@ -53,7 +54,7 @@ impl Pairs {
         (0..self.figures).rev().max_by_key(wins)
     }
 
-    /// Logarithm of the ratio of a figure to another one.
+    /// Logarithm of the ratio of two figures.
     pub fn log_ratio(&self, i: usize, j: usize) -> f64 {
         let sign = if i < j { 1.0 } else { -1.0 };
         sign * self.log_ratios[self.place(i, j)]
@@ -65,20 +66,20 @@ impl Pairs {
     }
 }
 
-/// Where a point lies that has two figures, of which less is better.
+/// Position of a point with two figures, of which less is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// On the Pareto front: against every other point, it is better in one of the figures.
+    /// On the Pareto front: better in one of the figures than every other point.
     Front,
-    /// The noise leaves that open.
+    /// Undecided due to noise.
     Open,
-    /// Beaten: another point is better in one figure, and better or equal in the other.
+    /// Dominated: another point is better in one figure, and better or equal in the other.
     Beaten,
 }
 
-/// The place of each point. What is said of one point is wrong with probability at most [`LEVEL`]: that it is on the
-/// front needs a test against every other point, each of which has to hold, so that they need no
-/// correction for their number (Berger 1982); that it is beaten needs one of them, with Bonferroni's correction.
+/// The place of each point. Each statement is wrong with probability at most [`LEVEL`]: being on
+/// the front requires tests against all other points to hold, which needs no correction (Berger
+/// 1982); being beaten requires one, with Bonferroni's correction.
 pub fn places(points: &[[LogFigure; 2]]) -> Vec<Place> {
     let others = points.len().saturating_sub(1).max(1) as f64;
     let place = |i: usize| {
@@ -120,7 +121,7 @@ fn chance_that_less(a: &LogFigure, b: &LogFigure) -> f64 {
     }
 }
 
-/// Whether two figures are one: images are equal across structures, and so are their errors.
+/// True if two figures are identical: images, and so their errors, are equal across structures.
 fn is_same(a: &LogFigure, b: &LogFigure) -> bool {
     a == b
 }

@@ -1,43 +1,41 @@
-//! ꟻLIP, the difference of two pictures that an observer sees who alternates between them.
+//! ꟻLIP, the perceived difference between two alternating pictures.
 //!
-//! Source: P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. D. Fairchild, "ꟻLIP: A
-//! Difference Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020; with the
-//! constants and matrices of the authors' program. Equations are those of the paper. There is a crate, which
-//! binds the C++ code and knows bytes only.
+//! Source: P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. D. Fairchild,
+//! "ꟻLIP: A Difference Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech.
+//! 3(2), 2020; with the constants and matrices of the authors' program. Equation numbers refer to
+//! the paper. The existing crate binds the C++ code and supports bytes only.
 
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Pixels per degree of the observer: a display 0.7 m wide with 3840 pixels, 0.7 m away.
 const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
-/// Exponent of colour differences, and where the compressed part of their scale ends (section 4.1.3).
+/// Exponent of colour differences, and end of the compressed part of their scale (section 4.1.3).
 const COLOUR_EXPONENT: f64 = 0.7;
 const KNEE_AT: f64 = 0.4;
 const KNEE_TO: f64 = 0.95;
-/// Width of what counts as an edge or a point, degrees, and the exponent of their differences (section 4.2).
+/// Width of an edge or point, degrees, and the exponent of their differences (section 4.2).
 const FEATURE_WIDTH: f64 = 0.082;
 const FEATURE_EXPONENT: f64 = 0.5;
-/// Gaussians of the contrast sensitivity in luminance, red–green and blue–yellow: pairs of a weight a and a
-/// width b of a √(π / b) exp(−π² x² / b) (table 1).
+/// Gaussians of contrast sensitivity in luminance, red–green and blue–yellow: pairs of a weight a
+/// and a width b of a √(π / b) exp(−π² x² / b) (table 1).
 const SENSITIVITY: [&[[f64; 2]]; 3] = [
     &[[1.0, 0.0047]],
     &[[1.0, 0.0053]],
     &[[34.1, 0.04], [13.5, 0.025]],
 ];
-/// XYZ of white, which scales to 1.
+/// XYZ of white, mapped to 1.
 const WHITE: [f64; 3] = [0.950428545, 1.0, 1.088900371];
 
-/// One number a pixel, row by row.
 struct Plane {
     width: usize,
     values: Vec<f64>,
 }
 
-/// What is compared of a picture.
+/// The compared features of a picture.
 pub struct Seen {
-    /// Hunt-adjusted L*a*b* after the contrast sensitivity.
+    /// Hunt-adjusted L*a*b* after contrast sensitivity.
     colours: Vec<[f64; 3]>,
-    /// Strength of edges and of points.
     features: Vec<[f64; 2]>,
 }
 
@@ -46,13 +44,14 @@ fn times(matrix: [[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
 }
 
 fn decode_srgb(v: f64) -> f64 {
-    match v <= 0.04045 {
-        true => v / 12.92,
-        false => ((v + 0.055) / 1.055).powf(2.4),
+    if v <= 0.04045 {
+        v / 12.92
+    } else {
+        ((v + 0.055) / 1.055).powf(2.4)
     }
 }
 
-/// Linear sRGB over white in XYZ.
+/// Linear sRGB to XYZ relative to white.
 fn to_xyz(linear: [f64; 3]) -> [f64; 3] {
     const D: f64 = 73_733_382.0;
     let xyz = times(
@@ -88,12 +87,15 @@ fn from_opponents([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     from_xyz([y + cx / 500.0, y, y - cz / 200.0])
 }
 
-/// L*a*b* with its colours weakened in the dark (Hunt's effect, equation 7).
+/// L*a*b* with colours attenuated in the dark (Hunt effect, equation 7).
 fn hunt_adjusted(linear: [f64; 3]) -> [f64; 3] {
     const DELTA: f64 = 6.0 / 29.0;
-    let curve = |t: f64| match t > DELTA.powi(3) {
-        true => t.cbrt(),
-        false => t / (3.0 * DELTA * DELTA) + 4.0 / 29.0,
+    let curve = |t: f64| {
+        if t > DELTA.powi(3) {
+            t.cbrt()
+        } else {
+            t / (3.0 * DELTA * DELTA) + 4.0 / 29.0
+        }
     };
     let [x, y, z] = to_xyz(linear).map(curve);
     let lightness = 116.0 * y - 16.0;
@@ -101,13 +103,13 @@ fn hunt_adjusted(linear: [f64; 3]) -> [f64; 3] {
     [lightness, 0.01 * lightness * a, 0.01 * lightness * b]
 }
 
-/// City-block distance in lightness plus the Euclidean one in colour (equation 6).
+/// City-block distance in lightness plus Euclidean distance in colour (equation 6).
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
 
 impl Plane {
-    /// Convolution with `across` in x and `down` in y, both of odd lengths; pixels at borders go on outside.
+    /// Separable convolution, `across` in x and `down` in y, of odd lengths; repeats border pixels.
     fn filtered(&self, across: &[f64], down: &[f64]) -> Self {
         let (width, height) = (self.width, self.values.len() / self.width);
         let clamped = |at: usize, k: usize, taps: usize, size: usize| {
@@ -133,13 +135,13 @@ impl Plane {
     }
 }
 
-/// A function at whole distances up to `radius`.
+/// A function at integer distances up to `radius`.
 fn taps(radius: f64, function: impl Fn(f64) -> f64) -> Vec<f64> {
     let radius = radius as i32;
     (-radius..=radius).map(|x| function(f64::from(x))).collect()
 }
 
-/// One channel of the picture as the contrast sensitivity of the eye leaves it (equation 4).
+/// One channel filtered by the eye's contrast sensitivity (equation 4).
 fn sensed(plane: &Plane, gaussians: &[[f64; 2]]) -> Plane {
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil();
     let shape = |b: f64| {
@@ -147,7 +149,7 @@ fn sensed(plane: &Plane, gaussians: &[[f64; 2]]) -> Plane {
             (-(PI * x / PIXELS_PER_DEGREE).powi(2) / b).exp()
         })
     };
-    // Each Gaussian is a product of one in x and one in y; together they have the sum 1.
+    // Each Gaussian is separable; together they sum to 1.
     let weight = |[a, b]: [f64; 2]| a * (PI / b).sqrt();
     let total: f64 = gaussians
         .iter()
@@ -168,8 +170,8 @@ fn sensed(plane: &Plane, gaussians: &[[f64; 2]]) -> Plane {
     }
 }
 
-/// Strength of edges and points in luminance from 0 to 1: lengths of the first and of the second derivative
-/// (equations 11 and 12).
+/// Strength of edges and points in luminance from 0 to 1: magnitudes of the first and second
+/// derivatives (equations 11 and 12).
 fn features(luminance: &Plane) -> Vec<[f64; 2]> {
     let deviation = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil();
@@ -179,7 +181,7 @@ fn features(luminance: &Plane) -> Vec<[f64; 2]> {
     smooth.iter_mut().for_each(|w| *w /= sum);
     let strengths = |weight: &dyn Fn(f64) -> f64| -> Vec<f64> {
         let mut taps = taps(radius, |x| weight(x) * gaussian(x));
-        // Positive weights have the sum 1, negative ones −1.
+        // Positive weights sum to 1, negative ones to −1.
         let of_sign = |sign: f64| taps.iter().map(|w| (sign * w).max(0.0)).sum::<f64>();
         let [positive, negative] = [of_sign(1.0), of_sign(-1.0)];
         for w in &mut taps {
@@ -198,7 +200,7 @@ impl Seen {
     /// Analyses a picture of sRGB values in [0, 1], row by row.
     ///
     /// # Panics
-    /// If the pixels are no rectangle of that width.
+    /// If the number of pixels is not a multiple of the width.
     pub fn new(srgb: &[[f64; 3]], width: usize) -> Self {
         assert!(width > 0 && srgb.len().is_multiple_of(width));
         let opponents: Vec<[f64; 3]> = srgb
@@ -220,7 +222,7 @@ impl Seen {
         }
     }
 
-    /// The difference of every pixel, 0 to 1.
+    /// Difference of every pixel, 0 to 1.
     ///
     /// # Panics
     /// If the pictures differ in size.
@@ -231,9 +233,10 @@ impl Seen {
         let knee = KNEE_AT * most;
         let pixel = |i: usize| {
             let error = distance(self.colours[i], other.colours[i]).powf(COLOUR_EXPONENT);
-            let of_colour = match error < knee {
-                true => error * KNEE_TO / knee,
-                false => KNEE_TO + (error - knee) / (most - knee) * (1.0 - KNEE_TO),
+            let of_colour = if error < knee {
+                error * KNEE_TO / knee
+            } else {
+                KNEE_TO + (error - knee) / (most - knee) * (1.0 - KNEE_TO)
             };
             let [edges, points] =
                 [0, 1].map(|k| (self.features[i][k] - other.features[i][k]).abs());
@@ -265,8 +268,8 @@ mod tests {
         values.iter().sum::<f64>() / values.len() as f64
     }
 
-    /// Numbers of the PyPI package `flip-evaluator` 1.7, which is the authors' program in single precision: its
-    /// features of a flat picture are not quite 0, and their root raises the difference by 2·10⁻⁵.
+    /// Values of the PyPI package `flip-evaluator` 1.7, the authors' program in single precision:
+    /// features of a flat picture are not quite 0, which raises the difference by 2·10⁻⁵.
     #[test]
     fn known_pictures_differ_as_the_authors_program_says() {
         let black_and_white = difference(&flat([0.0; 3]), &flat([1.0; 3]));
@@ -287,7 +290,7 @@ mod tests {
             (20, 0.019_276_08),
         ] {
             let found = edges[16 * 32 + x];
-            // Pixel 16 is as far from either edge: the root of a rounded zero.
+            // Pixel 16 is equidistant from both edges: the root of a rounded zero.
             let tolerance = if x == 16 { 2e-4 } else { 5e-5 };
             assert!(
                 (found - expected).abs() < tolerance,

@@ -1,17 +1,18 @@
-//! How times grow with the number of elements: like n, or like n log n.
+//! Growth of times with the number of elements: n or n log n.
 //!
-//! Both models have two constants, t = a + b·n and t = a + b·n·log₂ n, fitted by least squares of relative residuals,
-//! since times span orders of magnitude. As many constants on both sides, the difference of Akaike's criteria with
-//! or without the correction for few points is m·ln(R₁/R₂), where R are the sums of squares over m sizes (Burnham and
-//! Anderson, "Model selection and multimodel inference", 2002, section 2.4). It is taken for each round of measurements by
-//! itself, so that its spread over rounds is known, and a model is named only where the whole interval speaks for it.
+//! Both models have two constants, t = a + b·n and t = a + b·n·log₂ n, fitted by least squares of
+//! relative residuals, since times span orders of magnitude. With equally many constants, the
+//! difference of Akaike's criteria, with or without the correction for few points, is m·ln(R₁/R₂),
+//! where R are the sums of squares over m sizes (Burnham and Anderson, "Model selection and
+//! multimodel inference", 2002, section 2.4). It is computed per round of measurements, so its
+//! spread is known, and a model is named only if the whole interval supports it.
 
 use crate::interval::Interval;
 use crate::statistics::{LEAST_FOR_MEDIAN, ROUNDING, median, median_interval};
 
-/// Fewer sizes do not tell two models of two constants apart.
+/// Minimum number of sizes to distinguish two models of two constants.
 pub(crate) const LEAST_SIZES: usize = 5;
-/// Criteria that differ by less support both models (Burnham and Anderson 2002, section 2.6).
+/// Criteria closer than this support both models (Burnham and Anderson 2002, section 2.6).
 const NO_DIFFERENCE: f64 = 2.0;
 
 /// A model of growth.
@@ -24,7 +25,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// As a text writes it.
+    /// Name for texts.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "n",
@@ -39,8 +40,8 @@ impl Model {
         }
     }
 
-    /// Root of the mean square of the relative residuals of its best fit to (n, t); `None` for fewer than
-    /// `LEAST_SIZES` points, and for such as are not positive.
+    /// Root mean square of the relative residuals of the best fit to (n, t); `None` for fewer than
+    /// `LEAST_SIZES` points or non-positive ones.
     pub fn residual(self, points: &[(f64, f64)]) -> Option<f64> {
         let usable = |p: &(f64, f64)| p.0 > 0.0 && p.1 > 0.0 && p.0.is_finite() && p.1.is_finite();
         if points.len() < LEAST_SIZES || !points.iter().all(usable) {
@@ -61,27 +62,27 @@ impl Model {
     }
 }
 
-/// Which model fits better.
+/// Comparison of the two models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Growth {
     /// Median over rounds of the relative residuals of t = a + b·n.
     pub linear: f64,
-    /// The same of t = a + b·n·log₂ n.
+    /// Median over rounds of the relative residuals of t = a + b·n·log₂ n.
     pub linearithmic: f64,
-    /// Criterion of n less that of n log n, positive where n log n fits better: median over rounds, with its interval.
+    /// Criterion of n minus that of n log n, positive if n log n fits better, over rounds.
     pub difference: Interval,
-    /// The model that the interval speaks for.
+    /// The model supported by the interval.
     pub better: Option<Model>,
 }
 
-/// Compares the models on so many rounds of times, each a curve of (n, t).
+/// Compares the models on several rounds of times, each a curve of (n, t).
 pub fn growth(rounds: &[Vec<(f64, f64)>]) -> Option<Growth> {
     let of = |model: Model| -> Option<Vec<f64>> {
         rounds.iter().map(|round| model.residual(round)).collect()
     };
     let (linear, linearithmic) = (of(Model::Linear)?, of(Model::Linearithmic)?);
     let difference = |((a, b), round): ((&f64, &f64), &Vec<(f64, f64)>)| {
-        // Residuals that are rounding are no better than others that are.
+        // Residuals at rounding level are equally good.
         2.0 * round.len() as f64 * (a.max(ROUNDING) / b.max(ROUNDING)).ln()
     };
     let pairs = linear.iter().zip(&linearithmic).zip(rounds);
@@ -105,7 +106,7 @@ mod tests {
     use super::*;
     use raystone_core::random::Pcg32;
 
-    /// Rounds of times at 2^14 … 2^22 elements, each off by up to `noise`.
+    /// Rounds of times at 2^14 … 2^22 elements, each perturbed by up to `noise`.
     fn rounds(count: usize, noise: f64, time: impl Fn(f64) -> f64) -> Vec<Vec<(f64, f64)>> {
         let mut random = Pcg32::new(3);
         let mut round = || {

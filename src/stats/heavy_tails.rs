@@ -1,9 +1,10 @@
-//! Whether the interval of a mean error can be trusted, or a single pixel decides over it that replicates seldom hit.
+//! Detects unreliable intervals of a mean error dominated by a pixel that replicates seldom hit.
 //!
-//! The relMSE of an image is a mean over pixels. Where a pixel holds a sliver of a lamp, one image in a hundred hits it, and that one
-//! has many times the error of the others. A few replicates then hold no such image: they agree with each other, and their
-//! interval lies below the truth. No formula that sees the replicates alone can tell. The reference can: with thousands of samples it has
-//! hit the sliver, and the variance of its parts says what error of each pixel is to be expected at fewer samples.
+//! The relMSE of an image is a mean over pixels. If a pixel contains a sliver of a lamp, one image
+//! in a hundred hits it, with many times the error of the others. A few replicates then contain no
+//! such image: they agree, and their interval lies below the truth. The replicates alone cannot
+//! reveal this. The reference can: with thousands of samples it has hit the sliver, and the
+//! variance of its parts predicts the error of each pixel at fewer samples.
 
 use crate::interval::Interval;
 use crate::metrics::{RELATIVE_EPSILON, Reference};
@@ -20,32 +21,33 @@ pub struct Tail {
     pub missed: f64,
 }
 
-/// The share of the expected error in one pixel above which an interval is not to be trusted. In pictures of five scenes with 48 × 36 to 80 × 60 pixels
-/// and 1, 4 and 16 samples it is below 0.035 where intervals hold in 93 to 97 % of all cases, and above where they do not.
+/// Largest share of the expected error in one pixel for a reliable interval. In images of five
+/// scenes with 48 × 36 to 80 × 60 pixels and 1, 4 and 16 samples it is smaller where intervals hold
+/// in 93 to 97 % of cases, and larger where they do not.
 const MOST_SHARE: f64 = 0.035;
 
-/// The part of the way to the upper end of an interval that the error of one pixel may be that the replicates have missed.
+/// Largest missed error of one pixel, relative to the upper half of the interval.
 const MOST_MISSED: f64 = 0.5;
 
-/// Whether a single pixel decides over the interval of a mean relMSE, so that it is not to be trusted.
+/// True if a single pixel makes the interval of a mean relMSE unreliable.
 pub fn is_heavy(tail: Tail, relmse: Interval) -> bool {
     tail.greatest_share > MOST_SHARE || tail.missed > MOST_MISSED * (relmse.high - relmse.value)
 }
 
-/// Error of each pixel over replicates, beside the one that the reference lets expect.
+/// Per-pixel errors over replicates, next to those predicted by the reference.
 #[derive(Debug, Clone)]
 pub struct PixelErrors {
-    /// Sum over replicates of each pixel's part of the relMSE.
+    /// Sum over replicates of each pixel's contribution to the relMSE.
     sums: Vec<f64>,
-    /// Whether one of the replicates is as bright as the reference there, or brighter.
+    /// True if some replicate is at least as bright as the reference there.
     reached: Vec<bool>,
     replicates: u32,
-    /// Variance between the reference's parts of each pixel, summed over channels, over r² + 0.01; none without parts.
+    /// Channel sum of each pixel's variance between reference parts, over r² + 0.01; or empty.
     of_parts: Vec<f64>,
 }
 
 impl PixelErrors {
-    /// Of no replicate yet.
+    /// Starts without replicates.
     pub fn new(reference: &Reference) -> Self {
         let pixels = reference.image().pixels.len();
         Self {
@@ -61,7 +63,7 @@ impl PixelErrors {
         }
     }
 
-    /// Adds the image of a replicate.
+    /// Adds a replicate's image.
     ///
     /// # Errors
     /// [`ImageError::SizeMismatch`].
@@ -78,13 +80,14 @@ impl PixelErrors {
         Ok(())
     }
 
-    /// What single pixels do to the mean at `spp` samples per pixel, where the reference's parts have `part_spp` each.
+    /// Effect of single pixels on the mean at `spp` samples, for reference parts of `part_spp`.
     ///
-    /// A pixel is expected to have the variance that independent samples would have, σ² / spp, with σ² / `part_spp` between the parts. A
-    /// sampler may be better than that, and replicates that lie on both sides of the reference show it: then what they show
-    /// counts, if it is less. Where all are darker than the reference, they may have missed what is bright, and show nothing.
+    /// A pixel's expected variance is that of independent samples, σ² / spp, with σ² / `part_spp`
+    /// between the parts. A better sampler shows in replicates on both sides of the reference: the
+    /// observed error is then used if it is smaller. If all are darker than the reference, they may
+    /// have missed something bright and show nothing.
     ///
-    /// `None` without parts, without replicates, and where no error is expected.
+    /// `None` without parts or replicates, or if no error is expected.
     pub fn tail(&self, spp: u32, part_spp: u32) -> Option<Tail> {
         if self.of_parts.is_empty() || self.replicates == 0 || part_spp == 0 {
             return None;

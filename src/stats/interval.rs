@@ -1,10 +1,10 @@
-//! A figure with its interval, and the noise that the interval follows from.
+//! A figure with its interval, and the noise behind the interval.
 
 use crate::hypothesis::{student_t_quantile, student_t_two_sided};
 use crate::statistics::{ROUNDING, variance};
 use serde::{Deserialize, Serialize};
 
-/// Share of intervals that miss the truth.
+/// Error probability of intervals.
 pub(crate) const ALPHA: f64 = 0.05;
 
 /// A figure with its 95 % interval, see [`crate::statistics`].
@@ -25,7 +25,7 @@ impl From<f64> for Interval {
 }
 
 impl Interval {
-    /// A figure whose interval has no width: it is exact, or nothing is known of its spread.
+    /// A figure whose interval has no width, because it is exact or its spread is unknown.
     pub fn exact(value: f64) -> Self {
         Self {
             value,
@@ -34,7 +34,7 @@ impl Interval {
         }
     }
 
-    /// The same figure in another unit.
+    /// The figure in another unit.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {
@@ -45,17 +45,17 @@ impl Interval {
     }
 }
 
-/// What one source of noise makes of an estimate, which is taken to have Student's distribution about the truth.
+/// Effect of a source of noise on an estimate, with Student's distribution about the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Variance of the estimate.
     pub variance: f64,
-    /// Degrees of freedom that the variance is known with, at least 1.
+    /// Degrees of freedom of the variance, at least 1.
     pub freedom: f64,
 }
 
 impl Spread {
-    /// Of the mean of some samples; fewer than two say nothing.
+    /// Spread of the mean of samples; `None` for fewer than two.
     pub fn of_mean(samples: &[f64]) -> Option<Self> {
         let n = samples.len() as f64;
         Some(Self {
@@ -64,8 +64,8 @@ impl Spread {
         })
     }
 
-    /// From the estimates that leave out one of `n` parts each: the delete-one jackknife (Quenouille 1956,
-    /// Tukey 1958). Fewer than two say nothing.
+    /// Spread from estimates that leave out one of `n` parts each: the delete-one jackknife
+    /// (Quenouille 1956, Tukey 1958). `None` for fewer than two.
     pub(crate) fn jackknife(estimates: &[f64]) -> Option<Self> {
         let n = estimates.len() as f64;
         Some(Self::of_mean(estimates)?.times((n - 1.0).powi(2)))
@@ -79,7 +79,7 @@ impl Spread {
         }
     }
 
-    /// With so many times the variance.
+    /// Scales the variance.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self {
@@ -88,11 +88,11 @@ impl Spread {
         }
     }
 
-    /// Of independent sources together: variances add, and degrees of freedom are those of Welch and
-    /// Satterthwaite. Of none there is no variance.
+    /// Combines independent sources: variances add; degrees of freedom are those of Welch and
+    /// Satterthwaite. Without sources, the variance is 0.
     pub fn together(sources: &[Self]) -> Self {
         let variance: f64 = sources.iter().map(|s| s.variance).sum();
-        // As shares of the whole variance, so that tiny variances do not underflow when squared.
+        // As shares of the total variance, so that tiny variances do not underflow when squared.
         let share = |s: &Self| (s.variance / variance).powi(2) / s.freedom;
         let shares: f64 = sources.iter().map(share).sum();
         Self {
@@ -105,9 +105,10 @@ impl Spread {
         }
     }
 
-    /// Of a difference of two independent estimates: both together, with no more degrees of freedom than the side has
-    /// that knows less (Hsu 1938). Two samples may lie close together by chance; by Welch and Satterthwaite alone
-    /// their variance then counts for little, and the many degrees of freedom of the other side for all.
+    /// Spread of the difference of two independent estimates: both combined, with at most the
+    /// degrees of freedom of the less certain side (Hsu 1938). Two samples may lie close together
+    /// by chance; by Welch and Satterthwaite alone, their variance would count little, and the many
+    /// degrees of freedom of the other side fully.
     #[must_use]
     pub fn of_difference(a: Self, b: Self) -> Self {
         let both = Self::together(&[a, b]);
@@ -117,12 +118,12 @@ impl Spread {
         }
     }
 
-    /// Whether it is no more than the rounding of sums makes of numbers of this size.
+    /// True if it is no more than rounding of sums of this size.
     pub(crate) fn is_rounding(self, size: f64) -> bool {
         self.variance.sqrt() <= ROUNDING * size
     }
 
-    /// What the estimate is off by with probability `chance` at most.
+    /// Error bound of the estimate, exceeded with probability at most `chance`.
     pub fn half_width(self, chance: f64) -> f64 {
         student_t_quantile(chance, self.freedom) * self.variance.sqrt()
     }
@@ -137,8 +138,8 @@ impl Spread {
         }
     }
 
-    /// Probability of a difference this large or larger in either direction if there is none. It is one of logarithms, or a
-    /// part of something, so that 1 is its natural size.
+    /// Two-sided probability of a difference at least this large if there is none. Differences are
+    /// logarithms or fractions, with natural size 1.
     pub fn p(self, gap: f64) -> f64 {
         if gap.abs() <= ROUNDING {
             1.0

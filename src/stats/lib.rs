@@ -1,4 +1,4 @@
-//! Estimates with their intervals, tests of hypotheses, and metrics of images.
+//! Estimates with intervals, hypothesis tests, and image metrics.
 #![warn(missing_docs)]
 
 pub mod adaptive;

@@ -1,8 +1,8 @@
-//! Positive figures on their logarithms, with all that makes them uncertain, and what follows from them.
+//! Positive figures as logarithms with their uncertainty, and quantities derived from them.
 //!
-//! Everything is on logarithms, since errors and times are positive, skewed, and compared by their ratio; the
-//! logarithm of an error per second is the sum of those of the error and of the time, and so is its variance.
-//! [`LogFigure::product`] is the one way from figures to what follows from them: ratios, ratios of ratios, exponents.
+//! Errors and times are positive, skewed, and compared by ratio, hence logarithms; that of an error
+//! per second is the sum of those of error and time, and so is its variance. [`LogFigure::product`]
+//! is the only way to derive quantities: ratios, ratios of ratios, exponents.
 //!
 //! | evidence | its noise |
 //! |---|---|
@@ -12,29 +12,29 @@
 //! | summary | the distances to the ends of an interval, each side its own |
 //! | exact | none |
 //!
-//! What does not belong together is taken as independent. That holds for samplers of equal seeds: over
-//! 400 seeds (Cornell box, 80 × 60, 16 samples) the logarithms of relMSE of any two of four samplers have a correlation
-//! between −0.01 and 0.04, so that pairs would gain nothing.
+//! Everything else is assumed independent. That holds for samplers with equal seeds: over 400 seeds
+//! (Cornell box, 80 × 60, 16 samples), the logarithms of relMSE of any two of four samplers have a
+//! correlation between −0.01 and 0.04, so pairing would gain nothing.
 
 use crate::interval::{ALPHA, Interval, Spread};
 use crate::statistics::{ROUNDING, slope_weights, variance};
 
-/// Of sorted times, the share that is left out at each end.
+/// Fraction of sorted times trimmed at each end.
 const TRIMMED: f64 = 0.2;
 
-/// What makes a figure uncertain, on its logarithm.
+/// A source of uncertainty of a figure, on its logarithm.
 #[derive(Debug, Clone, PartialEq)]
 enum Noise {
-    /// Of this figure alone: how far down the truth may be, and how far up.
+    /// Of this figure alone: possible error downwards and upwards.
     Own([Spread; 2]),
-    /// Of what other figures may have in common with it.
+    /// Possibly shared with other figures.
     Shared(Series),
 }
 
-/// What a figure is part by part.
+/// A figure part by part.
 #[derive(Debug, Clone, PartialEq)]
 struct Series {
-    /// What tells its parts from those of other sources; empty where nothing shares them.
+    /// Identifies the source of the parts; empty if nothing shares them.
     of: String,
     parts: Parts,
     logs: Vec<f64>,
@@ -42,14 +42,14 @@ struct Series {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Parts {
-    /// Of something, as of a reference: the logarithm without each of them.
+    /// For instance of a reference: the logarithm without each part.
     LeftOut,
-    /// Rounds: how far each lies from the logarithm.
+    /// Rounds: distance of each from the logarithm.
     Rounds,
 }
 
 impl Series {
-    /// Whether parts belong together, one by one.
+    /// True if parts correspond one to one.
     fn is_of(&self, other: &Self) -> bool {
         let same = self.parts == other.parts && self.logs.len() == other.logs.len();
         same && !self.of.is_empty() && self.of == other.of
@@ -68,7 +68,7 @@ impl Noise {
         match self {
             Self::Own([down, up]) => {
                 let [down, up] = [down, up].map(|s| s.times(exponent * exponent));
-                // A negative exponent turns the sides round.
+                // A negative exponent swaps the sides.
                 Self::Own(if exponent < 0.0 {
                     [up, down]
                 } else {
@@ -93,8 +93,9 @@ impl Noise {
     }
 }
 
-/// Mean of the logarithms of times without the least and the greatest fifth, which single interruptions do not move. Its
-/// variance is that of the winsorised sample (Tukey and McLaughlin 1963, Yuen 1974). `None` below two that would be left.
+/// Mean of log times without the smallest and largest fifth, robust to interruptions. Its variance
+/// is that of the winsorised sample (Tukey and McLaughlin 1963, Yuen 1974). `None` if fewer than
+/// two remain.
 fn trimmed(logs: &[f64]) -> Option<(f64, Spread)> {
     let mut sorted = logs.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -115,12 +116,12 @@ fn trimmed(logs: &[f64]) -> Option<(f64, Spread)> {
     Some((mean, spread))
 }
 
-/// A positive figure, known by its logarithm and what makes that uncertain.
+/// A positive figure, given by its logarithm and the sources of uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogFigure {
     /// Natural logarithm of the figure; −∞ for an exact 0.
     pub log: f64,
-    /// The figure itself: of exact ones products and quotients are exact.
+    /// The figure itself, so that products and quotients of exact figures are exact.
     value: f64,
     noise: Vec<Noise>,
 }
@@ -132,7 +133,7 @@ pub struct Difference {
     pub log_ratio: f64,
     /// The ratio with its 95 % interval.
     pub ratio: Interval,
-    /// Probability of one this large or larger in either direction if the figures are equal.
+    /// Two-sided probability of a ratio at least this large if the figures are equal.
     pub p: f64,
 }
 
@@ -146,10 +147,10 @@ impl LogFigure {
         }
     }
 
-    /// From the logarithm, and logarithms that leave out each part of each source of noise: those of its own, as its
-    /// replicates, and those that it shares, as the halves of a reference, in an order that is the same for all figures.
+    /// From the logarithm, and logarithms that leave out each part of each source of noise: its
+    /// own, such as replicates, and shared ones, such as reference halves, in equal order.
     ///
-    /// `None` if anything is not finite, but for figures that are 0 with whatever is left out.
+    /// `None` if anything is not finite, except for figures that stay 0 whatever is left out.
     pub fn new(log: f64, own: &[Vec<f64>], shared: Vec<Vec<f64>>) -> Option<Self> {
         let all = || own.iter().chain(&shared).flatten().chain([&log]);
         if all().all(|x| *x == f64::NEG_INFINITY) {
@@ -172,15 +173,16 @@ impl LogFigure {
         })
     }
 
-    /// Of times of the same work that were measured in no rounds that are known: see [`Self::of_rounds`].
+    /// From times of the same work not measured in known rounds: see [`Self::of_rounds`].
     pub fn of_times(times: &[f64]) -> Option<Self> {
         Self::of_rounds("", times)
     }
 
-    /// Of times or rates of the same work, round by round. Figures of the same sitting, which this text tells from all others, were
-    /// measured in the same rounds: what the machine did in a round is no noise of their ratio. An empty text is no sitting.
+    /// From times or rates of the same work, round by round. Figures with the same `sitting` were
+    /// measured in the same rounds, so the machine's variation in a round does not affect their
+    /// ratio. An empty text means no sitting.
     ///
-    /// `None` where fewer than two samples would be left by the trimmed mean, and for samples that are not all positive and finite.
+    /// `None` if fewer than two samples remain, or if one is not positive and finite.
     pub fn of_rounds(sitting: &str, figures: &[f64]) -> Option<Self> {
         if !figures.iter().all(|x| *x > 0.0 && x.is_finite()) {
             return None;
@@ -196,8 +198,8 @@ impl LogFigure {
         })
     }
 
-    /// The quotient of two sums over groups, of which each has its parts of both. With fewer than two groups, and where
-    /// one group alone has anything, nothing is known of others.
+    /// Quotient of two sums over groups, each contributing to both. With fewer than two groups, or
+    /// if only one group is non-zero, its uncertainty is unknown.
     pub fn of_groups(of: &str, groups: &[[f64; 2]]) -> Self {
         let without = |left_out: usize| {
             let kept = groups.iter().enumerate().filter(|(i, _)| *i != left_out);
@@ -219,9 +221,9 @@ impl LogFigure {
         }
     }
 
-    /// From no more than a 95 % interval with so many degrees of freedom (infinite where they are unknown): each side has
-    /// the distance to its own end (Zou and Donner 2008). An interval that reaches 0 may be anything below. `None` for
-    /// what is not positive, but for an exact 0.
+    /// From a 95 % interval with `freedom` degrees of freedom (infinite if unknown): each side uses
+    /// the distance to its own end (Zou and Donner 2008). An interval that reaches 0 is unbounded
+    /// below. `None` for a non-positive value, except an exact 0.
     pub fn of_interval(interval: Interval, freedom: f64) -> Option<Self> {
         let Interval { value, low, high } = interval;
         if value == 0.0 && low == 0.0 && high == 0.0 {
@@ -242,7 +244,7 @@ impl LogFigure {
         })
     }
 
-    /// The product of powers of figures. What figures share part by part goes into it part by part.
+    /// Product of powers of figures. Shared parts are combined part by part.
     pub fn product(terms: &[(&Self, f64)]) -> Self {
         let mut product = Self::exact(1.0);
         for (figure, exponent) in terms.iter().filter(|(_, exponent)| *exponent != 0.0) {
@@ -284,26 +286,26 @@ impl LogFigure {
         self.noise.push(noise);
     }
 
-    /// One over it.
+    /// The reciprocal.
     #[must_use]
     pub fn inverse(&self) -> Self {
         Self::product(&[(self, -1.0)])
     }
 
-    /// The same times a number that is known.
+    /// The figure times a known number.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self::product(&[(self, 1.0), (&Self::exact(factor), 1.0)])
     }
 
-    /// The same with further noise of its own.
+    /// The figure with additional noise of its own.
     #[must_use]
     pub fn with_noise(mut self, noise: Option<Spread>) -> Self {
         self.noise.extend(noise.map(|s| Noise::Own([s; 2])));
         self
     }
 
-    /// The same with the noise of another figure, which it depends on as on this power of it.
+    /// The figure with the noise of another figure, on this power of which it depends.
     #[must_use]
     pub fn with_noise_of(mut self, other: &Self, exponent: f64) -> Self {
         for noise in &other.noise {
@@ -312,13 +314,13 @@ impl LogFigure {
         self
     }
 
-    /// Whether anything makes it uncertain.
+    /// True if it is uncertain.
     pub fn has_noise(&self) -> bool {
         !self.noise.is_empty()
     }
 
-    /// The exponent of a power law through points `(x, y)`, by least squares of logarithms, as the logarithm of the figure
-    /// that is returned; `None` with fewer than two different x, and where one is not positive.
+    /// Exponent of a power law through points `(x, y)`, by least squares of logarithms, as the
+    /// figure's logarithm; `None` for fewer than two different x or non-positive values.
     pub fn exponent(points: &[(f64, Self)]) -> Option<Self> {
         if !points.iter().all(|(_, y)| y.log.is_finite()) {
             return None;
@@ -329,7 +331,7 @@ impl LogFigure {
         Some(Self::product(&terms))
     }
 
-    /// All its noise, where it is the same up and down; else the larger.
+    /// Total noise; the larger side if they differ.
     pub fn spread(&self) -> Spread {
         let [down, up] = self.spreads();
         if down.variance > up.variance {
@@ -339,7 +341,7 @@ impl LogFigure {
         }
     }
 
-    /// All its noise, down and up.
+    /// Total noise, down and up.
     fn spreads(&self) -> [Spread; 2] {
         let sides: Vec<[Spread; 2]> = self.noise.iter().filter_map(Noise::spreads).collect();
         [0, 1].map(|side| Spread::together(&sides.iter().map(|s| s[side]).collect::<Vec<_>>()))
@@ -372,14 +374,14 @@ impl LogFigure {
         }
     }
 
-    /// Down and up; `None` where it is exact.
+    /// Half widths, down and up; `None` if exact.
     fn half_widths(&self, spreads: [Spread; 2]) -> Option<[f64; 2]> {
         let is_exact = spreads.iter().all(|s| self.is_exact(*s));
         (!is_exact).then(|| spreads.map(|s| s.half_width(ALPHA)))
     }
 
-    /// What the figure exceeds with probability `chance` at most: the upper end of the interval that misses with
-    /// that chance on either side together. Skewed figures are missed almost only where they lie above.
+    /// Bound that the figure exceeds with probability at most `chance`: the upper end of the
+    /// interval with that two-sided error probability. Intervals of skewed figures mostly fail low.
     pub fn upper(&self, chance: f64) -> f64 {
         let [_, up] = self.spreads();
         if self.is_exact(up) {
@@ -392,8 +394,8 @@ impl LogFigure {
         !self.log.is_finite() || spread.is_rounding(self.log.abs().max(1.0))
     }
 
-    /// The ratio to another figure, with Welch's test of their difference by all sources of noise of both. Figures that are known
-    /// by as many rounds or replicates each are held to its level; for others see [`Spread::of_difference`].
+    /// Ratio to another figure, with Welch's test of their difference over all sources of noise.
+    /// The level holds for equally many rounds or replicates; else see [`Spread::of_difference`].
     pub fn compared_with(&self, other: &Self) -> Difference {
         let ratio = Self::product(&[(self, 1.0), (other, -1.0)]);
         let spreads = ratio.spreads();

@@ -1,4 +1,4 @@
-//! Error of images by versioned metrics.
+//! Versioned metrics of image error.
 
 use crate::shown::Shown;
 use raystone_image::{
@@ -8,17 +8,16 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Added to the squared reference in relative metrics, so that dark pixels do not rule the mean.
+/// Added to the squared reference in relative metrics, against dominance of dark pixels.
 pub const RELATIVE_EPSILON: f64 = 1e-2;
 
-/// What an image is measured against: the mean of a reference, and its independent parts and their
-/// two halves if there are.
+/// A reference: its mean image, and its independent parts and their two halves if available.
 #[derive(Clone)]
 pub struct Reference {
     mean: Image,
     halves: Option<[Image; 2]>,
     parts: Vec<Image>,
-    /// The tone-mapped reference, made when it is first compared with.
+    /// The tone-mapped reference, computed on first use.
     shown: OnceLock<Arc<Shown>>,
 }
 
@@ -34,7 +33,7 @@ impl fmt::Debug for Reference {
 }
 
 impl Reference {
-    /// A reference known as one image: metrics that need two halves are absent.
+    /// A reference with a single image: metrics that need two halves are absent.
     ///
     /// # Errors
     /// [`ImageError::NonFiniteReference`].
@@ -54,8 +53,8 @@ impl Reference {
         })
     }
 
-    /// A reference from independent renders of equal sample counts (other seeds): the first half of
-    /// them against the second; of an odd number the last is left out.
+    /// A reference from independent renders of equal sample counts (other seeds): the first half
+    /// against the second; the last of an odd number is ignored.
     ///
     /// # Errors
     /// [`ImageError::TooFew`] below two parts, [`ImageError::SizeMismatch`],
@@ -73,13 +72,12 @@ impl Reference {
         Ok(reference)
     }
 
-    /// The independent parts, those of the first half first; none if it is known as one image.
+    /// The independent parts, those of the first half first; empty for a single image.
     pub fn parts(&self) -> &[Image] {
         &self.parts
     }
 
-    /// How many estimates [`ErrorReport::without_part`] has: halves of one part have none left without
-    /// it.
+    /// Number of [`ErrorReport::without_part`] estimates; halves of one part have none.
     fn estimates(&self) -> usize {
         if self.parts.len() < 4 {
             0
@@ -88,12 +86,12 @@ impl Reference {
         }
     }
 
-    /// The reference image itself.
+    /// The reference image.
     pub fn image(&self) -> &Image {
         &self.mean
     }
 
-    /// The exposure that the reference and what is compared with it are shown with.
+    /// Exposure used to display the reference and images compared with it.
     pub fn exposure(&self) -> f32 {
         automatic_exposure(&self.mean)
     }
@@ -104,7 +102,7 @@ impl Reference {
         self.own_error(|_| 1.0)
     }
 
-    /// The same of the relative error, each square over ((A + B) / 2)² + 0.01.
+    /// [`Self::own_mse`] relative: each square over ((A + B) / 2)² + 0.01.
     pub fn own_relmse(&self) -> Option<f64> {
         self.own_error(|mean| mean * mean + RELATIVE_EPSILON)
     }
@@ -119,7 +117,6 @@ impl Reference {
     }
 }
 
-/// One channel of one pixel.
 pub(super) struct Sample {
     channel: usize,
     value: f64,
@@ -128,24 +125,23 @@ pub(super) struct Sample {
     half_b: f64,
 }
 
-/// How a metric is computed.
 enum Rule {
-    /// The mean of a term over pixels and channels, then perhaps a root.
+    /// Mean of a term over pixels and channels, and a function of the mean.
     Mean {
         term: fn(&Sample) -> f64,
         finish: fn(f64) -> f64,
     },
-    /// From two images whose pixels are all finite; `None` where it has no finite value.
+    /// From two finite images; `None` if there is no finite value.
     Whole(fn(&Comparison) -> Option<f64>),
 }
 
 /// An error metric.
 pub struct Metric {
-    /// Name with its constants and version, as records carry it.
+    /// Name with constants and version, as in records.
     pub id: &'static str,
     /// One line: formula and use. `v` the image, `r` the reference, A and B its halves.
     pub description: &'static str,
-    /// Whether it is absent for a reference without halves.
+    /// True if it needs a reference with halves.
     pub needs_halves: bool,
     rule: Rule,
 }
@@ -184,7 +180,7 @@ impl Metric {
     }
 }
 
-/// Every metric, in the order of tables. A changed formula gets a new version in its id.
+/// All metrics in table order. A changed formula gets a new version in its id.
 #[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
     Metric::mean("mse/v1", "mean (v − r)²", Sample::squared_error),
@@ -220,10 +216,9 @@ pub const METRICS: &[Metric] = &[
         |c| Some(c.shown.flip(c.shown_reference))),
 ];
 
-/// The part of the terms that the trimmed metric leaves out.
+/// Fraction of terms that the trimmed metric omits.
 const TRIMMED: f64 = 1e-3;
 
-/// Two images of one size, all finite.
 struct Comparison<'a> {
     image: &'a Image,
     reference: &'a Reference,
@@ -249,7 +244,7 @@ impl<'a> Comparison<'a> {
         Some(sum / self.image.pixels.len() as f64)
     }
 
-    /// As SimpleImageIO (P. Grittmann) rejects outliers: terms of pixels and channels by size.
+    /// Rejects outliers like SimpleImageIO (P. Grittmann): terms of pixels and channels by size.
     fn trimmed(&self) -> Option<f64> {
         let mut terms = Vec::with_capacity(3 * self.image.pixels.len());
         for (i, pixel) in self.image.pixels.iter().enumerate() {
@@ -277,11 +272,12 @@ impl Sample {
         (self.value - self.half_a) * (self.value - self.half_b) / self.relative_scale()
     }
 
-    /// What has the channel's mean squared error as its mean over all channels.
+    /// Term whose mean over all channels is this channel's mean squared error.
     fn squared_error_of(&self, channel: usize) -> f64 {
-        match self.channel == channel {
-            true => 3.0 * self.squared_error(),
-            false => 0.0,
+        if self.channel == channel {
+            3.0 * self.squared_error()
+        } else {
+            0.0
         }
     }
 
@@ -298,17 +294,17 @@ impl Sample {
 /// Error of one image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ErrorReport {
-    /// Metric id → value, over the finite pixels; metrics that cannot be computed are absent.
+    /// Metric values by id, over the finite pixels; metrics that cannot be computed are absent.
     pub metrics: BTreeMap<String, f64>,
-    /// Id of a metric that needs halves → its values against the reference without its first part,
-    /// without its second, …: how they differ tells what the reference's own noise makes of the
-    /// metric. Empty without at least two parts in each half.
+    /// Values by id of metrics that need halves, against the reference without its first part,
+    /// without its second, …: their spread shows how the reference's own noise affects the metric.
+    /// Empty without at least two parts in each half.
     pub without_part: BTreeMap<String, Vec<f64>>,
-    /// Pixels that were NaN or infinite and are in no mean. Any is a failure of the renderer.
+    /// Number of NaN or infinite pixels, which enter no mean. Any is a renderer failure.
     pub non_finite_pixels: usize,
 }
 
-/// Every metric of `image` against `reference`. Where pixels are not finite, what needs whole images is absent.
+/// Evaluates every metric of `image`. Non-finite pixels exclude whole-image metrics.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].
@@ -374,7 +370,7 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
     Ok(report)
 }
 
-/// A metric that is a mean, with its term and what is done to the mean.
+/// A mean metric, its term, and the function of the mean.
 type MeanMetric = (&'static Metric, fn(&Sample) -> f64, fn(f64) -> f64);
 
 impl Metric {
@@ -408,9 +404,10 @@ impl Reference {
         let half = (self.parts.len() / 2) as f64;
         let value = f64::from(self.parts[part].pixels[pixel][channel]);
         let rest = |mean: f64| mean + (mean - value) / (half - 1.0);
-        let (half_a, half_b) = match 2 * part < self.parts.len() {
-            true => (rest(sample.half_a), sample.half_b),
-            false => (sample.half_a, rest(sample.half_b)),
+        let (half_a, half_b) = if 2 * part < self.parts.len() {
+            (rest(sample.half_a), sample.half_b)
+        } else {
+            (sample.half_a, rest(sample.half_b))
         };
         Sample {
             channel,
@@ -422,8 +419,8 @@ impl Reference {
     }
 }
 
-/// Picture of the error: per pixel √ of the mean over channels of (v − r)² / (r² + 0.01), over
-/// `full_scale`, clamped to `[0, 1]` and coloured by `colour`.
+/// Picture of the error: per pixel √ of the mean over channels of (v − r)² / (r² + 0.01), divided
+/// by `full_scale`, clamped to `[0, 1]` and coloured by `colour`.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].
@@ -440,9 +437,10 @@ pub fn error_map(
             sample.relative_squared_error()
         };
         let error = ((term(0) + term(1) + term(2)) / 3.0).sqrt() as f32;
-        match error.is_finite() {
-            true => colour((error / full_scale).clamp(0.0, 1.0)),
-            false => NON_FINITE_COLOUR,
+        if error.is_finite() {
+            colour((error / full_scale).clamp(0.0, 1.0))
+        } else {
+            NON_FINITE_COLOUR
         }
     };
     Ok(Picture {

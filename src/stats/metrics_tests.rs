@@ -174,9 +174,9 @@ fn patterns() -> [Image; 2] {
     images.map(|pixels| Image::new(width as u32, height as u32, pixels).unwrap())
 }
 
-/// Values of NumPy 2.4 from the formulas in double precision; SSIM of scikit-image 0.26
-/// (`structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1)`), FLIP
-/// of `flip-evaluator` 1.7 (`evaluate(…, "LDR")`, single precision).
+/// Values computed with NumPy 2.4 from the formulas in double precision; SSIM with scikit-image
+/// 0.26 (`structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
+/// data_range=1)`), FLIP with `flip-evaluator` 1.7 (`evaluate(…, "LDR")`, single precision).
 #[test]
 fn metrics_have_the_values_of_independent_programs() {
     let [reference, image] = patterns();
@@ -220,7 +220,7 @@ fn metrics_have_the_values_of_independent_programs() {
             "{id}: {found} is not {value}"
         );
     }
-    // An outlier rules the mean and not the trimmed mean; the tolerances can tell it.
+    // An outlier dominates the mean but not the trimmed mean; the tolerances can tell.
     let mut calm = image.clone();
     calm.pixels[7 * 48 + 9] = reference.image().pixels[7 * 48 + 9];
     let calm = measure(&calm, &reference).unwrap();

@@ -1,16 +1,14 @@
-//! Metrics of pictures as they are shown: tone-mapped with the exposure of the reference, encoded as sRGB, in
-//! [0, 1] and not rounded to 8 bits.
+//! Metrics of displayed images: the reference's exposure, sRGB in [0, 1], not rounded to 8 bits.
 
 use crate::flip::Seen;
 use raystone_image::{Image, LUMINANCE, displayed};
 
-/// Standard deviation of SSIM's window, pixels, and how far it reaches: 11 × 11 pixels.
+/// Standard deviation of SSIM's window in pixels, and its radius: 11 × 11 pixels.
 const SSIM_SIGMA: f64 = 1.5;
 const SSIM_REACH: usize = 5;
-/// What keeps SSIM's quotients finite: (0.01)² and (0.03)² of the range, which is 1.
+/// Stabilisers of SSIM's quotients: (0.01)² and (0.03)² of the range, which is 1.
 const SSIM_CONSTANTS: [f64; 2] = [1e-4, 9e-4];
 
-/// A picture and what is compared of it.
 pub(super) struct Shown {
     width: usize,
     pixels: Vec<[f64; 3]>,
@@ -18,7 +16,6 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// A finite image, shown with this exposure.
     pub(crate) fn new(image: &Image, exposure: f32) -> Self {
         let shown = |pixel| displayed(pixel, exposure);
         let pixels: Vec<[f64; 3]> = image.pixels.iter().map(shown).collect();
@@ -35,7 +32,7 @@ impl Shown {
         mean(&self.seen.difference(&other.seen))
     }
 
-    /// Peak signal over noise in decibels, the peak being 1; infinite for equal pictures.
+    /// Peak signal-to-noise ratio in decibels, for a peak of 1; infinite for equal pictures.
     pub(crate) fn psnr(&self, other: &Self) -> f64 {
         let pairs = self
             .pixels
@@ -46,8 +43,8 @@ impl Shown {
         -10.0 * mean(&squares).log10()
     }
 
-    /// Mean structural similarity of luma over all windows that lie in the picture (Wang, Bovik, Sheikh,
-    /// Simoncelli 2004, equation 13, with their Gaussian window and constants); `None` where none does.
+    /// Mean structural similarity of luma over all windows inside the picture (Wang, Bovik, Sheikh,
+    /// Simoncelli 2004, equation 13, their Gaussian window and constants); `None` if none fits.
     pub(crate) fn ssim(&self, other: &Self) -> Option<f64> {
         let luma = |shown: &Self| -> Vec<f64> {
             let weighted = |p: &[f64; 3]| (0..3).map(|c| LUMINANCE[c] * p[c]).sum();

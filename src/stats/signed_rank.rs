@@ -1,26 +1,26 @@
-//! Wilcoxon's signed-rank test (1945): the permutation test of pairs over all changes of sign of their differences, on
-//! ranks, so that single interruptions do not move it.
+//! Wilcoxon's signed-rank test (1945): the permutation test of paired differences over all sign
+//! changes, on ranks, robust to single interruptions.
 //!
-//! In the form of Tukey (1949) it counts Walsh averages (the mean of each pair of differences, each with itself too): the
-//! estimate is their median (Hodges and Lehmann 1963), the interval lies between two of them, and the test counts those
-//! above and below zero. The distribution is exact up to `MOST_EXACT` differences.
+//! In Tukey's form (1949) it counts Walsh averages (means of all pairs of differences, including
+//! each with itself): the estimate is their median (Hodges and Lehmann 1963), the interval lies
+//! between two of them, and the test counts those above and below zero. The distribution is exact
+//! up to `MOST_EXACT` differences.
 
-/// Beyond so many differences the normal distribution stands for the exact one, with an error below 10⁻⁴.
+/// Above this number of differences, the normal approximation has an error below 10⁻⁴.
 pub(crate) const MOST_EXACT: usize = 60;
 
-/// Differences of pairs, ready to be tested.
+/// Differences of pairs, prepared for testing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignedRank {
     /// Walsh averages, sorted.
     walsh: Vec<f64>,
-    /// How many differences there are.
     count: usize,
-    /// Probability of each sum of ranks, if either sign is as likely; empty beyond [`MOST_EXACT`].
+    /// Probability of each rank sum if both signs are equally likely; empty beyond [`MOST_EXACT`].
     chances: Vec<f64>,
 }
 
 impl SignedRank {
-    /// `None` of no differences, and where one is not finite.
+    /// `None` for no differences, or if one is not finite.
     pub fn new(differences: &[f64]) -> Option<Self> {
         if differences.is_empty() || !differences.iter().all(|x| x.is_finite()) {
             return None;
@@ -42,25 +42,23 @@ impl SignedRank {
         })
     }
 
-    /// The median of the Walsh averages.
+    /// Median of the Walsh averages.
     pub fn estimate(&self) -> f64 {
         let n = self.walsh.len();
         0.5 * (self.walsh[(n - 1) / 2] + self.walsh[n / 2])
     }
 
-    /// Two-sided p-value of the hypothesis that positive and negative differences are alike. Averages of zero count for
-    /// the hypothesis.
+    /// Two-sided p-value of symmetry about zero; averages of zero support it.
     pub fn p(&self) -> f64 {
         let above = self.walsh.iter().filter(|x| **x > 0.0).count();
         let below = self.walsh.iter().filter(|x| **x < 0.0).count();
         (2.0 * self.at_least(above.max(below))).min(1.0)
     }
 
-    /// The interval of the points that the test at level `alpha` does not reject; without bounds where so few
-    /// differences cannot reject any.
+    /// Interval of the points not rejected at level `alpha`; unbounded for too few differences.
     pub fn interval(&self, alpha: f64) -> [f64; 2] {
         let n = self.walsh.len();
-        // The greatest number of averages that may be left out at an end.
+        // Largest number of averages that may be omitted at an end.
         let mut left_out = 0;
         while left_out < n && self.at_least(n - left_out) <= 0.5 * alpha {
             left_out += 1;
@@ -71,7 +69,7 @@ impl SignedRank {
         }
     }
 
-    /// Probability that a sum of ranks is at least so large.
+    /// Probability of a rank sum of at least `sum`.
     fn at_least(&self, sum: usize) -> f64 {
         if !self.chances.is_empty() {
             return self.chances.iter().skip(sum).sum::<f64>().min(1.0);
@@ -104,11 +102,11 @@ mod tests {
 
     #[test]
     fn it_agrees_with_the_published_table() {
-        // Hollander and Wolfe, table A.4: P(T+ ≥ 38) for n = 9 is 0.037, P(T+ ≥ 15) for n = 5 is 1/32.
+        // Hollander and Wolfe, table A.4: P(T+ ≥ 38) is 0.037 for n = 9, P(T+ ≥ 15) 1/32 for n = 5.
         let of = |n: usize| SignedRank::new(&vec![1.0; n]).unwrap();
         assert!((of(9).at_least(38) - 0.037).abs() < 5e-4);
         assert!((of(5).at_least(15) - 1.0 / 32.0).abs() < 1e-12);
-        // The normal distribution takes over without a step.
+        // The normal approximation takes over without a step.
         let (exact, normal) = (of(60).at_least(1150), of(61).at_least(1150 + 30));
         assert!((exact / normal - 1.0).abs() < 0.1, "{exact} {normal}");
     }
@@ -130,7 +128,7 @@ mod tests {
         let ([low, high], [low_b, high_b]) = (a.interval(0.05), b.interval(0.05));
         assert!((low + 0.5 * high_b).abs() < 1e-12 && (high + 0.5 * low_b).abs() < 1e-12);
         assert!(low < a.estimate() && a.estimate() < high);
-        // What lies at an end of the interval is just not rejected.
+        // The ends of the interval are just not rejected.
         let shifted = |by: f64| SignedRank::new(&d.map(|x| x - by)).unwrap().p();
         assert!(shifted(low) > 0.05 && shifted(low - 1e-9) <= 0.05);
     }

@@ -1,26 +1,26 @@
-//! Statistics of measured samples: location, spread, intervals, slopes and Pareto fronts.
-//! Tests of hypotheses are in [`crate::hypothesis`].
+//! Statistics of samples: location, spread, intervals, slopes, Pareto fronts; see also
+//! [`crate::hypothesis`].
 //!
-//! A figure that does not exist is `None`, never NaN: every function here answers `None` for an
-//! empty slice and for samples that are not all finite. Intervals are those of Student's t and of
-//! order statistics, because replicates are few: of eight samples a percentile bootstrap covers the
-//! mean in 89 % of all cases and not in 95 %. Figures that are positive have theirs on logarithms, since
-//! they are skewed: of four samples with the distribution of χ² with two degrees of freedom, Student's interval
-//! covers the mean in 88 % of all cases, the one on logarithms in 94 %. No interval covers what samples do
-//! not show: where one image in ten has a firefly that outweighs all else, four images hold one in a third
-//! of all cases.
+//! An undefined figure is `None`, never NaN: every function here returns `None` for an empty slice
+//! or non-finite samples. Intervals use Student's t and order statistics, because replicates are
+//! few: for eight samples, a percentile bootstrap covers the mean in 89 % of cases instead of 95 %.
+//! Positive figures use logarithms, since they are skewed: for four samples of χ² with two degrees
+//! of freedom, Student's interval covers the mean in 88 % of cases, that on logarithms in 94 %. No
+//! interval covers what samples do not show: if one image in ten has a firefly that outweighs all
+//! else, four images contain one in a third of cases.
 
 use crate::interval::{ALPHA, Interval, Spread};
 
-/// From so many samples on there is a 95 % interval of a median: the range of fewer covers it in
-/// 2^(1−n) of all cases less than always, which is 94 % for five.
+/// Minimum sample size for a 95 % interval of a median: the range of n samples covers it with
+/// probability 1 − 2^(1−n), 94 % for five.
 pub const LEAST_FOR_MEDIAN: usize = 6;
 
-/// A line through fewer points has no residuals that could speak against it.
+/// Minimum points for a slope; a line through fewer has no residuals.
 pub(crate) const LEAST_FOR_SLOPE: usize = 3;
 
-/// What differs by no more than this part of its size differs by rounding alone. Sums of 4,000 numbers of f64 err by
-/// less, and no measured noise is as small: radiance has 24 bits, and times of up to ten seconds are whole nanoseconds.
+/// Relative difference attributed to rounding alone. Sums of 4,000 f64 numbers err by less, and no
+/// measured noise is so small: radiance has 24 bits, and times up to ten seconds are whole
+/// nanoseconds.
 pub const ROUNDING: f64 = 1e-12;
 
 /// Arithmetic mean.
@@ -40,12 +40,12 @@ pub fn variance(samples: &[f64]) -> Option<f64> {
     (samples.len() > 1).then(|| sum / (samples.len() - 1) as f64)
 }
 
-/// 95 % interval of an estimate with several independent sources of noise. Each source gives the
-/// estimates that leave out one of its parts, see `jackknife` and [`Spread::together`]. Noise
-/// that two sources only make together counts for both, so the interval is rather too wide.
+/// 95 % interval of an estimate with several independent sources of noise. Each source consists of
+/// the estimates that leave out one of its parts, see `jackknife` and [`Spread::together`]. Noise
+/// from the interaction of two sources counts for both, so the interval is rather too wide.
 ///
-/// A source of fewer than two estimates says nothing; without any the interval has no width. `None`
-/// if something is not finite.
+/// Sources of fewer than two estimates are ignored; without any, the width is 0. `None` if not
+/// finite.
 pub fn jackknife_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     if !value.is_finite() || !sources.iter().flatten().all(|x| x.is_finite()) {
         return None;
@@ -55,16 +55,16 @@ pub fn jackknife_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> 
         .filter_map(|s| Spread::jackknife(s))
         .collect();
     let whole = Spread::together(&spreads);
-    // Estimates that differ by the rounding of their sums are equal.
+    // Differences within the rounding of the sums count as equal.
     if whole.is_rounding(value.abs()) {
         return Some(Interval::exact(value));
     }
     Some(whole.interval(value))
 }
 
-/// [`jackknife_interval`] of a figure that is positive by its nature, taken on logarithms: it holds ratios as
-/// often above as below, is never negative, and covers more of what is skewed to the right. Where the value
-/// or one of the estimates is not positive, there are no logarithms, and the plain interval stands.
+/// [`jackknife_interval`] of a positive figure, on logarithms: symmetric in ratios, never negative,
+/// and with better coverage of right-skewed figures. If the value or an estimate is not positive,
+/// it falls back to the plain interval.
 pub fn positive_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     let positive = |x: &f64| *x > 0.0;
     if !positive(&value) || !sources.iter().flatten().all(positive) {
@@ -73,7 +73,7 @@ pub fn positive_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     let log = |estimates: &Vec<f64>| estimates.iter().map(|x| x.ln()).collect();
     let logs: Vec<Vec<f64>> = sources.iter().map(log).collect();
     let interval = jackknife_interval(value.ln(), &logs)?;
-    // The exponential of a logarithm is not the same number to the last digit.
+    // The exponential of a logarithm may differ in the last digit.
     let end = |log: f64| {
         if log == interval.value {
             value
@@ -88,26 +88,24 @@ pub fn positive_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
     })
 }
 
-/// The samples without the first, without the second, …: what [`jackknife_interval`] is made from.
-/// Nothing for a single sample.
+/// The samples without the first, the second, …, for [`jackknife_interval`]; empty for one.
 pub fn leave_one_out<T: Clone>(samples: &[T]) -> impl Iterator<Item = Vec<T>> {
     let count = if samples.len() > 1 { samples.len() } else { 0 };
     (0..count).map(|left_out| [&samples[..left_out], &samples[left_out + 1..]].concat())
 }
 
-/// `estimator` of the samples with its 95 % interval by the jackknife; of one sample without width.
+/// `estimator` of the samples with its 95 % jackknife interval; zero width for one sample.
 fn interval_of(samples: &[f64], estimator: fn(&[f64]) -> f64) -> Option<Interval> {
     let estimates = leave_one_out(samples).map(|rest| estimator(&rest));
     finite(samples).then(|| jackknife_interval(estimator(samples), &[estimates.collect()]))?
 }
 
-/// [`mean`] with its 95 % interval, which is Student's; the interval of one sample has no width.
+/// [`mean`] with its 95 % Student interval; zero width for one sample.
 pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
     interval_of(samples, raw_mean)
 }
 
-/// Root of the mean of squares with its 95 % interval on logarithms ([`positive_interval`]); not below 0,
-/// of one square without width.
+/// Root mean square with its 95 % [`positive_interval`]; zero width for one square.
 pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
     let root = |squares: &[f64]| raw_mean(squares).sqrt();
     let estimates = leave_one_out(squares).map(|rest| root(&rest)).collect();
@@ -118,16 +116,16 @@ pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
     })
 }
 
-/// [`median`] with the 95 % interval of its order statistics, between two of which it interpolates
-/// (Hettmansperger and Sheather 1986); nothing is assumed of the distribution but that it is
-/// continuous. Of fewer than [`LEAST_FOR_MEDIAN`] samples it is their range, which covers less.
+/// [`median`] with the 95 % interval of its order statistics, interpolated (Hettmansperger and
+/// Sheather 1986); assumes only a continuous distribution. Below [`LEAST_FOR_MEDIAN`] samples it is
+/// their range, which covers less.
 pub fn median_interval(samples: &[f64]) -> Option<Interval> {
     let value = median(samples)?;
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let n = sorted.len();
-    // Coverage of the interval from the k-th least to the k-th greatest: 1 − 2 P(X < k), where X is
-    // binomial with n throws of a coin.
+    // Coverage of the interval from the k-th smallest to the k-th largest: 1 − 2 P(X < k), where X
+    // is binomial with n coin tosses.
     let mut log_chance = -(n as f64) * std::f64::consts::LN_2;
     let mut coverage = 1.0 - 2.0 * log_chance.exp();
     let (mut k, mut share) = (1, 0.0);
@@ -149,13 +147,12 @@ pub fn median_interval(samples: &[f64]) -> Option<Interval> {
     })
 }
 
-/// Slope of the least-squares line through (ln x, ln ȳ), where ȳ is the mean over replicates of y at
-/// that x, with its 95 % interval by a jackknife over whole replicates. −0.5 is the slope of an RMSE
-/// under plain Monte Carlo.
+/// Slope of the least-squares line through (ln x, ln ȳ), where ȳ is the mean over replicates of y
+/// at x, with its 95 % interval from a jackknife over whole replicates. Plain Monte Carlo RMSE has
+/// slope −0.5.
 ///
-/// Each curve is one replicate as (x, y) pairs. Points where x or y is not a positive finite number
-/// are left out. `None` if fewer than `LEAST_FOR_SLOPE` different x remain. A single curve gives an
-/// interval of no width.
+/// Each curve is one replicate as (x, y) pairs. Points where x or y is not positive and finite are
+/// ignored. `None` below `LEAST_FOR_SLOPE` different x. A single curve gives zero width.
 pub fn log_log_slope(curves: &[Vec<(f64, f64)>]) -> Option<Interval> {
     let all: Vec<&[(f64, f64)]> = curves.iter().map(Vec::as_slice).collect();
     let slope = slope_of_mean_curve(&all)?;
@@ -165,8 +162,8 @@ pub fn log_log_slope(curves: &[Vec<(f64, f64)>]) -> Option<Interval> {
     jackknife_interval(slope, &[estimates?])
 }
 
-/// Rank correlation τ-b of pairs (Kendall 1945), which knows ties: 1 where both order alike, -1 where one reverses the
-/// other. `None` below two pairs, and where one of both is the same in all.
+/// Rank correlation τ-b of pairs (Kendall 1945), which handles ties: 1 for the same order, −1 for
+/// the reverse. `None` below two pairs, or if one of both is constant.
 pub fn kendall_tau(pairs: &[[f64; 2]]) -> Option<f64> {
     if !finite(&pairs.concat()) {
         return None;
@@ -183,8 +180,8 @@ pub fn kendall_tau(pairs: &[[f64; 2]]) -> Option<f64> {
     (x > 0.0 && y > 0.0).then(|| sum as f64 / (x * y).sqrt())
 }
 
-/// Indices of the points that no other point beats, smaller being better in both coordinates, by
-/// increasing first coordinate. Equal points on the front are all kept; points with a NaN never are.
+/// Indices of the non-dominated points, smaller being better in both coordinates, by increasing
+/// first coordinate. Includes equal points on the front; never points with a NaN.
 pub fn pareto_front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len())
         .filter(|&i| !points[i].0.is_nan() && !points[i].1.is_nan())
@@ -228,8 +225,8 @@ pub fn log_log_fit(points: &[(f64, f64)]) -> Option<f64> {
     slope_of_mean_curve(&[points])
 }
 
-/// What each ln y counts for in the slope of the least-squares line through (ln x, ln y): the slope is the sum of the
-/// products. `None` unless all x are positive and two of them differ.
+/// Weights of each ln y in the slope of the least-squares line through (ln x, ln y): the slope is
+/// the weighted sum. `None` unless all x are positive and two of them differ.
 pub(crate) fn slope_weights(x: &[f64]) -> Option<Vec<f64>> {
     let logs: Vec<f64> = x.iter().map(|x| x.ln()).collect();
     let centre = mean(&logs)?;

@@ -1,5 +1,5 @@
-//! A figure from outside the crate: one row and the code that measures it, and it stands in the records and
-//! wherever figures are shown.
+//! A figure from outside the crate: one row and the code that measures it, and it appears in
+//! records and everywhere figures are shown.
 
 use crate::support;
 use raystone::accel::{BuiltAccel, TriangleSoup};
@@ -10,7 +10,6 @@ use raystone::run::Registries;
 use std::path::Path;
 use std::process::Command;
 
-/// The row.
 const LARGEST_LEAF: Figure = Figure::new(
     "largest-leaf/v1",
     "largest leaf",
@@ -20,7 +19,7 @@ const LARGEST_LEAF: Figure = Figure::new(
     Spread::Exact,
 );
 
-/// The code that measures it: of trees, since cells of grids are no leaves.
+/// Measures trees only, since grid cells are not leaves.
 fn largest_leaf(built: &dyn BuiltAccel, _: &TriangleSoup) -> Option<f64> {
     let stats = built.stats();
     stats.depth?;
@@ -40,7 +39,7 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Every text in which the figure has to stand: the page, the summary, the export and the terminal.
+/// Every text that must contain the figure: the page, the summary, the export and the terminal.
 fn shown(out: &Path, lines: &[Line]) -> [String; 4] {
     let [page, summary, export] =
         ["index.html", "summary.md", "figures.csv"].map(|name| read(&out.join(name)));
@@ -79,7 +78,7 @@ fn a_figure_from_outside_stands_in_records_page_summary_export_and_terminal() {
         .collect();
     assert_eq!(export.len(), 1, "{}", texts[2]);
     assert!(export[0].starts_with("cornell-box,bvh,"), "{export:?}");
-    // The program, which knows nothing of it, shows it from the records alone.
+    // The program, which does not know it, shows it from the records alone.
     std::fs::remove_file(folder.path().join("index.html")).expect("a page");
     let again = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .arg("report")

@@ -1,5 +1,5 @@
-//! A measurement from outside the crate: this file and one line of a registry, and it is planned, timed, resumed, recorded, shown,
-//! compared and exported like those of the program.
+//! A measurement from outside the crate: with this file and one registry line it is planned, timed,
+//! resumed, recorded, shown, compared and exported like the program's own.
 
 use crate::support;
 use raystone::accel::{Query, RayBatch, Tracer};
@@ -16,7 +16,6 @@ use raystone::run::{
 use std::path::Path;
 use std::process::Command;
 
-/// The figures.
 static FIGURES: [Figure; 2] = [
     Figure::new(
         "camera-ns/v1",
@@ -112,7 +111,7 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// What the program, which knows nothing of the measurement, prints.
+/// Output of the program, which does not know the measurement.
 fn raystone(arguments: &[&str]) -> String {
     let out = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .args(arguments)
@@ -121,7 +120,6 @@ fn raystone(arguments: &[&str]) -> String {
     String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
 }
 
-/// The cells of a measurement.
 fn cells<'a>(lines: &'a [Line], measurement: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
     let measured = all_of::<MeasuredRecord>(lines);
     measured
@@ -156,7 +154,7 @@ fn a_measurement_from_outside_is_planned_timed_resumed_shown_compared_and_export
             assert_eq!(rays.value.value, 32.0 * 24.0);
         }
     }
-    // Nothing is left to do for a second run of the same.
+    // A repeated run has nothing left to do.
     let options = RunOptions {
         out: first.clone(),
         existing: Existing::Resume,

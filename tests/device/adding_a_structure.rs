@@ -1,5 +1,5 @@
-//! Keeps `docs/adding-a-structure.md` true: the structure that it adds goes through the public
-//! interface and the whole gate, and every file that it quotes is quoted rightly.
+//! Verifies `docs/adding-a-structure.md`: the structure that it adds passes through the public
+//! interface and the whole correctness check, and every quoted file is quoted correctly.
 
 mod device_slabs;
 mod sorted_slabs;
@@ -51,7 +51,7 @@ sequence = "pixel-hash"
 seed = 2
 "#;
 
-/// The gate of every cell of the experiment, with the kernels of a folder in the place of those that came along.
+/// Verdicts on every cell of the experiment, with its own kernels or those of a folder.
 fn verdicts(kernels: Option<&Path>) -> Vec<GateVerdict> {
     let mut registries = Registries::default();
     registries.accel.register(&SortedSlabs);
@@ -130,7 +130,7 @@ fn kernel_and_twin_equal_brute_force_on_hard_scenes() {
     }
 }
 
-/// Kernels of `device-slabs`, with a change in the one that builds.
+/// Kernels of `device-slabs`, with a change in the building one.
 fn building(from: &str, to: &str) -> KernelLibrary {
     let changed = |(name, text): &(&'static str, &'static str)| match *name {
         "accel/device_slabs" => (*name, text.replace(from, to)),

@@ -1,5 +1,5 @@
-//! A ray–triangle test from outside the crate: one type, one kernel and one line of registering, and every
-//! structure, the judge, the gate, sweeps and records follow it. And what sweeps over tests and offsets show.
+//! A ray-triangle test from outside the crate: one type, one kernel and one registry line;
+//! structures, the reference tracer, checks, sweeps and records use it.
 
 use crate::support;
 use raystone::accel::triangle::{APART, Meeting, TriangleRecord, TriangleTest, plane_error};
@@ -13,8 +13,8 @@ use raystone::measure::record::{
 use raystone::params::Sources;
 use raystone::run::Registries;
 
-/// The test as its paper prints it; a crooked one lets no ray in whose second weight is small, unlike its
-/// kernel.
+/// The test as its paper prints it; a `crooked` one rejects rays with a small second weight, unlike
+/// its kernel.
 struct AsPublished {
     crooked: bool,
 }
@@ -85,7 +85,7 @@ fn run(registries: &Registries, axes: &str) -> Vec<Line> {
     support::run(&text, registries, folder.path(), None).1
 }
 
-/// Whether the structures passed, by triangle test and structure.
+/// Verdicts by structure, for a triangle test.
 fn verdicts<'a>(lines: &'a [Line], test: &str) -> Vec<(&'a str, bool)> {
     let structures = all_of::<StructureRecord>(lines);
     let of_test = structures.filter(|s| s.key.name(axis::TRIANGLE) == test);
@@ -166,8 +166,8 @@ fn the_judge_follows_the_test_of_its_soup() {
     assert_eq!(hits(&CROOKED), raystone::accel::NO_HIT);
 }
 
-/// Rays that start in the surface that they leave meet it again here and there: the axis shows the error that
-/// this makes, since references are rendered with the default offset.
+/// Rays sometimes hit the surface they leave again: the axis shows the resulting error, as
+/// references are rendered with the default offset.
 #[test]
 fn a_sweep_over_offsets_shows_the_bias_of_rays_that_are_not_moved() {
     let lines = run(

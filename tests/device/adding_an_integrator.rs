@@ -1,5 +1,5 @@
-//! A sequence, a decorrelation and integrators from outside the program, with kernels of their own, in a run
-//! like any other; and an integrator of passes, whose image is that of a single kernel to the bit.
+//! A sequence, a decorrelation and integrators from outside the program, with their own kernels, in
+//! an ordinary run; and a multi-pass integrator bit-identical to a single kernel.
 
 mod deferred;
 mod facing;

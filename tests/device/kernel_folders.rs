@@ -1,5 +1,4 @@
-//! Folders of kernels in the place of the embedded ones: what a run of them leaves behind, and what is
-//! refused.
+//! Kernel folders replacing the embedded kernels: traces they leave in a run, and refusals.
 
 use crate::support;
 use raystone::config::Axis;
@@ -11,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A path tracer whose bias shows, and what a test changes.
+/// A path tracer with a detectable bias, and a test's changes.
 fn experiment(changes: &[&str]) -> String {
     let common = [
         "run.replicates = 8",
@@ -37,20 +36,20 @@ fn write(folder: &Path, file: &str, text: impl AsRef<[u8]>) {
     std::fs::write(path, text).expect("a written file");
 }
 
-/// The path tracer with one text in the place of another.
+/// Writes the path tracer with one text replaced.
 fn changed(folder: &Path, from: &str, to: &str) {
     let text = embedded("integrator/path");
     assert_eq!(text.matches(from).count(), 1);
     write(folder, "integrator/path.wesl", text.replace(from, to));
 }
 
-/// The path tracer without the weights of multiple importance sampling: emission is counted twice.
+/// The path tracer without the weights of multiple importance sampling: emission counts twice.
 fn without_weights(folder: &Path) {
     let weight = "weight = found_weight(density, light_pdf(leaving, surface, hit));";
     changed(folder, weight, "weight = 1.0;");
 }
 
-/// The path tracer in other words.
+/// The path tracer, rephrased.
 fn in_other_words(folder: &Path) {
     let from = "var result = vec3<f32>(0.0);";
     changed(folder, from, "var result = vec3<f32>(0.0, 0.0, 0.0);");
@@ -64,7 +63,7 @@ fn program(arguments: &[&str]) -> Output {
     output.expect("the program starts")
 }
 
-/// Runs the experiment with these kernels in the place of the embedded ones and beside them.
+/// Runs the experiment with these kernels instead of, or next to, the embedded ones.
 fn lines(out: &Path, kernels: &[&str]) -> Vec<Line> {
     let kernels: Vec<String> = kernels.iter().map(|name| format!("{name:?}")).collect();
     let text = experiment(&[&format!("axes.kernels = [{}]", kernels.join(", "))]);
@@ -74,8 +73,8 @@ fn lines(out: &Path, kernels: &[&str]) -> Vec<Line> {
     text.lines().map(parse).collect()
 }
 
-/// One fault in an integrator, beside the original: it is seen against a reference without the fault, and
-/// nothing of it looks like the original in the records.
+/// A faulty integrator next to the original: it is detected against a reference without the fault,
+/// and none of its records look like the original's.
 #[test]
 fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -139,7 +138,7 @@ fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
             .expect("a record");
         found.ran.kernel_hash.clone()
     };
-    // The traversal is the same text, the path tracer is not.
+    // The traversal has the same text, the path tracer does not.
     let structure = |r: &Body| matches!(r, Body::Structure(_));
     assert_eq!(kernel(&original, structure), kernel(&changed, structure));
     let time = |r: &Body| matches!(r, Body::Time(_));
@@ -155,7 +154,7 @@ fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
     }
 }
 
-/// With other kernels alone the reference is still that of the embedded ones.
+/// With only other kernels the reference is still that of the embedded ones.
 #[test]
 fn the_reference_is_that_of_the_embedded_kernels_whatever_runs() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -219,7 +218,7 @@ fn a_test_that_the_adapter_cannot_keep_is_skipped_with_its_reason() {
     );
 }
 
-/// What every command says to a folder, and that it ends with 2.
+/// The answer of every command to a folder, with exit code 2.
 fn refusal(folder: &Path) -> String {
     let folder = folder.to_str().expect("UTF-8");
     let mut said = BTreeSet::new();

@@ -1,6 +1,5 @@
-//! Every kernel that an experiment can ask for composes and validates, stays within WebGPU's
-//! default limits, carries no counters unless asked, and has structs laid out like Rust's. No
-//! adapter is needed.
+//! Every kernel that an experiment can request composes and validates, stays within WebGPU's
+//! default limits, contains counters only on request, and has Rust's struct layout. No adapter.
 
 mod covering;
 mod families;
@@ -15,13 +14,13 @@ use std::collections::BTreeSet;
 use std::mem::{offset_of, size_of};
 use std::sync::LazyLock;
 
-/// Kernels that answer rays, make images at once, and with queues between them.
+/// Kernels that answer rays, render in one kernel, and render with queues.
 static FAMILIES: LazyLock<[Family; 3]> = LazyLock::new(|| [batches(), renderers(), queued()]);
 
 /// Storage buffers that WebGPU promises.
 const BUFFERS: usize = 8;
 
-/// Why the kernel breaks WebGPU's default limits, if it does; of storage buffers it may have so many.
+/// The WebGPU default limit exceeded by the kernel, if any, allowing `buffers` storage buffers.
 fn broken_limit(wgsl: &str, buffers: usize) -> Option<String> {
     let count = |what: &str| wgsl.matches(what).count();
     let storage = count("var<storage");
@@ -52,15 +51,14 @@ fn compose_within_limits(library: &KernelLibrary, kernel: &Composition) -> Strin
     wgsl
 }
 
-/// Whether a kernel counts anything.
 fn counts(wgsl: &str) -> bool {
     ["count_", "counters", "ray_counts"]
         .iter()
         .any(|word| wgsl.contains(word))
 }
 
-/// What is wrong with a kernel: it does not compose, breaks a limit, or counts what nobody asked for. Whether it has to count where it is
-/// asked to, `must_count` says.
+/// The fault of a kernel: it does not compose, exceeds a limit, or counts without request.
+/// `must_count` says if it has to count on request.
 fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Option<String> {
     let wgsl = match library.compose(kernel) {
         Ok(composed) => composed.wgsl,
@@ -69,7 +67,7 @@ fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Opt
     let asked = ["counters", "ray_counts"]
         .iter()
         .any(|f| kernel.features.contains(*f));
-    // What shades in an order has one more where the scene is in no textures: adapters without it refuse that organisation.
+    // Ordered shading uses one more buffer if the scene is not in textures, or is refused.
     let has = |feature: &str| kernel.features.contains(feature);
     let in_order = has("sorted_hits") || has("by_kind");
     let has_more = kernel.entry == "organisation/shade" && in_order && !has("scene_texels");
@@ -82,7 +80,7 @@ fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Opt
     }
 }
 
-/// Composes all kernels of a family, of which there are so many or more.
+/// Composes all kernels of a family, of which there are at least `least`.
 fn see_that_all_are_sound(family: &Family, least: usize, must_count: impl Fn(&str) -> bool + Sync) {
     let (library, kernels) = (KernelLibrary::default(), &family.kernels);
     println!("{} kernels: {:?}", kernels.len(), family.levels());
@@ -131,22 +129,22 @@ fn any_two_choices_meet_in_a_row_unless_they_clash() {
     }
     assert_eq!(met, pairs(&levels, clash));
     assert!(!met.contains(&((0, 6), (3, 1))) && met.contains(&((0, 6), (3, 0))));
-    // No fewer can do, and not many more are needed.
+    // Fewer are impossible, and few more are needed.
     assert!((35..50).contains(&rows.len()), "{} rows", rows.len());
 }
 
-/// A fault that shows in kernels with both choices, and in no others.
+/// A fault that shows only in kernels with both choices.
 struct Planted<'a> {
     family: &'a Family,
-    /// What stands in a function of a module, and is put behind its first line.
+    /// A module, and the text in one of its functions after which the fault is inserted.
     at: (&'static str, &'static str),
     fault: &'static str,
     both: [Chosen; 2],
 }
 
 impl Planted<'_> {
-    /// The kernels with the fault. One that names `PLANTED` of the module in a role is none where that has such a name: all have it but
-    /// the second choice.
+    /// The kernels with the fault. A fault that uses `PLANTED` of the module in a role only shows
+    /// with the second choice: all other modules define it.
     fn library(&self) -> KernelLibrary {
         let library = KernelLibrary::default();
         let (module, line) = self.at;
@@ -172,7 +170,7 @@ impl Planted<'_> {
         library.with_sources(&sources)
     }
 
-    /// Whether some kernel with both choices fails, and none of some others does.
+    /// True if some kernel with both choices fails, and none of some others does.
     fn is_seen(&self) -> bool {
         let library = self.library();
         let [a, b] = self.both;
@@ -333,7 +331,7 @@ fn structs_of_kernels_are_laid_out_like_those_of_rust() {
     ]);
     let record_size = size_of::<TriangleRecord>() as u32;
     assert_eq!(layout(&module, "TriangleRecord"), (record_size, record));
-    // Rust may order the fields of Counters as it likes: names and number are what counts.
+    // Rust may reorder the fields of Counters: only names and number matter.
     let (span, members) = layout(&module, "Counters");
     assert_eq!(span as usize, size_of::<Counters>());
     let Counters {

@@ -1,4 +1,4 @@
-//! How a device is used: kernels, recordings, passes, organisations of kernels, and what users add of all these.
+//! Tests of the device: kernels, recordings, passes, organisations, and user additions.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! Orders of pixels: whatever the order, the image is that of one pass to the bit, and the first picture has no gap.
+//! Pixel orders: images are bit-identical to a single pass, and the first picture has no gaps.
 
 use crate::support;
 use crate::support::{Stage, sampler_of, variant};
@@ -10,11 +10,11 @@ use raystone::integrator::order::splat;
 use raystone::integrator::{IntegratorRegistry, Order, PartRenderer, RenderJob};
 use raystone::params::Choice as _;
 
-/// No multiple of a tile.
+/// Not a multiple of a tile.
 const SIZE: [u32; 2] = [53, 38];
 const SPP: u32 = 3;
 
-/// The image of three samples in an order, with kernels of a library, the sums after the first pass, and the passes.
+/// The image of three samples in an order, with a kernel library, first sums, and passes.
 fn in_order(
     order: Order,
     kernels: Option<KernelLibrary>,
@@ -79,7 +79,7 @@ fn images_of_all_orders_equal_that_of_whole_samples_to_the_bit() {
             "{}",
             order.name()
         );
-        // One bit of one sum is seen.
+        // A single wrong bit is detected.
         let mut sums = vec![[1.0; 4]; all];
         let same = splat(&sums, SIZE);
         sums[all / 2][1] = 1.0 + f32::EPSILON;
@@ -91,9 +91,9 @@ fn images_of_all_orders_equal_that_of_whole_samples_to_the_bit() {
 fn faults_of_the_kernel_are_seen() {
     let expected = whole();
     let faults = [
-        // Each part is the first one, moved by nothing.
+        // Each part is the first one, without displacement.
         ("part.first_x + part.step * id.x", "part.step * id.x"),
-        // The last column of each part is left out.
+        // The last column of each part is missing.
         ("id.x >= part.columns", "id.x + 1u >= part.columns"),
         // The seed is that of the place within the part.
         (
@@ -102,7 +102,7 @@ fn faults_of_the_kernel_are_seen() {
         ),
         // All samples are the first.
         ("frame.first_sample + i", "i"),
-        // Sums begin anew.
+        // Sums restart.
         ("var sum = accumulation[pixel]", "var sum = vec4<f32>(0.0)"),
     ];
     for (from, to) in faults {

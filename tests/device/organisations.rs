@@ -1,5 +1,5 @@
-//! Organisations of the path tracer: all make the image of the single kernel to the bit, whatever the structure, the queues' length,
-//! compaction and sorting; and planted faults do not.
+//! Organisations of the path tracer: bit-identical to the single kernel for any structure, queue
+//! length, compaction and sorting; planted faults are detected.
 
 mod kinds;
 
@@ -15,11 +15,10 @@ use raystone::integrator::{
 use raystone::params::{ParamValue, Params, Variant};
 use raystone::scene::SceneData;
 
-/// No multiple of the eight pixels of a workgroup's edge.
+/// Not a multiple of the workgroup's edge of eight pixels.
 const SIZE: [u32; 2] = [37, 29];
 const SPPS: [u32; 2] = [1, 3];
 
-/// An organisation of this name with these parameters.
 fn organisation(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
     let changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone()));
     Variant {
@@ -48,7 +47,7 @@ fn organised(what: &Variant, by: &Variant) -> Result<ConfiguredIntegrator, Strin
     integrator.organised(OrganisationRegistry::default().configured(by)?)
 }
 
-/// Images, each pixel by the bits of its channels.
+/// Images as bits of the channels per pixel.
 type Bits = Vec<Vec<[u32; 3]>>;
 
 /// Bits of the images after [`SPPS`] samples, and rays by class.
@@ -83,7 +82,7 @@ fn glass_box() -> SceneData {
     builtin("cornell-box", &[("glass", ParamValue::Flag(true))])
 }
 
-/// A closed room with glass, copies in the open, and what is cut out by masks.
+/// A closed room with glass, instances in the open, and masked surfaces.
 fn scenes() -> [SceneData; 3] {
     [
         glass_box(),
@@ -207,12 +206,12 @@ fn what_cannot_be_organised_so_is_refused_with_the_reason() {
     }
 }
 
-/// What is wrong where a kernel has this fault; nothing if the image is that of the single kernel.
+/// The error with this kernel fault; `None` if the image is that of the single kernel.
 fn fault(by: &Variant, module: &str, from: &str, to: &str) -> Option<String> {
     fault_on(glass_box(), &path(4), by, (module, from, to))
 }
 
-/// The same on a scene, of an integrator.
+/// [`fault`] on a scene, with an integrator.
 fn fault_on(
     scene: SceneData,
     what: &Variant,
@@ -233,7 +232,7 @@ fn fault_on(
 
 #[test]
 fn a_tree_of_lights_knows_the_surface_that_a_ray_has_left() {
-    // A wall that shines beside the lamp: rays find lights that a tree would have chosen by the surface they come from.
+    // A shining wall next to the lamp: rays find lights that a tree selects by surface.
     let lamps = || {
         let mut scene = builtin("cornell-box", &[]);
         scene.materials[0].emission = Vec3::splat(0.5);
@@ -244,7 +243,7 @@ fn a_tree_of_lights_knows_the_surface_that_a_ray_has_left() {
     let paths = |from, to| fault_on(lamps(), &tree, &several, ("organisation/paths", from, to));
     let normal = "vec4<f32>(s.path.normal,";
     assert_eq!(paths(normal, "vec4<f32>( s.path.normal,"), None);
-    // Stored twice a bounce: a sign that is lost twice is not lost.
+    // Stored twice per bounce: a sign lost twice is not lost.
     assert!(paths(normal, "vec4<f32>(s.path.normal.yzx,").is_some());
 }
 
@@ -283,7 +282,7 @@ fn planted_faults_are_seen() {
             "if (next + 1u < batch.total)",
         ),
         (&queues, "finish", "select(0u, 1u, stored.is_alive)", "1u"),
-        // Answers of neighbours, of none, and turned round.
+        // Answers of neighbours, of none, and reversed.
         (
             &queues,
             "finish",
@@ -299,7 +298,7 @@ fn planted_faults_are_seen() {
         (&several, "finish", ".x == 0u", ".x != 0u"),
         (&several, "finish", "stored.shadow = NO_SHADOW;", ""),
         (&several, "shade", "answers[place]", "answers[place ^ 1u]"),
-        // What a path is between its rays.
+        // Path state between rays.
         (
             &several,
             "paths",
@@ -324,7 +323,7 @@ fn planted_faults_are_seen() {
             "number % frame.samples",
             "(number + 1u) % frame.samples",
         ),
-        // The order of samples, and a result that is kept.
+        // The order of samples, and a stale result.
         (
             &several,
             "accumulate",
@@ -343,7 +342,7 @@ fn planted_faults_are_seen() {
             "frame.first_sample + done",
             "frame.first_sample",
         ),
-        // Orders that are none.
+        // Invalid orders.
         (
             &sorted("ray-key"),
             "ray_keys",

@@ -1,5 +1,5 @@
-//! A structure that answers rays in passes of its own goes through gate, timing, counters, a run and its
-//! report like any other, and nothing in the program knows of it.
+//! A structure that answers rays in its own passes goes through check, timing, counters, a run and
+//! its report like any other, without special treatment.
 
 mod sorted_rays;
 
@@ -81,7 +81,7 @@ fn rays_in_another_order_get_the_same_answers_and_counters() {
     let mut random = Pcg::new(5);
     for case in scenes::degenerate_cases() {
         let mut rays = scenes::aimed_rays(&mut random, &case.soup, 700);
-        // What is no ray has no key, and an answer all the same.
+        // An invalid ray has no key, but still an answer.
         rays[3].origin[1] = f32::NAN;
         rays[4].direction = [f32::INFINITY, 0.0, f32::NAN];
         let params = default_params(&Bvh.parameters());
@@ -176,7 +176,7 @@ fn a_run_times_counts_and_reports_it_and_leaves_out_single_kernel_integrators() 
         let found = says(&["\"timings\"", "mrays_s", &format!("\"{name}\"")]);
         assert!(found >= 1, "{name}: {records}");
     }
-    // Images are made with the structure that kernels can import, and the others are left out.
+    // Images use the structure that kernels can import, and the others are skipped.
     for name in ["sorted-rays", "uncounted-rays"] {
         assert_eq!(
             says(&["\"skipped\"", "answers buffers of rays", name]),
@@ -189,14 +189,13 @@ fn a_run_times_counts_and_reports_it_and_leaves_out_single_kernel_integrators() 
     assert!(page.contains("sorted-rays") && page.contains("uncounted-rays"));
 }
 
-/// What stands in answers that nobody gave.
 const NO_ANSWER: [u32; 4] = [0xffff_dead; 4];
-/// Rays of a buffer, those that are to be answered, and how many of them there are.
+/// Rays in a buffer, and how many of them are live.
 const RAYS: u32 = 900;
 const RANGE: std::ops::Range<u32> = 100..800;
 const LIVE: u32 = 300;
 
-/// Answers of a buffer through a structure, where the device says how many of the rays there are.
+/// Answers of a buffer through a structure, with the number of rays determined on the device.
 fn live_answers(gpu: &Gpu, kind: &dyn AccelKind, query: Query) -> Vec<[u32; 4]> {
     let stage = support::Stage::builtin(gpu, "cornell-box", &[]);
     let tracer = stage.tracer(&stage.traced(gpu, kind), query);
@@ -209,7 +208,7 @@ fn live_answers(gpu: &Gpu, kind: &dyn AccelKind, query: Query) -> Vec<[u32; 4]> 
         answers: answers.clone(),
         status: stored(&[0; 16]),
     };
-    // Another number stands beside it.
+    // Another number is next to it.
     let live = LiveRays {
         counts: stored(&[7, LIVE]),
         word: 1,
@@ -225,7 +224,7 @@ fn live_answers(gpu: &Gpu, kind: &dyn AccelKind, query: Query) -> Vec<[u32; 4]> 
     words.as_chunks::<4>().0.to_vec()
 }
 
-/// Whether live rays have the answers of the plain BVH, and the others none.
+/// True if live rays have the answers of the plain BVH, and the others none.
 fn only_live_rays_are_answered(gpu: &Gpu, kind: &dyn AccelKind) -> bool {
     [Query::Closest, Query::Any].into_iter().all(|query| {
         let expected = live_answers(support::gpu(), &Bvh, query);
@@ -249,7 +248,7 @@ fn of_rays_that_the_device_counts_the_live_ones_alone_are_answered_by_structures
         assert!(only_live_rays_are_answered(&gpu, kind), "{}", kind.name());
     }
     for (from, to) in [
-        // All that there is room for, one too few, the number of others, behind the end of the range.
+        // All that fit, one too few, the number of others, behind the end of the range.
         ("min(batch.count, live[batch.word])", "batch.count"),
         (
             "min(batch.count, live[batch.word])",

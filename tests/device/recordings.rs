@@ -1,4 +1,4 @@
-//! Recordings: steps in order, one submission, times per step, nothing made twice, limits.
+//! Recordings: ordered steps, one submission, times per step, nothing made twice, limits.
 
 use crate::support::{alone, open};
 use raystone::gpu::{
@@ -37,7 +37,7 @@ fn adding(number: u32, words: &Storage) -> Bindings {
     bindings
 }
 
-/// Clears, adds 3 to all words, then 40 to those of so many workgroups as a step before decides.
+/// Clears, adds 3 to all words, then 40 to those of as many workgroups as an earlier step decides.
 fn recording(words: &Storage, wanted: u32) -> Recording {
     let groups = Storage::scratch("groups", 12);
     let mut plan = Bindings::new();
@@ -93,7 +93,7 @@ fn what_is_played_again_makes_nothing_new() {
         assert_eq!(played.download::<u32>("after").expect("words"), [43; 256]);
     }
     assert_eq!(player.made(), made);
-    // More scratch than before is new.
+    // A larger scratch buffer is a new one.
     let mut larger = Recording::new();
     larger.clear(Storage::scratch("copy", 2 * BYTES));
     player.play(&larger).expect("it plays");
@@ -227,7 +227,7 @@ fn kernels_that_are_compared_are_compiled_apart_and_in_turns() {
             .with_folder(&folder)
             .expect("kernels")
     };
-    // The same texts under another name: a library of its own.
+    // The same texts under another name: a separate library.
     let other = tempfile::tempdir().expect("a folder");
     std::fs::write(other.path().join("beside.wesl"), "const BESIDE = 1u;").expect("a file");
     let other = library().with_folder(other.path()).expect("kernels");

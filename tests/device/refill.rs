@@ -1,5 +1,5 @@
-//! Lane refill: invocations that answer several rays, one after the other, find what those of one ray find
-//! and work as much for it; and what could go wrong between two rays is seen.
+//! Lane refill: invocations that answer several rays in turn find the same hits with the same work
+//! as those of one ray; faults between two rays are detected.
 
 use crate::support;
 use crate::support::{
@@ -13,7 +13,7 @@ use raystone::params::{ParamValue, Params};
 const REFILLED: [&str; 3] = ["bvh", "bvh4", "cwbvh"];
 const KERNEL: &str = "integrator/trace_rays";
 
-/// A soup, and rays that are no multiple of anything; one of them is none.
+/// A soup, and an odd number of rays; one of them is invalid.
 fn subject(rays: usize) -> (TriangleSoup, Vec<Ray>) {
     let mut rng = Pcg::new(23);
     let soup = scenes::lattice_soup(&mut rng, 600, 9);
@@ -37,7 +37,7 @@ fn with_refill(kind: &dyn AccelKind, refill: &str, rays_per_lane: i64) -> Params
     params
 }
 
-/// Hits, whether there is any, and the work of both.
+/// Hits, any-hit flags, and the work of both.
 type Answers = (Vec<Hit>, Vec<bool>, Vec<Counters>, Vec<Counters>);
 
 fn answers(
@@ -80,8 +80,8 @@ fn what_is_found_and_counted_does_not_depend_on_it() {
     }
 }
 
-/// Whether refilled invocations with this fault in a kernel are told from those without refill; what raises
-/// the error word is.
+/// True if this kernel fault makes refilled invocations differ from those without refill, or raises
+/// the error word.
 fn is_seen(subject: &(TriangleSoup, Vec<Ray>), fault: (&str, &str, &str)) -> bool {
     let (module, from, to) = fault;
     let gpu = open(kernels_with(module, &[(from, to)]));

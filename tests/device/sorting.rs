@@ -1,9 +1,9 @@
-//! The radix sort of the device against the host's stable sort, and faults that this comparison sees.
+//! The device's radix sort against the host's stable sort, and faults that this comparison detects.
 
 use crate::support::{Pcg, gpu, kernels_with, open};
 use raystone::gpu::{Gpu, KernelLibrary, Pairs, RadixSort, Recording};
 
-/// Sorts on the device by the lowest `bits`, and returns keys and values.
+/// Sorts on the device by the lowest `bits`; returns keys and values.
 fn sorted(gpu: &Gpu, keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     let count = keys.len() as u32;
     let values: Vec<u32> = (0..count).collect();
@@ -20,7 +20,7 @@ fn sorted(gpu: &Gpu, keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
         .download("keys", &out.keys)
         .download("values", &out.values);
     let played = gpu.play(&recording).unwrap_or_else(|e| panic!("{e}"));
-    // A buffer of few words is longer than they are.
+    // A buffer of few words is longer than needed.
     let words = |name: &str| {
         let mut words: Vec<u32> = played.download(name).expect("words");
         words.truncate(keys.len());
@@ -29,7 +29,7 @@ fn sorted(gpu: &Gpu, keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     (words("keys"), words("values"))
 }
 
-/// The same on the host.
+/// [`sorted`] on the host.
 fn expected(keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     let mut values: Vec<u32> = (0..keys.len() as u32).collect();
     // Whole digits.
@@ -39,7 +39,6 @@ fn expected(keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     (keys, values)
 }
 
-/// Keys of several kinds, by name.
 fn kinds(random: &mut Pcg, count: u32) -> Vec<(&'static str, Vec<u32>)> {
     let mut of = |key: &mut dyn FnMut(&mut Pcg, u32) -> u32| -> Vec<u32> {
         (0..count).map(|place| key(random, place)).collect()

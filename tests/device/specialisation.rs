@@ -1,4 +1,4 @@
-//! Kernels without what a scene does not need give the images of those that carry it all, to the bit.
+//! Kernels without features that a scene does not need give bit-identical images.
 
 use crate::support::*;
 use glam::Vec3;
@@ -18,14 +18,13 @@ const GROUPS: [&str; 7] = [
     "transforms",
 ];
 
-/// Parameters of `path` by name.
 type Changes<'a> = Vec<(&'a str, ParamValue)>;
 
 fn word<'a>(key: &'a str, value: &str) -> (&'a str, ParamValue) {
     (key, ParamValue::Name(value.to_owned()))
 }
 
-/// A kernel's image, features that it was compiled with and without, and hash.
+/// A kernel's image, the features it was compiled with and without, and its hash.
 struct Rendered {
     bits: Vec<[u32; 3]>,
     features: Vec<String>,
@@ -50,7 +49,7 @@ fn rendered(stage: &Stage, changes: &Changes, carry: &str) -> Rendered {
     }
 }
 
-/// Pixels in which kernels that carry these groups differ from the specialised one.
+/// Pixels in which kernels with these groups differ from the specialised one.
 fn differing(stage: &Stage, changes: &Changes, carried: &[&str]) -> Vec<String> {
     let plain = rendered(stage, changes, "none");
     let mut wrong = Vec::new();
@@ -68,14 +67,14 @@ fn differing(stage: &Stage, changes: &Changes, carried: &[&str]) -> Vec<String> 
         let gained: Vec<&String> = plain.left_out.iter().filter(gained).collect();
         let has = |name: &&&String| full.features.contains(**name);
         assert!(gained.iter().all(|name| has(&name)), "{gained:?}");
-        // Estimators that choose no light have no choice to carry.
+        // Estimators that choose no light carry no choice.
         let same = plain.kernel == full.kernel;
         assert!(same == gained.is_empty() || !changes.is_empty(), "{carry}");
     }
     wrong
 }
 
-/// A grey floor under a map of the environment, alone or with a lamp.
+/// A grey floor under an environment map, alone or with a lamp.
 fn under_a_map(lamp: bool) -> SceneData {
     let mut scene = builtin("lamp", &[word("kind", "rectangle")]);
     if !lamp {

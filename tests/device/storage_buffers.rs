@@ -1,11 +1,9 @@
-//! A path tracer leaves room among the eight storage buffers that WebGPU promises.
+//! A path tracer uses fewer than the eight storage buffers that WebGPU guarantees.
 
 use crate::support::*;
 
-/// Most storage buffers of a path tracer.
 const MOST: usize = 6;
 
-/// Storage buffers of a composed kernel.
 fn storage_buffers(kernel: &str) -> usize {
     kernel.matches("var<storage").count()
 }

@@ -1,5 +1,5 @@
-//! Workgroups: hits and images do not depend on how many invocations start together, nor on the shape of the pixels that they
-//! take; planted faults show. Nor does a dispatch take long, however slow what it does.
+//! Workgroups: hits and images do not depend on workgroup size, nor on the shape of their pixels;
+//! planted faults are detected. No dispatch takes long, however slow its work.
 
 use crate::support::*;
 use raystone::accel::{Hit, Query, Ray, Traced, Workgroup, WorkgroupRegistry};
@@ -10,12 +10,11 @@ use raystone::integrator::{
 use raystone::params::{ParamValue, Params, Variant};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// No multiple of any edge, nor its pixels of any workgroup.
+/// Not a multiple of any edge, nor its pixels of any workgroup.
 const SIZE: [u32; 2] = [37, 29];
-/// Nor these rays: with the slices of a batch (64, 512, …) every kernel has a group that is not full.
+/// Nor these rays: with the slices of a batch (64, 512, …) every kernel has a partial group.
 const RAYS: usize = 5003;
 
-/// The workgroup of this name.
 fn workgroup(name: &str) -> Workgroup {
     *WorkgroupRegistry::default()
         .named("workgroup", name)
@@ -27,7 +26,7 @@ fn in_groups(gpu: &Gpu, traced: &Traced, name: &str) -> Traced {
     traced.expect("an inline structure")
 }
 
-/// A small scene with copies, and rays at it and past it; one of them is none.
+/// A small scene with instances, and rays at it and past it; one of them is invalid.
 fn subject(gpu: &Gpu) -> (Stage, Vec<Ray>) {
     let stage = Stage::builtin(gpu, "instances", &[("count", ParamValue::Integer(9))]);
     let mut rays = scenes::aimed_rays(&mut Pcg::new(5), &stage.soup, RAYS);
@@ -35,7 +34,7 @@ fn subject(gpu: &Gpu) -> (Stage, Vec<Ray>) {
     (stage, rays)
 }
 
-/// Nearest hits, in dispatches of one row and of narrow ones, and whether there is any.
+/// Nearest hits, in dispatches of one row and of narrow ones, and any-hit flags.
 fn answers(stage: &Stage, traced: &Traced, rays: &[Ray]) -> Result<[Vec<Hit>; 2], GpuError> {
     let batch = stage.tracer(traced, Query::Closest)?.batch(rays)?;
     batch.trace()?;
@@ -59,7 +58,7 @@ fn every_structure_finds_the_same_in_workgroups_of_every_size() {
         let traced = stage.traced(gpu(), kind);
         let expected = answers(&stage, &traced, &rays).expect("answers");
         assert!(expected[0].iter().any(|hit| hit.triangle != u32::MAX));
-        // Rays lie in a row: of 64 and 256 there is one kernel each.
+        // Rays lie in a row: there is one kernel each for 64 and 256.
         for size in ["32", "128", "16x16"] {
             let other = in_groups(gpu(), &traced, size);
             let found = answers(&stage, &other, &rays);
@@ -71,7 +70,7 @@ fn every_structure_finds_the_same_in_workgroups_of_every_size() {
     }
 }
 
-/// Structures whose kernels know their place in a workgroup, or take several rays each.
+/// Structures whose kernels use their place in a workgroup, or take several rays each.
 fn with(name: &str, changes: &[(&str, &str)]) -> Params {
     let mut params = default_params(&structure(name).parameters());
     for (key, value) in changes {
@@ -113,7 +112,6 @@ fn organisation(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
     }
 }
 
-/// Bits of an image of some samples.
 fn pixels(
     stage: &Stage,
     traced: &Traced,
@@ -138,7 +136,7 @@ fn pixels(
     Ok(shots[0].image.pixels.iter().map(bits).collect())
 }
 
-/// Organisations with what they are given to organise.
+/// Organisations with an integrator each.
 fn organised() -> Vec<(Variant, Variant)> {
     let short = ("capacity", ParamValue::Integer(1024));
     let sorted = ("sorting", ParamValue::Name("ray-key".to_owned()));
@@ -192,7 +190,7 @@ fn a_workgroup_beyond_the_adapter_is_refused_with_both_numbers() {
         "{text}"
     );
     assert!(answers(&stage, &in_groups(&small, &traced, "8x8"), &rays).is_ok());
-    // So is memory of a workgroup.
+    // So is workgroup memory.
     small.limits.max_compute_workgroup_storage_size = 64 * 16 * 4;
     small.limits.max_compute_invocations_per_workgroup = 1024;
     small.limits.max_compute_workgroup_size_x = 1024;
@@ -213,7 +211,7 @@ fn a_workgroup_beyond_the_adapter_is_refused_with_both_numbers() {
 
 #[test]
 fn no_dispatch_takes_long_however_slow_what_it_does() {
-    // Brute force over so many triangles takes as long for a sample as a tree for hundreds.
+    // Brute force over so many triangles takes as long per sample as a tree for hundreds.
     let stage = Stage::builtin(
         gpu(),
         "displaced-sphere",
@@ -233,8 +231,7 @@ fn no_dispatch_takes_long_however_slow_what_it_does() {
         renderer.render(&[4], 1).expect("an image");
         (renderer.longest_slice_ms(), renderer.spent().ms())
     };
-    // A slice is cut by what those before took; other programs that come meanwhile lengthen it, now and then. One that is not cut is
-    // too long every time.
+    // Slices are sized by earlier ones; other load may lengthen some, but not all.
     const TRIES: usize = 10;
     for (what, run) in [
         ("rays", &trace as &dyn Fn() -> (f64, f64)),
@@ -261,7 +258,7 @@ fn a_name_that_is_no_workgroup_is_an_error_with_the_nearest() {
     assert_eq!(registry.iter().count(), Workgroup::ALL.len());
 }
 
-/// Whether a fault in what traces buffers of rays shows in workgroups of this size.
+/// True if a fault in tracing ray buffers shows in workgroups of this size.
 fn rays_show(size: &str, (module, from, to): (&str, &str, &str), refill: &str) -> bool {
     let (stage, rays) = subject(gpu());
     let params = with("cwbvh", &[("refill", refill)]);
@@ -279,7 +276,7 @@ fn rays_show(size: &str, (module, from, to): (&str, &str, &str), refill: &str) -
     }
 }
 
-/// Whether a fault in what traces images does.
+/// True if a fault in tracing images shows.
 fn pixels_show(
     shape: &str,
     (module, from, to): (&str, &str, &str),
@@ -303,7 +300,7 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
     const RAYS: &str = "integrator/trace_rays";
     let mut unseen = Vec::new();
     let of_rays = [
-        // The last group that is not full is dropped.
+        // The last, partial group is dropped.
         (
             "128",
             (
@@ -353,7 +350,7 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
     let cases = organised();
     let [single, again, several, queues] = [0, 2, 3, 4].map(|place| &cases[place]);
     let of_pixels = [
-        // Rows and columns exchanged, in the kernel and of the pixel.
+        // Rows and columns swapped, in the kernel and of the pixel.
         (
             "32",
             "integrator/render",
@@ -368,7 +365,7 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             "@if(!block_list) let x = id.y;",
             single,
         ),
-        // Groups of another width than those that were counted; the last column or row of groups is lost.
+        // Groups of another width than counted; the last column or row of groups is lost.
         (
             "256",
             "organisation/regeneration",
@@ -425,7 +422,7 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
         }
     }
     assert!(unseen.is_empty(), "not seen: {unseen:#?}");
-    // A change that is none is not.
+    // A no-op change is not.
     assert!(!rays_show(
         "128",
         (RAYS, "// A workgroup has", "// Any workgroup has"),

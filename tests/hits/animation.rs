@@ -1,5 +1,5 @@
-//! Scenes that move: frames, refitted trees against trees built anew in every structure that is laid out over one, and
-//! faults of refitting that the checks see.
+//! Moving scenes: frames, refitted trees against rebuilt ones in every structure with a tree
+//! layout, and planted refit faults.
 
 use crate::support::{
     Stage, builtin, default_params, gpu, is_exact, kernels_with, open, run, shows, structure,
@@ -66,7 +66,7 @@ fn the_first_frame_is_the_scene_and_a_wave_returns_to_it() {
         let radius = scene.bounds().radius();
         let last = match animation.motion {
             Motion::Deform => 0.0,
-            // Straight on, by as much as was asked for.
+            // Straight on, by the requested distance.
             Motion::Instances => animation.amplitude as f32 * radius,
         };
         assert!((way(4) - last).abs() < 1e-4 * radius, "{animation:?}");
@@ -94,7 +94,7 @@ fn shared_vertices_stay_shared_and_copies_stay_copies() {
     assert!(nothing.contains("no instances"), "{nothing}");
 }
 
-/// What is wrong with a structure that was taken over to a frame, if anything is.
+/// The error of a structure updated to a frame, if any.
 fn fault(
     gpu: &Gpu,
     actor: &Actor,
@@ -141,11 +141,10 @@ fn every_structure_over_a_tree_or_objects_is_taken_to_a_frame_and_passes_its_gat
             }
         }
     }
-    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh and object-list in two on one.
+    // bvh, roped-bvh, bvh4, cwbvh in three ways on both scenes; meta-bvh, object-list: two on one.
     assert!(taken >= 4 * 3 * 2 + 2 * 2, "{taken}");
 }
 
-/// The tree that a way leads to.
 fn tree(gpu: &Gpu, actor: &Actor, way: Way, soup: &TriangleSoup) -> Result<Tree, String> {
     let mut log = BuildLog::with_gpu(gpu);
     let from = actor.start(way, soup).map_err(|e| e.to_string())?;
@@ -203,7 +202,7 @@ fn faults_in_the_passes_of_a_refit_are_seen() {
     for (kernel, what, from, to) in faults {
         let module = format!("accel/tree/parallel/device/{kernel}");
         let faulty = open(kernels_with(&module, &[(from, to)]));
-        // Built where nothing is wrong.
+        // Built with correct kernels.
         let actor = Actor::new(structure("bvh"), &params, WAVE.motion, (&first, gpu()));
         let actor = actor.expect("a tree");
         let host = tree(gpu(), &actor, Way::Host, &later).expect("a tree");
@@ -217,7 +216,7 @@ fn faults_in_the_passes_of_a_refit_are_seen() {
     }
 }
 
-/// A refit of the host with a fault in it.
+/// A faulty host refit.
 type Fault = fn(&mut Tree, &Tree);
 
 #[test]
@@ -225,9 +224,9 @@ fn faults_of_a_refitted_tree_fail_validation_or_the_gate() {
     if !is_exact(gpu()) {
         return;
     }
-    // A tree, and the one that it was before.
+    // A tree, and its previous state.
     let faults: [(&str, Fault); 4] = [
-        // No layout holds the box of the root itself; that it is fitted is told by the other twin.
+        // No layout stores the box of the root itself; the other twin checks its fit.
         ("the root's children keep their boxes", |tree, before| {
             let NodeKind::Inner { left, right } = tree.nodes[0].kind else {
                 panic!("a tree of one leaf")
@@ -270,7 +269,7 @@ fn faults_of_a_refitted_tree_fail_validation_or_the_gate() {
             let valid = built.validate(&stage.soup);
             assert!(valid.is_err(), "{name}: {what}");
         }
-        // Vertices that come one frame late are right for the frame before: only this frame's triangles tell.
+        // Vertices that lag one frame fit the previous one: only this frame's triangles reveal it.
         let late = TriangleSoup::new(&frame(&scene, &WAVE, 1));
         let late = tree(gpu(), &actor, Way::Device, &late).expect("a tree");
         let built = actor.built(Taken::Tree(late), &stage.soup);
@@ -326,7 +325,7 @@ fn a_run_records_every_frame_and_shows_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let (summary, lines) = run(EXPERIMENT, &registries, folder.path(), None);
     assert_eq!(summary.failed, 0);
-    // The grid has no way to take a frame over.
+    // The grid cannot be updated to a frame.
     assert!(summary.skipped >= 1);
     let found = animations(&lines);
     assert_eq!(found.len(), 2, "bvh and meta-bvh");

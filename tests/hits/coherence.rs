@@ -1,5 +1,4 @@
-//! The model of coherence sees what the kernels do: what twins read, the rays of the integrators, the counters of
-//! the device; and a run records it.
+//! The coherence model matches twins' reads, integrators' rays and device counters, in runs, too.
 
 use crate::support;
 use crate::support::{Pcg, build, param_variants, scenes, trace, variant};
@@ -18,7 +17,7 @@ use raystone::sampling::{Sampler, SamplerRegistry};
 use raystone::scene::SceneData;
 use std::collections::BTreeMap;
 
-/// Rays of all sorts through triangles of all sorts.
+/// All kinds of rays through all kinds of triangles.
 fn soup_and_rays(seed: u64) -> (TriangleSoup, Vec<Ray>) {
     let mut rng = Pcg::new(seed);
     let soup = scenes::lattice_soup(&mut rng, 150, 8);
@@ -27,7 +26,7 @@ fn soup_and_rays(seed: u64) -> (TriangleSoup, Vec<Ray>) {
     (soup, rays)
 }
 
-/// Every structure, with one set of parameters for each layout or kernel that it can choose.
+/// Every structure, with one parameter set per layout or kernel that it can choose.
 fn each_structure(
     soup: &TriangleSoup,
     mut check: impl FnMut(&str, &dyn raystone::accel::BuiltAccel),
@@ -75,7 +74,7 @@ fn what_a_twin_reads_is_what_the_device_has_and_as_often_as_its_counters_say() {
     });
 }
 
-/// A test of a triangle reads its 48 bytes, at a multiple of 48; and there is no ray of which nothing but tests is read.
+/// Checks that a triangle test reads its 48 bytes, aligned, and that no trace has only tests.
 fn check_fetches(what: &str, found: &Trace, memory: &Memory) {
     for step in 0..found.steps.len() {
         if found.steps[step].kind == Kind::Triangle {
@@ -132,10 +131,9 @@ fn a_triangle_test_that_reads_more_than_twins_keep_is_refused() {
 }
 
 const SIZE: [u32; 2] = [24, 16];
-/// Of the image whose rays are compared: neighbours are near each other.
+/// Size of the image whose rays are compared: neighbours are close together.
 const LARGE: [u32; 2] = [240, 160];
 
-/// What rays are made of.
 struct Setting {
     scene: SceneData,
     integrator: ConfiguredIntegrator,
@@ -174,7 +172,6 @@ impl Setting {
         }
     }
 
-    /// Rays of the whole image.
     fn rays(&self, samples: &[u32]) -> Rays {
         let stride = self.sampler.stride();
         let groups = groups_of(self.size, [8, 4], self.groups, stride);
@@ -283,7 +280,7 @@ fn rays_are_those_that_the_integrators_count_on_the_device() {
         let names = raystone::integrator::RAY_COUNT_CLASSES;
         for (name, counted) in names.into_iter().zip(counted).take(4) {
             let own = own.get(name).copied().unwrap_or(0);
-            // Decisions that rounding may turn: of these thousands of rays a few.
+            // Decisions affected by rounding: a few among thousands of rays.
             let apart = own.abs_diff(counted);
             assert!(
                 apart <= counted / 400,
@@ -323,7 +320,7 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
             );
         }
     }
-    // An order of rays that is lost costs coherence; that of warps next to nothing.
+    // Losing the order of rays costs coherence; losing that of warps almost none.
     let bounces = [&compacted, &by_warps, &by_rays].map(|t| efficiency(t, "bounce 1"));
     assert!(bounces[2] < 0.98 * bounces[0], "{bounces:?}");
     assert!((bounces[1] / bounces[0] - 1.0).abs() < 0.02, "{bounces:?}");
@@ -393,7 +390,7 @@ fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
     let all = tally(&rays[..80], 9, 1);
     assert_eq!((all.rays, all.lanes % 32), (80, 0));
     assert_eq!(tally(&rays[..80], 1, 3).active, all.active);
-    // Two groups of one warp: the first of all, and the last but one.
+    // Two groups of one warp: the first, and the last but one.
     let some = tally(&rays[..80], 2, 1);
     assert_eq!(some.rays, 64);
     let alone = |from: usize| tally(&rays[from..from + 32], 1, 1);
@@ -401,7 +398,7 @@ fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
     assert_eq!(some.issues, sum(|t| t.issues));
     assert_eq!(some.active, sum(|t| t.active));
     assert_eq!(some.lines, sum(|t| t.lines));
-    // Each group has an L1 of its own, so that equal groups need every line twice.
+    // Each group has its own L1, so equal groups need every line twice.
     let twice = [&rays[..32], &rays[..32]].concat();
     let (apart, together) = (tally(&twice, 2, 1), tally(&twice, 1, 2));
     assert_eq!(apart.lines, 2 * alone(0).lines);
@@ -436,7 +433,7 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
     let records: Vec<_> = all_of::<CoherenceRecord>(&lines).collect();
     assert_eq!(records.len(), 6);
     for record in &records {
-        // Two numbers of samples, four organisations.
+        // Two sample counts, four organisations.
         assert_eq!(record.at.len(), 8);
         for at in &record.at {
             let classes: Vec<&str> = at.classes.iter().map(|(class, _)| class.as_str()).collect();
@@ -445,7 +442,7 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
                 ["primary", "shadow 0", "bounce 1", "shadow 1", "bounce 2"]
             );
             assert_eq!((at.paths, at.classes[0].1.rays), (128, 128));
-            // What groups have adds up to the class, and no group has all of it.
+            // The groups add up to the class, and no group has all of it.
             for ((_, tally), groups) in at.classes.iter().zip(&at.groups) {
                 let sum = |i: usize| groups.iter().map(|g| g[i]).sum::<u64>();
                 assert_eq!([sum(0), sum(1)], [tally.rays, tally.cost()]);
@@ -491,7 +488,7 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
     assert_eq!(bodies(&lines), bodies(&again));
 }
 
-/// Two groups of two warps of each class of recorded rays went through the model.
+/// Checks that two groups of two warps of each class of recorded rays went through the model.
 fn check_recorded_rays(lines: &[raystone::measure::record::Line]) {
     let structures: Vec<_> = all_of::<StructureRecord>(lines).collect();
     assert_eq!(structures.len(), 3);

@@ -1,5 +1,5 @@
-//! Closed meshes from inside, hit by rays of every length: no miss, whatever the length of a direction,
-//! the zeros in it, the noise of the seams and the scale of an instance; and every structure says so.
+//! Closed meshes hit from inside by rays of every length: no miss for any direction length, zero
+//! components, noisy seams or instance scale; all structures agree.
 
 use crate::support;
 use crate::support::{assert_same_hits, build, default_params, in_turn, scenes, trace};
@@ -12,9 +12,9 @@ use raystone::accel::{
 use raystone::geometry::Triangle;
 use raystone::scene::{Assembly, Transform};
 
-/// Lengths of directions: what integrators use, and far beyond.
+/// Direction lengths: those of integrators, and far beyond.
 const LENGTHS: [f32; 10] = [1e-15, 1e-10, 1e-7, 1e-5, 1e-4, 1e-2, 1.0, 1e4, 1e10, 1e20];
-/// What stands where a coordinate should be 0: sin π in f32, in f64 and in extended precision, and less.
+/// Values in place of zero coordinates: sin π in f32, in f64 and in extended precision, and less.
 const SEAMS: [f64; 7] = [
     -8.742_278e-8,
     1.224_646_8e-16,
@@ -87,7 +87,7 @@ fn directions() -> Vec<Vec3> {
     out
 }
 
-/// Rays of one length from inside, from planes of vertices and beside them.
+/// Rays of one length from inside, from planes of vertices and next to them.
 fn rays(length: f32) -> Vec<Ray> {
     let origins = [
         Vec3::ZERO,
@@ -115,7 +115,7 @@ fn missed(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
         .collect()
 }
 
-/// Every structure on the host and on the device equals the judge, for both kinds of query.
+/// Checks that every structure on host and device equals the reference, for both kinds of query.
 fn structures_agree(what: &str, soup: &TriangleSoup, rays: &[Ray], flat: &[Hit], placed: &[Hit]) {
     let kinds = AccelRegistry::default();
     for kind in in_turn("structures without cracks", kinds.iter()) {

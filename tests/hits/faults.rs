@@ -1,4 +1,4 @@
-//! A fault that shows under a triangle test which is not the default; `tests/mutants` plants all others.
+//! A fault that shows under a non-default triangle test; `tests/mutants` plants all others.
 
 use crate::support;
 use crate::support::{

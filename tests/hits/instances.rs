@@ -1,5 +1,5 @@
-//! Two-level structures: equal to brute force over the same instances to the bit, before and after
-//! instances move; and what the gate, the records and the flat structures make of such scenes.
+//! Two-level structures: bit-identical to brute force over the same instances, before and after
+//! instances move; and the check, records and flat structures for such scenes.
 
 use crate::support;
 use crate::support::Stage;
@@ -19,8 +19,8 @@ use raystone::scene::{Assembly, Transform};
 
 const KINDS: [&dyn AccelKind; 2] = [&ObjectList, &MetaBvh];
 
-/// The defaults and each parameter of the upper level in turn at other values; and spatial splits,
-/// after which a triangle stands in several leaves of its object.
+/// The defaults, each upper-level parameter in turn at other values, and spatial splits, after
+/// which several leaves of an object contain a triangle.
 fn variants(kind: &dyn AccelKind) -> Vec<Params> {
     let default = default_params(&kind.parameters());
     let mut out = vec![default.clone()];
@@ -52,7 +52,7 @@ fn triangles(soup: &TriangleSoup) -> Vec<Triangle> {
     soup.records.iter().map(|r| r.triangle()).collect()
 }
 
-/// A turn by right angles, possibly mirrored, and a move by whole numbers: copies share planes.
+/// A rotation by right angles, possibly mirrored, and an integer translation: copies share planes.
 fn lattice_transform(rng: &mut Pcg) -> Transform {
     let mut axes = [Vec3::X, Vec3::Y, Vec3::Z];
     axes.swap(0, rng.below(3) as usize);
@@ -62,7 +62,7 @@ fn lattice_transform(rng: &mut Pcg) -> Transform {
     Transform::new(columns, Vec3::new(step(), step(), step()))
 }
 
-/// Anything that can be inverted: turned, mirrored, scaled by 10⁻² to 10², now and then nearly flat.
+/// Any invertible transform: rotated, mirrored, scaled by 10⁻² to 10², sometimes nearly flat.
 fn wild_transform(rng: &mut Pcg) -> Transform {
     let turn = |rng: &mut Pcg| {
         let q = Quat::from_xyzw(rng.signed(), rng.signed(), rng.signed(), rng.signed());
@@ -80,7 +80,7 @@ fn wild_transform(rng: &mut Pcg) -> Transform {
     Transform::new([linear.x_axis, linear.y_axis, linear.z_axis], place)
 }
 
-/// Instances of two lattice objects, one of which has a triangle that is there twice.
+/// Instances of two lattice objects, one of which contains a triangle twice.
 fn random_assembly(
     rng: &mut Pcg,
     instances: usize,
@@ -99,7 +99,7 @@ fn random_assembly(
     assembly
 }
 
-/// Rays of all sorts for a scene of about this extent, and what brute force over instances answers.
+/// All kinds of rays for a scene of this extent, with brute-force answers over instances.
 fn rays_and_hits(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> (Vec<Ray>, Vec<Hit>) {
     let placed = soup.placed.as_ref().expect("instances");
     let mut rays = scenes::aimed_rays(rng, soup, count);
@@ -111,7 +111,7 @@ fn rays_and_hits(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> (Vec<Ray>,
     (rays, hits)
 }
 
-/// Twin and kernel of a structure against the expected hits, closest and any; counters of both.
+/// Checks closest and any hits of a structure's twin and kernel; returns their counters.
 fn check(what: &str, kind: &dyn AccelKind, soup: &TriangleSoup, rays: &[Ray], expected: &[Hit]) {
     for params in variants(kind) {
         let built = build(kind, soup, &params);
@@ -171,7 +171,7 @@ fn twins_and_the_judge_equal_brute_force_on_many_random_scenes() {
         let count = 1 + rng.below(24) as usize;
         let soup = soup_of(&random_assembly(&mut rng, count, transform));
         let (mut rays, _) = rays_and_hits(&mut rng, &soup, 16);
-        // The same from far outside, where the rounding of transformed origins is worst.
+        // The same from far outside, where rounding of transformed origins is worst.
         let near = rays.clone();
         rays.extend(near.into_iter().map(|mut ray| {
             let back = Vec3::from(ray.direction).normalize_or_zero() * 1e4;
@@ -219,7 +219,7 @@ fn after_an_update_hits_are_those_of_the_moved_instances() {
     let (rays, hits) = rays_and_hits(&mut rng, &after, 500);
     let mut fewer = after.clone();
     fewer.placed.as_mut().expect("instances").instances.pop();
-    // Objects of as many triangles that lie elsewhere: whoever built them anew would be found out.
+    // Objects with as many triangles elsewhere, to detect a rebuild of them.
     let mut elsewhere = after.clone();
     for object in &mut elsewhere.placed.as_mut().expect("instances").objects {
         let doubled = object.records.iter().map(|r| r.triangle().vertices);
@@ -313,7 +313,7 @@ fn instances_are_where_their_flat_copies_are() {
         .iter()
         .zip(&placed)
         .filter(|(a, b)| a.triangle == b.triangle && (a.t - b.t).abs() <= 1e-4 * a.t.max(1e-2));
-    // Edges and grazing rays may fall to either side.
+    // Edges and grazing rays may fall on either side.
     let same = same.count();
     assert!(same * 1000 > rays.len() * 995, "{same} of {}", rays.len());
 }
@@ -343,7 +343,7 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
     }
-    // The flat judge would call instances wrong, bit for bit; as ties none of it is hidden.
+    // The flat reference would call instances wrong bit by bit; as ties, none of it is hidden.
     let rounded = judge.sets.iter().zip(&over_instances.sets);
     let wrong = rounded.map(|(flat, set)| {
         let found: Vec<_> = (set.truth.iter())

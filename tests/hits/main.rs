@@ -1,4 +1,4 @@
-//! What rays hit: structures, their builders and traversals, triangle tests, the gate.
+//! Tests of hits: structures, builders and traversals, triangle tests, the correctness check.
 
 #[path = "../support/mod.rs"]
 mod support;

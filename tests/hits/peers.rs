@@ -1,5 +1,4 @@
-//! Ray casters of others: that those of this crate's registry answer rightly, that a wrong one is found out, and that a run goes on
-//! without one.
+//! External tracers: registered ones are right, wrong ones detected, missing ones tolerated.
 
 use crate::support;
 use crate::support::{Stage, brute_force, builtin, from_file, gpu};
@@ -16,7 +15,6 @@ use raystone::scene::SceneData;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// A scene with its rays.
 struct Subject {
     stage: Stage,
     sets: Vec<RaySet>,
@@ -29,7 +27,7 @@ fn subject(scene: SceneData) -> Subject {
     Subject { stage, sets }
 }
 
-/// Answers of a peer to all classes; nothing where it cannot run here.
+/// A peer's answers to all classes; `None` if it cannot run here.
 fn answers(peer: &dyn Peer, subject: &Subject) -> Option<Vec<Vec<Hit>>> {
     let built = match peer.build(gpu(), &subject.stage.soup) {
         Ok(built) => built,
@@ -90,7 +88,7 @@ fn all_peers_answer_rightly() {
     assert!(ran >= 6, "obvhs runs everywhere: {ran}");
 }
 
-/// What a caster with a fault makes of a right answer.
+/// Maps a right answer to that of a faulty tracer.
 type Fault = fn(&Subject, &RaySet, usize, Hit) -> Hit;
 
 const FAULTS: [(&str, Fault); 9] = [
@@ -165,8 +163,8 @@ fn a_wrong_peer_is_found_out() {
     assert!(judged(&subject, &fewer).is_err());
 }
 
-/// A triangle of Crytek Sponza, 2,725 long and six high: where it is hit near its middle the default test of ours is off by 3 % of a short
-/// distance, and a peer that is right must not pay for that.
+/// A triangle of Crytek Sponza, 2,725 long and six high: near its middle our default test is off by
+/// 3 % of a short distance, and a correct peer must not fail because of it.
 #[test]
 fn a_distance_that_is_more_exact_than_the_judges_is_right() {
     let folder = TempDir::new().expect("a folder");
@@ -182,7 +180,7 @@ fn a_distance_that_is_more_exact_than_the_judges_is_right() {
     };
     let ours = brute_force(&stage.soup, &[ray])[0];
     assert!((0.4525..0.4533).contains(&ours.t), "{ours}");
-    // What an average of the distances of the vertices makes of this triangle.
+    // The average of the vertices' distances for this triangle.
     let ours = Hit { t: 0.4389, ..ours };
     let truth = vec![ours];
     let set = RaySet {
@@ -200,7 +198,7 @@ fn a_distance_that_is_more_exact_than_the_judges_is_right() {
     }
 }
 
-/// A caster asked for the ends of segments: a hit behind the end or before the beginning is none.
+/// For segments: a hit behind the end or before the beginning does not count.
 #[test]
 fn ends_of_rays_are_kept() {
     let scene = builtin("displaced-sphere", &[]);
@@ -250,7 +248,7 @@ fn run(out: &TempDir, changes: &[&str]) -> Output {
     command.output().expect("the program starts")
 }
 
-/// A caster that answers as obvhs does until it has been asked so many times, then that everything misses.
+/// A tracer that answers like obvhs for a number of queries, then misses everything.
 struct Tired(u32);
 
 struct TiredBuilt<'a>(Box<dyn BuiltPeer + 'a>, u32);
@@ -304,16 +302,18 @@ impl BuiltPeer for TiredBuilt<'_> {
 impl PeerBatch for TiredBatch<'_> {
     fn trace(&self) -> Result<Elapsed, GpuError> {
         self.3.set(self.3.get() + 1);
-        match self.3.get() > self.2 {
-            true => Ok(Stopwatch::start().elapsed()),
-            false => self.0.trace(),
+        if self.3.get() > self.2 {
+            Ok(Stopwatch::start().elapsed())
+        } else {
+            self.0.trace()
         }
     }
 
     fn hits(&self) -> Result<Vec<Hit>, GpuError> {
-        match self.3.get() > self.2 {
-            true => Ok(self.1.iter().map(Hit::miss).collect()),
-            false => self.0.hits(),
+        if self.3.get() > self.2 {
+            Ok(self.1.iter().map(Hit::miss).collect())
+        } else {
+            self.0.hits()
         }
     }
 }
@@ -347,7 +347,7 @@ fn a_run_shows_peers_apart_and_goes_on_without_one() {
     let out = TempDir::new().expect("a folder");
     let ran = run(&out, &[]);
     let text = String::from_utf8_lossy(&ran.stderr);
-    // The reference of two samples is too noisy for such an image, which is a failed check; a missing or a wrong peer is none.
+    // The two-sample reference is too noisy, which fails a check; a missing or wrong peer does not.
     let checks: Vec<&str> = text.lines().filter(|l| l.starts_with("failed:")).collect();
     assert!(
         checks.iter().all(|l| l.contains("Reference noise")),

@@ -1,6 +1,6 @@
-//! Registered structures on real models, judged as a run judges it. With RAYSTONE_REAL_RAYS every
-//! model of the list is taken, with that many rays in each of the five classes (200,000 make a
-//! million rays a model), and in a full run with a few thousand; else one of three models.
+//! Registered structures on real models, checked as in a run. With RAYSTONE_REAL_RAYS every model
+//! of the list is used, with that many rays in each of the five classes (200,000 make a million
+//! rays per model), and in a full run with a few thousand; otherwise one of three models.
 
 use crate::support;
 use crate::support::*;
@@ -10,7 +10,7 @@ use raystone::integrator::Traced;
 use raystone::measure::gate::{Checks, Judge};
 use std::path::{Path, PathBuf};
 
-/// Models below `../shared/scenes`; a run that is not full takes one of the first ones.
+/// Models below `../shared/scenes`; a run that is not full uses one of the first ones.
 const MODELS: [&str; 12] = [
     "utah-teapot/teapot.obj",
     "cornell-box/CornellBox-Water.obj",
@@ -27,7 +27,7 @@ const MODELS: [&str; 12] = [
 ];
 const SMALL_ONES: usize = 3;
 const FEW_RAYS: u32 = 4096;
-/// Brute force takes a minute with more ray–triangle tests than this on two cores.
+/// With more ray-triangle tests than this, brute force takes a minute on two cores.
 const MOST_TESTS: u64 = 2_000_000_000;
 
 fn rays_by_flag() -> Option<u32> {
@@ -37,17 +37,17 @@ fn rays_by_flag() -> Option<u32> {
 
 fn models() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let taken = match rays_by_flag().is_some() || is_full() {
-        true => MODELS.to_vec(),
-        false => in_turn("real models", MODELS[..SMALL_ONES].iter().copied()),
+    let taken = if rays_by_flag().is_some() || is_full() {
+        MODELS.to_vec()
+    } else {
+        in_turn("real models", MODELS[..SMALL_ONES].iter().copied())
     };
     taken.iter().map(|m| folder.join(m)).collect()
 }
 
-/// What a structure comes to on a stage.
 enum Outcome {
     Passed,
-    /// It, or the adapter, has a limit that the model exceeds.
+    /// The model exceeds a limit of the structure or the adapter.
     TooLarge(String),
     Wrong(String),
 }

@@ -1,4 +1,4 @@
-//! Shadow rays from the other end and light by light: the same segments, and every structure answers them as its judge does.
+//! Reversed and light-by-light shadow rays: the same segments, and structures match.
 
 use crate::support;
 use crate::support::Stage;
@@ -70,7 +70,7 @@ fn all_orders_hold_the_same_segments_and_those_of_a_light_lie_side_by_side() {
             }
             assert!(share(set, &judge.sets) < 2e-3, "{class:?}");
         }
-        // A ray from a light begins on it: changes of the lamp along the clustered set are as many as lamps less one.
+        // A ray from a light begins on it: the lamp changes once less than there are lamps.
         let reversed = of(&judge, RayClass::ShadowReversedClustered);
         let lamp = |ray: &Ray| {
             let on = |t: &raystone::geometry::Triangle| {
@@ -120,7 +120,7 @@ fn every_structure_answers_them_as_the_judge_does() {
     }
 }
 
-/// The share of a class that differs from the shadow rays once a fault is in its rays or in its places.
+/// Fraction of a class that differs from the shadow rays with a fault in its rays or places.
 fn with_fault(class: RayClass, fault: impl Fn(&mut RaySet)) -> f64 {
     let stage = many_lights(8);
     let judge = judge(&stage);
@@ -140,7 +140,7 @@ fn with_fault(class: RayClass, fault: impl Fn(&mut RaySet)) -> f64 {
 fn wrong_ends_and_a_lost_order_are_seen() {
     let reversed = RayClass::ShadowReversed;
     assert!(with_fault(reversed, |_| {}) < 2e-3);
-    // The ray goes on through the surface that it should end at.
+    // The ray continues through the surface where it should end.
     assert!(
         with_fault(reversed, |set| set
             .rays
@@ -161,7 +161,7 @@ fn wrong_ends_and_a_lost_order_are_seen() {
         (set.rays.iter_mut()).for_each(|r| r.direction = r.direction.map(|x| -x));
     };
     assert!(with_fault(reversed, forward) > 0.01);
-    // Answers are taken back to the pixels in the order of lights.
+    // Answers are returned to pixels in the order of lights.
     let lost = |set: &mut RaySet| set.shadow.sort_unstable();
     for class in [ORDERS[1], ORDERS[2]] {
         assert!(with_fault(class, lost) > 0.01, "{class:?}");

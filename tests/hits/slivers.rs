@@ -1,5 +1,5 @@
-//! Thin triangles, by every triangle test: how far from the plane a hit lies, and that a ray which leaves a
-//! triangle does not meet it again. The judge is the plane in f64.
+//! Thin triangles in every triangle test: distance of a hit from the plane, and no
+//! self-intersection of rays that leave a triangle. The reference is the plane in f64.
 
 use crate::support;
 use crate::support::Pcg;
@@ -19,7 +19,7 @@ const ASPECTS: [f64; 7] = [1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6];
 const TRIANGLES: usize = 400;
 const RAYS: usize = 24;
 
-/// A triangle of length `scale` somewhere within `far` of the origin, its height the length over `aspect`.
+/// A triangle of length `scale` within `far` of the origin, with height length / `aspect`.
 fn sliver(aspect: f64, scale: f64, far: f64, rng: &mut Pcg) -> [Vec3; 3] {
     let signed = |rng: &mut Pcg| f64::from(rng.signed());
     let point = |rng: &mut Pcg| DVec3::new(signed(rng), signed(rng), signed(rng));
@@ -37,7 +37,6 @@ fn sliver(aspect: f64, scale: f64, far: f64, rng: &mut Pcg) -> [Vec3; 3] {
     corners.map(|v| (centre + turn * (scale * v)).as_vec3())
 }
 
-/// Unit normal and corners in f64.
 fn plane(corners: [Vec3; 3]) -> Option<(DVec3, DVec3)> {
     let [a, b, c] = corners.map(|v| v.as_dvec3());
     let normal = (b - a).cross(c - a).try_normalize()?;
@@ -95,7 +94,7 @@ fn unit(rng: &mut Pcg) -> DVec3 {
     }
 }
 
-/// What a kernel makes of a hit: the point, its error, edges.
+/// A kernel's hit: the point, its error, edges.
 fn point_of(corners: [Vec3; 3], [u, v]: [f32; 2]) -> (Vec3, [f32; 3]) {
     let [v0, v1, v2] = corners;
     let (e1, e2) = (v0 - v1, v2 - v0);
@@ -103,14 +102,14 @@ fn point_of(corners: [Vec3; 3], [u, v]: [f32; 2]) -> (Vec3, [f32; 3]) {
     (v0 - u * e1 + v * e2, error)
 }
 
-/// What a test makes of thin triangles of an aspect.
+/// Results of a test on thin triangles of an aspect.
 #[derive(Debug, Default)]
 struct Seen {
     rays: usize,
-    /// Of the rays that leave a triangle by the default offset those that meet it again.
+    /// Rays that leave a triangle with the default offset and hit it again.
     met_again: usize,
     hits: usize,
-    /// Greatest height of a hit over the plane, as a part of what the offset leaves room for.
+    /// Largest height of a hit over the plane, relative to the offset's allowance.
     height: f64,
 }
 
@@ -148,8 +147,9 @@ fn seen(test: AnyTriangleTest, aspect: f64) -> Seen {
     seen
 }
 
-/// Tests that take the distance to a plane by a product of edges, as published: of a thin triangle with long edges the
-/// product is a difference of large ones, and the plane is off by length over height. `docs/design.md` says so.
+/// Tests that compute the distance to a plane by a product of edges, as published: for a thin
+/// triangle with long edges it is a difference of large numbers, and the plane is off by length
+/// over height. See `docs/design.md`.
 fn has_plane_by_edges(test: AnyTriangleTest) -> bool {
     ["moeller-trumbore", "pluecker"].contains(&test.name())
 }
@@ -172,7 +172,7 @@ fn no_thin_triangle_meets_the_rays_that_leave_it_and_hits_lie_in_its_plane() {
             assert!(seen.height < 1.0, "{} 1:{aspect}: {seen:?}", test.name());
         }
     }
-    // What this sees of a distance that is off.
+    // Detects a wrong distance.
     let seen = seen(&MoellerTrumbore, 1e4);
     assert!(
         seen.met_again > seen.rays / 50 && seen.height > 10.0,
@@ -180,7 +180,7 @@ fn no_thin_triangle_meets_the_rays_that_leave_it_and_hits_lie_in_its_plane() {
     );
 }
 
-/// Pixels of a flat sheet under an open sky, by a triangle test, that are not exactly 1.
+/// Number of pixels of a flat sheet under an open sky that are not exactly 1, for a triangle test.
 fn shadowed(test: AnyTriangleTest) -> usize {
     let tests = Intersection {
         triangle: test,

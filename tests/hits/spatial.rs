@@ -1,6 +1,6 @@
-//! `octree` and `kd-tree` where dividing space is hard: rays in the planes, along the edges and through
-//! the corners of cells, needles and grazing rays, segments that end at a hit; what their parameters
-//! promise; stacks that are too small. Twin and kernel against brute force, to the bit.
+//! `octree` and `kd-tree` in the hard cases of spatial subdivision: rays in planes, along edges and
+//! through corners of cells, needles and grazing rays, segments that end at a hit; guarantees of
+//! their parameters; stacks that are too small. Twin and kernel against brute force, bit by bit.
 
 use crate::support;
 use crate::support::scenes::{self, FAR};
@@ -55,7 +55,7 @@ fn twin_hits(built: &dyn BuiltAccel, soup: &TriangleSoup, rays: &[Ray]) -> Vec<H
     rays.iter().map(closest).collect()
 }
 
-/// Those that list triangles by their boxes, for which equality is proved for any ray.
+/// Those that list triangles by their boxes, for which equality is proven for any ray.
 fn by_boxes() -> Vec<(&'static str, Params)> {
     let mut out = variants();
     out.retain(|(_, params)| params.0["clip"] == ParamValue::Flag(false));
@@ -63,8 +63,7 @@ fn by_boxes() -> Vec<(&'static str, Params)> {
     out
 }
 
-/// Twin and kernel of variants against brute force, and any hit against closest; returns the number of
-/// hits.
+/// Checks twin and kernel against brute force, and any hit against closest; returns the hits.
 fn check(
     what: &str,
     variants: &[(&str, Params)],
@@ -91,8 +90,7 @@ fn check(
     blocked.iter().filter(|b| **b).count()
 }
 
-/// Walls, floors and tilted panels whose corners lie at multiples of 1 in the box 0..16: halving the
-/// box puts planes of cells into them.
+/// Walls, floors and tilted panels with integer corners in 0..16, where cell planes lie.
 fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let mut triangles = vec![
         [Vec3::ZERO, Vec3::X * 16.0, Vec3::Y * 16.0],
@@ -120,8 +118,7 @@ fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
     scenes::soup(triangles)
 }
 
-/// Rays from lattice points in and around the box 0..16, along axes and diagonals, zeros of both
-/// signs.
+/// Rays from lattice points around the box 0..16, along axes and diagonals, zeros of both signs.
 fn rays_in_planes(rng: &mut Pcg, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let origin = [0; 3].map(|_| rng.between(-4, 36) as f32 * 0.5);
@@ -186,7 +183,7 @@ fn needles_and_grazing_rays_see_what_brute_force_sees() {
         };
         let needles: Vec<[Vec3; 3]> = (0..150).map(needle).collect();
         let soup = scenes::soup(needles.iter().copied());
-        // Clipped lists promise nothing below an angle of 1/32.
+        // Clipped lists guarantee nothing below an angle of 1/32.
         let steep = (
             variants(),
             rays_at(&mut rng, &needles, &[-1.0, 0.2, 0.05], 1500),
@@ -213,7 +210,7 @@ fn a_leaf_that_lost_a_triangle_is_seen_by_the_same_rays() {
         .iter()
         .find(|h| h.triangle != NO_HIT)
         .expect("a hit");
-    // As if every leaf had lost it: its place is taken by a copy of triangle 0.
+    // As if every leaf had lost it: a copy of triangle 0 replaces it.
     let mut without = soup.clone();
     let lost = &mut without.records[struck.triangle as usize];
     (lost.v0, lost.v1, lost.v2) = (soup.records[0].v0, soup.records[0].v1, soup.records[0].v2);

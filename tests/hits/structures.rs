@@ -1,5 +1,5 @@
-//! Every registered structure against brute force, to the bit: the scalar twin, the kernel, the
-//! counters, any-hit queries, and builds. A new structure is tested without a new line here.
+//! Every registered structure against brute force, bit by bit: scalar twin, kernel, counters,
+//! any-hit queries, and builds. New structures are tested without a new line here.
 
 use crate::support;
 use crate::support::scenes::{self, Case};
@@ -90,7 +90,7 @@ fn check_kernel(
     }
 }
 
-/// The defaults of a structure, and one set of parameters for each other kernel that it can choose whose turn it is.
+/// The default parameters, and one set for each other kernel of the structure whose turn it is.
 fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
     let soup = scenes::lattice_soup(&mut Pcg::new(2), 40, 5);
     let mut kernels = Vec::new();
@@ -108,14 +108,14 @@ fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
     out
 }
 
-/// How many random scenes: RAYSTONE_FUZZ_SCENES, or 2,000, and 100,000 in a full run.
+/// Number of random scenes: RAYSTONE_FUZZ_SCENES, or 2,000, and 100,000 in a full run.
 fn fuzz_scenes() -> u64 {
     let set = std::env::var("RAYSTONE_FUZZ_SCENES").ok();
     let parse = |text: String| text.parse().expect("RAYSTONE_FUZZ_SCENES is a number");
     set.map_or_else(|| so_many("random lattice scenes", 2_000, 100_000), parse)
 }
 
-/// Hard scenes with rays of all sorts, and what brute force answers.
+/// Hard scenes with all kinds of rays, and the answers of brute force.
 fn hard_cases(seed: u64, rays_per_kind: usize) -> Vec<(Case, Vec<Ray>, Vec<Hit>)> {
     let mut rng = Pcg::new(seed);
     let mut cases = scenes::degenerate_cases();

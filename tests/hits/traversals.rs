@@ -1,5 +1,5 @@
-//! Every traversal over every layout of the binary BVH: the same hits as brute force to the bit, the
-//! work that the papers promise, and errors where something is too small.
+//! Every traversal of every layout of the binary BVH: hits bit-identical to brute force, the work
+//! claimed by the papers, and errors if something is too small.
 
 use crate::support;
 use crate::support::scenes::{self, Case};
@@ -10,7 +10,6 @@ use raystone::accel::{
 use raystone::config::Axis;
 use raystone::params::{ParamRange, ParamValue, Params};
 
-/// Parameters of `bvh` with some of them set.
 fn params(changes: &[(&str, &str)]) -> Params {
     let mut out = default_params(&Bvh.parameters());
     for (name, value) in changes {
@@ -25,7 +24,7 @@ fn params(changes: &[(&str, &str)]) -> Params {
     out
 }
 
-/// The names that a parameter of `bvh` can take.
+/// Allowed names of a parameter of `bvh`.
 fn names_of(parameter: &str) -> &'static [&'static str] {
     let schema = Bvh.parameters();
     let found = schema.iter().find(|p| p.name == parameter);
@@ -35,7 +34,7 @@ fn names_of(parameter: &str) -> &'static [&'static str] {
     }
 }
 
-/// Traversal with node size, stack memory and entries: what decides over the kernel.
+/// Traversal with node size, stack memory and entries, which determine the kernel.
 const KERNELS: &[&[(&str, &str)]] = &[
     &[("traversal", "stack"), ("node_bytes", "64")],
     &[("traversal", "stack"), ("node_bytes", "32")],
@@ -73,7 +72,7 @@ const KERNELS: &[&[(&str, &str)]] = &[
     ],
 ];
 
-/// Every kernel whose turn it is, with every order of nodes and every form of leaves.
+/// Every kernel whose turn it is, with every node order and leaf form.
 fn combinations() -> Vec<Params> {
     let mut out = Vec::new();
     for kernel in in_turn("kernels of a binary tree", KERNELS) {
@@ -153,7 +152,7 @@ fn kernels_of_all_combinations_equal_brute_force_and_count_like_their_twins() {
     }
     let combinations = combinations();
     for (index, (case, rays, expected)) in hard_cases(100).into_iter().enumerate() {
-        // The order of nodes changes no kernel: each case takes another third of the combinations.
+        // The order of nodes changes no kernel: each case uses another third of the combinations.
         for params in combinations.iter().skip(index % 3).step_by(3) {
             let what = format!("{} {params:?}", case.name);
             let built = build(&Bvh, &case.soup, params);
@@ -179,11 +178,11 @@ fn kernels_of_all_combinations_equal_brute_force_and_count_like_their_twins() {
 #[test]
 fn trees_that_list_a_triangle_in_several_leaves_are_traversed_to_the_bit_too() {
     let mut rng = Pcg::new(12);
-    // Long thin triangles across each other: spatial splits cut them.
+    // Long thin intersecting triangles, which spatial splits cut.
     let soup = scenes::lattice_soup(&mut rng, 600, 30);
     let rays = scenes::aimed_rays(&mut rng, &soup, 1500);
     let expected = brute_force(&soup, &rays);
-    // What is built on a device has tests/device/device_builders.
+    // Device builds are tested in tests/device/device_builders.
     let on_the_host = |name: &&&str| !name.starts_with("device-");
     for builder in names_of("builder").iter().filter(on_the_host) {
         let built = build(&Bvh, &soup, &params(&[("builder", builder)]));
@@ -199,7 +198,7 @@ fn trees_that_list_a_triangle_in_several_leaves_are_traversed_to_the_bit_too() {
     }
 }
 
-/// Work of the twin over a scene with much behind much else, summed over all rays.
+/// Work of the twin over a scene with high depth complexity, summed over all rays.
 fn summed_work(changes: &[(&str, &str)]) -> (Vec<Counters>, Counters) {
     let mut rng = Pcg::new(5);
     let soup = scenes::lattice_soup(&mut rng, 3000, 40);
@@ -311,12 +310,12 @@ fn combinations_that_make_no_sense_are_refused_with_the_reason() {
     }
 }
 
-/// Triangles whose Morton codes of 60 bits begin with another bit each, and 2¹⁷ with none: a radix tree of them parts one
-/// from the rest at a bit, and in the end halves those that are alike.
+/// Triangles whose 60-bit Morton codes each begin with another bit, and 2¹⁷ with none: a radix tree
+/// separates one from the rest per bit, and finally halves the equal ones.
 fn deep_scene() -> TriangleSoup {
     let single = (0..60).map(|bit| {
         let mut at = glam::Vec3::ZERO;
-        // Well within its cell, however places are rounded.
+        // Well within its cell, however positions are rounded.
         at[bit % 3] = 1.2 * 0.5_f32.powi(bit as i32 / 3 + 1);
         at
     });
@@ -390,7 +389,7 @@ fn an_overflowing_stack_and_a_blown_step_fuse_raise_the_error_word() {
         let told = error_word(&module, fuse, "step < 4u", &changes).expect("a blown fuse");
         assert!(told.contains("step fuse"), "{traversal}: {told}");
     }
-    // Lanes that are refilled count the steps of each ray.
+    // Refilled lanes count the steps of each ray.
     let (module, fuse) = ("accel/bvh/stack", "(*at).steps == limits.step_fuse");
     let changes = [("refill", "always")];
     assert_eq!(error_word(module, fuse, fuse, &changes), None);

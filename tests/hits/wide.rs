@@ -1,4 +1,4 @@
-//! Wide BVHs: every layout of their arrays, every builder below them.
+//! Wide BVHs: every array layout, and every underlying builder.
 
 use crate::support;
 use crate::support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
@@ -80,7 +80,7 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     if !support::is_exact(&gpu) {
         return;
     }
-    // The canonical triangles come in parts; those of the leaves, at least as many, in one texture.
+    // The canonical triangles are split into parts; those of leaves are in one texture.
     let bytes = 48 * soup.records.len() as u64;
     gpu.limits.max_storage_buffer_binding_size = bytes / 3;
     let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
@@ -95,7 +95,7 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
         assert_eq!(batch.error_word().expect("the error word"), 0, "{name}");
         assert_same_hits(name, &rays, &expected, &batch.hits().expect("hits"));
 
-        // What fits into neither is refused with both numbers.
+        // If they fit into neither, the error has both numbers.
         let refused = |gpu: &raystone::gpu::Gpu, built: &dyn raystone::accel::BuiltAccel| {
             let traced = Traced::upload(gpu, built).expect("it is uploaded");
             let tracer = Tracer::new(gpu, &buffers, &traced, Query::Closest);

@@ -1,4 +1,4 @@
-//! Parameters that a library user declares: read, refused and swept like those of the program.
+//! Parameters declared by a library user: read, refused and swept like the program's own.
 
 use raystone::config::{Axis, Catalogue, Experiment, Settings};
 use raystone::parameters;
@@ -51,7 +51,7 @@ parameters! {
     }
 }
 
-/// All that a measurement adds to have a section of its own.
+/// Everything a measurement adds to have its own section.
 impl Settings for Warmth {
     const SECTION: &'static str = "warmth";
     const REQUIRED: &'static [&'static str] = &["limit"];
@@ -75,7 +75,7 @@ fn one_declaration_gives_schema_defaults_and_fields() {
     let names: Vec<_> = schema.iter().map(|p| p.name).collect();
     assert_eq!(names, ["power", "place", "layers", "clear", "loop"]);
     assert_eq!(schema[0].description, "radiance, any unit");
-    // What a struct within says of itself, and what the one around it says instead.
+    // The nested struct's own declaration, and the override by the outer one.
     assert_eq!(schema[2].range, ParamRange::Integer { min: 2, max: 4 });
     assert_eq!(
         Glass::schema()[0].range,
@@ -85,7 +85,7 @@ fn one_declaration_gives_schema_defaults_and_fields() {
         (Lamp::default().glass.layers, Glass::default().layers),
         (3, 1)
     );
-    // 0.2 as a file writes it, not the f64 of the f32.
+    // 0.2 as in a file, not the f64 of the f32.
     assert_eq!(schema[3].default, ParamValue::Number(0.2));
     assert_eq!(Lamp::from_params(&Params::default()), Ok(Lamp::default()));
     assert_eq!(Place::from_name("on-the-floor"), Some(Place::OnTheFloor));
@@ -132,7 +132,7 @@ fn what_does_not_fit_is_an_error_that_names_it_and_never_a_panic() {
             "{error}"
         );
     }
-    // Read without being completed first: an old record may lack what was added since.
+    // Read without completing first: an old record may lack newer parameters.
     let missing = Lamp::read(&Params::default());
     assert!(
         matches!(missing, Err(ParamError::Value { name: "power", .. })),

@@ -2,7 +2,7 @@
 
 use raystone::gpu::{Composition, KernelLibrary};
 
-/// A traversal kernel of the path tracer, with everything that a kernel file may be part of.
+/// A traversal kernel of the path tracer, with everything a kernel file may be part of.
 fn composition(structure: &str) -> Composition {
     let mut out = Composition::new("integrator/render")
         .with("accel", structure)
@@ -39,7 +39,7 @@ fn composition(structure: &str) -> Composition {
     out
 }
 
-/// Composes with `text` in the place of the kernel `file`; the message names `place` for it.
+/// Composes with `text` as the kernel `file`; the message names `place` for it.
 fn message(file: &str, text: &str, structure: &str) -> Result<(), String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(format!("{file}.wesl"));

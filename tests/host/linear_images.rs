@@ -1,11 +1,11 @@
-//! Linear images of other renderers are read as their own library reads them.
+//! Linear images of other renderers are read as by their own library.
 
 use crate::support::needs;
 use raystone::image::{Image, read_linear};
 use std::path::{Path, PathBuf};
 
-/// Files below `../shared/scenes`: size, mean of R, G and B, and the mean of R in the upper half, as OpenEXR 3.5
-/// (or, for `.hdr`, a decoder of its own in NumPy) finds them.
+/// Files below `../shared/scenes`: size, mean of R, G and B, and the mean of R in the upper half,
+/// from OpenEXR 3.5 (for `.hdr`, from a separate decoder in NumPy).
 type Known = (&'static str, [u32; 2], [f64; 3], f64);
 
 const KNOWN: &[Known] = &[
@@ -99,7 +99,7 @@ fn images_of_other_renderers_have_their_known_means_the_right_way_up() {
             half.iter().map(|p| f64::from(p[0])).sum::<f64>() / half.len() as f64
         };
         assert!((upper(&image) / top - 1.0).abs() < 1e-6, "{name}");
-        // The test can tell an image that is upside down.
+        // The test detects an upside-down image.
         let mut flipped = image;
         flipped.pixels.reverse();
         assert!((upper(&flipped) / top - 1.0).abs() > 1e-6, "{name}");

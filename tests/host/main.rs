@@ -1,4 +1,4 @@
-//! What needs no device: parsers, plans, records, statistics, comparisons, exact judges.
+//! Tests without a device: parsers, plans, records, statistics, comparisons, exact references.
 
 #[path = "../support/mod.rs"]
 mod support;

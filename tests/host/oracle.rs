@@ -6,7 +6,6 @@ use raystone::geometry::{Ray, Triangle};
 use raystone::oracle::{ClosestHit, Fault, Verdict, judge, judge_any_hits, judge_closest_hits};
 use raystone::random::Pcg32;
 
-/// Where random rays and triangles come from.
 struct Random(Pcg32);
 
 impl Random {
@@ -52,7 +51,6 @@ fn towards(x: f32, y: f32) -> Ray {
     ray(Vec3::new(x, y, -1.0), Vec3::Z)
 }
 
-/// One triangle, one ray, in f32.
 type Test32 = fn(&Triangle, &Ray) -> Option<f32>;
 
 /// Normal first: det = d·n, t = c·n / det, u and v from d×c.
@@ -71,7 +69,7 @@ fn normal_first(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     (inside && t > ray.t_min && t < ray.t_max).then_some(t)
 }
 
-/// As in Möller and Trumbore 1997, with divisions.
+/// Möller and Trumbore 1997, with divisions.
 fn moeller_trumbore(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     let [v0, v1, v2] = triangle.vertices;
     let direction = Vec3::from(ray.direction);
@@ -86,7 +84,7 @@ fn moeller_trumbore(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > ray.t_min && t < ray.t_max).then_some(t)
 }
 
-/// Sheared vertices, as in Woop, Benthin and Wald 2013, with a reciprocal.
+/// Sheared vertices (Woop, Benthin and Wald 2013), with a reciprocal.
 fn sheared(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     let direction = Vec3::from(ray.direction);
     let size = direction.abs();
@@ -117,7 +115,6 @@ fn closest(test: Test32, triangles: &[Triangle], ray: &Ray) -> ClosestHit {
     best
 }
 
-/// Whether a fault is the expected one.
 type IsFault = fn(&Fault) -> bool;
 
 #[track_caller]
@@ -218,16 +215,16 @@ fn edges_and_coincident_surfaces_are_ambiguous_but_only_there() {
 #[test]
 fn grazing_rays_are_ambiguous_and_degenerate_triangles_are_never_hit() {
     let scene = [corner(0.0)];
-    // In the plane z = 0, crossing the triangle: det = 0 in exact arithmetic, known to be so.
+    // In the plane z = 0, crossing the triangle: det = 0 exactly, and known to be.
     let in_plane = ray(Vec3::new(-1.0, 0.25, 0.0), Vec3::X);
     assert_eq!(judge(&scene, in_plane, None), Verdict::Agrees);
-    // Not aligned to the axes, det = 0 is not certain in f32.
+    // Not axis-aligned, det = 0 is not certain in f32.
     let tilted = |v: Vec3| Vec3::new(v.x, v.y, 0.3 * v.x + 0.7 * v.y);
     let slope = [triangle(scene[0].vertices.map(tilted))];
     let graze = ray(tilted(Vec3::new(-1.0, 0.25, 0.0)), tilted(Vec3::X));
     assert_eq!(judge(&slope, graze, None), Verdict::Ambiguous);
     assert_eq!(judge(&slope, graze, Some((0, 1.5))), Verdict::Ambiguous);
-    // A little above the plane the same ray misses for certain.
+    // Slightly above the plane the same ray certainly misses.
     let above = ray(Vec3::from(graze.origin) + 1e-4 * Vec3::Z, tilted(Vec3::X));
     assert_eq!(judge(&slope, above, None), Verdict::Agrees);
     assert_wrong(judge(&slope, above, Some((0, 1.5))), |f| {
@@ -263,7 +260,7 @@ fn any_hit_answers_are_judged_by_whether_something_blocks() {
     assert_eq!(verdicts[4..], [Verdict::Ambiguous, Verdict::Ambiguous]);
 }
 
-/// Judges the answers of `test` over a soup; returns (hits, ambiguous).
+/// Checks the answers of `test` over a soup; returns (hits, ambiguous).
 fn judge_soup(test: Test32, triangles: &[Triangle], rays: &[Ray]) -> (usize, usize) {
     let answer = |ray: &Ray| (*ray, closest(test, triangles, ray));
     let queries: Vec<_> = rays.iter().map(answer).collect();
@@ -300,7 +297,7 @@ fn straightforward_f32_tests_are_never_wrong_on_random_rays() {
 fn rays_aimed_at_edges_needles_and_far_scenes_are_never_wrong() {
     let mut random = Random::new(2);
     let mut soup = random.soup(100, 0.3);
-    // Needles: two vertices almost the same.
+    // Needles: two nearly coincident vertices.
     for triangle in &mut soup[..50] {
         triangle.vertices[2] = triangle.vertices[1] + 1e-5 * random.vector();
     }

@@ -1,5 +1,5 @@
-//! Every entry of every registry with parameters as a library user may hand them over: none, unknown
-//! names, wrong types, values out of range. Missing ones take their defaults; the rest is an error.
+//! Every registry entry with parameters as a library user may pass them: none, unknown names, wrong
+//! types, values out of range. Missing ones take their defaults; the rest is an error.
 
 use crate::support::{Pcg, default_params, scenes};
 use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, BvhParameters, TriangleSoup};
@@ -7,7 +7,7 @@ use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Variant}
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
 
-/// Parameters that a schema does not allow, each with a word that the message must hold.
+/// Parameters that a schema does not allow, each with a word that the message must contain.
 fn hostile(schema: &ParameterSchema) -> Vec<(Params, String)> {
     let alone = |name: &str, value| Params([(name.to_owned(), value)].into());
     let mut out = vec![(
@@ -119,7 +119,7 @@ fn a_sampler_completes_its_parameters_and_refuses_what_it_does_not_know() {
     }
     for decorrelation in registry.decorrelation_entries() {
         for sequence in registry.sequence_entries() {
-            // A pair may make no sense; it must say so, not panic.
+            // A pair may be incompatible; that must be an error, not a panic.
             let sampler =
                 registry.sampler(&plain(&sequence.name), &plain(&decorrelation.name), &demand);
             made += usize::from(sampler.is_ok());

@@ -1,4 +1,4 @@
-//! Records of the version before this one are read, whatever they hold.
+//! Records of the previous version are read, whatever their content.
 
 use raystone::config::Cell;
 use raystone::measure::bias::BiasVerdict;
@@ -64,7 +64,7 @@ fn kernels_checks_and_tests_of_old_records_move_to_the_key_and_to_what_ran() {
     assert_eq!(line.key.label(axis::TRIANGLE), "pluecker");
     assert_eq!(line.ran.kernel_hash, "ab");
     assert!(line.ran.unchecked && line.ran.features == ["nee"]);
-    // What was read is written in the present schema, and reads back the same.
+    // Re-written in the present schema, it reads back the same.
     let written = text_of([&line]).expect("JSON");
     assert!(
         written.contains(SCHEMA) && written.contains("\"key\""),

@@ -1,4 +1,4 @@
-//! Lists that are taken in turn: nothing is left out for good, and the page of the tests names each.
+//! Lists tested in turn: nothing is skipped forever, and the page of the tests names each list.
 
 use crate::support::tier::{one_of, places};
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ fn every_place_has_its_turn_and_no_turn_is_empty() {
     assert_eq!(one_of(1, "one part", ["a", "b"]), ["a", "b"]);
 }
 
-/// Names of lists in the sources below a folder, by the calls that take part of them.
+/// Names of lists in the sources below a folder, from the calls that use part of them.
 fn lists(folder: &Path, found: &mut BTreeSet<String>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();

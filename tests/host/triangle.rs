@@ -1,5 +1,5 @@
-//! The one triangle test against exact integer arithmetic, and on closed surfaces: what all
-//! structures are equal to must itself be right.
+//! The triangle test against exact integer arithmetic, and on closed surfaces: all structures are
+//! compared with it, so it must be right.
 
 use crate::support::{Pcg, brute_force, scenes};
 use raystone::accel::triangle::{
@@ -7,10 +7,10 @@ use raystone::accel::triangle::{
 };
 use raystone::accel::{Intersection, NO_HIT, Ray, TriangleSoup};
 
-/// What exact integer arithmetic says of one ray and one triangle.
+/// The exact result for one ray and one triangle.
 enum Exact {
     Miss,
-    /// The triangle is seen edge-on or has no area: its rounded weights may be anything.
+    /// The triangle is edge-on or has no area: its rounded weights are arbitrary.
     EdgeOn,
     /// On an edge or corner: either answer is right.
     Edge,
@@ -18,7 +18,7 @@ enum Exact {
     Inside(i64, i64),
 }
 
-/// Judges lattice geometry: every coordinate is a multiple of one half.
+/// Intersects lattice geometry exactly: every coordinate is a multiple of one half.
 fn exactly(triangle: &TriangleRecord, ray: &Ray) -> Exact {
     let whole = |v: [f32; 3]| v.map(|x| (2.0 * x) as i64);
     let cross = |a: [i64; 3], b: [i64; 3]| -> [i64; 3] {
@@ -51,13 +51,13 @@ fn exactly(triangle: &TriangleRecord, ray: &Ray) -> Exact {
     Exact::Inside(t, area)
 }
 
-/// Whether products of edges are all that a test makes of a triangle.
+/// True if a test uses only products of edges.
 fn is_exact(test: AnyTriangleTest) -> bool {
     test.name() == MoellerTrumbore.name()
 }
 
-/// What rounding may make of the distance `t`. The products of edges are exact on a lattice, so that the
-/// quotient alone is rounded; a test that shears averages the distances of the vertices.
+/// Rounding error of the distance `t`. Products of edges are exact on a lattice, so only the
+/// quotient is rounded; a shearing test averages the distances of the vertices.
 fn tolerance(test: AnyTriangleTest, record: &TriangleRecord, ray: &Ray, t: f64) -> f64 {
     let size = ray.direction.map(f32::abs);
     let longest = (0..3).fold(0, |z, a| if size[a] > size[z] { a } else { z });
@@ -65,9 +65,10 @@ fn tolerance(test: AnyTriangleTest, record: &TriangleRecord, ray: &Ray, t: f64) 
         .vertices()
         .map(|v| (v[longest] - ray.origin[longest]).abs());
     let far = f64::from(far.into_iter().fold(0.0, f32::max) / size[longest]);
-    let reach = match is_exact(test) {
-        true => t.abs(),
-        false => t.abs().max(far),
+    let reach = if is_exact(test) {
+        t.abs()
+    } else {
+        t.abs().max(far)
     };
     reach * 2.0_f64.powi(-21)
 }
@@ -115,7 +116,7 @@ fn agrees_with_integers(triangle: AnyTriangleTest) {
                         let t = t as f64 / area as f64;
                         let (low, high) = (f64::from(ray.t_min), f64::from(ray.t_max));
                         let slack = tolerance(triangle, record, &ray, t);
-                        // A rounded distance may fall to either side of an end.
+                        // A rounded distance may fall on either side of an end.
                         let near = |end: f64| (t - end).abs() <= slack;
                         let exact = is_exact(triangle);
                         assert!(

@@ -1,10 +1,10 @@
 //! Kernels and their Rust twins: same file stem in mirrored folders, same function names, same
-//! constants. Whatever has no twin is listed here with the reason.
+//! constants. Exceptions are listed here with the reason.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Kernel file → Rust file, where the stem differs.
+/// Kernel file → Rust file, if the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/grid", "src/accel/grid/mod.rs"),
     ("accel/query", "src/accel/twin.rs"),
@@ -27,7 +27,7 @@ const OTHER_FILE: &[(&str, &str)] = &[
     ("sampling/sampler", "src/sampling/lib.rs"),
 ];
 
-/// Kernel files, and folders of them, without a twin, with the reason.
+/// Kernel files and folders without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
     (
         "organisation/",
@@ -309,7 +309,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/texture", "judged by images, not by a twin"),
 ];
 
-/// Functions and constants of a kernel that its twin writes in another way, with the reason.
+/// Kernel functions and constants that the twin expresses differently, with the reason.
 const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     (
         "accel/triangle/compensated",
@@ -500,20 +500,21 @@ fn without_tests(path: &Path) -> String {
 
 fn twin_text(kernel: &str) -> String {
     let text = without_tests(&twin_path(kernel));
-    // What a ray is, all crates share.
+    // The ray type is shared by all crates.
     match kernel {
         "accel/ray" => text + &without_tests(&root().join("src/core/geometry.rs")),
         _ => text,
     }
 }
 
-/// Text of a twin with what all twins of its folder share, where a structure is a folder.
+/// Text of a twin, with the shared part of its folder if a structure is a folder.
 fn twin_and_shared_text(kernel: &str) -> String {
     let shared = twin_path(kernel).with_file_name("mod.rs");
-    // A crate of its own begins with its root.
-    let shared = match shared.exists() {
-        true => shared,
-        false => shared.with_file_name("lib.rs"),
+    // A separate crate begins with its root.
+    let shared = if shared.exists() {
+        shared
+    } else {
+        shared.with_file_name("lib.rs")
     };
     let in_folder = kernel.matches('/').count() > 1;
     let shared = if in_folder {
@@ -524,7 +525,6 @@ fn twin_and_shared_text(kernel: &str) -> String {
     twin_text(kernel) + &shared
 }
 
-/// Whether this is the name of a kernel, or of the folder that it lies in.
 fn is_named(kernel: &str, name: &str) -> bool {
     kernel == name || (name.ends_with('/') && kernel.starts_with(name))
 }
@@ -536,7 +536,7 @@ fn twinned() -> Vec<String> {
     out
 }
 
-/// Names behind `fn `; of Rust, only free functions if `free`.
+/// Names after `fn `; in Rust, only free functions if `free`.
 fn functions(text: &str, free: bool) -> BTreeSet<String> {
     let mut out = BTreeSet::new();
     for line in text.lines() {
@@ -576,7 +576,7 @@ fn constants(text: &str) -> BTreeMap<String, String> {
     out
 }
 
-/// Values of constants as bits, evaluated by naga; Rust's spelling is turned into WGSL's.
+/// Values of constants as bits, evaluated by naga; Rust spelling is converted to WGSL.
 fn values(constants: &BTreeMap<String, String>) -> BTreeMap<String, u32> {
     let wgsl = |declaration: &String| {
         let (left, value) = declaration.split_once('=').expect("a value");
@@ -760,6 +760,6 @@ fn kinds_of_lights_have_the_numbers_of_their_rows() {
         let name = kind.name.to_uppercase();
         assert_eq!(constants.get(&name), Some(&number), "{name}");
     }
-    // And NO_LIGHT.
+    // Plus NO_LIGHT.
     assert_eq!(constants.len(), raystone::scene::LIGHT_KINDS.len() + 1);
 }

@@ -1,4 +1,4 @@
-//! Samples by block, and tiles that take as many as they need.
+//! Samples by block, and tiles with as many samples as they need.
 
 use crate::support;
 use crate::support::*;
@@ -47,7 +47,7 @@ fn blocks_on_the_list_have_the_samples_of_a_whole_image_and_others_none() {
     assert!(lit > 64, "{lit}");
 }
 
-/// 16 replicates to 128 samples, and what a test changes.
+/// 16 replicates up to 128 samples, with changes.
 fn experiment(changes: &[&str]) -> String {
     let common = [
         "run.replicates = 16",
@@ -75,7 +75,7 @@ fn run(text: &str) -> (Vec<ErrorRecord>, BiasVerdict) {
     (errors.collect(), verdict.expect("a bias check"))
 }
 
-/// Samples and mean error at each of them.
+/// Sample counts, with the mean error at each.
 fn curve(records: &[ErrorRecord]) -> Vec<(u32, f64)> {
     let at = |k: usize| {
         let values: Vec<f64> = records
@@ -92,7 +92,7 @@ fn curve(records: &[ErrorRecord]) -> Vec<(u32, f64)> {
 fn tiles_end_on_their_own_without_bias_and_the_target_is_met() {
     let (uniform, _) = run(&experiment(&[]));
     let uniform = curve(&uniform);
-    // What an even image has at 32 samples, so that some tiles need fewer and some more.
+    // The error of a uniform image at 32 samples, so that some tiles need fewer and some more.
     let target = uniform[2].1;
     let rule = format!("run.stop = {{ relmse = {target}, confidence = 0.95, tile = 8 }}");
     let text = experiment(&[&rule]);
@@ -104,7 +104,7 @@ fn tiles_end_on_their_own_without_bias_and_the_target_is_met() {
     assert!((9..128).contains(&spp), "{adaptive:?}");
     assert!(error < target, "{error} of {target}");
     assert_eq!(adaptive[0], uniform[0], "the first stage is even");
-    // A run more, of the longest here.
+    // A further run, the longest here.
     if !is_full() {
         return;
     }

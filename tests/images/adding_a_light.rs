@@ -1,5 +1,5 @@
-//! A light from outside the program: a row for rendering and a row of checks are all that a kind takes. Single paths and a known image
-//! agree with its formula, Mitsuba is told of it, and faults are seen.
+//! A light from outside the program needs only a row for rendering and a row of checks. Single
+//! paths and a known image match its formula, it is exported to Mitsuba, and faults are detected.
 
 use crate::adding_a_material::{fault_in, faulty_gpu, verdict};
 use crate::support::*;
@@ -35,7 +35,7 @@ static CHECKS: LightChecks = LightChecks {
     ..LightChecks::new(&BULB, LightTwin::Alone(sample), in_mitsuba)
 };
 
-/// As if it shone evenly.
+/// Exports it as an isotropic light.
 fn in_mitsuba(export: &mut Export<'_>, _: usize, light: &Light) -> Result<(), ExportError> {
     let place = light.place().map(|(place, _)| vector(place));
     export.xml += &format!(
@@ -84,7 +84,6 @@ fn sample(light: &Light, from: DVec3, _: [f64; 2], _: &mut Rounding) -> Option<L
     })
 }
 
-/// A floor at y = 0 of this material.
 fn floor(material: Material) -> Result<SceneData, SceneError> {
     let mut scene = raystone::scene::named("single-triangle")?;
     let corners = [
@@ -138,7 +137,7 @@ fn shows(scene: &SceneData, kind: &LightKind) -> bool {
     list.lights.iter().any(|light| light.kind(scene) == kind)
 }
 
-/// The scene of lights without triangles, the new one among them, and the new one alone in a room.
+/// The scene of lights without triangles including the new one, and the new one alone in a room.
 fn scenes() -> [SceneData; 2] {
     let trials = trial_scenes_of(&kinds()).expect("scenes").into_iter();
     let mut trials = trials.map(|trial: TrialScene| trial.scene);
@@ -211,7 +210,7 @@ fn mitsuba_is_told_of_it_or_it_is_refused_by_name() {
     assert!(refused.to_string().contains("light 0, a bulb"), "{refused}");
 }
 
-/// KindChecks without a row, and those that nothing shows.
+/// Kinds without a row of checks, and those that nothing shows.
 fn unchecked(all: &[&LightKind], kinds: &KindChecks) -> Vec<String> {
     let trials = trial_scenes_of(kinds).expect("scenes");
     let images = known_images_of(kinds).expect("images");

@@ -1,5 +1,6 @@
-//! Materials from outside the program: a row for rendering and a row of checks are all that a kind takes. Kernels are composed with
-//! it, files are read into it, single paths and a known image agree with its formulas, Mitsuba is told of it, and faults are seen.
+//! Materials from outside the program need only a row for rendering and a row of checks. Kernels
+//! compose with them, files load as them, single paths and a known image match their formulas, they
+//! are exported to Mitsuba, and faults are detected.
 
 mod rows;
 
@@ -27,7 +28,7 @@ use rows::{GAUZE, MINNAERT, kinds, minnaert};
 
 const IMAGE: [u32; 2] = [26, 19];
 
-/// The row of balls, among which those of the new kinds stand.
+/// The row of balls, including the new kinds.
 fn balls(kinds: &KindChecks) -> SceneData {
     let scenes = trial_scenes_of(kinds).expect("scenes").into_iter();
     let mut scenes = scenes.map(|trial| trial.scene);
@@ -35,7 +36,7 @@ fn balls(kinds: &KindChecks) -> SceneData {
     found.expect("the trial scene of gloss")
 }
 
-/// The box with one material alone, whose normals are those of a bumpy surface.
+/// The box with a single material and the normals of a bumpy surface.
 fn bumpy() -> SceneData {
     let mut scene = builtin("cornell-box", &[]);
     for material in &mut scene.materials {
@@ -89,7 +90,6 @@ fn organisation(name: &str, changes: &[(&str, &str)]) -> Variant {
     }
 }
 
-/// The verdict on single paths.
 pub fn verdict(
     gpu: &Gpu,
     scene: &SceneData,
@@ -120,7 +120,7 @@ pub fn verdict(
     judge(&oracle, &view, &answers)
 }
 
-/// The device with a fault in a kernel that a kind brings along.
+/// The device with a fault in a kernel of a kind.
 pub fn faulty_gpu((name, text): (&str, &str), from: &str, to: &str) -> Gpu {
     assert_eq!(text.matches(from).count(), 1, "{from}");
     let text = text.replace(from, to);
@@ -174,7 +174,7 @@ fn a_kernel_for_each_kind_makes_the_image_of_the_single_kernel() {
     }
 }
 
-/// What is wrong with a view of a known image.
+/// The error of a view of a known image.
 pub fn fault_in(gpu: &Gpu, kinds: &KindChecks, image: &str, view: &str) -> Option<String> {
     let images = known_images_of(kinds).expect("images");
     let image = images.iter().find(|known| known.name == image);
@@ -261,7 +261,7 @@ fn files_are_read_into_it() {
     assert_eq!(plain.materials[0].kind, &DIFFUSE);
 }
 
-/// KindChecks without a row, and those that nothing shows.
+/// Kinds without a row of checks, and those that nothing shows.
 fn unchecked(all: &[&MaterialKind], kinds: &KindChecks) -> Vec<String> {
     let trials = trial_scenes_of(kinds).expect("scenes");
     let images = known_images_of(kinds).expect("images");
@@ -293,7 +293,7 @@ fn every_kind_has_its_row_and_is_shown() {
         ["row", "trial scene", "known image"].map(all)
     );
     assert_eq!(unchecked(&[&MINNAERT], &kinds()), [""; 0]);
-    // What is there of the program's kinds stays where it is.
+    // The program's kinds stay in place.
     let before = trial_scenes().expect("scenes");
     let after = trial_scenes_of(&kinds()).expect("scenes");
     let names = |trials: &[raystone::measure::trial_scenes::TrialScene]| -> Vec<String> {
@@ -305,7 +305,7 @@ fn every_kind_has_its_row_and_is_shown() {
     assert_eq!(names(&before), names(&after));
 }
 
-/// Lines of the table of kernels that a row asks for.
+/// Lines that an entry requires in the table of kernels.
 fn lines(number: usize, kind: &MaterialKind) -> Vec<String> {
     let (feature, name) = (kind.feature, kind.feature.to_uppercase());
     let answer =

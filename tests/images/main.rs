@@ -1,4 +1,4 @@
-//! What is rendered: samplers, materials, lights, integrators, and the judges of images.
+//! Tests of rendering: samplers, materials, lights, integrators, and the image references.
 
 #[path = "../support/mod.rs"]
 mod support;

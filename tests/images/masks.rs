@@ -1,5 +1,5 @@
-//! Alpha masks: closest and any hit of every structure and triangle test where surfaces are cut out, the gate with planted faults,
-//! estimators under a masked lamp, and an answer that is known without any of them.
+//! Alpha masks: closest and any hits of every structure and triangle test with masked surfaces, the
+//! correctness check with planted faults, masked lamps, and a known answer.
 
 use crate::support::*;
 use raystone::accel::{AccelRegistry, Intersection, NO_HIT, Ray, TriangleRegistry, TriangleSoup};
@@ -49,7 +49,7 @@ fn every_structure_answers_as_brute_force_does_where_surfaces_are_cut_out() {
     let ignored = brute_force(&whole, &rays);
     let changed = differences(&expected, &ignored).len();
     assert!(changed > 400, "masks change {changed} of 4000 rays");
-    // Instances that are moved round otherwise: they have a judge of their own in the gate.
+    // Instance transforms round differently: they have their own reference.
     let flat = TriangleSoup {
         placed: None,
         ..soup
@@ -101,7 +101,7 @@ fn the_gate_passes_what_is_right() {
         let verdict = verdict.expect("a verdict");
         assert!(verdict.passed, "{name}: {verdict:?}");
         let oracle = &verdict.oracle;
-        // What rounding leaves open is near the outlines of holes.
+        // Rounding only matters near the outlines of holes.
         assert!(
             oracle.ambiguous - oracle.hard_ambiguous < oracle.rays / 50,
             "{oracle:?}"
@@ -111,7 +111,7 @@ fn the_gate_passes_what_is_right() {
     assert_eq!(unsound, None);
 }
 
-/// Faults, each with the structure whose gate must be red.
+/// Faults, each with the structure whose check must fail.
 const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
     (
         "masks ignored in any hit",

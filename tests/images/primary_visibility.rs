@@ -1,5 +1,5 @@
-//! Paths that begin at rasterised triangles: nearly all pixels see what a ray through the same point finds, those that do have its value to
-//! the bit, and what could go wrong shows.
+//! Paths that begin at rasterised triangles: nearly all pixels see the same triangle as a ray
+//! through the same point, and then have bit-identical values; planted faults are detected.
 
 use crate::support;
 use crate::support::*;
@@ -13,7 +13,7 @@ use raystone::integrator::{
 };
 use raystone::params::{ParamValue, Params, Variant};
 
-/// No multiple of a row's padding.
+/// Not a multiple of a row's padding.
 const SIZE: [u32; 2] = [101, 75];
 const SPP: u32 = 2;
 
@@ -23,7 +23,7 @@ fn begun_by(primary: &str) -> Variant {
     integrator_variant("path", &[("primary", primary), depth])
 }
 
-/// The image of some samples, and the triangles that were rasterised, if any were.
+/// The image of some samples, and the rasterised triangles, if any.
 fn rendered(
     stage: &Stage,
     structure_name: &str,
@@ -45,7 +45,7 @@ fn rendered(
     Ok((image, seen))
 }
 
-/// The triangles that rays through the centres of pixels find.
+/// The triangles found by rays through pixel centres.
 fn found(stage: &Stage) -> Vec<u32> {
     let [forward, right, up] = stage.camera.basis(SIZE);
     let [width, height] = SIZE.map(|edge| edge as f32);
@@ -69,17 +69,16 @@ fn found(stage: &Stage) -> Vec<u32> {
     hits.iter().map(|hit| hit.triangle).collect()
 }
 
-/// How rasterised paths differ from traced ones.
 #[derive(Debug)]
 struct Difference {
     /// Pixels that see another triangle.
     triangles: usize,
-    /// Pixels that see the same one and have another value.
+    /// Pixels that see the same one but have another value.
     unexplained: usize,
 }
 
 impl Difference {
-    /// More than a rasteriser's grid of fractions of a pixel and roundings make.
+    /// More than explained by a rasteriser's subpixel grid and rounding.
     fn is_too_great(&self) -> bool {
         let pixels = (SIZE[0] * SIZE[1]) as usize;
         // Measured: at most 0.2 % and none.
@@ -106,7 +105,7 @@ fn difference(stage: &Stage) -> Result<Difference, GpuError> {
     })
 }
 
-/// Scenes to be looked at from outside, from inside with triangles on all sides and behind, and from a hair's breadth.
+/// Scenes viewed from outside, from inside with triangles all around, and from very close.
 fn stages(gpu: &Gpu) -> Vec<(&'static str, Stage)> {
     let sphere = [("triangles", ParamValue::Integer(2000))];
     let mut all = vec![
@@ -210,7 +209,7 @@ fn what_cannot_be_rasterised_is_refused_with_the_reason() {
     );
 }
 
-/// Whether rasterised paths with this fault in a kernel are told from traced ones, on some scene.
+/// True if this kernel fault makes rasterised paths differ from traced ones in some scene.
 fn is_seen((module, from, to): (&str, &str, &str)) -> bool {
     let gpu = open(kernels_with(module, &[(from, to)]));
     let shows = |stage: &Stage| match difference(stage) {
@@ -238,11 +237,11 @@ fn planted_faults_are_seen() {
             "(x, y, view.near,",
             "(x + 0.01 * distance, y, view.near,",
         ),
-        // A near plane that cuts the scene, depth that grows with the distance, none at all.
+        // A near plane that cuts the scene, depth that grows with distance, none at all.
         (DRAWN, "(x, y, view.near,", "(x, y, view.near * 3e5,"),
         (DRAWN, "(x, y, view.near,", "(x, y, distance - view.near,"),
         (DRAWN, "(x, y, view.near,", "(x, y, 0.5 * distance,"),
-        // Holes that are none, and the other way round; of another point.
+        // Holes that do not exist, and vice versa; of another point.
         (
             DRAWN,
             "if (is_hole(at.triangle, at.place.xy)) {",
@@ -250,7 +249,7 @@ fn planted_faults_are_seen() {
         ),
         (DRAWN, "if (is_hole(", "if (!is_hole("),
         (DRAWN, "weights.x, weights.y)", "weights.y, weights.x)"),
-        // Only what faces the camera; only what faces away.
+        // Front faces only; back faces only.
         (
             DRAWN,
             "fn seen(at: Corner) -> @location(0) u32 {",

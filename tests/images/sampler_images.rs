@@ -1,5 +1,5 @@
-//! Rendered error of every structured sampler against plain hashing, at 256 samples per pixel. Takes a minute:
-//! forty kernels are compiled, and the references have 8192 samples.
+//! Rendered error of every structured sampler against plain hashing, at 256 samples per pixel.
+//! Takes a minute: forty kernels are compiled, and the references have 8192 samples.
 
 use crate::support::*;
 use raystone::gpu::Gpu;
@@ -12,7 +12,7 @@ const SPP: u32 = 256;
 /// Samples of each half of the reference.
 const REFERENCE: u32 = 4096;
 const SEEDS: u32 = 8;
-/// A mean square over 8 replicates of 192 pixels is known to about 5 %: twice that is no accident.
+/// A mean square over 8 replicates of 192 pixels is known to about 5 %; twice that is significant.
 const MARGIN: f64 = 1.1;
 
 const SAMPLERS: [(&str, &str); 10] = [
@@ -28,7 +28,7 @@ const SAMPLERS: [(&str, &str); 10] = [
     ("r2", "none"),
 ];
 
-/// A scene, what is rendered of it, and two independent halves of the reference.
+/// A scene, its rendering, and two independent halves of the reference.
 struct View<'a> {
     gpu: &'a Gpu,
     stage: &'a Stage,
@@ -65,13 +65,14 @@ impl<'a> View<'a> {
         seeds.iter().map(image).collect()
     }
 
-    /// Mean square of the error over seeds, pixels and channels, without the reference's noise: the product of
-    /// the differences from its two halves.
+    /// Mean squared error over seeds, pixels and channels, without the reference's noise: the
+    /// product of the differences from its two halves.
     fn error(&self, gpu: &Gpu, (sequence, decorrelation): (&str, &str)) -> f64 {
         let sampler = sampler_of(sequence, decorrelation, SPP);
-        let seeds: Vec<u32> = match sampler.is_random() {
-            true => (1..=SEEDS).collect(),
-            false => vec![1],
+        let seeds: Vec<u32> = if sampler.is_random() {
+            (1..=SEEDS).collect()
+        } else {
+            vec![1]
         };
         let images = self.images(gpu, &sampler, SPP, &seeds);
         let mut sum = 0.0;
@@ -94,7 +95,7 @@ impl<'a> View<'a> {
 fn no_structured_sampler_is_worse_than_hashing() {
     let gpu = gpu();
     let triangles = [("triangles", ParamValue::Integer(800))];
-    // A closed box with a lamp, and a body under an open sky.
+    // A closed box with a lamp, and an object under an open sky.
     let stages = [
         Stage::builtin(gpu, "cornell-box", &[]),
         Stage::builtin(gpu, "displaced-sphere", &triangles),
@@ -119,7 +120,7 @@ fn no_structured_sampler_is_worse_than_hashing() {
     }
     assert!(wrong.is_empty(), "{wrong:?}");
 
-    // One set of points for all pairs of dimensions must be seen.
+    // A common point set for all pairs of dimensions must be detected.
     let faulty = open(kernels_with(
         "sampling/pmj02",
         &[("(s.dimension >> 1u) * (last + 1u)", "0u")],

@@ -1,4 +1,4 @@
-//! What a run says about samplers, against computations of its own; and controls that must be found.
+//! Sampler figures of a run against independent computations; and controls that must be detected.
 
 use crate::support;
 use crate::support::{plan, run, sampler_of};
@@ -196,7 +196,7 @@ fn streams_have_every_figure_and_jitter_lies_between_its_ends() {
 #[test]
 fn one_shift_for_two_dimensions_shows_in_the_matrix_of_pairs() {
     let sampler = sampler_of("halton", "cranley-patterson", 16);
-    // The shifts of 1024 pixels: their first points less the point that all share.
+    // The shifts of 1024 pixels: their first points minus the common point.
     let points = |source: fn(u32) -> u32| -> Vec<[f64; 3]> {
         let of_pixel = |pixel| [0, 1, 2].map(|d| sampler.sample_u32(at(pixel, 0, source(d), 3)));
         (0..1024)

@@ -1,4 +1,4 @@
-//! A structure whose scene moves, and the ways in which it takes a frame over.
+//! A structure over a moving scene, and its ways to follow it from frame to frame.
 
 use raystone_accel::tree::Tree;
 use raystone_accel::{AccelError, AccelKind, BuildLog, BuiltAccel, OverTree, TriangleSoup};
@@ -6,39 +6,38 @@ use raystone_config::Motion;
 use raystone_core::params::Params;
 use raystone_gpu::Gpu;
 
-/// How a structure takes over the triangles of a frame.
+/// How a structure follows a new frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// The first frame's tree with new boxes, fitted on the device.
+    /// Refits the first frame's tree on the device.
     Device,
-    /// The same, fitted on the host.
+    /// Refits the first frame's tree on the host.
     Host,
-    /// New transforms under what was built over the objects: [`BuiltAccel::update`].
+    /// New transforms over the structures of the objects: [`BuiltAccel::update`].
     Update,
-    /// Built anew.
+    /// Rebuilds from scratch.
     Rebuild,
 }
 
-/// A structure as it was built over the first frame.
+/// A structure built over the first frame.
 pub struct Actor<'a> {
     kind: &'a dyn AccelKind,
     params: &'a Params,
     first: First<'a>,
 }
 
-/// What is kept from frame to frame.
+/// State reused in every frame.
 enum First<'a> {
-    /// A tree, and what lays it out.
     Tree(&'a dyn OverTree, Tree),
-    /// Objects that do not change: a structure that takes over transforms.
+    /// Unchanged objects of a structure that updates transforms.
     Objects,
 }
 
-/// What a way led to: where a tree is laid out, only the tree is timed, since all ways have the layout in common.
+/// Result of a way. If trees have a common layout step, only the tree is timed.
 pub enum Taken {
     /// A tree.
     Tree(Tree),
-    /// All of it.
+    /// The complete structure.
     Built(Box<dyn BuiltAccel>),
 }
 
@@ -46,7 +45,7 @@ impl<'a> Actor<'a> {
     /// Builds over the first frame.
     ///
     /// # Errors
-    /// It cannot be built, or has no way to take a frame over but building it anew.
+    /// It cannot be built, or can only be rebuilt from frame to frame.
     pub fn new(
         kind: &'a dyn AccelKind,
         params: &'a Params,
@@ -78,7 +77,7 @@ impl<'a> Actor<'a> {
         })
     }
 
-    /// The ways that lead from frame to frame: first that of less work, last building anew.
+    /// The available ways: the cheapest first, rebuilding last.
     pub fn ways(&self) -> &'static [Way] {
         match self.first {
             First::Tree(..) => &[Way::Device, Way::Host, Way::Rebuild],
@@ -86,7 +85,7 @@ impl<'a> Actor<'a> {
         }
     }
 
-    /// What a way starts from, made before it is timed.
+    /// Prepares the input of a way, before timing.
     ///
     /// # Errors
     /// It cannot be built.
@@ -105,10 +104,10 @@ impl<'a> Actor<'a> {
         })
     }
 
-    /// Takes over the triangles of a frame.
+    /// Follows the triangles of a frame.
     ///
     /// # Errors
-    /// As the building, refitting or updating that it is.
+    /// Those of building, refitting or updating.
     pub fn take(
         &self,
         way: Way,
@@ -133,7 +132,7 @@ impl<'a> Actor<'a> {
         }
     }
 
-    /// The structure that was led to.
+    /// The resulting structure.
     ///
     /// # Errors
     /// A tree exceeds a limit of the layout.

@@ -1,5 +1,5 @@
-//! A scene that moves: what was built over its first frame is taken over to each further one, against building anew.
-//! Each frame has a judge of its own, and what was taken over must answer as that one does, to the bit.
+//! Moving scenes: structures of the first frame are refitted or updated to each further one,
+//! against a rebuild. Each frame has a reference tracer, which they must match bit by bit.
 
 mod actor;
 mod motion;
@@ -19,35 +19,34 @@ use raystone_verify::gate::{Judge, gate, timed_fault};
 use raystone_verify::rays::RaySet;
 use std::cell::RefCell;
 
-/// A frame, and how it is looked at.
+/// A frame and its test setup.
 pub(crate) struct Frame<'a> {
-    /// Its number.
+    /// Frame number.
     pub number: u32,
-    /// The triangles of the first frame.
+    /// Triangles of the first frame.
     pub first: &'a TriangleSoup,
-    /// The scene as it stands.
+    /// The scene in this frame.
     pub stage: &'a Stage,
-    /// Rays with their true hits in it.
+    /// Rays with their true hits.
     pub judge: &'a Judge,
-    /// How the adapter computes.
+    /// Arithmetic of the adapter.
     pub probe: &'a ArithmeticProbe,
-    /// Whether kernels keep the driver's checks.
+    /// True to keep the driver's runtime checks in kernels.
     pub runtime_checks: bool,
-    /// Rounds.
+    /// Timing settings.
     pub timing: &'a Timing,
-    /// Seed of their order.
+    /// Seed of the round order.
     pub seed: u64,
 }
 
-/// Refitted and rebuilt, both judged.
 struct Pair {
     traced: [Traced; 2],
     sah: [Option<f64>; 2],
     judged: usize,
 }
 
-/// Takes every structure over to a frame, on the device with its kernels: gates, then costs, all in the same rounds. What
-/// fails is told for that structure alone.
+/// Moves every structure to a frame, on the device with its kernels: correctness first, then costs
+/// in the same rounds. A failure affects only that structure.
 pub(crate) fn take_over(
     frame: &Frame,
     actors: &[(&Actor, &Gpu)],
@@ -90,8 +89,8 @@ pub(crate) fn take_over(
 }
 
 impl Frame<'_> {
-    /// Takes a structure over and builds it anew, and judges both. A tree refitted on the host must equal that of the
-    /// device to the bit, and is then judged with it.
+    /// Refits and rebuilds a structure, and checks both. A tree refitted on the host must be
+    /// bit-identical to that of the device, and is checked through it.
     fn pair(&self, actor: &Actor, gpu: &Gpu) -> Result<Pair, String> {
         let ways = actor.ways();
         let soup = &self.stage.soup;
@@ -126,7 +125,7 @@ impl Frame<'_> {
         })
     }
 
-    /// Rays that were judged.
+    /// Checks a structure; returns the number of rays.
     fn gate(&self, gpu: &Gpu, traced: &Traced) -> Result<usize, String> {
         let triangles = &self.stage.buffers.triangles;
         let soup = &self.stage.soup;
@@ -134,9 +133,10 @@ impl Frame<'_> {
         let verdict = gate(gpu, triangles, soup, traced, self.judge, self.probe, checks);
         let verdict = verdict.map_err(|e| e.to_string())?;
         let judge = self.judge.of(traced.space);
-        match verdict.passed {
-            true => Ok(judge.sets.iter().map(|set| set.rays.len()).sum()),
-            false => Err(fault_text(&verdict, judge.first_wrong.as_deref())),
+        if verdict.passed {
+            Ok(judge.sets.iter().map(|set| set.rays.len()).sum())
+        } else {
+            Err(fault_text(&verdict, judge.first_wrong.as_deref()))
         }
     }
 
@@ -145,7 +145,7 @@ impl Frame<'_> {
         sets.iter().filter(|set| set.is_timed())
     }
 
-    /// Everything that is timed of a structure: ways, then classes of rays, each refitted and rebuilt.
+    /// All timed work of a structure: ways, then ray classes, each refitted and rebuilt.
     fn timed<'a>(
         &'a self,
         place: usize,
@@ -176,7 +176,7 @@ impl Frame<'_> {
         Ok(items)
     }
 
-    /// The record, of [`Frame::timed`] in its order.
+    /// The record, from [`Frame::timed`] in order.
     fn record(
         &self,
         pair: Pair,
@@ -222,15 +222,14 @@ impl Frame<'_> {
     }
 }
 
-/// Something that is done in every round.
 enum Work<'a> {
-    /// A structure takes a frame over.
+    /// A structure follows a frame.
     Take(&'a Actor<'a>, Way, &'a Frame<'a>, &'a Gpu),
-    /// Rays of a class are traced.
+    /// Traces the rays of a class.
     Trace(Box<RayBatch>, &'a RaySet, Space),
 }
 
-/// What was timed of an actor, and what it took each time.
+/// Timed work of an actor, with its times.
 struct Timed<'a> {
     actor: usize,
     work: Work<'a>,
@@ -238,7 +237,7 @@ struct Timed<'a> {
 }
 
 impl Work<'_> {
-    /// Milliseconds by all clocks. What is made before or thrown away after is not in them.
+    /// Times by all clocks, excluding setup and teardown.
     fn run(&self) -> Result<Elapsed, GpuError> {
         match self {
             Self::Trace(batch, ..) => batch.trace(),
@@ -265,7 +264,7 @@ impl Measured for Timed<'_> {
 }
 
 impl Timed<'_> {
-    /// What the last rounds took.
+    /// Cost over the last rounds.
     fn cost(&self, rounds: usize) -> Cost {
         let notes = self.notes.borrow();
         let kept = &notes[notes.len().saturating_sub(rounds)..];
@@ -276,7 +275,7 @@ impl Timed<'_> {
         }
     }
 
-    /// What is wrong with the answers of the last round.
+    /// Error in the answers of the last round.
     fn fault(&self, frame: &Frame) -> Result<Option<String>, GpuError> {
         let Work::Trace(batch, set, space) = &self.work else {
             return Ok(None);

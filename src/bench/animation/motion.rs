@@ -1,4 +1,4 @@
-//! How a scene moves: every frame is made from the scene as it was loaded.
+//! Motion of a scene: every frame is derived from the scene as loaded.
 
 use glam::{DVec3, Vec3};
 use raystone_config::{Animation, Motion};
@@ -6,13 +6,12 @@ use raystone_core::random::Pcg32;
 use raystone_scene::{Assembly, SceneData, Transform};
 use std::f64::consts::TAU;
 
-/// Seed of the directions of instances.
 const SEED: u64 = 1;
 
-/// The scene in a frame; the first frame is the scene itself, to the bit.
+/// The scene in a frame; the first is bit-identical to the scene itself.
 ///
 /// # Errors
-/// Instances are to move, and there are none, or one cannot stand where it would.
+/// Instance motion without instances, or an instance that cannot be placed.
 pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<SceneData, String> {
     let time = animation.time(frame);
     let radius = f64::from(scene.bounds().radius());
@@ -25,7 +24,7 @@ pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<Sce
                 length: animation.wavelength * radius,
                 time,
             };
-            // What is bent is no copy any more.
+            // Deformed triangles are no longer copies.
             moved.assembly = None;
             for triangle in &mut moved.triangles {
                 triangle.vertices = triangle.vertices.map(|v| wave.moves(v));
@@ -43,8 +42,8 @@ pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<Sce
     Ok(moved)
 }
 
-/// A wave through all space: x moves with y, y with z, z with x. It travels by one wavelength from the first frame to
-/// the last, which therefore looks like the first.
+/// A wave in space: x moves with y, y with z, z with x. It travels one wavelength from the first to
+/// the last frame, which therefore look alike.
 struct Wave {
     amplitude: f64,
     length: f64,
@@ -65,7 +64,7 @@ impl Wave {
     }
 }
 
-/// Moves every instance straight on, so far, in a direction of its own.
+/// Moves every instance by `way` in a direction of its own.
 fn part(assembly: &mut Assembly, way: f64) -> Result<(), String> {
     let mut random = Pcg32::new(SEED);
     let directions: Vec<DVec3> = (assembly.instances().iter())

@@ -1,24 +1,24 @@
-//! A set-associative cache of lines that forgets the line which was used longest ago (LRU).
+//! A set-associative LRU cache of lines.
 
 use std::collections::{BTreeMap, HashMap};
 
 /// Size and associativity of a cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CacheShape {
-    /// Lines that it holds.
+    /// Number of lines.
     pub lines: u64,
-    /// Lines of a set; 0: all of them (fully associative).
+    /// Lines per set; 0 for fully associative.
     pub ways: u64,
 }
 
 impl CacheShape {
-    /// A cache of so many bytes; at least one line.
+    /// A cache of `bytes` bytes, at least one line.
     pub(crate) fn of_bytes(bytes: u64, line_bytes: u64, ways: u64) -> Self {
         let lines = (bytes / line_bytes).max(1);
         Self { lines, ways }
     }
 
-    /// Sets, and the lines of each. Lines that do not fill a set are left out.
+    /// Number of sets and lines per set. Lines that do not fill a set are dropped.
     fn sets(self) -> (u64, usize) {
         match self.ways {
             0 => (1, self.lines as usize),
@@ -27,19 +27,18 @@ impl CacheShape {
     }
 }
 
-/// The lines that a cache holds. A line with number n lies in set n modulo the number of sets.
+/// Content of a cache. Line n belongs to set n modulo the number of sets.
 #[derive(Debug, Clone)]
 pub(crate) struct Cache {
     ways: usize,
-    /// When each line that is held was last used.
+    /// Time of last use of each cached line.
     used: HashMap<u64, u64>,
-    /// Lines of each set by that time.
+    /// Lines of each set by time of last use.
     sets: Vec<BTreeMap<u64, u64>>,
     time: u64,
 }
 
 impl Cache {
-    /// An empty cache.
     pub(crate) fn new(shape: CacheShape) -> Self {
         let (sets, ways) = shape.sets();
         Self {
@@ -50,8 +49,7 @@ impl Cache {
         }
     }
 
-    /// Uses a line, and tells whether it was there. A line that was not takes the place of the one of its set
-    /// that was used longest ago.
+    /// Accesses a line; true for a hit. A miss replaces the least recently used line of the set.
     pub(crate) fn access(&mut self, line: u64) -> bool {
         self.time += 1;
         let set = (line % self.sets.len() as u64) as usize;
@@ -74,7 +72,7 @@ mod tests {
     use super::*;
     use raystone_core::random::Pcg32;
 
-    /// The definition, word by word: each set a list, the line used last in front.
+    /// Literal definition: each set a list, most recently used first.
     struct Naive(Vec<Vec<u64>>, usize);
 
     impl Naive {
@@ -97,7 +95,7 @@ mod tests {
     #[test]
     fn what_was_used_longest_ago_goes_and_not_what_came_first() {
         let two = CacheShape { lines: 2, ways: 0 };
-        // 1 is used again, so that 2 goes for 3; a queue would have let 1 go.
+        // 1 is reused, so 2 is evicted for 3; a FIFO would evict 1.
         let expected = [false, false, true, false, true, false];
         assert_eq!(hits(two, &[1, 2, 1, 3, 1, 2]), expected);
         // Two sets of one line: even and odd numbers.
@@ -109,7 +107,7 @@ mod tests {
     #[test]
     fn it_is_the_naive_cache_for_any_size_and_associativity() {
         let mut random = Pcg32::new(5);
-        // Near ones, far ones, and runs, so that both ends of every cache are reached.
+        // Near, far and sequential lines, to reach both ends of every cache.
         let lines: Vec<u64> = (0..4000_u64)
             .map(|i| match i % 3 {
                 0 => random.below(12) as u64,

@@ -1,52 +1,50 @@
-//! Where on the device lies what a twin reads: its arrays are laid out like those of the device, so that an
-//! address on the host tells array and byte.
+//! Maps reads of a host twin, whose arrays have the device's layout, to device memory.
 
 use raystone_accel::watch::Read;
 use raystone_accel::{BuiltAccel, TriangleSoup};
 
-/// Arrays begin at multiples of this many bytes.
+/// Alignment of arrays in bytes.
 const ALIGNMENT: u64 = 256;
 
-/// Bytes of the device that a lane reads at once.
+/// A contiguous device read by one lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Fetch {
-    /// Address of the first, all arrays lying one behind another.
+    /// First address, with all arrays laid out consecutively.
     pub first: u64,
-    /// How many, at least one.
+    /// Number of bytes, at least one.
     pub bytes: u32,
 }
 
 impl Fetch {
-    /// Numbers of the cache lines that it touches.
+    /// Indices of the cache lines touched.
     pub fn lines(self, line_bytes: u64) -> impl Iterator<Item = u64> {
         let last = self.first + u64::from(self.bytes.max(1)) - 1;
         self.first / line_bytes..=last / line_bytes
     }
 }
 
-/// An array, or one of the parts of an array, on host and device.
+/// An array, or part of one, on host and device.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     array: usize,
     host: usize,
     bytes: usize,
-    /// Of its first byte.
+    /// Device address of its first byte.
     device: u64,
 }
 
-/// The arrays that traversals of a structure read, in one space of addresses.
+/// The arrays that traversals of a structure read, in one address space.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// Names with the address of each, in their order.
     arrays: Vec<(&'static str, u64)>,
     parts: Vec<Part>,
 }
 
 impl Memory {
-    /// The arrays of a structure, and the triangles that it was built over.
+    /// The arrays of a structure and of its triangles.
     ///
     /// # Errors
-    /// The triangle test reads words that hosts do not keep.
+    /// The triangle test reads words that are not on the host.
     pub fn new(built: &dyn BuiltAccel, soup: &TriangleSoup) -> Result<Self, String> {
         let test = soup.intersection.triangle;
         let (own, record) = (
@@ -65,7 +63,7 @@ impl Memory {
         Ok(Self::of(&arrays))
     }
 
-    /// These arrays, part by part.
+    /// Builds the address space of these arrays, part by part.
     pub fn of(arrays: &[(&'static str, Vec<&[u32]>)]) -> Self {
         let mut memory = Self {
             arrays: Vec::new(),
@@ -89,10 +87,10 @@ impl Memory {
         memory
     }
 
-    /// What is fetched on the device where a twin reads this.
+    /// The device fetch that corresponds to a read of the twin.
     ///
     /// # Errors
-    /// It reads what is in no array of the device.
+    /// It reads memory outside the device's arrays.
     pub(crate) fn fetch(&self, read: Read) -> Result<Fetch, String> {
         let inside = |part: &&Part| {
             let end = part.host + part.bytes;
@@ -106,7 +104,7 @@ impl Memory {
         })
     }
 
-    /// Name of the array in which a fetch begins, and the byte there.
+    /// Name of the array in which a fetch begins, and the offset in bytes.
     pub fn place(&self, fetch: Fetch) -> (&'static str, u64) {
         let before = self.parts.iter().filter(|part| part.device <= fetch.first);
         let array = before.map(|part| part.array).max().unwrap_or(0);

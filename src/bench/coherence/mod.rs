@@ -1,14 +1,13 @@
-//! How alike the rays of neighbouring lanes are, and what a processor makes of it: a model that needs no GPU.
+//! Coherence of rays in neighbouring lanes, and its effect on a processor: a model without a GPU.
 //!
-//! The rays that an integrator would trace with a sampler ([`paths`]) are sent through the twin of a structure,
-//! which tells every node that it visits and every triangle that it tests with the memory that it reads for
-//! them ([`trace`]). The lanes of a warp then take these steps together (`simt`), and the cache lines that a
-//! step needs pass through the caches of a machine ([`cache`]). All is counted in integers, in an order that
-//! depends on nothing but the input ([`model`]): the same rays give the same figures on every machine, with any
-//! number of threads.
+//! The rays of an integrator and sampler ([`paths`]) traverse a structure's host twin, which
+//! reports every node visit and triangle test with its memory reads ([`trace`]). The lanes of a
+//! warp execute these steps in lock step (`simt`), and the cache lines of each step pass through
+//! the caches of a machine ([`cache`]). Everything is counted in integers, in an order that depends
+//! only on the input ([`model`]): equal rays give equal figures on any machine.
 //!
-//! What it leaves out: latency, the order of warps that a scheduler would choose, the loads of shading and of
-//! samplers, words of masks. `docs/coherence.md` has the rules, and what they say.
+//! Not modelled: latency, the order of warps chosen by a scheduler, loads of shading and samplers,
+//! mask words. `docs/coherence.md` states the rules and their meaning.
 
 pub mod cache;
 pub mod memory;

@@ -1,9 +1,9 @@
-//! Warps on a machine: what is issued, which cache lines it needs, and where they come from.
+//! Warps on a machine: issues, the cache lines they need, and where these come from.
 //!
-//! A group of warps shares an L1, all groups share the L2. In turn, each group's next warp issues once; in a group the
-//! warps take turns, too. A warp goes through its passes one after the other. Each line of an issue is one access to the
-//! L1; one that misses is one access to the L2, and one that misses there comes from memory. Both begin empty. Counts and
-//! what is made of them: [`raystone_record::Tally`].
+//! A group of warps shares an L1; all groups share the L2. Each group's next warp issues once,
+//! round-robin over groups and over the warps of a group. A warp executes its passes in order. Each
+//! line of an issue is one L1 access; a miss is one L2 access, and a miss there goes to memory.
+//! Both caches begin empty. Counts and derived figures: [`raystone_record::Tally`].
 
 use super::cache::{Cache, CacheShape};
 use super::simt::{Issue, issues};
@@ -13,43 +13,42 @@ use raystone_config::{Coherence, Rule};
 use raystone_record::Tallies;
 use std::collections::VecDeque;
 
-/// What warps run on.
+/// The machine that executes warps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Machine {
-    /// How the lanes of a warp go on.
+    /// Rule of turns within a warp.
     pub rule: Rule,
     /// Bytes of a cache line.
     pub line_bytes: u64,
-    /// The cache of a group of warps.
+    /// L1, one per group of warps.
     pub l1: CacheShape,
-    /// The cache of all groups.
+    /// L2, shared by all groups.
     pub l2: CacheShape,
 }
 
 /// Rays that the lanes of a warp trace together.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pass {
-    /// What they are of: tallies are kept by class.
+    /// Ray class, the key of tallies.
     pub class: u32,
-    /// One for each lane; `None` where it has no ray.
+    /// One trace per lane; `None` for a lane without a ray.
     pub lanes: Vec<Option<Trace>>,
 }
 
-/// What the lanes of a warp trace, pass after pass.
+/// The passes of a warp.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Warp {
-    /// In their order.
+    /// Passes in order.
     pub passes: Vec<Pass>,
 }
 
-/// A warp with what it will issue.
 struct Queue {
     lanes: u64,
     issues: VecDeque<(u32, Issue)>,
 }
 
 impl Machine {
-    /// The machine of an experiment.
+    /// The machine of an experiment's settings.
     pub fn new(settings: &Coherence) -> Self {
         let line_bytes = u64::from(settings.line_bytes);
         let cache = |kib: u32, ways: u32| {
@@ -65,7 +64,7 @@ impl Machine {
 }
 
 impl Queue {
-    /// What a warp issues, with what can be counted before.
+    /// The issues of a warp, and the tallies known in advance.
     fn new(warp: &Warp, machine: &Machine) -> (Self, Tallies) {
         let mut tallies = Tallies::new();
         let mut all = VecDeque::new();
@@ -87,12 +86,12 @@ impl Queue {
     }
 }
 
-/// What a machine makes of groups of warps, all together.
+/// Runs groups of warps on a machine; returns the total tallies.
 pub fn run(machine: &Machine, groups: &[Vec<Warp>]) -> Tallies {
     together(&run_groups(machine, groups))
 }
 
-/// The sums of the tallies of groups.
+/// Sum of the tallies of groups.
 pub fn together(groups: &[Tallies]) -> Tallies {
     let mut all = Tallies::new();
     for (class, tally) in groups.iter().flatten() {
@@ -101,7 +100,7 @@ pub fn together(groups: &[Tallies]) -> Tallies {
     all
 }
 
-/// What a machine makes of each of these groups of warps while it runs all of them.
+/// Runs all groups of warps on a machine; returns the tallies of each.
 pub(crate) fn run_groups(machine: &Machine, groups: &[Vec<Warp>]) -> Vec<Tallies> {
     let queue = |warp: &Warp| Queue::new(warp, machine);
     let of_group = |warps: &Vec<Warp>| warps.par_iter().map(queue).collect::<Vec<_>>();
@@ -134,7 +133,7 @@ pub(crate) fn run_groups(machine: &Machine, groups: &[Vec<Warp>]) -> Vec<Tallies
     groups.into_iter().map(|(_, _, tallies)| tallies).collect()
 }
 
-/// The next warp of a group with what it issues; warps that are done are dropped on the way.
+/// The next warp of a group and its issue; drops finished warps.
 fn next(warps: &mut VecDeque<Queue>) -> Option<(Queue, (u32, Issue))> {
     loop {
         let mut warp = warps.pop_front()?;
@@ -198,9 +197,9 @@ mod tests {
         };
         // Lines of 16 bytes; an L1 holds two, the L2 three.
         // Turn 1: the first group visits: lines 0 and 2, both from memory. The second: line 0, from the L2.
-        // Turn 2: a triangle, line 4, in the place of line 0 of the first L1. The second group: line 0 again, in its L1.
-        // Turn 3: line 1, in the place of line 2 in the L1 and in the L2, where 0 was used later than 2.
-        // Turn 4: line 2, which is in neither any more.
+        // Turn 2: a triangle, line 4, replaces line 0 in the first L1. Second group: line 0, L1 hit.
+        // Turn 3: line 1 replaces line 2 in L1 and L2, where 0 was used more recently.
+        // Turn 4: line 2, no longer in either.
         let tallies = run(&machine(16, [2, 3]), &[vec![first], vec![second]]);
         let expected = [
             Tally {
@@ -248,7 +247,7 @@ mod tests {
         let warp = |at| Warp {
             passes: vec![pass(0, vec![lane(&[(Node, at), (Node, at)])])],
         };
-        // Lines 0, 1, 0, 1 through a cache of one line; one warp after the other would hit twice.
+        // Lines 0, 1, 0, 1 through a one-line cache; warps run one after the other would hit twice.
         let hits = |l1| run(&machine(16, [l1, 8]), &[vec![warp(0), warp(16)]])[&0].l1_hits;
         assert_eq!((hits(1), hits(2)), (0, 2));
     }
@@ -291,14 +290,14 @@ mod tests {
             let unique: std::collections::BTreeSet<u64> =
                 fetches.clone().flat_map(|f| f.lines(128)).collect();
             assert!(bytes >= 48 && sum(|t| t.lines) >= unique.len() as u64);
-            // A cache that holds everything misses each line once, in each group and in all.
+            // An infinite cache misses each line once, per group and overall.
             let misses: u64 = boundless.values().map(Tally::misses).sum();
             assert_eq!(misses, unique.len() as u64);
             let l1_hits = |t: &std::collections::BTreeMap<u32, Tally>| {
                 t.values().map(|t| t.l1_hits).sum::<u64>()
             };
             assert!(l1_hits(&tallies) < l1_hits(&boundless));
-            // Each group has what its own warps issue, and together they are all.
+            // Each group has its own warps' issues; together they are the total.
             let of_groups = run_groups(&machine(128, [16, 40]), &groups);
             assert_eq!(together(&of_groups), tallies);
             for (tally, warps) in of_groups.iter().zip(&groups) {
@@ -307,12 +306,12 @@ mod tests {
                 let steps: usize = own.map(|t| t.steps.len()).sum();
                 assert_eq!(tally.values().map(|t| t.active).sum::<u64>(), steps as u64);
             }
-            // Lanes that change places change nothing: a step is what they do together.
+            // Swapping lanes has no effect, as they step together.
             let mut turned = groups.clone();
             let lanes = turned.iter_mut().flatten().flat_map(|w| &mut w.passes);
             lanes.for_each(|p| p.lanes.reverse());
             assert_eq!(run(&machine(128, [16, 40]), &turned), tallies);
-            // Those that change warps do.
+            // Swapping between warps has.
             let mut mixed = groups.clone();
             for group in &mut mixed {
                 let (a, b) = (

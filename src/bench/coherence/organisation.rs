@@ -1,4 +1,4 @@
-//! Which rays the lanes of a warp have.
+//! Assignment of rays to the lanes of a warp.
 
 use super::model::{Pass, Warp};
 use super::paths::RayClass;
@@ -7,22 +7,21 @@ use raystone_core::random::Pcg32;
 use raystone_record::SINGLE_KERNEL;
 use raystone_render::CountedRays;
 
-/// How rays are given to lanes.
+/// How rays are assigned to lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Organisation {
-    /// One kernel: a lane keeps its pixel, and waits once its path has ended (Dufay 2017, Alg. 2).
+    /// Megakernel: a lane keeps its pixel, and idles once its path has ended (Dufay 2017, Alg. 2).
     SingleKernel,
-    /// A kernel for each bounce: the rays that are left, in the order of their pixels, fill warps anew (stable
-    /// compaction), among the warps of one group.
+    /// One kernel per bounce: remaining rays refill a group's warps in pixel order (stable).
     Compacted,
-    /// The same with the warps' rays one behind the other in any order, as a scan or a ballot and one atomic leave them.
+    /// As `Compacted`, but with warps in random order, as after a scan or ballot with one atomic.
     CompactedByWarps,
-    /// The same with the rays in any order, the worst that an atomic for each can do.
+    /// As `Compacted`, but with rays in random order, the worst case of one atomic per ray.
     CompactedByRays,
 }
 
 impl Organisation {
-    /// All of them.
+    /// All organisations.
     pub const ALL: [Self; 4] = [
         Self::SingleKernel,
         Self::Compacted,
@@ -30,7 +29,7 @@ impl Organisation {
         Self::CompactedByRays,
     ];
 
-    /// What it is called.
+    /// Name of the organisation.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SingleKernel => SINGLE_KERNEL,
@@ -40,7 +39,7 @@ impl Organisation {
         }
     }
 
-    /// The warps of a group, from those in which every lane keeps its pixel. These have all the same passes.
+    /// Regroups warps in which every lane keeps its pixel, and which all have the same passes.
     pub fn of(self, warps: Vec<Warp>) -> Vec<Warp> {
         match self {
             Self::SingleKernel => warps,
@@ -48,7 +47,7 @@ impl Organisation {
         }
     }
 
-    /// The rays that are left in a pass, as they follow each other. Those from the camera have not been compacted yet.
+    /// The remaining rays of a pass in order. Camera rays have not been compacted yet.
     fn left(self, passes: &[&Pass], index: usize) -> Vec<Trace> {
         let is_first = |pass: &&Pass| RayClass::of_word(pass.class).rays == CountedRays::Primary;
         if self != Self::Compacted && passes.first().is_some_and(is_first) {
@@ -88,7 +87,7 @@ impl Organisation {
     }
 }
 
-/// Any order with equal probability (Fisher & Yates).
+/// Uniformly random permutation (Fisher & Yates).
 fn shuffle<T>(items: &mut [T], random: &mut Pcg32) {
     for last in (1..items.len()).rev() {
         items.swap(last, random.below(last + 1));
@@ -121,7 +120,7 @@ mod tests {
         assert_eq!(steps(&filled), [[1, 2, 3], [4, 0, 0]]);
         assert!(filled[2].passes.is_empty());
         assert!(filled[0].passes[0].class == 7);
-        // Whatever the order, the same rays; and those of a warp stay side by side where warps are in any order.
+        // The same rays in any order; rays of a warp stay together if only warps are permuted.
         let sorted = |organisation: Organisation| {
             let mut all = steps(&organisation.of(warps.clone())).concat();
             all.sort_unstable();

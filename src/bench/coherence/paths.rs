@@ -1,8 +1,8 @@
-//! The rays that lanes trace: those of single paths, drawn with the words of the sampler by the oracle for
-//! images, which knows what the integrators do ([`raystone_verify::path_oracle`]).
+//! The rays that lanes trace: those of single paths, generated from the sampler's words by the
+//! image oracle, which knows the integrators ([`raystone_verify::path_oracle`]).
 //!
-//! They are computed in f64 and rounded to f32 once. Where the system's sines differ in their last bit, a ray differs only
-//! if that bit decides its rounding, once in 10⁸ numbers or so.
+//! They are computed in f64 and rounded to f32 once. If system sines differ in the last bit, a ray
+//! differs only if that bit decides its rounding, about once in 10⁸ numbers.
 
 use super::trace::{Trace, trace_of};
 use super::{Memory, Pass, Warp};
@@ -14,25 +14,25 @@ use raystone_verify::path_oracle::{self, PathId, PathOracle, PathRay, Rounding};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Edge of a workgroup of the image kernel, pixels.
+/// Edge of the image kernel's workgroup, pixels.
 pub const WORKGROUP: u32 = 8;
 
-/// The golden ratio less 1, and a half, as fractions of 2³².
+/// The golden ratio minus 1, and a half, as fractions of 2³².
 const GOLDEN: u32 = 0x9e37_79b9;
 const HALF: u32 = 0x8000_0000;
 
-/// Rays start off their surface by this fraction of the scene's diagonal.
+/// Offset of rays from their surface, as a fraction of the scene's diagonal.
 const OFFSET: f64 = 1e-5;
 
-/// A shadow ray ends so much before its light that it does not meet it.
+/// Shadow rays end at this fraction of the distance, short of their light.
 const BEFORE_LIGHT: f64 = 0.9999;
 
-/// What rays are for, and after how many bounces.
+/// Purpose and depth of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RayClass {
-    /// Bounces before.
+    /// Number of bounces before.
     pub depth: u32,
-    /// What for.
+    /// Purpose.
     pub rays: CountedRays,
 }
 
@@ -44,13 +44,13 @@ impl RayClass {
         CountedRays::Ao,
     ];
 
-    /// As passes are marked with it; what is traced first has a lower word.
+    /// Encodes the class, as a mark of passes; classes traced earlier have lower words.
     pub fn word(self) -> u32 {
         let kind = Self::KINDS.iter().position(|kind| *kind == self.rays);
         self.depth * 4 + kind.unwrap_or_default() as u32
     }
 
-    /// The class that is marked so.
+    /// Decodes [`Self::word`].
     pub fn of_word(word: u32) -> Self {
         Self {
             depth: word / 4,
@@ -59,7 +59,7 @@ impl RayClass {
     }
 }
 
-/// `primary`, `bounce 1`, `shadow 0` (from the first point), …
+/// Prints `primary`, `bounce 1`, `shadow 0` (from the first point), …
 impl fmt::Display for RayClass {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = RAY_COUNT_CLASSES[self.rays as usize];
@@ -70,12 +70,13 @@ impl fmt::Display for RayClass {
     }
 }
 
-/// The pixel of each lane of a warp; `None` beside the image.
+/// Pixels of a warp's lanes; `None` outside the image.
 pub type Pixels = Vec<Option<[u32; 2]>>;
 
-/// The warps of some groups. Each group is so many warps one after the other, in the order of workgroups and of lanes within
-/// them; the first of each are spread over the image, by rows evenly and along them by the golden ratio. Groups that hold all of an
-/// image hold each of its warps once. A warp is `[width, height]` lanes, which divide the edges of a workgroup. The pixels of
+/// The warps of several groups. Each group is a sequence of consecutive warps, in the order of
+/// workgroups and of lanes within them. The first warps are spread over the image, evenly by rows
+/// and within them by the golden ratio. If the groups cover the image, each warp occurs once. A
+/// warp has `[width, height]` lanes, which divide the edges of a workgroup. The pixels of
 /// neighbouring lanes lie `stride` apart: see [`paired`].
 pub fn groups_of(
     size: [u32; 2],
@@ -98,9 +99,10 @@ pub fn groups_of(
         (pixel[0] < size[0] && pixel[1] < size[1]).then_some(pixel)
     };
     let pixels = |number| (0..warp[0] * warp[1]).map(|l| lane(number, l)).collect();
-    let first = |group: u32| match u64::from(groups) * u64::from(warps) >= u64::from(all) {
-        true => group.saturating_mul(warps).min(all),
-        false => {
+    let first = |group: u32| {
+        if u64::from(groups) * u64::from(warps) >= u64::from(all) {
+            group.saturating_mul(warps).min(all)
+        } else {
             let share =
                 |fraction: u32, of: u32| ((u64::from(fraction) * u64::from(of)) >> 32) as u32;
             let column = share(group.wrapping_mul(GOLDEN).wrapping_add(HALF), blocks[0]);
@@ -115,44 +117,44 @@ pub fn groups_of(
     (0..groups).map(group).collect()
 }
 
-/// Where rays come from.
+/// The source of rays.
 pub struct View<'a> {
-    /// What traces paths.
+    /// The path oracle.
     pub oracle: &'a PathOracle<'a>,
-    /// Of which image.
+    /// The image.
     pub image: &'a path_oracle::View<'a>,
-    /// Of the scene, scene units.
+    /// Diagonal of the scene, scene units.
     pub diagonal: f64,
-    /// Samples that are looked at.
+    /// Sample indices.
     pub samples: &'a [u32],
-    /// Seed of the replicate.
+    /// Replicate seed.
     pub seed: u32,
 }
 
-/// A place among the passes of a warp: number of the sample, bounces before, whether any hit is enough, and the light.
+/// Position among a warp's passes: sample, bounces before, any-hit flag, and light.
 type Place = (u32, u32, bool, u32);
 
-/// The rays of a pass, lane by lane.
+/// The rays of a pass, by lane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPass {
-    /// What they are.
+    /// Their class.
     pub class: RayClass,
-    /// What is asked.
+    /// Their query.
     pub query: Query,
-    /// One for each lane, `None` where it has none.
+    /// One ray per lane, or `None`.
     pub lanes: Vec<Option<Ray>>,
 }
 
-/// The rays of groups of warps: passes of each warp.
+/// The rays of groups of warps, as passes of each warp.
 pub struct Rays {
-    /// Group by group, warp by warp; the warps of a group have the same passes.
+    /// By group and warp; the warps of a group have the same passes.
     pub groups: Vec<Vec<Vec<RayPass>>>,
-    /// Paths that they are of.
+    /// Number of paths.
     pub paths: u64,
 }
 
 impl Rays {
-    /// The rays of these pixels.
+    /// Generates the rays of these pixels.
     pub fn new(view: &View, groups: &[Vec<Pixels>]) -> Self {
         let rays = groups.par_iter().map(|group| of_group(view, group));
         let pixels = groups.iter().flatten().flatten().flatten().count();
@@ -162,7 +164,7 @@ impl Rays {
         }
     }
 
-    /// What a structure does for them.
+    /// Traces the rays through a structure.
     ///
     /// # Errors
     /// As [`trace_of`].
@@ -188,7 +190,7 @@ impl Rays {
 }
 
 fn of_group(view: &View, warps: &[Pixels]) -> Vec<Vec<RayPass>> {
-    // Passes that any lane takes part in; the others of the group wait in them.
+    // Passes with any active lane; the group's other lanes wait.
     let mut classes: BTreeMap<Place, RayClass> = BTreeMap::new();
     let mut rays: Vec<Vec<BTreeMap<Place, Ray>>> = Vec::new();
     for pixels in warps {
@@ -215,7 +217,6 @@ fn of_group(view: &View, warps: &[Pixels]) -> Vec<Vec<RayPass>> {
     rays.into_iter().map(of_warp).collect()
 }
 
-/// All rays of a pixel.
 fn of_pixel(view: &View, pixel: [u32; 2]) -> Vec<(Place, RayClass, Ray)> {
     let mut rays = Vec::new();
     for (number, &sample) in (0..).zip(view.samples) {
@@ -238,7 +239,7 @@ fn of_pixel(view: &View, pixel: [u32; 2]) -> Vec<(Place, RayClass, Ray)> {
     rays
 }
 
-/// The ray in f32, moved off the surface that it leaves.
+/// The ray in f32, offset from the surface it leaves.
 fn for_structure(ray: &PathRay, diagonal: f64) -> Ray {
     let side = ray.direction.dot(ray.normal).signum();
     let origin = ray.origin + ray.normal * (side * OFFSET * diagonal);
@@ -255,14 +256,14 @@ mod tests {
 
     #[test]
     fn lanes_have_the_pixels_that_the_image_kernel_gives_them() {
-        // Workgroups of 8 × 8: a warp of 32 is the upper or the lower half of one.
+        // Workgroups of 8 × 8: a warp of 32 is the upper or lower half of one.
         let all = groups_of([20, 8], [8, 4], [1, 6], 1);
         assert_eq!((all.len(), all[0].len()), (1, 6));
         assert_eq!(all[0][0][0], Some([0, 0]));
         assert_eq!(all[0][0][31], Some([7, 3]));
         assert_eq!(all[0][1][0], Some([0, 4]));
         assert_eq!(all[0][2][9], Some([9, 1]));
-        // The third workgroup reaches beyond the image by four columns.
+        // The third workgroup extends beyond the image by four columns.
         assert_eq!(all[0][4].iter().flatten().count(), 16);
         assert_eq!(all[0][4][3..5], [Some([19, 0]), None]);
         // Another shape of the same size gives other neighbours.
@@ -274,7 +275,7 @@ mod tests {
         let groups = groups_of([64, 64], [8, 4], [4, 2], 1);
         assert!(groups.iter().all(|group| group.len() == 2));
         let first: Vec<_> = groups.iter().map(|group| group[0][0]).collect();
-        // Rows 1, 3, 5, 7 of workgroups; columns ½, ½ + φ, … of eight, without the whole part.
+        // Rows 1, 3, 5, 7 of workgroups; columns ½, ½ + φ, … of eight, fractional parts.
         let corners = [[32, 8], [0, 24], [40, 40], [16, 56]];
         assert_eq!(first, corners.map(Some));
         for (count, stride) in [([4, 32], 1), ([3, 50], 1), ([200, 1], 1), ([4, 32], 8)] {
@@ -282,7 +283,7 @@ mod tests {
             let pixels: std::collections::BTreeSet<_> = all.iter().flatten().flatten().collect();
             assert_eq!((all.len(), pixels.len()), (128, 64 * 64), "{count:?}");
         }
-        // Sparse: lanes lie eight pixels apart, and an image that ends within a tile is held as a whole.
+        // Sparse: lanes lie eight pixels apart, and an image ending within a tile is still covered.
         let sparse = groups_of([80, 8], [8, 4], [1, 256], 8).concat();
         assert_eq!(sparse[0][..3], [Some([0, 0]), Some([8, 0]), Some([16, 0])]);
         let pixels: std::collections::BTreeSet<_> = sparse.iter().flatten().flatten().collect();

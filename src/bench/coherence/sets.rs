@@ -1,4 +1,4 @@
-//! The coherence of rays that follow each other in a buffer, as tracers take them: a lane, a ray.
+//! Coherence of consecutive rays in a buffer, one per lane, as external tracers process them.
 
 use super::trace::trace_of;
 use super::{Machine, Memory, Pass, Warp, run_groups};
@@ -7,8 +7,8 @@ use raystone_accel::{CpuTwin, Query, Ray};
 use raystone_config::Coherence;
 use raystone_record::Tallies;
 
-/// What the machine of `settings` makes of each of some groups of these rays (their class is 0), spread over them: each is
-/// [`Coherence::warps`] warps one after the other. The last warp may have lanes without a ray.
+/// Tallies (for class 0) of the machine of `settings` for each of several groups spread over these
+/// rays; a group is [`Coherence::warps`] consecutive warps. The last warp may have idle lanes.
 ///
 /// # Errors
 /// As [`trace_of`].
@@ -40,13 +40,16 @@ pub fn of_rays(
     Ok(run_groups(&Machine::new(settings), &groups))
 }
 
-/// The first warp of each group, of so many warps in all: groups side by side where they hold all, else evenly spread.
+/// First warp of each group among `all`: adjacent if they cover all, else evenly spread.
 fn first_warps(all: usize, settings: &Coherence) -> Vec<usize> {
     let [groups, warps] = [settings.groups, settings.warps].map(|n| n as usize);
     let whole = all.div_ceil(warps);
-    let place = |group: usize| match groups < whole {
-        true => group * whole / groups * warps,
-        false => group * warps,
+    let place = |group: usize| {
+        if groups < whole {
+            group * whole / groups * warps
+        } else {
+            group * warps
+        }
     };
     (0..groups.min(whole)).map(place).collect()
 }

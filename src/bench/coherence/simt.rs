@@ -1,27 +1,27 @@
-//! The lanes of a warp in lock step.
+//! Lock-step execution of a warp's lanes.
 //!
-//! All lanes of a warp run one loop, and an instruction is issued for all that take part in it. A turn of
-//! the loop has two parts: a visit of a node, by the lanes whose next step is one, and the tests of triangles. Each is
-//! an issue of its own, so that a turn in which some lanes visit and others test counts as two. Lanes that have
-//! nothing to do in an issue, that are done, or that have no ray, wait. How long a turn tests is the [`Rule`].
+//! All lanes of a warp run one loop, and an instruction is issued for all active ones. A turn of
+//! the loop has two parts: a node visit, by the lanes whose next step is one, and triangle tests.
+//! Each is a separate issue, so a turn in which some lanes visit and others test counts twice.
+//! Lanes without work in an issue, finished ones, and those without a ray wait. The [`Rule`]
+//! determines how long a turn tests.
 
 use super::trace::{Kind, Trace};
 use raystone_config::Rule;
 
-/// Something that lanes of a warp do together.
+/// A step executed together by lanes of a warp.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Issue {
-    /// What.
+    /// Kind of step.
     pub kind: Kind,
-    /// Lanes that take part, at least one.
+    /// Number of active lanes, at least one.
     pub active: u32,
-    /// Bytes that they ask for, those that several ask for counted for each.
+    /// Bytes requested, counted per lane even if shared.
     pub bytes: u64,
-    /// Numbers of the cache lines in which these lie, each once, ascending.
+    /// Distinct cache line indices, ascending.
     pub lines: Vec<u64>,
 }
 
-/// Where the lanes of a warp are.
 struct Lanes<'a> {
     traces: &'a [Option<Trace>],
     at: Vec<usize>,
@@ -39,7 +39,7 @@ impl Lanes<'_> {
         (0..self.traces.len()).filter(is_next).collect()
     }
 
-    /// These lanes take their next step; nothing if there are none.
+    /// Advances these lanes by a step; `None` if there are none.
     fn issue(&mut self, kind: Kind, lanes: &[usize]) -> Option<Issue> {
         let mut issue = Issue {
             kind,
@@ -63,7 +63,7 @@ impl Lanes<'_> {
     }
 }
 
-/// What the lanes of a warp do together, in order; a lane without a ray has no trace.
+/// All issues of a warp in order; a lane without a ray has no trace.
 pub(crate) fn issues(traces: &[Option<Trace>], rule: Rule, line_bytes: u64) -> Vec<Issue> {
     let mut lanes = Lanes {
         traces,
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn lanes_visit_together_and_wait_for_those_that_test() {
-        // Lane 0 tests two triangles after its first node, lane 1 none, lane 2 has no ray, lane 3 is done early.
+        // Lane 0 tests two triangles after its first node, lane 1 none; 2 has no ray, 3 ends early.
         let warp = [
             lane(&[(Node, 0), (Triangle, 64), (Triangle, 80), (Node, 16)]),
             lane(&[(Node, 0), (Node, 36)]),
@@ -121,7 +121,7 @@ mod tests {
             lane(&[(Node, 4), (Triangle, 64)]),
         ];
         let expected = vec![
-            // Bytes 0, 0 and 4: one line of 16 bytes, and 12 bytes asked for.
+            // Bytes 0, 0 and 4: one line of 16 bytes, and 12 bytes requested.
             (Node, 3, 12, vec![0]),
             (Triangle, 2, 8, vec![4]),
             (Triangle, 1, 4, vec![5]),

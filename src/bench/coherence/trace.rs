@@ -1,38 +1,38 @@
-//! What a ray does on its way through a structure, step by step, with what each step fetches.
+//! The steps of a ray through a structure, with the memory fetches of each.
 
 use super::memory::{Fetch, Memory};
 use raystone_accel::watch::{Event, watch};
 use raystone_accel::{Counters, CpuTwin, Query, Ray};
 
-/// What is done in a step.
+/// Kind of step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A node or cell is visited.
+    /// A visit of a node or cell.
     Node,
-    /// A triangle is tested.
+    /// A triangle test.
     Triangle,
 }
 
 /// A visit or a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// Which.
+    /// Kind of step.
     pub kind: Kind,
-    /// Behind the last of its fetches among those of the trace; they begin where those of the step before end.
+    /// End of its fetches within the trace; they begin where the previous step's end.
     pub end: u32,
 }
 
-/// The way of one ray.
+/// The traversal of one ray.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Trace {
-    /// In the order in which they are done.
+    /// Steps in order.
     pub steps: Vec<Step>,
-    /// What all of them fetch.
+    /// Fetches of all steps.
     pub fetches: Vec<Fetch>,
 }
 
 impl Trace {
-    /// A trace of these steps.
+    /// Builds a trace from steps.
     pub fn of(steps: impl IntoIterator<Item = (Kind, Vec<Fetch>)>) -> Self {
         let mut trace = Self::default();
         for (kind, fetches) in steps {
@@ -47,7 +47,7 @@ impl Trace {
         self.steps.push(Step { kind, end });
     }
 
-    /// What a step fetches.
+    /// Fetches of a step.
     pub fn fetches_of(&self, step: usize) -> &[Fetch] {
         let first = match step.checked_sub(1) {
             Some(before) => self.steps[before].end,
@@ -56,17 +56,16 @@ impl Trace {
         &self.fetches[first as usize..self.steps[step].end as usize]
     }
 
-    /// Steps of a kind.
+    /// Number of steps of a kind.
     pub fn count(&self, kind: Kind) -> u32 {
         self.steps.iter().filter(|step| step.kind == kind).count() as u32
     }
 }
 
-/// The way of a ray through the structure of this twin. What is read before a visit or a test belongs to it, what
-/// is read after the last one to that.
+/// Traces a ray through this twin's structure. Reads belong to the next visit or test, or the last.
 ///
 /// # Errors
-/// The twin reads what the device does not have, or tells fewer steps than it counts.
+/// The twin reads memory that the device lacks, or reports fewer steps than it counts.
 pub fn trace_of(
     twin: &dyn CpuTwin,
     memory: &Memory,
@@ -93,12 +92,13 @@ pub fn trace_of(
     }
     let told = [Kind::Node, Kind::Triangle].map(|kind| trace.count(kind));
     let counted = [counters.nodes, counters.triangle_tests];
-    match told == counted {
-        true => Ok(trace),
-        false => Err(format!(
+    if told == counted {
+        Ok(trace)
+    } else {
+        Err(format!(
             "its twin counts {} visits and {} tests of one ray, and tells {} and {}",
             counted[0], counted[1], told[0], told[1]
-        )),
+        ))
     }
 }
 

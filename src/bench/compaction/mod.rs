@@ -1,8 +1,8 @@
-//! Compactions of streams: judged word by word, then timed in interleaved rounds.
+//! Stream compaction: checked word by word, then timed in interleaved rounds.
 //!
-//! Nothing is compared with a hand-written answer of one method: what should stay follows from the flags. Before each
-//! turn the count is set to a wrong number and what stayed is wiped out; after it, outside of what is timed, two sums
-//! over what stays are formed on the device and compared with the host's.
+//! There are no hand-written expected results per method: the flags determine the surviving
+//! elements. Before each turn the count is set to a wrong value and the survivors are erased; after
+//! it, outside the timed part, the device computes two checksums of the survivors to compare.
 
 pub mod stream;
 
@@ -28,7 +28,7 @@ parameters! {
     }
 }
 
-/// The compactions as they are named on the axis of integrators: parameters of the stream come before their own.
+/// Compactions as named on the integrator axis: stream parameters come before their own.
 pub(crate) fn benches(registry: &CompactionRegistry) -> impl Iterator<Item = Entry> {
     registry.0.entries().into_iter().map(|entry| Entry {
         name: format!("{COMPACTIONS}{}", entry.name),
@@ -38,16 +38,16 @@ pub(crate) fn benches(registry: &CompactionRegistry) -> impl Iterator<Item = Ent
 }
 
 impl Load {
-    /// The stream that a variant of [`benches`] asks for; at its defaults where it asks for none.
+    /// The stream of a variant of [`benches`], with defaults for missing parameters.
     pub(crate) fn of(variant: &Variant) -> Self {
         Self::read(&variant.params).unwrap_or_default()
     }
 }
 
-/// The method that a variant of [`benches`] names.
+/// The method of a variant of [`benches`].
 ///
 /// # Errors
-/// It is not registered, or has other parameters; in words.
+/// It is not registered, or has other parameters.
 pub(crate) fn benched(
     registry: &CompactionRegistry,
     variant: &Variant,
@@ -60,14 +60,14 @@ pub(crate) fn benched(
     registry.configured(&method)
 }
 
-/// Invocations of a workgroup of the kernel that looks at what stayed.
+/// Workgroup size of the checksum kernel.
 const DIGEST_LANES: u32 = 256;
-/// What stands in the count before a method has counted.
+/// Count before a method has run.
 const NOT_COUNTED: u32 = 0xdead_beef;
 
-/// Streams on the device, the longest of each kind; shorter ones are their beginnings.
+/// Streams on the device, the longest of each kind; shorter ones are prefixes.
 pub struct Inputs {
-    /// Flags on the host.
+    /// Host copy of the flags.
     pub flags: Vec<u32>,
     flags_there: Storage,
     elements: Storage,
@@ -75,10 +75,10 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Uploads flags, and elements of so many bytes with them.
+    /// Uploads flags, and elements of `bytes` bytes each.
     ///
     /// # Errors
-    /// They are larger than the adapter binds, or have no whole words.
+    /// They exceed the adapter's binding limit, or are not whole words.
     pub fn upload(gpu: &Gpu, flags: Vec<u32>, bytes: u32) -> Result<Self, GpuError> {
         if bytes == 0 || !bytes.is_multiple_of(4) {
             let text = format!("an element of {bytes} bytes has no whole words of 4 bytes");
@@ -94,24 +94,24 @@ impl Inputs {
     }
 }
 
-/// A compaction of a stream, recorded: it can be judged, and timed again and again.
+/// A recorded stream compaction that can be checked and timed repeatedly.
 pub struct Bench {
     player: Arc<Player>,
     method: Arc<dyn Compaction>,
     flags: Vec<u32>,
     bytes: u32,
-    /// Sets what the method has to write to what it is not.
+    /// Invalidates the method's outputs.
     prepare: Recording,
     compact: Recording,
-    /// Brings the count, and two sums over what stayed.
+    /// Computes the count and two checksums of the survivors.
     look: Recording,
     kept: Storage,
     digest: [u32; 2],
-    /// Elements that stay.
+    /// Number of surviving elements.
     pub kept_elements: u32,
-    /// Kernels that run.
+    /// Number of kernel dispatches.
     pub runs: u32,
-    /// Bytes of the buffers between them.
+    /// Total size of intermediate buffers.
     pub scratch_bytes: u64,
 }
 
@@ -119,7 +119,7 @@ impl Bench {
     /// Records `method` over the first `length` elements of the inputs, with room for `capacity`.
     ///
     /// # Errors
-    /// A kernel does not compose or compile, or a buffer is larger than the adapter binds.
+    /// A kernel does not compose or compile, or a buffer exceeds the adapter's binding limit.
     pub fn new(
         player: &Arc<Player>,
         gpu: &Gpu,
@@ -166,7 +166,7 @@ impl Bench {
         })
     }
 
-    /// Bytes that any method has to move: flags once, and what stays once from and once to memory.
+    /// Minimum memory traffic of any method in bytes: flags once, survivors read and written once.
     pub fn least_bytes(&self) -> u64 {
         let flags = match self.method.order() {
             Order::WithHoles => 0,
@@ -175,10 +175,10 @@ impl Bench {
         flags + 2 * u64::from(self.bytes) * u64::from(self.kept_elements)
     }
 
-    /// What is wrong with what the method makes of the stream, word by word; `None` if nothing is.
+    /// Checks the method's output word by word; returns the first error, if any.
     ///
     /// # Errors
-    /// The device does not play it.
+    /// The device cannot execute it.
     pub fn judge(&self) -> Result<Option<String>, GpuError> {
         self.player.play(&self.prepare)?;
         self.player.play(&self.compact)?;
@@ -188,7 +188,7 @@ impl Bench {
         let kept: Vec<u32> = played.download("kept")?;
         let found = (count, &kept[..]);
         let fault = stream::fault(&self.flags, self.bytes, &*self.method, found);
-        // The sums that every turn is judged by have to say the same.
+        // The checksums that check every turn must agree.
         let sums: Vec<u32> = played.download("digest")?;
         Ok(fault.or_else(|| self.differs(count, &sums)))
     }
@@ -205,7 +205,7 @@ impl Bench {
     }
 }
 
-/// Two sums over what stays, and the count.
+/// Records the count and two checksums over the survivors.
 fn look(gpu: &Gpu, stream: &Stream) -> Result<Recording, GpuError> {
     let digest = Storage::scratch("digest", 16);
     let kernel = Composition::new("compaction/digest").constant("SCAN_LANES", DIGEST_LANES);
@@ -226,7 +226,6 @@ fn look(gpu: &Gpu, stream: &Stream) -> Result<Recording, GpuError> {
 }
 
 impl Measured for Bench {
-    /// The time of the method alone.
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.player.play(&self.prepare)?;
         let elapsed = self.player.play(&self.compact)?.elapsed();

@@ -1,11 +1,10 @@
-//! Streams on the host, what compactions should make of them, and what is wrong with what they made.
+//! Streams on the host, expected compactions, and checks of actual ones.
 
 use raystone_core::random::Pcg32;
 use raystone_gpu::compaction::{Compaction, Order};
 use raystone_sampling::hash::pcg_hash;
 
-/// A word of an element. The first is its number, from 1 on, so that what stays can be told apart; the others are a
-/// hash of it.
+/// A word of an element. The first is its number, from 1, the others a hash of it.
 pub fn word(element: u32, word: u32) -> u32 {
     match word {
         0 => element + 1,
@@ -13,23 +12,25 @@ pub fn word(element: u32, word: u32) -> u32 {
     }
 }
 
-/// The words of so many elements.
 pub(crate) fn elements(count: u32, bytes: u32) -> Vec<u32> {
     let of = |element| (0..bytes / 4).map(move |w| word(element, w));
     (0..count).flat_map(of).collect()
 }
 
-/// Flags of so many elements, of which this share stays: each by a throw of its own, and in a bucket drawn likewise.
+/// Flags of `count` elements, of which a share `valid` survives, in random buckets.
 pub fn flags(count: u32, valid: f64, buckets: u32, seed: u64) -> Vec<u32> {
     let mut random = Pcg32::new(seed);
-    let mut flag = || match random.uniform() < valid {
-        true => 1 + random.below(buckets as usize) as u32,
-        false => 0,
+    let mut flag = || {
+        if random.uniform() < valid {
+            1 + random.below(buckets as usize) as u32
+        } else {
+            0
+        }
     };
     (0..count).map(|_| flag()).collect()
 }
 
-/// The elements that should stay, in the order of a stable method.
+/// The elements that should survive, in stable order.
 pub fn expected(flags: &[u32], method: &dyn Compaction) -> Vec<u32> {
     let all = || (0..flags.len() as u32).zip(flags);
     if method.order() == Order::WithHoles {
@@ -40,7 +41,7 @@ pub fn expected(flags: &[u32], method: &dyn Compaction) -> Vec<u32> {
     buckets.map(|(element, _)| element).collect()
 }
 
-/// Two sums over what stays: of the hashes of elements, and the same with each times its place.
+/// Two checksums over the survivors: the sum of hashes, and of hashes times positions.
 pub fn digest(expected: &[u32], bytes: u32) -> [u32; 2] {
     let mut sums = [0_u32; 2];
     for (slot, element) in (0..).zip(expected) {
@@ -58,7 +59,7 @@ fn mix(hash: u32, word: u32) -> u32 {
     product ^ (product >> 15)
 }
 
-/// What is wrong with what a method says that stays (`count`, and the words from the first slot on), in words.
+/// Describes the first error in a method's `count` and output words.
 pub fn fault(
     flags: &[u32],
     bytes: u32,

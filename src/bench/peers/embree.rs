@@ -1,5 +1,6 @@
-//! Intel's Embree, version 3 or 4, if its library is found at run time. Its own binary interface is declared here as far as it is needed:
-//! `rtcore_ray.h`, `rtcore_scene.h`, `rtcore_geometry.h`. Scenes are robust (`RTC_SCENE_FLAG_ROBUST`).
+//! Intel's Embree, version 3 or 4, if its library is found at run time, with the required
+//! declarations of `rtcore_ray.h`, `rtcore_scene.h`, `rtcore_geometry.h`. Scenes are robust
+//! (`RTC_SCENE_FLAG_ROBUST`).
 
 use super::native::Caster;
 use super::{BuiltPeer, Peer};
@@ -12,7 +13,7 @@ use std::ffi::{c_int, c_void};
 use std::mem::ManuallyDrop;
 use std::ptr::{null, null_mut};
 
-/// The names that the library has, the newest first, and its major version.
+/// Library names, newest first, with major version.
 const NAMES: [(&str, u32); 6] = [
     ("libembree4.so.4", 4),
     ("libembree4.so", 4),
@@ -33,7 +34,7 @@ const HIGH_QUALITY: c_int = 2;
 /// `RTC_DEVICE_PROPERTY_VERSION`.
 const VERSION: c_int = 0;
 
-/// `RTCRayHit`, whose first part is `RTCRay`.
+/// `RTCRayHit`, which begins with an `RTCRay`.
 #[repr(C, align(16))]
 struct RayHit {
     origin: [f32; 3],
@@ -50,7 +51,7 @@ struct RayHit {
     primitive: u32,
     geometry: u32,
     instance: u32,
-    /// `instPrimID` of version 4.1; padding else.
+    /// `instPrimID` of version 4.1; otherwise padding.
     instance_primitive: u32,
 }
 
@@ -82,9 +83,9 @@ struct FilteredHit {
     primitive: u32,
 }
 
-/// Takes hits away where a surface is cut out. `user` is the soup.
+/// Rejects hits where a mask cuts out the surface. `user` is the soup.
 unsafe extern "C" fn filter(arguments: *const FilterArguments) {
-    // SAFETY: Embree hands over one ray with one hit, and the soup that the geometry was given, which outlives it.
+    // SAFETY: Embree passes one ray with one hit, and the geometry's soup, which outlives it.
     unsafe {
         let arguments = &*arguments;
         let soup = &*arguments.user.cast::<TriangleSoup>();
@@ -96,7 +97,7 @@ unsafe extern "C" fn filter(arguments: *const FilterArguments) {
     }
 }
 
-/// The functions that are called for each ray.
+/// The functions called per ray.
 #[derive(Clone, Copy)]
 enum Cast {
     Three {
@@ -109,22 +110,21 @@ enum Cast {
     },
 }
 
-/// The registry entry `embree`.
 pub(super) struct Embree;
 
 struct Built<'a> {
-    /// Never unloaded: its threads wait for work for as long as the program runs.
+    /// Never unloaded: its threads wait for work as long as the program runs.
     library: ManuallyDrop<Library>,
     cast: Cast,
     device: *mut c_void,
     scene: *mut c_void,
     version: isize,
     build_ms: f64,
-    /// What the filter reads: kept alive and unmoved.
+    /// Read by the filter: must stay alive and in place.
     _soup: &'a TriangleSoup,
 }
 
-// SAFETY: a committed scene may be asked by many threads at once.
+// SAFETY: a committed scene may be queried by many threads at once.
 unsafe impl Sync for Built<'_> {}
 
 impl Peer for Embree {
@@ -141,7 +141,7 @@ impl Peer for Embree {
         _gpu: &Gpu,
         soup: &'a TriangleSoup,
     ) -> Result<Box<dyn BuiltPeer + 'a>, String> {
-        // SAFETY: Embree's library has no constructors that ask for anything.
+        // SAFETY: Embree's library has no constructors with requirements.
         let found = NAMES.iter().find_map(|(name, major)| {
             let library = unsafe { Library::new(name) }.ok()?;
             Some((library, *major))
@@ -150,7 +150,7 @@ impl Peer for Embree {
             "its library is not found: install libembree3 or libembree4 (Debian: `apt-get install libembree4-4` or \
              `libembree3-3`), or add its folder to LD_LIBRARY_PATH",
         )?;
-        // SAFETY: the signatures are those of the headers of this major version.
+        // SAFETY: the signatures match the headers of this major version.
         let built = unsafe { build(library, major, soup) };
         Ok(Box::new(built.map_err(|e| e.to_string())?))
     }
@@ -172,7 +172,7 @@ unsafe fn build(
     type Act = unsafe extern "C" fn(*mut c_void);
     type Attach = unsafe extern "C" fn(*mut c_void, *mut c_void) -> u32;
     type Property = unsafe extern "C" fn(*mut c_void, c_int) -> isize;
-    // SAFETY: as promised by the caller; buffers are as long as they are said to be.
+    // SAFETY: as promised by the caller; buffers have the stated lengths.
     unsafe {
         let get = |name: &str| -> Result<Symbol<'_, Act>, libloading::Error> {
             library.get(name.as_bytes())
@@ -244,7 +244,7 @@ impl Drop for Built<'_> {
             ("rtcReleaseScene", self.scene),
             ("rtcReleaseDevice", self.device),
         ] {
-            // SAFETY: both were made by this library, and nothing uses them any more.
+            // SAFETY: both were created by this library, and are no longer used.
             unsafe {
                 if let Ok(release) = self
                     .library
@@ -281,7 +281,7 @@ impl Caster for Built<'_> {
             filter: null(),
             instance: [INVALID; 2],
         };
-        // SAFETY: the scene is committed, and the ray is a valid `RTCRayHit`, which begins with an `RTCRay`.
+        // SAFETY: the scene is committed, and `RTCRayHit` is valid and begins with an `RTCRay`.
         unsafe {
             match (self.cast, query) {
                 (Cast::Three { nearest, .. }, Query::Closest) => {

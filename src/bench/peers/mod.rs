@@ -1,6 +1,6 @@
-//! Ray casters of others, to measure against: the same rays, in the same rounds. Their hits differ from ours by rounding, so
-//! they are judged in double precision and not by their bits, and they stand beside the structures of this crate, never among
-//! them: no verdict compares the two.
+//! External tracers for comparison: the same rays, in the same rounds. Their hits differ from ours
+//! by rounding, so they are checked in double precision, not bit by bit, and listed next to this
+//! crate's structures, never among them: no verdict compares the two.
 
 mod embree;
 mod native;
@@ -13,18 +13,18 @@ pub use registry::PeerRegistry;
 use raystone_accel::{Hit, Query, Ray, TriangleSoup};
 use raystone_gpu::{Elapsed, Gpu, GpuError};
 
-/// A ray caster that this crate has not written.
+/// An external tracer.
 pub trait Peer: Send + Sync {
-    /// Name, as an experiment writes it.
+    /// Name in experiments.
     fn name(&self) -> &'static str;
 
-    /// One line about it.
+    /// One-line description.
     fn description(&self) -> &'static str;
 
-    /// Builds what it casts rays into; `gpu` says on which adapter casters of a driver are to run.
+    /// Builds its structure; `gpu` names the adapter for tracers that run in a driver.
     ///
     /// # Errors
-    /// It cannot run here, or not with these triangles: why not, in words.
+    /// It cannot run here, or not with these triangles: the reason.
     fn build<'a>(
         &self,
         gpu: &Gpu,
@@ -34,16 +34,16 @@ pub trait Peer: Send + Sync {
 
 /// A built peer.
 pub trait BuiltPeer {
-    /// Version, and on what it runs.
+    /// Version, and the hardware it runs on.
     fn about(&self) -> String;
 
-    /// Milliseconds of wall time that building took.
+    /// Wall time of the build in milliseconds.
     fn build_ms(&self) -> f64;
 
-    /// Rays that it will be asked for again and again.
+    /// Prepares rays to be traced repeatedly.
     ///
     /// # Errors
-    /// They do not fit into the memory of its device.
+    /// They do not fit into its device's memory.
     fn batch<'a>(
         &'a self,
         query: Query,
@@ -53,14 +53,14 @@ pub trait BuiltPeer {
 
 /// Rays with their answers.
 pub trait PeerBatch {
-    /// Answers all rays anew; nothing of earlier answers is left.
+    /// Traces all rays, discarding earlier answers.
     ///
     /// # Errors
     /// The device is lost or hangs.
     fn trace(&self) -> Result<Elapsed, GpuError>;
 
-    /// The last answers, ray by ray: distance and triangle, or [`Hit::miss`]. Of an any-hit query
-    /// only whether there is a triangle means something. Weights are 0.
+    /// The last answers by ray: distance and triangle, or [`Hit::miss`]. For any-hit queries, only
+    /// the presence of a triangle is meaningful. Weights are 0.
     ///
     /// # Errors
     /// The device is lost or hangs.

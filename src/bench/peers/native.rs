@@ -1,4 +1,4 @@
-//! What casters on the host have in common: answers in memory, found by all threads of the machine.
+//! Common part of tracers on the host: answers in memory, computed by all threads of the machine.
 
 use super::{BuiltPeer, PeerBatch};
 use rayon::prelude::*;
@@ -6,15 +6,15 @@ use raystone_accel::{Hit, Query, Ray};
 use raystone_gpu::{Elapsed, GpuError, Stopwatch};
 use std::cell::RefCell;
 
-/// Rays that a thread takes at a time.
+/// Rays per work item of a thread.
 const CHUNK: usize = 1024;
 
-/// One ray after the other.
+/// Traces single rays.
 pub(crate) trait Caster: Sync {
-    /// The nearest hit, or [`Hit::miss`]; any hit if only that is asked for.
+    /// The nearest hit, any hit if only that is requested, or [`Hit::miss`].
     fn cast(&self, query: Query, ray: &Ray) -> Hit;
 
-    /// Its version.
+    /// Version of the tracer.
     fn version(&self) -> String;
 
     /// See [`BuiltPeer::build_ms`].
@@ -48,7 +48,6 @@ impl<C: Caster> BuiltPeer for C {
     }
 }
 
-/// Rays that a caster answers.
 struct NativeBatch<'a, C> {
     caster: &'a C,
     query: Query,
@@ -64,9 +63,12 @@ impl<C: Caster> PeerBatch for NativeBatch<'_, C> {
         let watch = Stopwatch::start();
         let chunks = self.rays.par_iter().with_min_len(CHUNK);
         chunks
-            .map(|ray| match ray.is_ray() {
-                true => caster.cast(query, ray),
-                false => Hit::miss(ray),
+            .map(|ray| {
+                if ray.is_ray() {
+                    caster.cast(query, ray)
+                } else {
+                    Hit::miss(ray)
+                }
             })
             .collect_into_vec(&mut hits);
         Ok(watch.elapsed())

@@ -1,4 +1,4 @@
-//! The crate `obvhs`: PLOC with reinsertion, a binary tree and one of eight compressed children.
+//! The `obvhs` crate: PLOC with reinsertion, as a binary tree and one of eight compressed children.
 
 use super::native::Caster;
 use super::{BuiltPeer, Peer};
@@ -15,11 +15,9 @@ use raystone_core::clock::Instant;
 use raystone_gpu::Gpu;
 use std::time::Duration;
 
-/// Which of its structures.
 pub(super) enum Obvhs {
-    /// A binary tree.
     Binary,
-    /// Eight compressed children a node.
+    /// Eight compressed children per node.
     Wide,
 }
 
@@ -30,7 +28,7 @@ enum Tree {
 
 struct Built<'a> {
     tree: Tree,
-    /// In the order of the leaves, with the index of each in the scene.
+    /// In leaf order, with the scene index of each.
     triangles: Vec<RtTriangle>,
     ids: Vec<u32>,
     soup: &'a TriangleSoup,
@@ -83,19 +81,20 @@ impl Peer for Obvhs {
 }
 
 impl Built<'_> {
-    /// Distance of the triangle at a place, infinite if the ray misses it or passes where it is cut out.
+    /// Distance of the triangle at `place`, infinite for a miss or where a mask cuts it out.
     #[inline(always)]
     fn intersect(&self, ray: &ray::Ray, place: usize) -> f32 {
         let t = self.triangles[place].intersect(ray);
         let Some(masks) = self.soup.masks.as_deref().filter(|_| t.is_finite()) else {
             return t;
         };
-        // Its weights belong to the second and the third vertex.
+        // Its weights belong to the second and third vertices.
         let weights = self.triangles[place].compute_barycentric(ray);
         let record = &self.soup.records[self.ids[place] as usize];
-        match is_cut_out(Some(masks), record, weights.x, weights.y) {
-            true => f32::INFINITY,
-            false => t,
+        if is_cut_out(Some(masks), record, weights.x, weights.y) {
+            f32::INFINITY
+        } else {
+            t
         }
     }
 }

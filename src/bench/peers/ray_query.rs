@@ -1,4 +1,4 @@
-//! The driver's own ray tracing, through wgpu's ray queries, on a device of its own on the same adapter.
+//! The driver's ray tracing through wgpu's ray queries, on a separate device of the same adapter.
 
 use super::{BuiltPeer, Peer, PeerBatch};
 use raystone_accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
@@ -8,19 +8,17 @@ use std::cell::RefCell;
 use std::num::NonZeroU64;
 use wgpu::util::DeviceExt as _;
 
-/// A workgroup of the kernel.
 const LANES: u32 = 64;
-/// Rays of a dispatch: software adapters take some microseconds for one, and a dispatch of seconds looks like a hang.
+/// Rays per dispatch: at microseconds per ray in software, longer dispatches look like a hang.
 const SLICE: usize = 1 << 16;
 const KERNEL: &str = include_str!("ray_query.wgsl");
 
-/// The registry entry `ray-query`.
 pub(super) struct RayQuery;
 
 struct Built {
     raw: RawDevice,
     tlas: wgpu::Tlas,
-    /// What the tree refers to.
+    /// Referenced by the tree.
     _blas: wgpu::Blas,
     pipelines: [wgpu::ComputePipeline; 2],
     build_ms: f64,
@@ -30,7 +28,7 @@ struct Batch<'a> {
     built: &'a Built,
     rays: &'a [Ray],
     pipeline: &'a wgpu::ComputePipeline,
-    /// Of each slice, with its number of rays.
+    /// Bind group and number of rays of each slice.
     slices: Vec<(wgpu::BindGroup, u32)>,
     answers: wgpu::Buffer,
     staging: wgpu::Buffer,
@@ -166,15 +164,18 @@ impl BuiltPeer for Built {
                 2 * bytes
             ));
         }
-        // What is no ray has no direction; the kernel must not be asked.
-        let words = rays.iter().map(|ray| match ray.is_ray() {
-            true => [
-                ray.origin,
-                [ray.t_min, 0.0, 0.0],
-                ray.direction,
-                [ray.t_max.min(f32::MAX), 0.0, 0.0],
-            ],
-            false => [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]],
+        // An invalid ray has no direction; the kernel must not trace it.
+        let words = rays.iter().map(|ray| {
+            if ray.is_ray() {
+                [
+                    ray.origin,
+                    [ray.t_min, 0.0, 0.0],
+                    ray.direction,
+                    [ray.t_max.min(f32::MAX), 0.0, 0.0],
+                ]
+            } else {
+                [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]
+            }
         });
         let words: Vec<[f32; 8]> = words
             .map(|[o, a, d, b]| [o[0], o[1], o[2], a[0], d[0], d[1], d[2], b[0]])
@@ -263,7 +264,7 @@ impl PeerBatch for Batch<'_> {
         let elapsed = watch.elapsed();
         let words = self.answers()?;
         let hit = |(ray, [kind, t, id, _]): (&Ray, &[u32; 4])| match kind {
-            // 1 is what the kernel writes for a miss; 0 stands where it wrote nothing, and is no answer.
+            // The kernel writes 1 for a miss; 0 means it wrote nothing, and is no answer.
             1 => Hit::miss(ray),
             _ => Hit {
                 t: f32::from_bits(*t),

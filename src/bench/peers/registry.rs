@@ -1,4 +1,4 @@
-//! The peers that experiments can name: one line each.
+//! The registry of peers: one line each.
 
 use super::{BuiltPeer, Peer, embree::Embree, obvhs::Obvhs, ray_query::RayQuery};
 use raystone_accel::TriangleSoup;
@@ -6,10 +6,9 @@ use raystone_config::NO_PEER;
 use raystone_core::params::{Kinds, Named};
 use raystone_gpu::Gpu;
 
-/// Everything that can be named on the `peer` axis.
+/// Everything nameable on the `peer` axis.
 pub type PeerRegistry = Kinds<dyn Peer>;
 
-/// The registry entry `none`.
 struct NoPeer;
 
 impl Peer for NoPeer {

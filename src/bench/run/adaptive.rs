@@ -1,4 +1,4 @@
-//! Adaptive sampling by tile: each takes as many samples as the first ones say that it needs.
+//! Adaptive sampling by tile: the first samples decide how many more each tile takes.
 
 use super::error::Fault;
 use super::errors::{
@@ -15,8 +15,8 @@ use raystone_stats::adaptive::{LEAST_GROUP, Tiles, samples_needed, tile_error};
 /// Groups of replicates, each of which decides for the other.
 const GROUPS: usize = 2;
 
-/// All replicates of one sampler, each tile with the samples that it needs. Errors are recorded at the mean number of samples of a
-/// pixel.
+/// Renders all replicates of one sampler, each tile with as many samples as it needs. Errors are
+/// recorded at the mean number of samples per pixel.
 pub(super) fn by_tile(
     session: &mut Session,
     cell: &Cell,
@@ -84,7 +84,7 @@ pub(super) fn by_tile(
     Ok(Replicates { spp, images })
 }
 
-/// The samples that the tiles of each group need, by what the other group says.
+/// The samples that the tiles of each group need, decided by the other group.
 fn decided(images: &[Image], tiles: Tiles, counts: &[u32], rule: &StopRule) -> Vec<Vec<u32>> {
     let of_group = |group: usize| {
         let others = images.iter().enumerate();
@@ -99,7 +99,7 @@ fn decided(images: &[Image], tiles: Tiles, counts: &[u32], rule: &StopRule) -> V
     (0..GROUPS).map(of_group).collect()
 }
 
-/// The mean of samples `done` to `spp` in the tiles that need them; black elsewhere.
+/// Mean of samples `done` to `spp` in the tiles that need them; black elsewhere.
 fn further(
     pass: &Pass,
     tiles: Tiles,
@@ -119,17 +119,18 @@ fn further(
     if !blocks.is_empty() {
         pass.renderer.add_samples(done, spp - done, seed)?;
     }
-    match blocks.is_empty() {
-        true => Ok(Image {
+    if blocks.is_empty() {
+        Ok(Image {
             width: tiles.size[0],
             height: tiles.size[1],
             pixels: vec![[0.0; 3]; (tiles.size[0] * tiles.size[1]) as usize],
-        }),
-        false => pass.renderer.image(),
+        })
+    } else {
+        pass.renderer.image()
     }
 }
 
-/// Joins the samples before `done` with those up to `spp`, in the tiles that took them.
+/// Combines the samples before `done` with those up to `spp`, in the tiles that took them.
 fn add(before: &mut Image, new: &Image, tiles: Tiles, needed: &[u32], (done, spp): (u32, u32)) {
     let share = f64::from(done) / f64::from(spp);
     let pairs = before.pixels.iter_mut().zip(&new.pixels).enumerate();
@@ -140,7 +141,7 @@ fn add(before: &mut Image, new: &Image, tiles: Tiles, needed: &[u32], (done, spp
     }
 }
 
-/// Samples of a pixel, on average over the image and the groups, after the step to `done`; rounded.
+/// Mean samples per pixel over the image and the groups, after the step to `done`; rounded.
 fn mean_samples(tiles: Tiles, needed: &[Vec<u32>], done: u32) -> u32 {
     let taken = |tile: usize| {
         let of_groups = needed.iter().map(|of| f64::from(of[tile].min(done)));

@@ -1,4 +1,4 @@
-//! The measurements of the program, and the loops of those that are not measured cell by cell.
+//! The program's measurements, and the loops of those not run cell by cell.
 
 use super::animation;
 use super::coherence;
@@ -16,20 +16,20 @@ use super::times;
 use super::units::MeasurementRegistry;
 use super::world::World;
 
-/// How the cells of a measurement are run.
+/// How a measurement's cells are run.
 #[derive(Clone, Copy)]
 pub(super) enum Run {
     /// One by one, by the driver.
     CellByCell,
-    /// Before all others of a world, which they serve.
+    /// Before all others of a world, which depend on them.
     First,
-    /// All of a world, after its structures.
+    /// All cells of a world, after its structures.
     OfWorld(fn(&mut Session, &World, &[Gated]) -> Result<(), RunError>),
-    /// All of the plan, behind the scenes.
+    /// All cells of the plan, after the scenes.
     Alone(fn(&mut Session, &Device) -> Result<(), RunError>),
 }
 
-/// All of them, in the order in which a run takes them.
+/// The program's measurements, in run order.
 static BUILT_IN: [(&dyn Measurement, Run); 8] = [
     (&structures::Structures, Run::First),
     (&peers::Peers, Run::First),
@@ -52,7 +52,7 @@ impl Default for MeasurementRegistry {
     }
 }
 
-/// How the cells of a measurement are run: those from outside one by one.
+/// How a measurement's cells are run: external ones one by one.
 pub(super) fn run_of(measurement: &dyn Measurement) -> Run {
     let mut known = BUILT_IN.iter();
     let known = known.find(|(known, _)| known.name() == measurement.name());

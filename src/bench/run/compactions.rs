@@ -1,4 +1,4 @@
-//! Compactions of streams: each is checked word by word, then all are timed in the same rounds.
+//! Stream compactions: each is checked word by word, then all are timed in the same rounds.
 
 use super::cost::{Cost, Work};
 use super::measurement::{Absent, At, Measurement, Preparation, Prepared};
@@ -14,7 +14,6 @@ use raystone_record::{Reading, Samples as Rounds};
 use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 
-/// The measurement.
 pub(super) struct Compactions;
 
 impl Measurement for Compactions {
@@ -62,7 +61,6 @@ impl Measurement for Compactions {
     }
 }
 
-/// A compaction that passed its check.
 struct Ready {
     load: Load,
     bench: Bench,
@@ -116,10 +114,9 @@ impl Prepared for Ready {
     }
 }
 
-/// What makes two streams parts of one: the share that stays, buckets, bytes of an element.
+/// Streams of equal kind are prefixes of one: share of survivors, buckets, bytes per element.
 type Kind = (u64, u32, u32);
 
-/// Streams on the device.
 struct Streams<'a> {
     at: &'a At<'a>,
     cells: &'a [Cell],
@@ -156,7 +153,7 @@ impl Streams<'_> {
         }
     }
 
-    /// Elements of the longest stream of a kind: that one is uploaded, and each cell takes its beginning.
+    /// Length of the longest stream of a kind, which is uploaded; each cell uses a prefix.
     fn longest(&self, kind: Kind) -> Option<u32> {
         let length = |other: &Cell| {
             let load = Load::of(&other[Axis::Integrator]);

@@ -1,4 +1,4 @@
-//! What a plan is expected to take: the one model behind `--dry-run`, the time that is left, and shards of equal length.
+//! Cost estimate of a plan, used by `--dry-run`, the remaining time, and balanced shards.
 
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_core::params::Variant;
@@ -9,34 +9,34 @@ use std::ops::{Add, AddAssign, Mul};
 
 /// Rays per second of a software adapter with two cores: a round figure for incoherent rays.
 const RAYS_PER_SECOND: f64 = 2e6;
-/// Seconds in which the driver compiles a kernel that it has not met before, with its composition and its first run.
+/// Seconds for the driver to compile a new kernel, including composition and the first run.
 const SECONDS_PER_KERNEL: f64 = 0.3;
-/// Elements per second that such an adapter compacts, all passes of a turn and its check together: as round.
+/// Elements per second compacted by such an adapter, with passes and check: a round figure.
 const ELEMENTS_PER_SECOND: f64 = 3e7;
-/// Classes of recorded rays that are timed, and those with shadow rays in other orders.
+/// Number of timed classes of recorded rays, without and with other shadow ray orders.
 const RAY_CLASSES: [f64; 2] = [5.0, 8.0];
-/// Bounces of a usual path: in a closed room paths take four to six rays, most under a sky two.
+/// Bounces of a typical path: in a closed room paths take four to six rays, under a sky mostly two.
 const USUAL_BOUNCES: u32 = 2;
-/// Seconds to load a scene and check the reference tracer on it, and for each megabyte of the model's file.
+/// Seconds to load a scene and check its reference tracer, and per megabyte of the model.
 const SECONDS_PER_WORLD: [f64; 2] = [1.0, 0.3];
-/// Seconds to build a structure for each megabyte of the model's file.
+/// Seconds to build a structure, per megabyte of the model's file.
 const BUILD_SECONDS: f64 = 0.15;
 
-/// Work, by what its time is expected from.
+/// Work, by the quantities that determine its time.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Work {
     /// Rays.
     pub rays: f64,
-    /// Elements of streams that are compacted.
+    /// Stream elements compacted.
     pub elements: f64,
-    /// Kernels that the driver compiles.
+    /// Kernels compiled.
     pub kernels: f64,
-    /// Seconds of anything else.
+    /// Seconds of other work.
     pub other_s: f64,
 }
 
 impl Work {
-    /// So many rays.
+    /// Work of tracing rays.
     pub fn rays(count: u32) -> Self {
         Self {
             rays: f64::from(count),
@@ -44,7 +44,7 @@ impl Work {
         }
     }
 
-    /// So many kernels.
+    /// Work of compiling kernels.
     pub fn kernels(count: u32) -> Self {
         Self {
             kernels: f64::from(count),
@@ -52,7 +52,7 @@ impl Work {
         }
     }
 
-    /// So many seconds.
+    /// Work of a given time.
     pub fn other(seconds: f64) -> Self {
         Self {
             other_s: seconds,
@@ -60,7 +60,7 @@ impl Work {
         }
     }
 
-    /// Seconds that it takes on a software adapter with two cores.
+    /// Expected seconds on a software adapter with two cores.
     pub fn seconds(&self) -> f64 {
         self.rays / RAYS_PER_SECOND
             + self.elements / ELEMENTS_PER_SECOND
@@ -68,7 +68,7 @@ impl Work {
             + self.other_s
     }
 
-    /// In words, for `--dry-run`.
+    /// Describes the work for `--dry-run`.
     pub fn describe(&self) -> String {
         format!(
             "estimate: about {} on a software adapter with two cores, from {} million rays at \
@@ -119,21 +119,21 @@ impl Mul<f64> for Work {
     }
 }
 
-/// The expected work of a plan and of its steps.
+/// Expected work of a plan and its steps.
 #[derive(Clone)]
 pub struct Cost<'a> {
     /// The experiment.
     pub experiment: &'a Experiment,
     /// Its plan.
     pub plan: &'a Plan,
-    /// Rays of a sample by label of the integrator.
+    /// Rays per sample by label of the integrator.
     rays_per_sample: BTreeMap<&'a str, f64>,
-    /// Size of the model's file by name of the scene.
+    /// Size of the model's file by scene name.
     megabytes: BTreeMap<&'a str, f64>,
 }
 
 impl<'a> Cost<'a> {
-    /// Of a plan.
+    /// The cost model of a plan.
     pub fn new(experiment: &'a Experiment, plan: &'a Plan, known: &IntegratorRegistry) -> Self {
         let integrators = experiment.axes[Axis::Integrator].iter();
         let rays = |i: &'a Variant| (i.label.as_str(), rays_per_sample(known, i));
@@ -157,25 +157,25 @@ impl<'a> Cost<'a> {
         known.copied().unwrap_or(0.0)
     }
 
-    /// A scene is loaded, and the reference tracer checked on it.
+    /// Loading a scene and checking the reference tracer on it.
     pub(super) fn world(&self, cell: &Cell) -> Work {
         let [world, megabyte] = SECONDS_PER_WORLD;
         Work::other(world + megabyte * self.megabytes(cell))
     }
 
-    /// A structure is built and gated.
+    /// Building and checking a structure.
     pub(super) fn gate(&self, cell: &Cell) -> Work {
         Work::rays(self.experiment.gate.rays) * self.ray_classes()
             + Work::kernels(2)
             + Work::other(BUILD_SECONDS * self.megabytes(cell))
     }
 
-    /// Classes of recorded rays that are timed.
+    /// Number of timed classes of recorded rays.
     pub(super) fn ray_classes(&self) -> f64 {
         RAY_CLASSES[usize::from(self.experiment.gate.shadow_orders)]
     }
 
-    /// An image of the experiment's size.
+    /// Rendering an image of the experiment's size.
     pub fn image(&self, integrator: &Variant, spp: u32) -> Work {
         let [width, height] = self.experiment.run.resolution.map(f64::from);
         let rays = self.rays_per_sample.get(integrator.label.as_str());
@@ -185,7 +185,7 @@ impl<'a> Cost<'a> {
         }
     }
 
-    /// One of the parts that a reference is rendered in; nothing where it is read from a file.
+    /// Rendering one part of a reference; nothing if it is read from a file.
     pub(super) fn reference_part(&self, cell: &Cell) -> Work {
         let reference = &self.experiment.reference;
         if reference.file.is_some() {
@@ -195,20 +195,19 @@ impl<'a> Cost<'a> {
         whole * f64::from(REFERENCE_PARTS).recip()
     }
 
-    /// Something that is timed, `turn` in each round, with its warm-up.
+    /// A timed measurement with `turn` in each round, including warm-up.
     pub fn timed(&self, turn: Work) -> Work {
         let timing = &self.experiment.timing;
         turn * f64::from(timing.rounds) + Work::other(f64::from(timing.min_warmup_ms) / 1e3)
     }
 
-    /// Seconds of one of the steps of [`Self::timed`], of which the warm-up is one.
+    /// Seconds of one step of [`Self::timed`], counting the warm-up as a step.
     pub(super) fn step_s(&self, timed: Work) -> f64 {
         timed.seconds() / f64::from(self.experiment.timing.rounds + 1)
     }
 }
 
-/// Rays that one sample usually takes: one from the camera, and at each bounce one onwards and one
-/// to a light.
+/// Typical rays per sample: one from the camera, and at each bounce one onwards and one to a light.
 fn rays_per_sample(known: &IntegratorRegistry, integrator: &Variant) -> f64 {
     let known = known.configured(integrator);
     let dimensions = known.map_or(FIRST_BOUNCE, |known| known.facts.dimensions);
@@ -216,7 +215,7 @@ fn rays_per_sample(known: &IntegratorRegistry, integrator: &Variant) -> f64 {
     f64::from(1 + 2 * bounces.min(USUAL_BOUNCES))
 }
 
-/// A count in millions, with a decimal where it is small.
+/// A count in millions, with a decimal if small.
 fn millions(count: f64) -> String {
     let millions = count / 1e6;
     let decimals = if millions < 10.0 { 1 } else { 0 };

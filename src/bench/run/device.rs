@@ -5,9 +5,9 @@ use raystone_core::params::Variant;
 use raystone_gpu::{AdapterChoice, Gpu};
 use std::sync::OnceLock;
 
-/// An open device, which composes kernels from every library of a run.
+/// An open device that composes kernels from every library of a run.
 pub(super) struct Device {
-    /// With the embedded kernels.
+    /// Uses the embedded kernels.
     pub gpu: Gpu,
     views: Vec<(Variant, Gpu)>,
     adapter: AdapterChoice,
@@ -39,7 +39,7 @@ impl Device {
         Ok([first].into_iter().chain(twin).collect())
     }
 
-    /// The device with these kernels; an error if the plan was made for others.
+    /// The device with these kernels; an error if they are not in the plan.
     pub(super) fn of(&self, kernels: &Variant) -> Result<&Gpu, RunError> {
         if kernels.name.is_empty() {
             return Ok(&self.gpu);

@@ -1,5 +1,5 @@
-//! Measurements that are carried out cell by cell: what is done already is passed over, the rest is made ready and checked one by
-//! one, timed in the same rounds, and written.
+//! Runs cell-by-cell measurements: skips finished cells, prepares and checks the others one by one,
+//! times them in the same rounds, and records them.
 
 use super::error::RunError;
 use super::measurement::{Absent, At, Measurement, Prepared};
@@ -9,14 +9,13 @@ use raystone_config::{Axis, Cell};
 use raystone_gpu::GpuError;
 use raystone_record::{Body, Key, Line, MeasuredRecord, Note, Ran, Reading, fault_of};
 
-/// A cell that is ready.
 struct Ready<'a> {
     cell: &'a Cell,
     item: Box<dyn Prepared + 'a>,
 }
 
-/// The open cells of a measurement that lie on `world`, the scene and tests of [`At::stage`]; those without a scene where there
-/// is none. Ends early when the device is lost: what is left is measured on another one.
+/// Runs the open cells of a measurement on `world`, the scene and tests of [`At::stage`]; without
+/// one, those without a scene. Ends early when the device is lost; another continues.
 pub(super) fn run(
     session: &mut Session,
     measurement: &'static dyn Measurement,
@@ -84,7 +83,7 @@ pub(super) fn run(
     Ok(())
 }
 
-/// The readings, unless a record of them could not be read again.
+/// Fails readings whose record could not be read back.
 fn sound(readings: Vec<Reading>) -> Result<Vec<Reading>, String> {
     match fault_of(&readings) {
         Some(fault) => Err(fault),
@@ -92,7 +91,7 @@ fn sound(readings: Vec<Reading>) -> Result<Vec<Reading>, String> {
     }
 }
 
-/// Seconds of one of the steps of a cell: it is made ready, warmed up, and timed in each round.
+/// Seconds of one step of a cell, which consist of preparation, warm-up, and each round.
 fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 {
     let seconds = measurement.cost(cell, &session.cost).seconds();
     if measurement.is_timed() {
@@ -102,10 +101,10 @@ fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 
     }
 }
 
-/// Samples of each thing that is timed of a cell, or why there are none.
+/// Samples of each timed item of a cell, or why there are none.
 type Timed = Result<Vec<Samples>, Absent>;
 
-/// Samples of each cell, or what went wrong; if the device is gone, the place of the cell that was being timed.
+/// Samples of each cell, or its failure; if the device is lost, the index of the cell being timed.
 fn time(
     session: &mut Session,
     measurement: &dyn Measurement,

@@ -1,10 +1,10 @@
-//! Why a run, or one of its cells, cannot go on.
+//! Errors of a run or one of its cells.
 
 use raystone_gpu::GpuError;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why a run could not start or go on. A cell that fails is a record, not an error.
+/// A run could not start or continue. A cell that fails is a record, not an error.
 #[derive(Debug, Error)]
 pub enum RunError {
     /// No usable adapter (exit code 3).
@@ -13,24 +13,24 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
-    /// Something that ended a run before its end; what was measured is kept.
+    /// The run ended early; completed measurements are preserved.
     #[error("{source}; what was measured is in {}", folder.display())]
     EndedEarly {
         /// The folder of the records.
         folder: PathBuf,
-        /// What ended it.
+        /// The cause.
         source: Box<RunError>,
     },
     /// [`Interrupt::now`](super::Interrupt::now) was called.
     #[error("the run was interrupted")]
     Interrupted,
-    /// A result that is known to be wrong (exit code 1).
+    /// A result is known to be wrong (exit code 1).
     #[error("{0}")]
     Wrong(String),
 }
 
 impl RunError {
-    /// Whether somebody asked for the end.
+    /// True if the run was interrupted on request.
     pub fn is_interruption(&self) -> bool {
         matches!(self, Self::Interrupted)
     }
@@ -54,11 +54,11 @@ impl RunError {
     }
 }
 
-/// Why something has no figures.
+/// Why there are no figures.
 pub(crate) enum Fault {
-    /// One cell is at fault, which gets a record of it.
+    /// Only one cell failed; it gets a record.
     Cell(String),
-    /// Nothing can go on.
+    /// The run cannot continue.
     Run(RunError),
 }
 
@@ -75,7 +75,7 @@ impl From<RunError> for Fault {
 }
 
 impl Fault {
-    /// The reason that is one cell's, or what ends the run.
+    /// The reason if only a cell failed, or the error that ends the run.
     pub(super) fn of_cell(self) -> Result<String, RunError> {
         match self {
             Self::Cell(reason) => Ok(reason),

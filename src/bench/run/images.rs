@@ -1,4 +1,4 @@
-//! What the images of a run are made with, their compiled kernels, and what their files say of it.
+//! Estimators of a run's images, their compiled kernels, and image file metadata.
 
 use super::device::Device;
 use super::error::Fault;
@@ -14,7 +14,7 @@ use raystone_record::{IMAGE_AXES, SPREAD};
 use raystone_render::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
 use raystone_sampling::Sampler;
 
-/// Why an integrator cannot render through a structure, if so: such a cell is left out.
+/// Why an integrator cannot render through a structure; such a cell is skipped.
 pub(super) fn unfit(session: &Session, cell: &Cell, traced: &Traced) -> Option<String> {
     match session.registries.integrator(cell) {
         Ok(integrator) => integrator.refusal(traced),
@@ -22,7 +22,7 @@ pub(super) fn unfit(session: &Session, cell: &Cell, traced: &Traced) -> Option<S
     }
 }
 
-/// What an image file says of its making: name and value, of those that are known.
+/// Image file attributes: known properties of the rendering by name.
 pub(super) fn attributes(
     program: &Program,
     cell: &Cell,
@@ -32,9 +32,12 @@ pub(super) fn attributes(
 ) -> Vec<Attribute<'static>> {
     let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
     let changed = program.dirty == Some(true);
-    let commit = program.commit.map(|commit| match changed {
-        true => format!("{commit} with uncommitted changes"),
-        false => commit.to_owned(),
+    let commit = program.commit.map(|commit| {
+        if changed {
+            format!("{commit} with uncommitted changes")
+        } else {
+            commit.to_owned()
+        }
     });
     let software = format!("raystone {}", program.version);
     let known = [
@@ -52,8 +55,7 @@ pub(super) fn attributes(
         .collect()
 }
 
-/// Linear images of what all replicates say together, if the run was asked for images: their mean, and the
-/// variance of one of them, by pixel and channel.
+/// Writes mean and single variance over all replicates, by pixel and channel, on request.
 pub(super) fn write_spread(
     session: &Session,
     cell: &Cell,
@@ -81,13 +83,13 @@ pub(super) fn write_spread(
     Ok(())
 }
 
-/// `sequence × decorrelation`.
+/// Formats `sequence × decorrelation`.
 pub(super) fn sampler_label(cell: &Cell) -> String {
     let labels = [&cell[Axis::Sequence], &cell[Axis::Decorrelation]].map(|v| v.label.as_str());
     labels.join(" × ")
 }
 
-/// What is computed per sample, what draws the samples, and the kernels of both.
+/// An integrator and a sampler with their kernels.
 pub(super) struct Estimator {
     pub sampler: Sampler,
     pub integrator: ConfiguredIntegrator,
@@ -96,7 +98,7 @@ pub(super) struct Estimator {
 }
 
 impl Estimator {
-    /// That of a cell, for `samples` samples per pixel.
+    /// The estimator of a cell, for `samples` samples per pixel.
     ///
     /// # Errors
     /// A name is not registered, or the sampler has too few dimensions or samples.
@@ -104,7 +106,7 @@ impl Estimator {
         Self::for_width(session, cell, samples, session.experiment.run.resolution[0])
     }
 
-    /// The same for images of another width than the experiment's.
+    /// [`Estimator::new`] for images of another width than the experiment's.
     ///
     /// # Errors
     /// As [`Estimator::new`].
@@ -127,7 +129,6 @@ impl Estimator {
         })
     }
 
-    /// An image of the experiment's size.
     pub(super) fn job(
         &self,
         session: &Session,
@@ -144,10 +145,10 @@ impl Estimator {
         }
     }
 
-    /// The same, with samples in chosen blocks of pixels alone.
+    /// [`Self::renderer`] for selected blocks of pixels.
     ///
     /// # Errors
-    /// As [`Estimator::renderer`], or the integrator cannot do that.
+    /// As [`Estimator::renderer`], or the integrator does not support it.
     pub(super) fn by_blocks<'a>(
         &self,
         session: &mut Session,
@@ -165,8 +166,7 @@ impl Estimator {
         compiled.map_err(|e| e.to_string())
     }
 
-    /// The compiled image of a world. The sampler's words were compared with those of its
-    /// twin, in all that `seeds` make of them.
+    /// Compiles the image of a world, after checking the sampler's words for all `seeds`.
     ///
     /// # Errors
     /// A word differs, or the kernel does not compile.

@@ -1,4 +1,4 @@
-//! What the figures of a cell depend on, and whether those of an earlier run still hold.
+//! Inputs of a cell's figures, and validity of an earlier run's figures.
 
 use super::kernels::Kernels;
 use super::registries::Registries;
@@ -10,15 +10,15 @@ use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::OnceLock;
 
-/// Digits of the hashes that are kept.
+/// Stored hash digits.
 const DIGITS: usize = 16;
 
 fn short(parts: &[(&str, &str)]) -> String {
     cell_hash(parts)[..DIGITS].to_owned()
 }
 
-/// The sources that figures depend on: the hash that the build noted, and of programs that use the library (with registries of their
-/// own) the bytes of the program.
+/// Identity of the sources that figures depend on: the hash noted by the build, plus, for programs
+/// that use the library with their own registries, the bytes of the program.
 pub(super) fn program() -> &'static str {
     static PROGRAM: OnceLock<String> = OnceLock::new();
     PROGRAM.get_or_init(|| {
@@ -34,7 +34,7 @@ pub(super) fn program() -> &'static str {
     })
 }
 
-/// Where clocks were read: figures of other places must not be compared.
+/// Where clocks were read; figures from different places must not be compared.
 pub fn place(environment: &Environment) -> String {
     let e = environment;
     format!(
@@ -43,9 +43,8 @@ pub fn place(environment: &Environment) -> String {
     )
 }
 
-/// What the cells of a run depend on now.
+/// Current inputs of a run's cells.
 pub(super) struct Current<'a> {
-    /// By name of the measurement.
     settings: BTreeMap<&'static str, String>,
     kernels: &'a Kernels,
     /// Label of a scene → hash of its content, or why it has none.
@@ -55,7 +54,7 @@ pub(super) struct Current<'a> {
 }
 
 impl<'a> Current<'a> {
-    /// Of an experiment with these kernels; the hash of the image that is compared with, if it is a file's.
+    /// Inputs of an experiment with these kernels; `reference_file` is the hash of that image.
     pub(super) fn new(
         experiment: &Experiment,
         reference_file: &str,
@@ -63,7 +62,7 @@ impl<'a> Current<'a> {
         kernels: &'a Kernels,
     ) -> Self {
         let measurements = registries.measurements.iter();
-        // Sections that others add may matter to any measurement.
+        // Sections added by others may matter to any measurement.
         let further = if experiment.further.is_empty() {
             String::new()
         } else {
@@ -81,14 +80,14 @@ impl<'a> Current<'a> {
         }
     }
 
-    /// Hash of the parameters of a unit and of the settings that matter to it.
+    /// Hash of a unit's parameters and relevant settings.
     pub(super) fn settings_of(&self, unit: &Unit) -> String {
         let key = serde_json::to_string(&Key::from(&unit.cell)).unwrap_or_default();
         let settings = self.settings.get(unit.kind()).map_or("", String::as_str);
         short(&[("kind", unit.kind()), ("key", &key), ("settings", settings)])
     }
 
-    /// What a unit depends on that is known before it is measured.
+    /// Inputs of a unit that are known before measuring.
     pub(super) fn inputs(&self, unit: &Unit) -> Inputs {
         let scene = unit.cell.get(Axis::Scene);
         let scene = scene.and_then(|scene| self.scenes.get(&scene.label)?.clone().ok());
@@ -105,7 +104,7 @@ impl<'a> Current<'a> {
         }
     }
 
-    /// Of each set of modules of kernels, by its id, what changed since; `None` if nothing did.
+    /// Change in each set of kernel modules, by id; `None` if there is none.
     pub(super) fn changed<'s>(
         &self,
         sets: &HashMap<&'s str, &KernelSetRecord>,
@@ -115,8 +114,7 @@ impl<'a> Current<'a> {
             .collect()
     }
 
-    /// Why what was recorded of a unit does not hold any more; `None` if it does. `sets`: see
-    /// [`Self::changed`].
+    /// Why a unit's record is no longer valid; `None` if it is. `sets`: see [`Self::changed`].
     pub(super) fn stale(
         &self,
         unit: &Unit,
@@ -152,11 +150,12 @@ impl<'a> Current<'a> {
     }
 }
 
-/// What one measurement of a cell was made of: its inputs, and the modules of its kernels if they are recorded.
+/// Provenance of a measurement: its inputs, and the modules of its kernels if recorded.
 pub(super) type MadeOf<'a> = (&'a Inputs, Option<&'a KernelSetRecord>);
 
-/// What two measurements of one cell were made of that must not differ, and does. Where errors are rendered through the fastest structure,
-/// two machines may take different ones: of the modules, only those that both used have to be equal.
+/// The first difference in provenance that two measurements of one cell must not have. If errors
+/// are rendered through the fastest structure, machines may choose different ones: only modules
+/// used by both have to be equal.
 pub(super) fn differing((a, set_a): MadeOf, (b, set_b): MadeOf) -> Option<&'static str> {
     let other_kernels = match (set_a, set_b) {
         (Some(a), Some(b)) => {
@@ -178,7 +177,7 @@ pub(super) fn differing((a, set_a): MadeOf, (b, set_b): MadeOf) -> Option<&'stat
         .map(|(what, _)| what)
 }
 
-/// The record of the modules that kernels were made of.
+/// Record of a set of kernel modules.
 pub(super) fn kernel_set(kernels: &str, modules: BTreeMap<String, String>) -> KernelSetRecord {
     let mut parts = vec![("kernels", kernels)];
     parts.extend(

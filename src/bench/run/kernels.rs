@@ -1,4 +1,4 @@
-//! The kernels of a run: a library for each folder on the axis, and a device that composes from each.
+//! Kernels of a run: a library per folder on the axis, and a device that composes from each.
 
 use super::device::Device;
 use super::error::RunError;
@@ -9,10 +9,10 @@ use raystone_gpu::{self as gpu, KernelLibrary};
 use raystone_record::{KernelFile, KernelFolder, KernelSetRecord};
 use std::path::Path;
 
-/// The embedded kernels with those of `folder` on top, checked as far as can be without composing.
+/// The embedded kernels overlaid with those of `folder`, checked without composing.
 ///
 /// # Errors
-/// The folder cannot be read, a file in it is no WESL, or no kernel could be made with it.
+/// The folder cannot be read, a file is not WESL, or no kernel could be composed with it.
 pub fn kernel_library(folder: &Path, registries: &Registries) -> Result<KernelLibrary, RunError> {
     let library = registries.library().with_folder(folder);
     let checked = library.and_then(|library| {
@@ -22,14 +22,14 @@ pub fn kernel_library(folder: &Path, registries: &Registries) -> Result<KernelLi
     checked.map_err(|e| RunError::Input(format!("kernels {}: {e}", folder.display())))
 }
 
-/// The libraries of an axis of kernels, and that of the program with what was registered.
+/// The libraries of a kernel axis, and the program's with all registered modules.
 pub struct Kernels {
     embedded: KernelLibrary,
     folders: Vec<(Variant, KernelLibrary)>,
 }
 
 impl Kernels {
-    /// Reads and checks the folders; the variant of the empty name stands for the embedded kernels.
+    /// Reads and checks the folders; the variant with an empty name is the embedded kernels.
     ///
     /// # Errors
     /// As [`kernel_library`].
@@ -45,7 +45,7 @@ impl Kernels {
         })
     }
 
-    /// Opens the adapter of the options, with a device for each library.
+    /// Opens the chosen adapter, with a device for each library.
     pub(super) fn open(&self, options: &RunOptions) -> Result<Device, RunError> {
         let gpu = gpu::open(&options.adapter, self.embedded.clone())?;
         let gpu = gpu.compiled_apart(options.compilations);
@@ -56,7 +56,7 @@ impl Kernels {
         Ok(Device::new(gpu, views, options.adapter.clone()))
     }
 
-    /// Why kernels that were made of these modules are others now; `None` if they are not.
+    /// Why kernels made of these modules are out of date; `None` if they are current.
     pub(super) fn changed(&self, set: &KernelSetRecord) -> Option<String> {
         let folder = (self.folders.iter()).find(|(kernels, _)| kernels.label == set.kernels);
         let folder = folder.map(|(_, library)| library);
@@ -75,7 +75,6 @@ impl Kernels {
         (!names.is_empty()).then(|| format!("kernels changed: {}", names.join(", ")))
     }
 
-    /// What is recorded of them.
     pub(super) fn folders(&self) -> Vec<KernelFolder> {
         let folder = |(kernels, library): &(Variant, KernelLibrary)| KernelFolder {
             label: kernels.label.clone(),

@@ -1,8 +1,9 @@
-//! Measurements: what is measured of a plan, what that costs, and how.
+//! Measurements of a plan and their cost.
 //!
-//! A measurement is one entry of the [`MeasurementRegistry`]. Plans, shards, expected times, resumed runs and records know it by
-//! that entry alone. One that is measured cell by cell (see [`Measurement::prepare`]) writes [readings](Reading), which stand in
-//! pages, comparisons and exports without another line of code; the others bring a loop of their own.
+//! A measurement is one entry of the [`MeasurementRegistry`]; plans, shards, expected times,
+//! resumed runs and records use only that entry. Cell-by-cell measurements (see
+//! [`Measurement::prepare`]) write [readings](Reading), which appear in pages, comparisons and
+//! exports without further code; the others have their own loop.
 
 use super::cost::{Cost, Work};
 use super::device::Device;
@@ -16,95 +17,94 @@ use raystone_record::figure::Figure;
 use raystone_record::{Note, Reading};
 use raystone_render::Stage;
 
-/// One kind of measurement.
+/// A kind of measurement.
 pub trait Measurement: Send + Sync {
-    /// Its name in records and lists, for instance `compaction`.
+    /// Name in records and lists, for instance `compaction`.
     fn name(&self) -> &'static str;
 
-    /// What several of its cells are called.
+    /// Plural name of its cells.
     fn plural(&self) -> &'static str;
 
-    /// Its figures, beside those of [`raystone_record::figure::FIGURES`].
+    /// Its figures, in addition to [`raystone_record::figure::FIGURES`].
     fn figures(&self) -> &'static [Figure] {
         &[]
     }
 
-    /// Adds what experiments may say of it: entries of axes, sections of settings.
+    /// Adds its entries of axes and sections of settings to the catalogue.
     fn declare(&self, _catalogue: &mut Catalogue) {}
 
-    /// The cells of a plan that it measures, in the order of the plan.
+    /// The cells of a plan that it measures, in plan order.
     fn cells(&self, experiment: &Experiment, plan: &Plan) -> Vec<Cell>;
 
-    /// The name of a cell in records: unique among those of all measurements.
+    /// Name of a cell in records, unique among all measurements.
     fn unit_name(&self, cell: &Cell) -> String {
         format!("{} of {cell}", self.name())
     }
 
-    /// What cells have in common that are measured in the same rounds, and so stay in one shard: a measurement, and the part of
-    /// the cell.
+    /// Key (measurement and part of the cell) of cells in the same rounds, and so in one shard.
     fn rounds_of(&self, cell: &Cell) -> (&'static str, Cell) {
         (self.name(), cell.on(&Cell::WORLD))
     }
 
-    /// Whether what is done for one cell serves others as well: what kernels that took counts for all of its cells.
+    /// True if work for one cell serves others: its kernels then count for all of its cells.
     fn is_shared(&self) -> bool {
         false
     }
 
-    /// Whether clocks speak, so that figures of different machines must not meet.
+    /// True if it reads clocks, so figures of different machines must not be mixed.
     fn is_timed(&self) -> bool {
         true
     }
 
-    /// The settings of the experiment that its figures depend on, as a text that differs where they do. `reference_file` is the
-    /// hash of the image that errors are measured against; empty if that is rendered.
+    /// Text of the experiment settings that its figures depend on. `reference_file` is the hash of
+    /// the reference image; empty if it is rendered.
     fn settings(&self, experiment: &Experiment, reference_file: &str) -> String;
 
-    /// The work of a cell, without what several share.
+    /// Work of a cell, without shared work.
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work;
 
-    /// Work that several cells share, done once for all that lie on the returned cell.
+    /// Work shared by several cells, done once for all of them on the returned cell.
     fn shared_cost(&self, _cell: &Cell, _cost: &Cost) -> Option<(Cell, Work)> {
         None
     }
 
-    /// The structures that a cell is measured through.
+    /// The structures through which a cell is measured.
     fn through(&self) -> Through {
         Through::Own
     }
 
-    /// Makes cells ready and checks them, one by one, in their order; the driver times them together and writes their readings.
+    /// Prepares and checks cells in order; the driver times them together and writes readings.
     fn prepare<'a>(&'a self, _at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let unfit = || Absent::Failed(format!("{} are not measured cell by cell", self.plural()));
         Box::new(cells.iter().map(move |_| Err(unfit())))
     }
 }
 
-/// The structures that a cell is measured through.
+/// The structures through which a cell is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Through {
-    /// That of the cell.
+    /// The cell's own.
     Own,
-    /// Any of its scene with its kernels: what it measures does not depend on the structure.
+    /// Any of its scene with its kernels: the result does not depend on the structure.
     Any,
     /// None.
     None,
 }
 
-/// Cells on their way to be timed: one item for each.
+/// Cells being prepared, one item each.
 pub type Preparation<'a> = Box<dyn Iterator<Item = Result<Box<dyn Prepared + 'a>, Absent>> + 'a>;
 
-/// A cell that is ready, and passed its checks.
+/// A cell that is ready and has passed its checks.
 pub trait Prepared {
-    /// What is timed of it, in the rounds of all cells; nothing where no clock is read.
+    /// Items to time in the rounds of all cells; empty if no clock is read.
     fn timed(&self) -> Vec<&dyn Measured> {
         Vec::new()
     }
 
-    /// Its figures, from the samples of each thing that was timed.
+    /// Its figures, from the samples of each timed item.
     ///
     /// # Errors
-    /// What is wrong with them, in words: the cell fails.
+    /// The problem with them: the cell fails.
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String>;
 
     /// What figures cannot say.
@@ -116,9 +116,9 @@ pub trait Prepared {
 /// Why a cell is not timed.
 #[derive(Debug)]
 pub enum Absent {
-    /// It cannot be measured here, for this reason: the cell is left out.
+    /// It cannot be measured here, for this reason: the cell is skipped.
     Refused(String),
-    /// It is wrong: the cell fails.
+    /// Its result is wrong: the cell fails.
     Failed(String),
 }
 
@@ -132,27 +132,27 @@ impl From<raystone_gpu::GpuError> for Absent {
     }
 }
 
-/// Where a measurement is carried out.
+/// Context of a measurement.
 pub struct At<'a> {
     /// The experiment.
     pub experiment: &'a Experiment,
-    /// Everything that can be named.
+    /// All registries.
     pub registries: &'a Registries,
     /// The scene with its tests; `None` for cells without a scene.
     pub stage: Option<&'a Stage>,
     pub(super) device: &'a Device,
-    /// The structures that passed their gate, by cell.
+    /// The structures that passed the correctness check, by cell.
     pub(super) traced: Vec<(&'a Cell, &'a Traced)>,
-    /// Structures that the driver refused, each with the reason.
+    /// Structures refused by the driver, with the reason.
     pub(super) refused: Vec<(Cell, String)>,
     pub(super) progress: Progress,
 }
 
 impl At<'_> {
-    /// The device with the kernels of a cell.
+    /// The device with a cell's kernels.
     ///
     /// # Errors
-    /// The plan was made for other kernels.
+    /// The kernels are not in the plan.
     pub fn gpu(&self, cell: &Cell) -> Result<&Gpu, Absent> {
         let gpu = self.device.of(&cell[Axis::Kernels]);
         gpu.map_err(|error| Absent::Failed(error.to_string()))
@@ -172,10 +172,10 @@ impl At<'_> {
         self.progress.say(what);
     }
 
-    /// The structure of a cell on the device.
+    /// A cell's structure on the device.
     ///
     /// # Errors
-    /// The driver refused it, or it did not pass its gate.
+    /// The driver refused it, or it failed its correctness check.
     pub fn traced(&self, cell: &Cell) -> Result<&Traced, Absent> {
         let mut structures = self.traced.iter();
         let structure = structures.find(|(structure, _)| cell.is_on(structure));

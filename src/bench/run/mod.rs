@@ -1,7 +1,6 @@
-//! Running an experiment: the one place where all parts meet.
+//! Runs an experiment: the one place where all parts meet.
 //!
-//! config → scene → accel → gpu → integrator → measure → records. Reports are made from the records alone,
-//! by others.
+//! config → scene → accel → gpu → integrator → measure → records. Reports use only records.
 
 mod adaptive;
 mod animation;
@@ -76,27 +75,26 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use world::{Loaded, NoWorld, World, load_options};
 
-/// One structure's verdict, for `raystone verify`.
+/// Verdict on one structure, for `raystone verify`.
 #[derive(Debug, Clone)]
 pub struct Verified {
     /// Scene, tests, structure and kernels.
     pub cell: Cell,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
-    /// Whether the scene could not be loaded (exit code 2).
+    /// True if the scene could not be loaded (exit code 2).
     pub bad_input: bool,
-    /// Whether there is none because the driver ends loops too early for the structure.
+    /// True if there is no verdict because the driver ends loops too early for the structure.
     pub refused: bool,
-    /// Verdicts on integrators, through the first structure that passed with its kernels.
+    /// Verdicts on integrators, through the first passing structure with its kernels.
     pub paths: Vec<(Cell, PathsRecord)>,
 }
 
-/// Runs a plan, writes `records.jsonl` and images to `options.out`, which another run cannot write
-/// meanwhile. Earlier results there stay until the run has ended.
+/// Runs a plan and writes `records.jsonl` and images to `options.out`, locked against other runs.
+/// Earlier results stay there until the run has ended.
 ///
 /// # Errors
-/// No adapter, kernels that cannot be read, or a folder that cannot be written or holds results; the
-/// records so far are kept.
+/// No adapter, unreadable kernels, or a folder not writable or with results; records stay.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
@@ -105,7 +103,7 @@ pub fn run(
 ) -> Result<RunSummary, RunError> {
     let kernels = Kernels::load(&plan.kernels, registries)?;
     let is_resumed = options.existing == Existing::Resume;
-    // Without an adapter no folder is touched; a run that has nothing to do needs none.
+    // Without an adapter no folder is touched; a run with nothing to do needs none.
     let device = (!is_resumed).then(|| kernels.open(options));
     let device = device.transpose()?;
     let mut session = Session::new(experiment, plan, registries, options)?;
@@ -157,7 +155,7 @@ fn reason(error: &RunError) -> String {
     }
 }
 
-/// The content of each scene as it is now, for an adapter that binds so many bytes.
+/// Current content hash of each scene, for an adapter with this binding limit.
 fn scene_hashes(
     plan: &Plan,
     options: &RunOptions,
@@ -172,7 +170,7 @@ fn scene_hashes(
     plan.scenes.iter().map(hash).collect()
 }
 
-/// Writes every record, and puts them in their place: the folder.
+/// Measures everything, writes the records, and moves them to their folder.
 fn measure(
     session: &mut Session,
     mut device: Device,
@@ -180,8 +178,7 @@ fn measure(
 ) -> Result<PathBuf, RunError> {
     let (plan, options) = (session.plan, session.options);
     for scene in &plan.scenes {
-        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
-        // of this loop finishes at least one cell.
+        // A lost device fails its cell; a new one continues. Every iteration finishes a cell.
         loop {
             run_scene(session, &device, scene)?;
             if device.gpu.lost().is_none() {
@@ -202,7 +199,7 @@ fn measure(
     session.write_end()
 }
 
-/// What is measured without a scene.
+/// Measurements without a scene.
 fn run_alone(session: &mut Session, device: &Device) -> Result<(), RunError> {
     let at = At {
         experiment: session.experiment,
@@ -240,7 +237,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
         }
     };
     for cell in session.plan.worlds(variant) {
-        // After a lost device worlds that are complete are not built again.
+        // After a lost device, completed worlds are not rebuilt.
         let done = format!("world {cell}: done");
         if session.ledger.is_done(&done)
             || !session
@@ -306,8 +303,8 @@ fn run_world(
     Ok(())
 }
 
-/// Renders the references of a plan and keeps them in `options.cache`, where runs find them: all parts, or those that are a shard's. How many
-/// were rendered, and which references have none.
+/// Renders the references of a plan, or a shard's parts of them, into `options.cache`, where runs
+/// find them. Returns the number of rendered parts, and the references that have none.
 ///
 /// # Errors
 /// No adapter, or no cache.
@@ -361,7 +358,7 @@ pub fn render_references(
     Ok((rendered, failures))
 }
 
-/// What samplers of a world are compared under: the world with each integrator.
+/// Reference keys of a world's samplers: the world with each integrator.
 fn references_of(plan: &Plan, world: &Cell) -> Vec<Cell> {
     let axes = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
     let mut found: Vec<Cell> = Vec::new();
@@ -374,8 +371,8 @@ fn references_of(plan: &Plan, world: &Cell) -> Vec<Cell> {
     found
 }
 
-/// Runs the gate alone on every structure of a plan, with `rays` rays of each class; integrators are judged on all `trials`, too
-/// ([`raystone_verify::trial_scenes`]), or on those alone that are of the plan's scenes.
+/// Checks every structure of a plan, with `rays` rays of each class. Integrators are also checked
+/// on all `trials` ([`raystone_verify::trial_scenes`]), or only on those of the plan's scenes.
 ///
 /// # Errors
 /// No adapter.

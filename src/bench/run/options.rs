@@ -1,4 +1,4 @@
-//! What is said of a run beside its experiment, and how it ended.
+//! Options of a run besides its experiment, and its outcome.
 
 use super::folder::{Existing, Interrupt};
 use raystone_config::Shard;
@@ -7,57 +7,58 @@ use raystone_gpu::{AdapterChoice, ArithmeticProbe};
 use raystone_image::FileFormat;
 use std::path::PathBuf;
 
-/// What an experiment does not say.
+/// Options of a run that are not part of the experiment.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
-    /// The program that measures, as records name it.
+    /// The measuring program, for records.
     pub program: Program,
-    /// Folder for records and images; made if missing.
+    /// Output folder for records and images; created if missing.
     pub out: PathBuf,
-    /// What to do where that folder holds results.
+    /// Handling of existing results in that folder.
     pub existing: Existing,
-    /// Ends the run early.
+    /// Interrupts the run.
     pub interrupt: Interrupt,
-    /// Is told what went wrong beside the measuring, at once.
+    /// Called immediately with warnings.
     pub warn: Option<fn(&str)>,
-    /// Is told how the run goes on, line by line.
+    /// Called with lines of progress.
     pub tell: Option<fn(&str)>,
-    /// Which adapter.
+    /// Adapter to use.
     pub adapter: AdapterChoice,
-    /// Whether, and in which format, linear radiance is written beside the pictures of a run.
+    /// Format in which linear radiance is written next to a run's pictures; `None`: it is not.
     pub images: Option<&'static FileFormat>,
-    /// Folder in which rendered references are kept for later runs; `None`: each run renders its own.
+    /// Folder that caches rendered references for later runs; `None`: each run renders its own.
     pub cache: Option<PathBuf>,
-    /// Whether models may name files outside their folder: see [`raystone_scene::LoadOptions`].
+    /// True if models may name files outside their folder: see [`raystone_scene::LoadOptions`].
     pub allow_outside: bool,
-    /// The part of the plan that is run; `None`: all of it.
+    /// The part of the plan to run; `None`: all of it.
     pub shard: Option<Shard>,
-    /// Whether to wait for another run that writes the folder.
+    /// True to wait for another run that is writing the folder.
     pub wait: bool,
-    /// Whether the first cell that fails ends the run.
+    /// True to end the run at the first failed cell.
     pub fail_fast: bool,
-    /// Whether to draw a progress bar on standard error.
+    /// True for a progress bar on standard error.
     pub progress: bool,
-    /// Whether the run is to end with exit code 0 whatever fails: recorded, and said in the report.
+    /// True to exit with code 0 whatever fails; failures are still recorded and reported.
     pub lenient: bool,
-    /// Destroys the device when the turn of this cell comes: for tests of the recovery.
+    /// Destroys the device when this cell is reached, to test recovery.
     pub lose_device_at: Option<String>,
-    /// How often every timed kernel is compiled, in turns over the rounds; 0 and 1: once. See [`raystone_gpu::Gpu::compiled_apart`].
+    /// Number of compilations of every timed kernel, in turns over the rounds; 0 and 1: one. See
+    /// [`raystone_gpu::Gpu::compiled_apart`].
     pub compilations: usize,
-    /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.
+    /// Assumed arithmetic of the adapter instead of probing it, for tests.
     pub arithmetic: Option<ArithmeticProbe>,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RunSummary {
-    /// Cells (or gates) that failed.
+    /// Number of failed cells or structure checks.
     pub failed: usize,
-    /// Cells left out with a reason.
+    /// Number of skipped cells.
     pub skipped: usize,
-    /// Cells of an earlier run that still held.
+    /// Number of still valid cells of an earlier run.
     pub kept: usize,
-    /// Whether a scene could not be loaded (exit code 2).
+    /// True if a scene could not be loaded (exit code 2).
     pub bad_input: bool,
     /// Folder of the records.
     pub out: PathBuf,

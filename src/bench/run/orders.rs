@@ -1,4 +1,4 @@
-//! Full cells whose pixels are taken in orders of passes: how long a sample takes, and how soon a picture is there.
+//! Full cells rendered in pixel orders: time per sample, and time to the first picture.
 
 use super::images::Estimator;
 use super::recorder::image_hash;
@@ -13,11 +13,11 @@ use raystone_record::OrderTime;
 use raystone_render::{InOrder, Order, PartRenderer};
 use raystone_stats::statistics::median_interval;
 
-/// Each order, timed in interleaved rounds by the wall clock, submissions that are waited for included; none if the experiment does
-/// not ask for it. `hash` is that of the image of one pass.
+/// Measures each order in interleaved rounds by the wall clock, including submissions and waits;
+/// empty if the experiment does not request it. `hash` is that of the single-pass image.
 ///
 /// # Errors
-/// The kernel does not compile, the device is lost, or an image is another; in words.
+/// The kernel does not compile, the device is lost, or an image differs.
 pub(super) fn of_cell(
     session: &mut Session,
     world: &World,
@@ -41,7 +41,7 @@ pub(super) fn of_cell(
         .iter()
         .map(|order| (*order, Vec::new()))
         .collect();
-    // The first round warms up and looks at the images.
+    // The first round warms up and checks the images.
     for round in 0..=timing.rounds {
         for left in (1..turns.len()).rev() {
             turns.swap(left, random.below(left + 1));

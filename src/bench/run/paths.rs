@@ -1,4 +1,4 @@
-//! The gate of integrators: single paths against the oracle for images, before anything is rendered with them.
+//! Correctness check of integrators before rendering: single paths against the image oracle.
 
 use super::error::{Fault, RunError};
 use super::session::{Session, content_hash};
@@ -14,13 +14,12 @@ use raystone_verify::image_gate::{Answer, Pixels, answers, judge, sums};
 use raystone_verify::path_oracle::{Estimator, PathOracle, View};
 use raystone_verify::trial_scenes::{TrialScene, trial_scenes_of, trials_of};
 
-/// Of the frame that is judged: no square, and no multiple of a workgroup.
+/// Size of the checked frame: not square, and not a multiple of a workgroup.
 const SIZE: [u32; 2] = [26, 19];
 
-/// Through which trial scenes are traced.
 const STRUCTURE: &str = "bvh";
 
-/// What an outcome depends on beside the world: the first sampler of each does.
+/// Axes besides the world that affect the outcome: the first sampler of each suffices.
 const AXES: [Axis; 4] = [
     Axis::Integrator,
     Axis::Offset,
@@ -28,12 +27,12 @@ const AXES: [Axis; 4] = [
     Axis::Kernels,
 ];
 
-/// How many paths are judged.
+/// Number of paths checked.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
-    /// Indices of samples, spread over those of the experiment.
+    /// Number of sample indices, spread over the experiment's.
     samples: u32,
-    /// Of so many pixels one.
+    /// One pixel in `every` is checked.
     every: u32,
 }
 
@@ -42,7 +41,7 @@ const RUN: Extent = Extent {
     samples: 4,
     every: 4,
 };
-/// On a trial scene by `verify`: 1976 paths, since a material may have a twentieth of the image.
+/// On a trial scene by `verify`: 1976 paths, since a material may cover a twentieth of the image.
 const TRIAL: Extent = Extent {
     samples: 4,
     every: 1,
@@ -53,10 +52,10 @@ const VERIFY: Extent = Extent {
     every: 1,
 };
 
-/// Judges the integrator of a cell, unless that was done before.
+/// Checks a cell's integrator, unless already done.
 ///
 /// # Errors
-/// It failed, now or then.
+/// It failed, now or earlier.
 pub(super) fn check(
     session: &mut Session,
     world: &World,
@@ -73,7 +72,7 @@ pub(super) fn check(
     }
 }
 
-/// Judges all integrators of a plan on a world through the structure of a cell, with its kernels, that were not judged before.
+/// Checks all unchecked integrators of a plan on a world, with a cell's structure and kernels.
 pub(super) fn verify(
     session: &mut Session,
     world: &World,
@@ -110,7 +109,7 @@ fn judge_and_record(
         Err(reason) => (PathsRecord::not_judged(reason), Ran::default()),
     };
     if world.gpu.lost().is_some() {
-        // Judged again on the next device.
+        // Checked again on the next device.
         return Ok(record);
     }
     session
@@ -133,7 +132,6 @@ fn judge_and_record(
     Ok(record)
 }
 
-/// What is judged: a scene on the device with the kernels of a cell.
 struct Subject<'a> {
     stage: &'a Stage,
     gpu: &'a Gpu,
@@ -143,8 +141,8 @@ struct Subject<'a> {
     offset: RayOffset,
 }
 
-/// The verdict and the kernels that it is on, or why there is none. Trial scenes join what a scene may show too little of; by
-/// `verify` all of them may do, once for each integrator and its kernels.
+/// The verdict and its kernels, or why there is none. Trial scenes supplement what the scene may
+/// not show; in `verify` all of them may, once per integrator and kernels.
 fn made(
     session: &mut Session,
     world: &World,
@@ -188,7 +186,7 @@ fn made(
     Ok((record, ran))
 }
 
-/// Judges the trials of this integrator on a trial scene, or itself where the scene lists none.
+/// Checks this integrator's trials on a trial scene, or itself if the scene lists none.
 fn of_trial(
     session: &mut Session,
     subject: &Subject,
@@ -210,9 +208,10 @@ fn of_trial(
     let listed: Result<Vec<_>, _> = listed.collect();
     let listed = listed.map_err(|e| e.to_string())?;
     let own = [integrator];
-    let integrators: Vec<&ConfiguredIntegrator> = match trial.trials.is_empty() {
-        true => own.to_vec(),
-        false => listed.iter().collect(),
+    let integrators: Vec<&ConfiguredIntegrator> = if trial.trials.is_empty() {
+        own.to_vec()
+    } else {
+        listed.iter().collect()
     };
     let mut all = PathsRecord::default();
     if integrators.is_empty() {
@@ -244,7 +243,6 @@ fn of_trial(
     Ok(all)
 }
 
-/// The verdict on an integrator.
 fn judged(
     session: &mut Session,
     subject: &Subject,
@@ -283,7 +281,7 @@ fn judged(
     Ok((record, ran))
 }
 
-/// So many of the indices below `spp`, the first and the last among them.
+/// `count` indices below `spp`, including the first and the last.
 fn spread(spp: u32, count: u32) -> Vec<u32> {
     let last = u64::from(spp.max(1) - 1);
     let steps = u64::from(count.max(2) - 1);
@@ -292,7 +290,7 @@ fn spread(spp: u32, count: u32) -> Vec<u32> {
     indices
 }
 
-/// What the kernels answer, and what is wrong with their sums.
+/// The kernels' answers, and errors in their sums.
 fn render(
     subject: &Subject,
     (integrator, sampler): (&ConfiguredIntegrator, &Sampler),

@@ -1,4 +1,4 @@
-//! Rasterised primary visibility beside rays: which pixels see another triangle, what that does to the image, and what each takes.
+//! Rasterised primary visibility against rays: different pixels, effect on the image, times.
 
 use super::images::Estimator;
 use super::session::Session;
@@ -14,13 +14,14 @@ use raystone_render::{Renderer, Visibility};
 use raystone_stats::statistics::median_interval;
 use raystone_verify::rays::{primary_pixels, primary_rays};
 
-/// One pixel in so many may differ although it sees the triangle that the host's ray finds: directions of host and kernels differ by roundings.
+/// One pixel in this many may differ although it sees the same triangle as the host's ray, as
+/// directions of host and kernels differ by rounding.
 const UNEXPLAINED: u64 = 10_000;
 
-/// The comparison for a cell whose paths begin at rasterised triangles, after its last timed image; `None` for others.
+/// Compares a cell with rasterised first hits, after its last timed image; `None` for others.
 ///
 /// # Errors
-/// A kernel does not compile, the device is lost, or pixels differ that see the same triangle; in words.
+/// A kernel does not compile, the device is lost, or pixels differ that see the same triangle.
 pub(super) fn of_cell(
     session: &mut Session,
     world: &World,
@@ -49,16 +50,15 @@ pub(super) fn of_cell(
     Ok(Some(record))
 }
 
-/// What rasteriser and rays found and took.
+/// Results and times of rasteriser and rays.
 struct Turns {
-    /// Pixel by pixel.
     other_triangle: Vec<bool>,
     raster_ms: Vec<f64>,
     traced_ms: Vec<f64>,
 }
 
 impl Turns {
-    /// Both in turns, by the wall clock; the first round warms up.
+    /// Runs both in turns by the wall clock; the first round warms up.
     fn taken(
         session: &mut Session,
         world: &World,
@@ -99,7 +99,7 @@ impl Turns {
     }
 }
 
-/// The image of the same samples by rays through the centres of pixels.
+/// The image of the same samples, traced through pixel centres.
 fn centred(
     session: &mut Session,
     world: &World,
@@ -122,7 +122,7 @@ fn centred(
         .ok_or_else(|| "no image was taken".to_owned())
 }
 
-/// By how much an image differs from one by rays; times are left out.
+/// Difference of an image from a traced one, without times.
 fn compared(rasterised: &Image, traced: &Image, other_triangle: &[bool]) -> PrimaryRecord {
     let mut record = PrimaryRecord {
         pixels: traced.pixels.len() as u64,

@@ -1,9 +1,9 @@
-//! How far a run is: a bar on a terminal, lines elsewhere.
+//! Progress of a run: a bar on a terminal, lines elsewhere.
 //!
-//! Every step has an expected time by [`super::Cost`], loading, checks and compiling included, from which the share that is done
-//! follows. The rest is expected at the pace so far: a step that takes longer than expected makes the rest longer, and nothing is
-//! called nearly done that is not. The first steps say little of the pace: a share of the whole counts as done at the pace that was
-//! expected.
+//! Every step has an expected time by [`super::Cost`], including loading, checks and compiling,
+//! which determines the finished share. The rest is extrapolated at the pace so far: a step that
+//! takes longer than expected lengthens the rest. The first steps say little about the pace, so a
+//! share of the whole counts as done at the expected pace.
 
 use super::options::RunOptions;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -11,30 +11,28 @@ use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Steps of the bar.
 const STEPS: u64 = 1000;
-/// Between two lines where there is no terminal.
+/// Interval of progress lines without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
-/// The share of a run that counts as done at the expected pace.
+/// Share of a run that counts as done at the expected pace.
 const PRIOR: f64 = 0.1;
 
 #[derive(Debug)]
 struct Shared {
     start: Instant,
-    /// Expected seconds of all, and of what is done.
+    /// Expected seconds in total, and of finished steps.
     expected_s: f64,
     done_s: f64,
-    /// When a line was told.
     told: Instant,
 }
 
 impl Shared {
-    /// The share that is done, below 1 as long as the run goes on.
+    /// Finished share, below 1 while the run continues.
     fn share(&self) -> f64 {
         (self.done_s / self.expected_s.max(1e-9)).clamp(0.0, 0.995)
     }
 
-    /// Seconds that are left: what was expected of them, times the pace so far.
+    /// Remaining seconds: expected time multiplied by the pace so far.
     fn left_s(&self) -> f64 {
         let prior = (PRIOR * self.expected_s).max(1e-9);
         let so_far = self.start.elapsed().as_secs_f64();
@@ -44,7 +42,7 @@ impl Shared {
     }
 }
 
-/// The progress of a run; clones are one.
+/// The shared progress of a run; cheap to clone.
 #[derive(Debug, Clone)]
 pub(super) struct Progress {
     pub bar: ProgressBar,
@@ -53,7 +51,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// A bar if the options ask for one, else lines if they say where to.
+    /// A bar if requested, else lines if there is a callback.
     pub(super) fn new(options: &RunOptions) -> Self {
         let shared = Arc::new(Mutex::new(Shared {
             start: Instant::now(),
@@ -61,9 +59,10 @@ impl Progress {
             done_s: 0.0,
             told: Instant::now(),
         }));
-        let bar = match options.progress {
-            true => ProgressBar::new(STEPS),
-            false => ProgressBar::hidden(),
+        let bar = if options.progress {
+            ProgressBar::new(STEPS)
+        } else {
+            ProgressBar::hidden()
         };
         let template = "{bar:32} {percent}% · {elapsed} · about {left} left · {wide_msg}";
         let style = ProgressStyle::with_template(template);
@@ -85,24 +84,23 @@ impl Progress {
         }
     }
 
-    /// Sets what all of the run is expected to take, seconds.
+    /// Sets the expected total time in seconds.
     pub(super) fn expect(&self, seconds: f64) {
         let mut shared = lock(&self.shared);
         shared.expected_s = seconds;
         shared.start = Instant::now();
     }
 
-    /// A step that was expected to take so many seconds is done.
+    /// Completes a step of this expected time in seconds.
     pub(super) fn add(&self, seconds: f64) {
         let mut shared = lock(&self.shared);
         shared.done_s += seconds;
         let position = (shared.share() * STEPS as f64) as u64;
-        // The bar draws, and asks for what is left.
+        // The bar redraws and queries the remaining time.
         drop(shared);
         self.bar.set_position(position);
     }
 
-    /// Tells what is being done.
     pub(super) fn say(&self, message: String) {
         if let Some(tell) = self.tell {
             let mut shared = lock(&self.shared);
@@ -124,7 +122,6 @@ fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A time as people say it.
 fn duration(seconds: f64) -> String {
     let seconds = seconds.round() as u64;
     match seconds {
@@ -153,13 +150,13 @@ mod tests {
         // Half of it took 50 s: nearly as long again.
         let left = shared(10.0, 5.0, 50).left_s();
         assert!((40.0..50.0).contains(&left), "{left}");
-        // Before anything is known, what was expected; a first step that hangs makes it longer.
+        // At first the expected time; a first step that hangs lengthens it.
         assert!((shared(60.0, 0.0, 0).left_s() - 60.0).abs() < 0.5);
         assert!(shared(60.0, 0.0, 300).left_s() >= 299.0);
-        // The first steps took three times as long as expected: that says little of the whole.
+        // The first steps took three times as long as expected, which says little about the whole.
         let left = shared(300.0, 6.0, 18).left_s();
         assert!((300.0..420.0).contains(&left), "{left}");
-        // Everything is done as expected, and yet the run goes on.
+        // Everything is done as expected, and yet the run continues.
         for so_far in [1, 60, 600] {
             let left = shared(10.0, 10.0, so_far).left_s();
             assert!((1.0..10.0).contains(&left), "{left}");

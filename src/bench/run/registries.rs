@@ -17,7 +17,7 @@ use raystone_render::{
 use raystone_sampling::SamplerRegistry;
 use raystone_verify::kinds::KindChecks;
 
-/// Everything that can be named.
+/// All registries.
 #[derive(Clone, Default)]
 pub struct Registries {
     /// Structures.
@@ -26,25 +26,25 @@ pub struct Registries {
     pub samplers: SamplerRegistry,
     /// Integrators.
     pub integrators: IntegratorRegistry,
-    /// Ray–triangle tests.
+    /// Ray-triangle tests.
     pub triangles: TriangleRegistry,
-    /// Ray–box tests.
+    /// Ray-box tests.
     pub boxes: BoxRegistry,
-    /// Offsets of rays that leave a surface.
+    /// Ray offsets at surfaces.
     pub offsets: OffsetRegistry,
     /// Organisations of the path tracer.
     pub organisations: OrganisationRegistry,
-    /// Ray casters of others.
+    /// External tracers.
     pub peers: PeerRegistry,
-    /// Workgroups of kernels that trace.
+    /// Workgroups of tracing kernels.
     pub workgroups: WorkgroupRegistry,
-    /// Compactions of streams.
+    /// Stream compactions.
     pub compactions: CompactionRegistry,
-    /// What checks know of the kinds of materials and lights.
+    /// Checks of material and light kinds.
     pub kinds: KindChecks,
-    /// What is measured.
+    /// Measurements.
     pub measurements: MeasurementRegistry,
-    /// Figures of structures beside those of the crate.
+    /// Additional figures of structures.
     pub figures: FigureRegistry,
 }
 
@@ -70,7 +70,7 @@ impl Registries {
         catalogue
     }
 
-    /// How the rays of a cell meet triangles and boxes.
+    /// The triangle and box tests of a cell.
     ///
     /// # Errors
     /// A test is not registered.
@@ -82,7 +82,7 @@ impl Registries {
         })
     }
 
-    /// How the rays of a cell leave surfaces.
+    /// The ray offset of a cell.
     ///
     /// # Errors
     /// The offset is not registered.
@@ -90,7 +90,7 @@ impl Registries {
         (self.offsets.named("offset", &cell[Axis::Offset].name)).copied()
     }
 
-    /// In which workgroups the rays of a cell are traced; the default where it does not say.
+    /// The workgroup of a cell, or the default.
     ///
     /// # Errors
     /// The workgroup is not registered.
@@ -101,10 +101,10 @@ impl Registries {
         }
     }
 
-    /// What a cell computes per sample, as the cell organises it; by a single kernel where it does not matter.
+    /// The integrator of a cell in its organisation; a single kernel if that does not matter.
     ///
     /// # Errors
-    /// A name or a parameter is unknown, or the integrator cannot be organised so.
+    /// A name or parameter is unknown, or the integrator does not support the organisation.
     pub fn integrator(&self, cell: &Cell) -> Result<ConfiguredIntegrator, String> {
         let integrator = self.integrators.configured(&cell[Axis::Integrator]);
         let integrator = integrator.map_err(|e| e.to_string())?;
@@ -114,12 +114,12 @@ impl Registries {
         }
     }
 
-    /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
+    /// Additional module names that a kernel folder may contain, for registered kinds.
     pub fn kernels(&self) -> Vec<String> {
         self.accel.iter().flat_map(|kind| kind.kernels()).collect()
     }
 
-    /// The kernels of the program, and those that came with what was registered.
+    /// The program's kernels plus those of registered kinds.
     pub fn library(&self) -> KernelLibrary {
         let sequences = self.samplers.sequences.defaults().map(|s| s.sources());
         let decorrelations = self.samplers.decorrelations.defaults();
@@ -133,10 +133,10 @@ impl Registries {
         KernelLibrary::default().with_sources(&sources)
     }
 
-    /// Whether seeds change what this pair draws.
+    /// True if seeds change the samples of this pair.
     ///
     /// # Errors
-    /// Why the pair makes no sense, in words.
+    /// Why the pair is incompatible.
     pub fn is_randomised(
         &self,
         sequence: &Variant,
@@ -146,7 +146,7 @@ impl Registries {
         random.map_err(|e| e.to_string())
     }
 
-    /// Whether the mean over seeds of what this sampler estimates is claimed to be the integral.
+    /// True if this sampler's estimate claims to be unbiased over seeds.
     pub fn is_unbiased(&self, cell: &Cell) -> bool {
         let claimed =
             (self.samplers).is_unbiased(&cell[Axis::Sequence], &cell[Axis::Decorrelation]);

@@ -1,5 +1,5 @@
-//! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
-//! there at once; the structure is validated on the host.
+//! Renders one picture, for `raystone render`. Nothing is checked on the device or recorded, so
+//! that the first picture appears at once; the structure is validated on the host.
 
 use super::error::RunError;
 use super::images::{Estimator, attributes};
@@ -21,12 +21,12 @@ use raystone_scene::{self as scene, LoadReport};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Samples are added for about so long before the progress is shown.
+/// Target duration between progress updates.
 const STEP: Duration = Duration::from_millis(500);
-/// Least time between two writes of an unfinished picture.
+/// Minimum time between writes of an unfinished picture.
 const REFRESH: Duration = Duration::from_secs(2);
 
-/// What was rendered, how fast, and what was approximated.
+/// Summary of a rendering.
 #[derive(Debug, Clone)]
 pub struct Rendering {
     /// Triangles of the scene.
@@ -35,38 +35,39 @@ pub struct Rendering {
     pub spp: u32,
     /// Seconds from the start until the first picture was written.
     pub first_picture_s: f64,
-    /// Seconds that the samples took, compilation of the kernel not included.
+    /// Seconds for the samples, without kernel compilation.
     pub samples_s: f64,
-    /// Seconds from the start to the end.
+    /// Seconds from start to end.
     pub total_s: f64,
     /// Rays of all classes.
     pub rays: u64,
-    /// What the loader dropped or approximated.
+    /// Dropped and approximated content.
     pub report: LoadReport,
-    /// Pixels that are NaN or infinite: a fault of the renderer.
+    /// Number of NaN or infinite pixels: a renderer bug.
     pub non_finite_pixels: usize,
-    /// Where pixels were taken in an order of passes: how long that took.
+    /// Times of rendering in an order of passes.
     pub in_order: Option<InOrder>,
 }
 
-/// Where pictures go, and in which order pixels are taken.
+/// Output files and pixel order.
 #[derive(Debug, Clone, Copy)]
 pub struct Pictures<'a> {
-    /// The picture, in the format of its ending.
+    /// The picture, in the format of its extension.
     pub file: &'a Path,
-    /// Passes, each a part of the pixels; `None` takes whole samples.
+    /// Passes, each over a part of the pixels; `None` renders whole samples.
     pub order: Option<Order>,
-    /// Where the first picture without a gap goes, if there is an order; `None`: it is the first of the file.
+    /// File for the first complete picture of an order; `None`: the main file.
     pub preview: Option<&'a Path>,
 }
 
-/// Renders the first scene, structure, sampler and integrator of the axes at `experiment.run.spp.max()`
-/// samples into a file, whose ending chooses the format. The file is there after the first sample
-/// and is written again while more are added; in an order of passes it is there as soon as no pixel is without a colour.
+/// Renders the first scene, structure, sampler and integrator of the axes at
+/// `experiment.run.spp.max()` samples into a file, whose extension selects the format. The file
+/// exists after the first sample, or with an order as soon as every pixel has a colour, and is
+/// rewritten as samples are added.
 ///
 /// # Errors
-/// An unknown ending, no adapter, a scene that does not load, a structure that cannot be built or is
-/// not valid, a file that cannot be written, or an image that is not sound: see [`Renderer::image`].
+/// An unknown extension, no adapter, a scene that does not load, a structure that cannot be built
+/// or is invalid, a file that cannot be written, or an invalid image: see [`Renderer::image`].
 pub fn render(
     experiment: &Experiment,
     plan: &Plan,
@@ -92,7 +93,7 @@ pub fn render(
     let device = kernels.open(options)?;
     let load = load_options(options, table_bytes(&device.gpu.limits));
     let scene_data = scene::load(scene, &load).map_err(input)?;
-    // That of the experiment, of the scene, or one that frames the scene.
+    // The camera of the experiment or scene, or one that frames the scene.
     let own = || scene_data.view(experiment.aspect());
     let camera = experiment.camera.unwrap_or_else(own);
     raystone_scene::check_camera(&camera).map_err(input)?;
@@ -167,7 +168,6 @@ fn input(error: impl ToString) -> RunError {
     RunError::Input(error.to_string())
 }
 
-/// The structure of an experiment over the stage's scene.
 fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, RunError> {
     let kind = session.registries.accel.get(&accel.name);
     let kind = kind.ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;
@@ -180,8 +180,8 @@ fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, Ru
     })
 }
 
-/// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image and its samples after the first, whenever the
-/// samples have doubled and [`REFRESH`] is over, and at the end.
+/// Adds `spp` samples in steps of about [`STEP`]. Calls `show` with the image and its samples after
+/// the first, whenever the samples have doubled and [`REFRESH`] has passed, and at the end.
 fn add_all_samples(
     session: &Session,
     renderer: &Renderer,

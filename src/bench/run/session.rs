@@ -1,4 +1,4 @@
-//! What lives as long as a run: records, clock, progress, cells already done.
+//! State of a run: records, clock, progress, finished cells.
 
 use super::cost::Cost;
 use super::device::Device;
@@ -28,13 +28,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-/// Pixels of images whose linear radiance is kept unasked: 1.5 MiB each.
+/// Images up to this many pixels store linear radiance by default: 1.5 MiB each.
 const MOST_KEPT_PIXELS: usize = 1 << 17;
 
-/// Where the wall time goes; what no part claims is the harness's own overhead.
+/// Accounts wall time to parts; unclaimed time is overhead of the program.
 pub(super) struct Clock {
     start: Instant,
-    /// Seconds from 1970 to `start`.
+    /// Unix time of `start` in seconds.
     began_unix_s: u64,
     parts_s: BTreeMap<String, f64>,
 }
@@ -58,7 +58,6 @@ impl Clock {
     }
 }
 
-/// The state of a run.
 pub(super) struct Session<'a> {
     pub experiment: &'a Experiment,
     pub plan: &'a Plan,
@@ -68,48 +67,48 @@ pub(super) struct Session<'a> {
     pub progress: Progress,
     /// Expected times of its steps.
     pub cost: Cost<'a>,
-    /// What is left to be measured.
+    /// Units left to measure.
     pub ledger: Ledger,
-    /// What is written.
+    /// Output.
     pub recorder: Recorder<'a>,
-    /// What was checked once for several cells.
+    /// Checks shared by several cells.
     pub checked: Checked,
-    /// What images are compared with, if it is not rendered.
+    /// The reference image, if read from a file.
     pub reference_file: Option<ReferenceFile>,
 }
 
-/// How a unit ends.
+/// Outcome of a unit.
 #[derive(Default)]
 pub(super) struct End<'a> {
-    /// Why it failed, if it did.
+    /// The failure reason, if it failed.
     pub failure: Option<String>,
     /// Hash of its scene; empty if it has none.
     pub scene: &'a str,
-    /// What else its figures depend on, by name.
+    /// Other inputs of its figures, by name.
     pub of: &'a [(&'a str, &'a str)],
     /// Hashes of further lines that belong to it.
     pub lines: Vec<String>,
-    /// Kernels that were noted for these names count for it, too.
+    /// Names whose kernels also count for it.
     pub shared: &'a [&'a str],
 }
 
-/// What was checked once for several cells.
+/// Checks shared by several cells.
 #[derive(Default)]
 pub(super) struct Checked {
-    /// The gate's second scene.
+    /// Second scene of the correctness check.
     pub trial: super::trial::Trial,
     /// Hashes of the lines about integrators.
     pub integrator_lines: BTreeMap<String, String>,
-    /// What is wrong with the integrators that were checked.
+    /// Errors of checked integrators.
     pub integrators: BTreeMap<String, Option<String>>,
-    /// Whether they are checked on all trial scenes, and not on those alone that are of a scene.
+    /// True to check on all trial scenes, not only on those of the plan's scenes.
     pub on_all_trials: bool,
     /// Samplers whose words were compared with the twin's.
     pub words: HashSet<String>,
 }
 
 impl<'a> Session<'a> {
-    /// Opens the folder for writing; fails before anything is measured if it cannot be written.
+    /// Opens the folder; fails before any measurement if it is not writable.
     pub(super) fn new(
         experiment: &'a Experiment,
         plan: &'a Plan,
@@ -124,7 +123,7 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// How many units are left to be measured beside those that are kept.
+    /// Number of units left to measure besides `kept`.
     pub(super) fn open_beside(&self, kept: &Kept) -> usize {
         let names: HashSet<&str> = kept.cells.iter().map(|cell| cell.unit.as_str()).collect();
         let open = self.ledger.open_units();
@@ -132,7 +131,7 @@ impl<'a> Session<'a> {
             .count()
     }
 
-    /// Takes over what still holds of an earlier run on this device, and writes the first line of this one: how many cells hold.
+    /// Adopts valid results of an earlier run on this device; the first line tells their number.
     pub(super) fn begin(
         &mut self,
         device: &Device,
@@ -155,7 +154,7 @@ impl<'a> Session<'a> {
         Ok(count)
     }
 
-    /// Fails all units that are not measured yet and that `is_one`, for one reason, which is told once.
+    /// Fails all open units matching `is_one` for one reason, reported once.
     pub(super) fn fail_all(
         &mut self,
         about: &str,
@@ -171,7 +170,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Leaves out all units of a world that are not measured yet, for one reason, which is told once.
+    /// Skips all open units of a world for one reason, reported once.
     pub(super) fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
         let skipped = self.plan.all_on(world, reason.clone());
         self.ledger.skipped += skipped.cells;
@@ -189,7 +188,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Takes over what still holds of an earlier run.
     fn take_over(&mut self, kept: Kept) -> Result<(), RunError> {
         self.recorder.take_over(&kept.lines)?;
         for cell in kept.cells {
@@ -203,7 +201,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Leaves all units to others that are not of the shard of the options.
+    /// Drops all units outside the shard of the options.
     pub(super) fn keep_shard(&mut self) {
         let Some(shard) = self.options.shard else {
             return;
@@ -217,7 +215,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Writes the line of a unit, with the hash of all that its figures depend on, and closes the unit.
+    /// Writes a unit's line, with the hash of all its inputs, and closes the unit.
     pub(super) fn conclude(&mut self, unit: &str, line: Line, end: End) -> Result<(), RunError> {
         let hash = content_hash(&line, end.scene, end.of);
         self.recorder.write(&line.hashed(&hash))?;
@@ -230,7 +228,7 @@ impl<'a> Session<'a> {
         self.close(unit, outcome, lines, end.shared)
     }
 
-    /// A unit ended, and all its lines are written: those of these hashes. What was noted for `shared` counts for it, too.
+    /// Closes a unit with its lines' hashes. Kernels noted for `shared` also count for it.
     pub(super) fn close(
         &mut self,
         name: &str,
@@ -292,14 +290,14 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Destroys the device if a test asked for it at this cell.
+    /// Destroys the device if a test requested it at this cell.
     pub(super) fn lose_device_on_request(&self, gpu: &Gpu, cell: &str) {
         if self.options.lose_device_at.as_deref() == Some(cell) {
             gpu.device.destroy();
         }
     }
 
-    /// Tells what went wrong beside the measuring: now, and in the report.
+    /// Issues a warning immediately, and in the report.
     pub(super) fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
         self.tell_warning(&format!("{about}: {reason}"));
         let cell = about.to_owned();
@@ -310,7 +308,7 @@ impl<'a> Session<'a> {
             })))
     }
 
-    /// Hands a warning on, above the progress bar.
+    /// Shows a warning above the progress bar.
     pub(super) fn tell_warning(&self, text: &str) {
         self.recorder.log(&format!("warning: {text}"));
         if let Some(tell) = self.options.warn {
@@ -318,7 +316,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The first record.
     fn write_start(
         &mut self,
         environment: Environment,
@@ -354,7 +351,6 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Records cells that are left out.
     pub(super) fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
         self.ledger.skipped += skipped.cells;
         let record = SkippedRecord {
@@ -364,7 +360,7 @@ impl<'a> Session<'a> {
         self.recorder.write(&Line::about_all(Body::Skipped(record)))
     }
 
-    /// Records a cell that needs longer loops than the driver runs.
+    /// Records a cell that needs longer loops than the driver supports.
     pub(super) fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
         self.ledger.refused.insert(cell.clone(), reason.clone());
         self.ledger.skipped += 1;
@@ -378,7 +374,7 @@ impl<'a> Session<'a> {
         self.close(&cell, (Outcome::LeftOut, &reason), vec![hash], &[])
     }
 
-    /// The last record; puts the results in their place, and tells where that is.
+    /// Writes the last record, moves the results to their folder, and reports it.
     pub(super) fn write_end(&mut self) -> Result<PathBuf, RunError> {
         let wall_s = self.clock.start.elapsed().as_secs_f64();
         let parts_s = self.clock.parts_s.clone();
@@ -405,11 +401,12 @@ impl<'a> Session<'a> {
         experiment.run.spp.max().max(experiment.timing.spp)
     }
 
-    /// Ends the run here if somebody asked for it.
+    /// Ends the run here if interrupted.
     pub(super) fn go_on(&self) -> Result<(), RunError> {
-        match self.options.interrupt.is_asked() {
-            true => Err(RunError::Interrupted),
-            false => Ok(()),
+        if self.options.interrupt.is_asked() {
+            Err(RunError::Interrupted)
+        } else {
+            Ok(())
         }
     }
 
@@ -426,7 +423,7 @@ impl<'a> Session<'a> {
         self.close(cell, (Outcome::Failed, &reason), vec![hash], &[])
     }
 
-    /// Tells how the run goes on: above the progress bar, or as a line.
+    /// Shows progress above the bar, or as a line.
     pub(super) fn tell_progress(&self, text: &str) {
         self.recorder.log(text);
         if let Some(tell) = self.options.tell {
@@ -434,15 +431,14 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Shows what is being done.
     pub(super) fn say(&self, message: impl Into<String>) {
         let message = message.into();
         self.recorder.log(&message);
         self.progress.say(message);
     }
 
-    /// Writes a picture of this kind, of what the labels name: its path relative to the run's folder. One that
-    /// cannot be written is a warning, and costs no figure.
+    /// Writes a picture of this kind, named by the labels; returns its path relative to the run's
+    /// folder. A write error is a warning and affects no figure.
     pub(super) fn picture(
         &self,
         kind: &str,
@@ -452,8 +448,8 @@ impl<'a> Session<'a> {
         self.image_file(kind, labels, "png", |path| write_png(path, picture))
     }
 
-    /// Writes the linear radiance of a picture that the report compares pixel by pixel: in the format that the run was
-    /// asked for, else as EXR if it is small.
+    /// Writes the linear radiance of a picture that the report compares pixel by pixel: in the
+    /// requested format, else as EXR if small.
     pub(super) fn compared(
         &self,
         kind: &str,
@@ -475,7 +471,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Writes linear radiance beside the pictures, if the run was asked for it.
+    /// Writes linear radiance next to the pictures, if requested.
     pub(super) fn linear(
         &self,
         kind: &str,
@@ -508,15 +504,14 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Hash of the lines that say why a cell failed.
+/// Hash of the lines that explain a cell's failure.
 pub(super) fn failure_hash(cell: &str, reason: &str) -> String {
     cell_hash(&[("failed", cell), ("reason", reason)])
 }
 
-/// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else
-/// its figures depend on.
+/// Content hash of a line's cell: its key, scene bytes, kernels, and other inputs of its figures.
 pub(super) fn content_hash<B>(line: &Line<B>, scene_hash: &str, also: &[(&str, &str)]) -> String {
-    // A scene is known by its bytes, wherever it lies.
+    // A scene is identified by its bytes, not its path.
     let key = line.key.clone().with(axis::SCENE, "");
     let key = serde_json::to_string(&key).unwrap_or_default();
     let parts = [

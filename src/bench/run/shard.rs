@@ -1,10 +1,10 @@
-//! Plans in parts.
+//! Shards of a plan.
 
 use super::units::Unit;
 use std::collections::BTreeMap;
 
-/// The number of the shard that each unit belongs to, from 1. What is measured in the same rounds stays together; shards are runs of neighbours
-/// in the plan, so that each loads few scenes, of about the same `cost` (any unit, not negative).
+/// Shard number of each unit, from 1. Units of the same rounds stay together; shards are contiguous
+/// parts of the plan, so that each loads few scenes, with similar `cost` (any unit, not negative).
 pub fn shards(units: &[Unit], of: usize, cost: impl Fn(&Unit) -> f64) -> Vec<usize> {
     let mut groups: BTreeMap<(&str, String), usize> = BTreeMap::new();
     let mut costs: Vec<f64> = Vec::new();
@@ -62,7 +62,7 @@ mod tests {
             let count = of.iter().filter(|n| **n == number).count();
             assert!((12..=13).contains(&count), "{number}: {count}");
         }
-        // A cost that outweighs all others stays alone.
+        // A cost that outweighs all others gets its own shard.
         let heavy = |unit: &Unit| {
             if unit.name.starts_with("s0,") {
                 300.0

@@ -1,5 +1,5 @@
-//! The gate's second scene: small, and made to lead through the code that otherwise only large or deep
-//! scenes reach. Every structure of a run is put through it once.
+//! Second scene of the correctness check: small, but exercises code that otherwise only large or
+//! deep scenes reach. Every structure of a run is tested on it once.
 
 use super::session::Session;
 use super::world::World;
@@ -13,10 +13,8 @@ use raystone_verify::gate::{Checks, Judge, gate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The scene.
 const SCENE: &str = "far-corners";
-/// Its rays: of each class, of those compared with brute force, and of those decided in double precision
-/// (besides the hard ones).
+/// Its rays: per class, against brute force, and in double precision (besides hard ones).
 const GATE: Gate = Gate {
     rays: 1024,
     brute_force_tests: 1,
@@ -25,13 +23,13 @@ const GATE: Gate = Gate {
     offset: 0.0,
     shadow_orders: false,
 };
-/// Brute force takes each of so many rays.
+/// Brute force checks one ray in this many.
 const EVERY: usize = 8;
 
-/// The scene with its judges, made once per run, and what structures were found to do on it.
+/// The scene with its reference tracers, prepared once per run, and its results.
 #[derive(Default)]
 pub(super) struct Trial {
-    /// By the tests that it was judged with.
+    /// By the tests used for checking.
     scenes: BTreeMap<String, Arc<JudgedScene>>,
     outcomes: BTreeMap<String, Option<String>>,
 }
@@ -55,8 +53,8 @@ impl JudgedScene {
     }
 }
 
-/// What is wrong with a structure on the second scene; nothing if nothing is, if the scene of the run is
-/// that one, or with tests that hard rays are not asked of.
+/// The error of a structure on the second scene; `None` if there is none, if the run's scene is the
+/// same, or with tests that do not promise hard rays.
 ///
 /// # Errors
 /// A kernel does not compile, or the device is lost or hangs.
@@ -70,7 +68,7 @@ pub(super) fn fault(
     if world.cell[Axis::Scene].name == SCENE || !tests.bears_hard_rays() {
         return Ok(None);
     }
-    // Structures with the same parameters, tests, workgroups and kernels are the same.
+    // Structures with equal parameters, tests, workgroups and kernels are the same.
     let parts = [
         Axis::Accel,
         Axis::Triangle,
@@ -119,7 +117,7 @@ impl JudgedScene {
         let traced = match stage.traced(kind, &accel.params) {
             Ok(traced) => traced,
             Err(StageError::Gpu(error)) => return Err(error),
-            // Parameters that suit the scene of the run may be too small or too large for this one.
+            // Parameters chosen for the run's scene may be too small or too large for this one.
             Err(StageError::Accel(AccelError::Invalid(fault))) => return Ok(Some(fault)),
             Err(_) => return Ok(None),
         };

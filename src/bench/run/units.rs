@@ -1,4 +1,4 @@
-//! The registry of measurements, and what they make of a plan: its units.
+//! The registry of measurements, and a plan's units.
 
 use super::cost::{Cost, Work};
 use super::measurement::Measurement;
@@ -7,15 +7,15 @@ use raystone_record::figure::Figure;
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// All measurements, in the order in which a run takes them.
+/// All measurements, in run order.
 #[derive(Clone)]
 pub struct MeasurementRegistry(pub(super) Vec<&'static dyn Measurement>);
 
 impl MeasurementRegistry {
-    /// Adds a measurement that is carried out cell by cell.
+    /// Adds a cell-by-cell measurement.
     ///
     /// # Errors
-    /// Another one has its name, or one of its figures has an id that is taken.
+    /// Its name or the id of one of its figures is taken.
     pub fn add(&mut self, measurement: &'static dyn Measurement) -> Result<(), String> {
         let name = measurement.name();
         if self.iter().any(|known| known.name() == name) {
@@ -42,18 +42,17 @@ impl MeasurementRegistry {
         Ok(())
     }
 
-    /// All of them.
+    /// All measurements.
     pub fn iter(&self) -> impl Iterator<Item = &'static dyn Measurement> {
         self.0.iter().copied()
     }
 
-    /// Figures of those that were added.
+    /// Figures of added measurements.
     pub fn figures(&self) -> impl Iterator<Item = &'static Figure> {
         self.iter().flat_map(Measurement::figures)
     }
 
-    /// Everything that is measured of a plan, in the order in which a run of one shard takes it: scene by scene, then what has
-    /// none.
+    /// All units of a plan, in run order: scene by scene, then those without a scene.
     pub fn units(&self, experiment: &Experiment, plan: &Plan) -> Vec<Unit> {
         let cells: Vec<_> = (self.iter().map(|m| (m, m.cells(experiment, plan)))).collect();
         let scenes = plan.scenes.iter().map(Some).chain([None]);
@@ -68,14 +67,14 @@ impl MeasurementRegistry {
     }
 }
 
-/// What is measured as one, kept as one when a run is resumed, and given to one shard.
+/// A unit of measuring, resuming and sharding.
 #[derive(Clone)]
 pub struct Unit {
-    /// Its name, unique in the plan.
+    /// Name, unique in the plan.
     pub name: String,
-    /// How it is measured.
+    /// Its measurement.
     pub measurement: &'static dyn Measurement,
-    /// What is measured.
+    /// Its cell.
     pub cell: Cell,
 }
 
@@ -107,12 +106,12 @@ impl fmt::Debug for Unit {
 }
 
 impl Cost<'_> {
-    /// Seconds that a unit takes, without what several share.
+    /// Seconds of a unit, without shared work.
     pub fn seconds_of(&self, unit: &Unit) -> f64 {
         unit.measurement.cost(&unit.cell, self).seconds()
     }
 
-    /// The work of these units, with the scenes and what else several of them need.
+    /// Work of these units, including their scenes and shared parts.
     pub fn whole<'u>(&self, units: impl IntoIterator<Item = &'u Unit>) -> Work {
         let mut whole = Work::default();
         let (mut worlds, mut several) = (BTreeSet::new(), BTreeSet::new());

@@ -1,12 +1,11 @@
-//! No sampler is rendered with before its kernel's words equal the twin's.
+//! Checks that a sampler's kernel draws the same words as its twin, before rendering with it.
 
 use super::session::Session;
 use crate::words::{Used, check_words, kernel_hash};
 use raystone_gpu::Gpu;
 use raystone_sampling::Sampler;
 
-/// Compares a sampler's kernel with its twin in all that a run draws from it; once for each kernel, table and
-/// set of seeds.
+/// Compares a sampler's kernel with its twin over all draws; once per kernel, table and seeds.
 ///
 /// # Errors
 /// A word differs, or the kernel does not run.

@@ -1,4 +1,4 @@
-//! A scene made ready: loaded, uploaded, judged.
+//! A loaded, uploaded scene with its reference tracer.
 
 use super::device::Device;
 use super::error::{Fault, RunError};
@@ -15,19 +15,18 @@ use raystone_verify::gate::{Checks, Judge};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A scene as it was read.
 pub(super) struct Loaded {
     scene: Arc<SceneData>,
     camera: Camera,
 }
 
-/// A scene and the tests of its triangles and boxes, with everything that its cells share.
+/// A scene with its triangle and box tests, and everything its cells share.
 pub(super) struct World<'a> {
     pub device: &'a Device,
     /// The device with the embedded kernels.
     pub gpu: &'a Gpu,
     pub probe: ArithmeticProbe,
-    /// What all cells of this world have in common: see [`Cell::WORLD`].
+    /// Common part of this world's cells: see [`Cell::WORLD`].
     pub cell: Cell,
     pub stage: Stage,
     pub camera: Camera,
@@ -42,11 +41,10 @@ impl std::ops::Deref for World<'_> {
     }
 }
 
-/// Why there is no world.
 pub(super) enum NoWorld {
-    /// The scene is at fault.
+    /// The scene is invalid.
     BadInput(String),
-    /// The adapter does not keep what the experiment asks for: its cells are left out.
+    /// The adapter does not support what the experiment requires: its cells are skipped.
     NotKept(String),
 }
 
@@ -63,13 +61,13 @@ impl From<String> for NoWorld {
     }
 }
 
-/// Bytes that an adapter binds for the tables of a scene.
+/// Bytes that an adapter can bind for a scene's tables.
 pub(super) fn table_bytes(limits: &wgpu::Limits) -> u64 {
     let binding = limits.max_storage_buffer_binding_size;
     binding.min(limits.max_buffer_size)
 }
 
-/// How scenes are loaded for an adapter that binds so many bytes.
+/// Scene loading options for an adapter with this binding limit.
 pub(super) fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
     LoadOptions {
         allow_outside: options.allow_outside,
@@ -113,7 +111,7 @@ impl Loaded {
 }
 
 impl<'a> World<'a> {
-    /// Uploads and judges a scene with the tests of a cell.
+    /// Uploads a scene and checks the reference tracer with a cell's tests.
     pub(super) fn new(
         session: &mut Session,
         device: &'a Device,

@@ -1,25 +1,23 @@
-//! The macro that declares parameters, and the traits that it implements.
+//! The macro that declares parameters, and the traits it implements.
 
 use super::{Bounded, ParamError, ParamValue, Parameter, ParameterSchema, ParameterType, Params};
 use std::ops::RangeInclusive;
 
-/// A struct of parameters, declared by [`parameters!`](crate::parameters). Its default has every parameter
-/// at its own.
+/// A parameter struct declared by [`parameters!`](crate::parameters), with defaults.
 pub trait Parameters: Default + Sized {
-    /// Its doc comment in one line: what a registry says of it.
+    /// Its doc comment on one line, shown by registries.
     const ABOUT: &'static str;
 
-    /// Names, meanings, defaults and ranges, in the order of the declaration.
+    /// Names, meanings, defaults and ranges, in order of declaration.
     fn schema() -> ParameterSchema;
 
-    /// Reads the values of all parameters, none of which may be missing. [`Parameters::from_params`] is
-    /// what callers want.
+    /// Reads the values of all parameters. Callers use [`Parameters::from_params`].
     ///
     /// # Errors
-    /// A value that is missing or of another type.
+    /// A value is missing or has another type.
     fn read(params: &Params) -> Result<Self, ParamError>;
 
-    /// The parameters with these values, and the defaults of those that are missing.
+    /// Creates the struct from these values, with defaults for missing ones.
     ///
     /// # Errors
     /// An unknown parameter, or a value out of its range.
@@ -27,13 +25,13 @@ pub trait Parameters: Default + Sized {
         Self::read(&params.completed(&Self::schema())?)
     }
 
-    /// The same for parameters that were checked before; where they do not fit, all have their defaults.
+    /// [`Parameters::from_params`] for checked parameters; all defaults if they do not fit.
     fn from_checked(params: &Params) -> Self {
         Self::from_params(params).unwrap_or_default()
     }
 }
 
-/// The name of a field as a user types it: `loop` where Rust has to write `r#loop`.
+/// The name of a field as typed: `loop` for `r#loop`.
 pub fn named(field: &'static str) -> &'static str {
     field.strip_prefix("r#").unwrap_or(field)
 }
@@ -41,7 +39,7 @@ pub fn named(field: &'static str) -> &'static str {
 /// Reads one parameter. For [`parameters!`](crate::parameters).
 ///
 /// # Errors
-/// It is missing, or of another type.
+/// It is missing or has another type.
 pub fn read<T: ParameterType>(params: &Params, field: &'static str) -> Result<T, ParamError> {
     let name = named(field);
     let found = params.0.get(name);
@@ -52,7 +50,7 @@ pub fn read<T: ParameterType>(params: &Params, field: &'static str) -> Result<T,
     })
 }
 
-/// Gives a parameter of a struct `S` within a struct another default and range. For
+/// Gives a parameter of a nested struct `S` another default and range. For
 /// [`parameters!`](crate::parameters).
 pub fn redeclare<S, T: Bounded>(
     schema: &mut [Parameter],
@@ -68,16 +66,17 @@ pub fn redeclare<S, T: Bounded>(
     }
 }
 
-/// Declares structs of parameters and enums of choices; see [the module](crate::params).
+/// Declares parameter structs and choice enums; see [the module](crate::params).
 ///
-/// A field is `name: type = default;` with its meaning as doc comment; numbers have a range,
-/// `name: type = default, in low..=high;`, which one of [`ParamRange`](crate::params::ParamRange)'s methods can narrow behind it:
-/// `in 2..=64, where power_of_two();`. Types are those of [`ParameterType`]: numbers, switches, texts, choices, lists and arrays of
-/// them, and `Option`, whose default may be `None`. A default need not be in the range: it then stands for nothing
-/// that could be written, and the meaning says what it does. A field without a default,
-/// `name: Struct;`, holds another declared struct, whose parameters join these under their own names;
-/// `name: Struct { field = default, in low..=high; };` gives one of them another default and range.
-/// Choices are `Variant = "name"`. Structs and enums may derive more, and their fields have an attribute of serde, for records.
+/// A field is `name: type = default;` with its meaning as doc comment; numbers have a range, `name:
+/// type = default, in low..=high;`, which one of [`ParamRange`](crate::params::ParamRange)'s
+/// methods can restrict: `in 2..=64, where power_of_two();`. Types are those of [`ParameterType`]:
+/// numbers, flags, texts, choices, lists and arrays of them, and `Option`, whose default may be
+/// `None`. A default outside the range represents a value that cannot be written, as explained by
+/// the meaning. A field without a default, `name: Struct;`, embeds another declared struct, whose
+/// parameters join these under their own names; `name: Struct { field = default, in low..=high; };`
+/// gives one of them another default and range. Choices are `Variant = "name"`. Structs and enums
+/// may derive more, and fields have a serde attribute, for records.
 #[macro_export]
 macro_rules! parameters {
     () => {};

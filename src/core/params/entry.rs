@@ -1,13 +1,13 @@
-//! Entries of registries, and their variants: entries with parameters set.
+//! Registry entries, and variants: entries with parameters set.
 
 use super::{ParamValue, Parameter, ParameterSchema, Params};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What is known of one registry entry.
+/// Description of a registry entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Name as a user types it.
+    /// Name as typed.
     pub name: String,
     /// One line: what it is and its source (paper).
     pub description: String,
@@ -16,12 +16,12 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// This entry with every parameter at its default.
+    /// The entry with all parameters at their defaults.
     pub fn default_variant(&self) -> Variant {
         self.variant(&[])
     }
 
-    /// This entry with some parameters set; the label shows those that differ from the default.
+    /// The entry with some parameters set; the label shows those that differ from the default.
     pub fn variant(&self, set: &[(&'static str, ParamValue)]) -> Variant {
         let value_of = |parameter: &Parameter| {
             let set = set.iter().find(|(name, _)| *name == parameter.name);

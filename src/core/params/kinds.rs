@@ -1,16 +1,16 @@
-//! Registries of kinds that stand for themselves: what an axis can name.
+//! Registries of static kinds that an axis can name.
 
 use super::{Entry, ParameterSchema};
 use crate::text::nearest;
 
-/// Paths and texts of kernel modules that something brings along, because they are not the program's.
+/// Paths and texts of additional kernel modules that are not part of the program.
 pub type Sources = &'static [(&'static str, &'static str)];
 
-/// What a registry has to know of a kind.
+/// A kind that a registry can hold.
 pub trait Named: 'static {
-    /// All that the program brings along, in the order of `raystone list`.
+    /// The program's own kinds, in the order of `raystone list`.
     fn built_in() -> Vec<&'static Self>;
-    /// Name as a user types it.
+    /// Name as typed.
     fn name(&self) -> &'static str;
     /// One line: what it is and its source (paper).
     fn description(&self) -> &'static str;
@@ -18,13 +18,13 @@ pub trait Named: 'static {
     fn parameters(&self) -> ParameterSchema {
         Vec::new()
     }
-    /// Kernel modules that it brings along.
+    /// Its additional kernel modules.
     fn sources(&self) -> Sources {
         &[]
     }
 }
 
-/// Every kind of `T` that can be named, in the order of `raystone list`.
+/// All named kinds of `T`, in the order of `raystone list`.
 pub struct Kinds<T: ?Sized + 'static>(Vec<&'static T>);
 
 impl<T: ?Sized> Clone for Kinds<T> {
@@ -33,7 +33,7 @@ impl<T: ?Sized> Clone for Kinds<T> {
     }
 }
 
-/// What the program brings along.
+/// The program's own kinds.
 impl<T: Named + ?Sized> Default for Kinds<T> {
     fn default() -> Self {
         Self(T::built_in())
@@ -46,21 +46,21 @@ impl<T: Named + ?Sized> Kinds<T> {
         Self(kinds.into_iter().collect())
     }
 
-    /// Adds a kind; it replaces one of the same name.
+    /// Adds a kind, replacing one of the same name.
     pub fn register(&mut self, kind: &'static T) {
         self.0.retain(|k| k.name() != kind.name());
         self.0.push(kind);
     }
 
-    /// The kind of this name.
+    /// Finds a kind by name.
     pub fn get(&self, name: &str) -> Option<&'static T> {
         self.iter().find(|kind| kind.name() == name)
     }
 
-    /// The kind of this name, of which the message of an error says that it is a `what`.
+    /// Finds a kind by name; `what` names the kind of entry in the error message.
     ///
     /// # Errors
-    /// No kind is called so; the message names the nearest one.
+    /// No such kind exists; the message suggests the nearest name.
     pub fn named(&self, what: &str, name: &str) -> Result<&'static T, String> {
         self.get(name).ok_or_else(|| {
             let near = nearest(name, self.iter().map(Named::name)).unwrap_or_default();
@@ -83,7 +83,7 @@ impl<T: Named + ?Sized> Kinds<T> {
         self.iter().map(entry).collect()
     }
 
-    /// The kernel modules that came with what was registered.
+    /// Kernel modules of all registered kinds.
     pub fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
         self.iter().flat_map(|kind| kind.sources().iter().copied())
     }

@@ -1,9 +1,10 @@
-//! Declared parameters: what a registry entry can be set to.
+//! Declared parameters of registry entries.
 //!
-//! The macro [`parameters!`](crate::parameters) declares the parameters of an entry once, as a struct
-//! with types, defaults, ranges and a line of meaning each; choices are enums of the same declaration.
-//! The parser, `raystone list`, sweeps and the docs read [`Parameters::schema`], the code reads the fields
-//! of the struct that [`Parameters::from_params`] makes. A misspelt name does not compile:
+//! The macro [`parameters!`](crate::parameters) declares an entry's parameters once, as a struct
+//! with types, defaults, ranges and a line of meaning each; choices are enums in the same
+//! declaration. The parser, `raystone list`, sweeps and the docs use [`Parameters::schema`]; code
+//! uses the fields of the struct returned by [`Parameters::from_params`]. A misspelt name does not
+//! compile:
 //!
 //! ```compile_fail
 //! raystone_core::parameters! {

@@ -1,9 +1,9 @@
-//! Registries: what a user can name, each with the struct of its parameters.
+//! Registries of named kinds, each with its parameter struct.
 
 use super::{Entry, ParamError, Parameters, Params};
 use std::sync::Arc;
 
-/// One registered kind of `T`: what it is called, and how it is made from parameters.
+/// A registered kind of `T`: its entry, and its constructor.
 pub struct Registered<T: ?Sized> {
     /// Name, description and parameters.
     pub entry: Entry,
@@ -20,8 +20,8 @@ impl<T: ?Sized> Clone for Registered<T> {
 }
 
 impl<T: ?Sized> Registered<T> {
-    /// A kind that `P` declares, whose doc comment says what it is; `make` is [`Parameters::from_params`]
-    /// behind an `Arc<T>`.
+    /// A kind declared by `P`, whose doc comment describes it; `make` wraps
+    /// [`Parameters::from_params`] in an `Arc<T>`.
     pub fn new<P: Parameters>(name: &str, make: fn(&Params) -> Result<Arc<T>, ParamError>) -> Self {
         Self {
             entry: Entry {
@@ -33,12 +33,12 @@ impl<T: ?Sized> Registered<T> {
         }
     }
 
-    /// Name as a user types it.
+    /// Name as typed.
     pub fn name(&self) -> &str {
         &self.entry.name
     }
 
-    /// This kind with these parameters, and the defaults of those that are missing.
+    /// Creates this kind with these parameters, and defaults for missing ones.
     ///
     /// # Errors
     /// An unknown parameter, or a value out of its range.
@@ -47,7 +47,7 @@ impl<T: ?Sized> Registered<T> {
     }
 }
 
-/// All kinds of `T` that can be named, in the order of `raystone list`.
+/// All named kinds of `T`, in the order of `raystone list`.
 pub struct Registry<T: ?Sized>(Vec<Registered<T>>);
 
 impl<T: ?Sized> Clone for Registry<T> {
@@ -62,7 +62,7 @@ impl<T: ?Sized> Registry<T> {
         Self(kinds)
     }
 
-    /// Adds a kind; one of the same name is replaced.
+    /// Adds a kind, replacing one of the same name.
     pub fn add(&mut self, kind: Registered<T>) {
         self.0.retain(|k| k.name() != kind.name());
         self.0.push(kind);
@@ -73,12 +73,12 @@ impl<T: ?Sized> Registry<T> {
         self.0.iter()
     }
 
-    /// The kind of this name.
+    /// Finds a kind by name.
     pub fn find(&self, name: &str) -> Option<&Registered<T>> {
         self.iter().find(|kind| kind.name() == name)
     }
 
-    /// Every kind with its parameters at their defaults.
+    /// Every kind with default parameters.
     pub fn defaults(&self) -> impl Iterator<Item = Arc<T>> {
         self.iter()
             .filter_map(|kind| kind.make(&Params::default()).ok())

@@ -1,4 +1,4 @@
-//! What values parameters may take, and why some do not fit.
+//! Allowed values of parameters, and errors of values that do not fit.
 
 use super::{ParamValue, ParameterType as _, Params};
 use crate::text::nearest;
@@ -6,63 +6,63 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// What values a parameter may take.
+/// Allowed values of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParamRange {
     /// A real number in `[min, max]`.
     Number {
-        /// Least value.
+        /// Minimum.
         min: f64,
-        /// Greatest value.
+        /// Maximum.
         max: f64,
     },
     /// An integer in `[min, max]`.
     Integer {
-        /// Least value.
+        /// Minimum.
         min: i64,
-        /// Greatest value.
+        /// Maximum.
         max: i64,
     },
-    /// Some of the integers in a range.
+    /// Certain integers in a range.
     Stepped(Step, RangeInclusive<i64>),
-    /// A switch.
+    /// A flag.
     Flag,
     /// One of these names.
     Choice(&'static [&'static str]),
     /// The name of an entry of this registry.
     Entry(&'static str),
-    /// Any text; the empty one stands for nothing.
+    /// Any text; empty means none.
     Text,
-    /// Any text but the empty one.
+    /// Any non-empty text.
     Filled,
-    /// A list of so many such values.
+    /// A list of values of this range.
     List(Box<ParamRange>, Length),
-    /// A list, not empty, of ascending integers from 1 to this one. Files may abbreviate it, `{ pow2 = [lo, hi] }`.
+    /// Ascending integers from 1 to this one, at least one; in files also `{ pow2 = [lo, hi] }`.
     Ascending(i64),
 }
 
-/// Some integers.
+/// A subset of the integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// 1, 2, 4, 8, …
     PowerOfTwo,
-    /// Multiples of this one.
+    /// Multiples of this number.
     MultipleOf(i64),
 }
 
 /// Lengths of lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Length {
-    /// Any, and each value once.
+    /// Any length, without repeated values.
     Any,
-    /// This one.
+    /// This length.
     Exactly(usize),
-    /// This one, and each value once.
+    /// This length, without repeated values.
     Different(usize),
 }
 
 impl Length {
-    /// Whether a list may have so many values.
+    /// True if a list may have `count` values.
     pub fn allows(self, count: usize) -> bool {
         match self {
             Self::Any => true,
@@ -71,7 +71,7 @@ impl Length {
     }
 }
 
-/// How many, before what: `two different `.
+/// Prints the length as a prefix: `two different `.
 impl fmt::Display for Length {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (length, which) = match self {
@@ -93,7 +93,7 @@ impl fmt::Display for ParamRange {
     }
 }
 
-/// An interval. An end next to a number of fewer digits stands for that number, which itself is not in the interval.
+/// Formats an interval. An end that adjoins a shorter number prints as that number, excluded.
 fn interval(min: f64, max: f64) -> String {
     let is_next = |end: f64, next: f64| next.to_string().len() < end.to_string().len();
     let (below, above) = (min.next_down(), max.next_up());
@@ -111,13 +111,13 @@ fn interval(min: f64, max: f64) -> String {
 }
 
 impl ParamRange {
-    /// Those that are powers of two, of integers or of lists of them.
+    /// Restricts integers or lists of them to powers of two.
     #[must_use]
     pub fn power_of_two(self) -> Self {
         self.stepped(Step::PowerOfTwo)
     }
 
-    /// Those that are multiples of `step`, of integers or of lists of them.
+    /// Restricts integers or lists of them to multiples of `step`.
     #[must_use]
     pub fn multiple_of(self, step: i64) -> Self {
         self.stepped(Step::MultipleOf(step))
@@ -131,7 +131,7 @@ impl ParamRange {
         }
     }
 
-    /// Of lists of integers those that ascend from 1 or more, and are not empty.
+    /// Restricts lists of integers to non-empty ascending ones from 1 or more.
     #[must_use]
     pub fn ascending(self) -> Self {
         match self {
@@ -141,7 +141,7 @@ impl ParamRange {
         }
     }
 
-    /// Of arrays, or lists of them, those that have each value once.
+    /// Restricts arrays, or lists of them, to distinct values.
     #[must_use]
     pub fn different(self) -> Self {
         match self {
@@ -151,13 +151,13 @@ impl ParamRange {
         }
     }
 
-    /// Of texts those that name an entry of a registry.
+    /// Restricts texts to names of entries of a registry.
     #[must_use]
     pub fn entry_of(self, registry: &'static str) -> Self {
         Self::Entry(registry)
     }
 
-    /// One of the values in words, or many.
+    /// Describes one value, or many.
     fn words(&self, many: bool) -> String {
         let (one, several, which) = match self {
             Self::Number { min, max } if *max >= f32::MAX.into() && *min <= f32::MIN.into() => (
@@ -199,7 +199,7 @@ impl ParamRange {
         format!("{}{which}", if many { several } else { one })
     }
 
-    /// Whether a parameter may have this value. Integers are numbers.
+    /// True if the value is allowed. Integers count as numbers.
     pub fn allows(&self, value: &ParamValue) -> bool {
         match (self, value) {
             (Self::Number { min, max }, ParamValue::Number(x)) => (min..=max).contains(&x),
@@ -233,7 +233,7 @@ impl ParamRange {
     }
 }
 
-/// The place of the first value that stands before it as well.
+/// Index of the first value that repeats an earlier one.
 pub fn repeated(items: &[ParamValue]) -> Option<usize> {
     (0..items.len()).find(|&i| items[..i].contains(&items[i]))
 }
@@ -245,50 +245,50 @@ pub struct Parameter {
     pub name: &'static str,
     /// One line: meaning, unit, source.
     pub description: &'static str,
-    /// Value when the experiment says nothing. One that is not in the range stands for nothing.
+    /// Value if the experiment gives none. One outside the range means none.
     pub default: ParamValue,
     /// Allowed values.
     pub range: ParamRange,
 }
 
 impl Parameter {
-    /// The default; nothing where it stands for nothing that can be written.
+    /// The default, or `None` if it cannot be written.
     pub fn default_written(&self) -> Option<&ParamValue> {
         self.range.allows(&self.default).then_some(&self.default)
     }
 }
 
-/// The parameters of a registry entry: the parser, the help, the docs table and sweeps read it.
+/// Parameters of a registry entry, for parser, help, docs table and sweeps.
 pub type ParameterSchema = Vec<Parameter>;
 
-/// Why parameters do not fit their schema.
+/// Parameters do not fit their schema.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ParamError {
-    /// No parameter has this name.
+    /// Unknown parameter name.
     #[error("there is no parameter `{name}`{}", .nearest.map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
     Unknown {
-        /// What was given.
+        /// The name given.
         name: String,
-        /// The most similar name, if there are parameters at all.
+        /// The most similar name, if the entry has parameters.
         nearest: Option<&'static str>,
     },
-    /// A value of another type, or outside the range.
+    /// A value of another type, or out of range.
     #[error("parameter `{name}` must be {expected}, not {found}")]
     Value {
         /// The parameter.
         name: &'static str,
-        /// The type and range of its values.
+        /// Type and range of its values.
         expected: String,
-        /// What was given.
+        /// The value given.
         found: String,
     },
 }
 
 impl Params {
-    /// These values, and for what is missing the defaults of `schema`.
+    /// These values, with the schema's defaults for missing ones.
     ///
     /// # Errors
-    /// A name that the schema does not know, or a value that it does not allow.
+    /// A name unknown to the schema, or a value it does not allow.
     pub fn completed(&self, schema: &[Parameter]) -> Result<Params, ParamError> {
         for name in self.0.keys() {
             if schema.iter().all(|p| p.name != name) {

@@ -1,28 +1,28 @@
-//! The types that declared parameters can have.
+//! Types of declared parameters.
 
 use super::{Length, ParamRange, ParamValue, Variant};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-/// A type that a declared parameter can have.
+/// A type of declared parameters.
 pub trait ParameterType: Sized {
-    /// The value as files and records hold it.
+    /// The value as stored in files and records.
     fn value(&self) -> ParamValue;
 
-    /// The value that was written, if it is one of this type.
+    /// Parses a written value; `None` if it has another type.
     fn parse(value: &ParamValue) -> Option<Self>;
 }
 
 /// A type whose parameters need a range: `in low..=high`.
 pub trait Bounded: ParameterType {
-    /// What is bounded: the value itself, or each one in a list.
+    /// Type of the bounds: the value itself, or an element of a list.
     type Bound;
 
-    /// The range as parser and help read it.
+    /// The range for parser and help.
     fn range(range: RangeInclusive<Self::Bound>) -> ParamRange;
 }
 
-/// A type whose parameters take any of its values.
+/// A type whose parameters accept any of its values.
 pub trait Unbounded: ParameterType {
     /// All of its values.
     fn range() -> ParamRange;
@@ -30,15 +30,15 @@ pub trait Unbounded: ParameterType {
 
 /// An enum of names, declared by [`parameters!`](crate::parameters).
 pub trait Choice: Copy + 'static {
-    /// All choices, in the order of the declaration.
+    /// All choices in order of declaration.
     const ALL: &'static [Self];
     /// Their names.
     const NAMES: &'static [&'static str];
 
-    /// Name as a user types it.
+    /// Name as typed.
     fn name(self) -> &'static str;
 
-    /// The choice of this name.
+    /// Finds a choice by name.
     fn from_name(name: &str) -> Option<Self> {
         let index = Self::NAMES.iter().position(|known| *known == name)?;
         Self::ALL.get(index).copied()
@@ -68,7 +68,7 @@ impl Bounded for f64 {
     }
 }
 
-/// The f64 of the same decimal digits, so that 0.2 is what a file calls 0.2.
+/// The f64 with the same decimal digits, so that 0.2 is 0.2 in a file.
 fn widen(x: f32) -> f64 {
     x.to_string().parse().unwrap_or_else(|_| f64::from(x))
 }
@@ -165,7 +165,7 @@ unbounded!(
     Variant: ParamRange::Filled
 );
 
-/// A path, as it is written.
+/// A path as written.
 impl ParameterType for PathBuf {
     fn value(&self) -> ParamValue {
         ParamValue::Name(self.display().to_string())
@@ -176,7 +176,7 @@ impl ParameterType for PathBuf {
     }
 }
 
-/// A registry entry by its name; whoever reads it looks up its parameters.
+/// A registry entry by name; the reader looks up its parameters.
 impl ParameterType for Variant {
     fn value(&self) -> ParamValue {
         ParamValue::Name(self.name.clone())
@@ -187,7 +187,7 @@ impl ParameterType for Variant {
     }
 }
 
-/// What may be left out. The empty text stands for nothing, as in [`ParamRange::Text`], and cannot be written.
+/// Optional; the empty text means `None`, as in [`ParamRange::Text`], and cannot be written.
 impl<T: ParameterType> ParameterType for Option<T> {
     fn value(&self) -> ParamValue {
         let nothing = ParamValue::Name(String::new());

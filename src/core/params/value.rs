@@ -1,4 +1,4 @@
-//! Values of parameters.
+//! Parameter values.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

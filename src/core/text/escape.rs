@@ -1,10 +1,10 @@
-//! A text as it stands in another language: LaTeX, Markdown, XML, a terminal. Labels come from files of others, so that every text is
-//! shown and none is obeyed; every writer of this program escapes here.
+//! Escapes text for LaTeX, Markdown, XML and terminals. Labels come from untrusted files, so every
+//! text is shown and never interpreted; all writers of this program escape here.
 
 use std::fmt::Write as _;
 
-/// Text without what a terminal or a page would obey or hide: control characters, those that turn the direction of text,
-/// and those without width are shown by their numbers; the end of a line is a blank.
+/// Makes text safe for terminals and pages: control, bidirectional and zero-width characters are
+/// shown as numbers, and line ends as blanks.
 pub fn visible(text: &str) -> String {
     let acts = |c: char| {
         c.is_control()
@@ -21,15 +21,14 @@ pub fn visible(text: &str) -> String {
     out
 }
 
-/// A character by its number.
 fn number(out: &mut String, c: char, [open, close]: [&str; 2]) {
     let _ = write!(out, "{open}U+{:04X}{close}", u32::from(c));
 }
 
-/// Text in a line of Markdown, on a page of a forge as well: no markup, no tags, no links, no mention of a person or an issue.
+/// Escapes a line of Markdown, also for forges: no markup, tags, links, or mentions.
 pub fn markdown(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    // Pages make links of addresses.
+    // Pages turn addresses into links.
     for c in visible(text).replace("://", ":\u{2060}//").chars() {
         match c {
             '&' => out += "&amp;",
@@ -44,7 +43,7 @@ pub fn markdown(text: &str) -> String {
     out
 }
 
-/// Text or an attribute of XML 1.0, and so of SVG; what it has no way to write (control characters) is shown by its number.
+/// Escapes text or an attribute of XML 1.0, and so SVG; control characters are shown as numbers.
 pub fn xml(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -64,30 +63,31 @@ pub fn xml(text: &str) -> String {
     out
 }
 
-/// Characters as they stand raised, and what each stands for.
+/// Superscript characters and their plain counterparts.
 const RAISED: [&str; 2] = ["⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺ⁿ", "0123456789-+n"];
-/// The same of lowered ones.
+/// Subscript characters and their plain counterparts.
 const LOWERED: [&str; 2] = ["₀₁₂₃₄₅₆₇₈₉ᵢ", "0123456789i"];
 
-/// What stands for a character in the second of two lists.
+/// Maps a character of the first list to the second.
 fn counterpart(c: char, [from, to]: [&str; 2]) -> Option<char> {
     let mut pairs = from.chars().zip(to.chars());
     pairs.find(|(known, _)| *known == c).map(|(_, other)| other)
 }
 
-/// Digits and signs as they stand raised in a line of text; other characters stay.
+/// Raises digits and signs; other characters are unchanged.
 pub fn raised(exponent: &str) -> String {
     let up = |c| counterpart(c, [RAISED[1], RAISED[0]]).unwrap_or(c);
     exponent.chars().map(up).collect()
 }
 
-/// Text in a paragraph or table of LaTeX, for pdfTeX, XeTeX and LuaTeX alike. Brackets and stars are kept from `\\`, which takes them for
-/// its arguments, and hyphens from each other; a character outside of ASCII that has no command is shown by its number.
+/// Escapes a paragraph or table cell of LaTeX, for pdfTeX, XeTeX and LuaTeX alike. Brackets and
+/// stars are protected from `\\`, which would take them as arguments, and hyphens from each other;
+/// non-ASCII characters without a command are shown as numbers.
 pub fn latex(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text.chars();
     while let Some(c) = rest.clone().next() {
-        // All that stands raised is one exponent: two in a row are an error.
+        // Consecutive raised characters are one exponent: two in a row are an error.
         for (mark, table) in [('^', RAISED), ('_', LOWERED)] {
             let inside: String = rest.clone().map_while(|c| counterpart(c, table)).collect();
             if let Some(last) = inside.chars().count().checked_sub(1) {
@@ -110,7 +110,7 @@ pub fn latex(text: &str) -> String {
     out
 }
 
-/// The command that shows a character which LaTeX reads as something else, or cannot read.
+/// The command for a character that LaTeX interprets or cannot read.
 #[rustfmt::skip]
 fn latex_command(c: char) -> Option<&'static str> {
     Some(match c {

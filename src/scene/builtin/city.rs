@@ -1,5 +1,5 @@
-//! A town of unit cubes: houses with stepped gables, towers and gardens between streets, of which only the faces that
-//! show are there (as in the meshes of block worlds that papers measure on, Rungholt among them).
+//! A town of unit cubes: houses with stepped gables, towers and gardens between streets. Only
+//! visible faces exist, as in the block-world meshes that papers measure, such as Rungholt.
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
@@ -18,12 +18,11 @@ parameters! {
     }
 }
 
-/// Columns of a plot along an edge, its two streets included.
+/// Columns along an edge of a plot, including its two streets.
 const PLOT: usize = 14;
-/// Columns of a street.
+/// Width of a street in columns.
 const STREET: usize = 3;
 
-/// Materials by index.
 const PAVING: u32 = 0;
 const GRASS: u32 = 1;
 const WALL: u32 = 2;
@@ -53,14 +52,12 @@ impl BuiltinScene for City {
     }
 }
 
-/// What stands on a square of the ground.
+/// The cubes on a square of the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Column {
-    /// Cubes.
     height: i32,
-    /// Cubes below this one are of the wall.
+    /// Cubes below this one belong to the wall.
     wall: i32,
-    /// What it has on top.
     top: u32,
 }
 
@@ -73,27 +70,25 @@ impl Column {
         }
     }
 
-    /// Material of a cube that shows at its side.
     fn side(&self, cube: i32) -> u32 {
         if cube < self.wall { WALL } else { self.top }
     }
 }
 
-/// What a plot is built with.
 #[derive(Debug, Clone, Copy)]
 struct Plot {
-    /// First column of the house in each direction, and behind its last one.
+    /// First column of the house in each direction, and one past its last.
     house: [[i32; 2]; 2],
-    /// Cubes of its walls.
+    /// Height of its walls in cubes.
     walls: i32,
-    /// Axis that its ridge runs across; none is a flat roof.
+    /// Axis across its ridge; `None` for a flat roof.
     gable: Option<usize>,
     /// Columns with trees.
     trees: [[i32; 2]; 3],
 }
 
 impl Plot {
-    /// The plot in this row and column of the town, whatever its size.
+    /// The plot at this row and column of the town, independent of the town's size.
     fn new(seed: u64, row: usize, column: usize) -> Self {
         let mut random = Pcg32::with_stream(seed, (row as u64) << 32 | column as u64);
         let mut between =
@@ -117,7 +112,6 @@ impl Plot {
         }
     }
 
-    /// What stands at a place of the plot.
     fn column(&self, at: [i32; 2]) -> Column {
         let is_inside =
             |axis: usize| (self.house[axis][0]..self.house[axis][1]).contains(&at[axis]);
@@ -146,7 +140,6 @@ impl Plot {
     }
 }
 
-/// A square of columns.
 struct Town {
     /// Columns along an edge of the town, and of the stored square.
     edge: usize,
@@ -155,9 +148,9 @@ struct Town {
 }
 
 impl Town {
-    /// The largest town of at most so many triangles, of two at least.
+    /// The largest town of at most `triangles` triangles, at least 2.
     fn with_at_most(triangles: usize, seed: u64) -> Self {
-        // A column shows at least its top.
+        // A column has at least a visible top.
         let stored = (triangles / 2).isqrt().max(1);
         let plots = stored.div_ceil(PLOT);
         let plot = |i: usize| Plot::new(seed, i / plots, i % plots);
@@ -176,16 +169,17 @@ impl Town {
         let (mut fits, mut too_large) = (1, stored + 1);
         while too_large - fits > 1 {
             town.edge = fits.midpoint(too_large);
-            match town.triangles() <= triangles {
-                true => fits = town.edge,
-                false => too_large = town.edge,
+            if town.triangles() <= triangles {
+                fits = town.edge;
+            } else {
+                too_large = town.edge;
             }
         }
         town.edge = fits;
         town
     }
 
-    /// Height at a place; none outside.
+    /// Height at a place; 0 outside.
     fn height(&self, row: Option<usize>, column: Option<usize>) -> i32 {
         let inside = |c: Option<usize>| c.filter(|c| *c < self.edge);
         match (inside(row), inside(column)) {
@@ -194,7 +188,7 @@ impl Town {
         }
     }
 
-    /// Heights beside a column: in the rows before and behind it, then in the columns.
+    /// Heights of the four neighbours: previous and next row, then columns.
     fn beside(&self, row: usize, column: usize) -> [i32; 4] {
         [
             self.height(row.checked_sub(1), Some(column)),
@@ -209,7 +203,6 @@ impl Town {
         (0..edge).flat_map(move |row| (0..edge).map(move |column| (row, column)))
     }
 
-    /// Triangles that show.
     fn triangles(&self) -> usize {
         let faces = |(row, column): (usize, usize)| {
             let height = self.columns[row * self.stored + column].height;
@@ -221,7 +214,7 @@ impl Town {
         2 * self.places().map(faces).sum::<usize>()
     }
 
-    /// Adds them, the middle of the town at the origin, counter-clockwise from outside.
+    /// Adds the visible triangles, counter-clockwise from outside, centred at the origin.
     fn push(&self, builder: &mut SceneBuilder) {
         let half = self.edge as i32 / 2;
         for (row, column) in self.places() {
@@ -230,7 +223,7 @@ impl Town {
             let point = |dx: i32, y: i32, dz: i32| glam::IVec3::new(x + dx, y, z + dz).as_vec3();
             let top = [[0, 0], [0, 1], [1, 1], [1, 0]].map(|[dx, dz]| point(dx, here.height, dz));
             builder.push_quad(top, here.top);
-            // Feet of each side, so that the wall above them faces outwards.
+            // Feet of each side, ordered so that the wall above faces outwards.
             let feet = [
                 [[0, 0], [0, 1]],
                 [[1, 1], [1, 0]],
@@ -271,7 +264,7 @@ mod tests {
         assert_ne!(city(5_000, 1).hash, city(5_000, 2).hash);
     }
 
-    /// Every inner edge is shared by faces that turn the same way round; only the edge of the ground is open.
+    /// Faces agree in orientation on every inner edge; only the edge of the ground is open.
     #[test]
     fn its_surface_is_closed_but_for_the_edge_of_the_ground_and_faces_outwards() {
         let scene = city(20_000, 7);

@@ -1,8 +1,8 @@
-//! The Cornell box: the measured geometry that the Program of Computer Graphics of Cornell
-//! University published ("Cornell Box Data", 1998), in millimetres, with its camera.
+//! The Cornell box: the measured geometry published by the Program of Computer Graphics of Cornell
+//! University ("Cornell Box Data", 1998), in millimetres, with its camera.
 //!
-//! Reflectances and the radiance of the light are the usual linear RGB conversions of the
-//! published spectra. The ceiling is a frame around the light, so that no two surfaces coincide.
+//! Reflectances and light radiance are the usual linear RGB conversions of the published spectra.
+//! The ceiling is a frame around the light, so that no surfaces coincide.
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{DEFAULT_IOR, Material};
@@ -75,7 +75,7 @@ const CEILING: Quad = [
     [0.0, 548.8, 0.0],
 ];
 
-/// Its corners lie beside those of [`CEILING`].
+/// Its corners adjoin those of [`CEILING`].
 const LAMP: Quad = [
     [343.0, 548.8, 227.0],
     [343.0, 548.8, 332.0],
@@ -83,7 +83,7 @@ const LAMP: Quad = [
     [213.0, 548.8, 227.0],
 ];
 
-/// Corners (x, z) of a block's top, around, and its height.
+/// Corners (x, z) of a block's top in order, and its height.
 const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     (
         [[130.0, 65.0], [82.0, 225.0], [240.0, 272.0], [290.0, 114.0]],
@@ -100,7 +100,7 @@ const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     ),
 ];
 
-/// The ball: centre and radius. It stands clear of floor and walls, and shows no facets at usual sizes.
+/// Centre and radius of the ball, clear of floor and walls, without visible facets.
 const BALL: ([f64; 3], f64) = ([186.0, 91.0, 169.0], 90.0);
 const BALL_GRID: SphereGrid = SphereGrid {
     bands: 96,
@@ -154,7 +154,7 @@ impl BuiltinScene for CornellBox {
                 eye: Vec3::new(278.0, 273.0, -800.0),
                 target: Vec3::new(278.0, 273.0, 0.0),
                 up: Vec3::Y,
-                // A focal length of 35 mm behind a film of 25 mm.
+                // Focal length 35 mm, film 25 mm.
                 vertical_fov_degrees: 39.3077,
             }),
             ..Look::default()

@@ -1,4 +1,4 @@
-//! A bumpy closed surface of any number of triangles of about the same size.
+//! A bumpy closed surface with any number of triangles of similar size.
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};

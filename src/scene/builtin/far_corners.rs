@@ -1,6 +1,6 @@
-//! A small scene that leads through the code which otherwise only large or deep scenes reach: rows of
-//! texels beyond the first, triangles that cannot be split apart, trees of nearly thirty levels, needles, empty
-//! space around dense spots, and instances whose boxes have to grow.
+//! A small scene that exercises code which otherwise only large or deep scenes reach: multiple rows
+//! of texels, inseparable triangles, trees of nearly thirty levels, needles, empty space around
+//! dense spots, and instances whose boxes have to grow.
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
@@ -17,15 +17,15 @@ parameters! {
     pub(super) struct FarCorners {}
 }
 
-/// Quadrilaterals along each edge of the sheet: its triangles fill rows of texels.
+/// Quadrilaterals along each edge of the sheet: enough to fill rows of texels.
 const SHEET: usize = 64;
-/// Nested shells, each half as large as the one around it: levels of a tree.
+/// Nested shells, each half as large as the previous one: levels of a tree.
 const SHELLS: i32 = 44;
-/// Triangles in the same place.
+/// Coincident triangles.
 const COPIES: usize = 72;
-/// Long thin triangles through everything.
+/// Long thin triangles across the scene.
 const NEEDLES: usize = 48;
-/// Triangles in a spot of a thousandth of the scene.
+/// Triangles in a spot a thousandth of the scene in size.
 const SPOT: usize = 300;
 
 impl BuiltinScene for FarCorners {
@@ -51,13 +51,13 @@ impl BuiltinScene for FarCorners {
     }
 }
 
-/// Everything that is not an instance of something else.
+/// Everything that is not an instance.
 fn ground() -> Vec<Triangle> {
     let mut builder = SceneBuilder::new(false, 0);
     let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
     let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
     sheet(&mut builder);
-    // Shells around a corner: all hold the origin, so that the small ones are reached past the large ones.
+    // Shells around a corner: all contain the origin, so rays reach small ones past the large ones.
     for level in 0..SHELLS {
         let s = 2.0_f32.powi(-level);
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| s * axis);
@@ -85,7 +85,7 @@ fn ground() -> Vec<Triangle> {
     builder.into_triangles()
 }
 
-/// Half of it lies in a plane of coordinates and is cut at binary fractions, half is wavy.
+/// Half lies in an axis-aligned plane and is cut at binary fractions, half is wavy.
 fn sheet(builder: &mut SceneBuilder) {
     builder.push_grid(SHEET, 0, |i, k| {
         let [x, z] = [i, k].map(|n| n as f32 / SHEET as f32);
@@ -99,7 +99,7 @@ fn sheet(builder: &mut SceneBuilder) {
     });
 }
 
-/// A closed object, uneven and not around its origin.
+/// A closed, uneven object away from the origin.
 fn bumpy() -> Vec<Triangle> {
     let mut builder = SceneBuilder::new(false, 0);
     SphereGrid::with_at_most(72).push(&mut builder, 0, |direction| {
@@ -109,7 +109,7 @@ fn bumpy() -> Vec<Triangle> {
     builder.into_triangles()
 }
 
-/// Turned, tiny, mirrored, flat, and far away and large.
+/// Rotated, tiny, mirrored, flat, and far away and large.
 fn places() -> [Transform; 6] {
     let turned = |axis: f64, scale: Vec3, offset: Vec3| {
         let (s, c) = sin_cos_turns(axis);

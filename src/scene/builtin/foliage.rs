@@ -1,4 +1,4 @@
-//! Plants of crossed cards, a mesh fence and a lamp behind a lattice: surfaces that are there only where their masks say so.
+//! Plants of crossed cards, a mesh fence and a lamp behind a lattice: surfaces with alpha masks.
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{AlphaChannel, AlphaMask, Material, Texture, TextureUse, Transform, Wrap};
@@ -74,7 +74,7 @@ impl BuiltinScene for Foliage {
     }
 }
 
-/// Texture coordinates of a quadrilateral as [`quad`] has it.
+/// Texture coordinates of [`quad`].
 const CORNERS: [[Vec2; 3]; 2] = [
     [
         Vec2::new(0.0, 1.0),
@@ -93,7 +93,7 @@ fn quad(corner: Vec3, right: Vec3, up: Vec3) -> Vec<Triangle> {
     [[a, b, c], [a, c, d]].map(Triangle::from).into()
 }
 
-/// Three upright cards through one axis.
+/// Three upright cards sharing an axis.
 fn cards() -> (Vec<Triangle>, Vec<[Vec2; 3]>) {
     let card = |k: u32| {
         let (sin, cos) = sin_cos_turns(f64::from(k) / 6.0);
@@ -103,7 +103,7 @@ fn cards() -> (Vec<Triangle>, Vec<[Vec2; 3]>) {
     ((0..3).flat_map(card).collect(), CORNERS.repeat(3))
 }
 
-/// Where a plant stands, how it is turned, scaled and leans.
+/// Random placement of a plant: position, rotation, scale and lean.
 fn somewhere(pcg: &mut Pcg32) -> Transform {
     let mut uniform = || f64::from(pcg.uniform_f32());
     let place = Vec3::new(
@@ -156,7 +156,7 @@ fn materials(masked: bool) -> Vec<Material> {
     ]
 }
 
-/// Leaves on stalks: alpha falls off over a few texels, so that the cutoff lies between texels.
+/// Leaves on stalks: alpha falls off over a few texels, so the cutoff lies between texels.
 fn leaves_image(size: usize) -> Texture {
     let mut pcg = Pcg32::new(7);
     let mut uniform = || f64::from(pcg.uniform_f32());
@@ -197,7 +197,7 @@ fn leaves_image(size: usize) -> Texture {
     }
 }
 
-/// One mesh of wires, wider than high, in the colours of an opaque image.
+/// A wire mesh, wider than high, in the colours of an opaque image.
 fn mesh_image() -> Texture {
     let texel = |i: u32| {
         let (x, y) = (f64::from(i % 12), f64::from(i / 12));

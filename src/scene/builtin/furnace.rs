@@ -1,4 +1,4 @@
-//! Scenes whose image is known exactly: any bias of an integrator shows.
+//! Scenes whose image is known exactly, to reveal any bias of an integrator.
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
@@ -29,7 +29,7 @@ impl BuiltinScene for FurnaceBox {
     fn build(&self) -> (SceneBuilder, Look) {
         let albedo = self.albedo;
         let mut builder = SceneBuilder::default();
-        // Corner k has the bits of k as coordinates; faces are seen counter-clockwise from inside.
+        // The bits of k are the coordinates of corner k; faces are counter-clockwise from inside.
         let faces = [
             [0, 2, 6, 4],
             [1, 5, 7, 3],

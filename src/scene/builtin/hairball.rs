@@ -1,5 +1,5 @@
-//! Strands that grow out of a ball in all directions and curl: normals change from pixel to pixel, so that rays which
-//! leave neighbouring pixels have nothing in common (Laine's hairball, which Dufay 2017 expects no gain on, in closed form).
+//! Curling strands around a ball, with normals that change from pixel to pixel, so secondary rays
+//! are incoherent (Laine's hairball in closed form; Dufay 2017 expects no gain there).
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
@@ -19,13 +19,13 @@ parameters! {
     }
 }
 
-/// Pieces of a strand, each a prism of three sides.
+/// Pieces of a strand, each a three-sided prism.
 const PIECES: usize = 20;
 const SIDES: usize = 3;
-/// Where strands begin and end, from the centre.
+/// Distances from the centre where strands begin and end.
 const ROOT: f64 = 0.15;
 const TIP: f64 = 1.0;
-/// Thickness at the root; it falls to a tenth at the tip.
+/// Thickness at the root, tapering to a tenth at the tip.
 const THICKNESS: f64 = 0.012;
 
 impl BuiltinScene for Hairball {
@@ -62,11 +62,10 @@ impl BuiltinScene for Hairball {
     }
 }
 
-/// A curve around a straight line out of the centre.
 struct Strand {
     /// Along the line, and across it.
     axes: [DVec3; 3],
-    /// Radius of the curl at the tip, how often it turns, and where it begins.
+    /// Curl radius at the tip, number of turns, and phase.
     curl: f64,
     turns: f64,
     phase: f64,
@@ -75,7 +74,6 @@ struct Strand {
 impl Strand {
     fn new(pcg: &mut Pcg32) -> Self {
         let mut uniform = || f64::from(pcg.uniform_f32());
-        // Uniform on the sphere.
         let z = 2.0 * uniform() - 1.0;
         let (sin, cos) = sin_cos_turns(uniform());
         let radius = (1.0 - z * z).sqrt();
@@ -89,7 +87,7 @@ impl Strand {
         }
     }
 
-    /// The middle of the strand, from 0 at the root to 1 at the tip.
+    /// Centre line of the strand, from 0 at the root to 1 at the tip.
     fn middle(&self, t: f64) -> DVec3 {
         let [out, across, up] = self.axes;
         let (sin, cos) = sin_cos_turns(self.phase + self.turns * t);
@@ -97,7 +95,7 @@ impl Strand {
         out * (ROOT + (TIP - ROOT) * t) + (across * cos + up * sin) * curl
     }
 
-    /// Corners around the middle.
+    /// Corners around the centre line.
     fn ring(&self, t: f64) -> [Vec3; SIDES] {
         let [_, across, up] = self.axes;
         let thickness = THICKNESS * (1.0 - 0.9 * t);

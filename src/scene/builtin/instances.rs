@@ -1,5 +1,5 @@
-//! Copies of four bumpy objects in a lattice of cells, each moved, turned, scaled unevenly and now
-//! and then mirrored: what two-level structures are compared on.
+//! Copies of four bumpy objects in a lattice, each translated, rotated, unevenly scaled and
+//! sometimes mirrored: a benchmark for two-level structures.
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
@@ -11,11 +11,10 @@ use raystone_core::geometry::Triangle;
 use raystone_core::parameters;
 use raystone_core::random::Pcg32;
 
-/// Different objects.
 const OBJECTS: u32 = 4;
-/// No point of an object is farther from its centre.
+/// Bound on the distance of an object's points from its centre.
 const OBJECT_RADIUS: f64 = 1.3;
-/// At overlap 1, objects are larger by this factor than what fits into a cell.
+/// Size of objects at overlap 1, relative to what fits into a cell.
 const LARGEST: f64 = 6.0;
 
 parameters! {
@@ -76,8 +75,7 @@ fn object(index: u32, detail: usize) -> Vec<Triangle> {
     builder.into_triangles()
 }
 
-/// Where a copy stands in its cell of the unit cube, how it is turned and scaled; one of eight is
-/// mirrored.
+/// Random placement of a copy in its cell of the unit cube; one in eight is mirrored.
 fn transform(pcg: &mut Pcg32, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
     let mut uniform = || f64::from(pcg.uniform_f32());
     let edge = 1.0 / cells as f64;
@@ -100,7 +98,7 @@ fn transform(pcg: &mut Pcg32, cell: [usize; 3], cells: usize, overlap: f64) -> T
 }
 
 /// A uniformly distributed rotation from three uniform numbers (K. Shoemake, "Uniform random
-/// rotations", Graphics Gems III, 1992), as products that are equal on every platform.
+/// rotations", Graphics Gems III, 1992), using products that are identical on every platform.
 fn rotation([a, b, c]: [f64; 3]) -> DMat3 {
     let (s1, c1) = sin_cos_turns(b);
     let (s2, c2) = sin_cos_turns(c);
@@ -140,7 +138,6 @@ mod tests {
         )
     }
 
-    /// World boxes of all copies.
     fn boxes(scene: &SceneData) -> Vec<Bounds> {
         let assembly = scene.assembly.as_ref().unwrap();
         let copies = assembly.instances().iter();

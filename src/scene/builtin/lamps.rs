@@ -59,7 +59,7 @@ parameters! {
 const FLOOR: u32 = 0;
 const SHINING: u32 = 1;
 
-/// A grey floor of 2·`half` units in the plane y = 0, seen from the side.
+/// A grey floor of edge 2·`half` in the plane y = 0, seen from the side.
 fn on_floor(half: f32, lights: Vec<Light>) -> (SceneBuilder, Look) {
     let mut builder = SceneBuilder::default();
     let corner = |x: f32, z: f32| Vec3::new(x * half, 0.0, z * half);
@@ -87,7 +87,6 @@ fn on_floor(half: f32, lights: Vec<Light>) -> (SceneBuilder, Look) {
     (builder, look)
 }
 
-/// Height of the lamps of `lamp`.
 const HEIGHT: f32 = 2.0;
 
 impl BuiltinScene for LampScene {
@@ -145,12 +144,13 @@ impl BuiltinScene for LampScene {
 }
 
 impl Luminaire {
-    /// The profile of the file, or an even one. Without that of the file there is no scene.
+    /// The file's profile, or an isotropic one. If the file cannot be read, the scene is refused.
     fn profile(&self, builder: &mut SceneBuilder) -> Option<IesProfile> {
         let even = "TILT=NONE 1 -1 1 2 1 1 2 0 0 0 1 1 0 0 180 0 100 100";
-        let profile = match self.file.is_empty() {
-            true => IesProfile::parse("even", &even.replacen("NONE ", "NONE\n", 1)),
-            false => IesProfile::read(Path::new(&self.file)),
+        let profile = if self.file.is_empty() {
+            IesProfile::parse("even", &even.replacen("NONE ", "NONE\n", 1))
+        } else {
+            IesProfile::read(Path::new(&self.file))
         };
         match profile {
             Ok(mut profile) => {
@@ -164,11 +164,11 @@ impl Luminaire {
         }
     }
 
-    /// What multiplies the intensities of a profile.
     fn scale(&self, profile: &IesProfile) -> f32 {
-        let wanted = match self.watts > 0.0 {
-            true => LUMENS_PER_WATT * self.watts,
-            false => self.lumens,
+        let wanted = if self.watts > 0.0 {
+            LUMENS_PER_WATT * self.watts
+        } else {
+            self.lumens
         };
         let measured = profile.lumens();
         if wanted > 0.0 && measured > 0.0 {
@@ -179,7 +179,7 @@ impl Luminaire {
     }
 }
 
-/// Of monochromatic light of 540 THz, by the definition of the candela.
+/// Luminous efficacy of monochromatic light of 540 THz, by the definition of the candela.
 const LUMENS_PER_WATT: f64 = 683.0;
 
 impl BuiltinScene for Luminaire {
@@ -238,7 +238,7 @@ impl BuiltinScene for ManyLights {
     }
 }
 
-/// The upper side and the four walls of a box.
+/// The top and four walls of a box.
 fn push_block(builder: &mut SceneBuilder, corner: Vec3, size: Vec3) {
     let at = |x: f32, y: f32, z: f32| corner + size * Vec3::new(x, y, z);
     let around = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];

@@ -1,4 +1,4 @@
-//! Procedural scenes: no files, deterministic to the bit on every platform.
+//! Procedural scenes without files, bit-exact on every platform.
 //!
 //! A new scene is one file here and one line in `BUILTINS`.
 
@@ -22,18 +22,17 @@ use super::builder::{Look, SceneBuilder};
 use super::{SceneData, SceneError, common_parameters};
 use raystone_core::params::{Entry, ParamError, ParameterSchema, Parameters, Params, Variant};
 
-/// A built-in scene: the struct of its parameters.
+/// A built-in scene: its parameter struct.
 trait BuiltinScene: Parameters {
-    /// Name as a user types it.
+    /// Name as typed.
     const NAME: &'static str;
-    /// One line: what it shows.
+    /// One-line description.
     const DESCRIPTION: &'static str;
 
-    /// The triangles, and how they look.
+    /// Returns triangles and look.
     fn build(&self) -> (SceneBuilder, Look);
 }
 
-/// One line of the registry.
 struct Builtin {
     name: &'static str,
     description: &'static str,
@@ -52,7 +51,6 @@ impl Builtin {
     }
 }
 
-/// The registry.
 const BUILTINS: [Builtin; 15] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
@@ -71,7 +69,7 @@ const BUILTINS: [Builtin; 15] = [
     Builtin::of::<city::City>(),
 ];
 
-/// The built-in scenes with their parameters, for the parser, lists and docs.
+/// The built-in scenes and their parameters, for the parser, lists and docs.
 pub fn builtin_scenes() -> Vec<Entry> {
     BUILTINS
         .iter()
@@ -86,14 +84,14 @@ pub fn builtin_scenes() -> Vec<Entry> {
         .collect()
 }
 
-/// The built-in scene that `variant` names, if it names one.
+/// The built-in scene named by `variant`, if any.
 pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> {
     let scene = BUILTINS.iter().find(|scene| scene.name == variant.name)?;
     let built = (scene.build)(&variant.params).map_err(SceneError::from);
     Some(built.and_then(|(builder, look)| builder.finish(&variant.name, look)))
 }
 
-/// What to type instead of `name`: the nearest built-in name, else all of them.
+/// Suggestions for `name`: the nearest built-in name, or all of them.
 pub(super) fn hint(name: &str) -> String {
     let nearest = BUILTINS
         .iter()
@@ -124,7 +122,7 @@ pub(crate) mod tests {
         try_load_with(name, changes).unwrap()
     }
 
-    /// A model of one triangle, without any light, with these common parameters.
+    /// A one-triangle model without light, with these common parameters.
     pub(crate) fn load_unlit(changes: &[(&str, ParamValue)]) -> SceneData {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("unlit.obj");
@@ -141,7 +139,7 @@ pub(crate) mod tests {
         load(&variant, &LoadOptions::default()).unwrap()
     }
 
-    /// The same as [`load_with`] for a scene that may not be there.
+    /// [`load_with`] for a scene that may not exist.
     pub(crate) fn try_load_with(
         name: &str,
         changes: &[(&str, ParamValue)],
@@ -163,12 +161,11 @@ pub(crate) mod tests {
         load(&variant, &LoadOptions::default())
     }
 
-    /// A built-in scene with its default parameters.
     pub(crate) fn load_default(name: &str) -> SceneData {
         load_with(name, &[])
     }
 
-    /// Whether every edge is used once in each direction: closed and consistently oriented.
+    /// True if every edge is used once in each direction: closed and consistently oriented.
     pub(crate) fn is_closed(scene: &SceneData) -> bool {
         let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
         let key = |v: glam::Vec3| v.to_array().map(f32::to_bits);

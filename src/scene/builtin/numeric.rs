@@ -1,5 +1,4 @@
-//! Sines that are equal to the bit on every platform: the standard library's
-//! `sin` is whatever the system's mathematics library says.
+//! Bit-exact sines on every platform: `sin` of the standard library depends on the system.
 
 use std::f64::consts::TAU;
 
@@ -16,8 +15,8 @@ const SERIES: [[f64; 2]; 10] = {
     series
 };
 
-/// Sine and cosine of `turns` full turns, error below 1e-15. Only IEEE additions and
-/// multiplications in a fixed order.
+/// Sine and cosine of `turns` full turns, error below 1e-15, by IEEE additions and multiplications
+/// in fixed order.
 pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let turns = turns - turns.floor();
     // Within an eighth of a turn of a quarter point, where the series converges fast.

@@ -1,4 +1,4 @@
-//! The least scene that a structure can be built of: for integrators that trace nothing.
+//! The smallest valid scene, for integrators that trace nothing.
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};

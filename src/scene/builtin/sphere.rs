@@ -1,4 +1,4 @@
-//! A closed grid of longitude and latitude on the unit sphere.
+//! A closed longitude-latitude grid on the unit sphere.
 
 use super::super::builder::SceneBuilder;
 use super::numeric::sin_cos_turns;
@@ -12,11 +12,10 @@ pub(super) struct SphereGrid {
 }
 
 impl SphereGrid {
-    /// The grid nearest to `triangles` and not above, with cells about as wide as they are high.
-    /// `triangles` is at least 8 (the octahedron).
+    /// The largest nearly square grid of at most `triangles` triangles, at least 8 (octahedron).
     pub(super) fn with_at_most(triangles: usize) -> Self {
         let half = triangles.max(8) / 2;
-        // Twice as many sectors as bands make square cells: half = sectors * (bands - 1).
+        // Twice as many sectors as bands give square cells: half = sectors * (bands - 1).
         let square = ((half as f64 / 2.0).sqrt() as usize).max(1);
         let candidates = square.div_ceil(2)..=(square + square / 2);
         let best = candidates
@@ -29,12 +28,11 @@ impl SphereGrid {
         }
     }
 
-    /// Number of triangles.
     pub(super) fn triangles(&self) -> usize {
         2 * self.sectors * (self.bands - 1)
     }
 
-    /// Adds the sphere with each unit vector moved by `place`, counter-clockwise from outside.
+    /// Adds the sphere with each unit vector mapped by `place`, counter-clockwise from outside.
     pub(super) fn push(
         &self,
         builder: &mut SceneBuilder,

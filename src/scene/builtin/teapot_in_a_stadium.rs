@@ -1,5 +1,5 @@
-//! Teapot in a stadium: a small detailed object in a scene a thousand times larger, the case that
-//! breaks uniform grids (Haines, Ray Tracing News 1988).
+//! Teapot in a stadium: a small detailed object in a scene a thousand times larger, which defeats
+//! uniform grids (Haines, Ray Tracing News 1988).
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
@@ -23,12 +23,11 @@ const ROWS: [u32; 2] = [2, 3];
 
 /// Edge of the field, units; the teapot is about 6.4 long.
 const FIELD_EDGE: f32 = 10_000.0;
-/// Cells along an edge of the field.
 const FIELD_CELLS: usize = 96;
-/// Rows of seats, and straight pieces of each.
+/// Rows of seats, and straight segments per row.
 const ROW_COUNT: usize = 24;
 const ROW_PIECES: usize = 128;
-/// Of the first row, and of each.
+/// Radius of the first row, and size of each.
 const FIRST_RADIUS: f32 = 2500.0;
 const ROW_DEPTH: f32 = 90.0;
 const ROW_HEIGHT: f32 = 50.0;
@@ -61,7 +60,7 @@ impl BuiltinScene for TeapotInAStadium {
     }
 }
 
-/// Concentric steps: an upright riser and a level tread each.
+/// Concentric steps, each with an upright riser and a level tread.
 fn push_rows(builder: &mut SceneBuilder) {
     let at = |radius: f32, height: f32, piece: usize| {
         let (sin, cos) = sin_cos_turns((piece % ROW_PIECES) as f64 / ROW_PIECES as f64);

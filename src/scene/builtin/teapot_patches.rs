@@ -1,13 +1,12 @@
 //! The Utah teapot (Martin Newell, 1975): bicubic Bézier patches, tessellated.
 //!
-//! Newell's 32 patches are 28 of revolution-like parts (rim, body, lid, bottom: a profile swept
-//! around four quarters) and the mirrored halves of handle and spout; the tables hold exactly
-//! that. Newell's coordinates have z up; the bottom was added later (Blinn).
+//! Of Newell's 32 patches, 28 are revolution-like (rim, body, lid, bottom: a profile swept around
+//! four quarters), the others mirrored halves of handle and spout; the tables store exactly that.
+//! Newell's coordinates have z up; the bottom was added later (Blinn).
 
 use glam::{DVec2, DVec3, Vec3};
 
-/// Control points (radius, height) of the swept parts, top to bottom: rim, upper body, lower body,
-/// knob, lid, bottom.
+/// Control points (radius, height) of rim, upper body, lower body, knob, lid, bottom.
 const PROFILES: [[[f64; 2]; 4]; 6] = [
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
     [[1.5, 2.4], [1.75, 1.875], [2.0, 1.35], [2.0, 0.9]],
@@ -17,14 +16,14 @@ const PROFILES: [[[f64; 2]; 4]; 6] = [
     [[1.5, 0.15], [1.5, 0.075], [1.425, 0.0], [0.0, 0.0]],
 ];
 
-/// Control points of a quarter circle of radius 1 as Newell drew it.
+/// Control points of Newell's quarter circle of radius 1.
 const QUARTER: [[f64; 2]; 4] = [[1.0, 0.0], [1.0, 0.56], [0.56, 1.0], [0.0, 1.0]];
 
-/// One row of half a patch of handle or spout: a point (x, z) of the inner and of the outer curve
-/// in the plane of symmetry, and the half width.
+/// One row of half a handle or spout patch: points (x, z) of the inner and outer curves in the
+/// plane of symmetry, and the half width.
 type HalfRow = ([f64; 2], [f64; 2], f64);
 
-/// The two half patches of the handle, then the two of the spout.
+/// The two half patches of the handle, then of the spout.
 const HALVES: [[HalfRow; 4]; 4] = [
     [
         ([-1.6, 2.025], [-1.5, 2.25], 0.3),
@@ -54,9 +53,8 @@ const HALVES: [[HalfRow; 4]; 4] = [
 
 type Patch = [[DVec3; 4]; 4];
 
-/// The triangles of the teapot, y up, standing on y = 0, about 6.4 units long: `subdivision`
-/// squared quadrilaterals per patch, those at the poles as single triangles. Below 2, handle and
-/// spout are flat.
+/// The teapot's triangles, y up, standing on y = 0, about 6.4 units long: `subdivision` squared
+/// quadrilaterals per patch, single triangles at poles. Below 2, handle and spout are flat.
 pub(super) fn tessellate(subdivision: usize) -> Vec<[Vec3; 3]> {
     let n = subdivision.max(1);
     let mut triangles = Vec::new();
@@ -78,7 +76,7 @@ pub(super) fn tessellate(subdivision: usize) -> Vec<[Vec3; 3]> {
     triangles
 }
 
-/// All 32 patches; the first index runs down (or along), the second around.
+/// All 32 patches; the first index runs down or along, the second around.
 fn patches() -> Vec<Patch> {
     let mut patches = Vec::new();
     for profile in PROFILES {
@@ -114,8 +112,7 @@ fn evaluate(patch: &Patch, u: f64, v: f64) -> Vec3 {
     de_casteljau(patch.map(|row| de_casteljau(row, v)), u).as_vec3()
 }
 
-/// In f64 and by interpolation, so that patches meet in equal f32 points and equal control points
-/// give that very point.
+/// In f64, so that patches meet in equal f32 points, and equal control points are preserved.
 fn de_casteljau([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {
     let [ab, bc, cd] = [a.lerp(b, t), b.lerp(c, t), c.lerp(d, t)];
     ab.lerp(bc, t).lerp(bc.lerp(cd, t), t)

@@ -1,4 +1,4 @@
-//! Random triangles: the worst case for every hierarchy, and a quick test of any structure.
+//! Random triangles: the worst case for hierarchies, and a quick test of any structure.
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};

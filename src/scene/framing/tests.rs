@@ -1,4 +1,4 @@
-//! Where scenes are looked at from.
+//! Tests of automatic framing.
 
 use super::*;
 use crate::Material;
@@ -10,9 +10,9 @@ fn corner(half: Vec3, i: usize) -> Vec3 {
     half * Vec3::new(sign(0), sign(1), sign(2))
 }
 
-/// A box without the sides in `missing` (0 … 5: −x, x, −y, y, −z, z), faces inwards or outwards.
+/// A box without the sides in `missing` (0 … 5: −x, x, −y, y, −z, z), facing inwards or outwards.
 fn walls(half: Vec3, missing: &[usize], inwards: bool) -> SceneData {
-    // Seen from outside, counterclockwise.
+    // Counter-clockwise seen from outside.
     let sides = [
         [0, 4, 6, 2],
         [1, 3, 7, 5],
@@ -44,7 +44,7 @@ fn finish(builder: SceneBuilder) -> SceneData {
     builder.finish("test.obj", look).unwrap()
 }
 
-/// Largest coordinate of a vertex in the image, 1 at its border; infinite behind the camera.
+/// Largest image coordinate of a vertex, 1 at the border; infinite behind the camera.
 fn extent(scene: &SceneData, camera: &Camera, aspect: f32) -> f32 {
     let [forward, right, up] = basis((camera.target - camera.eye).normalize(), camera.up);
     let tangent = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();

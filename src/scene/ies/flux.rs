@@ -1,13 +1,13 @@
-//! Intensity in a direction, and the luminous flux of all of them.
+//! Luminous intensity by direction, and total luminous flux.
 
 use super::{IesProfile, Photometry};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Beyond the last angle by this much is not outside yet, degrees: rounding of the kernel's f32.
+/// Tolerance beyond the last angle, degrees: rounding of the kernel's f32.
 const SLACK: f64 = 1e-3;
 
-/// The interval of ascending values that `x` lies in, and how far along; nothing outside.
+/// The interval of ascending values around `x`, and the fraction along it; `None` outside.
 fn bracket(values: &[f32], x: f64) -> Option<(usize, f64)> {
     let [first, last] = [values.first()?, values.last()?].map(|v| f64::from(*v));
     if x < first - SLACK || x > last + SLACK {
@@ -22,17 +22,18 @@ fn bracket(values: &[f32], x: f64) -> Option<(usize, f64)> {
     Some((low, ((x - a) / (b - a)).clamp(0.0, 1.0)))
 }
 
-/// The angle of (x, y) from the x axis; 0 where both are 0, whatever their signs: along the axis of a luminaire. Twin of
-/// `angle_of` in `kernels/shading/hemisphere.wesl`.
+/// Angle of (x, y) from the x axis; 0 if both are 0, whatever their signs: along the luminaire's
+/// axis. Twin of `angle_of` in `kernels/shading/hemisphere.wesl`.
 fn angle_of(y: f64, x: f64) -> f64 {
-    match x == 0.0 && y == 0.0 {
-        true => 0.0,
-        false => y.atan2(x),
+    if x == 0.0 && y == 0.0 {
+        0.0
+    } else {
+        y.atan2(x)
     }
 }
 
 impl IesProfile {
-    /// Candela in a direction in the axes of the luminaire, of length 1. Twin of `ies_candela` in
+    /// Intensity (cd) along a unit vector in the luminaire's axes. Twin of `ies_candela` in
     /// `kernels/shading/light/ies.wesl`.
     pub fn intensity(&self, direction: DVec3) -> f64 {
         let [x, y, z] = direction.to_array();
@@ -65,10 +66,10 @@ impl IesProfile {
         })
     }
 
-    /// Luminous flux, lumens: the integral of the bilinear intensity over all directions, exact.
+    /// Luminous flux, lumens: the exact integral of the bilinear intensity over all directions.
     pub fn lumens(&self) -> f64 {
         let rows = self.vertical.len();
-        // Solid angle is the product of one factor of each angle.
+        // Solid angle is the product of one factor per angle.
         let (of_vertical, of_horizontal): (Primitive, Primitive) = match self.photometry {
             Photometry::C => (SINE, CONSTANT),
             Photometry::A => (COSINE, CONSTANT),
@@ -89,13 +90,13 @@ impl IesProfile {
     }
 }
 
-/// First and second antiderivative of a weight, of an angle in radians.
+/// First and second antiderivative of a weight, as functions of an angle in radians.
 type Primitive = [fn(f64) -> f64; 2];
 const CONSTANT: Primitive = [|x| x, |x| 0.5 * x * x];
 const SINE: Primitive = [|x| -x.cos(), |x| -x.sin()];
 const COSINE: Primitive = [f64::sin, |x| -x.cos()];
 
-/// Integral of a piecewise linear function times the weight, by parts: exact.
+/// Exact integral of a piecewise linear function times the weight, by parts.
 fn integral(degrees: &[f32], values: &[f64], [first, second]: Primitive) -> f64 {
     let pairs = degrees.windows(2).zip(values.windows(2));
     pairs

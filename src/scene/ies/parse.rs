@@ -1,12 +1,12 @@
-//! Reading LM-63.
+//! Parser for LM-63.
 
 use super::{IesProfile, Photometry};
 use thiserror::Error;
 
-/// Why there is no photometry.
+/// Errors of reading a photometric file.
 #[derive(Debug, Error)]
 pub enum IesError {
-    /// The operating system refused the file.
+    /// The operating system could not read the file.
     #[error(
         "{file}: cannot read the photometric file ({source}); check the path and its permissions"
     )]
@@ -16,26 +16,26 @@ pub enum IesError {
         /// The reason.
         source: std::io::Error,
     },
-    /// The content breaks LM-63.
+    /// The content violates LM-63.
     #[error(
         "{file}, line {line}: {problem}; repair the file or ask the maker of the luminaire for another"
     )]
     Malformed {
         /// The file.
         file: String,
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }
 
-/// Angles and intensities that a file may have at most.
+/// Limit on the number of angles and intensities.
 const MOST_ANGLES: usize = 10_000;
-/// Two angles are the same up to this, degrees.
+/// Tolerance for equal angles, degrees.
 const SAME: f32 = 1e-3;
 
-/// The numbers after `TILT=`, each with its line.
+/// The numbers after `TILT=`, with their lines.
 struct Numbers<'a> {
     file: &'a str,
     words: Vec<(usize, &'a str)>,
@@ -79,11 +79,12 @@ impl<'a> Numbers<'a> {
 
     fn count(&mut self, what: &str) -> Result<usize, IesError> {
         let x = self.number(what)?;
-        match x >= 1.0 && x <= MOST_ANGLES as f64 && x.fract() == 0.0 {
-            true => Ok(x as usize),
-            false => Err(self.here(format!(
+        if x >= 1.0 && x <= MOST_ANGLES as f64 && x.fract() == 0.0 {
+            Ok(x as usize)
+        } else {
+            Err(self.here(format!(
                 "{what} is {x}, not an integer from 1 to {MOST_ANGLES}"
-            ))),
+            )))
         }
     }
 
@@ -108,10 +109,10 @@ impl<'a> Numbers<'a> {
 }
 
 impl IesProfile {
-    /// Reads the text of a file called `file`.
+    /// Parses the text of a file called `file`.
     ///
     /// # Errors
-    /// It breaks the standard: says in which line and how.
+    /// The text violates the standard: names the line and the problem.
     pub fn parse(file: &str, text: &str) -> Result<Self, IesError> {
         let malformed = |line, problem: String| IesError::Malformed {
             file: file.to_owned(),
@@ -153,15 +154,15 @@ impl IesProfile {
     }
 }
 
-/// The value of the line `TILT=`, which ends the labels; those of 1986 are free text.
+/// The value of `TILT=`, which ends the labels; those of 1986 are free text.
 fn tilt(line: &str) -> Option<&str> {
     let (name, value) = line.split_once('=')?;
     let is_tilt = name.trim().eq_ignore_ascii_case("TILT");
     is_tilt.then(|| value.trim())
 }
 
-/// The year of the standard that the first line names, as `IESNA91`, `IESNA:LM-63-2002` and `IES:LM-63-2019` do; that of the
-/// first, which has no such line, where it names none.
+/// The year of the standard in the first line, such as `IESNA91`, `IESNA:LM-63-2002` or
+/// `IES:LM-63-2019`; 1986, which has no such line, if there is none.
 fn year(labels: &[&str]) -> u32 {
     const FIRST: u32 = 1986;
     let first = labels.iter().find(|line| !line.trim().is_empty());
@@ -183,13 +184,13 @@ fn year(labels: &[&str]) -> u32 {
     }
 }
 
-/// The first year in which the number between the ballast factor and the watts is no factor of ballast and lamp. LM-63-1995 and
-/// LM-63-2002 keep it for future use, and in LM-63-2019 it tells how the file was made (1.1 is a laboratory's).
+/// First year in which the number between ballast factor and watts is not the ballast-lamp factor.
+/// LM-63-1995 and LM-63-2002 reserve it; in LM-63-2019 it states the origin (1.1: laboratory).
 const NO_LAMP_FACTOR: u32 = 1995;
-/// The first year in which it says how the file was made.
+/// First year in which it states how the file was made.
 const GENERATION_TYPE: u32 = 2019;
 
-/// Factors for lamps that are tilted: a luminaire is shown as it was measured.
+/// Skips the factors for tilted lamps: luminaires are rendered as measured.
 fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
     numbers.number("the lamp-to-luminaire geometry")?;
     let pairs = numbers.count("the number of tilt angles")?;
@@ -279,18 +280,19 @@ fn check_vertical(photometry: Photometry, angles: &[f32]) -> Result<(), String> 
         Photometry::C => (&[0.0, 90.0], &[90.0, 180.0]),
         _ => (&[-90.0, 0.0], &[90.0]),
     };
-    // Luminaires that shine only a little upwards are cut off in practice.
+    // In practice, files of luminaires that shine only slightly upwards are truncated.
     let fits = starts.iter().any(|s| is(*s, first)) && last <= ends[ends.len() - 1] + SAME;
-    match fits && last > first {
-        true => Ok(()),
-        false => Err(format!(
+    if fits && last > first {
+        Ok(())
+    } else {
+        Err(format!(
             "vertical angles from {first} to {last} are none of the standard"
-        )),
+        ))
     }
 }
 
 impl IesProfile {
-    /// Completes the horizontal angles by the symmetry that they stand for.
+    /// Completes the horizontal angles by symmetry.
     fn unfold(&mut self) -> Result<(), String> {
         let [first, last] = [
             self.horizontal[0],
@@ -343,7 +345,7 @@ impl IesProfile {
         }
     }
 
-    /// Adds the other angles mirrored at the first or last one, `about`.
+    /// Adds the other angles, mirrored at the first or last one, `about`.
     fn mirror(&mut self, about: f32) {
         let rows = self.vertical.len();
         let columns: Vec<(f32, Vec<f32>)> = self
@@ -360,7 +362,7 @@ impl IesProfile {
         self.set_columns(all);
     }
 
-    /// From angles between 90 and 450 to those between 0 and 360.
+    /// Maps angles between 90 and 450 to 0 to 360.
     fn turn_to_zero(&mut self) {
         let rows = self.vertical.len();
         let columns = self.horizontal.iter().zip(self.candela.chunks(rows));
@@ -372,7 +374,7 @@ impl IesProfile {
                 )
             })
             .collect();
-        // 90 stands there as 450, too, and 0 only as 360.
+        // 90 also occurs as 450, and 0 only as 360.
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all.dedup_by(|a, b| is(a.0, b.0));
         if let Some(full) = all.last().filter(|(h, _)| is(*h, 360.0)).cloned() {
@@ -380,7 +382,7 @@ impl IesProfile {
         }
         self.set_columns(all);
         if !is(self.horizontal[0], 0.0) {
-            // No measured angle lies at 360: between its neighbours.
+            // No angle was measured at 360: interpolate its neighbours.
             let (low, high) = (self.horizontal.len() - 1, 0);
             let [a, b] = [360.0 - self.horizontal[low], self.horizontal[high]];
             let column = |k: usize| self.candela[k * rows..][..rows].to_vec();
@@ -452,7 +454,7 @@ mod tests {
 
     #[test]
     fn the_first_line_says_what_the_numbers_of_the_ballast_mean() {
-        // Candela multiplier 2, ballast factor 0.5, and 0.9 behind it; intensities of 100 straight down, 50 at 45 degrees.
+        // Candela multiplier 2, ballast factor 0.5, then 0.9; 100 straight down, 50 at 45 degrees.
         let read = |labels: &str| {
             let text = format!(
                 "{labels}TILT=NONE\n1 1000 2 3 1 1 2 0 0 0\n0.5 0.9 40\n0 45 90\n0\n100 50 0\n"
@@ -460,13 +462,13 @@ mod tests {
             IesProfile::parse("x.ies", &text).expect("a profile")
         };
         for (labels, down) in [
-            // A factor of ballast and lamp until 1991: 100 · 2 · 0.5 · 0.9.
+            // Ballast-lamp factor until 1991: 100 · 2 · 0.5 · 0.9.
             ("", 90.0),
             ("own measurement 12\nTILTED DOWNLIGHT, WHITE\n", 90.0),
             ("IESNA91\n[TEST] own\n", 90.0),
             ("IESNA:LM-63-1986\n", 90.0),
             ("iesna:lm-63-1991\n", 90.0),
-            // For future use, and since 2019 the way in which the file was made: 100 · 2 · 0.5.
+            // Reserved, and since 2019 how the file was made: 100 · 2 · 0.5.
             ("IESNA:LM-63-1995\n[TEST] own\n", 100.0),
             ("IESNA:LM-63-2002\n", 100.0),
             ("\nIESNA:LM-63-02\n", 100.0),

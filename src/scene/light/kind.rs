@@ -8,16 +8,16 @@ use std::fmt;
 pub struct LightKind {
     /// Name.
     pub name: &'static str,
-    /// One line: what it is, and in which unit.
+    /// One line: what it is, and its unit.
     pub description: &'static str,
-    /// What its colour is called.
+    /// Name of its colour.
     pub color: &'static str,
-    /// The feature that brings its kernel into those of a scene.
+    /// The feature that adds its kernel to a scene's kernels.
     pub feature: &'static str,
-    /// The group of features that it belongs to: `lights`, or `background` where rays find it that leave the scene.
+    /// Its group of features: `lights`, or `background` if rays that leave the scene find it.
     pub group: &'static str,
-    /// Kernel modules that it brings along, because they are not the program's; of `shading/light/<feature>` kernels import
-    /// `<feature>_sample(light, surface, point)`.
+    /// Kernel modules of a kind from outside the program. From `shading/light/<feature>`, kernels
+    /// import `<feature>_sample(light, surface, point)`.
     pub sources: Sources,
 }
 
@@ -100,7 +100,7 @@ kind!(
     "radiance from all around by an equirectangular map (HDR, EXR, PFM, NPY)"
 );
 
-/// The table of kinds, in the order in which lights are numbered; a kind's place is its number in
+/// All kinds, in the order of the light list; a kind's index is its number in
 /// `kernels/shading/light/table.wesl`.
 pub static LIGHT_KINDS: [&LightKind; 8] = [
     &TRIANGLE,
@@ -114,7 +114,7 @@ pub static LIGHT_KINDS: [&LightKind; 8] = [
 ];
 
 impl LightKind {
-    /// Its place in [`LIGHT_KINDS`]; behind them all from outside the program.
+    /// Index in [`LIGHT_KINDS`]; one past the end for kinds from outside the program.
     pub fn number(&self) -> u32 {
         let place = LIGHT_KINDS.iter().position(|known| *known == self);
         place.unwrap_or(LIGHT_KINDS.len()) as u32

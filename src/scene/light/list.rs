@@ -1,5 +1,5 @@
-//! All lights of a scene, in the order in which they are numbered: emissive triangles and parallelograms by their
-//! first triangle, then the other lights by kind.
+//! All lights of a scene in numbering order: emissive triangles and parallelograms by their first
+//! triangle, then the other lights by kind.
 
 use super::{Light, LightKind, kind, luminance};
 use crate::{Material, SceneData};
@@ -7,23 +7,23 @@ use glam::{DVec3, Vec3};
 use raystone_core::geometry::Triangle;
 use std::f64::consts::PI;
 
-/// Two triangles of one material that are one light.
+/// Two triangles of one material that form a single light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parallelogram {
-    /// The two triangles, which follow each other in the scene.
+    /// The two consecutive triangles.
     pub triangles: [u32; 2],
-    /// The corner of both before the one that the first triangle has alone.
+    /// The shared corner before the one that only the first triangle has.
     pub corner: Vec3,
-    /// From there to the corner that each triangle has alone; their cross product points to the front.
+    /// From `corner` to each triangle's own corner; their cross product points to the front.
     pub edges: [Vec3; 2],
 }
 
-/// How far the fourth corner may lie from where the other three put it, in the length of the diagonal.
+/// Tolerance of the fourth corner's position, relative to the diagonal.
 const TOLERANCE: f64 = 1e-6;
 
 impl Parallelogram {
-    /// The parallelogram that two triangles form, if they do: they share the ends of a diagonal, turn the same way, and
-    /// the fourth corner is where the other three put it.
+    /// The parallelogram of two triangles, if they form one: they share a diagonal, have the same
+    /// orientation, and the fourth corner is where the other three imply.
     pub fn of(first: u32, a: &Triangle, b: &Triangle) -> Option<Self> {
         (0..3)
             .flat_map(|i| (0..3).map(move |k| (i, k)))
@@ -50,30 +50,30 @@ impl Parallelogram {
     }
 }
 
-/// What shines.
+/// Geometry of a listed light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
-    /// This triangle.
+    /// A triangle.
     Triangle(u32),
-    /// Two triangles.
+    /// A parallelogram.
     Parallelogram(Parallelogram),
-    /// The light of this place in [`SceneData::lights`].
+    /// The light at this index of [`SceneData::lights`].
     Light(u32),
 }
 
-/// A light with its number in the list.
+/// A light and its properties for selection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ListedLight {
-    /// What shines.
+    /// The light's geometry.
     pub source: Source,
-    /// Area of triangles and parallelograms; 0 of others.
+    /// Area of triangles and parallelograms; 0 for others.
     pub area: f64,
-    /// Luminous power, above 0.
+    /// Luminous power, positive.
     pub power: f64,
 }
 
 impl ListedLight {
-    /// Its row in [`super::LIGHT_KINDS`].
+    /// Its entry in [`super::LIGHT_KINDS`].
     pub fn kind(&self, scene: &SceneData) -> &'static LightKind {
         match self.source {
             Source::Triangle(_) => &kind::TRIANGLE,
@@ -83,16 +83,16 @@ impl ListedLight {
     }
 }
 
-/// The lights of a scene that shine, and what is said of those that do not.
+/// The lights of a scene that shine, and reports on those that do not.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LightList {
-    /// Each with a power above 0. Triangles come first, lights at infinity last.
+    /// Lights with positive power. Triangles come first, lights at infinity last.
     pub lights: Vec<ListedLight>,
-    /// One line for each light that was left out.
+    /// One line for each omitted light.
     pub problems: Vec<String>,
 }
 
-/// Finite, and above 0 somewhere.
+/// True if the emission is finite, and positive in some channel.
 fn shines(material: &Material) -> bool {
     material.emission.is_finite() && luminance(material.emission) > 0.0
 }
@@ -159,7 +159,7 @@ impl LightList {
             let there = |id: &usize| *id < scene.triangles.len();
             let outward = |id: usize| there(&id).then(|| Triangle::from(scene.outward(id)));
             let [a, b] = [next - 1, next].map(outward);
-            // A lamp with a texture or a mask is sampled by the triangle that has the texture coordinates.
+            // A lamp with a texture or mask is sampled per triangle, for its texture coordinates.
             let lamp = &scene.materials[of];
             let plain = lamp.emission_texture.is_none() && lamp.mask.is_none();
             let pair = a.zip(b).filter(|_| plain && material(next) == Some(of));

@@ -1,8 +1,9 @@
-//! Lights: what shines on a scene. Emission of surfaces is a matter of their materials; the lights here are
-//! those without triangles. A kind of light is a kernel in `kernels/shading/light/` with its lines in the table of kernels,
-//! `kernels/shading/lights.wesl`, a row of [`LIGHT_KINDS`] with what [`Light`] holds of it, its rows of
-//! `shading_tables` (`src/render/light_tables.rs`), and the row of its checks in `src/verify/lights/`. One from outside the program is
-//! a [`Light::Other`] of a kind of its own: two rows and a kernel. How the parts fit: `docs/shading.md`.
+//! Lights without triangles; surfaces emit by their materials. A kind of light consists of a kernel
+//! in `kernels/shading/light/` with its lines in the table of kernels,
+//! `kernels/shading/lights.wesl`; an entry of [`LIGHT_KINDS`] with its variant of [`Light`]; its
+//! rows of `shading_tables` (`src/render/light_tables.rs`); and its checks in `src/verify/lights/`.
+//! A kind from outside the program is a [`Light::Other`]: two rows and a kernel. Overview:
+//! `docs/shading.md`.
 
 mod kind;
 mod list;
@@ -14,91 +15,91 @@ use super::{EnvironmentMap, IesProfile};
 use glam::{DVec3, Quat, Vec3};
 use std::sync::Arc;
 
-/// A light that has no triangles. Colours are linear RGB in the radiance unit of the scene (times its unit of length
-/// squared for intensities).
+/// A light without triangles. Colours are linear RGB in the scene's radiance unit (times its length
+/// unit squared for intensities).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Light {
-    /// A sphere that emits the same radiance everywhere, and reflects nothing. Rays see it, and it casts shadows.
+    /// A sphere with constant radiance that reflects nothing. Visible to rays, and casts shadows.
     Sphere {
         /// Centre.
         center: Vec3,
-        /// Radius, above 0.
+        /// Radius, positive.
         radius: f32,
-        /// Radiance of its surface, towards outside and inside.
+        /// Radiance of its surface, outwards and inwards.
         radiance: Vec3,
     },
-    /// A point that emits evenly.
+    /// An isotropic point light.
     Point {
-        /// Place.
+        /// Position.
         position: Vec3,
         /// Radiant intensity, per steradian.
         intensity: Vec3,
     },
-    /// A point that emits into a cone.
+    /// A point light with a cone.
     Spot {
-        /// Place.
+        /// Position.
         position: Vec3,
-        /// Axis of the cone, away from the light; of any length above 0.
+        /// Axis of the cone, away from the light; any non-zero length.
         direction: Vec3,
-        /// Radiant intensity on the axis, per steradian; without decay the irradiance at any distance.
+        /// Radiant intensity on the axis, per steradian; without decay, irradiance at any distance.
         intensity: Vec3,
-        /// Angle from the axis up to which it shines in full, radians.
+        /// Angle from the axis up to which it has full intensity, radians.
         inner: f32,
-        /// Angle from the axis from which it is dark, radians, at least `inner` and at most π.
+        /// Angle from the axis beyond which it is dark, radians, between `inner` and π.
         outer: f32,
-        /// Whether light falls off with the square of the distance.
+        /// True for inverse-square falloff.
         decay: bool,
     },
-    /// A point with the measured intensities of a luminaire.
+    /// A point light with a luminaire's measured intensities.
     Ies {
-        /// Place.
+        /// Position.
         position: Vec3,
-        /// Takes the axes of [`IesProfile`] to those of the scene; of length 1.
+        /// Rotates the axes of [`IesProfile`] to the scene's; unit length.
         rotation: Quat,
-        /// What multiplies the candela of the profile.
+        /// Multiplier of the profile's candela.
         color: Vec3,
         /// The measured intensities.
         profile: Arc<IesProfile>,
     },
-    /// Radiance from all around, in the place of a constant one. A scene has one at most.
+    /// Radiance from all directions, replacing a constant one. At most one per scene.
     Environment {
         /// Radiance by direction.
         map: Arc<EnvironmentMap>,
-        /// What multiplies it.
+        /// Multiplier of the radiance.
         scale: f32,
-        /// By how much it is turned about +y, radians, counter-clockwise seen from above.
+        /// Rotation about +y, radians, counter-clockwise seen from above.
         turn: f32,
     },
-    /// Light from infinitely far away.
+    /// A light at infinity.
     Directional {
-        /// Where the light travels; of any length above 0.
+        /// Direction the light travels; any non-zero length.
         direction: Vec3,
-        /// Irradiance of a surface that faces it.
+        /// Irradiance of a surface facing it.
         irradiance: Vec3,
     },
-    /// A point of a kind from outside the program, which no ray can find. Lights are chosen as if it shone evenly.
+    /// A point light of an outside kind, invisible to rays; isotropic for light selection.
     Other {
         /// The kind.
         kind: &'static LightKind,
-        /// Place.
+        /// Position.
         position: Vec3,
-        /// Where it points, in `c.xyz` of the kernel's `Light`.
+        /// Its direction, `c.xyz` of the kernel's `Light`.
         direction: Vec3,
-        /// What scales it.
+        /// Its colour.
         color: Vec3,
-        /// Numbers that only this kind has: `a.w`, `b.w` and `c.w`.
+        /// Parameters specific to its kind: `a.w`, `b.w` and `c.w`.
         parameters: [f32; 3],
     },
 }
 
-/// Relative luminance of linear sRGB, by which lights are weighed.
+/// Relative luminance of linear sRGB, the weight of lights.
 pub(crate) fn luminance(c: Vec3) -> f64 {
     let [r, g, b] = c.to_array().map(f64::from);
     0.212_671 * r + 0.715_160 * g + 0.072_169 * b
 }
 
 impl Light {
-    /// Its row in [`LIGHT_KINDS`].
+    /// Its entry in [`LIGHT_KINDS`].
     pub fn kind(&self) -> &'static LightKind {
         match self {
             Self::Sphere { .. } => &kind::SPHERE,
@@ -111,7 +112,7 @@ impl Light {
         }
     }
 
-    /// Radiance, intensity or irradiance: what scales it.
+    /// Radiance, intensity or irradiance scale.
     pub fn color(&self) -> Vec3 {
         match self {
             Self::Sphere { radiance, .. } => *radiance,
@@ -122,7 +123,7 @@ impl Light {
         }
     }
 
-    /// The middle and the radius of what shines; nothing at infinity.
+    /// Centre and radius of the emitter; `None` at infinity.
     pub fn place(&self) -> Option<(Vec3, f32)> {
         match self {
             Self::Sphere { center, radius, .. } => Some((*center, *radius)),
@@ -134,12 +135,12 @@ impl Light {
         }
     }
 
-    /// Whether it has no place: no tree over places can hold it.
+    /// True if it is at infinity: no spatial tree can contain it.
     pub fn is_infinite(&self) -> bool {
         self.place().is_none()
     }
 
-    /// The same light turned about the origin and then moved. Maps turn about one axis alone: they stay as they are.
+    /// The light rotated about the origin, then translated; maps stay unchanged.
     #[must_use]
     pub fn moved(mut self, turn: Quat, by: Vec3) -> Self {
         match &mut self {
@@ -169,8 +170,8 @@ impl Light {
         self
     }
 
-    /// Luminous power in a scene whose bounding sphere has this radius: what lights are chosen by. Without decay and for
-    /// lights at infinity, that of what falls on the sphere's disk.
+    /// Luminous power in a scene with this bounding radius, the weight for light selection. Without
+    /// decay and at infinity, the power that reaches the sphere's disk.
     pub fn power(&self, scene_radius: f64) -> f64 {
         use std::f64::consts::{PI, TAU};
         let color = luminance(self.color());
@@ -184,7 +185,7 @@ impl Light {
                 decay,
                 ..
             } => {
-                // The square of a linear step between the cosines has a mean of a third.
+                // The square of a linear ramp between the cosines has mean 1/3.
                 let [inner, outer] = [inner, outer].map(|angle| f64::from(*angle).cos());
                 let flux = TAU * ((1.0 - inner) + (inner - outer) / 3.0) * color;
                 if *decay {
@@ -201,7 +202,7 @@ impl Light {
         }
     }
 
-    /// What is wrong with it, if it cannot shine as it is.
+    /// The problem of a light that cannot shine.
     pub fn problem(&self) -> Option<String> {
         let finite = |v: &Vec3| v.is_finite();
         let color = self.color();

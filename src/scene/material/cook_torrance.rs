@@ -1,10 +1,9 @@
-//! Microfacets with Beckmann's distribution over a diffuse lobe. No model file has them; experiments of
-//! shading do.
+//! Beckmann microfacets over a diffuse lobe. No model file uses them; shading experiments do.
 
 use super::{Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
-/// The kind.
+/// Beckmann microfacets over a diffuse lobe.
 pub static COOK_TORRANCE: MaterialKind = MaterialKind {
     name: "cook-torrance",
     feature: "cook_torrance",
@@ -23,49 +22,49 @@ pub static COOK_TORRANCE: MaterialKind = MaterialKind {
     recognise: |_| None,
 };
 
-/// Slope of facets below which the lobe is narrower than f32 tells directions apart.
+/// Slope below which the lobe is too narrow for f32 directions.
 const LEAST_ROUGHNESS: f32 = 0.01;
 const GREATEST_IOR: f32 = 10.0;
 
-/// How facets hide each other.
+/// Masking and shadowing of facets.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Masking {
     /// Long grooves (Cook and Torrance 1982).
     #[default]
     VCavities,
-    /// Facets that know nothing of their neighbours (Smith 1967), as Walter et al. 2007 approximate it.
+    /// Uncorrelated facets (Smith 1967), as approximated by Walter et al. 2007.
     Smith,
 }
 
-/// How reflection grows towards grazing angles.
+/// Fresnel term.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Fresnel {
-    /// Schlick's polynomial of 1994.
+    /// Schlick's polynomial (1994).
     Schlick,
     /// Fresnel's equations for unpolarised light.
     #[default]
     Exact,
 }
 
-/// What a Cook–Torrance material is made of.
+/// Parameters of a Cook–Torrance material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CookTorrance {
     /// Linear RGB reflectance of the diffuse lobe.
     pub diffuse: Vec3,
-    /// Linear RGB weight of the specular lobe. Where both add up to more than 1 they are scaled together.
+    /// Linear RGB weight of the specular lobe. If the sum exceeds 1, both are scaled down.
     pub specular: Vec3,
-    /// Root mean square slope of the facets, 0.01 to 1.
+    /// Root mean square facet slope, 0.01 to 1.
     pub roughness: f32,
     /// Index of refraction, 1 to 10.
     pub ior: f32,
-    /// How facets hide each other.
+    /// Masking and shadowing of facets.
     pub masking: Masking,
-    /// How reflection grows towards grazing angles.
+    /// Fresnel term.
     pub fresnel: Fresnel,
 }
 
 impl Material {
-    /// A Cook–Torrance material.
+    /// Returns a Cook–Torrance material.
     pub fn cook_torrance(name: impl Into<String>, of: &CookTorrance) -> Self {
         let flag = |is_on| f32::from(u8::from(is_on));
         let numbers = [

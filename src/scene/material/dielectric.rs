@@ -1,17 +1,17 @@
-//! Smooth dielectrics: glass, water, and panes of them.
+//! Smooth dielectrics: glass, water, and thin panes.
 //!
-//! * MTL: illumination models 4, 6, 7 and 9 refract. The index is `Ni` (1.5 where it is missing); the body
-//!   filters light by `Tf`, at each of its two surfaces by the root. A missing or black `Tf` filters nothing:
-//!   exporters write 0 for "not stated". `d` below 1 with another model is a mixture of surface and
-//!   nothing, which no kind renders yet.
-//! * glTF: `KHR_materials_transmission` of at least a half on what is no metal, with the base colour as tint
-//!   and `KHR_materials_ior` (1.5 where it is missing). Walls are thin, as the standard has them, unless
+//! * MTL: illumination models 4, 6, 7 and 9 refract. The index is `Ni` (default 1.5); the body
+//!   filters light by `Tf`, by its square root at each of two surfaces. A missing or black `Tf`
+//!   filters nothing: exporters write 0 for "not stated". `d` below 1 with another model is partial
+//!   coverage, which no kind renders yet.
+//! * glTF: `KHR_materials_transmission` of at least a half on non-metals, with the base colour as
+//!   tint and `KHR_materials_ior` (default 1.5). Walls are thin, as in the standard, unless
 //!   `KHR_materials_volume` gives them a thickness.
 
 use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
-/// The kind.
+/// Smooth dielectrics.
 pub static DIELECTRIC: MaterialKind = MaterialKind {
     name: "dielectric",
     feature: "dielectric",
@@ -27,18 +27,18 @@ pub static DIELECTRIC: MaterialKind = MaterialKind {
     recognise,
 };
 
-/// Index of refraction where a file names none: window glass.
+/// Default index of refraction: window glass.
 pub const DEFAULT_IOR: f32 = 1.5;
 
-/// Beyond these no surface transmits anything worth a ray.
+/// Outside these bounds, no surface transmits a significant amount.
 const LEAST_IOR: f32 = 0.1;
 const GREATEST_IOR: f32 = 10.0;
 
-/// Illumination models of the MTL standard that refract.
+/// MTL illumination models that refract.
 const ILLUM: [u8; 4] = [4, 6, 7, 9];
-/// Part of the light that is transmitted from which a surface counts as glass.
+/// Transmitted fraction above which a surface counts as glass.
 const LEAST_TRANSMISSION: f32 = 0.5;
-/// Metalness from which nothing is transmitted.
+/// Metalness above which nothing is transmitted.
 const METAL: f32 = 0.5;
 
 fn recognise(description: &Description<'_>) -> Option<Look> {
@@ -73,7 +73,7 @@ fn look(tint: Vec3, ior: Option<f32>, is_thin: bool) -> Look {
     }
 }
 
-/// The index and whether the wall is thin. What is no index (0 in glTF stands for infinity) is that of glass.
+/// Index and thin flag. An invalid index (0 in glTF means infinity) becomes that of glass.
 fn parameters(ior: Option<f32>, is_thin: bool) -> Vec<f32> {
     let stated = ior.filter(|ior| ior.is_finite() && *ior > 0.0);
     let ior = stated.unwrap_or(DEFAULT_IOR).clamp(LEAST_IOR, GREATEST_IOR);
@@ -81,18 +81,18 @@ fn parameters(ior: Option<f32>, is_thin: bool) -> Vec<f32> {
 }
 
 impl Material {
-    /// The surface of a body of this index of refraction, whose corners turn counter-clockwise seen from outside. Light is
-    /// multiplied by `tint` at every passage.
+    /// The surface of a solid with this index of refraction, with corners counter-clockwise seen
+    /// from outside. Light is multiplied by `tint` at every passage.
     pub fn dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
         Self::looking(name, &DIELECTRIC, look(tint, Some(ior), false))
     }
 
-    /// The same as a wall without thickness: light passes straight on.
+    /// A wall without thickness: light passes straight through.
     pub fn thin_dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
         Self::looking(name, &DIELECTRIC, look(tint, Some(ior), true))
     }
 
-    /// The same dielectric with Schlick's polynomial in place of Fresnel's equations. Other kinds stay what they are.
+    /// Uses Schlick's polynomial instead of Fresnel's equations. Other kinds are unchanged.
     pub fn with_schlick(mut self) -> Self {
         if self.kind == &DIELECTRIC {
             self.parameters.truncate(2);

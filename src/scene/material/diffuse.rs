@@ -1,9 +1,9 @@
-//! Lambertian surfaces, and whatever no other kind recognises.
+//! Lambertian surfaces, the fallback for unrecognised materials.
 
 use super::{Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
-/// The kind.
+/// Lambertian surfaces.
 pub static DIFFUSE: MaterialKind = MaterialKind {
     name: "diffuse",
     feature: "diffuse",
@@ -15,7 +15,7 @@ pub static DIFFUSE: MaterialKind = MaterialKind {
 };
 
 impl Material {
-    /// A plain Lambertian material, `color` being linear RGB reflectance.
+    /// A Lambertian material; `color` is linear RGB reflectance.
     pub fn diffuse(name: impl Into<String>, color: Vec3) -> Self {
         Self::looking(name, &DIFFUSE, Look::plain(color))
     }

@@ -3,7 +3,7 @@
 use super::{Description, Format, Lobes, Look, Material, MaterialKind};
 use glam::Vec3;
 
-/// The kind.
+/// Perfect mirrors.
 pub static MIRROR: MaterialKind = MaterialKind {
     name: "mirror",
     feature: "mirror",
@@ -14,9 +14,9 @@ pub static MIRROR: MaterialKind = MaterialKind {
     recognise,
 };
 
-/// Illumination models of the MTL standard that mirror (3 … 9 all ray trace; 5 is a mirror with Fresnel).
+/// MTL illumination models that mirror (3 … 9 all ray trace; 5 is a mirror with Fresnel).
 const ILLUM: [u8; 3] = [3, 5, 8];
-/// Metalness from which, and roughness up to which, a surface is a perfect mirror.
+/// Least metalness and largest roughness of a perfect mirror.
 const METALLIC: f32 = 0.99;
 const ROUGHNESS: f32 = 0.02;
 
@@ -42,7 +42,7 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
     is_mirror.then(|| Look::plain(base_color))
 }
 
-/// A mirror by its illumination model whose specular part outshines a nearly black diffuse one.
+/// True for a mirroring illumination model with a specular part over a nearly black diffuse one.
 fn outshines(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
     illum.is_some_and(|illum| ILLUM.contains(&illum))
         && specular.max_element() > 0.0
@@ -50,7 +50,7 @@ fn outshines(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
 }
 
 impl Material {
-    /// A perfect mirror of this linear RGB reflectance.
+    /// A perfect mirror with this linear RGB reflectance.
     pub fn mirror(name: impl Into<String>, color: Vec3) -> Self {
         Self::looking(name, &MIRROR, Look::plain(color))
     }

@@ -1,7 +1,7 @@
-//! Materials: what surfaces do with light. A kind of material is three files: its kernel in
-//! `kernels/shading/bsdf/`, its row here, and the row of its checks in `src/verify/materials/`. Each row stands on a list,
-//! a kind of the program also in the table of kernels, `kernels/shading/bsdf.wesl`; for a kind from outside the table is
-//! written from its row. Nothing else names kinds. How the parts fit: `docs/shading.md`.
+//! Surface materials. A kind of material is three files: its kernel in `kernels/shading/bsdf/`, its
+//! entry here, and its checks in `src/verify/materials/`. Kinds of the program are also listed in
+//! the table of kernels, `kernels/shading/bsdf.wesl`; for outside kinds the table is generated from
+//! the entry. Nothing else names kinds. Overview: `docs/shading.md`.
 
 mod cook_torrance;
 mod dielectric;
@@ -24,15 +24,15 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
 
-/// What kernels ask of a kind.
+/// Functions that kernels call on a kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lobes {
-    /// `<feature>_sample(surface, u)` and `<feature>_scattering(surface, direction)`. What the lobes send behind a surface
-    /// whose shading normal looks elsewhere is lost.
+    /// `<feature>_sample(surface, u)` and `<feature>_scattering(surface, direction)`. Samples below
+    /// the surface, due to the shading normal, are lost.
     Diffuse,
-    /// The same two. What the lobes send behind the surface is mirrored at it.
+    /// As [`Lobes::Diffuse`], but samples below the surface are mirrored at it.
     Glossy,
-    /// `<feature>_sample(surface, u)` alone: there are single directions only, and light samples are of no use.
+    /// Only `<feature>_sample(surface, u)`: directions are discrete, and light sampling is useless.
     Delta,
 }
 
@@ -41,23 +41,21 @@ pub enum Lobes {
 pub struct MaterialKind {
     /// Name.
     pub name: &'static str,
-    /// The feature that brings its kernel into those of a scene: the name as kernels can write it.
+    /// The feature that adds its kernel to a scene's kernels, as spelled in kernels.
     pub feature: &'static str,
-    /// One line: what it does with light.
+    /// One line: how it scatters light.
     pub description: &'static str,
-    /// What [`Material::parameters`] holds, in this order.
+    /// Names of [`Material::parameters`], in order.
     pub parameters: &'static [&'static str],
-    /// What kernels ask of it.
+    /// Functions that kernels call.
     pub lobes: Lobes,
-    /// Kernel modules that it brings along, because they are not the program's; `shading/bsdf/<feature>` is what kernels import.
+    /// Kernel modules of a kind from outside the program; kernels import `shading/bsdf/<feature>`.
     pub sources: Sources,
-    /// How a material that a file describes looks as one of this kind, if it is one. What none recognises
-    /// is diffuse.
+    /// Converts a file's material to this kind, if it is one; unrecognised ones are diffuse.
     pub recognise: fn(&Description<'_>) -> Option<Look>,
 }
 
-/// The table of kinds; a kind's place is its number in `kernels/shading/bsdf.wesl`. Where a file's material
-/// fits several, the last counts.
+/// All kinds by their number in `kernels/shading/bsdf.wesl`. The last matching kind wins.
 pub static MATERIAL_KINDS: [&MaterialKind; 6] = [
     &DIFFUSE,
     &PHONG,
@@ -84,35 +82,35 @@ impl fmt::Debug for MaterialKind {
 /// A surface material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// Name in the file, or a made-up one.
+    /// Name in the file, or a generated one.
     pub name: String,
-    /// What the kernels render.
+    /// The kind that kernels render.
     pub kind: &'static MaterialKind,
-    /// Numbers that only this kind has, as [`MaterialKind::parameters`] names them.
+    /// Parameters specific to the kind, named by [`MaterialKind::parameters`].
     pub parameters: Vec<f32>,
-    /// Linear RGB reflectance or tint, each in [0, 1]; multiplied by the texture if there is one.
+    /// Linear RGB reflectance or tint in [0, 1]; multiplied by the texture if there is one.
     pub base_color: Vec3,
-    /// What the base colour is multiplied by.
+    /// Multiplier of the base colour.
     pub base_color_texture: Option<TextureUse>,
-    /// What the roughness (green) and the metalness (blue) of a principled material are multiplied by.
+    /// Multiplier of a principled material's roughness (green) and metalness (blue).
     pub metallic_roughness_texture: Option<TextureUse>,
-    /// Directions of the normal in the frame of the texture.
+    /// Normal map, in the texture's tangent frame.
     pub normal_texture: Option<TextureUse>,
-    /// What the emission is multiplied by.
+    /// Multiplier of the emission.
     pub emission_texture: Option<TextureUse>,
-    /// What is cut out of the surface.
+    /// Alpha mask of the surface.
     pub mask: Option<AlphaMask>,
     /// Emitted radiance, linear RGB.
     pub emission: Vec3,
-    /// Whether both sides of the triangle emit, or only that from which its corners turn counter-clockwise (glTF without
-    /// `doubleSided`).
+    /// True if both sides emit; false if only the side from which the corners turn
+    /// counter-clockwise does (glTF without `doubleSided`).
     pub emits_both_sides: bool,
-    /// What else the file said.
+    /// Other properties in the file.
     pub source: MaterialSource,
 }
 
 impl Material {
-    /// A material of this kind that looks so.
+    /// A material of this kind and look.
     pub fn looking(name: impl Into<String>, kind: &'static MaterialKind, look: Look) -> Self {
         Self {
             name: name.into(),
@@ -130,8 +128,8 @@ impl Material {
         }
     }
 
-    /// The material of one of these kinds that `file` describes, without texture and emission. One that would reflect more than
-    /// arrives is scaled, with a warning.
+    /// The material that `file` describes, of one of these kinds, without texture and emission. If
+    /// it would reflect more than arrives, it is scaled down, with a warning.
     pub(super) fn described(
         name: String,
         description: &Description<'_>,
@@ -156,8 +154,7 @@ impl Material {
         }
     }
 
-    /// The uses of textures: of the base colour, of metalness and roughness, of the normal, of the emission. Kernels have them in
-    /// this order.
+    /// Textures in the kernels' order: base colour, metalness and roughness, normal, emission.
     pub fn texture_uses(&self) -> [Option<TextureUse>; 4] {
         [
             self.base_color_texture,
@@ -167,7 +164,7 @@ impl Material {
         ]
     }
 
-    /// The same and that of the mask, to be changed.
+    /// [`Self::texture_uses`] plus the mask, mutable.
     pub(super) fn texture_uses_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureUse>> {
         let of_mask = self.mask.iter_mut().map(|mask| &mut mask.texture);
         let shown = [
@@ -179,7 +176,7 @@ impl Material {
         shown.into_iter().chain(of_mask)
     }
 
-    /// The same material, emitting `radiance` (linear RGB) from both sides.
+    /// The material emitting `radiance` (linear RGB) from both sides.
     pub fn emitting(self, radiance: Vec3) -> Self {
         Self {
             emission: radiance,
@@ -188,8 +185,7 @@ impl Material {
         }
     }
 
-    /// The same material, emitting `radiance` (linear RGB) from the side on which the triangle's corners turn
-    /// counter-clockwise alone.
+    /// The material emitting `radiance` (linear RGB) from the counter-clockwise side only.
     pub fn emitting_from_front(self, radiance: Vec3) -> Self {
         Self {
             emission: radiance,
@@ -199,8 +195,8 @@ impl Material {
     }
 }
 
-/// What the file said of a material beyond what [`MaterialKind`] renders: kept, because more of it
-/// will be rendered later. Absent values are `None`, never a default.
+/// Properties in the file beyond what [`MaterialKind`] renders, preserved for later use. Absent
+/// values are `None`, never a default.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialSource {
     /// Linear roughness in [0, 1] (glTF), or derived from the Phong exponent (MTL).
@@ -215,7 +211,7 @@ pub struct MaterialSource {
     pub ior: Option<f32>,
     /// Fraction of light transmitted, in [0, 1].
     pub transmission: Option<f32>,
-    /// What is left of light that passed through the body (MTL `Tf`).
+    /// Fraction of light left after passing through the body (MTL `Tf`).
     pub filter: Option<[f32; 3]>,
     /// Thickness of the body below the surface (`KHR_materials_volume`); 0 is a thin wall.
     pub thickness: Option<f32>,
@@ -227,7 +223,7 @@ pub struct MaterialSource {
     pub illum: Option<u8>,
 }
 
-/// The file formats that describe materials, each with its own rules.
+/// File formats that describe materials, each with its own rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Wavefront MTL.
@@ -236,27 +232,27 @@ pub enum Format {
     Gltf,
 }
 
-/// What a file says of a material, for the kinds to recognise themselves in.
+/// A file's description of a material, for kinds to recognise.
 pub struct Description<'a> {
     /// The format of the file.
     pub format: Format,
     /// MTL `Kd`, glTF base or diffuse colour.
     pub base_color: Vec3,
-    /// Whether a texture scales metalness, roughness or transmission: the numbers alone say nothing then.
+    /// True if a texture scales metalness, roughness or transmission.
     pub is_varied: bool,
-    /// Whether the texture of metalness and roughness will be there.
+    /// True if the metalness and roughness texture will be present.
     pub is_followed: bool,
-    /// The rest of what it says.
+    /// Other properties.
     pub source: &'a MaterialSource,
 }
 
-/// A description as one kind renders it.
+/// A description as rendered by one kind.
 pub struct Look {
     /// Linear RGB reflectance or tint.
     pub base_color: Vec3,
-    /// As [`MaterialKind::parameters`] names them.
+    /// Parameters, named by [`MaterialKind::parameters`].
     pub parameters: Vec<f32>,
-    /// The largest part of light that the description reflects. Beyond 1, colours are divided by it.
+    /// Largest reflected fraction of the description. If above 1, colours are divided by it.
     pub reflected: f32,
 }
 
@@ -269,7 +265,7 @@ impl Look {
         }
     }
 
-    /// Two colours that reflect together, the second of which is the first three of the parameters.
+    /// Two colours that reflect together; the second is the first three parameters.
     pub fn balanced(base: Vec3, specular: Vec3, others: &[f32]) -> Self {
         let (base, specular) = (emitted(base), emitted(specular));
         let reflected = (base + specular).max_element();
@@ -283,10 +279,10 @@ impl Look {
     }
 }
 
-/// What is within it of 1 was meant to be 1.
+/// Deviations from 1 below this are rounding.
 const ROUNDING: f32 = 1e-4;
 
-/// `x` within these bounds; the lower one where it is NaN.
+/// `x` clamped to these bounds; the lower one for NaN.
 pub(crate) fn within(x: f32, least: f32, most: f32) -> f32 {
     if x.is_nan() {
         least
@@ -295,12 +291,12 @@ pub(crate) fn within(x: f32, least: f32, most: f32) -> f32 {
     }
 }
 
-/// Finite and within [0, 1].
+/// Makes a colour finite and within [0, 1].
 pub(super) fn reflectance(color: Vec3) -> Vec3 {
     Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
-/// Finite and not negative.
+/// Makes a colour finite and non-negative.
 pub(super) fn emitted(color: impl Into<Vec3>) -> Vec3 {
     let color = color.into();
     Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).max(Vec3::ZERO)

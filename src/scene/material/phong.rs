@@ -1,11 +1,11 @@
 //! Normalised Phong: a diffuse lobe and a power of the cosine about the mirror direction.
 //!
-//! MTL: illumination model 2 with `Kd`, `Ks` and `Ns`. Together `Kd` and `Ks` reflect at most what arrives.
+//! MTL: illumination model 2 with `Kd`, `Ks` and `Ns`; `Kd` and `Ks` sum to at most 1.
 
 use super::{Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
-/// The kind.
+/// Normalised Phong.
 pub static PHONG: MaterialKind = MaterialKind {
     name: "phong",
     feature: "phong",
@@ -21,9 +21,9 @@ pub static PHONG: MaterialKind = MaterialKind {
     recognise,
 };
 
-/// Illumination model of the MTL standard with highlights and no reflected rays.
+/// MTL illumination model with highlights and no reflected rays.
 const ILLUM: u8 = 2;
-/// Beyond it the lobe is narrower than f32 tells directions apart.
+/// Exponent above which the lobe is too narrow for f32 directions.
 const GREATEST_EXPONENT: f32 = 1e5;
 
 fn recognise(description: &Description<'_>) -> Option<Look> {
@@ -42,8 +42,8 @@ fn look(diffuse: Vec3, specular: Vec3, exponent: f32) -> Look {
 }
 
 impl Material {
-    /// A normalised Phong material: linear RGB reflectance of both lobes, which are scaled together where they add up to
-    /// more than 1, and the exponent (0 to 10⁵).
+    /// A normalised Phong material: linear RGB reflectance of both lobes, scaled down if the sum
+    /// exceeds 1, and the exponent (0 to 10⁵).
     pub fn phong(name: impl Into<String>, diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self::looking(name, &PHONG, look(diffuse, specular, exponent))
     }
@@ -80,7 +80,7 @@ mod tests {
         assert_eq!(recognised(Some(2), Some([0.0; 3]), Some(10.0)), None);
         assert_eq!(recognised(Some(2), None, Some(10.0)), None);
         assert_eq!(recognised(Some(2), grey, None), None);
-        // More than arrives: both lobes are halved.
+        // Reflects more than arrives: both lobes are halved.
         let (base, parameters, reflected) =
             recognised(Some(2), Some([1.5; 3]), Some(-1.0)).unwrap();
         assert_eq!((base, reflected), (Vec3::splat(0.25), 2.0));

@@ -1,13 +1,13 @@
 //! The metallic-roughness model of glTF 2.0.
 //!
-//! * glTF: all materials that are neither mirror nor glass. `KHR_materials_pbrSpecularGlossiness` is converted as
-//!   Khronos's own converter does: the metalness is solved for from the brightness of both colours.
-//! * MTL: where `Pm` is stated, a later addition to the format; with `Pr`, `Kd` and `Ni`.
+//! * glTF: all materials that are neither mirror nor glass. `KHR_materials_pbrSpecularGlossiness`
+//!   is converted like Khronos's converter, solving for metalness from both colours' brightness.
+//! * MTL: if `Pm`, a later addition to the format, is stated; with `Pr`, `Kd` and `Ni`.
 
 use super::{DEFAULT_IOR, Description, Format, Lobes, Look, Material, MaterialKind, within};
 use glam::Vec3;
 
-/// The kind.
+/// The metallic-roughness model of glTF 2.0.
 pub static PRINCIPLED: MaterialKind = MaterialKind {
     name: "principled",
     feature: "principled",
@@ -22,10 +22,10 @@ pub static PRINCIPLED: MaterialKind = MaterialKind {
     recognise,
 };
 
-/// Reflectance of a dielectric in the specular-glossiness model where it stands for no metal.
+/// Reflectance of a dielectric in the specular-glossiness model.
 const DIELECTRIC_F0: f32 = 0.04;
 
-/// Reflectance at normal incidence of a dielectric of this index of refraction; of glass where it is no index.
+/// Normal-incidence reflectance of a dielectric with this index of refraction; of glass if invalid.
 pub fn reflectance_of_ior(ior: f32) -> f32 {
     let ior = if ior.is_finite() && ior > 0.0 {
         ior
@@ -59,8 +59,8 @@ fn look(base_color: Vec3, metallic: f32, roughness: f32, f0: f32) -> Look {
     }
 }
 
-/// Base colour and metalness of a diffuse and a specular colour (Khronos, "PBR specular-glossiness to
-/// metallic-roughness conversion", in the repository of `KHR_materials_pbrSpecularGlossiness`).
+/// Base colour and metalness of a diffuse and a specular colour (Khronos, "PBR specular-glossiness
+/// to metallic-roughness conversion", in the repository of `KHR_materials_pbrSpecularGlossiness`).
 fn of_glossy(diffuse: Vec3, specular: Vec3) -> (Vec3, f32) {
     let brightness = |c: Vec3| (c * c).dot(Vec3::new(0.299, 0.587, 0.114)).sqrt();
     let left = 1.0 - specular.max_element();
@@ -82,8 +82,8 @@ fn solved_metallic(diffuse: f32, specular: f32, left: f32) -> f32 {
 }
 
 impl Material {
-    /// A metallic-roughness material: linear RGB base colour (of the diffuse part, or of the metal), metalness,
-    /// roughness and the dielectric's reflectance at normal incidence, each in [0, 1].
+    /// A metallic-roughness material: linear RGB base colour (diffuse or metallic), metalness,
+    /// roughness and normal-incidence reflectance of the dielectric, each in [0, 1].
     pub fn principled(
         name: impl Into<String>,
         base_color: Vec3,

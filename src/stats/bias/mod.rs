@@ -1,25 +1,24 @@
-//! The bias check: do the replicates of a sampler have the mean that the reference has?
+//! The bias check: tests whether a sampler's replicates have the same mean as the reference.
 //!
-//! A t-test ([`capped_t_test`]) compares luminance means of the replicates with those of the independent parts
-//! of the reference (the idea of Jung, Hanika and Dachsbacher, JCGT 9(2), 2020, with the replicate image as the
-//! unit of inference: the samples within one image may depend on each other). There are three of them, each at
-//! a third of the level:
+//! A t-test ([`capped_t_test`]) compares luminance means of the replicates with those of the
+//! independent parts of the reference (the idea of Jung, Hanika and Dachsbacher, JCGT 9(2), 2020,
+//! with the replicate image as the unit of inference, since samples within an image may be
+//! dependent). There are three tests, each at a third of the level:
 //!
-//! * of the mean of the whole image, which sees any bias that adds up;
-//! * of a mean in which noisy places count less (`weights`), which sees a small bias that all pixels share: on
-//!   the Cornell box, where most of the noise comes from the edges of the lamp, its standard error is a fifth of
-//!   the plain mean's;
-//! * per tile, for a bias that stays in its place: over all tiles the Benjamini–Hochberg procedure bounds the
-//!   share of false alarms.
+//! * the mean of the whole image, which detects any bias that accumulates;
+//! * a mean that weights noisy places less (`weights`), which detects a small bias shared by all
+//!   pixels: on the Cornell box, where most noise comes from the edges of the lamp, its standard
+//!   error is a fifth of the plain mean's;
+//! * per tile, for local bias: the Benjamini–Hochberg procedure bounds the share of false alarms.
 //!
-//! So a sampler without bias is called biased with at most the whole probability.
+//! An unbiased sampler is thus called biased with at most the total probability.
 //!
-//! What is hit seldom shows no noise where no replicate hit it, and differs from the reference all the same.
-//! Where replicates show less than `LEAST_NOISE` of the noise that the reference foretells, what it foretells counts
-//! (`careful_test`). Below `replicates_needed` nothing is said at all.
+//! Rare events show no noise where no replicate caught them, yet differ from the reference. If
+//! replicates show less than `LEAST_NOISE` of the noise predicted by the reference, the prediction
+//! is used (`careful_test`). Below `replicates_needed` there is no verdict.
 //!
-//! The t-test supposes that means are about normal. Many samples per pixel make them so; at very
-//! few, fireflies skew them and very small p-values come up too often.
+//! The t-test assumes nearly normal means. Many samples per pixel provide that; at very few,
+//! fireflies skew them and very small p-values are too frequent.
 
 mod weights;
 
@@ -32,28 +31,27 @@ use raystone_image::{Image, ImageError, luminance};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A sampler may be said to have no bias found only if one of so many standard errors of the mean
-/// luminance of the whole image …
+/// "No bias found" requires that a bias of this many standard errors of the whole image's mean
+/// luminance would have been found with probability `POWER`.
 pub(crate) const EFFECT: f64 = 10.0;
-/// … would have been found with this probability.
+/// Probability of finding a bias of `EFFECT`.
 pub(crate) const POWER: f64 = 0.9;
-/// Of the whole level, the part that each of the three tests gets.
+/// Share of the level for each of the three tests.
 const SHARE: f64 = 1.0 / 3.0;
-/// Of the noise that the reference foretells for a mean, the part of the variance below which replicates are not
-/// believed: of eight even replicates one tile in twenty has as little by chance.
+/// Fraction of the variance predicted by the reference below which the replicates' variance is not
+/// trusted: of eight even replicates, one tile in twenty has so little by chance.
 pub(crate) const LEAST_NOISE: f64 = 0.25;
-/// Most replicates that an experiment may have.
+/// Limit on an experiment's replicates.
 const MOST_REPLICATES: u32 = 1024;
 
-/// How to test.
+/// Test options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasOptions {
     /// Edge of a tile in pixels, at least 1.
     pub tile: u32,
-    /// Greatest probability of a false alarm, in (0, 1): a third for each of the three tests.
+    /// Maximum probability of a false alarm, in (0, 1): a third for each of the three tests.
     pub alpha: f64,
-    /// Differences below this part of the reference are not bias but rounding, see
-    /// `rounding_bound`.
+    /// Relative differences below this are rounding, not bias; see `rounding_bound`.
     pub rounding: f64,
 }
 
@@ -94,42 +92,40 @@ impl fmt::Display for BiasVerdict {
 /// Outcome of the check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BiasCheck {
-    /// Tiles tested; 0 if not testable.
+    /// Number of tiles tested; 0 if not testable.
     pub tiles: usize,
-    /// Top left pixels `[x, y]` of the rejected tiles.
+    /// Top left pixels `[x, y]` of rejected tiles.
     pub rejected: Vec<[u32; 2]>,
-    /// Probability of a false alarm asked for.
+    /// Probability of a false alarm requested.
     pub alpha: f64,
     /// Smallest p-value of a tile; 1 if not testable.
     pub min_p: f64,
-    /// p-value of the three tests together: the least level `alpha` at which one of them rejects. 1 if not
-    /// testable.
+    /// Combined p-value: the smallest `alpha` at which a test rejects; 1 if not testable.
     pub p: f64,
-    /// p-values of tiles in ten equal bins of `[0, 1]`, without those whose difference rounding explains (p = 1 by
-    /// definition): flat if there is no bias.
+    /// Histogram of tile p-values in ten equal bins of `[0, 1]`, without those whose difference is
+    /// explained by rounding (p = 1 by definition): flat if there is no bias.
     pub p_histogram: [usize; 10],
-    /// Test of the mean luminance of the whole image, the difference shortened by the rounding; absent
-    /// if not testable.
+    /// Test of the image's mean luminance, reduced by the rounding; absent if not testable.
     pub whole: Option<WelchTest>,
-    /// The same of the mean in which noisy places count less, relative to that mean; absent if not testable,
-    /// below four parts of the reference, and without noise.
+    /// Test of the mean that weights noisy places less, relative to that mean; absent if not
+    /// testable, below four parts of the reference, or without noise.
     pub weighted: Option<WelchTest>,
-    /// The least bias, as a part of the radiance that all pixels share, that one of these two tests would have
+    /// The smallest relative bias, shared by all pixels, that one of these two tests would have
     /// found with probability `POWER`; absent if not testable or black.
     pub detectable: Option<f64>,
     /// The verdict.
     pub verdict: BiasVerdict,
 }
 
-/// Tests `replicates` (independent seeds of one sampler, one spp) against the independent
-/// `reference_parts` (other seeds, better another sampler family).
+/// Tests `replicates` (independent seeds of one sampler and spp) against independent
+/// `reference_parts` (other seeds, preferably another sampler family).
 ///
-/// Fewer than two images on a side, or NaN or infinite pixels, are [`BiasVerdict::NotTestable`], and so
-/// are fewer than `replicates_needed`, unless no pixel has any noise on either side. Then, and only then, a
-/// tile counts as p = 1 if the means agree to the rounding, else as p = 0.
+/// The result is [`BiasVerdict::NotTestable`] for fewer than two images on a side, for NaN or
+/// infinite pixels, and for fewer than `replicates_needed`, unless no pixel has noise on either
+/// side. Only in that case, a tile has p = 1 if the means agree up to rounding, else p = 0.
 ///
 /// # Errors
-/// [`ImageError::SizeMismatch`] if the images are not all of one size.
+/// [`ImageError::SizeMismatch`] if the images differ in size.
 pub fn check_bias(
     replicates: &[Image],
     reference_parts: &[Image],
@@ -176,7 +172,7 @@ pub fn check_bias(
         .into_iter()
         .filter_map(|(test, size)| detectable(test?, size, level));
     check.detectable = least.reduce(f64::min).map(|least| least + options.rounding);
-    // Both sides have two finite samples or more, so the tests exist.
+    // Both sides have at least two finite samples, so the tests exist.
     let p_value = |test: Option<WelchTest>| test.map_or(1.0, |test| test.p);
     let [ours, theirs] = &tiles;
     let pairs = ours.iter().zip(theirs);
@@ -196,7 +192,7 @@ pub fn check_bias(
     Ok(check)
 }
 
-/// Why so many replicates of a sampler with noise tell nothing at this level; `None` where they are enough.
+/// Why this number of noisy replicates is inconclusive at this level; `None` if it suffices.
 fn too_few(replicates: usize, alpha: f64) -> Option<String> {
     let needed = replicates_needed(alpha);
     ((replicates as u64) < u64::from(needed)).then(|| {
@@ -208,15 +204,15 @@ fn too_few(replicates: usize, alpha: f64) -> Option<String> {
     })
 }
 
-/// The part of `size` that a bias must be for this test to find it with probability [`POWER`].
+/// The smallest bias relative to `size` that this test finds with probability [`POWER`].
 fn detectable(test: WelchTest, size: f64, level: f64) -> Option<f64> {
     let effect = t_test_effect(POWER, level, test.degrees_of_freedom);
     let part = effect * test.standard_error / size;
     part.is_finite().then_some(part)
 }
 
-/// From how many replicates on a bias of [`EFFECT`] standard errors in the whole image is found with
-/// probability [`POWER`] at level `alpha`, if the noise of the reference is far smaller than theirs.
+/// Number of replicates from which a bias of [`EFFECT`] standard errors in the whole image is found
+/// with probability [`POWER`] at level `alpha`, if the reference has far less noise.
 pub(crate) fn replicates_needed(alpha: f64) -> u32 {
     let finds = |&n: &u32| t_test_power(EFFECT, SHARE * alpha, f64::from(n - 1)) >= POWER;
     (2..MOST_REPLICATES).find(finds).unwrap_or(MOST_REPLICATES)
@@ -238,7 +234,7 @@ fn why_not_testable(replicates: &[Image], parts: &[Image]) -> Option<String> {
     None
 }
 
-/// Luminance means, by tile (row by row) and then by image.
+/// Luminance means by tile (row by row), then by image.
 fn tile_means(images: &[Image], tile: u32) -> Vec<Vec<f64>> {
     let (width, height) = (images[0].width, images[0].height);
     let tile = tile.max(1);
@@ -258,13 +254,12 @@ fn tile_means(images: &[Image], tile: u32) -> Vec<Vec<f64>> {
     means
 }
 
-/// Whether any pixel differs from one image to another.
+/// True if any pixel differs between images.
 fn has_noise(images: &[Image]) -> bool {
     images.iter().any(|image| image.pixels != images[0].pixels)
 }
 
-/// How much noisier a replicate is than a part of the reference, in variance: the median over tiles in which both have
-/// noise.
+/// Variance of replicates over reference parts: the median over tiles with noise in both.
 fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
     let ratio = |(a, b): (&Vec<f64>, &Vec<f64>)| Some(variance(a)? / variance(b)?);
     let ratios = ours.iter().zip(theirs).filter_map(ratio);
@@ -272,12 +267,13 @@ fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
     median(&ratios).unwrap_or(0.0)
 }
 
-/// The test of one mean. `noisier` is [`noise_ratio`], absent where no pixel has any noise: then the means are compared
-/// as they are.
+/// Tests one mean. `noisier` is [`noise_ratio`], absent if no pixel has noise: then compares
+/// directly.
 ///
-/// Where replicates have less than [`LEAST_NOISE`] of the variance that the reference's times `noisier` foretells, they
-/// have not seen what makes the noise there, and the foretold one counts. And n replicates that are all alike (to the
-/// rounding) speak no louder than they would with the reference's mean as one more of them, which makes |t| = n.
+/// If the replicates' variance is below [`LEAST_NOISE`] of the reference's times `noisier`, they
+/// have missed the source of the noise there, and the predicted variance is used. And n replicates
+/// that agree (up to rounding) weigh no more than they would with the reference's mean as an
+/// additional one, which makes |t| = n.
 fn careful_test(
     ours: &[f64],
     theirs: &[f64],
@@ -291,9 +287,10 @@ fn careful_test(
     };
     let n = ours.len() as f64;
     let (own, foretold) = (variance(ours)?, noisier * variance(theirs)?);
-    let missing = match own < LEAST_NOISE * foretold {
-        true => foretold - own,
-        false => 0.0,
+    let missing = if own < LEAST_NOISE * foretold {
+        foretold - own
+    } else {
+        0.0
     };
     let gap = (mean(ours)? - mean(theirs)?).abs() - margin;
     let standard_error = (found.standard_error.powi(2) + missing / n).sqrt();
@@ -313,7 +310,7 @@ fn mean_size(values: &[f64]) -> f64 {
 }
 
 fn count_tiles(check: &mut BiasCheck, p_values: &[f64], width: u32, options: BiasOptions) {
-    // A tile that rounding explains has p = 1, whatever chance did.
+    // A tile explained by rounding has p = 1 regardless of chance.
     for p in p_values.iter().filter(|p| **p < 1.0) {
         check.p_histogram[((p * 10.0) as usize).min(9)] += 1;
     }

@@ -1,4 +1,4 @@
-//! The bias check against images whose bias is known.
+//! Tests of the bias check on images with known bias.
 
 use super::*;
 use raystone_core::random::Pcg32;
@@ -16,7 +16,6 @@ fn noisy(count: usize, noise: f64, generator: &mut Pcg32) -> Vec<Image> {
     (0..count).map(&mut image).collect()
 }
 
-/// All pixels of each image times one factor.
 fn scaled(images: &[Image], factor: f64) -> Vec<Image> {
     let scale = |image: &Image| Image {
         pixels: (image.pixels.iter())
@@ -27,7 +26,6 @@ fn scaled(images: &[Image], factor: f64) -> Vec<Image> {
     images.iter().map(scale).collect()
 }
 
-/// The check with default options.
 fn check(replicates: &[Image], parts: &[Image]) -> BiasCheck {
     check_bias(replicates, parts, BiasOptions::default()).unwrap()
 }
@@ -105,13 +103,13 @@ fn brighten_tile(images: &[Image], factor: f32) -> Vec<Image> {
 #[test]
 fn rounding_of_a_constant_is_no_bias_and_one_percent_in_a_tile_is() {
     let exact = noisy(8, 0.0, &mut Pcg32::new(80));
-    // Of samples summed in blocks of 256.
+    // For samples summed in blocks of 256.
     let rounding = 128.0 * f64::from(f32::EPSILON);
     let options = BiasOptions {
         rounding,
         ..BiasOptions::default()
     };
-    // What a plain sum of 65,536 numbers in f32 makes of one tenth.
+    // A plain f32 sum of 65,536 numbers turns one tenth into this.
     let sum = (0..1 << 16).fold(0.0f32, |sum, _| sum + 0.1);
     let plain = f64::from(sum / 65_536.0) / f64::from(0.1f32);
     assert!((plain - 1.0).abs() > 1e-4, "{plain}");
@@ -178,8 +176,8 @@ fn without_bias_alarms_are_as_rare_as_promised() {
     assert!(flat, "p-values not flat: {shares:?}");
 }
 
-/// Images of which most tiles are even and every third one is hit by a lamp `hits` times by expectation, which
-/// lifts it by a half each time (Knuth's draws from Poisson's distribution).
+/// Images in which most tiles are uniform; every third is hit by a lamp `hits` times on average,
+/// adding a half each time (Knuth's Poisson sampling).
 fn seldom_hit(count: usize, noise: f64, hits: f64, generator: &mut Pcg32) -> Vec<Image> {
     let mut images = noisy(count, noise, generator);
     for image in &mut images {

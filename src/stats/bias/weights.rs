@@ -1,21 +1,20 @@
-//! Means of images in which noisy places count less, for a bias that is the same part of every pixel.
+//! Image means that weight noisy places less, to detect a bias proportional to every pixel.
 //!
-//! Of all weighted means, the one whose weights are the expected radiance over its variance has the least
-//! relative error (as in weighted least squares). Both are estimated from the reference, in blocks of pixels. A
-//! weight that depends on the very numbers it multiplies would make a bias of its own, since noise is skewed: so
-//! each half of the reference is weighted by what the other half says, and the replicates by the mean of both.
+//! Of all weighted means, weights of expected radiance over its variance give the least relative
+//! error (as in weighted least squares). Both are estimated from the reference, in blocks of
+//! pixels. A weight that depends on the values it multiplies would itself cause bias, since noise
+//! is skewed: so each half of the reference is weighted by the other, and the replicates by both.
 
 use crate::statistics::{median, variance};
 use raystone_image::{Image, luminance};
 
-/// Edge of a block of pixels with one weight.
 const BLOCK: usize = 4;
-/// The least variance that a block counts with, as a part of the median over blocks, both relative to the
-/// square of the radiance: so that no few blocks, which may look even by chance, rule the mean.
+/// Lower bound on a block's relative variance, as a fraction of the median over blocks, so that a
+/// few blocks that look even by chance do not dominate the mean.
 const LEAST_VARIANCE: f64 = 0.25;
 
-/// Weighted means of the replicates and of the parts of the reference, in units of the image's own: about 1.
-/// `None` below two parts in each half, and where a half has no noise. All images are of one size and finite.
+/// Weighted means of the replicates and reference parts, relative to the image's own: about 1.
+/// `None` below two parts per half, or if a half has no noise. Images are finite and of one size.
 pub(super) fn weighted_means(replicates: &[Image], parts: &[Image]) -> Option<[Vec<f64>; 2]> {
     let half = parts.len() / 2;
     let (a, b) = (parts.get(..half)?, parts.get(half..2 * half)?);
@@ -38,7 +37,7 @@ fn weighted(image: &Image, weights: &[f64]) -> f64 {
         .sum()
 }
 
-/// A weight for every pixel; the weighted mean of these images is 1.
+/// Weights per pixel for which the weighted mean of these images is 1.
 fn weights(images: &[Image]) -> Option<Vec<f64>> {
     let first = images.first().filter(|_| images.len() > 1)?;
     let columns = (first.width as usize).div_ceil(BLOCK);
@@ -61,9 +60,12 @@ fn weights(images: &[Image]) -> Option<Vec<f64>> {
     let bright = blocks.iter().filter(|block| block[1] > 0.0);
     let noisy: Vec<f64> = bright.map(relative).filter(|v| *v > 0.0).collect();
     let least = LEAST_VARIANCE * median(&noisy)?;
-    let weight = |block: &[f64; 3]| match block[1] > 0.0 {
-        true => block[0] / (block[1] * relative(block).max(least)),
-        false => 0.0,
+    let weight = |block: &[f64; 3]| {
+        if block[1] > 0.0 {
+            block[0] / (block[1] * relative(block).max(least))
+        } else {
+            0.0
+        }
     };
     let by_block: Vec<f64> = blocks.iter().map(weight).collect();
     let whole: f64 = blocks

@@ -1,4 +1,4 @@
-//! Faults planted in the kernels of compactions, and in what records them: each must be seen.
+//! Faults planted in the kernels of compactions, and in their recording: each must be detected.
 
 use super::methods::{drawn, fault, method};
 use crate::support::{gpu, in_turn, kernels_with, open};
@@ -6,7 +6,7 @@ use raystone::compaction::{Compaction, Order, Passes};
 use raystone::gpu::{Bindings, Composition, GpuError};
 use std::sync::Arc;
 
-/// A kernel, a text in it and what stands in its place, and a method that runs it, with parameters.
+/// A kernel, a text and its replacement, and a method that runs it, with parameters.
 type Fault = (
     &'static str,
     [&'static str; 2],
@@ -26,21 +26,21 @@ const FAULTS: [Fault; 24] = [
     ("gather", ["kept_up_to(middle) > slot", "kept_up_to(middle) >= slot"], "blelloch", &[]),
     ("roger_blocks", ["excess == 0 && !is_hole(block_at, j)", "excess == 0"], "roger", &[("block", 16)]),
     ("atomic", ["flag != 0u", "flag != 7u"], "atomic", &[]),
-    // An order is lost that was promised.
+    // A promised order is lost.
     ("scatter", ["+ found.exclusive", "+ found.total - found.inclusive"], "reduce-scan-scatter", &[]),
     ("tile", ["(tile * SCAN_LANES + lane) * PER_LANE", "tile * SCAN_LANES * PER_LANE + lane"], "bucket-sort", &[("per_lane", 4)]),
-    // The last block, which is not whole, is dropped.
+    // The last, partial block is dropped.
     ("stream", ["element < stream_length[0]", "element < stream_length[0] / 64u * 64u"], "workgroup", &[]),
     ("roger_blocks", ["block >= blocked.blocks", "block + 1u >= blocked.blocks"], "roger", &[("block", 16)]),
-    // What lies behind the end counts as holes, and the search runs past them.
+    // Elements behind the end count as holes, and the search runs past them.
     ("holes", ["element < stream_length[0] && flag_of", "element < padded.words / 2u && flag_of"], "horn", &[]),
     // A second level of sums is missing.
     ("add_totals", ["sums[word] += totals[block]", "sums[word] += 0u * totals[block]"], "roger", &[("block", 16)]),
     ("add_totals", ["word < level.words", "word < level.words && level.blocks < 2u"], "reduce-scan-scatter", &[("lanes", 64)]),
-    // A bucket is left out, or two are one.
+    // A bucket is omitted, or two are merged.
     ("scatter", ["bucket < BUCKETS", "bucket + 1u < BUCKETS"], "bucket-sort", &[]),
     ("reduce", ["sums[bucket * tiling.tiles + tile]", "sums[tile]"], "bucket-sort", &[]),
-    // Holes are sorted first, places are those of other elements, the count is one short or one for all.
+    // Holes are sorted first, places of other elements, the count one short or one for all.
     ("keys", ["select(flag - 1u, HOLE, flag == 0u)", "flag"], "radix-sort", &[]),
     ("keys", ["places[element] = element", "places[element] = element ^ 1u"], "radix-sort", &[]),
     ("follow", ["kept_count[0] = slot + 1u", "kept_count[0] = slot"], "radix-sort", &[]),
@@ -79,7 +79,7 @@ impl Compaction for Promised {
     }
 }
 
-/// Adds to whatever stands in the count.
+/// Adds to the existing count.
 struct Uncleared;
 
 impl Compaction for Uncleared {
@@ -107,7 +107,7 @@ fn a_counter_that_is_not_cleared_is_seen() {
 
 #[test]
 fn an_unstable_order_is_seen_where_a_stable_one_is_promised() {
-    // The same elements in another order: backwards within each workgroup.
+    // The same elements in another order: reversed within each workgroup.
     let backwards = (
         "first_slot + found.exclusive",
         "first_slot + found.total - found.inclusive",

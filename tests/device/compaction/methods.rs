@@ -1,4 +1,4 @@
-//! Every registered method against the host, at all sizes where something ends.
+//! Every registered method against the host, at all boundary sizes.
 
 use crate::support::{gpu, in_turn};
 use raystone::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
@@ -22,7 +22,7 @@ pub fn method(name: &str, params: &[(&str, i64)]) -> Arc<dyn Compaction> {
     made.unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Each method at its defaults, and some with other parameters; those that this adapter cannot run are said.
+/// Each method with default parameters, and some with others; reports those that cannot run.
 fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
     let registry = CompactionRegistry::default();
     let mut variants: Vec<Variant> =
@@ -62,7 +62,7 @@ fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
     made.collect()
 }
 
-/// What is wrong with a method over the first `length` of these flags.
+/// The error of a method over the first `length` of these flags.
 pub fn fault(
     gpu: &Gpu,
     method: &Arc<dyn Compaction>,
@@ -74,7 +74,7 @@ pub fn fault(
     let inputs = Inputs::upload(gpu, flags.to_vec(), bytes).expect("buffers that fit");
     let bench = Bench::new(&player, gpu, Arc::clone(method), &inputs, room);
     let bench = bench.unwrap_or_else(|e| panic!("{e}"));
-    // Twice, so that what the first left behind is in the way of the second.
+    // Twice, so that leftovers of the first run interfere with the second.
     let judge = || bench.judge().unwrap_or_else(|e| panic!("{e}"));
     judge().or_else(judge)
 }
@@ -120,15 +120,15 @@ fn how_many_elements_there_are_may_stand_on_the_device_alone() {
     }
 }
 
-/// Methods whose workgroups do not lie in one row any more at the greatest size: a kernel each of an invocation per
-/// element, of tiles and of blocks.
+/// Methods whose workgroups no longer fit into one row at the largest size: one kernel each with an
+/// invocation per element, with tiles and with blocks.
 const PAST_A_ROW: [&str; 3] = [
     "atomic",
     "reduce-scan-scatter[(\"lanes\", 8), (\"per_lane\", 3)]",
     "roger",
 ];
 
-/// Three levels of sums, and more workgroups than lie in a row.
+/// Three levels of sums, and more workgroups than fit into a row.
 #[test]
 fn every_method_compacts_streams_of_several_levels() {
     for (name, method) in in_turn("methods of compaction", methods(gpu())) {
@@ -143,7 +143,7 @@ fn every_method_compacts_streams_of_several_levels() {
     }
 }
 
-/// Roger 2008, Fig. 4.8: four blocks of 16, of which 10, 9, 7 and 9 elements stay.
+/// Roger 2008, Fig. 4.8: four blocks of 16, of which 10, 9, 7 and 9 elements survive.
 #[test]
 fn the_worked_example_of_the_thesis_comes_out() {
     let text = "43X192XX7X6X58X5431X2X6XX7X98XX5X87XX235XXX6XX1X1XXX45X7X6X8329X";
@@ -161,7 +161,7 @@ fn the_worked_example_of_the_thesis_comes_out() {
     assert_eq!(holes, [6, 7, 9, 7]);
 }
 
-/// Workgroups of 64 for what stays, in rows of 65535; none where none stays.
+/// Workgroups of 64 for the survivors, in rows of 65535; none if there are none.
 #[test]
 fn an_indirect_dispatch_covers_what_stays() {
     let gpu = gpu();

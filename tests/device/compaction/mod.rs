@@ -1,4 +1,4 @@
-//! Stream compaction, and the scans that it is made of.
+//! Stream compaction, and its scans.
 
 mod faults;
 mod methods;

@@ -1,4 +1,4 @@
-//! Compactions in a run like any other: records, figures, report.
+//! Compactions in an ordinary run: records, figures, report.
 
 use crate::support::{plan, run};
 use raystone::measure::figure::{
@@ -32,7 +32,6 @@ min_warmup_ms = 0
 max_warmup_ms = 1
 "#;
 
-/// The compactions among some lines.
 fn compactions(lines: &[Line]) -> Vec<Recorded<'_, MeasuredRecord>> {
     let measured = all_of::<MeasuredRecord>(lines);
     measured
@@ -40,7 +39,7 @@ fn compactions(lines: &[Line]) -> Vec<Recorded<'_, MeasuredRecord>> {
         .collect()
 }
 
-/// Elements and bytes of an element, as the label of a cell says.
+/// A parameter such as elements or bytes, from the cell's label.
 fn parameter(cell: &Recorded<MeasuredRecord>, name: &str) -> f64 {
     let variant = cell.key.get(axis::INTEGRATOR).expect("a compaction");
     match &variant.params.0[name] {
@@ -105,7 +104,7 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     }
 }
 
-/// Kernels that count one too few: their cells have no figure, those of the embedded kernels beside them have.
+/// Kernels that count one too few have no figure, while the embedded ones do.
 #[test]
 fn a_method_that_is_wrong_has_no_figure() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Wide nodes made on the device: the same words as those of the host twin.
+//! Wide nodes made on the device: the same words as the host twin's.
 
 use super::soups::{clusters, equal_positions, shrinking};
 use super::{METHODS, SPONZA, with_builder};
@@ -12,13 +12,13 @@ use std::path::Path;
 
 const WIDE: [&dyn AccelKind; 2] = [&Bvh4, &Cwbvh];
 
-/// Parameters beside the builder.
+/// Parameters besides the builder.
 type Changes<'a> = &'a [(&'a str, ParamValue)];
 
 /// The words of all arrays, and the figures.
 type Words = (Vec<Vec<u32>>, StructureStats);
 
-/// What a builder leads to, if it is valid.
+/// The result of a builder, if it is valid.
 fn words(
     gpu: &Gpu,
     kind: &dyn AccelKind,
@@ -134,7 +134,7 @@ fn passes_of_the_collapse_are_timed_by_name() {
     assert!(!names.contains(&"collapse"), "{names:?}");
 }
 
-/// Kernel, what is wrong, and how.
+/// Kernel, original text, replacement, and the fault.
 const FAULTS: [(&str, &str, &str, &str); 19] = [
     (
         "costs",

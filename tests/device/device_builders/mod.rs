@@ -1,5 +1,5 @@
-//! Trees built on the device: equal to those of the host twin to the bit, valid, and passed by the gate over every
-//! structure that is made of a binary tree; and faults that these checks see.
+//! Trees built on the device: bit-identical to the host twin's, valid, and passing the correctness
+//! check in every structure over a binary tree; and faults that these checks detect.
 
 mod collapse;
 mod soups;
@@ -34,12 +34,11 @@ fn settings() -> Vec<Settings> {
     METHODS.into_iter().flat_map(both).collect()
 }
 
-/// The tree of the device, or what was found wrong with it.
 fn on_device(gpu: &Gpu, soup: &TriangleSoup, settings: &Settings) -> Result<LinkedTree, String> {
     device::build(soup, settings, &mut BuildLog::with_gpu(gpu)).map_err(|e| e.to_string())
 }
 
-/// Compares node by node; tells the first that differs.
+/// Compares node by node; reports the first difference.
 fn difference(host: &LinkedTree, device: &LinkedTree) -> Option<String> {
     if host.root != device.root || host.nodes.len() != device.nodes.len() {
         let size = |tree: &LinkedTree| (tree.root, tree.nodes.len());
@@ -56,7 +55,7 @@ fn difference(host: &LinkedTree, device: &LinkedTree) -> Option<String> {
     ))
 }
 
-/// Whether each inner node's box is that around its children, and leaves' those of their triangles.
+/// Checks that each inner node's box bounds its children, and each leaf's its triangles.
 fn check_boxes(tree: &LinkedTree, soup: &TriangleSoup) {
     for (index, node) in tree.nodes.iter().enumerate() {
         let around = Bounds::from(node.around());
@@ -128,7 +127,7 @@ fn clustering_equals_the_host_twin_whatever_its_radius() {
 
 #[test]
 fn clusters_of_equal_boxes_are_joined_in_few_rounds() {
-    // Where ties went to the first neighbour, a round would join one pair.
+    // If ties went to the first neighbour, a round would join one pair.
     let settings = Settings {
         method: Method::Ploc { radius: 14 },
         long_codes: false,
@@ -299,7 +298,7 @@ fn what_cannot_be_built_says_why() {
 
 #[test]
 fn faults_in_the_passes_are_seen() {
-    // Kernel, what is wrong, and whether triangles share their codes.
+    // Kernel, original text, replacement, and whether triangles share their codes.
     let faults = [
         (
             "device/boxes",
@@ -385,7 +384,7 @@ fn faults_in_the_passes_are_seen() {
             let host = build(soup, settings).expect("a tree");
             match on_device(&gpu, soup, settings) {
                 Ok(device) => difference(&host, &device).is_some(),
-                // Faults may end the build with an error, but not by a kernel that does not compile.
+                // Faults may fail the build, but not by a kernel that does not compile.
                 Err(error) => !error.contains(".wesl"),
             }
         };
@@ -394,13 +393,13 @@ fn faults_in_the_passes_are_seen() {
             let settings = settings().into_iter().filter(|s| s.method == method);
             settings.map(|s| seen(&s)).collect::<Vec<_>>()
         });
-        // What only one of the methods runs is not seen by the other.
+        // Code run by only one of the methods is not tested by the other.
         let all = |seen: &[bool]| seen.iter().all(|s| *s);
         assert!(all(&lbvh) || all(&ploc), "{what}: {lbvh:?} {ploc:?}");
     }
 }
 
-/// The triangles, each vertex moved by up to so much.
+/// The triangles, with each vertex displaced by up to `by`.
 fn moved(soup: &TriangleSoup, random: &mut Pcg, by: f32) -> TriangleSoup {
     let mut out = soup.clone();
     for record in &mut out.records {

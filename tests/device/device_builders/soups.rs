@@ -1,9 +1,9 @@
-//! Triangles that builders on the device have trouble with.
+//! Difficult triangles for device builders.
 
 use crate::support::{Pcg, scenes};
 use raystone::accel::TriangleSoup;
 
-/// All triangles in one place: every code is the same, and places alone decide.
+/// All triangles in one place: codes are equal, and only indices decide.
 pub fn equal_positions(count: usize) -> TriangleSoup {
     let corner = glam::Vec3::new(0.25, 3.0, -7.0);
     scenes::soup((0..count).map(|_| [corner, corner + glam::Vec3::X, corner + glam::Vec3::Y]))
@@ -21,8 +21,8 @@ pub fn clusters(random: &mut Pcg, count: usize) -> TriangleSoup {
     scenes::soup((0..count).map(triangle).collect::<Vec<_>>())
 }
 
-/// Boxes that halve in size towards the origin: of all neighbours only the last two choose each other, so that most
-/// rounds of clustering are joined without a look.
+/// Boxes that halve in size towards the origin: only the last two neighbours choose each other, so
+/// most rounds of clustering are joined without a search.
 pub fn shrinking(count: i32) -> TriangleSoup {
     let triangle = |i: i32| {
         let size = 2.0_f32.powf(50.0 - 0.08 * i as f32);

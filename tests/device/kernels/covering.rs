@@ -1,21 +1,22 @@
-//! Few rows in which any two choices meet: pairwise covering (D. Cohen, S. Dalal, M. Fredman, G. Patton, "The AETG system",
-//! 1997). A fault in composing nearly always hangs on one choice or on two; the full product would only repeat them.
+//! A small set of rows that covers every pair of choices: pairwise covering (D. Cohen, S. Dalal, M.
+//! Fredman, G. Patton, "The AETG system", 1997). Composition faults nearly always depend on one or
+//! two choices; the full product would only repeat them.
 
 use crate::support::Pcg;
 use std::collections::BTreeSet;
 
-/// A choice: which factor, and which of its levels.
 pub type Choice = (usize, usize);
 
-/// Rows with one level of each factor: for any two levels of two factors that do not clash there is a row with both. `levels`
-/// tells how many each factor has. Where nothing is left to cover, levels are drawn: also of three and more many meet.
+/// Rows with one level per factor, such that any two levels of two factors that do not clash share
+/// a row. `levels` holds the number of levels per factor. Free levels are random, so many
+/// combinations of three and more occur, too.
 ///
 /// # Panics
-/// Levels clash so that a row cannot be filled.
+/// If clashes prevent filling a row.
 pub fn pairwise(levels: &[usize], clash: impl Fn(Choice, Choice) -> bool) -> Vec<Vec<usize>> {
     let mut random = Pcg::new(levels.len() as u64);
     let mut left = pairs(levels, &clash);
-    // Factors with many levels first: their pairs decide how many rows there are.
+    // Factors with many levels first: their pairs determine the number of rows.
     let mut order: Vec<usize> = (0..levels.len()).collect();
     order.sort_by_key(|factor| std::cmp::Reverse(levels[*factor]));
     let mut rows = Vec::new();
@@ -45,7 +46,6 @@ pub fn pairwise(levels: &[usize], clash: impl Fn(Choice, Choice) -> bool) -> Vec
     rows
 }
 
-/// All pairs of levels that do not clash.
 pub fn pairs(
     levels: &[usize],
     clash: impl Fn(Choice, Choice) -> bool,

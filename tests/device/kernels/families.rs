@@ -1,4 +1,4 @@
-//! What can be chosen for a kernel, and kernels in which any two choices meet.
+//! Choices of a kernel, and kernels that cover every pair of choices.
 
 use super::covering::{Choice, pairwise};
 use crate::support::{Pcg, build, param_variants, scenes};
@@ -11,14 +11,14 @@ use raystone::params::{Entry, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Of a kernel, what is chosen for one purpose.
+/// The part of a kernel chosen for one purpose.
 pub type Part = Composition;
 
 fn part() -> Part {
     Composition::default()
 }
 
-/// What a part makes of the text; constants change numbers alone.
+/// Source text that depends on a part; constants only change numbers.
 fn text_of(part: &Part) -> Part {
     Part {
         constants: BTreeMap::new(),
@@ -26,7 +26,7 @@ fn text_of(part: &Part) -> Part {
     }
 }
 
-/// What can be chosen for one purpose, by levels of one text each. Parts of a level take turns.
+/// Choices for one purpose, by levels of equal text. Parts of a level alternate.
 pub struct Factor {
     pub name: &'static str,
     pub levels: Vec<Vec<Part>>,
@@ -52,7 +52,6 @@ impl Factor {
         Self::new(name, [part(), part().feature(name, true)])
     }
 
-    /// Where a kernel starts.
     fn entry(entries: &[&str]) -> Self {
         let parts = entries.iter().map(|entry| Part::new(entry));
         Self::new("entry", parts)
@@ -76,7 +75,7 @@ impl Level<'_> {
     }
 }
 
-/// Kernels in which any two choices meet that can.
+/// Kernels that cover every possible pair of choices.
 pub struct Family {
     factors: Vec<Factor>,
     rows: Vec<Vec<usize>>,
@@ -84,7 +83,7 @@ pub struct Family {
 }
 
 impl Family {
-    /// `clash` says, of two levels in both orders, whether no experiment takes both.
+    /// `clash` is true for two levels, in both orders, that no experiment combines.
     fn new(base: &Part, factors: Vec<Factor>, clash: impl Fn(Level, Level) -> bool) -> Self {
         let levels: Vec<usize> = factors.iter().map(|f| f.levels.len()).collect();
         let level = |(factor, level): Choice| Level {
@@ -137,7 +136,7 @@ impl Family {
         [with, without].map(|half| half.into_iter().map(|(_, kernel)| kernel).collect())
     }
 
-    /// The modules that can take this place.
+    /// The modules available for this role.
     pub fn modules(&self, role: &str) -> BTreeSet<&str> {
         let factor = self.factors.iter().find(|f| f.name == role);
         let levels = factor.map_or(&[][..], |f| &f.levels);
@@ -145,21 +144,19 @@ impl Family {
         modules.map(String::as_str).collect()
     }
 
-    /// How many levels each factor has.
     pub fn levels(&self) -> Vec<(&'static str, usize)> {
         let factors = self.factors.iter();
         factors.map(|f| (f.name, f.levels.len())).collect()
     }
 }
 
-/// A level of a factor: the module that takes its place, or `on` or `off` of a feature.
+/// A level of a factor: the module in its role, or `on` or `off` for a feature.
 #[derive(Debug, Clone, Copy)]
 pub struct Chosen {
     pub factor: &'static str,
     pub choice: &'static str,
 }
 
-/// Adds a part to a kernel.
 fn lay(part: &Part, kernel: &mut Composition) {
     if !part.entry.is_empty() {
         kernel.entry.clone_from(&part.entry);
@@ -187,7 +184,7 @@ fn structures() -> (Factor, BTreeSet<Part>) {
     (Factor::new("accel", parts), refilled)
 }
 
-/// How rays meet triangles and boxes.
+/// Triangle and box tests.
 fn intersections() -> [Factor; 2] {
     let default = Intersection::default();
     let triangles = TriangleRegistry::default();
@@ -214,7 +211,6 @@ fn intersections() -> [Factor; 2] {
     ]
 }
 
-/// Shapes of workgroups, as their names tell them.
 fn workgroups() -> Factor {
     let named = Workgroup::ALL.iter().filter(|group| group.name != "auto");
     let parts = named.map(|group| {
@@ -227,7 +223,6 @@ fn workgroups() -> Factor {
     Factor::new("workgroup", parts)
 }
 
-/// Every entry with its parameters.
 fn variants(entries: &[Entry]) -> Vec<Variant> {
     let mut out = Vec::new();
     for entry in entries {
@@ -241,7 +236,7 @@ fn variants(entries: &[Entry]) -> Vec<Variant> {
     out
 }
 
-/// Sequences and decorrelations, and which of them make a sampler.
+/// Sequences and decorrelations, and the valid pairs.
 fn samplers() -> ([Factor; 2], BTreeSet<[String; 2]>) {
     let registry = SamplerRegistry::default();
     let demand = Demand {
@@ -283,7 +278,7 @@ fn offsets() -> Factor {
     Factor::new("offset", offsets.iter().map(|o| o.activate(part())))
 }
 
-/// Integrators with their parameters, and those that can be taken apart.
+/// Integrators with their parameters, and those that can be split.
 fn integrators() -> (Factor, BTreeSet<Part>) {
     let (mut parts, mut staged) = (Vec::new(), BTreeSet::new());
     for kind in IntegratorRegistry::default().iter() {
@@ -305,7 +300,7 @@ fn integrators() -> (Factor, BTreeSet<Part>) {
     (Factor::new("integrator", parts), staged)
 }
 
-/// Flags of scenes and of what carries those that a scene does without, and the flag of the counting run.
+/// Flags of scenes and their carriers, and the flag of the counting run.
 fn flags(more: &[&'static str]) -> Vec<Factor> {
     let of_scenes = SceneFeatures::default().flags();
     let of_scenes = of_scenes.into_iter().map(|(name, _)| name);
@@ -314,7 +309,7 @@ fn flags(more: &[&'static str]) -> Vec<Factor> {
     names.map(Factor::feature).collect()
 }
 
-/// What answers buffers of rays.
+/// Kernels that answer ray buffers.
 pub fn batches() -> Family {
     let (accel, refilled) = structures();
     let mut factors = vec![accel, workgroups()];
@@ -334,7 +329,7 @@ pub fn batches() -> Family {
     Family::new(&Part::new("integrator/trace_rays"), factors, clash)
 }
 
-/// Whether two levels are the halves of no sampler.
+/// True if two levels do not form a valid sampler.
 fn are_no_sampler(a: Level, b: Level, pairs: &BTreeSet<[String; 2]>) -> bool {
     let halves = (
         a.part.active.get("sequence"),
@@ -346,12 +341,12 @@ fn are_no_sampler(a: Level, b: Level, pairs: &BTreeSet<[String; 2]>) -> bool {
     }
 }
 
-/// Whether one says that there are balls that shine, and the other that there are no lights.
+/// True if one has spherical lights, and the other no lights.
 fn are_no_lights(a: Level, b: Level) -> bool {
     a.is_on("sphere_lights") && b.is_off("lights")
 }
 
-/// What makes images in one kernel.
+/// Kernels that render in one pass.
 pub fn renderers() -> Family {
     const REGENERATION: &str = "organisation/regeneration";
     let (accel, _) = structures();
@@ -372,9 +367,9 @@ pub fn renderers() -> Family {
     Family::new(&part(), factors, clash)
 }
 
-/// What makes images in several kernels with queues between them.
+/// Kernels that render in several passes with queues.
 pub fn queued() -> Family {
-    /// Run whether the queue is kept dense or not; then, only if it is.
+    /// Run with and without queue compaction; then those run only with it.
     const ALWAYS: [&str; 5] = ["accumulate", "extend", "finish", "generate", "shade"];
     const COMPACTED: [&str; 6] = [
         "kinds",

@@ -1,16 +1,15 @@
-//! A kernel and a queue for each kind of material: the image of the single kernel to the bit, kernels without what other kinds
-//! need, and planted faults.
+//! One kernel and queue per material kind: images bit-identical to the single kernel, kernels
+//! without the code of other kinds, and planted faults.
 
 use super::*;
 use glam::Vec2;
 use raystone::scene::{CookTorrance, Fresnel, Light, Masking, Material, Texture, TextureUse};
 
-/// `wavefront` with little room and a kernel for each kind of material.
+/// `wavefront` with a small queue and a kernel per material kind.
 fn per_material(more: &[(&str, ParamValue)]) -> Variant {
     small(&[&[("shading", word("per-material"))], more].concat())
 }
 
-/// A picture that repeats.
 fn picture() -> Texture {
     let texel = |i: u8| [40 * i, 255 - 30 * i, 90 + 20 * i, 255];
     Texture {
@@ -21,7 +20,7 @@ fn picture() -> Texture {
     }
 }
 
-/// One of each kind, and one that shines on its front; some with textures.
+/// One of each kind, and one with a shining front; some with textures.
 fn materials() -> Vec<Material> {
     let grey = Vec3::new(0.8, 0.7, 0.6);
     let lobes = CookTorrance {
@@ -52,7 +51,7 @@ fn materials() -> Vec<Material> {
     ]
 }
 
-/// Triangles of all kinds side by side below a white sky, some that shine among them, and a ball of light that rays meet, too.
+/// Triangles of all kinds below a white sky, some shining, and a ball of light rays can hit.
 fn all_kinds() -> SceneData {
     let mut scene = builtin(
         "triangle-soup",
@@ -77,7 +76,7 @@ fn all_kinds() -> SceneData {
     scene
 }
 
-/// All kinds, one kind beside what is cut out by masks, and glass in a room.
+/// All kinds, one kind next to masked surfaces, and glass in a room.
 fn scenes() -> [SceneData; 3] {
     let foliage = builtin("foliage", &[("plants", ParamValue::Integer(6))]);
     [all_kinds(), foliage, glass_box()]
@@ -179,7 +178,7 @@ fn a_kernel_has_its_own_kind_alone_in_it() {
     for name in own {
         assert_eq!(kernels_with(name), 1, "{name}");
     }
-    // Two kinds have textures, and what has met nothing has no surface.
+    // Two kinds have textures, and rays that have hit nothing have no surface.
     assert_eq!(kernels_with("bilinear"), 2);
     assert_eq!(kernels_with("load_surface_from"), 6);
     let kinds = [
@@ -204,31 +203,32 @@ fn planted_faults_are_seen() {
     let mut unseen = Vec::new();
     #[rustfmt::skip]
     let faults = [
-        // The kernel of another kind; a kind in no queue, and in that of its neighbour, too; what has met nothing is in none.
+        // The kernel of another kind; a kind in no queue, and in that of its neighbour, too; rays
+        // without a hit are in none.
         (&by, "organisation/kinds", "FIRST_KIND + material_kind(", "FIRST_KIND + 0u * material_kind("),
         (&by, "organisation/kinds", "flags[at] = flag;", "flags[at] = select(flag, 0u, flag == FIRST_KIND + 4u);"),
         (&one_by_one, "compaction/stream", "flags[element] == BUCKET", "flags[element] == BUCKET || flags[element] == BUCKET + 1u"),
         (&by, "organisation/kinds", "var flag = MISSED;", "var flag = 0u;"),
         (&by, "organisation/kinds", "triangle != NO_HIT", "triangle < 7u"),
-        // What shines on one side is of no kind.
+        // One-sided emitters are of no kind.
         (&one_by_one, "shading/material", "return kind & ~ONE_SIDED;", "return kind;"),
-        // A queue is one short, has the count of that before it, or workgroups rounded down.
+        // A queue is one short, has the previous one's count, or workgroups rounded down.
         (&by, "organisation/plan_kind", "let found = kind_counts[QUEUE];", "let found = max(kind_counts[QUEUE], 1u) - 1u;"),
         (&by, "organisation/plan_kind", "atomicStore(&counts[OF_KIND], found);", ""),
         (&by, "organisation/plan_kind", "write_groups(found);", "write_groups(found / 64u * 64u);"),
         (&by, "organisation/shade", "at >= atomicLoad(&counts[OF_KIND])", "at + 1u >= atomicLoad(&counts[OF_KIND])"),
         (&by, "organisation/plan_kind", "kind_counts[QUEUE]", "kind_counts[QUEUE ^ 1u]"),
         (&by, "compaction/atomic", "kept_count[flag - 1u]", "kept_count[0u]"),
-        // Paths of a neighbour, of any kind, and of the order before they were sorted.
+        // Paths of a neighbour, of any kind, and of the order before sorting.
         (&by, "organisation/shade", "QUEUE * batch.capacity + at]", "(QUEUE ^ 1u) * batch.capacity + at]"),
         (&by, "compaction/atomic", "(flag - 1u) * part.capacity", "(flag - 1u) * (part.capacity - 1u)"),
         (&by, "organisation/shade", "order[QUEUE * batch.capacity + at];", "order[QUEUE * batch.capacity + at + 1u];"),
         (&by, "organisation/shade", "let place = order[QUEUE * batch.capacity + at];", "let place = at;"),
         (&by, "organisation/kinds", "places[at] = at;", "places[at] = at / 2u;"),
         (&sorted, "organisation/kinds", "answers[places[at]].y", "answers[at].y"),
-        // What a kind needs is not in its kernel.
+        // A kind's requirement is missing in its kernel.
         (&by, "shading/material", "@if(textures) base_color", "@if(textures && phong) base_color"),
-        // Sums of all queues are kept.
+        // Sums of all queues persist.
         (&by, "organisation/plan", "atomicStore(&counts[QUEUED], 0u);", ""),
     ];
     for (by, module, from, to) in in_turn("faults of organisations by kinds", faults) {

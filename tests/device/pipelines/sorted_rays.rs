@@ -1,4 +1,4 @@
-//! A plain BVH whose rays are sorted before they are traced: five passes and one of clearing.
+//! A plain BVH whose rays are sorted before tracing: five passes and a clearing one.
 
 use raystone::accel::{
     AccelError, AccelKind, Access, BuildLog, BuiltAccel, BuiltBvh, Bvh, BvhParameters, CpuTwin,

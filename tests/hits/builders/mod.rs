@@ -1,5 +1,5 @@
-//! The builders of the binary tree: the same tree for any number of threads, exact hits where
-//! triangles are split, a bound on the depth, quality on a real scene, and bad input.
+//! Builders of the binary tree: the same tree for any number of threads, exact hits where triangles
+//! are split, bounded depth, quality on a real scene, and bad input.
 
 mod spatial_splits;
 
@@ -54,7 +54,6 @@ fn with_builder(name: &str, changes: &[&str]) -> Params {
     params(&[&[builder.as_str()], changes].concat())
 }
 
-/// The parameters of the tree among those of `bvh`.
 fn tree(params: &Params) -> TreeParameters {
     BvhParameters::from_params(params)
         .expect("parameters of bvh")
@@ -66,7 +65,7 @@ fn build(soup: &TriangleSoup, params: &Params) -> Tree {
         .unwrap_or_else(|e| panic!("{params:?}: {e}"))
 }
 
-/// The triangles of a model, or `None` with a word on the terminal.
+/// The triangles of a model, or `None` with a message.
 fn model(path: &str) -> Option<TriangleSoup> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if !path.exists() {
@@ -87,7 +86,7 @@ fn model(path: &str) -> Option<TriangleSoup> {
     Some(TriangleSoup::new(&scene))
 }
 
-/// Closest hits of the scalar twin of `bvh`, whose structure is valid.
+/// Closest hits of the scalar twin of `bvh`, after validating its structure.
 fn hits(soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Vec<Hit> {
     let built = Bvh
         .build(soup, params, &mut BuildLog::default())
@@ -101,7 +100,7 @@ fn hits(soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Vec<Hit> {
     rays.iter().map(closest).collect()
 }
 
-/// Long thin triangles along the axes, the case for spatial splits; `tilt` turns them away.
+/// Long thin axis-aligned triangles, the case for spatial splits; `tilt` rotates them away.
 fn sticks(rng: &mut Pcg, count: usize, tilt: f32) -> TriangleSoup {
     let mut random = |size: f32| size * Vec3::new(rng.signed(), rng.signed(), rng.signed());
     let stick = |i: usize| {
@@ -112,7 +111,6 @@ fn sticks(rng: &mut Pcg, count: usize, tilt: f32) -> TriangleSoup {
     scenes::soup((0..count).map(stick).collect::<Vec<_>>())
 }
 
-/// Small triangles all over a cube.
 fn clutter(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let mut random = |size: f32| size * Vec3::new(rng.signed(), rng.signed(), rng.signed());
     let triangle = |_| {
@@ -124,7 +122,7 @@ fn clutter(rng: &mut Pcg, count: usize) -> TriangleSoup {
 
 #[test]
 fn every_builder_makes_the_same_tree_on_any_number_of_threads() {
-    // More than one thread bins and sorts.
+    // Enough to bin and sort in several threads.
     let soup = clutter(&mut Pcg::new(5), 70_000);
     let rounds = ["reinsertion=1", "reinsertion_share=0.02"];
     for name in builders() {
@@ -203,7 +201,7 @@ fn leaves_are_chosen_by_cost_within_their_bounds() {
     let free = histogram(&["leaf_size=31"]);
     let fat = histogram(&["leaf_size=31", "traversal_cost=100"]);
     assert!(fat.len() > free.len(), "{fat:?} {free:?}");
-    // Dufay's rule: nodes of six triangles or fewer are not divided.
+    // Dufay's rule: nodes of six triangles or fewer are not split.
     let dufay = with_builder("longest-axis-sweep", &["leaf_size=31", "min_leaf_size=6"]);
     let tree = build(&soup, &dufay);
     for node in &tree.nodes {
@@ -219,7 +217,7 @@ fn leaves_are_chosen_by_cost_within_their_bounds() {
 
 #[test]
 fn the_depth_is_bounded_whatever_the_input() {
-    // Boxes that halve in size towards the origin make every greedy split cut one off.
+    // Boxes that halve in size towards the origin make every greedy split cut off one.
     let shrinking = |i: i32| {
         let size = 2.0_f32.powf(50.0 - 0.1 * i as f32);
         let corner = Vec3::splat(size);
@@ -310,7 +308,7 @@ fn the_trees_of_sponza_are_as_good_as_promised() {
     let binned = cost("binned", &[]);
     assert!(binned <= 70.6);
     assert!(cost("sweep", &[]) <= binned);
-    // As good as another program's spatial splits, tinybvh's.
+    // As good as the spatial splits of tinybvh.
     assert!(cost("sbvh", &[]) <= 64.4);
     assert!(cost("sbvh", &["spatial_clip=false"]) > 67.0);
     assert!(cost("sbvh", &["reinsertion=2", "reinsertion_share=0.1"]) <= 61.0);
@@ -319,7 +317,7 @@ fn the_trees_of_sponza_are_as_good_as_promised() {
 
 #[test]
 fn triangles_are_built_from_the_vertices_that_kernels_see() {
-    // Edges that round: the box of the file's vertices is not that of the record.
+    // Edges that round: the box of the file's vertices differs from that of the record.
     let vertices = [
         Vec3::new(1.0e6, 0.1, 0.3),
         Vec3::new(1.0e-3, 0.2, 0.7),

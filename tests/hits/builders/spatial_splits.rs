@@ -1,5 +1,5 @@
-//! Spatial splits: hits are exact where triangles are cut, in every structure over such a tree; trees cost what
-//! geometry says; what a triangle's leaves hold, and that a lost piece is found.
+//! Spatial splits: exact hits on clipped triangles in every structure over such a tree; expected
+//! tree costs; contents of a triangle's leaves, and detection of lost pieces.
 
 use super::{SPONZA, build, hits, model, params, sticks, with_builder};
 use crate::support::scenes::{self, aimed_rays, lattice_rays, lattice_soup};
@@ -13,8 +13,7 @@ use raystone::integrator::Traced;
 use raystone::measure::gate::Checks;
 use raystone::params::{ParamValue, Params};
 
-/// Rays within rounding of the plane of some triangle, through its box: by rounding they may be
-/// given a hit anywhere in the box.
+/// Rays nearly in the plane of a triangle: rounding may hit anywhere in its box.
 fn grazing_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let record = &soup.records[rng.below(soup.records.len() as u32) as usize];
@@ -36,7 +35,7 @@ fn grazing_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
-/// SBVH that splits whenever it can.
+/// SBVH that splits whenever possible.
 fn eager_sbvh(changes: &[&str]) -> Params {
     with_builder(
         "sbvh",
@@ -44,8 +43,8 @@ fn eager_sbvh(changes: &[&str]) -> Params {
     )
 }
 
-/// Rays towards points of triangles, at a cosine of at least 1/16 to their planes: clipped triangles promise
-/// nothing below 1/32.
+/// Rays towards points of triangles, at a cosine of at least 1/16 to their planes: clipped
+/// triangles guarantee nothing below 1/32.
 fn steep_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let record = &soup.records[rng.below(soup.records.len() as u32) as usize];
@@ -66,7 +65,6 @@ fn steep_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
     (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
-/// Long thin triangles of all kinds.
 fn split_soup(rng: &mut Pcg, seed: u64) -> TriangleSoup {
     match seed % 3 {
         0 => lattice_soup(rng, 80, 6),
@@ -75,7 +73,7 @@ fn split_soup(rng: &mut Pcg, seed: u64) -> TriangleSoup {
     }
 }
 
-/// What a spatial split does to a triangle: cut it, or its box.
+/// Split modes: clip the triangle, or its box.
 const WAYS: [&str; 2] = ["spatial_clip=true", "spatial_clip=false"];
 
 #[test]
@@ -90,7 +88,7 @@ fn hits_are_exact_where_triangles_are_split() {
         let first = brute_force(&soup, &rays);
         rays.extend(scenes::cut_at_hits(&rays, &first));
         let expected = brute_force(&soup, &rays);
-        // Where boxes are cut, all rays are proved.
+        // If boxes are clipped, all rays are proven.
         let grazing = grazing_rays(&mut rng, &soup, 600);
         let expected_grazing = brute_force(&soup, &grazing);
         for changes in [&[][..], &["reinsertion=5"], &["spatial_bins=3", "bins=2"]] {
@@ -112,7 +110,6 @@ fn hits_are_exact_where_triangles_are_split() {
     assert!(clipped < 5);
 }
 
-/// Every structure over binary trees, on clipped triangles.
 #[test]
 fn structures_over_clipped_triangles_pass_the_gate() {
     let gpu = support::gpu();
@@ -152,7 +149,7 @@ fn structures_over_clipped_triangles_pass_the_gate() {
 
 #[test]
 fn grazing_rays_are_given_hits_outside_the_triangle() {
-    // Why clipped triangles promise nothing of such rays: see `src/accel/tree/sbvh.rs`.
+    // Why clipped triangles guarantee nothing for such rays: see `src/accel/tree/sbvh.rs`.
     let mut rng = Pcg::new(9);
     let soup = sticks(&mut rng, 200, 8.0);
     let rays = grazing_rays(&mut rng, &soup, 20_000);
@@ -164,7 +161,7 @@ fn grazing_rays_are_given_hits_outside_the_triangle() {
         let [a, b, c] = record.triangle().vertices.map(Vec3::as_dvec3);
         let point = Vec3::from(ray.origin).as_dvec3()
             + f64::from(hit.t) * Vec3::from(ray.direction).as_dvec3();
-        // Barycentric coordinates of the point's foot in the plane.
+        // Barycentric coordinates of the point's projection onto the plane.
         let (e1, e2, p) = (b - a, c - a, point - a);
         let n = e1.cross(e2);
         let u = p.cross(e2).dot(n) / n.length_squared();
@@ -190,8 +187,8 @@ fn leaves_of(tree: &Tree, id: u32) -> Vec<Bounds> {
 
 #[test]
 fn the_leaves_of_a_triangle_hold_what_hits_may_be_given() {
-    // By how much a hit errs at a cosine of 1/32: 2 · 2⁻²⁰ · 32 times the diagonal, and more for slivers, whose
-    // normal is a small difference of large products.
+    // Error of a hit at a cosine of 1/32: 2 · 2⁻²⁰ · 32 times the diagonal, and more for slivers,
+    // whose normal is a small difference of large products.
     let margin = |soup: &TriangleSoup, e1: DVec3, e2: DVec3| {
         let bounds = scenes::box_of(soup);
         let [low, high] = [bounds.min, bounds.max].map(|v| Vec3::from(v).as_dvec3());
@@ -210,7 +207,7 @@ fn the_leaves_of_a_triangle_hold_what_hits_may_be_given() {
             let reach = margin(&soup, b - a, c - a);
             let leaves = [0, 1].map(|way: usize| leaves_of(&trees[way], record.id));
             for _ in 0..200 {
-                // Of the triangle, moved by the margin at most, within its box.
+                // A point of the triangle, moved by at most the margin, within its box.
                 let (u, v) = (f64::from(rng.unit()), f64::from(rng.unit()));
                 let near = a + u * (b - a) + v * u * (c - b);
                 let mut any = || Vec3::new(rng.signed(), rng.signed(), rng.signed()).as_dvec3();
@@ -241,14 +238,14 @@ fn the_leaves_of_a_triangle_hold_what_hits_may_be_given() {
     }
 }
 
-/// Four times this triangle, in the plane x = z, whose box is the cube of side 8.
+/// Four copies of this triangle, in the plane x = z, whose box is the cube of side 8.
 const DIAGONAL: [Vec3; 3] = [Vec3::ZERO, Vec3::splat(8.0), Vec3::new(8.0, 6.0, 8.0)];
 
 #[test]
 fn a_diagonal_triangle_costs_what_its_parts_cost() {
-    // Cut at x = 4, where the sum of both areas is least: the parts have the boxes [0, 4]³ and
-    // [4, 8] × [3, 8] × [4, 8], of half areas 48 and 56; that of the whole is 192. Their boxes cut have 128 each,
-    // and no cut pays. The margin is 0.01.
+    // Cut at x = 4, where the sum of both areas is smallest: the parts have the boxes [0, 4]³ and
+    // [4, 8] × [3, 8] × [4, 8], of half areas 48 and 56; that of the whole is 192. Clipped boxes
+    // have 128 each, and no cut pays. The margin is 0.01.
     let soup = scenes::soup([DIAGONAL; 4]);
     let tree = build(&soup, &with_builder("sbvh", &[]));
     let cost = tree.stats().sah_cost.expect("a cost");
@@ -279,7 +276,7 @@ fn a_diagonal_triangle_costs_what_its_parts_cost() {
 
 #[test]
 fn the_corners_that_diagonal_triangles_miss_are_nobody_elses() {
-    // A small triangle on either side of their plane, of which no part's box holds anything.
+    // A small triangle on either side of their plane, outside every part's box.
     let small = |at: Vec3| [at, at + Vec3::X, at + Vec3::Y];
     let corners = [Vec3::new(6.0, 4.0, 1.0), Vec3::new(1.0, 4.0, 6.0)].map(small);
     let soup = scenes::soup([DIAGONAL; 4].into_iter().chain(corners));
@@ -292,8 +289,8 @@ fn the_corners_that_diagonal_triangles_miss_are_nobody_elses() {
         )
     };
     let ((clipped, cost), (boxes, whole)) = (figures(&[]), figures(&["spatial_clip=false"]));
-    // The leaf of the four has the small ones in its box: 1 of the surface, for each of four tests; so has the node
-    // that one of them is in.
+    // The leaf of the four has the small ones in its box: surface fraction 1, for four tests; so
+    // has the node that contains one of them.
     let area = 4.0 * 0.5 * 512.0_f64.sqrt() + 1.0;
     println!(
         "EPO {clipped} and {boxes} (4 / area: {}), SAH {cost} and {whole}",
@@ -339,14 +336,14 @@ fn check_sponza(rays_of_each_kind: usize) {
     let expected = hits(&soup, &params(&[]), &rays);
     let sbvh = with_builder("sbvh", &["spatial_alpha=0.00001", "reinsertion=1"]);
     assert_same_hits("sbvh", &rays, &expected, &hits(&soup, &sbvh, &rays));
-    // The plain tree is judged by brute force on a few of them.
+    // The plain tree is checked by brute force on a few of them.
     let step = rays.len() / 40;
     let few: Vec<Ray> = rays.iter().step_by(step).copied().collect();
     let judged: Vec<Hit> = expected.iter().step_by(step).copied().collect();
     assert_same_hits("binned", &few, &brute_force(&soup, &few), &judged);
 }
 
-/// Twice this many rays: RAYSTONE_REAL_RAYS (500,000 make a million, and a minute), or 20,000.
+/// Rays of each kind: RAYSTONE_REAL_RAYS (500,000 make a million, and a minute), or 20,000.
 fn real_rays() -> usize {
     let set = std::env::var("RAYSTONE_REAL_RAYS").ok();
     let parse = |text: String| text.parse().expect("RAYSTONE_REAL_RAYS is a number");
@@ -381,7 +378,7 @@ fn a_tree_that_loses_a_piece_of_a_split_triangle_is_found_wrong() {
     let found = (0..tree.order.len())
         .filter(|e| check(Some(*e)).is_err())
         .count();
-    // A piece may be covered by chance by other leaves of the same triangle; most are not.
+    // Other leaves of the same triangle may cover a piece by chance; most are not covered.
     assert!(
         10 * found > 9 * tree.order.len(),
         "{found} of {}",

@@ -1,4 +1,4 @@
-//! The comparison itself, on answers made by hand.
+//! The comparison itself, on hand-made answers.
 
 use glam::Vec3;
 use raystone::accel::triangle::TriangleRecord;
@@ -8,8 +8,7 @@ use raystone::measure::gate::compare;
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::{ClassVerdict, RayClass};
 
-/// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 beside them in the same plane, and
-/// triangle 3 far behind.
+/// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 next to them, triangle 3 far behind.
 fn soup() -> TriangleSoup {
     let triangle = |x: f32, z: f32| Triangle {
         vertices: [
@@ -52,7 +51,6 @@ fn set() -> RaySet {
     }
 }
 
-/// Compares with the first hit changed.
 fn with(change: impl Fn(&mut Hit), exact: bool) -> ClassVerdict {
     let set = set();
     let mut hits = set.truth.clone();

@@ -1,4 +1,4 @@
-//! What is wrong does not pass: faults in the structure, in its kernel, and in the judge.
+//! Faults in the structure, its kernel, or the reference tracer must fail the check.
 
 use super::faulty::{SHORT_STACK, WRONG_INDEX, WRONG_INDEX_ROPED};
 use super::{judge, verdict, wrong};
@@ -16,14 +16,14 @@ fn cornell() -> Stage {
     Stage::builtin(gpu(), "cornell-box", &[])
 }
 
-/// The ray of a text like `ray ox oy oz dx dy dz t_min t_max | …`.
+/// Parses a ray from text like `ray ox oy oz dx dy dz t_min t_max | …`.
 fn parse_ray(text: &str) -> Ray {
     let ray = text.split(" | ").next();
     let ray = ray.and_then(|t| t.strip_prefix("ray "));
     ray.expect("a ray").parse().expect("eight numbers")
 }
 
-/// The first wrong ray says what the judge said; traced again, every triangle says the same.
+/// Checks that the first wrong ray reports the reference's answer, as does tracing every triangle.
 fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     let told = verdict.classes.iter().filter(|c| c.first_wrong.is_some());
     assert!(told.clone().count() > 0, "{verdict:?}");
@@ -38,7 +38,6 @@ fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     }
 }
 
-/// Rays whose nearest hit is `triangle`.
 fn hits_of(judge: &Judge, triangle: u32) -> usize {
     let truth = judge.sets.iter().flat_map(|set| &set.truth);
     truth.filter(|hit| hit.triangle == triangle).count()
@@ -104,7 +103,7 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
     assert!(hits > 0);
     assert!(verdict(gpu(), &right, structure("brute-force"), &judge).passed);
 
-    // Brute force sees the copies last: the last of equals wins every time.
+    // Brute force tests the copies last: the last of equals always wins.
     let last_wins = open(kernels_with("accel/triangle", &[(nearer, "t <= (*hit).t")]));
     let stage = Stage::new(&last_wins, scene());
     let faulty = verdict(&last_wins, &stage, structure("brute-force"), &judge);
@@ -112,7 +111,7 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
     assert_eq!(wrong(&faulty), hits);
     check_replay(&faulty, &stage.soup);
 
-    // The first of equals wins: right where triangles come in order, and only there.
+    // The first of equals wins: correct only if triangles come in order.
     let first_wins = open(kernels_with("accel/triangle", &[(nearer, "t < (*hit).t")]));
     let stage = Stage::new(&first_wins, scene());
     let in_order = verdict(&first_wins, &stage, structure("brute-force"), &judge);
@@ -157,7 +156,7 @@ fn a_structure_does_not_pass_before_a_judge_that_is_itself_wrong() {
     let sound = judge(&stage, 1024);
     assert!(sound.is_sound() && sound.first_wrong.is_none());
 
-    // The judge believes in a floor elsewhere; structures built on the same belief agree with it.
+    // The reference has a floor elsewhere; structures built on the same data agree with it.
     let mut misled = cornell();
     for record in &mut misled.soup.records[..2] {
         record.v0[1] += 50.0;

@@ -1,4 +1,4 @@
-//! Structures that wrap a real one and plant a fault in it.
+//! Structures that wrap a real one and plant a fault.
 
 use raystone::accel::StructureStats;
 use raystone::accel::{
@@ -6,20 +6,16 @@ use raystone::accel::{
 };
 use raystone::params::{ParameterSchema, Params};
 
-/// What is planted.
 #[derive(Clone, Copy)]
 pub enum Fault {
-    /// The leaf that holds this triangle calls it by a number that no triangle has.
+    /// The leaf with this triangle uses an invalid index for it.
     TriangleIndex(u32),
-    /// A constant of the kernel has another value.
+    /// A kernel constant has another value.
     Constant(&'static str, u32),
-    /// `validate` complains; hits are right.
     Structural,
-    /// `build` gives up.
     Build,
 }
 
-/// A structure with a fault.
 pub struct Faulty {
     pub name: &'static str,
     pub inner: &'static dyn AccelKind,
@@ -52,7 +48,7 @@ pub static NOT_BUILT: Faulty = Faulty {
     fault: Fault::Build,
 };
 
-/// The number that a faulty leaf gives: behind every other, so that it loses all ties.
+/// The invalid triangle index: the largest, so that it loses all ties.
 pub const NOBODY: u32 = u32::MAX - 1;
 
 impl AccelKind for Faulty {
@@ -111,7 +107,7 @@ impl BuiltAccel for Built {
                     .iter_mut()
                     .find(|a| a.name == "leaf_triangles");
                 let words = leaves.expect("a leaf array").words.to_mut();
-                // A record is twelve words, its index the fourth.
+                // A record has twelve words, its index the fourth.
                 let found = words.chunks_exact_mut(12).find(|r| r[3] == triangle);
                 found.expect("the triangle in a leaf")[3] = NOBODY;
             }

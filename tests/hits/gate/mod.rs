@@ -1,5 +1,4 @@
-//! The gate: right structures pass it, and every planted fault turns it red, with the right count and
-//! a ray that can be replayed.
+//! The correctness check: right structures pass, planted faults fail with a replayable ray.
 
 mod compare;
 mod faults;
@@ -15,19 +14,16 @@ use raystone::gpu::Gpu;
 use raystone::measure::gate::{Checks, Judge};
 use raystone::measure::record::GateVerdict;
 
-/// The judge of a scene with `rays` rays of each class.
 fn judge(stage: &Stage, rays: u32) -> Judge {
     stage.judge(Checks::Repeated, [rays, 20_000_000, 512])
 }
 
-/// The verdict on one structure.
 fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> GateVerdict {
     let traced = stage.traced(gpu, kind);
     let verdict = stage.verdict(gpu, &traced, judge);
     verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
 }
 
-/// Wrong rays of all classes.
 fn wrong(verdict: &GateVerdict) -> usize {
     verdict.classes.iter().map(|class| class.wrong).sum()
 }

@@ -1,12 +1,12 @@
-//! What is right passes.
+//! Correct structures pass.
 
 use super::{judge, verdict};
 use crate::support::*;
 use raystone::params::ParamValue;
 
-/// 144 × 144 rays in each of five classes; and the hard ones.
+/// 144 × 144 rays in each of five classes, plus the hard ones.
 const RAYS: u32 = 20_736;
-/// Brute force takes a minute with more triangles than this on two cores.
+/// With more triangles than this, brute force takes a minute on two cores.
 const MOST_FOR_BRUTE_FORCE: usize = 6000;
 
 fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
@@ -14,7 +14,7 @@ fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
     let judge = judge(&stage, RAYS);
     assert!(judge.is_sound(), "{:?}", judge.first_wrong);
     assert!(judge.brute_force.rays >= 2000 && judge.oracle.rays >= 256);
-    // Whatever the turn, each structure is judged in one scene.
+    // In any turn, each structure is checked in one scene.
     let kinds = match scene {
         "triangle-soup" => structures(),
         _ => in_turn("structures at the gate", structures()),

@@ -1,4 +1,4 @@
-//! A run with faulty structures: they are told, and get no figures.
+//! A run with faulty structures: they are reported, and get no figures.
 
 use super::faulty::{NOT_BUILT, NOT_VALID, SHORT_STACK, WRONG_INDEX};
 use crate::support::*;

@@ -1,4 +1,4 @@
-//! What is timed is looked at: a kernel that answers at first and slackens later gets no figure.
+//! Timed answers are checked: a kernel that is right at first and skips work later gets no figure.
 
 use crate::support::{SMALL, records};
 use raystone::gpu::KernelLibrary;
@@ -7,10 +7,10 @@ use std::path::Path;
 use std::process::Command;
 
 const KERNEL: &str = "integrator/trace_rays";
-/// Behind this line of the kernel the faults are planted.
+/// Kernel line after which the faults are inserted.
 const PLACE: &str = "    let index = batch.first + item;\n";
-/// What a batch's kernel does once it was dispatched more often than by the gate. Words of `status` from 9
-/// on are nobody's and outlast a dispatch.
+/// Faults of a batch kernel dispatched more often than by the correctness check. Words of `status`
+/// from 9 on are unused and persist between dispatches.
 const FAULTS: [(&str, &str); 5] = [
     (
         "later turns trace one ray less",
@@ -34,7 +34,6 @@ const FAULTS: [(&str, &str); 5] = [
     ),
 ];
 
-/// The kernel with a fault, in a folder of its own.
 fn plant(folder: &Path, fault: &str) {
     let library = KernelLibrary::default();
     let text = library.text(KERNEL).expect("the kernel");
@@ -46,7 +45,7 @@ fn plant(folder: &Path, fault: &str) {
     std::fs::write(file, import.to_owned() + &text).expect("a kernel");
 }
 
-/// Runs the experiment with the kernels of `folder`; failure and number of timings of the structure.
+/// Runs the experiment with the kernels of `folder`; returns the failure and the number of timings.
 fn run(folder: &Path) -> (Option<String>, usize) {
     let experiment = folder.join("timed.toml");
     std::fs::write(&experiment, SMALL).expect("an experiment");

@@ -1,4 +1,4 @@
-//! Planted faults must fail on the rays at which grids went wrong.
+//! Planted faults must fail on the rays that are hard for grids.
 
 use super::{grid, slanted, with};
 use crate::support::scenes;
@@ -6,7 +6,7 @@ use crate::support::{self, Pcg, brute_force, build, default_params, in_turn, ker
 use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
 
-/// A fault in a kernel: where, what stands there, what replaces it.
+/// A fault in a kernel: file, original and replacement text.
 struct Fault {
     what: &'static str,
     grid: &'static str,
@@ -94,7 +94,7 @@ const FAULTS: &[Fault] = &[
     },
 ];
 
-/// A device whose kernel `fault.file` has the fault, or none.
+/// A device whose kernel `fault.file` has the fault, if `planted`.
 fn device(fault: &Fault, planted: bool) -> Gpu {
     let to = if planted { fault.to } else { fault.from };
     support::open(kernels_with(fault.file, &[(fault.from, to)]))

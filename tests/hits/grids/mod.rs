@@ -1,7 +1,7 @@
-//! Grids against brute force, to the bit, on the rays at which grids of others went wrong: along the
-//! planes, edges and corners of cells, beside the grid, with −0 components, from outside and from its
-//! border, with hits beyond the cell that lists them, and in scenes far from the origin. Kernels with
-//! planted faults must fail on the same rays.
+//! Grids against brute force, bit by bit, on rays that are hard for grids: along planes, edges and
+//! corners of cells, next to the grid, with −0 components, from outside and from its border, with
+//! hits beyond the cell that lists them, and in scenes far from the origin. Kernels with planted
+//! faults must fail on the same rays.
 
 mod faults;
 
@@ -42,7 +42,7 @@ fn with(kind: &dyn AccelKind, changes: &[(&str, ParamValue)]) -> Params {
     params
 }
 
-/// The planes of a built grid: low corner, cell size and number of cells along an axis.
+/// Cell planes of a built grid: low corner, cell size and number of cells along an axis.
 fn lattice(built: &dyn BuiltAccel, axis: usize) -> (f32, f32, u32) {
     let buffers = built.buffers();
     let uniform = buffers.uniforms.iter().find(|(name, _)| *name == "grid");
@@ -52,8 +52,8 @@ fn lattice(built: &dyn BuiltAccel, axis: usize) -> (f32, f32, u32) {
     (float("low"), float("cell"), word("resolution"))
 }
 
-/// Rays that start on planes of cells, on one, two or three axes, and run along axes, diagonals of
-/// cells and planes; a third of them starts on the border of the grid or before it.
+/// Rays that start on cell planes of one, two or three axes, and run along axes, cell diagonals and
+/// planes; a third starts on the border of the grid or before it.
 fn cell_rays(rng: &mut Pcg, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> {
     let ray = |index: usize| {
         let planes = 1 + rng.below(3);
@@ -104,7 +104,7 @@ fn cell_rays(rng: &mut Pcg, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> {
     (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
-/// Rays parallel to the faces of the grid, on them, and one step or a little beside them.
+/// Rays parallel to the faces of the grid, on them, and one step or slightly beside them.
 fn rays_beside(rng: &mut Pcg, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> {
     let ray = |_| {
         let across = rng.below(3) as usize;
@@ -162,8 +162,8 @@ fn signed_axis_rays(rng: &mut Pcg, soup: &TriangleSoup) -> Vec<Ray> {
     rays.take(640).collect()
 }
 
-/// A scene where the first triangle that a cell lists is hit far behind the cell: long ones, slanted
-/// through many cells, in front of and behind crumbs.
+/// A scene where a cell's first triangle is hit far behind the cell: long ones, slanted through
+/// many cells, in front of and behind small ones.
 fn slanted(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let point =
         |rng: &mut Pcg, size: f32| size * Vec3::new(rng.signed(), rng.signed(), rng.signed());
@@ -180,7 +180,6 @@ fn moved(soup: &TriangleSoup, scale: f32, shift: Vec3) -> TriangleSoup {
     scenes::soup(corners.map(|c| c.map(|v| v * scale + shift)))
 }
 
-/// Scenes with a name.
 fn cases(rng: &mut Pcg) -> Vec<(&'static str, TriangleSoup)> {
     let base = slanted(rng, 400);
     let mut cases = vec![
@@ -198,7 +197,7 @@ fn cases(rng: &mut Pcg) -> Vec<(&'static str, TriangleSoup)> {
     cases
 }
 
-/// All rays for a scene in a grid, cut at some of their hits as well.
+/// All rays for a scene in a grid, also truncated at some of their hits.
 fn hard_rays(rng: &mut Pcg, soup: &TriangleSoup, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> {
     let mut rays = cell_rays(rng, built, count);
     rays.extend(rays_beside(rng, built, count / 2));
@@ -263,7 +262,7 @@ fn kernels_answer_the_rays_at_which_grids_went_wrong_and_count_like_their_twins(
     }
 }
 
-/// Parameters that choose another kernel, besides the defaults.
+/// Parameters that select another kernel, besides the defaults.
 fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
     let mut variants = vec![default_params(&kind.parameters())];
     if kind.name() == "uniform-grid" {
@@ -273,7 +272,7 @@ fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
     variants
 }
 
-/// Cells that all rays visit.
+/// Number of cells visited by all rays.
 fn visits(kind: &dyn AccelKind, params: &Params, soup: &TriangleSoup, rays: &[Ray]) -> u32 {
     let built = build(kind, soup, params);
     let twin = built.cpu_twin(soup).expect("grids have twins");

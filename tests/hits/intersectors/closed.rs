@@ -1,4 +1,4 @@
-//! Closed surfaces from inside: which triangle tests lose rays.
+//! Closed surfaces from inside: triangle tests that leak rays.
 
 use super::{ray, tests_of};
 use crate::support::{Pcg, scenes};
@@ -9,7 +9,7 @@ use raystone::accel::{
     TriangleSoup,
 };
 
-/// A closed surface of triangles whose corners are shared to the bit: a sphere of radius 2 over the
+/// A closed surface of triangles with bit-identical shared corners: a sphere of radius 2 over the
 /// faces of an octahedron, around `centre`.
 pub fn sphere(steps: i32, centre: DVec3) -> Vec<[Vec3; 3]> {
     let vertex = |signs: [i32; 3], i: i32, j: i32| {
@@ -60,7 +60,7 @@ fn cube(steps: i32, centre: DVec3) -> Vec<[Vec3; 3]> {
     out
 }
 
-/// Rays from inside: in all directions, at vertices and at edges, along axes with zeros of both signs.
+/// Rays from inside: in all directions, at vertices and edges, along axes with zeros of both signs.
 pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<Ray> {
     let one = |index: usize| {
         let mut rng = Pcg::new(index as u64);
@@ -72,7 +72,7 @@ pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<R
             1 => triangle[rng.below(3) as usize] - origin,
             2 => triangle[0] + rng.unit() * (triangle[1] - triangle[0]) - origin,
             _ => {
-                // From a coordinate of a vertex, so that the ray runs through vertices and along edges.
+                // From a vertex coordinate, so that the ray runs through vertices and edges.
                 let axis = rng.below(3) as usize;
                 let other = (axis + 1 + rng.below(2) as usize) % 3;
                 let near = triangle[0][other] as f64 - centre[other];
@@ -92,7 +92,6 @@ pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<R
     (0..count).into_par_iter().map(one).collect()
 }
 
-/// Rays that leave a closed surface unseen.
 fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
     let params = BvhParameters::default();
     let built = BuiltBvh::build(soup, &params, &mut BuildLog::default()).expect("a small scene");
@@ -105,7 +104,7 @@ fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
 }
 
 pub const ORDINARY: DVec3 = DVec3::new(0.3, -0.2, 0.1);
-/// Where Embree's own test puts its meshes.
+/// Location of the meshes in Embree's own test.
 const FAR_AWAY: DVec3 = DVec3::new(148_376.0, 1234.0, -223_423.0);
 
 fn closed_meshes() -> [(&'static str, DVec3, Vec<[Vec3; 3]>); 4] {

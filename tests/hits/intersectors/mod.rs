@@ -1,5 +1,5 @@
-//! Every ray–triangle test and ray offset: kernel and twin to the bit, structures equal to brute force,
-//! and closed surfaces from inside.
+//! Every ray-triangle test and ray offset: kernel and twin bit-identical, structures equal to brute
+//! force, and closed surfaces from inside.
 
 mod closed;
 
@@ -25,7 +25,6 @@ use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// A device with the kernels of this test.
 fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
     GPU.get_or_init(|| {
@@ -51,7 +50,7 @@ fn ray(origin: Vec3, direction: Vec3) -> Ray {
     }
 }
 
-/// A point of a triangle: a vertex, on an edge, inside, or beside it.
+/// A target at a triangle: a vertex, on an edge, inside, or outside.
 fn target([a, b, c]: [Vec3; 3], rng: &mut Pcg) -> Vec3 {
     let (u, v) = (rng.unit(), rng.unit());
     match rng.below(6) {
@@ -264,7 +263,7 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
         let soup = scenes::soup(triangles.iter().copied()).intersecting(tests);
         let kinds = AccelRegistry::default();
         for kind in in_turn("structures with every box test", kinds.iter()) {
-            // 0 · ∞ is no number that WGSL promises anything about.
+            // WGSL guarantees nothing for 0 · ∞.
             if !box_test.finite {
                 continue;
             }
@@ -305,7 +304,7 @@ fn baldwin_and_weber_read_three_more_vectors_a_triangle() {
     assert_eq!(Watertight.bytes(), 48);
 }
 
-/// Seconds of processor time that this program took on all threads: the software driver's included.
+/// Processor seconds of this program on all threads, including the software driver's.
 #[cfg(target_os = "linux")]
 fn processor_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
@@ -314,8 +313,8 @@ fn processor_seconds() -> f64 {
     ticks.filter_map(|t| t.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
-/// Not a check: processor time of every test through the plain BVH on a software adapter, for each class
-/// of rays, as a multiple of the first test's. Rounds alternate, so that load from outside hits all alike.
+/// Not a check: processor time of every test in the plain BVH on a software adapter, per ray class,
+/// relative to the first test. Rounds alternate, so that external load affects all alike.
 #[test]
 #[ignore = "no check but a measurement of minutes, by hand: `cargo test --release --test hits -- --ignored --nocapture intersectors` (docs/performance.md)"]
 #[cfg(target_os = "linux")]

@@ -1,4 +1,4 @@
-//! False alarms and power, over many made-up pairs of runs.
+//! False alarms and power over many synthetic pairs of runs.
 
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
@@ -7,16 +7,14 @@ use raystone::compare::judge::Verdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
 
-/// Repetitions of every A/A.
 const REPEATED: u64 = 120;
-/// More than so many false alarms among them come up once in a thousand times at the level of 5 %.
+/// At the 5 % level, more false alarms than this occur once in a thousand times.
 const MOST: usize = 14;
 
 fn alarms(found: &Comparison) -> usize {
     found.count(Verdict::Worse) + found.count(Verdict::Better)
 }
 
-/// How many of the repetitions end with any alarm.
 fn with_alarm(pair: impl Fn(u64) -> [Side; 2]) -> usize {
     let ends = (0..REPEATED).map(|i| {
         let [base, candidate] = pair(i);
@@ -25,7 +23,7 @@ fn with_alarm(pair: impl Fn(u64) -> [Side; 2]) -> usize {
     ends.filter(|alarms| *alarms > 0).count()
 }
 
-/// Two runs of the same, hours apart; in the second half of the structures the kernels' texts differ.
+/// Two identical runs, hours apart; kernel texts differ in the second half of the structures.
 fn two_runs(i: u64, noise: super::records::Noise, slower: fn(usize) -> f64) -> [Side; 2] {
     let base = Made {
         rounds: 21,
@@ -44,9 +42,9 @@ fn two_runs(i: u64, noise: super::records::Noise, slower: fn(usize) -> f64) -> [
     [base.side(), candidate.side()]
 }
 
-/// Two sets of kernels in the same rounds of one process, each compiled so often.
+/// Two sets of kernels in the same rounds of one process, each compiled `compilations` times.
 fn one_run(i: u64, slower: fn(usize) -> f64, compilation: f64, compilations: usize) -> [Side; 2] {
-    // In time of the processors: cells of one process moved by 1.1 % (root mean square).
+    // In processor time: cells of one process moved by 1.1 % (root mean square).
     let noise = super::records::Noise {
         hour: 0.0,
         cell: 0.005,
@@ -73,7 +71,7 @@ fn one_run(i: u64, slower: fn(usize) -> f64, compilation: f64, compilations: usi
     [base, candidate]
 }
 
-/// What compilations of one text differ by where that is much.
+/// Difference between compilations of one text when it is large.
 const SCATTERED: f64 = 0.03;
 
 #[test]
@@ -191,7 +189,7 @@ fn an_error_that_is_one_percent_larger_is_found_for_every_seed_together() {
         );
         assert!((change.value - 0.01).abs() < 0.002, "{change:?}");
     }
-    // Seed by seed nothing differs but in that sampler.
+    // Per seed, only that sampler differs.
     let touched = said(&found, "rmse-unbiased/v1").all(|f| f.key.label("sequence") == "sequence-2");
     assert!(touched);
 }

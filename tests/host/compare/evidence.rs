@@ -1,4 +1,4 @@
-//! What each kind of evidence comes to: samples, intervals, facts and times, and what is read from records as which.
+//! Each kind of evidence: samples, intervals, facts and times, and how records are classified.
 
 use super::records::Made;
 use super::{compared, said};
@@ -73,13 +73,13 @@ fn differences_of_exponents_are_absolute_and_those_of_errors_parts_of_the_base()
         (pairs.change.value - 0.02).abs() < 1e-12 && pairs.margin == 0.005,
         "{pairs:?}"
     );
-    // One image of each tells no spread.
+    // One image each has no spread.
     let one = |value| seeds(1, &[value]);
     assert_eq!(
         verdict(outcome(ERROR, &one(1.0), &one(2.0))),
         Verdict::Undecided
     );
-    // Of other seeds they are two samples, whose interval is a part of the base, too.
+    // With other seeds they are two samples, whose interval is also relative to the base.
     let larger = |scale: f64| {
         let [old, new] = [1.0, 1.1].map(|by| errors.map(|x| scale * by * x));
         tested(outcome(ERROR, &seeds(1, &old), &seeds(11, &new))).change
@@ -94,7 +94,7 @@ fn intervals_without_samples_are_tested_by_their_widths() {
     let interval = |value, low, high| Evidence::Summary(Interval { value, low, high }, 8.0);
     let base = interval(10.0, 9.0, 11.0);
     let both = tested(outcome(ERROR, &base, &interval(11.0, 9.0, 13.0)));
-    // Variances are as 1 to 4; freedom by Welch would be 25 / (1/8 + 16/8), and is no more than either side has.
+    // Variances are as 1 to 4; Welch's freedom, 25 / (1/8 + 16/8), is capped at either side's.
     let half = 0.1 * 5f64.sqrt();
     assert!((both.change.value - 0.1).abs() < 1e-12, "{both:?}");
     assert!(
@@ -230,7 +230,7 @@ fn drift_is_of_the_figure_and_its_own_cell_alone_is_left_out() {
         (spread.variance - 2.803e-3 / 7.0).abs() < 1e-9,
         "{spread:?}"
     );
-    // Calmer rounds than those of controls take nothing away.
+    // Rounds calmer than the controls' subtract nothing.
     assert_eq!(found("speed", 0.0), found("speed", 1e-4));
     assert_eq!(found("time", 1e-4), None);
     let mut many = Drift::default();
@@ -246,7 +246,6 @@ fn drift_is_of_the_figure_and_its_own_cell_alone_is_left_out() {
     );
 }
 
-/// The comparison with records that are the same but for this.
 fn with(change: impl Fn(&mut Line)) -> raystone::compare::Comparison {
     let base = Made::default();
     let mut lines = base.lines();
@@ -299,7 +298,7 @@ fn errors_of_another_reference_or_resolution_are_open_and_their_order_is_nothing
         |r| r.mse = Some(2e-9),
         |r| r.file = Some("other.exr".into()),
     ];
-    // Another draw of the noise, as of another reference.
+    // Another draw of the noise, as from another reference.
     let other = Made {
         other_images: true,
         seed: 2,
@@ -332,7 +331,7 @@ fn errors_of_another_reference_or_resolution_are_open_and_their_order_is_nothing
         said(&wide, ERROR).count() == 16
             && said(&wide, ERROR).all(|f| f.why.starts_with("other work"))
     );
-    // All but the ends, which say where a run begins and that it came to its end.
+    // All but the ends, which mark the beginning and end of a run.
     let mut turned = Made::default().lines();
     let last = turned.len() - 1;
     turned[1..last].reverse();

@@ -7,7 +7,7 @@ use raystone::compare::side::{Side, SideError};
 use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
 use raystone::measure::record::{Body, Line, RecordError, text_of};
 
-/// The comparison with a candidate whose records are the same but for this.
+/// The comparison with a candidate whose records are changed only by `change`.
 fn with(change: impl Fn(&mut Vec<Line>)) -> Comparison {
     let base = Made::default();
     let mut lines = base.lines();
@@ -15,7 +15,6 @@ fn with(change: impl Fn(&mut Vec<Line>)) -> Comparison {
     compared(&base.side(), &Side::new("made", lines, Vec::new()))
 }
 
-/// Changes the record of the fourth structure.
 fn with_structure(change: impl Fn(&mut raystone::measure::record::StructureRecord)) -> Comparison {
     with(|lines| {
         let records = lines.iter_mut().filter_map(|line| match &mut line.body {
@@ -59,7 +58,7 @@ fn one_wrong_hit_and_one_hit_more_are_worse() {
     });
     assert_eq!(wrong.verdict(), Verdict::Worse);
     assert!(said(&wrong, "gate/v1").any(|f| f.verdict == Verdict::Worse));
-    // Figures that went with the gate are missed, too.
+    // Figures lost with the correctness check are reported as missing, too.
     assert!(
         said(&wrong, "mrays-per-s/v1")
             .all(|f| f.verdict == Verdict::Undecided && f.why.contains("missing"))
@@ -149,7 +148,7 @@ fn times_of_another_machine_are_refused_and_all_else_is_compared() {
             .all(|f| f.verdict == Verdict::Undecided && f.measured.is_none())
     );
     assert!(said(&found, "sah-cost/v1").all(|f| f.verdict == Verdict::Worse));
-    // Where times do not decide, a refusal leaves nothing open.
+    // If times do not decide, a refusal leaves nothing open.
     let base = Made::default();
     let mut other = base.side();
     if let Body::Run(record) = &mut other.lines[0].body {
@@ -201,12 +200,11 @@ fn records_that_contradict_themselves_are_named() {
         said[0].verdict == Verdict::Undecided && said[0].why.contains("contradict"),
         "{said:?}"
     );
-    // The same line twice contradicts nothing.
+    // A repeated line is no contradiction.
     let twice = with(|lines| lines.extend(lines.clone()));
     assert_eq!(twice.verdict(), Verdict::Same);
 }
 
-/// Findings of a figure, whatever they are.
 fn of(found: &Comparison, figure: &str) -> usize {
     let is_it = |f: &&raystone::compare::Finding| f.figure.id == figure;
     found.findings.iter().filter(is_it).count()
@@ -215,7 +213,7 @@ fn of(found: &Comparison, figure: &str) -> usize {
 #[test]
 fn a_run_of_many_cells_whose_checks_failed_is_the_same_as_itself() {
     let mut lines = Made::default().lines();
-    // Named by checks in the order in which they come.
+    // Checks refer to it by order of appearance.
     for line in &mut lines {
         if let Body::Structure(record) = &mut line.body
             && ["structure-2", "structure-5"].contains(&line.key.label("accel"))
@@ -277,7 +275,7 @@ fn cut_and_mixed_files_are_named() {
         "{:?}",
         found.notes
     );
-    // Cut in the middle of the file, of a version to come, and with a number that is none.
+    // Truncated in the middle, from a future version, and with an invalid number.
     let (first, rest) = text.split_at(400);
     let newer = text.replacen("raystone/3", "raystone/4", 1);
     let nan = text.replacen("\"sah_cost\":12.5", "\"sah_cost\":NaN", 1);
@@ -368,7 +366,7 @@ fn cells_that_failed_belong_to_their_kernels_alone() {
         };
         Line::about_all(Body::Failed(record))
     };
-    // One fails with the new kernels alone, one with all.
+    // One fails only with the new kernels, one with all.
     lines.extend(
         [
             "box, grid, @idea-2",

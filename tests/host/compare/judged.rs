@@ -1,4 +1,4 @@
-//! Numbers behind the verdicts, against those of scipy 1.17, and effects that do not count.
+//! Numbers behind the verdicts against scipy 1.17, and effects too small to count.
 
 use super::records::Made;
 use super::{compared, said};
@@ -28,7 +28,7 @@ fn students_test_of_a_ratio_agrees_with_scipy() {
     let half = 0.02306004135204166_f64;
     assert!((time.change.high - (1.05f64.ln() + half).exp_m1()).abs() < 1e-9);
     assert!((time.change.value - 0.05).abs() < 1e-12);
-    // Of a rate it is the inverse.
+    // For a rate, the inverse.
     let rate = ratio.measured(figure("mrays-per-s/v1"), Some(noise), 0.02);
     assert!((rate.change.value - (1.0 / 1.05 - 1.0)).abs() < 1e-12);
     assert!(rate.change.low < rate.change.value && rate.change.high < 0.0);

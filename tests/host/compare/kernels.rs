@@ -1,11 +1,11 @@
-//! What a report says of a run with several sets of kernels: first what the idea changes, structure by structure.
+//! The report of a run with several sets of kernels: first the effect of the idea, by structure.
 
 use super::records::{Made, QUIET};
 use raystone::measure::record::{Body, Line, axis};
 use raystone::report::{sections, terminal_tables};
 use std::path::Path;
 
-/// One run of the program's own kernels and those of an idea, which is slower by this much where its kernels are others.
+/// A run of the program's own kernels and an idea's, slower by this much where its kernels differ.
 fn run(slower: fn(usize) -> f64) -> Vec<Line> {
     let base = Made {
         noise: QUIET,
@@ -35,7 +35,6 @@ fn idea_is_slower(structure: usize) -> f64 {
     if structure == 5 { 1.2 } else { 1.0 }
 }
 
-/// The lines of the table that this is the caption of.
 fn table(tables: &str, caption: &str) -> Vec<String> {
     let from = tables.lines().skip_while(|line| !line.starts_with(caption));
     from.take_while(|line| !line.is_empty())
@@ -64,7 +63,7 @@ fn a_run_of_two_sets_of_kernels_leads_with_what_the_idea_changes() {
     for unchanged in ["structure-0 ", "structure-3 "] {
         assert!(row(unchanged).contains("unchanged control"), "{lead:#?}");
     }
-    // Those that it changes stand first.
+    // Changed ones come first.
     let place = |structure: &str| lead.iter().position(|line| line.starts_with(structure));
     assert!(place("structure-7") < place("structure-0"), "{lead:#?}");
 }
@@ -76,7 +75,7 @@ fn what_the_idea_does_not_change_is_no_rival_of_itself() {
     assert!(verdict.contains("structure-0"), "{verdict}");
     assert!(!verdict.contains("structure-0 @my-idea"), "{verdict}");
     assert!(!verdict.contains("none @my-idea"), "{verdict}");
-    // Without its kernel in the records nobody knows that it is the same.
+    // Without its kernel in the records, it is not known to be the same.
     let mut unsaid = run(|_| 1.0);
     unsaid
         .iter_mut()

@@ -1,5 +1,5 @@
-//! Where a comparison has to say less: what is no control, what was measured once or against another reference, what
-//! lies within the effect that counts by its value alone.
+//! Where a comparison must claim less: no controls, measured once or against another reference, or
+//! below the threshold by value alone.
 
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
@@ -17,7 +17,7 @@ fn side(lines: Vec<Line>) -> Side {
     Side::new("made", lines, Vec::new())
 }
 
-/// Two runs of a quiet machine; in the second half of the structures the kernels differ.
+/// Two runs of a quiet machine; kernels differ in the second half of the structures.
 fn quiet(slower: fn(usize) -> f64) -> [Made; 2] {
     let base = Made {
         rounds: 21,
@@ -34,7 +34,6 @@ fn quiet(slower: fn(usize) -> f64) -> [Made; 2] {
     [base, candidate]
 }
 
-/// The times of a structure.
 fn times<'f>(found: &'f [Finding], structure: &str) -> Vec<&'f Finding> {
     let of = |f: &&Finding| f.is_time && f.key.label("accel") == structure;
     found.iter().filter(of).collect()
@@ -88,13 +87,13 @@ fn a_copied_measurement_is_the_same_and_tells_no_drift() {
     let times: Vec<_> = copied.findings.iter().filter(|f| f.is_time).collect();
     assert!(!times.is_empty() && times.iter().all(|f| f.verdict == Verdict::Same));
     assert!(times.iter().all(|f| !f.is_control && f.measured.is_none()));
-    // Too few cells for a drift: what was copied is the same nevertheless.
+    // Too few cells for a drift; copied results are the same nevertheless.
     let few = Made {
         structures: 1,
         ..Made::default()
     };
     assert_eq!(compared(&few.side(), &few.side()).verdict(), Verdict::Same);
-    // A candidate whose cells but one were copied has one control.
+    // A candidate with all but one cell copied has one control.
     let later = Made {
         seed: 2,
         ..Made::default()
@@ -229,7 +228,6 @@ fn what_was_measured_once_is_told_and_decides_nothing() {
     assert_eq!(found.verdict(), Verdict::Same);
 }
 
-/// Evidence of eight seeds from the first on.
 fn seeds(first: u32, values: [f64; 8]) -> Evidence {
     Evidence::Seeds {
         values: (first..).zip(values).collect(),
@@ -247,7 +245,7 @@ fn errors_against_other_references_are_paired_by_nothing() {
     let Outcome::Tested(pairs) = outcome(&slightly(1)) else {
         panic!("equal seeds are pairs");
     };
-    // The interval is that of the signed ranks at the level that is promised.
+    // The interval is that of the signed ranks at the stated level.
     let gaps = values.map(|x| 0.01 * x / (values.iter().sum::<f64>() / 8.0));
     let [low, high] = SignedRank::new(&gaps).expect("a test").interval(0.05);
     assert!((pairs.change.low - low).abs() < 1e-9 && (pairs.change.high - high).abs() < 1e-9);
@@ -282,7 +280,7 @@ fn rounds_of_one_process_are_compared_round_by_round() {
     assert!(together < 1e-20 && apart > 1e-3, "{together} {apart}");
 }
 
-/// Three compilations of a side, each alike in its rounds: three numbers are known, not 21.
+/// Three compilations per side, each with equal rounds, give three observations, not 21.
 #[test]
 fn rounds_of_one_compilation_are_one_observation() {
     let times = |of: [f64; 3]| Evidence::Times {
@@ -291,13 +289,13 @@ fn rounds_of_one_compilation_are_one_observation() {
     };
     let (base, candidate) = (times([1.0; 3]), times([1.1f64, 1.0, 1.0 / 1.1]));
     let ratio = TimeRatio::new(&base, &candidate, true, 3).expect("a ratio");
-    // Logarithms x, 0 and -x have the variance x², their mean a third of it.
+    // Logarithms x, 0 and -x have variance x², their mean a third of it.
     let wanted = 1.1f64.ln().powi(2) / 3.0;
     assert!((ratio.rounds.variance - wanted).abs() < 1e-12, "{ratio:?}");
     assert_eq!(ratio.rounds.freedom, 2.0);
     let alone = TimeRatio::new(&base, &candidate, true, 1).expect("a ratio");
     assert!(alone.rounds.variance < 0.5 * wanted, "{alone:?}");
-    // What no run writes.
+    // No run writes this many.
     let many = TimeRatio::new(&base, &candidate, true, usize::MAX).expect("a ratio");
     assert_eq!(many.rounds, alone.rounds);
 }
@@ -328,14 +326,14 @@ fn drift_is_that_of_the_scene_or_of_all_whichever_moved_more_and_leaves_the_cell
         ("b", 0.1),
     ];
     let drift = with(&calm_here);
-    // The scene itself is calm and all together are not; and the other way round.
+    // The scene itself is calm and the whole is not; and vice versa.
     let all = (3.0 * 1e-4 + 3.0 * 1e-2) / 6.0;
     assert!((variance(&drift, "a", 1e-6, None).expect("known") - all).abs() < 1e-12);
     assert!((variance(&drift, "b", 1e-6, None).expect("known") - 1e-2).abs() < 1e-12);
-    // Rounds that are noisier than those of controls count by what they have more.
+    // Rounds noisier than the controls' count by the excess.
     let noisy = variance(&drift, "b", 1e-3, None).expect("known");
     assert!((noisy - (1e-2 + 1e-3 - 1e-6)).abs() < 1e-12);
-    // Fewer than three controls tell nothing, and none is a control of its own.
+    // Fewer than three controls are inconclusive, and nothing is its own control.
     assert_eq!(variance(&with(&calm_here[..2]), "a", 1e-6, None), None);
     assert_eq!(
         variance(&with(&calm_here[..3]), "a", 1e-6, Some(0.01)),

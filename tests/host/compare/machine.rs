@@ -1,4 +1,4 @@
-//! What the machine does: controls, places, rounds of one process, and what was measured again.
+//! Effects of the machine: controls, places, rounds of one process, and repeated measurements.
 
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
@@ -13,7 +13,7 @@ fn side(lines: Vec<Line>) -> Side {
     Side::new("made", lines, Vec::new())
 }
 
-/// Two runs; in the second half of the structures the kernels differ, one of which takes this many times as long.
+/// Two runs; kernels differ in the second half of the structures, one slower by this factor.
 fn pair(noise: super::records::Noise, slower: fn(usize) -> f64) -> [Made; 2] {
     let base = Made {
         rounds: 21,
@@ -329,7 +329,7 @@ fn rounds_of_one_process_need_no_controls_and_nothing_is_suspect() {
         "{worse:?}"
     );
     assert_eq!(found.suspects().count(), 0);
-    // Both sides are of one run, whose notes are told once.
+    // Both sides come from one run, whose notes appear once.
     let notes: Vec<_> = found
         .notes
         .iter()
@@ -358,7 +358,7 @@ fn only_what_looks_slower_is_suspect() {
     );
 }
 
-/// Every time of these records measured again with these ratios.
+/// All times of these records measured again, with these ratios.
 fn again(of: &Made, clock: &'static str, ratio: impl Fn(&str) -> f64) -> Confirmed {
     let all = taken(&of.side())
         .into_iter()
@@ -412,7 +412,7 @@ fn what_was_measured_again_replaces_the_two_runs() {
             .iter()
             .all(|f| f.verdict == Verdict::Worse && !f.looks_worse)
     );
-    // Programs in turns have no controls: all may be slower.
+    // Alternating programs have no controls: all may be slower.
     let turns = found(&again(&base, IN_TURNS, |_| 1.2));
     assert!(
         turns
@@ -504,7 +504,7 @@ fn two_lines_on_one_thing_contradict_each_other_by_what_they_count() {
             "{id}: {open:?}"
         );
     }
-    // Times are never the same twice.
+    // Times never repeat exactly.
     let found = twice(|line| {
         if let Body::Structure(record) = &mut line.body {
             record.build_ms *= 2.0;

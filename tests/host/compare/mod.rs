@@ -1,4 +1,4 @@
-//! The comparison of runs: what it may not miss, and when it may not cry.
+//! Comparison of runs: required findings, and alarms it must not raise.
 
 mod alarms;
 mod evidence;
@@ -20,7 +20,7 @@ fn compared(base: &Side, candidate: &Side) -> Comparison {
     compare_sides(base, candidate, &Options::default(), &Confirmed::new())
 }
 
-/// What was said of a figure where it was not said to be the same.
+/// Findings of a figure other than "same".
 fn said<'a>(found: &'a Comparison, figure: &'a str) -> impl Iterator<Item = &'a Finding> {
     let of = move |f: &&Finding| f.figure.id == figure && f.verdict != Verdict::Same;
     found.findings.iter().filter(of)

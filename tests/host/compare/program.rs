@@ -1,4 +1,4 @@
-//! The command itself: exit codes, what each flag changes, what stands in its outputs, and bad input.
+//! The command itself: exit codes, effects of flags, contents of outputs, and bad input.
 
 use super::records::Made;
 use raystone::measure::record::{Body, Line, text_of};
@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// Folders of records, and the program run on them.
+/// Folders of records, and the program to run on them.
 struct Runs(tempfile::TempDir);
 
 impl Runs {
@@ -47,7 +47,6 @@ impl Runs {
         (output.status.code(), text)
     }
 
-    /// What a command says that ends as bad input.
     fn refusal(&self, arguments: &[&str]) -> String {
         let output = self.compare(arguments);
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -58,14 +57,12 @@ impl Runs {
     }
 }
 
-/// The made-up run with a change of the lines.
 fn changed(change: impl Fn(&mut Vec<Line>)) -> Vec<Line> {
     let mut lines = Made::default().lines();
     change(&mut lines);
     lines
 }
 
-/// SAH costs of all structures are this.
 fn with_cost(cost: f64) -> Vec<Line> {
     changed(|lines| {
         for line in lines {
@@ -96,7 +93,7 @@ fn exit_codes_and_the_last_line_say_what_it_comes_to() {
         (made.clone(), with_cost(13.0), 1, "WORSE"),
         (with_cost(13.0), made.clone(), 0, "BETTER"),
         (made.clone(), fewer(12.5), 4, "UNDECIDED"),
-        // What is worse goes before what is open, and that before what is better.
+        // Worse takes precedence over open, and open over better.
         (made.clone(), fewer(13.0), 1, "WORSE"),
         (made.clone(), fewer(12.0), 4, "UNDECIDED"),
         (fewer(12.5), made.clone(), 0, "SAME"),
@@ -130,7 +127,7 @@ fn flags_say_which_differences_count() {
     for (runs, flags, code) in [
         (&cost, &["--exact", "3.9"][..], 1),
         (&cost, &["--exact", "4.1"], 0),
-        // Errors are 1 % larger, and images are not those of before.
+        // Errors are 1 % larger, and images differ.
         (&error, &["--new-images"], 1),
         (&error, &["--new-images", "--error-effect", "2"], 0),
         (&error, &["--new-images", "--time-effect", "2"], 1),
@@ -143,7 +140,7 @@ fn flags_say_which_differences_count() {
     }
 }
 
-/// Two runs of a quiet machine with other kernels in half of the structures, one of which takes half as long again.
+/// Two runs of a quiet machine with other kernels in half of the structures, one slower.
 fn slower() -> Runs {
     let base = Made {
         rounds: 21,
@@ -165,7 +162,7 @@ fn times_decide_or_are_told_and_what_nothing_confirms_says_so() {
     let runs = slower();
     let (code, text) = runs.code(&[]);
     assert_eq!(code, Some(1), "{text}");
-    // The records are of no program of this version.
+    // The records come from no program of this version.
     assert!(
         text.contains(
             "What looks slower was not measured again: a side was measured by another program"
@@ -229,7 +226,7 @@ fn other_programs_read_both_sides_as_they_are() {
         comment.contains("| 12.5 → 13.0 | +4.00 % | exact |"),
         "{comment}"
     );
-    // What differs behind the digits of a table is shown with all of them.
+    // Values that differ beyond a table's digits are shown in full.
     let (_, text) = pair(&with_cost(12.5), &with_cost(12.5000125)).code(&[]);
     assert!(
         text.contains("12.5 → 12.5000125") && text.contains("+1.0e−4 %"),
@@ -276,7 +273,7 @@ fn one_run_with_two_sets_of_kernels_is_compared_without_its_controls_drift() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(text.contains("SAME: idea against embedded: "), "{text}");
-    // Turned round by name.
+    // Reversed by name.
     let output = runs.compare(&["run", "--kernels", "idea", "embedded"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("SAME: embedded against idea: "));
     assert!(
@@ -325,7 +322,7 @@ fn bad_input_is_named_with_what_to_do() {
         let words = runs.refusal(arguments);
         assert!(words.contains(said), "{arguments:?}: {words}");
     }
-    // What a killed run had measured is compared where it is asked for, and said to be a part.
+    // A killed run's measurements are compared on request, and marked as partial.
     let cut = Runs::new()
         .with("base", &made)
         .with_text("candidate", &text[..text.len() - 30]);
@@ -367,7 +364,7 @@ fn the_wrong_order_and_one_run_twice_are_said() {
     }
 }
 
-/// As root no folder is closed.
+/// Root can read every folder.
 #[cfg(unix)]
 #[test]
 fn records_that_may_not_be_read_are_named() {
@@ -385,7 +382,7 @@ fn records_that_may_not_be_read_are_named() {
     }
 }
 
-/// A program in the place of one that measures, which ends so.
+/// A fake measuring program that ends in this way.
 #[cfg(unix)]
 fn stand_in(runs: &Runs, name: &str, script: &str) -> PathBuf {
     use std::os::unix::fs::PermissionsExt as _;
@@ -407,7 +404,7 @@ fn a_program_that_fails_in_its_turn_is_named_with_its_status_and_last_words() {
     );
     let many = "for i in 1 2 3 4 5 6 7 8; do echo \"line $i\" >&2; done";
     for (number, (script, told)) in [
-        // Records that an earlier part of the run left do not hide how it ended.
+        // Records from an earlier part of the run do not hide how it ended.
         (
             format!("{leaves}; {many}; echo 'error: no space' >&2; exit 3"),
             "ended with exit status: 3: line 5; line 6; line 7; line 8; error: no space",

@@ -1,4 +1,4 @@
-//! Made-up runs with noise as it is on a shared machine.
+//! Synthetic runs with realistic noise of a shared machine.
 
 use raystone::compare::side::Side;
 use raystone::measure::record::Environment;
@@ -6,22 +6,22 @@ use raystone::measure::record::*;
 use raystone::random::Pcg32;
 use serde_json::{Value, json};
 
-/// Noise of a run. Each is a standard deviation of logarithms.
+/// Noise of a run, as standard deviations of logarithms.
 #[derive(Clone, Copy)]
 pub struct Noise {
-    /// Of the hour: all cells of the run alike.
+    /// Per hour: common to all cells of the run.
     pub hour: f64,
-    /// Of a cell in this run, with heavy tails (Student's t with 4 degrees of freedom).
+    /// Per cell and run, heavy-tailed (Student's t with 4 degrees of freedom).
     pub cell: f64,
-    /// Of a round of a cell, half of which it shares with the round before.
+    /// Per round of a cell, half of it shared with the previous round.
     pub round: f64,
     /// Share of rounds that take half as long again.
     pub interrupted: f64,
-    /// Of a compilation, with heavy tails: all its rounds alike.
+    /// Per compilation, heavy-tailed: common to all its rounds.
     pub compilation: f64,
 }
 
-/// As two runs of one program differed on a shared machine of two cores, in time of the processors.
+/// Difference of two runs of one program on a shared machine of two cores, in processor time.
 pub const SHARED: Noise = Noise {
     hour: 0.08,
     cell: 0.03,
@@ -29,7 +29,7 @@ pub const SHARED: Noise = Noise {
     interrupted: 0.1,
     compilation: 0.0,
 };
-/// As on a machine of its own.
+/// As on a dedicated machine.
 pub const QUIET: Noise = Noise {
     hour: 0.003,
     cell: 0.003,
@@ -38,29 +38,22 @@ pub const QUIET: Noise = Noise {
     compilation: 0.0,
 };
 
-/// What a made-up run is of.
 #[derive(Clone)]
 pub struct Made {
-    /// Structures; those from the second half on have other kernels in the candidate.
+    /// Structures; in the candidate, the second half has other kernels.
     pub structures: usize,
-    /// Rounds.
     pub rounds: usize,
-    /// Replicates.
     pub replicates: u32,
     pub noise: Noise,
-    /// Which sample of all that is random.
     pub seed: u64,
-    /// Seed of what is alike on both sides of one process: rounds share its noise.
+    /// Seed of the noise shared by both sides of one process, in rounds.
     pub machine: u64,
-    /// How often each kernel is compiled, in turns over the rounds.
     pub compilations: usize,
-    /// Whether kernels of the second half are other ones.
+    /// True if kernels of the second half differ.
     pub candidate: bool,
-    /// Time of structures over what it would be.
     pub slower: fn(usize) -> f64,
-    /// Error of samplers over what it would be.
     pub worse: fn(usize) -> f64,
-    /// Whether errors are another draw of the noise of images, as of another pattern of samples.
+    /// True if errors are another draw of the image noise, as with another sample pattern.
     pub other_images: bool,
 }
 
@@ -93,12 +86,11 @@ impl Random {
         (self.0.below(1 << 30) as f64 + 0.5) / (1u64 << 30) as f64
     }
 
-    /// Standard normal (Box and Muller).
     pub fn normal(&mut self) -> f64 {
         (-2.0 * self.unit().ln()).sqrt() * (std::f64::consts::TAU * self.unit()).cos()
     }
 
-    /// Student's t with 4 degrees of freedom, of variance 1.
+    /// Student's t with 4 degrees of freedom, scaled to variance 1.
     fn heavy(&mut self) -> f64 {
         let square: f64 = (0..4).map(|_| self.normal().powi(2)).sum();
         self.normal() / (square / 4.0).sqrt() / 2f64.sqrt()
@@ -130,7 +122,6 @@ fn exact(value: f64) -> Value {
 }
 
 impl Made {
-    /// The records.
     pub fn lines(&self) -> Vec<Line> {
         let run = json!({
             "kind": "run", "name": "made", "experiment": "made.toml", "experiment_text": "", "started_unix_s": 0,
@@ -153,7 +144,7 @@ impl Made {
         for sampler in 0..4 {
             lines.extend(self.sampler(sampler));
         }
-        // As every run has them: about no kernels in their key.
+        // Present in every run: their key names no kernels.
         let set = json!({ "kind": "kernels", "id": "set", "modules": { "accel/bvh": "0123" } });
         let done = json!({ "kind": "cell", "unit": "box, structure-0", "outcome": "done", "kernels": "set" });
         lines.extend([line(&[], "", set), line(&[], "", done)]);
@@ -168,7 +159,6 @@ impl Made {
         Side::new("made", self.lines(), Vec::new())
     }
 
-    /// Times of a cell, round by round.
     fn times(&self, structure: usize, class: usize, hour: f64, random: &mut Random) -> Vec<f64> {
         let Noise { cell, round, .. } = self.noise;
         let base = 1.0 + structure as f64 + 0.3 * class as f64;
@@ -180,7 +170,7 @@ impl Made {
                 .collect(),
         };
         let mut before = 0.0;
-        // What all threads of the machine suffer in a round.
+        // Affects all threads of the machine in a round.
         let mut machine = Random::new(self.machine);
         let time = |i: usize| {
             before = 0.5 * before + 0.75f64.sqrt() * random.normal();

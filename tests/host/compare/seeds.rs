@@ -1,4 +1,4 @@
-//! Runs with other seeds: the same figures of other samples, which are no better and no worse.
+//! Runs with other seeds: the same figures from other samples, neither better nor worse.
 
 use super::compared;
 use super::records::Made;
@@ -9,7 +9,6 @@ use raystone::measure::record::{Body, Line, RunRecord};
 use std::path::Path;
 use std::process::Command;
 
-/// The made-up run, with this text of an experiment.
 fn of_text(text: &str, lines: Vec<Line>) -> Side {
     let with = |mut line: Line| {
         if let Body::Run(run) = &mut line.body {
@@ -20,7 +19,7 @@ fn of_text(text: &str, lines: Vec<Line>) -> Side {
     Side::new("made", lines.into_iter().map(with).collect(), Vec::new())
 }
 
-/// As another seed would have it: other rays, other counts, other images.
+/// As with another seed: other rays, counts and images.
 fn of_other_rays(mut lines: Vec<Line>) -> Vec<Line> {
     for line in &mut lines {
         match &mut line.body {
@@ -79,7 +78,7 @@ fn another_seed_is_undecided_and_the_same_seed_is_worse() {
             .iter()
             .any(|note| note.contains("run.seed 1 and 2"))
     );
-    // What no seed changes is held to the bit.
+    // Seed-independent values are compared bit by bit.
     let mut slower = others();
     for line in &mut slower {
         if let Body::Structure(record) = &mut line.body {

@@ -1,4 +1,4 @@
-//! What a reader sees.
+//! Output for readers.
 
 use super::compared;
 use super::records::Made;
@@ -86,7 +86,7 @@ fn lines_fit_the_width_and_the_worst_comes_first() {
         "{text}"
     );
     assert!(text.contains("\n(1) pairs of equal seeds\n"), "{text}");
-    // In colour where it is asked for.
+    // Coloured on request.
     let coloured = Screen {
         colour: true,
         ..screen(120)
@@ -136,7 +136,7 @@ fn a_comment_holds_the_verdict_and_the_worst_however_much_there_is_to_say() {
         }
     }
     let mut found = compared(&base.side(), &other);
-    // Both folded sections are full, every reason and note is long, and what is worse stands last.
+    // Both folded sections are full, reasons and notes are long, and worse findings come last.
     let mut same = found.findings.clone();
     for (index, finding) in same.iter_mut().enumerate() {
         finding.verdict = [Verdict::Same, Verdict::Undecided][index % 2];
@@ -151,7 +151,7 @@ fn a_comment_holds_the_verdict_and_the_worst_however_much_there_is_to_say() {
         for name in ["candidate".to_owned(), "<".repeat(40_000)] {
             found.names[1] = name;
             let text = markdown(&found);
-            // A mark of the comment's name comes before it.
+            // The comment's name is preceded by a mark.
             assert!(text.len() <= 65_536 - 400, "{}", text.len());
             assert!(text.starts_with("### ❌ WORSE: "), "{}", &text[..40]);
             assert!(text.contains("| the worst |"), "the worst is cut");

@@ -1,4 +1,4 @@
-//! What is certain when time runs out.
+//! Certain bounds when time runs out.
 
 use super::sets::*;
 use raystone::discrepancy::{
@@ -18,7 +18,7 @@ fn a_search_without_time_gives_bounds_and_no_value() {
     assert_eq!(some.value(), None, "{some:?}");
 }
 
-/// What is certain in the shortest time in which it is so: busy machines get more.
+/// The bounds after the shortest time that satisfies `is_so`; busy machines get more.
 fn as_soon_as(points: &PointSet, is_so: impl Fn(&Bracket) -> bool) -> Bracket {
     let spans = std::iter::successors(Some(0.25), |seconds| Some(2.0 * seconds));
     let mut brackets = spans.map(|seconds| (seconds, star(points, &Budget::seconds(seconds))));

@@ -1,5 +1,5 @@
-//! Measures of point sets against published values and their definitions; `raystone discrepancy` as a
-//! user meets it, and SciPy's opinion of the same points.
+//! Measures of point sets against published values and their definitions, the `raystone
+//! discrepancy` command, and SciPy on the same points.
 
 mod bounds;
 mod nets;
@@ -15,7 +15,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Output, Stdio};
 
-/// The program with these arguments and this text on its standard input.
 fn run(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .arg("discrepancy")
@@ -26,7 +25,7 @@ fn run(arguments: &[&str], input: &str) -> Output {
         .spawn()
         .expect("the program starts");
     let mut stdin = child.stdin.take().expect("a pipe");
-    // Bad arguments end the program before it has read its input.
+    // With bad arguments the program ends before reading its input.
     let _ = stdin.write_all(input.as_bytes());
     drop(stdin);
     child.wait_with_output().expect("the program ends")
@@ -39,7 +38,6 @@ fn results(arguments: &[&str], input: &str) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// The `error: …` sentence of bad input.
 fn refusal(arguments: &[&str], input: &str) -> String {
     let output = run(arguments, input);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -182,7 +180,7 @@ for line in sys.stdin:
     print(*(repr(float(v)) for v in found))
 ";
 
-/// A Python with SciPy: `$RAYSTONE_PYTHON`, else the one on the path; or why there is none.
+/// A Python with SciPy, from `$RAYSTONE_PYTHON` or the path; or why there is none.
 fn python_with_scipy() -> Result<String, String> {
     let python = std::env::var("RAYSTONE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let found = Command::new(&python)

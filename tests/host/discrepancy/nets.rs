@@ -1,4 +1,4 @@
-//! Nets, the registry of measures.
+//! Nets, and the registry of measures.
 
 use super::sets::*;
 use raystone::discrepancy::{
@@ -11,7 +11,7 @@ fn t_value(points: &PointSet) -> Net {
 
 #[test]
 fn sobol_points_are_nets_of_their_published_quality() {
-    // Two dimensions are a (0, 2)-sequence; three of the first are one of quality 1 at most.
+    // Two dimensions form a (0, 2)-sequence; the first three have quality 1 at most.
     for m in 0..=10 {
         assert_eq!(t_value(&sobol_in(2, 1 << m)), Net { t: 0, m });
     }

@@ -73,9 +73,9 @@ fn known_sets_have_their_published_values() {
     );
 }
 
-/// The formulae of each measure as published, times 24 L² for coordinates k/L: `m`, h(x) and K(x, y). L2-star: Warnock
-/// 1972; centered and wrap-around: Hickernell 1998; mixture: Zhou, Fang & Ning 2013, eq. 17; average: the mean of
-/// L2-star's factors over x → 1 − x.
+/// The published formulae of each measure, times 24 L² for coordinates k/L: `m`, h(x) and K(x, y).
+/// L2-star: Warnock 1972; centered and wrap-around: Hickernell 1998; mixture: Zhou, Fang & Ning
+/// 2013, eq. 17; average: the mean of L2-star's factors over x → 1 − x.
 fn whole_numbers(kind: Quadratic, l: i128, x: i128, y: i128) -> [i128; 3] {
     let (z, zy, d) = ((2 * x - l).abs(), (2 * y - l).abs(), (x - y).abs());
     // z is 2 L |x − ½|.
@@ -102,7 +102,7 @@ fn whole_numbers(kind: Quadratic, l: i128, x: i128, y: i128) -> [i128; 3] {
     [m, h, k]
 }
 
-/// The squared discrepancy by whole numbers modulo 2^128, which suffice where the result is far smaller.
+/// The squared discrepancy in integers modulo 2^128, sufficient as the result is far smaller.
 fn by_whole_numbers(kind: Quadratic, points: &PointSet, l: i128) -> f64 {
     let whole: Vec<Vec<i128>> = points
         .points()
@@ -129,7 +129,7 @@ fn by_whole_numbers(kind: Quadratic, points: &PointSet, l: i128) -> f64 {
 fn sums_are_right_to_twelve_digits_against_whole_numbers() {
     let mut random = Pcg32::new(11);
     let mut first = |dim: usize, count: usize, bits: u32| {
-        // Scrambled a little, so that the coordinates have all of their bits.
+        // Slightly scrambled, so that coordinates use all their bits.
         let sobol = sobol_in(dim, count.next_power_of_two() as u32);
         let l = f64::from(1_u32 << bits);
         let cut = |x: &f64| {
@@ -145,7 +145,7 @@ fn sums_are_right_to_twelve_digits_against_whole_numbers() {
         (sobol_in(2, 4096), 12),
         (first(2, 4096, 12), 12),
         (first(2, 4096, 24), 24),
-        // Weights 1/N² that are no powers of two.
+        // Weights 1/N² that are not powers of two.
         (first(2, 3000, 24), 24),
         (first(3, 1500, 14), 14),
         (first(4, 1000, 10), 10),
@@ -163,7 +163,7 @@ fn sums_are_right_to_twelve_digits_against_whole_numbers() {
     }
 }
 
-/// L2-star as the integral that it is: over each rectangle between coordinates the count is constant.
+/// L2-star by direct integration: over each rectangle between coordinates the count is constant.
 fn l2_by_integration(points: &[[f64; 2]]) -> f64 {
     let axis = |d: usize| {
         let mut axis: Vec<f64> = points.iter().map(|p| p[d]).chain([0.0, 1.0]).collect();

@@ -1,14 +1,12 @@
-//! Point sets and a judge that is the definition itself.
+//! Point sets, and reference measures straight from the definition.
 
 use raystone::discrepancy::{Budget, PointSet};
 use raystone::random::Pcg32;
 
-/// Time enough for any small set.
 pub fn ample() -> Budget {
     Budget::seconds(600.0)
 }
 
-/// The points of a set in two dimensions.
 pub fn pairs(points: &PointSet) -> Vec<[f64; 2]> {
     points.points().map(|p| [p[0], p[1]]).collect()
 }
@@ -23,7 +21,7 @@ pub fn radical_inverse(base: u64, mut i: u64) -> f64 {
     value as f64 / scale as f64
 }
 
-/// Halton points in any dimension up to 8.
+/// Halton points in up to 8 dimensions.
 pub fn halton_in(dim: usize, first: u64, n: u64) -> PointSet {
     let bases = [2, 3, 5, 7, 11, 13, 17, 19];
     let point = |i| bases[..dim].iter().map(move |&b| radical_inverse(b, i));
@@ -67,7 +65,7 @@ fn directions(dim: usize) -> [u32; 32] {
     v
 }
 
-/// Sobol' points in natural order, up to 6 dimensions.
+/// Sobol' points in natural order, in up to 6 dimensions.
 pub fn sobol_in(dim: usize, n: u32) -> PointSet {
     let directions: Vec<_> = (0..dim).map(directions).collect();
     let coordinate = |i: u32, v: &[u32; 32]| {
@@ -82,7 +80,7 @@ pub fn sobol(n: u32) -> Vec<[f64; 2]> {
     pairs(&sobol_in(2, n))
 }
 
-/// Random points; few levels make ties and coordinates 0 and 1, and some points come twice.
+/// Random points; few levels cause ties and coordinates 0 and 1, and some points are repeated.
 pub fn random_in(dim: usize, n: usize, levels: usize, random: &mut Pcg32) -> PointSet {
     let mut all: Vec<f64> = Vec::new();
     for i in 0..n {

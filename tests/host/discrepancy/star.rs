@@ -35,7 +35,7 @@ fn known_sets_in_the_plane_have_their_published_discrepancy() {
     ] {
         assert_close(star_2d(&points).unwrap(), expected);
     }
-    // Tabled to ten or so digits only.
+    // Tabulated to about ten digits only.
     for (points, expected) in [
         (halton(0, 64), 0.0520833333),
         (halton(1, 64), 0.0520833333),
@@ -75,7 +75,7 @@ fn sets_small_enough_to_know_by_hand() {
         let of = |coordinates: Vec<f64>| exact(&PointSet::new(dim, coordinates).unwrap());
         assert_close(of(vec![0.0; dim]), 1.0);
         assert_close(of(vec![1.0; dim]), 1.0);
-        // The closed box up to the middle holds all; the open one that leaves it out is half the cube.
+        // The closed box up to the middle holds all; the open one without it is half the cube.
         assert_close(of(vec![0.5; dim * 7]), (1.0 - power(0.5)).max(0.5));
     }
     // A point on the right border is in no open box: too few points left of it, up to area 1.
@@ -133,11 +133,11 @@ fn the_tournament_agrees_with_the_quadratic_sweep() {
 
 #[test]
 fn a_plane_in_space_has_the_discrepancy_of_the_plane() {
-    // Boxes with too few points lose nothing by reaching through; those with too many end at 1.
+    // Boxes with too few points lose nothing by extending through; those with too many end at 1.
     let flat = sobol(512);
     let lift = |p: &[f64; 2], z: f64| [p[0], p[1], z];
     let all: Vec<[f64; 3]> = flat.iter().map(|p| lift(p, 0.0)).collect();
-    // At height 0 all points lie in boxes of no volume.
+    // At height 0 all points lie in boxes of zero volume.
     assert_close(exact(&PointSet::from_points(&all).unwrap()), 1.0);
     let even: Vec<[f64; 3]> = (0..8)
         .flat_map(|k| flat.iter().map(move |p| lift(p, f64::from(k) / 8.0)))
@@ -218,7 +218,7 @@ fn the_extreme_discrepancy_agrees_with_the_definition() {
 
 #[test]
 fn the_cost_of_many_points_grows_hardly_faster_than_their_number() {
-    /// Sixteen times as many points: 21 times the work where it is N log N, 256 times where it is quadratic.
+    /// For sixteen times as many points: 21 times the work if N log N, 256 times if N².
     const MOST_GROWTH: f64 = 90.0;
     let growth = |few: u32, cost: fn(&[[f64; 2]]) -> f64| {
         let [few, many] = [few, 16 * few].map(|n| {
@@ -231,7 +231,7 @@ fn the_cost_of_many_points_grows_hardly_faster_than_their_number() {
     };
     let found = growth(8192, |points| star_2d(points).unwrap());
     assert!(found < MOST_GROWTH, "{found} times the work");
-    // Every pair of points is looked at.
+    // Every pair of points is visited.
     let pairs = |points: &[[f64; 2]]| {
         let below = |p: &[f64; 2]| {
             points

@@ -1,11 +1,11 @@
-//! The O(N²) sweep for the exact star discrepancy in two dimensions: simple, so that it can judge.
+//! The O(N²) sweep for the exact star discrepancy in two dimensions, a simple reference.
 
 /// Sweeps a vertical line over the distinct x, keeping the y of the points passed in sorted order.
 ///
-/// A box `[0, x] × [0, y]` has too many points only if its top touches one of them, and too few only
-/// if its top is about to swallow one or is at 1; so the y of the points passed are enough, and the
-/// rank in the sorted list is the count. Equal y need no care: of a run of ties the first has the
-/// right open count, the last the right closed count, and the others give smaller values.
+/// A box `[0, x] × [0, y]` has too many points only if its top touches one of them, and too few
+/// only if its top is about to reach one or is at 1; so the y of the points passed suffice, and the
+/// rank in the sorted list is the count. Equal y need no special care: of a run of ties the first
+/// has the right open count, the last the right closed count, and the others give smaller values.
 pub(super) fn sweep(points: &[[f64; 2]]) -> f64 {
     let n = points.len() as f64;
     let mut by_x = points.to_vec();
@@ -22,7 +22,7 @@ pub(super) fn sweep(points: &[[f64; 2]]) -> f64 {
             passed.insert(passed.partition_point(|&y| y < p[1]), p[1]);
         }
         start += length;
-        // The points passed are those of the closed boxes at this x and of the open ones at the next.
+        // Points passed are those of closed boxes at this x and of open ones at the next.
         let next_x = by_x.get(start).map_or(1.0, |p| p[0]);
         let strip = Strip {
             closed: x * n,
@@ -36,14 +36,14 @@ pub(super) fn sweep(points: &[[f64; 2]]) -> f64 {
     excess / n
 }
 
-/// Areas of boxes of height 1 that end at this and at the next x, times N.
+/// Areas of boxes of height 1 that end at this and the next x, times N.
 struct Strip {
     closed: f64,
     open: f64,
 }
 
 impl Strip {
-    /// Largest of `closed count - N·area` and, if asked for, `N·area - open count`; sorted `ys`.
+    /// Largest `closed count - N·area` and, if requested, `N·area - open count`; sorted `ys`.
     fn worst(&self, ys: &[f64], ranks: &[f64], with_open: bool) -> f64 {
         const LANES: usize = 8;
         let mut many = [f64::MIN; LANES];

@@ -1,9 +1,10 @@
-//! What every kind of mistake is answered with, word for word, and how settings stand in the hashes of cells.
+//! Exact messages for every kind of mistake, and the settings in cell hashes.
 //!
-//! `mistakes.txt` has a case behind each line `= name`: lines that follow [`AXES`], directives (`% …`), and behind `>` what
-//! comes out. Directives: `whole` (nothing goes before), `set` and `only` (as on the command line), `load` (a file),
-//! `refuse` (of sequences, `pixel-hash` alone makes sense), `settings` (what hashes are made of, not only whether it is accepted).
-//! `RAYSTONE_WRITE_MISTAKES=1` writes the answers anew, for a change on purpose.
+//! `mistakes.txt` has one case per line `= name`: lines appended to [`AXES`], directives (`% …`),
+//! and after `>` the expected output. Directives: `whole` (no prefix), `set` and `only` (as on the
+//! command line), `load` (a file), `refuse` (of the sequences, only `pixel-hash` is valid),
+//! `settings` (print the hash inputs, not only acceptance). `RAYSTONE_WRITE_MISTAKES=1` rewrites
+//! the answers, for an intended change.
 
 use super::{AXES, assert_says, catalogue, parse};
 use raystone::config::{ConfigError, Experiment, Plan};
@@ -13,7 +14,6 @@ use std::path::Path;
 
 const CASES: &str = include_str!("mistakes.txt");
 
-/// Every error that there is.
 const ERRORS: [&str; 16] = [
     "Duplicate",
     "Empty",
@@ -80,7 +80,7 @@ impl Case {
     }
 }
 
-/// What the hashes of cells are made of, see `measure`'s inputs.
+/// Hash inputs of cells, see `measure`'s inputs.
 fn settings(e: &Experiment) -> String {
     [
         format!(
@@ -99,7 +99,6 @@ fn settings(e: &Experiment) -> String {
     .join("\n")
 }
 
-/// The cases by name, in their order.
 fn cases() -> Vec<(&'static str, Case)> {
     let mut cases: Vec<(&str, Case)> = Vec::new();
     for line in CASES.lines() {

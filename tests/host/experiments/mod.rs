@@ -1,5 +1,4 @@
-//! Experiment files, through the public interface: what is accepted, and what every kind of
-//! mistake is answered with.
+//! Experiment files through the public interface: accepted input, and answers to mistakes.
 
 mod mistakes;
 
@@ -29,7 +28,7 @@ fn parameter(name: &'static str, default: ParamValue, range: ParamRange) -> Para
     }
 }
 
-/// A catalogue of its own, so that these tests do not depend on what the registries hold.
+/// A separate catalogue, so that these tests do not depend on the registries.
 fn catalogue() -> Catalogue {
     let lambda = ParamRange::Number {
         min: 0.1,
@@ -82,7 +81,7 @@ fn parse_with(text: &str, overrides: &[&str]) -> Result<Experiment, ConfigError>
     Experiment::parse(text, "dir/trial.toml", &overrides, &catalogue())
 }
 
-/// The experiment of [`AXES`] and some more lines, which start on line 5.
+/// The experiment of [`AXES`] with additional lines, which start on line 5.
 fn parse(more: &str) -> Result<Experiment, ConfigError> {
     parse_with(&format!("{AXES}{more}"), &[])
 }
@@ -359,7 +358,7 @@ fn tests_and_offsets_are_swept_where_they_matter() {
     let exclude = "[[exclude]]\ntriangle = \"pluecker\"\nbox_test = \"plain\"\n";
     let experiment = parse_with(&format!("{text}{exclude}"), &[]).expect("a good sweep");
     let whole = plan(&experiment, &[]).expect("a plan");
-    // Three pairs of tests; 2 structures, which are the same with every offset; 2 sequences; 2 offsets.
+    // Three pairs of tests; 2 structures, shared by offsets; 2 sequences; 2 offsets.
     assert_eq!(whole.structures.len(), 3 * 2);
     assert_eq!(whole.samplers.len(), 3 * 2 * 2);
     assert_eq!(whole.times.len(), 3 * 2 * 2 * 2);
@@ -383,7 +382,7 @@ fn tests_and_offsets_are_swept_where_they_matter() {
             "cornell-box, triangle pluecker"
         ]
     );
-    // What differs from the default stands behind the names, and no two cells are called the same.
+    // Non-default values follow the names, and cell names are unique.
     let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
     assert_eq!(names.len(), whole.times.len());
     assert!(
@@ -456,7 +455,7 @@ fn filters_and_excludes_that_fit_nothing_are_mistakes() {
         plan(&parse_with(&all, &[]).expect("parses"), &[]),
         &["nothing is left"],
     );
-    // The same leftover exclude is no mistake where the command line replaced its axis.
+    // The same leftover exclude is allowed if the command line replaced its axis.
     let other = parse_with(SWEEP, &["axes.scene=a/b.obj"]).expect("a replaced axis");
     assert_eq!(plan(&other, &[]).unwrap().structures.len(), 3);
     let narrowed = parse_with(SWEEP, &["axes.sequence=sobol"]).expect("a replaced axis");

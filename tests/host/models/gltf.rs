@@ -150,7 +150,7 @@ fn nodes_that_share_a_mesh_become_instances_of_one_object() {
     assert!(warning.contains("cannot be inverted"), "{warning}");
 }
 
-/// The square with all the textures that a material may have, and normals that slant.
+/// The square with all textures that a material may have, and slanted normals.
 #[test]
 fn all_textures_and_the_normals_of_a_gltf_material_arrive() {
     let image = png();
@@ -212,7 +212,7 @@ fn all_textures_and_the_normals_of_a_gltf_material_arrive() {
     let slanted = decode_normal(scene.normals[2][1]).unwrap();
     assert!(slanted.distance(DVec3::new(0.5, 0.0, 0.5).normalize()) < 1e-4);
     assert_eq!(scene.normals[1][2], GEOMETRIC, "no length");
-    // Its set of coordinates is not that of the others.
+    // Its coordinate set is not that of the others.
     assert_eq!(lamp.emission_texture, None);
     let all = scene.report.warnings.join("\n");
     assert!(all.contains("several sets of coordinates"), "{all}");
@@ -251,7 +251,7 @@ fn a_mask_takes_alpha_and_cutoff_of_the_base_colour_and_blending_is_told() {
         mask.texture.unwrap().linear != glam::Mat2::IDENTITY,
         "its transform"
     );
-    // Masks say what rays hit: they are there without textures, too.
+    // Masks affect hits: they are loaded without textures, too.
     let bare = load("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,", false);
     assert_eq!(bare.materials[0].mask, Some(mask));
     assert_eq!(bare.materials[0].base_color_texture, None);

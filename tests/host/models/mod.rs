@@ -1,5 +1,4 @@
-//! Whole loads of small files written here, sound and damaged, and of real models where they are
-//! at hand.
+//! Complete loads of small files written here, valid and damaged, and of real models if available.
 
 mod gltf;
 mod obj;
@@ -33,7 +32,6 @@ fn load_path(path: &Path) -> Result<SceneData, SceneError> {
     load(&variant(path.to_str().unwrap()), &LoadOptions::default())
 }
 
-/// Loads `file` from a folder that holds all of `files`.
 fn load_files(file: &str, files: &[(&str, &[u8])]) -> Result<SceneData, SceneError> {
     let folder = TempDir::new().unwrap();
     for (name, bytes) in files {
@@ -62,7 +60,6 @@ fn png() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// A GLB file of this JSON and binary chunk.
 fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     let chunk = |kind: &[u8; 4], data: &[u8], pad: u8| {
         let mut data = data.to_vec();
@@ -145,7 +142,7 @@ fn missing_empty_and_foreign_files_are_told_apart() {
     assert!(matches!(load_path(&path), Err(SceneError::Read { .. })));
 }
 
-/// Damaged models are the business of `tests/mutated_files`, which has no textures in files.
+/// Damaged models are tested in `tests/mutated_files`, which has no textures in files.
 #[test]
 fn a_damaged_texture_never_panics() {
     let model = format!("mtllib m.mtl\nusemtl a\n{SQUARE}vt 0 0\nf 1/1 2/1 3/1\n");
@@ -169,6 +166,6 @@ fn a_damaged_texture_never_panics() {
         let scene = load_files("a.obj", &files).expect("a model without its texture");
         outcomes[scene.textures.len()] += 1;
     }
-    // Both happen, or the test damages too much or too little.
+    // Both occur, or the test damages too much or too little.
     assert!(outcomes.iter().all(|n| *n > 20), "{outcomes:?}");
 }

@@ -169,7 +169,7 @@ fn normals_are_kept_where_they_bend_the_surface() {
     let slanted = decode_normal(first[1]).unwrap();
     assert!(slanted.distance(DVec3::new(0.5, 0.0, 0.5).normalize()) < 1e-4);
     assert_eq!((first[2], *second), (GEOMETRIC, [GEOMETRIC; 3]));
-    // Flat ones, on whatever side, tell nothing.
+    // Flat ones, on either side, add nothing.
     let flat = format!("{SQUARE}vn 0 0 1\nvn 0 0 -3\nf 1//1 2//2 3//1 4//2\n");
     let without = load_obj(&format!("{SQUARE}f 1 2 3 4\n")).unwrap();
     let flat = load_obj(&flat).unwrap();
@@ -210,7 +210,7 @@ fn statements_place_textures_and_what_has_none_says_so() {
     }
 }
 
-/// A 2 x 1 image whose first texel is this alpha and whose second is opaque white.
+/// A 2 x 1 image whose first texel has this alpha and whose second is opaque white.
 fn masked_png(alpha: u8, light: u8) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let texels = vec![light, light, light, alpha, 255, 255, 255, 255];

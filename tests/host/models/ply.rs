@@ -1,4 +1,4 @@
-//! PLY, in text and in both orders of bytes.
+//! PLY, as text and in both byte orders.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Real models, where they are at hand.
+//! Real models, if available.
 
 use super::*;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ fn real_scene(file: &str) -> Option<PathBuf> {
 
 #[test]
 fn real_models_have_their_published_triangle_counts() {
-    // File, triangles, of which zero area.
+    // File, triangles, number with zero area.
     for (file, triangles, zero_area) in [
         ("sponza-crytek/sponza.obj", 262_267, 0),
         ("country-kitchen/kitchen.glb", 1_021_815, 219),

@@ -1,4 +1,4 @@
-//! Textures and maps that are larger than what an adapter binds: what is left stands for the same light.
+//! Textures and maps beyond the adapter's binding limit are reduced to the same light.
 
 use super::variant;
 use raystone::params::ParamValue;
@@ -57,9 +57,10 @@ fn loaded(file: &Path, max_texture_size: u32, table_bytes: u64) -> SceneData {
 /// Linear light of an sRGB byte (IEC 61966-2-1).
 fn light(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 
@@ -97,7 +98,7 @@ fn what_is_cut_out_lends_no_colour() {
 fn textures_and_maps_are_as_large_as_the_adapter_binds() {
     let folder = tempfile::tempdir().unwrap();
     let file = model(folder.path(), 64, [WHITE, BLACK]);
-    // Beside 8 MiB for materials and lights: four images of 64 × 64 texels and a triangle, or less.
+    // Next to 8 MiB for materials and lights: at most four 64 × 64 images and a triangle.
     let needed = (8 << 20) + 4 * (4 * 64 * 64 + 9);
     let sizes = |bytes| {
         let scene = loaded(&file, 1024, bytes);

@@ -1,11 +1,11 @@
-//! What a file says is drawn or named: colours of vertices, instances, visibility, polygons, and all that is not read.
+//! Content is drawn or reported: vertex colours, instances, visibility, polygons, unread parts.
 
 use super::*;
 use base64::Engine;
 use raystone::scene::decode_color;
 
-/// A glTF of a square without a material: `attributes` are further ones of it, whose accessors are in `more`, each the numbers of its
-/// component type and type, whether it is normalised, and its bytes. `nodes` are those of the scene, of which the first is its root.
+/// A glTF of a square without a material. `attributes` are additional ones, with their accessors in
+/// `more`: component type, type, normalised flag and bytes. `nodes` begin with the root.
 fn gltf(attributes: &str, nodes: &str, head: &str, more: &[(u32, &str, usize, Vec<u8>)]) -> String {
     let corners = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let positions = corners.iter().flat_map(|[x, y]| [*x, *y, 0.0]);
@@ -73,7 +73,7 @@ fn first_colours_of_gltf_are_linear_and_the_same_in_every_type() {
     for alpha in [false, true] {
         let kind = if alpha { "VEC4" } else { "VEC3" };
         let bytes: Vec<u8> = all(alpha, 255.0).iter().map(|x| *x as u8).collect();
-        // Three bytes a vertex stand four apart.
+        // Three bytes per vertex at a stride of four.
         let bytes = alpha.then_some(bytes);
         let words: Vec<u16> = all(true, 65_535.0).iter().map(|x| *x as u16).collect();
         let words: Vec<u8> = words.iter().flat_map(|x| x.to_le_bytes()).collect();
@@ -178,7 +178,7 @@ fn listed_instances_stand_where_they_are_put() {
         let scene = load_gltf(&gltf("", node, head, &lists(rotation)));
         assert_eq!(scene.triangles.len(), 4);
         assert_eq!(scene.triangles[0].vertices[2], Vec3::new(1.0, 11.0, 0.0));
-        // (1, 1) is scaled to (2, 3), turned to (−3, 2), and moved.
+        // (1, 1) is scaled to (2, 3), rotated to (−3, 2), and translated.
         let far = scene.triangles[2].vertices[2];
         assert!(far.distance(Vec3::new(2.0, 12.0, 1.0)) < 1e-3, "{far}");
         let assembly = scene.assembly.as_ref().expect("instances");
@@ -327,7 +327,7 @@ fn a_corner_without_normal_or_coordinates_never_takes_those_of_the_face_before()
 
 #[test]
 fn concave_polygons_are_what_they_are_and_crossing_ones_are_named() {
-    // A dart, whose fan from the first corner would cover what is outside of it.
+    // A dart, whose fan from the first corner would cover the outside.
     let area = |scene: &SceneData| -> f32 {
         let of = |t: &raystone::geometry::Triangle| {
             let [a, b, c] = t.vertices;
@@ -354,7 +354,7 @@ fn concave_polygons_are_what_they_are_and_crossing_ones_are_named() {
     )
     .unwrap();
     assert_eq!((area(&scene), scene.triangles.len()), (3.0, 4));
-    // Between the corners of a square the second face takes both diagonals.
+    // Between the corners of a square, the second face uses both diagonals.
     let square = ply.replace(
         "0 0 0\n2 1 0\n0 2 0\n0.5 1 0\n",
         "0 0 0\n2 0 0\n2 2 0\n0 2 0\n",

@@ -1,8 +1,7 @@
-//! Text models as the wild has them, and files that models name.
+//! Text models as found in practice, and files that models name.
 
 use super::*;
 
-/// A square with a lamp, and its materials.
 const LIT: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl lamp\nf 1 2 3\nusemtl wall\nf 1 3 4\n";
 const MTL: &str = "newmtl lamp\nKe 3 2 1\nnewmtl wall\nKd 0.5 0.25 0.75\n";
 
@@ -93,7 +92,7 @@ fn absolute_paths_of_an_obj_model_are_not_read() {
     );
 }
 
-/// A triangle whose buffer and image are at these places.
+/// A triangle with its buffer and image at these paths.
 fn gltf(buffer: &str, image: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
@@ -107,7 +106,7 @@ fn gltf(buffer: &str, image: &str) -> String {
     )
 }
 
-/// A folder `models` with buffers and images in it and beside it, and links both ways.
+/// A folder `models` with buffers and images inside and beside it, and links both ways.
 #[cfg(unix)]
 fn models_and_links() -> TempDir {
     use std::os::unix::fs::symlink;

@@ -1,4 +1,4 @@
-//! Ratios of predicted cycles: what groups of pixels say of each other is the noise, what they share is none.
+//! Ratios of predicted cycles: variation between pixel groups is noise; the shared part is not.
 
 use super::verdicts::expect;
 use raystone::measure::record::{COST, Interval, Key, Line, Ran, Tally};
@@ -8,20 +8,19 @@ use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
 use serde_json::json;
 
-/// Rays of six groups, and how much harder each is than the mean.
+/// Rays of six groups.
 const RAYS: [u64; 6] = [64, 64, 32, 64, 48, 64];
 const HARD: [f64; 6] = [1.0, 4.0, 0.5, 2.0, 1.5, 0.25];
 
-/// Cycles of an issue.
 const ISSUE: u64 = COST[0];
 
-/// Cycles of each group: so many per ray of common hardness, times its own part.
+/// Cycles of each group: common cycles per ray times its own factor.
 fn cycles(per_ray: f64, own: [f64; 6]) -> Vec<[u64; 2]> {
     let of = |i: usize| (per_ray * HARD[i] * own[i] * RAYS[i] as f64) as u64 / ISSUE * ISSUE;
     (0..6).map(|i| [RAYS[i], of(i)]).collect()
 }
 
-/// Coherence of a sampler at numbers of samples.
+/// Coherence of a sampler at several sample counts.
 fn followed(decorrelation: &str, at: &[(u32, Vec<[u64; 2]>)]) -> Line {
     let at_one = |(spp, groups): &(u32, Vec<[u64; 2]>)| {
         let sum = |i: usize| groups.iter().map(|g| g[i]).sum::<u64>();
@@ -51,7 +50,7 @@ fn followed(decorrelation: &str, at: &[(u32, Vec<[u64; 2]>)]) -> Line {
     Line::new(key, Ran::default(), body)
 }
 
-/// The same at 16 samples.
+/// [`followed`] at 16 samples.
 fn at_16(decorrelation: &str, groups: Vec<[u64; 2]>) -> Line {
     followed(decorrelation, &[(16, groups)])
 }
@@ -102,7 +101,7 @@ fn groups_that_disagree_leave_it_open() {
     let row = found(&lines, &ratio("least = 1.0"));
     let i = ours(&row);
     assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
-    // The quotient of the sums, as the figures of a report are, and the delete-one jackknife by hand.
+    // The quotient of sums, as in reports, and the delete-one jackknife by hand.
     let sums = |own: [f64; 6], without: usize| {
         let kept = (0..6).filter(|i| *i != without);
         kept.map(|i| HARD[i] * own[i] * RAYS[i] as f64).sum::<f64>()
@@ -129,7 +128,7 @@ fn a_gain_that_grows_is_judged_by_what_groups_say_of_all_four_figures() {
         let jitter = [16, 256].map(|spp| (spp, cycles(1e5, SAME)));
         [followed("shift", &shift), followed("jitter", &jitter)]
     };
-    // The same groups gain and lose: the growth is known though no gain is.
+    // The same groups gain and lose: the growth is known although no gain is.
     let row = found(&lines(MIXED), order);
     assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
     assert!((ours(&row).value - 1.3).abs() < 1e-3, "{row:?}");
@@ -163,7 +162,7 @@ fn one_group_says_nothing_of_others_and_older_records_have_none() {
         &ratio("least = 1.0"),
     );
     assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
-    // Nor is a ratio certain whose sides were followed in different numbers of groups.
+    // A ratio of sides with different numbers of groups is not certain either.
     let fewer = [
         at_16("shift", cycles(2e5, SAME)),
         at_16("jitter", cycles(1e5, SAME)[..5].to_vec()),

@@ -1,5 +1,5 @@
-//! Tables of theses: every file is sound, every claim of the digests is covered or said not to be, transcribed numbers
-//! stand in the digests, and verdicts see planted faults.
+//! Thesis tables: every file is valid, every claim of the digests is covered or explicitly not,
+//! transcribed numbers occur in the digests, and verdicts detect planted faults.
 
 mod groups;
 mod numbers;
@@ -25,7 +25,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The text of a digest, where the digests are; told aloud where not.
+/// The text of a digest, if available; reported otherwise.
 fn digest(source: &str) -> Option<String> {
     let path = root().join(format!("../shared/seeds/{source}.md"));
     let text = fs::read_to_string(&path);
@@ -66,7 +66,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
             let prepared = prepare(source, &settings, &registries.catalogue());
             let prepared = prepared.unwrap_or_else(|e| panic!("{}: {e}", source.name));
             assert_eq!(prepared.experiment.name, source.name);
-            // A figure that there is only with so many rounds.
+            // This figure needs a minimum number of rounds.
             let needs_rounds = |e: &Expect| e.figure == "against-single-kernel/v1";
             if prepared.thesis.expects.iter().any(needs_rounds) {
                 let rounds = prepared.experiment.timing.rounds as usize;
@@ -76,7 +76,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
                     source.name
                 );
             }
-            // Without models a whole run says what to get; a short one needs none.
+            // A full run without models says what to download; a short one needs none.
             for (substitute, ours) in &prepared.scenes {
                 if let (Err(reason), false) = (ours, quick) {
                     let told = reason.contains("--scenes") || reason.contains(&substitute.why);
@@ -89,7 +89,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
     }
 }
 
-/// What expectations speak of and no cell of the experiment is.
+/// Expectations that match no cell of the experiment.
 fn unmeasured(prepared: &Prepared, quick: bool) -> Vec<String> {
     let mut missing = Vec::new();
     let axes = &prepared.experiment.axes;
@@ -202,7 +202,7 @@ fn every_model_of_a_substitute_says_where_to_get_it() {
     );
 }
 
-/// Ids of hypotheses in a digest: rows of tables that begin with `| H5 |` or `| N1 |`.
+/// Ids of hypotheses in a digest: table rows that begin with `| H5 |` or `| N1 |`.
 fn ids(text: &str) -> BTreeSet<String> {
     let first = text
         .lines()

@@ -1,5 +1,5 @@
-//! Numbers of theses are those of the digests' tables: each is looked up by what its place measures (scene, structure,
-//! method, samples), so that a swapped row or column, another scene, unit or side of a ratio is seen.
+//! Thesis numbers match the digests' tables: each is looked up by what it measures (scene,
+//! structure, method, samples), to detect swapped rows or columns, scenes, units or ratios.
 
 use super::printed::Place;
 use super::{digest, theses};
@@ -8,7 +8,7 @@ use raystone::measure::figure::figure;
 use raystone::repro::SOURCES;
 use std::collections::BTreeSet;
 
-/// Units of the columns: what a figure has to be in, if the file names no other unit.
+/// Units of the columns, required of a figure unless the file names another unit.
 const UNITS: [(&str, &str); 7] = [
     ("ms", "ms"),
     ("Mrays/s", "Mrays/s"),
@@ -19,7 +19,7 @@ const UNITS: [(&str, &str); 7] = [
     ("Cornell Box", "ms"),
 ];
 
-/// How far a number of a file may be off: what is copied not at all, a quotient by its last digit.
+/// Tolerance of a file's number: zero for a copied one, the last digit for a quotient.
 fn rounding(expect: &Expect, ours: f64, value: f64) -> f64 {
     if expect.compare == Compare::Shown {
         return 1e-9 * value.abs();
@@ -30,7 +30,7 @@ fn rounding(expect: &Expect, ours: f64, value: f64) -> f64 {
     0.51 * 10f64.powi(-(digits as i32))
 }
 
-/// What is wrong with the numbers of a file; how many were held against the digest.
+/// Faults in a file's numbers, and how many were compared with the digest.
 fn faults(name: &str, thesis: &Thesis, text: &str) -> (Vec<String>, usize) {
     let mut faults = Vec::new();
     let mut held = 0;
@@ -51,9 +51,10 @@ fn faults(name: &str, thesis: &Thesis, text: &str) -> (Vec<String>, usize) {
                 Some(_) => {}
             }
             let unit = UNITS.iter().find(|(column, _)| *column == place.column());
-            let own = match expect.unit.is_empty() {
-                true => figure(&expect.figure).unit.to_string(),
-                false => expect.unit.clone(),
+            let own = if expect.unit.is_empty() {
+                figure(&expect.figure).unit.to_string()
+            } else {
+                expect.unit.clone()
             };
             if unit.is_some_and(|(_, unit)| expect.compare == Compare::Shown && *unit != own) {
                 faults.push(format!("{at}: {ours} in {own}"));
@@ -111,7 +112,7 @@ fn triangles_of_scenes_are_those_of_the_digest() {
     }
 }
 
-/// Faults planted in the files: file, text, other text.
+/// Faults planted in the files: file, text, replacement.
 const PLANTED: [(&str, &str, &str); 16] = [
     // A row swapped, a column swapped, neighbouring digits.
     (
@@ -152,7 +153,7 @@ const PLANTED: [(&str, &str, &str); 16] = [
         "column = \"Cornell Box\"\n",
         "column = \"Cornell Box\"\nunit = \"s\"\n",
     ),
-    // A ratio upside down, with another side, of another figure.
+    // A ratio inverted, with another side, of another figure.
     ("nilsson-table-5-2", "thesis = 1.156", "thesis = 0.865"),
     (
         "nilsson-table-5-3",

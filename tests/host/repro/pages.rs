@@ -1,4 +1,4 @@
-//! From a folder of records to verdicts and pages: which records count, what stands for which scene, what a page says first.
+//! From a folder of records to verdicts and pages: relevant records, scenes, page headers.
 
 use super::root;
 use super::rounds::{A, B, HERE, Sitting, drifted, timed};
@@ -182,7 +182,6 @@ fn finished() -> Line {
     line(Key::default(), body)
 }
 
-/// What a run with these settings would record.
 fn lines(settings: &Settings, software: bool) -> Vec<Line> {
     let prepared = prepare(&source(), settings, &Registries::default().catalogue()).expect("sound");
     let at = |scene| Sitting { scene, ..HERE };
@@ -235,7 +234,7 @@ fn records_are_judged_and_a_clock_speaks_on_a_device_alone() {
         page::tally(&[software.clone(), device]),
         "5 supported, 2 contradicted, 1 not testable here"
     );
-    // What stands for which scene, with its own triangles.
+    // Substituted scenes, with their own triangle counts.
     let scenes: Vec<(String, Option<Placed>)> = (software.scenes.iter())
         .map(|(s, ours)| (s.original.clone(), ours.clone().ok()))
         .collect();
@@ -278,7 +277,7 @@ fn records_of_another_experiment_of_a_killed_run_or_of_other_sizes_are_not_judge
         .is_none()
     );
     assert!(judged(&whole, &text(["\"sobol\"", "\"halton\""])).is_none());
-    // Other expectations of the same experiment are judged anew.
+    // Other expectations of the same experiment are re-evaluated.
     assert!(judged(&whole, &text(["least = 1.5", "least = 2.5"])).is_some());
     let quick = Settings {
         quick: true,
@@ -286,7 +285,7 @@ fn records_of_another_experiment_of_a_killed_run_or_of_other_sizes_are_not_judge
     };
     assert!(judged(&quick, &own).is_none());
     assert!(judged(&whole, &lines(&quick, false)).is_none());
-    // Those of the smaller sizes of a software adapter are, wherever they are judged; the page says so.
+    // Those of a software adapter's sizes apply wherever they are evaluated; the page says so.
     let small = Settings {
         software: true,
         ..whole.clone()
@@ -315,16 +314,16 @@ fn a_structure_that_failed_or_was_left_out_is_not_testable_and_never_supported()
     );
     // The other places decide.
     assert_eq!(table.verdict(1), Verdict::Supported);
-    // Without a word of it the expectation is at fault.
+    // Without any mention of it, the expectation is at fault.
     let mut absent = lines(&settings, false);
     absent.remove(6);
     let table = judged(&settings, &absent).expect("a table");
     assert_eq!(table.verdict(1), Verdict::Faulty);
-    // What is only shown has faults, too.
+    // Figures that are only shown have faults, too.
     absent.remove(5);
     let table = judged(&settings, &absent).expect("a table");
     assert_eq!(table.verdict(0), Verdict::Faulty);
-    // A time that failed says why.
+    // A failed time states the reason.
     let mut slow = lines(&settings, false);
     for line in &mut slow {
         if let Body::Time(record) = &mut line.body {

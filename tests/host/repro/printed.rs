@@ -1,8 +1,8 @@
-//! What a digest prints where a place of an experiment measures: looked up by scene, structure, method and samples.
+//! Printed digest values by scene, structure, method and samples.
 
 use raystone::config::expect::{At, Compare, Expect, Pick};
 
-/// Patterns of structures, and what Nilsson and Otte dag call them.
+/// Patterns of structures, and their names by Nilsson and Otte dag.
 const STRUCTURES: [(&str, &str); 5] = [
     ("bvh*", "BVH"),
     ("roped-bvh*", "Stackless BVH"),
@@ -11,14 +11,13 @@ const STRUCTURES: [(&str, &str); 5] = [
     ("irregular-grid*", "Irregular grid"),
 ];
 
-/// A table of a digest.
 struct Printed {
     columns: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
 impl Printed {
-    /// The first table below the first line with this text.
+    /// The first table after the first line with this text.
     fn new(text: &str, below: &str) -> Self {
         let (_, rest) = text
             .split_once(below)
@@ -37,7 +36,7 @@ impl Printed {
         let mut lines = lines.take_while(|line| line.starts_with('|')).map(cells);
         let columns = lines.next().expect("a head");
         let mut rows: Vec<Vec<String>> = lines.skip(1).collect();
-        // An empty first cell is that above.
+        // An empty first cell repeats the one above.
         for i in 1..rows.len() {
             if rows[i][0].is_empty() {
                 rows[i][0] = rows[i - 1][0].clone();
@@ -67,7 +66,7 @@ impl Printed {
     }
 }
 
-/// The name for the pattern that a pick has on an axis.
+/// The name for the pattern of a pick on an axis.
 fn named<'n>(pick: &Pick, axis: &str, names: &[(&str, &'n str)]) -> Option<&'n str> {
     let pattern = pick.get(axis)?;
     let found = names.iter().find(|(known, _)| known == pattern);
@@ -98,9 +97,10 @@ impl<'e> Place<'e> {
     }
 
     pub fn column(&self) -> &str {
-        match self.at.column.is_empty() {
-            true => &self.expect.column,
-            false => &self.at.column,
+        if self.at.column.is_empty() {
+            &self.expect.column
+        } else {
+            &self.at.column
         }
     }
 
@@ -116,7 +116,7 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// What the digest prints here: the row's label and the number; `None` for nothing.
+    /// The digest's label and number for this place; `None` if it prints nothing.
     pub fn printed(&self, name: &str, text: &str) -> Option<(String, f64)> {
         match name {
             "nilsson-table-5-2" => self.nilsson_5_2(text),
@@ -135,7 +135,7 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// What is printed as a factor, which is of numbers that were not rounded yet, where the quotient says the same.
+    /// The printed factor, computed from unrounded numbers, if the quotient agrees.
     fn factor(&self, printed: Option<f64>, value: impl Fn(&Pick) -> Option<f64>) -> Option<f64> {
         let (printed, value) = (printed?, self.quotient(value)?);
         ((value / printed - 1.0).abs() < 0.02).then_some(printed)
@@ -202,7 +202,7 @@ impl<'e> Place<'e> {
 
     fn dufay_2_2(&self, text: &str) -> Option<(String, f64)> {
         let table = Printed::new(text, "## 3.1 Table 2.2");
-        // Frames a second, and seconds.
+        // Frames per second, and seconds.
         let columns = [
             ("one-pass", (2, 3)),
             ("blocks", (4, 5)),
@@ -271,7 +271,7 @@ impl<'e> Place<'e> {
         ))
     }
 
-    /// The factor at the depth below over that at the depth above: times are of MK over SK.
+    /// The factor at the depth below over that at the depth above: times are MK over SK.
     fn depth(&self, text: &str) -> Option<(String, f64)> {
         let row = &*self.at.row;
         let tables = [("GTX 570", "3.4"), ("Titan X", "3.5")];
@@ -322,7 +322,7 @@ impl<'e> Place<'e> {
         let value = match &*self.expect.figure {
             "mrays-per-s/v1" if self.expect.compare == Compare::Shown => value(&self.of)?,
             "mrays-per-s/v1" => self.factor(table.at(&[self.on()], "Factor"), value)?,
-            // Nodes are compared the other way round: fewer of them make it faster.
+            // Nodes are compared inversely: fewer of them are faster.
             "nodes-per-ray/v1" => self.factor(table.at(&[self.on()], "Factor"), |pick| {
                 Some(1.0 / value(pick)?)
             })?,
@@ -366,7 +366,7 @@ impl<'e> Place<'e> {
         Some((row, self.quotient(value).filter(|_| is_column)?))
     }
 
-    /// His fit `K/√N`, and its exponent.
+    /// The thesis' fit `K/√N`, and its exponent.
     fn fit(&self, text: &str, sequence: &str) -> Option<(String, f64)> {
         if self.expect.figure == "star-exponent/v1" {
             return Some(("exponent".to_owned(), -0.5));
@@ -380,7 +380,7 @@ impl<'e> Place<'e> {
 
     fn roger(&self, text: &str) -> Option<(String, f64)> {
         let method = self.of.get("integrator")?;
-        // A million is the default, and no part of the name.
+        // A million is the default, and not in the name.
         let sizes = [
             ("elements=262144,", "256 k"),
             ("elements=4194304,", "4 M"),

@@ -1,5 +1,5 @@
-//! Ratios of what was timed in the same rounds: a drift that both sides share is none of the ratio's noise, and only what
-//! was timed in the same rounds is paired.
+//! Ratios of figures from the same rounds: drift shared by both sides is not noise of the ratio,
+//! and only figures of the same rounds are paired.
 
 use super::verdicts::expect;
 use raystone::compare::judge::TimeRatio;
@@ -11,13 +11,11 @@ use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
 use serde_json::json;
 
-/// The machine at each of eight rounds: three of them half as fast.
+/// The machine in each of eight rounds: three of them at half speed.
 const DRIFT: [f64; 8] = [1.0, 1.02, 2.0, 1.9, 1.01, 2.1, 0.99, 1.0];
-/// Noise of each side alone.
 pub const A: [f64; 8] = [2.0, 2.01, 1.99, 2.02, 2.0, 1.98, 2.01, 1.99];
 pub const B: [f64; 8] = [1.0, 0.99, 1.01, 1.0, 1.01, 0.99, 1.0, 1.0];
 
-/// When and where a cell was timed, in which rounds.
 #[derive(Clone, Copy)]
 pub struct Sitting {
     pub began: u64,
@@ -51,7 +49,7 @@ pub fn drifted(own: [f64; 8]) -> Vec<f64> {
         .collect()
 }
 
-/// Time of a full cell with these milliseconds, and that it is done.
+/// Time of a full cell in milliseconds, and the line that completes it.
 pub fn timed(accel: &str, at: Sitting, ms: &[f64]) -> [Line; 2] {
     sampled(accel, at, ms, 2)
 }
@@ -72,7 +70,7 @@ fn sampled(accel: &str, at: Sitting, ms: &[f64], spp: u32) -> [Line; 2] {
     lines(key, accel, at, body)
 }
 
-/// Rays of two classes through a structure; there are ten times as many of the second.
+/// Rays of two classes through a structure; the second has ten times as many.
 fn traced(accel: &str, at: Sitting, ms: [&[f64]; 2]) -> [Line; 2] {
     let timing = |class: &str, rays: f64, ms: &[f64]| {
         let rates: Vec<f64> = ms.iter().map(|ms| rays / ms * 1e-3).collect();
@@ -158,7 +156,7 @@ fn a_drift_that_both_share_is_none_of_the_ratios_noise() {
     assert!(width(&row) < 0.03, "{row:?}");
     assert!((row.ours.expect("a ratio").value - 2.0).abs() < 0.02);
     assert_eq!(row.verdict, Verdict::Supported);
-    // The interval is that of the estimator of comparisons.
+    // The interval is that of the estimator used in comparisons.
     let ratios: Vec<f64> = A.iter().zip(B).map(|(a, b)| a / b).collect();
     let paired = TimeRatio::of_rounds(&ratios, "").expect("rounds");
     let theirs = paired.measured(figure("ms-per-spp/v1"), None, 0.0).change;
@@ -205,10 +203,10 @@ fn only_what_was_timed_in_the_same_rounds_is_paired() {
         assert!(width(&row) > 0.5, "{row:?}");
         assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
     }
-    // Records of older programs do not say when they were taken.
+    // Records of older programs lack the time of measurement.
     let unsaid = Sitting { began: 0, ..HERE };
     assert!(width(&found(&pair(unsaid, unsaid), RATIO)) > 0.5);
-    // A round that one of them lacks.
+    // A round missing on one side.
     let [slow, fast] = [drifted(A), drifted(B)];
     let fewer = [timed("slow", HERE, &slow), timed("fast", HERE, &fast[..7])].concat();
     assert!(width(&found(&fewer, RATIO)) > 0.5);
@@ -286,7 +284,7 @@ fn a_time_per_sample_is_paired_as_such() {
     let body = RATIO.replace("least = 1.9", "most = 0.51");
     let row = found(&lines.concat(), &body);
     assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
-    // 4,000 rays in twice the time that 2,500 take.
+    // 4,000 rays in twice the time of 2,500.
     let rate = RATIO.replace("ms-per-spp", "cell-mrays-per-s");
     let row = found(&lines.concat(), &rate);
     assert!(
@@ -295,7 +293,6 @@ fn a_time_per_sample_is_paired_as_such() {
     );
 }
 
-/// The row of a question in the tables of a run.
 fn answer(lines: &[Line], question: &str) -> String {
     let tables = raystone::report::terminal_tables(lines);
     let row = tables.lines().find(|line| line.starts_with(question));
@@ -321,7 +318,7 @@ fn winners_of_a_report_are_found_by_the_rounds_that_both_were_timed_in() {
             "{row}"
         );
         assert!(row.contains("(1.10×)"), "{row}");
-        // In another run the drift is another.
+        // Another run has another drift.
         let later = Sitting {
             began: HERE.began + 60,
             ..HERE
@@ -336,8 +333,8 @@ fn winners_of_a_report_are_found_by_the_rounds_that_both_were_timed_in() {
 
 #[test]
 fn the_best_of_a_report_is_the_one_that_is_best_in_the_rounds_of_both() {
-    // The machine is slow in eight of fifteen rounds. The second one was lucky in one of these, and has a median of 1 against 2.7: in
-    // fourteen rounds the first is faster by a tenth.
+    // The machine is slow in eight of fifteen rounds. The second was lucky in one of these, and has
+    // a median of 1 against 2.7: in fourteen rounds the first is faster by a tenth.
     let machine = [[1.0; 7].to_vec(), [3.0; 8].to_vec()].concat();
     let first: Vec<f64> = machine.iter().map(|m| 0.9 * m).collect();
     let mut second = machine.clone();

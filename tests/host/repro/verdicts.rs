@@ -1,4 +1,4 @@
-//! Verdicts, on values made by hand: planted faults are seen.
+//! Verdicts on hand-made values detect planted faults.
 
 use raystone::config::Experiment;
 use raystone::config::expect::{Expect, Thesis};
@@ -68,7 +68,7 @@ fn a_ratio_upside_down_is_seen_and_its_interval_counts() {
     let at = |body: String| found(&body, &gpu()).verdict;
     assert_eq!(at(format!("{RATIO}least = 1.5")), Verdict::Supported);
     assert_eq!(at(format!("{RATIO}most = 1.0")), Verdict::Contradicted);
-    // 2.0 is above 1.9, its interval is not.
+    // 2.0 is above 1.9, but its interval is not.
     assert_eq!(at(format!("{RATIO}least = 1.9")), Verdict::Undecided);
     let upside_down = RATIO
         .replace("slow", "_")
@@ -321,7 +321,7 @@ fn an_order_of_gains_is_one_of_ratios_and_not_of_the_values_above() {
         "[{ spp = \"32\" }, { spp = \"8\" }]",
     );
     assert_eq!(verdict(&falls, &gains()).verdict, Verdict::Contradicted);
-    // A place may name the other side as well.
+    // A place may also name the other side.
     let of_places = RISES.replace(
         "over = { accel = \"fast\" }\n",
         "at = [{ over = { accel = \"fast\" } }]\n",
@@ -331,7 +331,7 @@ fn an_order_of_gains_is_one_of_ratios_and_not_of_the_values_above() {
     let mut close = gains();
     close[2] = value("slow", 32, "ms-per-spp/v1", 1.1, 1.22, 1.3);
     assert_eq!(verdict(RISES, &close).verdict, Verdict::Undecided);
-    // The other side is missing, or no number.
+    // The other side is missing, or not a number.
     assert_eq!(verdict(RISES, &gains()[..3]).verdict, Verdict::Faulty);
     let mut word = gains();
     word[3].reading = Reading::Word("never");
@@ -397,7 +397,6 @@ fn absent(cells: &[(&[(&str, &str)], &str)]) -> Context {
     }
 }
 
-/// Point sets of two sequences.
 fn discrepancies() -> Vec<Value<'static>> {
     let of = |sequence: &str, points: u32| {
         let key = Key::default()
@@ -435,7 +434,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
             "so was this",
         ),
     ]);
-    // A structure that was left out is no reason for a point set that nobody measured.
+    // A skipped structure does not explain an unmeasured point set.
     for of in [
         "sequence = \"haltn*\"",
         "sequence = \"halton\", points = \"46\"",
@@ -450,7 +449,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
             "{of}: {reason}"
         );
     }
-    // Nor is one for a sampler or a number of samples of another cell on the same scene.
+    // Nor does one explain a sampler or sample count of another cell on the same scene.
     let rmse = |of: &str| {
         format!("figure = \"rmse-unbiased/v1\"\ncompare = \"bound\"\nof = {{ {of} }}\nmost = 1.0\n")
     };
@@ -461,7 +460,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
     ] {
         assert_eq!(found(&rmse(of), &left_out).0, Verdict::Faulty, "{of}");
     }
-    // The cell itself, and all that would have been of it, cannot be tested.
+    // The cell itself, and everything derived from it, cannot be tested.
     for of in [
         "accel = \"grid\"",
         "accel = \"gr*\", spp = \"8\"",
@@ -474,7 +473,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
             "{of}"
         );
     }
-    // Where a figure was measured nowhere, its axes are not known, and a reason is one.
+    // If a figure was measured nowhere, its axes are unknown, and one reason suffices.
     let body = rmse("accel = \"grid\", rays = \"primary\"").replace("rmse-unbiased", "nowhere");
     assert_eq!(found(&body, &left_out).0, Verdict::NotTestable);
 }
@@ -544,7 +543,7 @@ fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
         );
         rows[0].verdict
     };
-    // The middle of three points has no weight in the slope: nothing times whatever its interval holds.
+    // The middle of three points has no weight in the slope, whatever its interval.
     assert_eq!(
         at([0.99, 0.0, 0.99], "least = -0.6\nmost = -0.4\n"),
         Verdict::Supported
@@ -553,10 +552,10 @@ fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
         at([0.99, 0.0, 0.99], "least = 0.5\n"),
         Verdict::Contradicted
     );
-    // The last may be anything below: the fall may be steeper and is no flatter.
+    // The last is unbounded below: the fall may be steeper but not flatter.
     assert_eq!(at([0.99, 0.99, 0.0], "most = -0.4\n"), Verdict::Supported);
     assert_eq!(at([0.99, 0.99, 0.0], "least = -0.6\n"), Verdict::Undecided);
-    // A count of nothing is a number, and has a ratio; nothing over nothing has none.
+    // A count of zero is a number and has a ratio; zero over zero has none.
     let ratio = |a: f64, b: f64, bound: &str| {
         let of = |accel: &str, x: f64| value(accel, 8, "nodes-per-ray/v1", x, x, x);
         let body = RATIO.replace("ms-per-spp", "nodes-per-ray") + bound;
@@ -565,6 +564,6 @@ fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
     assert_eq!(ratio(0.0, 3.0, "most = 0.5\n"), Verdict::Supported);
     assert_eq!(ratio(0.0, 3.0, "least = 0.5\n"), Verdict::Contradicted);
     assert_eq!(ratio(0.0, 0.0, "least = 0.5\n"), Verdict::Undecided);
-    // A figure that is not positive is said, and not left out.
+    // A non-positive figure is reported, not omitted.
     assert_eq!(ratio(-1.0, 3.0, "most = 0.5\n"), Verdict::Undecided);
 }

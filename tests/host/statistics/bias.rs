@@ -1,16 +1,15 @@
-//! The bias check on images with the noise of a path tracer: skewed, and most of it in few pixels.
+//! The bias check on images with a path tracer's noise: skewed, and mostly in few pixels.
 
 use raystone::image::Image;
 use raystone::measure::bias::{BiasCheck, BiasOptions, BiasVerdict, check_bias};
 use raystone::random::Pcg32;
 
 const SIZE: [u32; 2] = [32, 24];
-/// Of the default settings.
 const REPLICATES: usize = 16;
-/// Samples of a part of the reference, as a multiple of those of a replicate.
+/// Samples of a reference part relative to a replicate.
 const PART: f64 = 18.0;
 
-/// Mean and noise of a pixel: bright edges of a lamp at the top, walls of different colours elsewhere.
+/// Mean and noise of a pixel: bright edges of a lamp at the top, coloured walls elsewhere.
 fn pixel(index: u32) -> (f64, f64) {
     let (x, y) = (index % SIZE[0], index / SIZE[0]);
     match (x, y) {
@@ -19,7 +18,7 @@ fn pixel(index: u32) -> (f64, f64) {
     }
 }
 
-/// An image of so many times the samples of a replicate: exponential noise, which is skewed.
+/// An image with this multiple of a replicate's samples: exponential, hence skewed, noise.
 fn image(samples: f64, bias: f64, generator: &mut Pcg32) -> Image {
     let pixels = (0..SIZE[0] * SIZE[1]).map(|index| {
         let (mean, noise) = pixel(index);
@@ -29,13 +28,12 @@ fn image(samples: f64, bias: f64, generator: &mut Pcg32) -> Image {
     Image::new(SIZE[0], SIZE[1], pixels.collect()).unwrap()
 }
 
-/// The check of one run.
 fn check(bias: f64, generator: &mut Pcg32) -> BiasCheck {
     let parts: Vec<Image> = (0..8).map(|_| image(PART, 0.0, generator)).collect();
     let images: Vec<Image> = (0..REPLICATES)
         .map(|_| image(1.0, bias, generator))
         .collect();
-    // Nothing is forgiven as rounding, which would make p-values of 1.
+    // No tolerance for rounding, which would make p-values of 1.
     let options = BiasOptions {
         rounding: 0.0,
         ..BiasOptions::default()
@@ -82,15 +80,15 @@ fn without_bias_one_run_in_a_hundred_alarms_at_most_and_p_values_are_flat() {
             *sum += count;
         }
     }
-    // 1 % is 10; that 20 or more come up by chance has a probability of 0.3 %.
+    // 1 % is 10; 20 or more occur by chance with a probability of 0.3 %.
     assert!(alarms < 20, "{alarms} false alarms in {trials} runs");
     for bins in bins {
         assert!(is_flat(&bins), "{bins:?}");
     }
 }
 
-/// Whether counts in ten bins are those of uniform numbers: Pearson's χ² with nine degrees of freedom stays
-/// below its 99.9 % point, and no bin is off by a quarter.
+/// True if counts in ten bins are consistent with uniform numbers: Pearson's χ² with nine degrees
+/// of freedom stays below its 99.9 % point, and no bin deviates by a quarter.
 fn is_flat(bins: &[usize; 10]) -> bool {
     let expected = bins.iter().sum::<usize>() as f64 / 10.0;
     let off = |count: &usize| (*count as f64 - expected).abs() / expected;
@@ -100,7 +98,7 @@ fn is_flat(bins: &[usize; 10]) -> bool {
 
 #[test]
 fn a_bias_of_a_tenth_of_a_percent_makes_p_values_that_are_not_flat() {
-    // Negative control of the test above: of one fifth of what is found, in as many runs.
+    // Negative control of the test above: a fifth of the detected bias, in as many runs.
     let mut generator = Pcg32::new(53);
     let mut bins = [0; 10];
     for _ in 0..1000 {
@@ -122,7 +120,7 @@ fn the_least_bias_that_would_have_been_found_is_found_in_nine_runs_of_ten() {
         found.count() as f64 / f64::from(trials)
     };
     let [half, whole] = [0.5 * typical, typical].map(&mut share);
-    // 90 % or a little more, by the other tests; standard deviation 2 %.
+    // 90 % or slightly more, by the other tests; standard deviation 2 %.
     assert!((0.84..0.98).contains(&whole), "{whole} at {typical}");
     assert!(half < 0.5, "{half} at half of {typical}");
 }

@@ -7,7 +7,7 @@ use raystone::measure::statistics::{leave_one_out, mean, variance};
 use raystone::measure::stopping::is_met;
 use raystone::random::Pcg32;
 
-/// About normal, mean 0, variance 1.
+/// Approximately normal, mean 0, variance 1.
 fn normal(generator: &mut Pcg32) -> f64 {
     (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0
 }
@@ -16,19 +16,18 @@ fn mean_of(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 
-/// The mean of some replicates.
 fn of_mean(samples: &[f64]) -> LogFigure {
     let logs = leave_one_out(samples).map(|rest| mean_of(&rest).ln());
     LogFigure::new(mean_of(samples).ln(), &[logs.collect()], Vec::new()).unwrap()
 }
 
-/// The mean error of replicates: log-normal, with a standard deviation of about `spread` of the mean.
+/// The mean error of replicates: log-normal, standard deviation about `spread` times the mean.
 fn error(mean: f64, spread: f64, replicates: usize, g: &mut Pcg32) -> LogFigure {
     let mut draw = || mean * (spread * normal(g) - 0.5 * spread * spread).exp();
     of_mean(&(0..replicates).map(|_| draw()).collect::<Vec<_>>())
 }
 
-/// Seven times, one in ten of which was interrupted.
+/// Seven times, each interrupted with a probability of one tenth.
 fn times(median: f64, g: &mut Pcg32) -> Vec<f64> {
     let mut draw = || {
         let late = if g.uniform() < 0.1 { 1.5 } else { 1.0 };
@@ -37,12 +36,11 @@ fn times(median: f64, g: &mut Pcg32) -> Vec<f64> {
     (0..7).map(|_| draw()).collect()
 }
 
-/// Error × time.
 fn efficiency(error: LogFigure, time: &LogFigure) -> LogFigure {
     error.with_noise_of(time, 1.0).scaled(time.log.exp())
 }
 
-/// Whether the least of some figures differs from all others.
+/// True if the smallest of some figures differs from all others.
 fn has_winner(figures: &[LogFigure], differ: impl Fn(usize, usize) -> bool) -> bool {
     let least = (0..figures.len()).min_by(|a, b| figures[*a].log.total_cmp(&figures[*b].log));
     (0..figures.len()).all(|i| Some(i) == least || differ(least.unwrap(), i))
@@ -88,7 +86,7 @@ fn a_time_taken_as_exact_makes_winners_of_equals() {
     let (mut joined, mut median_alone) = (0, 0);
     for _ in 0..trials {
         let g = &mut generator;
-        // Errors are known well, times are not.
+        // Errors are known precisely, times are not.
         let mut pair = || {
             let time = LogFigure::of_times(&times(10.0, g)).unwrap();
             let error = error(1.0, 0.01, 16, g);
@@ -160,7 +158,6 @@ fn intervals_of_times_and_of_errors_per_second_cover_the_truth() {
     assert!(narrowed < trials * 85 / 100, "{narrowed}");
 }
 
-/// A figure with this value and relative standard error.
 fn known(value: f64, error: f64) -> LogFigure {
     LogFigure::exact(value).with_noise(Some(Spread {
         variance: error * error,
@@ -177,11 +174,11 @@ fn a_point_is_on_the_front_or_beaten_only_where_that_is_clear() {
         best.clone(),
         // As good, through a slower structure.
         slower(1.5, &best),
-        // As good, through one whose time hardly differs.
+        // As good, through one with nearly the same time.
         slower(1.01, &best),
         point(4.0, 1.0),
         point(5.0, 2.0),
-        // Faster than the fourth by as much as noise makes.
+        // Faster than the fourth within the noise.
         point(3.95, 1.01),
     ];
     use Place::{Beaten, Front, Open};
@@ -196,7 +193,7 @@ fn a_point_is_on_the_front_or_beaten_only_where_that_is_clear() {
 fn what_is_said_of_a_point_is_as_rarely_wrong_as_promised() {
     let mut generator = Pcg32::new(65);
     let trials = 1000;
-    // The first point and the last are equal in error, and equal in time: neither beats the other.
+    // The first and last points are equal in error and in time: neither beats the other.
     let (mut false_beaten, mut false_front, mut by_value) = (0, 0, 0);
     for _ in 0..trials {
         let g = &mut generator;
@@ -208,7 +205,7 @@ fn what_is_said_of_a_point_is_as_rarely_wrong_as_promised() {
         };
         let on_front = [point(1.0, 1.0), point(1.0, 1.0), point(2.0, 0.5)];
         false_beaten += usize::from(places(&on_front)[0] == Place::Beaten);
-        // Beaten in truth, by so little that it is seldom seen.
+        // Truly beaten, but by so little that it is seldom detected.
         let behind = [point(1.001, 1.005), point(1.0, 1.0)];
         let found = places(&behind);
         false_front += usize::from(found[0] == Place::Front);
@@ -230,8 +227,8 @@ const RULE: StopRule = StopRule {
     confidence: 0.95,
 };
 
-/// At which of the looks a cell ends whose error falls as one over the samples, from `first` on: each replicate keeps
-/// its samples, so that looks are correlated. Also whether it would at `chance` for each look.
+/// The look at which a cell ends whose error falls as 1/samples from `first` on; replicates
+/// accumulate samples, so looks are correlated. Also the look for `chance` at each look.
 fn ends_at(first: f64, replicates: usize, looks: usize, g: &mut Pcg32) -> [Option<usize>; 2] {
     let mut sums = vec![0.0; replicates];
     let mut samples = 0;
@@ -261,7 +258,7 @@ fn a_cell_that_ends_has_its_target_as_often_as_promised_however_often_it_was_loo
     let mut generator = Pcg32::new(66);
     let trials = 1500;
     for replicates in [4, 16] {
-        // The hardest case: the error is a hair above the target at the last look.
+        // The hardest case: the error is slightly above the target at the last look.
         let above = 1.001 * 2f64.powi(5);
         let ends = |g: &mut Pcg32| ends_at(above, replicates, 6, g);
         let wrong = (0..trials).filter(|_| ends(&mut generator)[0].is_some());
@@ -269,8 +266,8 @@ fn a_cell_that_ends_has_its_target_as_often_as_promised_however_often_it_was_loo
         println!("{replicates}: {wrong} of {trials} end too early");
         assert!(wrong <= trials * 6 / 100, "{replicates}: {wrong}");
     }
-    // Errors about the target at several looks, as nested samples of one error make them: each look has its
-    // chance, and shared out they keep the whole.
+    // Errors near the target at several looks, as from nested samples: each look has its own
+    // chance, and divided among them they preserve the total.
     let mut chances = [0; 2];
     for _ in 0..trials {
         let mut met = [false; 2];
@@ -284,7 +281,7 @@ fn a_cell_that_ends_has_its_target_as_often_as_promised_however_often_it_was_loo
     }
     println!("{chances:?} of {trials}: shared out, and each look by itself");
     assert!(chances[0] <= trials * 6 / 100, "{chances:?}");
-    // Negative control: the same confidence at each look.
+    // Negative control: the full confidence at each look.
     assert!(chances[1] > trials * 12 / 100, "{chances:?}");
 }
 
@@ -299,7 +296,7 @@ fn a_cell_with_room_to_its_target_ends_and_its_error_is_hardly_too_small() {
         }
     }
     println!("ended at look {ended:?}");
-    // The target is met at the third look exactly, so that the fourth, with half of the error, ends it.
+    // The target is met exactly at the third look, so the fourth, with half the error, ends it.
     assert!(ended[3] > trials * 8 / 10, "{ended:?}");
     assert!(ended[0] + ended[1] == 0, "{ended:?}");
 }
@@ -318,17 +315,17 @@ fn a_ratio_of_intervals_has_its_side_up_and_the_spread_of_both_sides() {
         .compared_with(&summary(0.9, 1.0, 1.1))
         .ratio;
     assert!((r.value - 2.0).abs() < 1e-12);
-    // Each side alone has a lower end 10 % down; together √2 of that on logarithms (Zou and Donner 2008).
+    // Each side alone has a lower end 10 % down; together √2 of that (Zou and Donner 2008).
     let down = (f64::ln(2.0 / 1.8).powi(2) + f64::ln(1.1f64).powi(2)).sqrt();
     assert!((r.low - (2f64.ln() - down).exp()).abs() < 1e-12, "{r:?}");
     assert!(r.low > 1.8 / 1.1 && r.low < 1.8 && r.high > 2.2);
     let exact = |x: f64| summary(x, x, x);
     let ratio = |a: &LogFigure, b: &LogFigure| a.compared_with(b).ratio;
-    // What is exact stays exact, to the last digit.
+    // Exact figures stay exact, to the last digit.
     for (a, b) in [(3.0, 2.0), (30.0, 10.0), (7.0, 49.0), (0.0, 3.0)] {
         assert_eq!(ratio(&exact(a), &exact(b)), Interval::exact(a / b));
     }
-    // An error whose interval reaches 0 has a ratio that may be anything below.
+    // An error whose interval reaches 0 has a ratio that is unbounded below.
     let open = ratio(&summary(0.0, 1.0, 2.0), &exact(1.0));
     assert_eq!(open.low, 0.0);
     assert!((open.high - 2.0).abs() < 1e-12);
@@ -359,14 +356,14 @@ fn an_exponent_is_that_of_the_power_law_and_an_uncertain_point_makes_it_uncertai
         (exact.value + 0.7).abs() < 1e-12 && exact.low == exact.high,
         "{exact:?}"
     );
-    // A lower last point makes the fall steeper: by its logarithm over twice ln 2, which is its weight.
+    // A lower last point steepens the fall, by its logarithm over twice ln 2, its weight.
     let wide = slope(&points([1.0, 1.0, 0.8]));
     let down = 0.8f64.ln() / (2.0 * 2f64.ln());
     assert!(
         (wide.low - exact.low - down).abs() < 1e-12 && wide.high - exact.high < 1e-12,
         "{wide:?}"
     );
-    // The middle point counts for nothing, however uncertain it is.
+    // The middle point has no weight, however uncertain it is.
     let middle = slope(&points([1.0, 0.0, 1.0]));
     assert!((middle.low - exact.low).abs() < 1e-12, "{middle:?}");
     let open = slope(&points([1.0, 1.0, 0.0]));
@@ -379,14 +376,14 @@ fn an_exponent_is_that_of_the_power_law_and_an_uncertain_point_makes_it_uncertai
     assert!(LogFigure::exponent(&zero).is_none());
 }
 
-/// What a machine does in each of some rounds: up to three times as slow, with long tails.
+/// Slowdown of a machine in each round: up to three times, with long tails.
 fn drift(rounds: usize, g: &mut Pcg32) -> Vec<f64> {
     (0..rounds)
         .map(|_| (0.3 * normal(g).powi(2)).exp())
         .collect()
 }
 
-/// Times of two cells in the same rounds, with noise of their own of 2 %.
+/// Times of two cells in the same rounds, with 2 % independent noise.
 fn rounds(ratio: f64, g: &mut Pcg32) -> [Vec<f64>; 2] {
     let machine = drift(7, g);
     [ratio, 1.0].map(|of| {
@@ -406,14 +403,14 @@ fn rounds_of_one_sitting_are_paired_and_those_of_two_are_not() {
     let paired = of("one", &twice).compared_with(&of("one", &machine));
     assert!((paired.ratio.value - 2.0).abs() < 1e-12 && paired.p == 0.0);
     assert_eq!(paired.ratio.low, paired.ratio.high);
-    // The same numbers, which nothing says to be of the same rounds.
+    // The same numbers, not known to be from the same rounds.
     for (a, b) in [("one", "two"), ("", "")] {
         let apart = of(a, &twice).compared_with(&of(b, &machine));
         assert!(apart.ratio.low < 1.8 && apart.p > 0.0, "{apart:?}");
     }
     let fewer = of("one", &twice[..8]).compared_with(&of("one", &machine));
     assert!(fewer.ratio.low < 1.8, "{fewer:?}");
-    // A gain that grows is one of four cells of the same rounds, and a mean of samplers is, too.
+    // A growing gain involves four cells of the same rounds, as does a mean of samplers.
     let gain = LogFigure::product(&[(&of("one", &twice), 1.0), (&of("one", &machine), -1.0)]);
     let growth = gain.compared_with(&LogFigure::exact(1.0)).ratio;
     assert!((growth.low - 2.0).abs() < 1e-12 && (growth.high - 2.0).abs() < 1e-12);
@@ -441,7 +438,7 @@ fn intervals_of_paired_rounds_cover_the_truth_and_equals_differ_as_rarely_as_pro
         found_apart += usize::from(compare(1.1, ["one", "two"], g).p <= 0.05);
     }
     println!("{covered} covered, {alarms} alarms, {found} and {found_apart} found of {trials}");
-    // 5 % is 200, and the standard deviation 14. The trimmed t of five that are left is within a percent of its level.
+    // 5 % is 200, and the standard deviation 14. The trimmed t of five is within 1 % of its level.
     assert!((140..=260).contains(&alarms), "{alarms}");
     assert_eq!(
         covered + alarms,
@@ -449,13 +446,13 @@ fn intervals_of_paired_rounds_cover_the_truth_and_equals_differ_as_rarely_as_pro
         "the test and the interval are one"
     );
     assert!(found > trials * 95 / 100, "{found}");
-    // Negative control: the same cells by themselves.
+    // Negative control: the same cells unpaired.
     assert!(found_apart < trials / 4, "{found_apart}");
 }
 
 #[test]
 fn two_replicates_against_sixteen_are_no_surer_than_two() {
-    // Two of normal noise and an exact side: Student's distribution of one degree of freedom is Cauchy's, in closed form.
+    // Two normal samples and an exact side: Student's t with one degree of freedom is Cauchy.
     let known = Spread {
         variance: 0.01,
         freedom: 1.0,
@@ -498,7 +495,7 @@ fn figures_of_groups_have_the_jackknife_of_their_quotient() {
     let by_hand = variance(&logs).unwrap() * 9.0 / 4.0;
     assert!((figure.spread().variance - by_hand).abs() < 1e-12);
     assert_eq!(figure.spread().freedom, 3.0);
-    // The same groups on both sides: what they share is no noise.
+    // The same groups on both sides: their shared part is not noise.
     let twice = groups.map(|[sum, of]| [2.0 * sum, of]);
     let ratio = |of: &str| {
         LogFigure::of_groups(of, &twice)
@@ -518,14 +515,14 @@ fn sums_of_equal_numbers_have_no_noise_however_many_there_are() {
         let equal = vec![0.1; n];
         let figure = of_mean(&equal).interval();
         assert_eq!(figure.low, figure.high, "{n}");
-        // The sums of one order differ from those of another.
+        // Sums in different orders differ.
         let turned: Vec<f64> = (0..n).map(|i| 0.1 * f64::from((i % 7) as u32)).collect();
         let mut back = turned.clone();
         back.reverse();
         let [a, b] = [turned, back].map(|x| LogFigure::exact(mean_of(&x).max(0.01)));
         assert_eq!(a.compared_with(&b).p, 1.0, "{n}");
     }
-    // A nanosecond in ten seconds is no rounding.
+    // A nanosecond in ten seconds is not rounding.
     let ms = [1e4, 1e4, 1e4 + 1e-6, 1e4, 1e4 + 1e-6, 1e4 + 1e-6];
     let time = LogFigure::of_times(&ms).expect("times").interval();
     assert!(time.low < time.high);

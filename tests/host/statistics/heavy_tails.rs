@@ -1,5 +1,5 @@
-//! Pictures whose mean error is known in closed form: grey pixels of normal noise, and one with a sliver of a lamp that a
-//! sample hits with a probability of a hundredth.
+//! Images whose mean error is known in closed form: grey pixels with normal noise, and one with a
+//! sliver of a lamp that a sample hits with a probability of a hundredth.
 
 use raystone::image::Image;
 use raystone::measure::heavy_tails::{PixelErrors, is_heavy};
@@ -13,7 +13,7 @@ const SPP: u32 = 4;
 const PART_SPP: u32 = 512;
 /// Mean and standard deviation of one sample of an ordinary pixel.
 const PLAIN: [f64; 2] = [0.5, 0.2];
-/// What the pixel with the sliver has without it, and how often a sample hits it.
+/// Radiance of the pixel with the sliver without it, and the hit probability of a sample.
 const DARK: f64 = 0.1;
 const CHANCE: f64 = 0.01;
 
@@ -36,7 +36,6 @@ fn image(lamp: f64, spp: u32, g: &mut Pcg32) -> Image {
     Image::new(SIZE[0], SIZE[1], values).expect("an image")
 }
 
-/// The expected relMSE.
 fn truth(lamp: f64) -> f64 {
     let term =
         |mean: f64, variance: f64| variance / f64::from(SPP) / (mean * mean + RELATIVE_EPSILON);
@@ -45,8 +44,7 @@ fn truth(lamp: f64) -> f64 {
     (sliver + (pixels() - 1) as f64 * plain) / pixels() as f64
 }
 
-/// Of many runs of so many replicates, how many intervals hold the truth, how many are said not to be trusted, and
-/// how many of the others hold it.
+/// Over many runs: intervals with the truth, flagged intervals, and others with the truth.
 struct Counts {
     trials: usize,
     covered: usize,
@@ -128,7 +126,7 @@ fn counts(lamp: f64, replicates: u32, trials: usize) -> Counts {
     counts
 }
 
-/// 93 to 97 %, give or take three standard errors of the count.
+/// 93 to 97 %, within three standard errors of the count.
 fn holds(share: f64, trials: usize) -> bool {
     let noise = 3.0 * (0.05 * 0.95 / trials as f64).sqrt();
     (0.93 - noise..=0.97 + noise).contains(&share)
@@ -150,7 +148,7 @@ fn intervals_without_a_sliver_hold_and_are_trusted() {
 fn a_pixel_that_replicates_seldom_hit_makes_an_interval_that_is_not_trusted() {
     for replicates in [4, 8, 16] {
         let counts = counts(20.0, replicates, TRIALS);
-        // What the interval alone promises, and does not hold.
+        // The nominal coverage of the interval alone, which it misses.
         assert!(
             counts.covered() < 0.85,
             "{replicates}: {}",

@@ -1,4 +1,4 @@
-//! Tests of hypotheses against published values, closed forms and trials.
+//! Hypothesis tests against published values, closed forms and simulations.
 
 use raystone::measure::hypothesis::*;
 use raystone::measure::interval::Spread;
@@ -18,7 +18,7 @@ fn assert_close(actual: f64, expected: f64, relative: f64) {
 #[test]
 fn student_t_has_its_closed_forms_and_tabled_values() {
     for t in [1e-6, 0.1, 1.0, 2.5, 12.0, 300.0] {
-        // The complement of the arctangent keeps its digits in the tail.
+        // The complement of the arctangent preserves digits in the tail.
         assert_close(
             student_t_two_sided(t, 1.0),
             2.0 / PI * (1.0 / t).atan(),
@@ -42,7 +42,6 @@ fn student_t_has_its_closed_forms_and_tabled_values() {
     }
 }
 
-/// p of Welch's test without a cap.
 fn welch(a: &[f64], b: &[f64]) -> f64 {
     let both = Spread::together(&[a, b].map(|x| Spread::of_mean(x).unwrap()));
     both.p(mean(a).unwrap() - mean(b).unwrap())
@@ -102,8 +101,8 @@ fn p_values_are_uniform_when_the_means_are_equal_and_small_when_not() {
     assert!(share_below(&apart, 0.05) > 0.9);
 }
 
-/// The share of small p-values among pairs of samples with equal means, as a multiple of what it should be:
-/// of Welch's test, and of the capped one. The second sample has eight, each with a third of the noise.
+/// Frequency of small p-values for samples with equal means, relative to nominal: for Welch's test
+/// and the capped one. The second sample has eight values, each with a third of the noise.
 fn shares_below(p: f64, replicates: usize, generator: &mut Pcg32) -> [f64; 2] {
     const TRIALS: usize = 200_000;
     let mut normal = |sigma: f64, count: usize| -> Vec<f64> {
@@ -198,7 +197,7 @@ fn benjamini_hochberg_steps_up() {
     ];
     let rejected = benjamini_hochberg(&p, 0.05);
     assert_eq!(rejected, [vec![true; 4], vec![false; 11]].concat());
-    // A larger p that passes carries the smaller ones with it, in whatever order they come.
+    // A larger p that passes also rejects the smaller ones, in any order.
     assert_eq!(
         benjamini_hochberg(&[0.04, 0.9, 0.035], 0.06),
         [true, false, true]
@@ -213,13 +212,13 @@ fn the_least_effect_that_a_t_test_finds_has_the_power_asked_for() {
         let effect = t_test_effect(power, alpha, freedom);
         assert_close(t_test_power(effect, alpha, freedom), power, 1e-2);
     }
-    // Of a normal number: 1.2816 above the critical 1.96.
+    // For the normal distribution: 1.2816 above the critical 1.96.
     assert_close(t_test_effect(0.9, 0.05, 1000.0), 1.2816 + 1.96, 5e-3);
 }
 
 #[test]
 fn holms_correction_steps_down() {
-    // The largest rank that holds carries on: 3 · 0.01, then 2 · 0.04, then 1 · 0.06 below that.
+    // The running maximum applies: 3 · 0.01, then 2 · 0.04, then 1 · 0.06 below that.
     assert_close(holm(&[0.04, 0.01, 0.06])[0], 0.08, 1e-12);
     assert_eq!(holm(&[0.04, 0.01, 0.06]), [0.08, 0.03, 0.08]);
     assert_eq!(holm(&[0.7, 0.6]), [1.0, 1.0]);
@@ -229,7 +228,7 @@ fn holms_correction_steps_down() {
 
 #[test]
 fn holms_correction_keeps_the_chance_of_any_false_rejection() {
-    // Ten true hypotheses, each p twice so that the tests depend on each other.
+    // Ten true hypotheses, each p twice so that the tests are dependent.
     let mut generator = Pcg32::new(12);
     let trials = 4000;
     let (mut corrected, mut plain) = (0, 0);

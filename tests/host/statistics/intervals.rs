@@ -28,12 +28,12 @@ fn samples_that_are_empty_or_not_finite_have_no_statistics() {
     assert_eq!(variance(&[1.0]), None);
 }
 
-/// About normal, mean 0, variance 1.
+/// Approximately normal, mean 0, variance 1.
 fn normal(generator: &mut Pcg32) -> f64 {
     (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0
 }
 
-/// Share of 2,000 trials whose interval holds `truth`.
+/// Share of 2,000 trials whose interval contains `truth`.
 fn coverage(truth: f64, mut trial: impl FnMut(&mut Pcg32) -> Interval) -> f64 {
     let mut generator = Pcg32::new(11);
     let covers = |i: Interval| i.low <= truth && truth <= i.high;
@@ -70,7 +70,7 @@ fn intervals_of_means_cover_the_truth_as_often_as_promised() {
 
 #[test]
 fn intervals_of_medians_cover_the_truth_as_often_as_promised() {
-    // Times have a tail on one side: ln 2 is the median of −ln u.
+    // Times have a one-sided tail: ln 2 is the median of −ln u.
     for n in [6, 7, 9, 12, 31] {
         assert_95(coverage(2.0f64.ln(), |g| {
             let samples: Vec<f64> = (0..n).map(|_| -(1.0 - g.uniform()).ln()).collect();
@@ -97,7 +97,7 @@ fn intervals_of_slopes_cover_the_truth_as_often_as_promised() {
 
 #[test]
 fn noise_of_two_sources_adds_up() {
-    // A mean of eight, less a mean of four that is noisier.
+    // A mean of eight, minus a noisier mean of four.
     assert_95(coverage(0.0, |g| {
         let a: Vec<f64> = (0..8).map(|_| normal(g)).collect();
         let b: Vec<f64> = (0..4).map(|_| 2.0 * normal(g)).collect();
@@ -124,11 +124,11 @@ fn a_root_of_a_mean_of_squares_has_an_interval_that_is_not_negative() {
 /// Errors of replicates, each with mean 1.
 #[derive(Debug, Clone, Copy)]
 enum Errors {
-    /// χ² with so many degrees of freedom over their number: mean squares of so many independent pixels.
+    /// χ² over its degrees of freedom: mean squares of this many independent pixels.
     ChiSquared(u32),
     /// Log-normal with this standard deviation of the logarithm.
     LogNormal(f64),
-    /// Even ones, of which one in ten has a firefly of nine times the rest.
+    /// Uniform ones, one in ten with a firefly of nine times the rest.
     Fireflies,
 }
 
@@ -139,10 +139,13 @@ impl Errors {
                 (0..n).map(|_| normal(generator).powi(2)).sum::<f64>() / f64::from(n)
             }
             Self::LogNormal(sigma) => (sigma * normal(generator) - 0.5 * sigma * sigma).exp(),
-            Self::Fireflies => match generator.uniform() < 0.1 {
-                true => 5.0,
-                false => 5.0 / 9.0 + 0.01 * normal(generator),
-            },
+            Self::Fireflies => {
+                if generator.uniform() < 0.1 {
+                    5.0
+                } else {
+                    5.0 / 9.0 + 0.01 * normal(generator)
+                }
+            }
         }
     }
 
@@ -151,7 +154,6 @@ impl Errors {
     }
 }
 
-/// What leaving one out makes of `estimator`.
 fn estimates(samples: &[f64], estimator: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     leave_one_out(samples)
         .map(|rest| estimator(&rest))
@@ -194,7 +196,7 @@ fn intervals_of_skewed_errors_cover_the_truth_at_four_replicates_and_more() {
 
 #[test]
 fn what_few_replicates_do_not_show_no_interval_covers() {
-    // Said in the module's documentation: here an interval promises what it cannot hold.
+    // As documented in the module: here an interval cannot keep its promise.
     let [few, many] = [4, 64].map(|n| coverage(1.0, |g| of_mean(&Errors::Fireflies.sample(n, g))));
     assert!(few < 0.6, "{few}");
     assert!(many > 0.9, "{many}");
@@ -311,7 +313,7 @@ fn the_rank_correlation_sees_order_alone_and_knows_ties() {
     // Of six pairs five agree and one does not: (5 − 1) / 6.
     let one_wrong = tau(&[[1.0, 1.0], [2.0, 2.0], [3.0, 4.0], [4.0, 3.0]]);
     assert_eq!(one_wrong, Some(4.0 / 6.0));
-    // Three pairs, of which one is a tie in x and none in y: 2 / √(2 · 3).
+    // Three pairs, one tied in x and none in y: 2 / √(2 · 3).
     let tied = tau(&[[1.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
     assert!((tied.unwrap() - 2.0 / 6.0_f64.sqrt()).abs() < 1e-15);
     assert_eq!(tau(&[[1.0, 1.0], [1.0, 2.0]]), None);

@@ -1,4 +1,4 @@
-//! Statistics of samples: what their docstrings promise.
+//! Statistics of samples, as promised in their docstrings.
 
 mod bias;
 mod comparisons;

@@ -1,4 +1,4 @@
-//! Two kinds of materials: their rows for rendering, and those of their checks.
+//! Two kinds of materials: their rendering and check rows.
 
 use glam::{DVec3, Vec3, vec3};
 use raystone::measure::kinds::KindChecks;
@@ -82,7 +82,7 @@ impl Bsdf for Minnaert<'_> {
     }
 }
 
-/// A surface that light passes in part.
+/// A partially transmitting surface.
 pub static GAUZE: MaterialKind = MaterialKind {
     name: "gauze",
     feature: "gauze",

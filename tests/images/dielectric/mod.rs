@@ -1,5 +1,5 @@
-//! The smooth dielectric against closed forms in f64: Fresnel's equations, Snell's law, total internal
-//! reflection, radiance in the denser medium; and whether planted faults are seen.
+//! The smooth dielectric against closed forms in f64: Fresnel's equations, Snell's law, total
+//! internal reflection, radiance in the denser medium; and detection of planted faults.
 
 use crate::support::{kernels_with, open};
 use raystone::gpu::{
@@ -7,11 +7,9 @@ use raystone::gpu::{
 };
 use std::path::Path;
 
-/// Tint of the kernel's material.
 const TINT: f64 = 0.5;
 const IORS: [f64; 5] = [1.0, 1.1, 1.33, 1.5, 2.4];
 
-/// A ray that arrives.
 #[derive(Debug, Clone, Copy)]
 struct Arrival {
     cosine: f32,
@@ -23,7 +21,7 @@ struct Arrival {
 }
 
 impl Arrival {
-    /// Index behind the surface over that before it.
+    /// Ratio of the index behind the surface to that before it.
     fn eta(&self) -> f64 {
         let ior = f64::from(self.ior);
         if self.outside || self.thin {
@@ -43,7 +41,7 @@ struct Departure {
     is_delta: bool,
 }
 
-/// Angles from straight to grazing, both sides, both ways on, thin and thick.
+/// Angles from normal to grazing, both sides, both outcomes, thin and thick.
 fn arrivals() -> Vec<Arrival> {
     let mut out = Vec::new();
     for ior in IORS.map(|n| n as f32) {
@@ -114,8 +112,7 @@ fn scatter(gpu: &Gpu, arrivals: &[Arrival]) -> Vec<Departure> {
     words.iter().map(departure).collect()
 }
 
-/// Reflectance for unpolarised light by the sines and tangents of the angles (Fresnel 1823), which is not
-/// how the kernel computes it.
+/// Reflectance for unpolarised light by sines and tangents (Fresnel 1823), unlike the kernel.
 fn reflectance(cosine: f64, eta: f64) -> f64 {
     let arriving = cosine.clamp(0.0, 1.0).acos();
     let sine = arriving.sin() / eta;
@@ -132,12 +129,11 @@ fn reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (perpendicular.powi(2) + parallel.powi(2))
 }
 
-/// What is wrong with a departure, in words.
 fn faults(a: &Arrival, d: &Departure) -> Vec<&'static str> {
     let (cosine, eta) = (f64::from(a.cosine), a.eta());
     let sine = (1.0 - cosine * cosine).sqrt();
     let cos_refracted = (1.0 - (sine / eta).powi(2)).max(0.0).sqrt();
-    // The root of a rounded difference: near the critical angle, and for what only grazes.
+    // The root of a rounded difference: near the critical angle, and at grazing angles.
     let tolerance = 2e-6 + 1e-6 / cos_refracted.max(1e-3);
     let once = reflectance(cosine, eta);
     let reflected = if a.thin {
@@ -198,7 +194,7 @@ fn faults(a: &Arrival, d: &Departure) -> Vec<&'static str> {
     out
 }
 
-/// Every kind of fault that these kernels show, once.
+/// Every kind of fault in these kernels, once.
 fn all_faults(library: KernelLibrary) -> Vec<&'static str> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/dielectric/kernels");
     let gpu = open(library.with_folder(&folder).expect("kernels"));
@@ -285,7 +281,7 @@ fn the_reference_has_the_values_of_the_textbook() {
         let straight = ((n - 1.0) / (n + 1.0_f64)).powi(2);
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-6;
         assert!(near(reflectance(1.0, n), straight) && near(reflectance(1.0, 1.0 / n), straight));
-        // At Brewster's angle, tan θ = n, one polarisation is not reflected at all.
+        // At Brewster's angle, tan θ = n, one polarisation is not reflected.
         let brewster = n.atan().cos();
         let other = ((1.0 - n * n) / (1.0 + n * n)).powi(2);
         assert!(near(reflectance(brewster, n), 0.5 * other), "{n}");

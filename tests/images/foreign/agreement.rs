@@ -1,12 +1,11 @@
-//! Whether two renderers have made the same image.
+//! Tests if two renderers have made the same image.
 
 use raystone::image::{Image, luminance};
 use raystone::measure::hypothesis::student_t_two_sided;
 
-/// Images of one scene with different seeds.
 pub struct Replicates(pub Vec<Image>);
 
-/// Mean luminances with the variances of these means, and from how many replicates both are.
+/// Mean luminances with the variances of these means, and the number of replicates.
 pub struct Moments {
     pub mean: Vec<f64>,
     pub variance: Vec<f64>,
@@ -32,7 +31,7 @@ impl Replicates {
 }
 
 impl Replicates {
-    /// The same in tiles of `edge` × `edge` pixels.
+    /// [`Self`] averaged over tiles of `edge` × `edge` pixels.
     pub fn tiled(&self, edge: u32) -> Self {
         let tiled = |image: &Image| {
             let [width, height] = [image.width, image.height].map(|n| n / edge);
@@ -53,7 +52,7 @@ impl Replicates {
 }
 
 impl Moments {
-    /// Those of tiles of pixels whose noise is independent.
+    /// Averages over tiles of pixels with independent noise.
     pub fn tiled(&self, width: usize, edge: usize) -> Self {
         let across = width / edge;
         let tiles = across * (self.mean.len() / width / edge);
@@ -72,12 +71,11 @@ impl Moments {
         }
     }
 
-    /// The mean over all pixels.
     pub fn total(&self) -> f64 {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
     }
 
-    /// The share of pixels whose difference Welch's test accepts at the Šidák level `alpha` of all of them.
+    /// The share of pixels whose difference Welch's test accepts at the joint Šidák level `alpha`.
     pub fn accepted(&self, other: &Self, alpha: f64) -> f64 {
         let level = 1.0 - (1.0 - alpha).powf(1.0 / self.mean.len() as f64);
         let accepted = (0..self.mean.len()).filter(|&i| self.p(other, i) >= level);
@@ -87,7 +85,7 @@ impl Moments {
     fn p(&self, other: &Self, i: usize) -> f64 {
         let (a, b) = (self.variance[i], other.variance[i]);
         let difference = (self.mean[i] - other.mean[i]).abs();
-        // Rounding of sums of f32, in pixels that are the same in every replicate.
+        // Rounding of f32 sums, in pixels that are the same in every replicate.
         let rounding = 1e-5 * self.mean[i].abs().max(other.mean[i].abs());
         if difference <= rounding {
             return 1.0;

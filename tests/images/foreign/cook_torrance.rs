@@ -1,7 +1,7 @@
-//! Images of Cook–Torrance surfaces against the formulas of the papers, integrated in f64: R. Cook, K. Torrance, "A
-//! reflectance model for computer graphics", 1982 (masking and Fresnel's equations), and B. Walter et al., "Microfacet
-//! models for refraction through rough surfaces", 2007 (the factor 4 in the place of 1982's π, and Smith's masking).
-//! Mitsuba has no such material.
+//! Images of Cook–Torrance surfaces against the papers' formulas, integrated in f64: R. Cook, K.
+//! Torrance, "A reflectance model for computer graphics", 1982 (masking and Fresnel's equations),
+//! and B. Walter et al., "Microfacet models for refraction through rough surfaces", 2007 (the
+//! factor 4 instead of 1982's π, and Smith's masking). Mitsuba has no such material.
 
 use super::{replicates, scene_of};
 use glam::{DVec3, Vec3};
@@ -12,11 +12,11 @@ use std::f64::consts::PI;
 
 const BASE: f64 = 0.2;
 const SPECULAR: f64 = 0.7;
-/// Where the plane y = 0 is seen.
+/// Point of the plane y = 0 that is viewed.
 const TARGET: Vec3 = Vec3::new(0.3, 0.0, -0.2);
 
-/// Roughness, index of refraction, masking, Fresnel; and by how much an image may differ. Smith's integral is
-/// approximated, by 0.35 % for each of the two directions at most.
+/// Roughness, index of refraction, masking, Fresnel; and the tolerance of an image. Smith's
+/// integral is approximated, by at most 0.35 % for each of the two directions.
 const MATERIALS: [(f64, f64, Masking, Fresnel, f64); 5] = [
     (0.15, 1.5, Masking::VCavities, Fresnel::Exact, 1e-3),
     (0.3, 1.8, Masking::VCavities, Fresnel::Schlick, 1e-3),
@@ -59,7 +59,7 @@ fn reflected(
     BASE / PI * n_i + SPECULAR * fresnel(kind, o_h, n) * d * g / (4.0 * n_o)
 }
 
-/// The integral of that over all directions from above, by the middles of parts of cos and angle.
+/// Its integral over all directions from above, by midpoints in cosine and angle.
 fn albedo(of: (f64, f64, Masking, Fresnel, f64), o: DVec3) -> f64 {
     const CELLS: u32 = 700;
     let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(CELLS);
@@ -92,7 +92,7 @@ fn plane(of: (f64, f64, Masking, Fresnel, f64), from: Vec3, degrees: f32) -> Sce
     )
 }
 
-/// Directions from the point that is seen, so many degrees above the plane and around.
+/// Direction from the viewed point, at this elevation and azimuth in degrees.
 fn towards(elevation: f32, around: f32) -> Vec3 {
     let (up, out) = elevation.to_radians().sin_cos();
     let (z, x) = around.to_radians().sin_cos();
@@ -101,7 +101,7 @@ fn towards(elevation: f32, around: f32) -> Vec3 {
 
 #[test]
 fn a_cook_torrance_plane_in_parallel_light_is_what_the_papers_say() {
-    // At the mirror direction, beside it, towards the light, at a grazing angle.
+    // At the mirror direction, next to it, towards the light, at a grazing angle.
     let views = [(40.0, 180.0), (55.0, 150.0), (70.0, 20.0), (15.0, 190.0)];
     let light = towards(40.0, 0.0);
     for of in MATERIALS {

@@ -1,5 +1,5 @@
-//! Scenes written for Mitsuba 3. That Mitsuba renders the same images from them is shown by `scripts/validate`, which
-//! the ignored test runs.
+//! Scenes exported to Mitsuba 3. `scripts/validate`, run by the ignored test, shows that Mitsuba
+//! renders the same images from them.
 
 use crate::support::builtin;
 use glam::Vec3;
@@ -12,7 +12,7 @@ use std::process::Command;
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// The folder, the XML, and what was said.
+/// The folder, the XML, and the messages.
 fn exported(scene: &SceneData, fronts_only: bool) -> (TempDir, String, Vec<String>) {
     let folder = TempDir::new().unwrap();
     let settings = MitsubaSettings {
@@ -27,7 +27,7 @@ fn exported(scene: &SceneData, fronts_only: bool) -> (TempDir, String, Vec<Strin
     (folder, xml, warnings)
 }
 
-/// Faces of a PLY file, by its header.
+/// Number of faces of a PLY file, from its header.
 fn faces(bytes: &[u8]) -> usize {
     let text = String::from_utf8_lossy(bytes);
     let line = text.lines().find_map(|l| l.strip_prefix("element face "));
@@ -158,7 +158,6 @@ fn textures_keep_their_factor_and_skies_are_written() {
     );
 }
 
-/// What the script ends with where Mitsuba cannot be installed.
 /// A light over a floor, as XML; or why it is refused.
 fn light(light: Light) -> Result<String, String> {
     let mut scene = builtin("lamp", &[]);
@@ -283,7 +282,7 @@ fn a_written_map_shines_from_where_mitsuba_looks_it_up() {
     let angle: f32 = angle.split('"').next().unwrap().parse().unwrap();
     let file = folder.path().join("textures/environment.exr");
     let written = raystone::image::read_linear(&file).unwrap();
-    // Mitsuba 3, `envmap`: u = atan2(x, −z)/2π of the direction in the emitter's axes, texel ⌊u · width⌋.
+    // Mitsuba 3, `envmap`: u = atan2(x, −z)/2π in the emitter's axes, texel ⌊u · width⌋.
     let seen = |direction: Vec3| {
         let local = glam::Quat::from_rotation_y(-angle.to_radians()) * direction;
         let u = (local.x.atan2(-local.z) / std::f32::consts::TAU).rem_euclid(1.0);

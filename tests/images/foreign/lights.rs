@@ -1,4 +1,4 @@
-//! What a light of a simple shape casts on a plane, in closed form.
+//! Irradiance of a plane by lights of simple shapes, in closed form.
 
 use super::{replicates, scene_of};
 use glam::{DVec3, Vec3};
@@ -10,12 +10,11 @@ use std::f64::consts::{PI, TAU};
 const SIZE: [u32; 2] = [8, 8];
 const ALBEDO: f64 = 0.6;
 const RADIANCE: f64 = 5.0;
-/// Height of the lights over the plane y = 0.
 const HEIGHT: f64 = 1.5;
-/// The mean of an image may differ by so much beyond five standard errors.
+/// Tolerance of an image's mean beyond five standard errors.
 const TOLERANCE: f64 = 0.001;
 
-/// A plane under a light, seen from aside, and the mean over the image of what its points reflect.
+/// Compares the mean of an oblique image of a lit plane with the light reflected by its points.
 fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) -> f64 {
     let camera = Camera::upright(Vec3::new(2.5, 1.0, -2.0), Vec3::new(0.2, 0.0, 0.3), 12.0);
     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z);
@@ -34,7 +33,7 @@ fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) ->
     let images = replicates(scene, 1, SIZE, 256, 8);
     let means: Vec<f64> = images.0.iter().map(|image| image.mean()).collect();
     let found = crate::support::Estimate::of(&means);
-    // Points within a pixel: the middle of 4 × 4 parts.
+    // Points within a pixel: the centres of 4 × 4 parts.
     let [forward, right, up] = camera.basis(SIZE).map(Vec3::as_dvec3);
     let eye = camera.eye.as_dvec3();
     let fine = 4 * SIZE[0];
@@ -52,14 +51,14 @@ fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) ->
     excess / expected
 }
 
-/// Seen from below, corners turn counter-clockwise.
+/// Corners turn counter-clockwise seen from below.
 fn rectangle() -> Vec<DVec3> {
     [(-0.4, -0.3), (0.4, -0.3), (0.4, 0.5), (-0.4, 0.5)]
         .map(|(x, z)| DVec3::new(x, HEIGHT, z))
         .to_vec()
 }
 
-/// A regular polygon of the area of a circle.
+/// A regular polygon with the area of a circle.
 fn circle(radius: f64) -> Vec<DVec3> {
     const SIDES: u32 = 128;
     let step = TAU / f64::from(SIDES);
@@ -76,7 +75,7 @@ fn a_rectangle_light_casts_what_lambert_says() {
     let light = rectangle();
     let excess = compare(&light, |p| polygon(p, DVec3::Y, &light), 1.0);
     assert!(excess < TOLERANCE, "{excess}");
-    // Leaning: the light is seen from aside, wholly above the plane.
+    // Tilted: the light is seen obliquely, wholly above the plane.
     let leaning: Vec<DVec3> = light.iter().map(|c| *c + DVec3::Y * (0.8 * c.x)).collect();
     let excess = compare(&leaning, |p| polygon(p, DVec3::Y, &leaning), 1.0);
     assert!(excess < TOLERANCE, "{excess}");
@@ -88,7 +87,7 @@ fn a_disk_light_casts_what_its_configuration_factor_says() {
     let irradiance = |p: DVec3| disk(HEIGHT, radius, p.x.hypot(p.z));
     let excess = compare(&circle(radius), irradiance, 1.0);
     assert!(excess < TOLERANCE, "{excess}");
-    // Both formulas are the same for a polygon of so many sides.
+    // Both formulas agree for a polygon with this many sides.
     let point = DVec3::new(0.3, 0.0, 0.2);
     let by_edges = polygon(point, DVec3::Y, &circle(radius));
     assert!((by_edges / irradiance(point) - 1.0).abs() < 1e-4);

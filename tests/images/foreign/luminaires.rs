@@ -1,5 +1,6 @@
-//! What a luminaire of an IES file casts on a plane: I(θ, φ) cos³θ / h², with intensities that are a product of
-//! two linear functions, so that what lies between the angles of the file is known, too. Mitsuba reads no such files.
+//! Irradiance of a plane by an IES luminaire: I(θ, φ) cos³θ / h², with intensities that are a
+//! product of two linear functions, so values between the file's angles are known. Mitsuba does not
+//! read such files.
 
 use super::{replicates, scene_of};
 use glam::{DVec3, Mat3, Quat, Vec3};
@@ -12,7 +13,6 @@ use std::sync::Arc;
 const SIZE: [u32; 2] = [12, 12];
 const ALBEDO: f32 = 0.6;
 const HEIGHT: f32 = 2.0;
-/// The candela multiplier of the file.
 const MULTIPLIER: f64 = 2.5;
 
 /// Candela at an angle from the nadir and one around it, degrees, before the multiplier.
@@ -71,15 +71,15 @@ fn image_under(horizontal: &[f64]) -> Image {
     replicates(scene, 1, SIZE, 256, 1).0.remove(0)
 }
 
-/// By how much its mean and its worst pixel differ from what the intensity at angles in degrees makes.
+/// Relative differences of mean and worst pixel from those of an intensity by angles (degrees).
 fn compare(image: &Image, of: impl Fn(f64, f64) -> f64) -> [f64; 2] {
     let camera = camera();
-    // Points within a pixel: the middles of 8 × 8 parts.
+    // Points within a pixel: the centres of 8 × 8 parts.
     let [forward, right, up] = camera.basis(SIZE).map(Vec3::as_dvec3);
     let eye = camera.eye.as_dvec3();
     let fine = 8;
     let place = |k: u32| 2.0 * (f64::from(k) + 0.5) / f64::from(fine * SIZE[0]) - 1.0;
-    // What a point reflects, and its angle around.
+    // Reflected radiance of a point, and its angle around.
     let reflected = |x: u32, y: u32| {
         let direction: DVec3 = forward + place(x) * right - place(y) * up;
         let p = eye - direction * (eye.y / direction.y);
@@ -98,7 +98,7 @@ fn compare(image: &Image, of: impl Fn(f64, f64) -> f64) -> [f64; 2] {
         let expected = parts.iter().map(|p| p.0).sum::<f64>() / parts.len() as f64;
         let found = f64::from(pixel[0]);
         total = [total[0] + found, total[1] + expected];
-        // Without a symmetry there is a step at 0 = 360: pixels there take points of their own.
+        // Without symmetry there is a step at 0 = 360: pixels there use their own points.
         let above = parts.iter().filter(|p| p.1 > 180.0).count();
         let is_across = parts.iter().any(|p| p.1 > 270.0) && (1..parts.len()).contains(&above);
         if !is_across {
@@ -108,7 +108,7 @@ fn compare(image: &Image, of: impl Fn(f64, f64) -> f64) -> [f64; 2] {
     [(total[0] / total[1] - 1.0).abs(), worst]
 }
 
-/// A name, the horizontal angles of the file, and the angle that stands for each.
+/// A name, the horizontal angles of the file, and the equivalent of each angle.
 type Kind = (&'static str, Vec<f64>, fn(f64) -> f64);
 
 #[test]
@@ -141,7 +141,7 @@ fn a_luminaire_casts_what_its_file_says_around_every_kind_of_symmetry() {
         let [mean, worst] = by(0.0, 1.0);
         println!("{name}: mean {mean:.1e}, worst pixel {worst:.1e}");
         assert!(mean < 1e-3 && worst < 0.003, "{name}: {mean}, {worst}");
-        // A quarter of a turn would be found, and angles that run the other way.
+        // A quarter turn would be detected, and reversed angles.
         let [_, turned] = by(90.0, 1.0);
         assert!(turned > 0.2 || angles.len() == 1, "{name}: {turned}");
         let [_, backwards] = by(0.0, -1.0);

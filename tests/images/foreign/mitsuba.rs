@@ -1,5 +1,5 @@
-//! The Cornell box against figures of Mitsuba 3 that are kept with the tests: 64 × 64 pixels, 16 replicates of 1024 samples per
-//! pixel of its path tracer, `max_depth` 7. `scripts/validate store` renews them.
+//! The Cornell box against stored figures of Mitsuba 3: 64 × 64 pixels, 16 replicates of 1024
+//! samples per pixel of its path tracer, `max_depth` 7. `scripts/validate store` renews them.
 
 use super::agreement::Moments;
 use super::{replicates, replicates_by};
@@ -8,12 +8,11 @@ use raystone::image::luminance;
 use raystone::scene::SceneData;
 
 const EDGE: u32 = 64;
-/// The ratio of the means may differ from 1 by so much, and so many pixels have to be accepted.
+/// Tolerance of the ratio of the means, and the required share of accepted pixels.
 const RATIO: f64 = 0.001;
 const ACCEPTED: f64 = 0.9975;
 const SPP: u32 = 128;
 const REPLICATES: u32 = 8;
-/// Those of the stored image.
 const STORED_REPLICATES: usize = 16;
 
 /// The pixels of a portable float map of [`EDGE`] × [`EDGE`] pixels, from the top.
@@ -29,8 +28,8 @@ fn pixels(bytes: &[u8]) -> Vec<[f32; 3]> {
     rows.flatten().copied().collect()
 }
 
-/// Means and variances of the stored image's luminance. Channels go up and down together, so that the standard deviation of the
-/// luminance is the luminance of those of the channels.
+/// Means and variances of the stored image's luminance. Channels vary together, so the standard
+/// deviation of the luminance is the luminance of the channels' standard deviations.
 fn stored() -> Moments {
     let mean = pixels(include_bytes!("../../data/mitsuba-cornell-box-mean.pfm"));
     let variance = pixels(include_bytes!(
@@ -46,7 +45,7 @@ fn stored() -> Moments {
     }
 }
 
-/// What distinguishes an image of the scene from Mitsuba's Cornell box: nothing, if all is well.
+/// Differences of the scene's image from Mitsuba's Cornell box; empty if there are none.
 fn faults(scene: SceneData) -> Vec<String> {
     let (ours, theirs) = (
         replicates(scene, 6, [EDGE; 2], SPP, REPLICATES).moments(),
@@ -100,7 +99,6 @@ const SAMPLERS: [(&str, &str); 12] = [
     ("sobol", "blue-noise"),
     ("owen-sobol", "none"),
 ];
-/// Pixels along the edge of a tile.
 const TILE: u32 = 8;
 
 #[test]

@@ -1,5 +1,4 @@
-//! Images against those of other programs and against formulas that owe nothing to this one: closed forms, radiosity, stored
-//! figures of Mitsuba 3, Nori's scenes.
+//! Images against other programs and formulas: radiosity, figures of Mitsuba 3, Nori's scenes.
 
 mod agreement;
 mod cook_torrance;
@@ -39,13 +38,13 @@ fn scene_of(polygons: &[(Vec<Vec3>, u32)], materials: Vec<Material>, camera: Cam
     scene
 }
 
-/// Images of a scene by the path tracer with so many bounces, one for each seed.
+/// Images of a scene by the path tracer with this many bounces, one per seed.
 fn replicates(scene: SceneData, bounces: i64, size: [u32; 2], spp: u32, count: u32) -> Replicates {
     let sampler = sampler("owen-sobol", "none");
     replicates_by(&sampler, scene, bounces, size, spp, count)
 }
 
-/// The same by another sampler.
+/// [`replicates`] with another sampler.
 fn replicates_by(
     sampler: &Sampler,
     scene: SceneData,

@@ -1,4 +1,4 @@
-//! Scenes of Nori: what is read from them, and what is answered to broken ones.
+//! Scenes of Nori: content, and errors of broken ones.
 
 use glam::Vec3;
 use raystone::params::{Params, Variant};
@@ -24,7 +24,8 @@ fn loaded(xml: &str) -> Result<SceneData, SceneError> {
     load(&variant, &LoadOptions::default())
 }
 
-/// A scene with one mesh, whose element holds `inside`, seen by a camera whose transform begins with `first`.
+/// A scene with one mesh, whose element contains `inside`, and a camera transform that begins with
+/// `first`.
 fn scene(inside: &str, first: &str) -> String {
     format!(
         r#"<?xml version="1.0"?>

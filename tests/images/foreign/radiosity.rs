@@ -1,6 +1,6 @@
-//! A Cornell box without blocks by radiosity in f64: form factors from the points in the middle of patches to whole patches are
-//! exact (Lambert's formula), and a room without blocks hides nothing. One Jacobi step is one bounce, so that paths and
-//! radiosity end after the same number of them.
+//! A Cornell box without blocks against radiosity in f64: form factors from patch centres to whole
+//! patches are exact (Lambert's formula), and there is no occlusion. One Jacobi step is one bounce,
+//! so that paths and radiosity end after the same number of them.
 
 use super::{replicates, scene_of};
 use crate::support::Estimate;
@@ -10,7 +10,7 @@ use raystone::measure::known_images::closed::polygon;
 use raystone::scene::Material;
 use std::f64::consts::PI;
 
-/// Patches along an edge of a wall. The lamp is made of whole ones.
+/// Patches along an edge of a wall. The lamp consists of whole ones.
 const EDGE: usize = 20;
 const BOUNCES: usize = 6;
 const EMISSION: [f64; 3] = [18.4, 15.6, 8.0];
@@ -21,10 +21,10 @@ const ALBEDOS: [[f64; 3]; 4] = [
     [0.78, 0.78, 0.78],
 ];
 const LAMP: usize = 3;
-/// Beyond five standard errors: the patches' share.
+/// Tolerance beyond five standard errors, due to the patches.
 const TOLERANCE: f64 = 0.003;
 
-/// A wall of the unit cube that is open at z = 0: a corner and two edges, whose product points inwards.
+/// A wall of the unit cube that is open at z = 0: corner and edges, cross product inwards.
 struct Wall {
     corner: DVec3,
     edges: [DVec3; 2],
@@ -98,7 +98,7 @@ fn patches() -> Vec<Patch> {
     patches
 }
 
-/// Radiance that arrives at a point of a wall over all patches, times cosine over π: to be multiplied by the albedo.
+/// Irradiance at a point of a wall from all patches, over π: to be multiplied by the albedo.
 fn gathered(
     point: DVec3,
     normal: DVec3,
@@ -115,18 +115,24 @@ fn gathered(
         .sum()
 }
 
-/// Radiance of every patch after so many bounces.
+/// Radiance of every patch after a number of bounces.
 fn solved(patches: &[Patch], bounces: usize) -> Vec<DVec3> {
-    let emitted = |patch: &Patch| match patch.material == LAMP {
-        true => DVec3::from(EMISSION),
-        false => DVec3::ZERO,
+    let emitted = |patch: &Patch| {
+        if patch.material == LAMP {
+            DVec3::from(EMISSION)
+        } else {
+            DVec3::ZERO
+        }
     };
     let factors: Vec<Vec<f64>> = patches
         .iter()
         .map(|to| {
-            let factor = |from: &Patch| match from.wall == to.wall {
-                true => 0.0,
-                false => polygon(to.centre, to.normal, &from.corners) / PI,
+            let factor = |from: &Patch| {
+                if from.wall == to.wall {
+                    0.0
+                } else {
+                    polygon(to.centre, to.normal, &from.corners) / PI
+                }
             };
             patches.iter().map(factor).collect()
         })
@@ -166,8 +172,8 @@ fn polygons() -> Vec<(Vec<Vec3>, u32)> {
     out
 }
 
-/// The largest relative difference between paths and radiosity over small places in the middle of floor, back, left and right
-/// wall, beyond five standard errors. `albedos` are those of the path tracer.
+/// The largest relative difference between paths and radiosity, beyond five standard errors, over
+/// small places in the middle of the walls. `albedos` are the path tracer's.
 fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 {
     const SIZE: [u32; 2] = [8, 8];
     let mut worst = f64::NEG_INFINITY;
@@ -183,9 +189,10 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
         let color = |c: [f64; 3]| DVec3::from(c).as_vec3();
         let material = |(k, c): (usize, &[f64; 3])| {
             let plain = Material::diffuse("wall", color(*c));
-            match k == LAMP {
-                true => plain.emitting(color(EMISSION)),
-                false => plain,
+            if k == LAMP {
+                plain.emitting(color(EMISSION))
+            } else {
+                plain
             }
         };
         let materials = albedos.iter().enumerate().map(material).collect();
@@ -220,7 +227,7 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
 #[test]
 fn a_box_without_blocks_is_as_bright_as_radiosity_says_and_a_grey_too_dark_is_found() {
     let patches = patches();
-    // From the floor all directions lead to a wall or through the open side, whose factor is that of the back wall.
+    // From the floor all directions lead to a wall or the open side, with the back wall's factor.
     let seen = |wall: usize| -> f64 {
         let of_wall = patches.iter().filter(|p| p.wall == wall);
         let middle = DVec3::new(0.5, 0.0, 0.5);
@@ -230,7 +237,7 @@ fn a_box_without_blocks_is_as_bright_as_radiosity_says_and_a_grey_too_dark_is_fo
     };
     let sum = 2.0 * seen(1) + seen(2) + seen(3) + seen(4);
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
-    // The last bounce is gathered at the points that the camera sees.
+    // The last bounce is gathered at the points seen by the camera.
     let radiance = solved(&patches, BOUNCES - 1);
     let right = excess(ALBEDOS, &patches, &radiance);
     assert!(right < TOLERANCE, "{right}");

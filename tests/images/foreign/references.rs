@@ -1,5 +1,5 @@
-//! Reference images of Mitsuba 3's own tests, each with the variance of one sample. As that program tests itself, the mean of N
-//! independent samples is compared with a reference that is taken for exact.
+//! Reference images of Mitsuba 3's own tests, each with the variance of one sample. As in its own
+//! tests, the mean of N independent samples is compared with a reference assumed exact.
 
 use super::replicates_by;
 use crate::support::sampler;
@@ -11,10 +11,10 @@ use raystone::scene::{Light, Material, SceneData, encode_normal, named};
 use std::path::PathBuf;
 
 const FOLDER: &str = "../shared/scenes/mitsuba-refs";
-/// Samples of a pixel: few enough for the noise of the reference to be small beside them.
+/// Samples per pixel: few enough for the reference's noise to be small in comparison.
 const SPP: u32 = 64;
 const REPLICATES: u32 = 4;
-/// Variance of a sample is at least so much, as there: pixels without noise differ by rounding and by filters of one sample.
+/// Minimum variance of a sample, as there: noiseless pixels differ by rounding and filters.
 const LEAST_VARIANCE: f64 = 1e-4;
 const ACCEPTED: f64 = 0.9975;
 const RATIO: f64 = 0.002;
@@ -30,7 +30,7 @@ fn below(path: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// A mesh with normals at its vertices where the file has them.
+/// A mesh, with vertex normals if the file has them.
 struct Mesh {
     triangles: Vec<Triangle>,
     normals: Vec<[Vec3; 3]>,
@@ -46,7 +46,7 @@ fn square() -> Mesh {
     }
 }
 
-/// The file's ball of radius 1 around 0; its normals are those of the ball.
+/// The file's ball of radius 1 around 0, with the ball's normals.
 fn ball() -> Option<Mesh> {
     let path = below("common/meshes/sphere.obj")?;
     let file = named(path.to_str().expect("UTF-8")).expect("a mesh");
@@ -57,8 +57,8 @@ fn ball() -> Option<Mesh> {
     })
 }
 
-/// A scene without triangles and light, seen as Mitsuba does where nothing is said: by 50 mm before film of 36 mm × 24 mm, whose
-/// diagonal is that of a square image.
+/// A scene without triangles and light, with Mitsuba's default view: a 50 mm lens before 36 mm × 24
+/// mm film, whose diagonal is that of a square image.
 fn empty(eye: Vec3, target: Vec3) -> SceneData {
     let diagonal = 36_f32.hypot(24.0);
     let fov = 2.0 * (diagonal / 2.0 / 50.0 / 2_f32.sqrt()).atan();
@@ -84,7 +84,7 @@ fn add(scene: &mut SceneData, mesh: &Mesh, to_world: Mat4, albedo: Vec3) {
     }
 }
 
-/// Share of pixels that are accepted, ratio of the means.
+/// Share of accepted pixels, and ratio of the means.
 fn compare(scene: SceneData, reference: &str, bounces: i64) -> Option<(f64, f64)> {
     let read = |ending: &str| Some(read_linear(&below(&format!("{reference}{ending}"))?));
     let theirs: Image = read(".exr")?.expect("an image");
@@ -99,7 +99,7 @@ fn compare(scene: SceneData, reference: &str, bounces: i64) -> Option<(f64, f64)
     let mut total = 0.0;
     for (at, mean) in moments.mean.iter().enumerate() {
         let expected = luminance(&theirs.pixels[at]);
-        // Channels go up and down together.
+        // Channels vary together.
         let spread = luminance(&variance.pixels[at].map(|v| v.max(0.0).sqrt()));
         let spread = spread.powi(2).max(LEAST_VARIANCE);
         let z = (mean - expected) * (count / spread).sqrt();

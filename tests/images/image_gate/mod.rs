@@ -1,4 +1,4 @@
-//! The gate of integrators: kernels agree with the oracle for images path by path, and planted faults do not.
+//! Correctness check of integrators: kernels match the image oracle per path, faults do not.
 
 mod real;
 
@@ -17,7 +17,6 @@ use raystone::scene::SceneData;
 
 const SIZE: [u32; 2] = [26, 19];
 
-/// The verdict on an integrator on a scene.
 fn verdict(
     gpu: &Gpu,
     scene: &SceneData,
@@ -28,7 +27,7 @@ fn verdict(
     tried(gpu, scene, what, sampler, samples).expect("images")
 }
 
-/// The same, where kernels may raise an error or not compile.
+/// [`verdict`] for kernels that may raise an error or not compile.
 fn tried(
     gpu: &Gpu,
     scene: &SceneData,
@@ -39,7 +38,7 @@ fn tried(
     judged_by(gpu, scene, scene, what, sampler, samples)
 }
 
-/// The same by the oracle of the scene that is expected.
+/// [`tried`] with the oracle of the expected scene.
 fn judged_by(
     gpu: &Gpu,
     scene: &SceneData,
@@ -52,7 +51,7 @@ fn judged_by(
     judged_on(gpu, &stage, expected, what, sampler, samples)
 }
 
-/// The same on a stage with the triangle test of its own.
+/// [`judged_by`] on a stage with its own triangle test.
 fn judged_on(
     gpu: &Gpu,
     stage: &raystone::integrator::Stage,
@@ -101,12 +100,12 @@ fn judged_on(
     Ok(record)
 }
 
-/// A sampler of independent numbers with as many dimensions as asked for.
+/// A sampler of independent numbers with the required dimensions.
 fn independent() -> Sampler {
     sampler_of("pixel-hash", "none", 100_000)
 }
 
-/// Trial scenes of these places, in five tests for their time.
+/// Checks the trial scenes in a range, split into five tests for their duration.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
     assert_eq!(scenes.len(), 15);
@@ -166,7 +165,7 @@ fn surfaces_within_rounding_are_told_apart_from_faults() {
         right.layered > right.paths / 2 && right.surfaces <= right.layered,
         "{right:?}"
     );
-    // Layers that rounding cannot exchange; and a fault of half a percent in ones that it can.
+    // Layers that rounding cannot exchange; and a half-percent fault in ones that it can.
     assert_eq!(of_another(&apart, &apart, &[]).surfaces, 0);
     assert!(of_another(&coincident, &apart, &[]).wrong > 0);
     let weight = "throughput *= next.weight;";
@@ -177,7 +176,7 @@ fn surfaces_within_rounding_are_told_apart_from_faults() {
 #[test]
 fn faults_do_not_hide_in_edges_decisions_and_textures() {
     let scene = layers(2e-3).expect("a built-in scene");
-    // A lamp aside: what camera rays see of it is the same but for its edges.
+    // A lamp displaced: camera rays see the same except at its edges.
     let room = builtin("cornell-box", &[]);
     let mut aside = room.clone();
     let shines = |id: &u32| room.materials[*id as usize].emission != glam::Vec3::ZERO;
@@ -196,7 +195,7 @@ fn faults_do_not_hide_in_edges_decisions_and_textures() {
     let fewer = [(survives, "sample_1d(sampler) >= survival - 0.03")];
     let record = of_another(&scene, &scene, &fewer);
     assert!((1..100).contains(&record.wrong), "{record:?}");
-    // Textures a thousandth of their width aside.
+    // Textures displaced by a thousandth of their width.
     let textured = trial_scenes().expect("scenes").swap_remove(4).scene;
     let mut aside = textured.clone();
     assert!(!aside.uvs.is_empty());
@@ -310,7 +309,7 @@ fn every_kind_of_sampler_is_judged_by_its_words() {
     }
 }
 
-/// A fault in a kernel, and what it says.
+/// A fault in a kernel, and the resulting message.
 fn fault(module: &str, from: &str, to: &str) -> Option<String> {
     let gpu = open(kernels_with(module, &[(from, to)]));
     let scene = builtin("cornell-box", &[]);
@@ -383,15 +382,16 @@ fn a_run_gives_no_error_figure_for_an_integrator_whose_paths_are_wrong() {
     assert!(report.contains("Integrators path by path"));
 }
 
-/// Figures of the oracle on scenes that the variable `SCENES` names.
+/// Prints figures of the oracle on the scenes named by the variable `SCENES`.
 #[test]
 #[ignore = "no check but a measurement: `cargo test --release --test images -- --ignored --nocapture image_gate`"]
 fn measure_scenes() {
     let names = std::env::var("SCENES").unwrap_or_else(|_| "cornell-box".to_owned());
     for name in names.split(',') {
-        let scene = match name.contains('/') {
-            true => from_file(name.as_ref()),
-            false => builtin(name, &[]),
+        let scene = if name.contains('/') {
+            from_file(name.as_ref())
+        } else {
+            builtin(name, &[])
         };
         let occlusion = integrator_variant("ao", &[("radius", ParamValue::Number(0.2))]);
         for what in [integrator_variant("primary", &[]), occlusion, path(6)] {
@@ -406,8 +406,8 @@ fn measure_scenes() {
     }
 }
 
-/// Which faults of a list the trial scenes show: lines `name | module | text | text in its place` of the file that the variable `FAULTS`
-/// names. So that a guess at what the gate cannot see costs no build.
+/// Finds the faults of a list that the trial scenes reveal: lines `name | module | text |
+/// replacement` of the file named by the variable `FAULTS`, to test guesses without a build.
 #[test]
 #[ignore = "no check but a measurement: `FAULTS=list cargo test --release --test images -- --ignored --nocapture hunt`"]
 fn hunt_faults() {

@@ -1,6 +1,7 @@
-//! Single paths on real scenes: none differs from the oracle's without a kind of rounding that explains it.
-//! With RAYSTONE_REAL_PATHS=/, and in a full run, every scene of the list is taken with every triangle test, which takes some minutes
-//! in release; with a part of names those that have it; else one of a few small ones with the default test.
+//! Single paths on real scenes: every difference from the oracle is explained by a kind of
+//! rounding. With RAYSTONE_REAL_PATHS=/, and in a full run, every scene of the list is used with
+//! every triangle test, which takes some minutes in release; with a part of names, the scenes that
+//! contain it; else one of a few small ones with the default test.
 
 use super::{independent, judged_on};
 use crate::support::*;
@@ -9,7 +10,7 @@ use raystone::integrator::Stage;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Below `../shared/scenes`; a run that is not full takes one of the first ones.
+/// Below `../shared/scenes`; a run that is not full uses one of the first ones.
 const SCENES: [&str; 79] = [
     "cornell-box/CornellBox-Water.obj",
     "cornell-box/CornellBox-Original.obj",

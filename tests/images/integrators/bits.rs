@@ -1,4 +1,4 @@
-//! What must be equal to the bit: the same seed, other slices, other structures.
+//! Bit-exact equality: same seed, other slices, other structures.
 
 use super::MAX_DEPTH;
 use crate::support::*;
@@ -26,7 +26,7 @@ fn a_seed_gives_the_same_bits_again_and_another_seed_gives_others() {
         let first = last(&renderer, &[2], 7);
         assert_eq!(first, last(&renderer, &[2], 7), "{}", sampler.label());
         let other = last(&renderer, &[2], 8);
-        // Without pixel and seed in it, a sampler draws the same whatever the seed.
+        // A sampler without pixel and seed in it draws the same for every seed.
         assert_eq!(first != other, sampler.is_random(), "{}", sampler.label());
     }
 }
@@ -85,7 +85,7 @@ fn the_images_at_powers_of_two_are_those_of_renders_of_their_own() {
     assert!(kept[0] != kept[1] && kept[1] != kept[2]);
 }
 
-/// The image of `bvh` and of the structures whose turn it is, by name.
+/// The images of `bvh` and of the structures whose turn it is, by name.
 fn images(stage: &Stage, what: &Variant) -> Vec<(&'static str, Vec<[u32; 3]>)> {
     let sampler = sampler("pixel-hash", "none");
     let image = |kind: &'static dyn raystone::accel::AccelKind| {
@@ -122,7 +122,7 @@ fn every_structure_gives_the_same_image_to_the_bit() {
             for (name, image) in &images {
                 assert_eq!(*image, images[0].1, "{scene}, {what}, {name}");
             }
-            // An image without content would be equal too: each scene has its own.
+            // Images without content would be equal, too: each scene has its own.
             assert!(!seen.contains(&images[0].1), "{scene}, {what}");
             seen.push(images[0].1.clone());
         }

@@ -1,5 +1,4 @@
-//! What a renderer sums and checks: blocks of samples, bands of rows, the samples that every pixel
-//! took, and the error word.
+//! Sums and checks of a renderer: sample blocks, row bands, samples per pixel, error word.
 
 use super::MAX_DEPTH;
 use crate::support::*;
@@ -19,7 +18,7 @@ fn with_renderer<T>(gpu: &Gpu, size: [u32; 2], work: impl FnOnce(&Renderer) -> T
     work(&stage.renderer(gpu, &traced, &sampler, &path(MAX_DEPTH), size, false))
 }
 
-/// What is said of an image whose sample loop was changed.
+/// The error for an image whose sample loop was changed.
 fn refused(loop_condition: &str, spps: &[u32]) -> GpuError {
     let planted = kernels_with(
         "integrator/render",
@@ -58,7 +57,7 @@ fn an_image_whose_pixels_took_other_samples_than_asked_for_is_an_error() {
         text.contains("1 pixels") && text.contains("(13, 4)"),
         "{text}"
     );
-    // In a block that the host has taken over already.
+    // In a block that the host has already taken over.
     let error = refused(
         "i < frame.samples - select(0u, 1u, frame.first_sample == 0u)",
         &[2 * BLOCK_SAMPLES],
@@ -162,7 +161,7 @@ fn a_driver_that_ends_loops_is_seen_and_what_it_cuts_is_refused() {
         renderer.render(&[1], 1).expect_err("cut loops")
     });
     assert!(error.is_refusal(), "{error}");
-    // Loops that end early where no kernel notices.
+    // Loops that end early without any kernel noticing.
     let silent = kernels_with(
         "common/loops",
         &[("k < loops.inner", "k < min(loops.inner, 70000u)")],

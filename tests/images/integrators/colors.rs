@@ -1,4 +1,4 @@
-//! Colours of vertices, from the file to the picture: under a white sky a square has the radiance of its reflectance.
+//! Vertex colours, from file to picture: under a white sky, radiance is reflectance.
 
 use crate::support::*;
 use glam::Vec3;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 const SIZE: u32 = 17;
 
-/// The scene in a white furnace, seen so that the unit square fills the picture: its pixels, from the top.
+/// The scene in a white furnace, with the unit square filling the image: its pixels, from the top.
 fn seen(mut scene: SceneData) -> (Vec<[f32; 3]>, Vec<String>) {
     scene.environment = Vec3::ONE;
     scene.daylight = None;
@@ -45,7 +45,7 @@ fn a_red_square_is_red_and_half_way_is_the_mean() {
     let obj = |left: &str, right: &str| {
         format!("v 0 0 0 {left}\nv 1 0 0 {right}\nv 1 1 0 {right}\nv 0 1 0 {left}\nf 1 2 3 4\n")
     };
-    // What a screen shows as 188 of 255 is 0.5029 of the light.
+    // Screen value 188 of 255 is 0.5029 of the light.
     let grey = 0.502_886;
     for (name, text, left, right) in [
         (

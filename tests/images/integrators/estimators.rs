@@ -1,5 +1,5 @@
-//! Estimators change the noise of an image, not its mean: strategies, heuristics, roulette. A limit on
-//! contributions does, and says so.
+//! Estimators change an image's noise, not its mean: strategies, heuristics, roulette. A limit on
+//! contributions does, and reports it.
 
 use crate::support::*;
 use raystone::gpu::Gpu;
@@ -7,7 +7,7 @@ use raystone::integrator::path::{Roulette, Strategy};
 use raystone::integrator::{ConfiguredIntegrator, IntegratorRegistry};
 use raystone::params::{Choice as _, ParamValue, Variant};
 
-/// Deep enough that roulette, from the first bounce on, has a say in all light that is not direct.
+/// Deep enough for roulette, from the first bounce on, to affect all indirect light.
 const DEPTH: i64 = 4;
 
 fn chosen(strategy: Strategy, roulette: Roulette, clamp: f64) -> Variant {
@@ -30,7 +30,7 @@ fn estimate(gpu: &Gpu, what: &Variant, spp: u32) -> Estimate {
     Estimate::of(&replicate_means(&renderer, spp, 16))
 }
 
-/// Samples per pixel that make every strategy about as exact: lamps are hard to hit.
+/// Samples per pixel that make every strategy about equally precise: lamps are hard to hit.
 fn spp(strategy: Strategy) -> u32 {
     match strategy {
         Strategy::Bsdf => 256,

@@ -1,5 +1,4 @@
-//! Balls of few facets whose vertex normals make them smooth, in the white furnace: a shading normal must send no light behind
-//! the surface.
+//! Coarse balls with vertex normals in the white furnace: no light is sent behind the surface.
 
 use crate::support::*;
 use glam::Vec3;
@@ -10,10 +9,10 @@ use raystone::scene::{CookTorrance, Fresnel, Masking, Material, SceneData, encod
 use std::f32::consts::{PI, TAU};
 
 const SIZE: [u32; 2] = [32, 32];
-/// As long as paths can be, and none ends before.
+/// Maximum path length, with no earlier end.
 const DEPTH: i64 = 20;
 
-/// A unit ball under a white sky, the normals of whose vertices are those of the sphere.
+/// A unit ball under a white sky, with the vertex normals of the sphere.
 fn ball([sectors, bands]: [u32; 2], material: Material) -> SceneData {
     let mut scene = builtin("white-furnace", &[]);
     let at = |sector: u32, band: u32| {
@@ -56,7 +55,6 @@ fn long(depth: i64) -> Variant {
     integrator_variant("path", &changes)
 }
 
-/// The least, the mean and the greatest pixel.
 fn seen(gpu: &Gpu, scene: SceneData, depth: i64, spp: u32) -> [f64; 3] {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));
@@ -75,7 +73,7 @@ fn seen(gpu: &Gpu, scene: SceneData, depth: i64, spp: u32) -> [f64; 3] {
     ]
 }
 
-/// Lossless surfaces, or nearly so: facets of a rough one hide each other.
+/// (Nearly) lossless surfaces: rough facets hide each other.
 fn shiny() -> Vec<(&'static str, Material)> {
     let of = CookTorrance {
         diffuse: Vec3::ZERO,
@@ -101,7 +99,7 @@ fn shiny() -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// A smooth ball and the same without its normals.
+/// A smooth ball, and the same without its normals.
 fn smooth_and_flat(size: [u32; 2], material: Material) -> [SceneData; 2] {
     let smooth = ball(size, material);
     let flat = SceneData {
@@ -122,7 +120,8 @@ fn smooth_balls_of_few_facets_reflect_all_light() {
                 assert!(least > 0.9999 && most < 1.0001, "{what}");
                 continue;
             }
-            // What microfacets hide from each other, and lobes have below the horizon, flat balls lose, too. The rest is noise.
+            // Light lost between microfacets, and in lobes below the horizon, is lost on flat
+            // balls, too. The rest is noise.
             let [flat_least, flat_mean, _] = seen(gpu(), flat, DEPTH, 64);
             let what = format!("{what}; flat: {flat_least} {flat_mean}");
             assert!(
@@ -134,8 +133,9 @@ fn smooth_balls_of_few_facets_reflect_all_light() {
     }
 }
 
-/// What the worst pixel and the mean of a smooth ball of glass must have after [`DEPTH`] bounces. What is missing goes round inside,
-/// beyond the critical angle: flat balls of 12 × 6 facets and more lose two to eighty times as much.
+/// Minimum of the worst pixel and the mean of a smooth glass ball after [`DEPTH`] bounces. The
+/// missing light is trapped beyond the critical angle: flat balls of 12 × 6 facets and more lose
+/// two to eighty times as much.
 const GLASS: [([u32; 2], f64, f64); 4] = [
     ([6, 4], 0.3, 0.975),
     ([12, 6], 0.82, 0.997),

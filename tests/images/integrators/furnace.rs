@@ -1,4 +1,4 @@
-//! Scenes whose every pixel is known.
+//! Scenes with a known value in every pixel.
 
 use super::MAX_DEPTH;
 use crate::support::*;
@@ -12,14 +12,14 @@ const SIZE: [u32; 2] = [16, 16];
 /// Emission alone, direct light, no roulette yet, roulette, most dimensions.
 const DEPTHS: [i64; 5] = [0, 1, 3, 6, 12];
 /// Relative error allowed to a sampler that draws the same 1,024 points in every pixel: the high
-/// dimensions of long paths are far from uniform then.
+/// dimensions of long paths are then far from uniform.
 const DETERMINISTIC_BOUND: f64 = 0.05;
 
-/// Samples per pixel of the former, and of those whose replicates are compared.
+/// Samples per pixel for those, and for samplers whose replicates are compared.
 const FIXED_SPP: u32 = 1024;
 const RANDOM_SPP: u32 = 4;
 
-/// Whether the mean over seeds is right at any number of samples: a turned disc keeps its radii.
+/// True if the mean over seeds is right at any sample count: a rotated disc preserves radii.
 fn is_unbiased(sampler: &Sampler) -> bool {
     sampler.is_random() && sampler.decorrelation_variant.name != "disc-rotation"
 }
@@ -32,7 +32,7 @@ fn furnace(albedo: f64) -> Stage {
     )
 }
 
-/// Radiance of the furnace box with this albedo after so many bounces.
+/// Radiance of the furnace box with this albedo after `depth` bounces.
 fn expected(albedo: f64, depth: i64) -> f64 {
     1.0 - albedo.powi(depth as i32 + 1)
 }
@@ -61,7 +61,7 @@ fn check(gpu: &Gpu, stage: &Stage, sampler: &Sampler, albedo: f64, depth: i64) {
         estimate.error < 0.02 * right,
         "{what}: {estimate:?} proves nothing"
     );
-    // The radiance after one more bounce is another number, and the test tells them apart.
+    // The radiance after one more bounce differs, and the test detects that.
     if albedo.powi(depth as i32) > 0.2 {
         assert!(
             !estimate.agrees_with(next),
@@ -78,7 +78,7 @@ fn the_furnace_box_has_the_radiance_of_its_bounces_with_every_sampler() {
             let sampler = sampler("pixel-hash", "none");
             check(gpu(), &stage, &sampler, albedo, depth);
         }
-        // One depth for the others: a software driver takes seconds for each kernel.
+        // One depth for the others: a software driver takes seconds per kernel.
         let (random, fixed) = (samplers(RANDOM_SPP), samplers(FIXED_SPP));
         let random = random.iter().filter(|s| is_unbiased(s));
         let all = random.chain(fixed.iter().filter(|s| !is_unbiased(s)));
@@ -109,10 +109,10 @@ fn every_pixel_of_the_white_furnace_is_one_and_none_is_where_the_sphere_is_grey(
     assert!(largest_error(&grey, "bvh") > 0.4);
 }
 
-/// Bounces until nothing of note goes round in a ball of glass.
+/// Bounces until no significant light remains in a glass ball.
 const LONG: i64 = 20;
 
-/// Mean radiance under a white sky of a ball of this material, seen from there.
+/// Mean radiance of a ball of this material under a white sky, seen from `eye`.
 fn ball(gpu: &Gpu, material: Material, eye: Vec3) -> Estimate {
     ball_to(gpu, material, eye, LONG)
 }
@@ -133,17 +133,16 @@ fn ball_to(gpu: &Gpu, material: Material, eye: Vec3, depth: i64) -> Estimate {
 const OUTSIDE: Vec3 = Vec3::new(0.0, 0.0, 3.0);
 const INSIDE: Vec3 = Vec3::new(0.1, -0.2, 0.3);
 
-/// What may be missing of 1: between facets, light that entered at a grazing angle meets the surface beyond
-/// the critical angle and goes round for more than [`LONG`] bounces. It is 1.65 %, 1.09 % and 0.71 % with 4, 8
-/// and 16 bounces: two thirds are left whenever the depth doubles.
+/// Allowed deficit from 1: between facets, light that entered at a grazing angle meets the surface
+/// beyond the critical angle and is trapped for more than [`LONG`] bounces. It is 1.65 %, 1.09 %
+/// and 0.71 % with 4, 8 and 16 bounces: each doubling of the depth leaves two thirds.
 const TRAPPED: f64 = 0.01;
 
-/// What a ball of glass with the index 1.5 shows that it should not, if anything.
+/// The fault visible in a glass ball of index 1.5, if any.
 fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
     let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
     let pane = Material::thin_dielectric("pane", Vec3::ONE, 1.5);
-    // Most samples are right to the last bits, and so few are ended by roulette that there may be no error
-    // but rounding.
+    // Most samples are right to the last bits, and roulette ends so few that rounding may dominate.
     let is = |found: Estimate, right: f64, trapped: f64| {
         println!("{found:?} for {right}");
         let margin = 5.0 * found.error + 1e-5 * right;
@@ -151,9 +150,9 @@ fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
         found.error < 0.02 * right && (low..right + margin).contains(&found.mean)
     };
     [
-        // What comes in goes out: a ball of glass cannot be seen where all around is equally bright.
+        // Energy is conserved: a glass ball is invisible in uniform surroundings.
         ("outside", is(ball(gpu, glass(), OUTSIDE), 1.0, TRAPPED)),
-        // Radiance over the square of the index stays the same along a ray.
+        // Radiance over the square of the index is constant along a ray.
         ("inside", is(ball(gpu, glass(), INSIDE), 1.5 * 1.5, 0.0)),
         ("bubble", is(ball(gpu, pane, OUTSIDE), 1.0, 0.0)),
     ]
@@ -163,7 +162,7 @@ fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
 
 #[test]
 fn what_a_ball_of_glass_keeps_gets_out_with_longer_paths() {
-    // With one seed a longer path begins like a shorter one, so that the differences are no noise.
+    // With one seed a longer path begins like a shorter one, so the differences are not noise.
     let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
     let kept = [4, 8, 16].map(|depth| 1.0 - ball_to(gpu(), glass(), OUTSIDE, depth).mean);
     for pair in kept.windows(2) {
@@ -175,7 +174,7 @@ fn what_a_ball_of_glass_keeps_gets_out_with_longer_paths() {
 #[test]
 fn a_ball_of_glass_in_the_white_furnace_cannot_be_seen() {
     assert_eq!(glass_fault(gpu()), None);
-    // What is reflected inside gets out later: half of all light is lost, at one passage each.
+    // Internally reflected light exits later: half of all light is lost, at one passage each.
     let tinted = Material::dielectric("glass", Vec3::splat(0.5), 1.5);
     let seen = ball(gpu(), tinted, INSIDE);
     assert!((seen.mean - 0.5 * 2.25).abs() < 1e-3, "{seen:?}");
@@ -184,7 +183,7 @@ fn a_ball_of_glass_in_the_white_furnace_cannot_be_seen() {
 #[test]
 fn faults_of_glass_show_in_the_white_furnace() {
     let faults = [
-        // Without the refraction of radiance, glass is as bright inside as outside.
+        // Without radiance scaling at refraction, glass is as bright inside as outside.
         (
             "shading/bsdf/dielectric",
             "tint / (eta * eta)",
@@ -223,7 +222,7 @@ fn nothing_is_occluded_before_a_convex_body_and_everything_in_a_closed_box() {
     };
     let inside = furnace(0.5);
     assert_eq!(mean_ao(&inside, 2.0), 0.0);
-    // Rays as short as the distance to most walls find some of them.
+    // Rays as long as the distance to most walls find some of them.
     assert!((0.2..0.95).contains(&mean_ao(&inside, 0.1)));
     let outside = Stage::builtin(gpu(), "white-furnace", &[]);
     assert_eq!(mean_ao(&outside, 2.0), 1.0);

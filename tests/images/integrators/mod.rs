@@ -1,5 +1,5 @@
-//! The integrators against images that are known: furnaces, mirrors, textures, open and closed
-//! scenes; and against themselves: seeds, slices, structures, with and without direct light.
+//! Integrators against known images: furnaces, mirrors, textures, open and closed scenes; and
+//! against themselves: seeds, slices, structures, with and without direct light.
 
 mod bits;
 mod blocks;
@@ -12,5 +12,5 @@ mod model;
 mod ray_counts;
 mod sides;
 
-/// Bounces where nothing else is asked for: tests that agree on it share their kernels.
+/// Default number of bounces: tests that share it share their kernels.
 const MAX_DEPTH: i64 = 6;

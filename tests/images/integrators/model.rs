@@ -1,4 +1,4 @@
-//! Models from files: a mirror shows what stands behind the camera, a texture its right side up.
+//! Models from files: a mirror shows what is behind the camera, a texture is right side up.
 
 use crate::support::*;
 use glam::Vec3;
@@ -9,8 +9,8 @@ use std::path::Path;
 
 const SIZE: u32 = 16;
 
-/// Looks down at the origin from z = 2; x to the right, y up. The square from −1 to 1 in the plane
-/// z = 0 fills the image.
+/// Looks down at the origin from z = 2; x to the right, y up. The square [−1, 1]² at z = 0 fills
+/// the image.
 fn camera() -> Camera {
     Camera {
         eye: Vec3::new(0.0, 0.0, 2.0),
@@ -60,7 +60,7 @@ fn a_mirror_shows_the_tinted_radiance_of_a_lamp_behind_the_camera() {
     let image = render(&mirror, 1, 4);
     for y in 0..SIZE {
         for x in 0..SIZE {
-            // The lamp stands to the right of the camera only.
+            // The lamp is to the right of the camera only.
             let expected = if x < SIZE / 2 {
                 [0.0; 3]
             } else {
@@ -99,7 +99,7 @@ fn second_weight(pixel: u32) -> f64 {
     let steps = 1000;
     let weight = |k: u32| {
         let x = (f64::from(pixel) + (f64::from(k) + 0.5) / f64::from(steps)) / f64::from(SIZE);
-        // Texel centres lie at a quarter and three quarters; 1 at the second, 0 at the first.
+        // Texel centres are at a quarter and three quarters; 1 at the second, 0 at the first.
         1.0 - (2.0 * (x - 0.75)).abs().min((2.0 * (x + 0.25)).abs())
     };
     (0..steps).map(weight).sum::<f64>() / f64::from(steps)
@@ -140,7 +140,7 @@ fn a_texture_lies_on_its_quad_the_right_way_up_in_linear_colours() {
         .expect("a picture");
     let materials = "newmtl picture\nKd 1 1 1\nmap_Kd picture.png\n";
     let mut scene = load(folder.path(), QUAD, materials);
-    // Under a white sky, and a plane sees nothing else, radiance is the colour.
+    // Under a white sky, which is all a plane sees, radiance is the colour.
     assert!(scene.daylight.take().is_some());
     assert_eq!((scene.textures.len(), scene.environment), (1, Vec3::ONE));
     let image = render(&Stage::new(gpu(), scene), 1, 256);
@@ -173,7 +173,7 @@ fn a_scene_without_a_light_is_under_a_grey_sky_with_a_key_light() {
         side,
         (side + sky.key).normalize(),
     ] {
-        // From above the square, away from it.
+        // From above the square, facing away from it.
         scene.camera = Some(Camera {
             eye: Vec3::new(0.0, 0.0, 9.0),
             target: Vec3::new(0.0, 0.0, 9.0) + towards,
@@ -208,13 +208,13 @@ fn a_bounced_ray_that_reaches_far_in_a_room_sees_the_sky() {
     assert_eq!(mean(&scene), 0.0, "there is no hole in the cube");
     scene.daylight.as_mut().expect("a sky").reach = 0.5;
     assert!(mean(&scene) > 0.1);
-    // The camera sees the walls all the same, and not the sky behind them.
+    // The camera still sees the walls, and not the sky behind them.
     let dark = scene.materials.iter_mut();
     dark.for_each(|material| material.base_color = Vec3::ZERO);
     assert_eq!(mean(&scene), 0.0);
 }
 
-/// Faces inwards.
+/// Facing inwards.
 const CUBE: &str = "
 v -2 -2 -2\nv 2 -2 -2\nv 2 2 -2\nv -2 2 -2\nv -2 -2 2.5\nv 2 -2 2.5\nv 2 2 2.5\nv -2 2 2.5
 usemtl picture

@@ -1,4 +1,4 @@
-//! Counted rays against numbers that follow from the scene.
+//! Ray counts against numbers that follow from the scene.
 
 use crate::support::*;
 use raystone::accel::AccelKind;
@@ -9,7 +9,7 @@ const SIZE: [u32; 2] = [16, 16];
 const SPP: u32 = 16;
 const SAMPLES: u64 = 16 * 16 * SPP as u64;
 
-/// Primary, shadow, AO and bounce rays of an image, and those skipped: one answer for all `kinds` of structures.
+/// Primary, shadow, AO, bounce and skipped rays of an image, equal for all `kinds` of structures.
 fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 5] {
     assert_eq!(
         RAY_COUNT_CLASSES,
@@ -20,7 +20,7 @@ fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 5] {
     for kind in kinds {
         let traced = stage.traced(gpu(), *kind);
         let renderer = stage.renderer(gpu(), &traced, &sampler, what, SIZE, true);
-        // Twice: a reset forgets what was counted before.
+        // Twice: a reset clears earlier counts.
         for _ in 0..2 {
             renderer.render(&[SPP], 4).expect("a render");
         }
@@ -37,7 +37,7 @@ fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
     let [primary, shadow, ao, bounce, skipped] = counts(&stage, &path(3), &kinds);
     assert_eq!(shadow + skipped, 3 * SAMPLES);
     assert_eq!([primary, ao, bounce], [SAMPLES, 0, 3 * SAMPLES]);
-    // A point of the emitter lies on the surface's own wall once in six draws: no ray then.
+    // One in six emitter points is on the surface's own wall, which needs no ray.
     let fraction = shadow as f64 / (3 * SAMPLES) as f64;
     let expected = 5.0 / 6.0;
     let error = (expected / 6.0 / (3 * SAMPLES) as f64).sqrt();

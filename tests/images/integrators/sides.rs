@@ -1,5 +1,5 @@
-//! Fronts of what a transform mirrors: where the determinant is negative, the winding of front faces is flipped (glTF 2.0, 3.7.4),
-//! wherever the transform stands and however the triangles are traced.
+//! Front faces under mirroring: a negative determinant flips the winding (glTF 2.0, 3.7.4),
+//! wherever the transform is and however the triangles are traced.
 
 use crate::support::*;
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -11,17 +11,16 @@ use raystone::scene::{Light, Material, SceneData, Texture, TextureUse, Transform
 use std::path::Path;
 
 const SIZE: [u32; 2] = [8, 8];
-/// Radiance of lamps.
 const RADIANCE: f64 = 5.0;
 
-/// A node around the mesh 0: scales from the outermost one on, and the side of z to which the mesh's +z then looks.
+/// A node around mesh 0: scales from the outermost on, and the resulting z side of +z.
 struct Placed {
     scales: &'static [[f32; 3]],
     front: f32,
 }
 
-/// An odd and an even number of negative axes, in one node and in nested ones. Mirroring at a plane through its normal leaves the
-/// front of a square where it is; mirroring along the normal turns it over; what turns it twice does not.
+/// Odd and even numbers of negative axes, in one node and in nested ones. Mirroring at a plane
+/// through its normal keeps the front of a square; along the normal flips it; twice does not.
 const PLACES: [Placed; 9] = [
     Placed {
         scales: &[[1.0, 1.0, 1.0]],
@@ -61,7 +60,7 @@ const PLACES: [Placed; 9] = [
     },
 ];
 
-/// A glTF model of a mesh of these triangles under nested nodes, and far away once more if it is to be an instance.
+/// A glTF mesh of these triangles under nested nodes, with a distant second instance if `shared`.
 fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     use base64::Engine;
     let bytes: Vec<u8> = corners
@@ -76,9 +75,10 @@ fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     };
     let inner = scales.len() - 1;
     let node = |(index, scale): (usize, &[f32; 3])| {
-        let what = match index == inner {
-            true => "\"mesh\":0".to_owned(),
-            false => format!("\"children\":[{}]", index + 1),
+        let what = if index == inner {
+            "\"mesh\":0".to_owned()
+        } else {
+            format!("\"children\":[{}]", index + 1)
         };
         format!("{{{what},\"scale\":{scale:?}}}")
     };
@@ -109,7 +109,7 @@ fn model(corners: &[Vec3], scales: &[[f32; 3]], shared: bool) -> SceneData {
     scene
 }
 
-/// The square from −0.5 to 0.5 that looks along +z, of two triangles that are one light, or of four that are four.
+/// The square from −0.5 to 0.5 facing +z, of two triangles (one light) or four (four lights).
 fn square(triangles: usize) -> Vec<Vec3> {
     let [a, b, c, d] =
         [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| Vec3::new(x, y, 0.0));
@@ -122,7 +122,7 @@ fn square(triangles: usize) -> Vec<Vec3> {
     }
 }
 
-/// Mean radiance with its standard error, in the middle of what a camera sees.
+/// Mean radiance with its standard error, in the middle of a camera's view.
 fn looked(
     gpu: &Gpu,
     scene: &SceneData,
@@ -146,9 +146,10 @@ fn looked(
 }
 
 fn tracers(shared: bool) -> &'static [&'static str] {
-    match shared {
-        true => &["bvh", "meta-bvh"],
-        false => &["bvh"],
+    if shared {
+        &["bvh", "meta-bvh"]
+    } else {
+        &["bvh"]
     }
 }
 
@@ -193,7 +194,7 @@ fn one_sided_lamps_in_mirrored_nodes_shine_where_they_should() {
             place.scales
         );
         let lamp = model(&square(triangles), place.scales, shared);
-        // Which side is bright.
+        // The bright side.
         for (side, accel) in [1.0, -1.0]
             .into_iter()
             .flat_map(|s| tracers(shared).iter().map(move |a| (s, a)))
@@ -206,7 +207,7 @@ fn one_sided_lamps_in_mirrored_nodes_shine_where_they_should() {
                 "{what}, from {side}: {seen:?}"
             );
         }
-        // What lies on that side is lit, by either strategy, and what lies on the other is not.
+        // Surfaces on that side are lit, by either strategy, and those on the other are not.
         for side in [1.0, -1.0] {
             let scene = with_wall(lamp.clone(), 1.5 * side);
             let right = if side == place.front {
@@ -252,7 +253,7 @@ fn slab() -> Vec<Vec3> {
 
 #[test]
 fn glass_in_mirrored_nodes_has_its_inside_inside() {
-    // Seen at 60 degrees: R = 0.0892 at each surface. With sides exchanged all would be reflected.
+    // Seen at 60 degrees: R = 0.0892 at each surface. Swapped sides would reflect everything.
     let (index, cos) = (1.5_f64, 0.5_f64);
     let beyond = (1.0 - (1.0 - cos * cos) / (index * index)).sqrt();
     let [along, across] = [
@@ -288,7 +289,7 @@ fn glass_in_mirrored_nodes_has_its_inside_inside() {
 
 #[test]
 fn bumps_in_mirrored_nodes_are_mirrored_and_not_turned_inside_out() {
-    // A map that tilts the normal towards +u: along +x in the mesh, along −x where that is mirrored.
+    // A map that tilts the normal towards +u: along +x in the mesh, along −x if it is mirrored.
     let tilt = DVec3::new(0.6, 0.0, 0.8);
     let texel = tilt.to_array().map(|x| ((x + 1.0) * 127.5).round() as u8);
     let mapped = DVec3::from_array(texel.map(|b| f64::from(b) / 127.5 - 1.0)).normalize();
@@ -340,7 +341,6 @@ fn bumps_in_mirrored_nodes_are_mirrored_and_not_turned_inside_out() {
     }
 }
 
-/// The front of a triangle.
 fn front(scene: &SceneData, id: usize) -> Vec3 {
     let [a, b, c] = scene.outward(id);
     (b - a).cross(c - a).normalize()
@@ -350,7 +350,7 @@ fn front(scene: &SceneData, id: usize) -> Vec3 {
 fn copies_and_moved_instances_keep_their_fronts() {
     let mut scene = model(&square(2), &[[-1.0, 1.0, 1.0]], true);
     let before = scene.hash.clone();
-    // Unlike its hits, its look depends on the sides.
+    // Unlike its hits, its appearance depends on the sides.
     assert_eq!(scene.mirrored, [true, true, false, false]);
     let turned = Transform::from_matrix(DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0)).as_mat4());
     scene.move_instance(1, turned).expect("an instance");
@@ -391,7 +391,7 @@ fn copies_and_moved_instances_keep_their_fronts() {
     }
 }
 
-/// The corners of the faces of a PLY file without normals and texture coordinates.
+/// Face corners of a PLY file without normals and texture coordinates.
 fn ply(path: &Path) -> Vec<[Vec3; 3]> {
     let bytes = std::fs::read(path).expect("a mesh");
     let head = b"end_header\n";

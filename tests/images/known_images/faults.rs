@@ -1,10 +1,10 @@
-//! Faults that are planted in kernels, and the image that has to show each.
+//! Faults planted in kernels, and the image that reveals each.
 
 use super::seen;
 use crate::support::in_turn;
 use raystone::gpu::KernelLibrary;
 
-/// File, texts with what stands in their place, an image that shows it.
+/// File, texts with replacements, and the image that reveals it.
 struct Fault {
     file: &'static str,
     changes: &'static [(&'static str, &'static str)],
@@ -27,7 +27,7 @@ const PATH: &str = "integrator/path";
 const FLAT: &str = "shading/light/flat";
 const TEXTURE: &str = "shading/texture";
 
-/// Those that an ordinary run of the tests plants.
+/// Planted in an ordinary test run.
 const SOME: [Fault; 5] = [
     fault(
         FLAT,
@@ -65,7 +65,6 @@ const SOME: [Fault; 5] = [
     ),
 ];
 
-/// All others.
 const OTHERS: [Fault; 38] = [
     fault(
         PATH,
@@ -321,7 +320,7 @@ const OTHERS: [Fault; 38] = [
     ),
 ];
 
-/// Whether the image shows the fault; panics if it was not planted.
+/// True if the image reveals the fault; panics if it was not planted.
 fn is_seen(fault: &Fault) -> bool {
     let library = KernelLibrary::default();
     let mut text = library.text(fault.file).expect("a known module").to_owned();
@@ -339,7 +338,7 @@ fn is_seen(fault: &Fault) -> bool {
         "{} {:?} by {}: {first:?}",
         fault.file, fault.changes[0].1, fault.image
     );
-    // A kernel that does not compile shows nothing.
+    // A kernel that does not compile reveals nothing.
     first.is_some_and(|fault| !fault.contains("not rendered"))
 }
 

@@ -1,4 +1,4 @@
-//! Known images: those that need few kernels agree with their answers, and planted faults are seen.
+//! Known images: those that need few kernels are right, and planted faults are detected.
 
 mod faults;
 
@@ -7,7 +7,7 @@ use raystone::measure::known_images::Seen;
 use raystone::run::{Registries, RunOptions, verify_images};
 use std::path::Path;
 
-/// What is seen of the images of these names with the kernels of a folder.
+/// The images of these names, rendered with the kernels of a folder.
 fn seen(folder: Option<&Path>, names: &[&str]) -> Vec<Seen> {
     let only = |name: &str| names.contains(&name);
     let seen = verify_images(&Registries::default(), &RunOptions::default(), folder, only);

@@ -1,5 +1,4 @@
-//! How often lights, and rows and columns of a map, are chosen by all values that a draw can have, against the probability that
-//! is divided by.
+//! Selection frequency of lights and map texels over all draws, against their probability.
 
 use super::density::{CHOSEN, images, probing};
 use super::lamp;
@@ -9,12 +8,12 @@ use raystone::random::Pcg32;
 use raystone::scene::{EnvironmentMap, Light, SceneData};
 use std::sync::Arc;
 
-/// Values of a draw, by images of 2²⁰ pixels.
+/// Number of possible draws, in images of 2²⁰ pixels.
 const VALUES: usize = 1 << 24;
 const EDGE: u32 = 1 << 10;
 const SEEDS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Points above and below a floor, of which some are ten thousand times as bright as others.
+/// Points above and below a floor, some ten thousand times as bright as others.
 fn points(count: usize, directional: usize) -> SceneData {
     let mut random = Pcg32::new(17);
     let mut scene = lamp("point");
@@ -34,7 +33,7 @@ fn points(count: usize, directional: usize) -> SceneData {
     scene
 }
 
-/// What is wrong with a choice among these lights, if something is.
+/// The fault in a choice among these lights, if any.
 pub fn fault_of_lights(gpu: &Gpu, choice: usize, scene: SceneData, never: bool) -> Option<String> {
     let lights = scene.lights.len();
     let (mut found, mut said) = (vec![0_usize; lights], vec![None; lights]);
@@ -71,7 +70,7 @@ pub fn fault_of_lights(gpu: &Gpu, choice: usize, scene: SceneData, never: bool) 
     None
 }
 
-/// What is wrong with the choice of texels of a map whose rows differ by a factor of a million, if something is.
+/// The fault in the choice of texels of a map whose rows differ by a factor of a million, if any.
 pub fn fault_of_texels(gpu: &Gpu) -> Option<String> {
     let [width, height] = [300, 1000];
     let mut random = Pcg32::new(3);
@@ -120,7 +119,7 @@ pub fn fault_of_texels(gpu: &Gpu) -> Option<String> {
     None
 }
 
-/// By power, evenly, by a tree.
+/// By power, uniformly, by a tree.
 const POWER: usize = 0;
 const EVENLY: usize = 1;
 const TREE: usize = 2;
@@ -147,7 +146,7 @@ fn choices_that_differ_from_their_probability_are_seen() {
         let kernels = crate::support::kernels_with("shading/light/tree", &[(from, to)]);
         fault_of_lights(&probing(kernels), TREE, points(40, 1), true)
     };
-    // The place in a part, scaled up to a number of 24 bits and used again.
+    // The position within a part, rescaled to a 24-bit number and reused.
     let again = tree(
         "units = part;\n            links = left;",
         "rest = u32(f32(rest) / f32(part) * f32(units));\n            units = part;\n            links = left;",

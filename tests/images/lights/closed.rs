@@ -7,10 +7,9 @@ use std::f64::consts::{PI, TAU};
 const HEIGHT: f64 = 2.0;
 const STRENGTH: f64 = 10.0;
 
-/// Places on the floor: below the lamp, beside it, far off.
+/// Places on the floor: below the lamp, next to it, far away.
 pub const PLACES: [[f64; 2]; 3] = [[0.0, 0.0], [0.7, 0.3], [-1.6, 1.1]];
 
-/// Kinds of lamps.
 pub const LAMPS: [&str; 6] = [
     "rectangle",
     "disk",
@@ -20,8 +19,8 @@ pub const LAMPS: [&str; 6] = [
     "directional",
 ];
 
-/// Irradiance of a plane with the normal +y by an even polygon above it that faces it (J. Lambert, "Photometria",
-/// 1760): half the sum over edges of the angle that each fills times the cosine of the plane through it.
+/// Irradiance of a plane with normal +y by a uniform polygon above and facing it (J. Lambert,
+/// "Photometria", 1760): half the sum over edges of subtended angle times the plane's cosine.
 fn polygon(corners: &[DVec3], place: DVec3) -> f64 {
     let count = corners.len();
     let edge = |k: usize| {
@@ -32,7 +31,6 @@ fn polygon(corners: &[DVec3], place: DVec3) -> f64 {
     (STRENGTH * 0.5 * (0..count).map(edge).sum::<f64>()).abs()
 }
 
-/// Irradiance of the floor.
 pub fn irradiance(lamp: &str, [x, z]: [f64; 2]) -> f64 {
     let place = DVec3::new(x, 0.0, z);
     let towards = DVec3::new(0.0, HEIGHT, 0.0) - place;

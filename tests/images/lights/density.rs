@@ -13,7 +13,7 @@ use raystone::sampling::dimensions;
 use raystone::scene::{EnvironmentMap, Light, SceneData};
 use std::sync::Arc;
 
-/// A kernel of this folder as an integrator.
+/// An integrator from a kernel of this folder.
 #[derive(Debug, Clone, Copy)]
 pub struct Probe {
     kernel: &'static str,
@@ -49,7 +49,7 @@ pub static DENSITY: [Probe; 3] = [
     },
 ];
 
-/// What is chosen, by power, evenly and by a tree.
+/// The chosen light, by power, uniformly and by a tree.
 pub static CHOSEN: [Probe; 3] = [
     Probe {
         kernel: "test/chosen",
@@ -92,12 +92,12 @@ impl Integrator for Probe {
     }
 }
 
-/// The embedded kernels, or others, and those of this folder.
+/// A library with the kernels of this folder added.
 pub fn probing(library: KernelLibrary) -> Gpu {
     open(library.with_sources(&SOURCES))
 }
 
-/// Mean colours of images of `size` pixels, one for each seed.
+/// Mean colours of images of `size` pixels, one per seed.
 pub fn probe(
     gpu: &Gpu,
     scene: SceneData,
@@ -114,7 +114,7 @@ pub fn probe(
     means
 }
 
-/// Hands out the pixels of images of `size` pixels, one for each seed.
+/// Passes on the pixels of images of `size` pixels, one per seed.
 pub fn images(
     gpu: &Gpu,
     scene: SceneData,
@@ -168,7 +168,7 @@ pub fn sky() -> Light {
     }
 }
 
-/// Scenes, each with its part of lights that rays can find.
+/// Scenes, each with its share of lights that rays can hit.
 fn scenes() -> Vec<(&'static str, SceneData)> {
     let mut all: Vec<_> = ["rectangle", "disk", "sphere"]
         .map(|kind| (kind, lamp(kind)))
@@ -182,7 +182,7 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
         });
     }
     all.push(("several spheres", several));
-    // No two of these lamps hide each other from the place that is looked at.
+    // No two of these lamps hide each other from the viewed place.
     let mut squares = lamp("rectangle");
     for place in [[1.6, 1.5, 0.0], [-1.5, 2.5, -1.5], [0.9, 1.1, 1.7]] {
         let corner = |x: f32, z: f32| Vec3::from(place) + Vec3::new(x, 0.1 * x, z);
@@ -206,7 +206,6 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
     all
 }
 
-/// What is wrong with the densities in this scene, if something is.
 pub fn fault(gpu: &Gpu, wanted: &str) -> Option<String> {
     for (name, scene) in scenes() {
         if wanted != name {

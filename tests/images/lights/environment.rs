@@ -1,4 +1,4 @@
-//! Environment maps: irradiance against a sum over directions, files, and what is said of broken ones.
+//! Environment maps: irradiance against a sum over directions, files, and errors of broken ones.
 
 use super::density::sky;
 use super::{estimate, lamp, path_with, towards};
@@ -52,7 +52,7 @@ fn floor() -> SceneData {
     scene
 }
 
-/// What is wrong with the irradiance of a floor below the map, if something is.
+/// The fault in the irradiance of a floor below the map, if any.
 pub fn fault(gpu: &Gpu) -> Option<String> {
     let scene = floor();
     let expected = irradiance(&scene.lights[0]) * 0.5 / PI;
@@ -63,7 +63,7 @@ pub fn fault(gpu: &Gpu) -> Option<String> {
             return Some(format!("{strategy}: {found:?}, not {expected}"));
         }
     }
-    // The camera sees it as it is.
+    // The camera sees it unchanged.
     for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4), (0.05, 6.0)] {
         let (sin, cos) = polar.sin_cos();
         let towards = Vec3::new(
@@ -115,7 +115,7 @@ fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
         told.len() == 1 && told[0].contains("its power is 0"),
         "{told:?}"
     );
-    // A white furnace by a map: what is reflected is the colour.
+    // A white furnace by a map: reflected radiance is the colour.
     let found = estimate(
         gpu(),
         &plain,
@@ -126,7 +126,7 @@ fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
     assert!(found.mean > 0.49 && found.mean < 1.01, "{found:?}");
 }
 
-/// A map of six columns, of which these are white and all others black, turned about +y.
+/// A map of six columns, these white and all others black, turned about +y.
 fn columns(white: &[usize], turn: f32) -> Light {
     let texel = |k: usize| Vec3::splat(f32::from(u8::from(white.contains(&(k % 6)))));
     let texels = (0..18).map(texel).collect();
@@ -138,8 +138,8 @@ fn columns(white: &[usize], turn: f32) -> Light {
     }
 }
 
-/// Where columns lie: a quarter of the way across a map is +x, half +z, three quarters −x (Mitsuba 3, `envmap`); a turn by
-/// a quarter takes +x to −z (the right hand about +y).
+/// Directions of columns: a quarter of the way across a map is +x, half +z, three quarters −x
+/// (Mitsuba 3, `envmap`); a quarter turn takes +x to −z (right-handed about +y).
 const PLACES: [(&[usize], f32, Vec3); 5] = [
     (&[1], 0.0, Vec3::X),
     (&[2, 3], 0.0, Vec3::Z),
@@ -148,7 +148,7 @@ const PLACES: [(&[usize], f32, Vec3); 5] = [
     (&[1], std::f32::consts::FRAC_PI_2, Vec3::NEG_Z),
 ];
 
-/// What is wrong with the directions of columns, as rays see and light samples find them.
+/// The fault in the directions of columns, as seen by rays and found by light samples, if any.
 pub fn fault_of_directions(gpu: &Gpu) -> Option<String> {
     for (white, turn, direction) in PLACES {
         let mut scene = floor();
@@ -166,7 +166,7 @@ pub fn fault_of_directions(gpu: &Gpu) -> Option<String> {
                     "{white:?} turned by {turn}: {found} at {towards}, not {seen}"
                 ));
             }
-            // A wall that faces this way, lit by samples of the map alone.
+            // A wall facing this way, lit only by samples of the map.
             let turn_up = glam::Quat::from_rotation_arc(Vec3::Y, towards);
             let mut wall = scene.clone();
             for triangle in &mut wall.triangles {

@@ -1,18 +1,15 @@
-//! Faults that are planted in the kernels of lights, and the checks that must see them.
+//! Faults planted in the kernels of lights, and the checks that must detect them.
 
 use super::{density, environment, files, irradiance, means};
 use crate::support::*;
 use density::probing;
 
-/// What sees a fault.
+/// The check that detects a fault.
 enum Seen {
-    /// Irradiance below this lamp, by this strategy.
+    /// Irradiance below this lamp, with this strategy.
     Irradiance(&'static str, &'static str),
-    /// Densities in this scene.
     Density(&'static str),
-    /// Irradiance below a map.
     Environment,
-    /// Flux of luminaires.
     Flux,
     /// The mean with this choice of lights.
     Mean(&'static str, &'static str),

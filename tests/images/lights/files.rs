@@ -10,7 +10,7 @@ use raystone::scene::{IesProfile, Light};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-/// Photometric files beside the project; none, said aloud, if they are not there.
+/// Photometric files next to the project; reports if they are missing.
 fn photometry() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/ies");
     let found = std::fs::read_dir(&folder).map(|entries| {
@@ -30,7 +30,7 @@ fn photometry() -> Vec<PathBuf> {
     files
 }
 
-/// Flux in lumens that was published for these files (linear interpolation).
+/// Published flux of these files in lumens (linear interpolation).
 const PUBLISHED: [(&str, f64); 6] = [
     ("cu-1.ies", 9217.18),
     ("cu-2.ies", 5834.2),
@@ -40,7 +40,7 @@ const PUBLISHED: [(&str, f64); 6] = [
     ("cu-7.ies", 531.98),
 ];
 
-/// A luminaire that no symmetry simplifies, of this type of photometry.
+/// A luminaire without symmetry, of this photometry type.
 fn uneven(kind: u32) -> String {
     let (vertical, horizontal) = match kind {
         1 => ("0 20 45 90 150", "0 60 180 270 360"),
@@ -61,7 +61,7 @@ fn flux(gpu: &Gpu, file: &Path) -> f64 {
     means[0][0]
 }
 
-/// What is wrong with the flux of uneven luminaires, if something is.
+/// The fault in the flux of asymmetric luminaires, if any.
 pub fn fault(gpu: &Gpu) -> Option<String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     (1..=3).find_map(|kind| {

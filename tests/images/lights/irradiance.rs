@@ -8,7 +8,6 @@ use raystone::gpu::Gpu;
 use raystone::scene::{Light, SceneData};
 use std::f64::consts::PI;
 
-/// What is wrong with the irradiance of this lamp, if something is.
 pub fn fault(gpu: &Gpu, kind: &str, strategy: &str) -> Option<String> {
     let scene = lamp(kind);
     let what = path_with(1, &[("strategy", strategy)]);
@@ -44,7 +43,7 @@ fn a_sphere_is_seen_casts_a_shadow_and_shines_inside() {
     let what = path_with(1, &[]);
     let seen = estimate(gpu(), &scene, above, &what, 4);
     assert!((seen.mean - 10.0).abs() < 1e-4, "{seen:?}");
-    // A point behind the sphere shines past it, and not through it.
+    // A point behind the sphere shines past it, but not through it.
     let behind = Light::Point {
         position: Vec3::new(0.0, 2.5, 0.0),
         intensity: Vec3::splat(1000.0),
@@ -57,7 +56,7 @@ fn a_sphere_is_seen_casts_a_shadow_and_shines_inside() {
         "{below_too}, {below}"
     );
     assert!(beside_too > 10.0 * beside, "{beside_too}, {beside}");
-    // From inside all directions above the floor show it: π times its radiance.
+    // From inside all directions above the floor see it: π times its radiance.
     scene.lights = vec![Light::Sphere {
         center: Vec3::new(0.5, 1.0, 0.0),
         radius: 10.0,

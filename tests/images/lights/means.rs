@@ -1,4 +1,4 @@
-//! Ways of choosing lights change the noise of an image, not its mean.
+//! Light selection changes an image's noise, not its mean.
 
 use super::density::sky;
 use super::{estimate, path_with};
@@ -8,7 +8,7 @@ use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
 use raystone::scene::{Light, SceneData};
 
-/// Lights of all kinds but that of files.
+/// Lights of all kinds except those from files.
 fn mixed() -> SceneData {
     let mut scene = builtin("many-lights", &[("lamps", ParamValue::Integer(6))]);
     scene.lights = vec![
@@ -43,7 +43,6 @@ fn image(gpu: &Gpu, scene: &SceneData, choice: &str, lights: &str) -> Estimate {
     estimate(gpu, scene, scene.camera.expect("a camera"), &what, 384)
 }
 
-/// What is wrong with the mean of this choice, if something is.
 pub fn fault(gpu: &Gpu, choice: &str, lights: &str, right: &Estimate) -> Option<String> {
     let found = image(gpu, &mixed(), choice, lights);
     let difference = found.minus(right);
@@ -51,7 +50,7 @@ pub fn fault(gpu: &Gpu, choice: &str, lights: &str, right: &Estimate) -> Option<
         .then(|| format!("{choice}, {lights}: {found:?}, not {right:?}"))
 }
 
-/// The mean by which others are judged.
+/// The mean used as reference.
 pub fn right() -> Estimate {
     image(gpu(), &mixed(), "power", "one")
 }

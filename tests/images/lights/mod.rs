@@ -1,5 +1,5 @@
-//! Lights against closed forms, their samples against their densities, and the ways of choosing them against each
-//! other; and whether planted faults are seen.
+//! Lights against closed forms, their samples against their densities, and the selection methods
+//! against each other; and detection of planted faults.
 
 mod chosen;
 mod closed;
@@ -17,12 +17,11 @@ use raystone::gpu::Gpu;
 use raystone::params::{ParamValue, Variant};
 use raystone::scene::SceneData;
 
-/// The scene `lamp` with this kind of lamp.
 fn lamp(kind: &str) -> SceneData {
     builtin("lamp", &[("kind", ParamValue::Name(kind.to_owned()))])
 }
 
-/// Looks at a place on the floor from close by, so that all pixels see it.
+/// Views a place on the floor from close up, so that all pixels see it.
 fn towards([x, z]: [f64; 2]) -> Camera {
     let target = Vec3::new(x as f32, 0.0, z as f32);
     Camera {

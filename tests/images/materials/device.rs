@@ -9,10 +9,10 @@ use raystone::integrator::SceneBuffers;
 use raystone::scene::{MATERIAL_KINDS, Material};
 use std::sync::Arc;
 
-/// The shading normal; no axis, so that the basis matters.
+/// The shading normal; not an axis, so that the basis matters.
 const NORMAL: Vec3 = Vec3::new(0.48, 0.6, 0.64);
 
-/// What is asked: a direction in which light is sampled by two numbers, or one that is told about.
+/// A query: sample a direction from two numbers, or evaluate a given one.
 #[derive(Debug, Clone, Copy)]
 pub enum Ask {
     Sample([f32; 2]),
@@ -49,7 +49,7 @@ fn to_world(local: DVec3) -> Vec3 {
     (local.x * x + local.y * y + local.z * z).as_vec3()
 }
 
-/// What the kernel gets of a direction: rounded in world space.
+/// The direction as seen by the kernel: rounded in world space.
 pub fn rounded(local: DVec3) -> DVec3 {
     to_local(to_world(local))
 }
@@ -72,7 +72,7 @@ impl Device {
         }
     }
 
-    /// Asks a material, seen from the local direction `o`.
+    /// Queries a material, seen from the local direction `o`.
     pub fn ask(&self, material: &Material, o: DVec3, asks: &[Ask]) -> Vec<Answer> {
         let viewer = to_world(o).extend(0.0).to_array();
         let row = |ask: &Ask| match *ask {
@@ -107,7 +107,7 @@ impl Device {
         words.iter().map(answer).collect()
     }
 
-    /// The tables of a scene of this material alone, as the program makes them.
+    /// The tables of a scene with only this material, as the program makes them.
     fn tables(&self, material: &Material) -> Bindings {
         let mut scene = crate::support::builtin("single-triangle", &[]);
         scene.materials = vec![material.clone()];

@@ -1,4 +1,4 @@
-//! Faults that are planted in the kernels of materials, and must be seen.
+//! Faults planted in the kernels of materials, which must be detected.
 
 use super::reference::Model;
 use super::{Seen, faults_of};

@@ -1,5 +1,5 @@
-//! Materials that reflect: sampling against density against value, by formulas in f64 and the device's own answers; and whether
-//! planted faults are seen.
+//! Reflecting materials: sampling against density against value, by f64 formulas and the device's
+//! own answers; and detection of planted faults.
 
 mod device;
 mod faults;
@@ -18,9 +18,9 @@ use std::path::Path;
 
 /// Degrees from the normal to the viewer.
 const ANGLES: [f64; 4] = [0.0, 35.0, 70.0, 86.0];
-/// Sampled directions of a material from an angle.
+/// Sampled directions per material and angle.
 const SAMPLES: usize = 1 << 14;
-/// Probability of a finding where nothing is wrong.
+/// Probability of a false finding.
 const LEAST_P: f64 = 1e-5;
 
 fn from(angle: f64) -> DVec3 {
@@ -29,7 +29,7 @@ fn from(angle: f64) -> DVec3 {
     rounded(DVec3::new(sin * x, sin * y, cos))
 }
 
-/// What is wrong with the value and the density of directions that the test chose.
+/// Faults in value and density of directions chosen by the test.
 fn told(device: &Device, model: &Model, o: DVec3, grid: &Grid) -> Vec<&'static str> {
     let directions: Vec<DVec3> = grid.some().map(rounded).collect();
     let asks: Vec<Ask> = directions.iter().map(|i| Ask::Tell(*i)).collect();
@@ -39,7 +39,7 @@ fn told(device: &Device, model: &Model, o: DVec3, grid: &Grid) -> Vec<&'static s
         let (pdf, value) = (model.pdf(o, *i), model.value(o, *i));
         let near =
             |found: f64, expected: f64| (found - expected).abs() <= 1e-3 * expected.abs() + 1e-6;
-        // What lies in the surface may be seen on either side.
+        // Directions in the surface may be seen on either side.
         if i.z.abs() < 1e-6 {
             continue;
         }
@@ -57,7 +57,7 @@ fn told(device: &Device, model: &Model, o: DVec3, grid: &Grid) -> Vec<&'static s
     out
 }
 
-/// What is wrong with sampled directions: their distribution, their densities, and the energy that they carry.
+/// Faults in sampled directions: distribution, densities, and energy.
 fn sampled(device: &Device, model: &Model, o: DVec3, grid: &Grid) -> Vec<&'static str> {
     let mut random = Pcg32::with_stream(7, Pcg32::DEFAULT_STREAM);
     let mut unit = || (random.next_u32() >> 8) as f32 / 16_777_216.0;
@@ -89,8 +89,8 @@ fn sampled(device: &Device, model: &Model, o: DVec3, grid: &Grid) -> Vec<&'stati
     out
 }
 
-/// Whether density and weight of a sampled direction are those of the formulas; at the rim of a narrow lobe the rounded
-/// direction has another density.
+/// True if density and weight of a sampled direction match the formulas; at the rim of a narrow
+/// lobe the rounded direction has another density.
 fn is_consistent(answer: &Answer, model: &Model, o: DVec3) -> bool {
     let i = answer.direction;
     if i.z.abs() < 1e-4 {
@@ -103,14 +103,13 @@ fn is_consistent(answer: &Answer, model: &Model, o: DVec3) -> bool {
         && (i.length() - 1.0).abs() < 1e-5
 }
 
-/// How much of what is wrong is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Seen {
     First,
     All,
 }
 
-/// Every kind of fault, or the first, that these kernels show in materials that `concerns` chooses.
+/// Every kind of fault, or the first, in materials chosen by `concerns`, with these kernels.
 fn faults_of(
     library: KernelLibrary,
     wanted: Seen,
@@ -148,7 +147,7 @@ fn sampling_density_and_value_agree_with_the_formulas() {
     );
 }
 
-/// f is the same where light goes the other way; Phong's lobe, by its definition, is not.
+/// f is symmetric in the two directions; Phong's lobe, by definition, is not.
 #[test]
 fn all_but_phong_are_reciprocal() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/materials/kernels");

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 const RINGS: usize = 14;
 const SECTORS: usize = 16;
 const POINTS: usize = 40;
-/// Cells with fewer expected samples are counted together.
+/// Cells with fewer expected samples are merged.
 const LEAST_EXPECTED: f64 = 10.0;
 
 /// The sphere in cells around a direction.
@@ -25,7 +25,7 @@ impl Grid {
         }
     }
 
-    /// The direction at these parts of the way: rings are narrow in the middle, π s⁴.
+    /// The direction at these fractions: rings are narrow in the middle, π s⁴.
     fn at(&self, s: f64, t: f64) -> DVec3 {
         let (sin, cos) = (PI * s.powi(4)).sin_cos();
         let (y, x) = (2.0 * PI * t).sin_cos();
@@ -41,7 +41,7 @@ impl Grid {
         part(s, RINGS) * SECTORS + part(t, SECTORS)
     }
 
-    /// A direction of each cell, none of them special.
+    /// A direction in each cell, none of them special.
     pub fn some(&self) -> impl Iterator<Item = DVec3> {
         let cells = (0..3 * RINGS).flat_map(|r| (0..SECTORS).map(move |c| (r, c)));
         cells.map(|(r, c)| {
@@ -69,8 +69,8 @@ impl Grid {
     }
 }
 
-/// Probability that directions above the surface of this density lie no better than these. Where too many or too few lie below the
-/// surface, which is no direction at all, it is 0.
+/// Probability that directions with this density fit at least as badly as these. Zero if too many
+/// or too few are below the surface, where there is no direction.
 pub fn chi_square(grid: &Grid, directions: &[DVec3], pdf: impl Fn(DVec3) -> f64) -> f64 {
     let mut found = vec![0.0; RINGS * SECTORS];
     let mut above = 0.0;
@@ -113,7 +113,7 @@ pub fn chi_square(grid: &Grid, directions: &[DVec3], pdf: impl Fn(DVec3) -> f64)
     1.0 - distribution.cdf(statistic)
 }
 
-/// Directions of the density itself pass, and those of a density that is a tenth wider do not.
+/// Directions drawn from the density pass, and those of a density a tenth wider fail.
 #[test]
 fn the_test_sees_a_wrong_width_and_passes_the_right_one() {
     let mut random = raystone::random::Pcg32::with_stream(3, 5);

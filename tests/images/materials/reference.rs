@@ -1,10 +1,10 @@
-//! Reflection in f64, from the formulas of `docs/shading.md` and in angles, which is not how the kernels compute it.
+//! Reflection in f64, from the formulas of `docs/shading.md` in angles, unlike the kernels.
 
 use glam::{DVec3, Vec3};
 use raystone::scene::{CookTorrance, Fresnel, Masking, Material};
 use std::f64::consts::PI;
 
-/// A material as its constructor takes it.
+/// A material's constructor arguments.
 #[derive(Debug, Clone, Copy)]
 pub enum Model {
     Diffuse {
@@ -28,7 +28,7 @@ fn luminance(c: DVec3) -> f64 {
     c.dot(DVec3::new(0.212671, 0.715160, 0.072169))
 }
 
-/// Reflectance by the sines and tangents of both angles (Fresnel 1823), or Schlick's polynomial.
+/// Reflectance by sines and tangents of both angles (Fresnel 1823), or Schlick's polynomial.
 fn fresnel(kind: Fresnel, cosine: f64, eta: f64) -> f64 {
     let straight = ((eta - 1.0) / (eta + 1.0)).powi(2);
     if kind == Fresnel::Schlick {
@@ -45,7 +45,7 @@ fn fresnel(kind: Fresnel, cosine: f64, eta: f64) -> f64 {
     0.5 * (perpendicular + parallel)
 }
 
-/// The part of Beckmann facets that is seen, by Walter's approximation.
+/// Visible fraction of Beckmann facets, by Walter's approximation.
 fn smith(cosine: f64, roughness: f64) -> f64 {
     let a = 1.0 / (roughness * cosine.min(1.0).acos().tan());
     if a < 1.6 {
@@ -167,9 +167,10 @@ impl Model {
         let f = (1.0 - metallic) * mixed + metallic * schlick(base, cosine) * specular;
         let found = (1.0 - metallic) * coat(o.z) + metallic * luminance(schlick(base, o.z));
         let through = (1.0 - metallic) * (1.0 - coat(o.z)) * luminance(base);
-        let share = match metallic < 1.0 && luminance(base) > 0.0 {
-            true => (through / (found + through)).clamp(0.1, 0.9),
-            false => 0.0,
+        let share = if metallic < 1.0 && luminance(base) > 0.0 {
+            (through / (found + through)).clamp(0.1, 0.9)
+        } else {
+            0.0
         };
         Lobes {
             share,
@@ -178,15 +179,14 @@ impl Model {
         }
     }
 
-    /// f · cos.
     pub fn value(&self, o: DVec3, i: DVec3) -> DVec3 {
-        match i.z > 0.0 {
-            true => self.lobes(o, i).value,
-            false => DVec3::ZERO,
+        if i.z > 0.0 {
+            self.lobes(o, i).value
+        } else {
+            DVec3::ZERO
         }
     }
 
-    /// Density of sampled directions.
     pub fn pdf(&self, o: DVec3, i: DVec3) -> f64 {
         if i.z <= 0.0 {
             return 0.0;

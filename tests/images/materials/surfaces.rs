@@ -1,5 +1,5 @@
-//! From a hit to a surface, in f64 from the words of the tables: normals of vertices, textures that are placed and wrapped, normal maps,
-//! and on which side light is reflected.
+//! From hits to surfaces, in f64 from the table words: vertex normals, texture placement and
+//! wrapping, normal maps, and the side on which light is reflected.
 
 use super::Path;
 use crate::support::{builtin, kernels_with, open};
@@ -40,7 +40,7 @@ fn random() -> Random {
     Random(Pcg32::with_stream(11, Pcg32::DEFAULT_STREAM))
 }
 
-/// Triangles in all directions, with all that a surface may have.
+/// Triangles in all directions, with all surface features.
 fn scene() -> SceneData {
     let mut random = random();
     let mut scene = builtin("single-triangle", &[]);
@@ -64,14 +64,15 @@ fn scene() -> SceneData {
         let triangle = Triangle { vertices };
         let [a, b, c] = vertices;
         let face = (b - a).cross(c - a).normalize();
-        // On one side, and on the other; one corner in four has none.
+        // On either side; one corner in four has none.
         let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
-        scene
-            .normals
-            .push([(); 3].map(|()| match random.unit() < 0.25 {
-                true => GEOMETRIC,
-                false => encode_normal(sign * (face + 0.8 * random.direction())),
-            }));
+        scene.normals.push([(); 3].map(|()| {
+            if random.unit() < 0.25 {
+                GEOMETRIC
+            } else {
+                encode_normal(sign * (face + 0.8 * random.direction()))
+            }
+        }));
         let uv =
             |random: &mut Random| Vec2::new(5.0 * random.unit() - 2.0, 5.0 * random.unit() - 2.0);
         scene.uvs.push([(); 3].map(|()| uv(&mut random)));
@@ -171,7 +172,7 @@ fn answers(gpu: &Gpu, library: &KernelLibrary, scene: &SceneData) -> Vec<[f32; 2
     played.download("answers").expect("answers")
 }
 
-/// All members of the frame are 0 but those that surfaces read.
+/// A frame that is 0 except for the members used by surfaces.
 fn frame(library: &KernelLibrary, buffers: &SceneBuffers) -> UniformValues {
     let text = library.text("integrator/frame").expect("the frame");
     let (_, members) = text.split_once("struct Frame {").expect("the struct");
@@ -191,13 +192,14 @@ fn frame(library: &KernelLibrary, buffers: &SceneBuffers) -> UniformValues {
 }
 
 fn linear(c: f64) -> f64 {
-    match c <= 0.04045 {
-        true => c / 12.92,
-        false => ((c + 0.055) / 1.055).powf(2.4),
+    if c <= 0.04045 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
     }
 }
 
-/// Bilinear between texel centres, each found by itself.
+/// Bilinear between texel centres, each looked up separately.
 fn sampled(scene: &SceneData, used: &TextureUse, uv: DVec2, decode: fn(f64) -> f64) -> DVec3 {
     let texture = &scene.textures[used.texture as usize];
     let uv = used.linear.as_dmat2() * uv + used.offset.as_dvec2();
@@ -227,13 +229,14 @@ fn sampled(scene: &SceneData, used: &TextureUse, uv: DVec2, decode: fn(f64) -> f
     upper.lerp(lower, part.y)
 }
 
-/// Bent by a map. The triangle's lines of constant v are across the gradient of v, and x runs along them; y is what is left of
-/// those of constant u, against v, without x and the normal (Gram and Schmidt).
+/// Applies a normal map. The triangle's lines of constant v are perpendicular to the gradient of v,
+/// and x runs along them; y is the negated direction of constant u, orthogonalised against x and
+/// the normal (Gram and Schmidt).
 fn bent(scene: &SceneData, used: &TextureUse, triangle: usize, uv: DVec2, normal: DVec3) -> DVec3 {
     let [a, b, c] = scene.triangles[triangle].vertices.map(|v| v.as_dvec3());
     let corners = scene.uvs[triangle].map(|uv| uv.as_dvec2());
     let face = (b - a).cross(c - a).normalize();
-    // Of a function that is linear between these values at the corners, times twice the area.
+    // Of a function that is linear between these corner values, times twice the area.
     let gradient = |at: [f64; 3]| face.cross(at[0] * (c - b) + at[1] * (a - c) + at[2] * (b - a));
     let [of_u, of_v] = [corners.map(|t| t.x), corners.map(|t| t.y)].map(gradient);
     let (mut along_u, mut along_v) = (of_v.cross(face), face.cross(of_u));
@@ -249,7 +252,6 @@ fn bent(scene: &SceneData, used: &TextureUse, triangle: usize, uv: DVec2, normal
     (scale * (mapped.x * x + mapped.y * y) + mapped.z * normal).normalize()
 }
 
-/// What is wrong with an answer.
 fn faults_at(scene: &SceneData, p: &Point, answer: &[f32; 20]) -> Vec<&'static str> {
     let id = p.triangle as usize;
     let [a, b, c] = scene.triangles[id].vertices.map(|v| v.as_dvec3());
@@ -286,10 +288,10 @@ fn faults_at(scene: &SceneData, p: &Point, answer: &[f32; 20]) -> Vec<&'static s
             out.push(what);
         }
     };
-    // Rounding decides where a margin is 0.
+    // Where a margin is 0, rounding decides.
     if margin > 2e-3 {
         expect(vector(0).distance(normal) < 2e-3, "normal");
-        // What a glossy surface would reflect behind itself is mirrored at it.
+        // Directions that a glossy surface would reflect behind itself are mirrored at it.
         let behind = |d: DVec3| d - 2.0 * d.dot(geometric) * geometric;
         let is_folded = |d: DVec3| material.kind == &PRINCIPLED && behind(d).dot(normal) > 0.0;
         let is_reflected =

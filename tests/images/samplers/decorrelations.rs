@@ -1,4 +1,4 @@
-//! What decorrelations do to points, and the distribution of random numbers.
+//! Effect of decorrelations on points, and the distribution of random numbers.
 
 use super::*;
 
@@ -18,7 +18,6 @@ fn chi_squared(values: impl Iterator<Item = u32>) -> f64 {
 
 const ACCIDENT: f64 = 130.0;
 
-/// One sample and dimension in many pixels.
 fn over_pixels(sampler: &Sampler, sample: u32, dimension: u32) -> impl Iterator<Item = u32> {
     (0..1 << 16).map(move |pixel| {
         sampler.sample_u32(Coordinate {
@@ -62,7 +61,7 @@ fn numbers_are_uniform_over_pixels_where_a_scheme_promises_it() {
             );
         }
     }
-    // One point for all pixels is not uniform, nor is a disc that is turned: the test can tell.
+    // One point for all pixels is not uniform, nor is a rotated disc: negative controls.
     for (decorrelation, dimension) in [("none", 1), ("disc-rotation", 2)] {
         let sampler = sampler("halton", decorrelation, &demand);
         assert!(chi_squared(over_pixels(&sampler, 17, dimension)) > ACCIDENT);
@@ -89,7 +88,7 @@ fn two_numbers_of_a_pixel_are_independent_over_pixels() {
 
 #[test]
 fn the_trigonometric_hash_is_the_negative_control_it_is_meant_to_be() {
-    // Two numbers of 8 bits each, over neighbouring pixels: the sine repeats its pattern.
+    // Two 8-bit numbers, over neighbouring pixels: the sine repeats its pattern.
     let changes = [("hash", name("trig"))];
     let sampler =
         try_sampler(("pixel-hash", &changes), ("none", &[]), &demand(4, 4)).expect("a sampler");
@@ -121,14 +120,14 @@ fn micro_jitter_stays_within_its_amplitude_and_is_biased_only_where_it_stops_at_
                     f64::from(way.unsigned_abs()) <= 2.0_f64.powi(32) / 8.0,
                     "{edge} {way}"
                 );
-                // A function with a peak at the edge sees points that gather there.
+                // A function with a peak at the edge detects points that accumulate there.
                 sum += f64::from(x == u32::MAX || x == 0);
             }
         }
         sum / (4096.0 * 64.0)
     };
-    // With μ = 1/8, a point at distance d < μ of an edge is stopped with probability (μ − d) / 2μ: about
-    // μ / 4 of all points at each of two edges.
+    // With μ = 1/8, a point at distance d < μ of an edge is clamped with probability (μ − d) / 2μ:
+    // about μ / 4 of all points at each of two edges.
     let stopped = mean("clamp");
     assert!((stopped - 1.0 / 16.0).abs() < 0.01, "{stopped}");
     assert_eq!(mean("wrap"), 0.0);
@@ -249,7 +248,7 @@ fn pixels_of_a_group_draw_the_same_and_neighbours_of_a_sparse_one_do_not() {
             };
             (0..64_u32).map(one).collect::<Vec<u32>>()
         };
-        // From a pixel within the second tile on.
+        // From a pixel in the second tile on.
         let first = draw([67, 66]);
         let places = (0..64).flat_map(|y| (0..64).map(move |x| [64 + x, 64 + y]));
         places.filter(|place| draw(*place) == first).collect()
@@ -354,7 +353,7 @@ fn cranley_patterson_keeps_differences_and_shifts_each_pixel_and_dimension_on_it
     }
 }
 
-/// How many pairs of neighbouring words, of runs of words that begin anew for each of `runs`, come up twice.
+/// Number of pairs of neighbouring words that occur twice; sequences restart in each of `runs`.
 fn repeated_pairs(runs: impl Iterator<Item = Vec<u32>>) -> usize {
     let mut pairs: Vec<u64> = Vec::new();
     for run in runs {
@@ -367,7 +366,7 @@ fn repeated_pairs(runs: impl Iterator<Item = Vec<u32>>) -> usize {
     pairs.windows(2).filter(|w| w[0] == w[1]).count()
 }
 
-/// The samplers whose words are random to all of their 32 bits.
+/// The samplers whose words are random in all 32 bits.
 fn random_samplers() -> Vec<Sampler> {
     let demand = demand(64, 4);
     let hash = |hash: &str| {
@@ -391,7 +390,7 @@ fn random_samplers() -> Vec<Sampler> {
 
 #[test]
 fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
-    // With hash(pixel + hash(seed)), 3.4 of these pairs of seeds would share a run of pixels by expectation.
+    // With hash(pixel + hash(seed)), an expected 3.4 of these pairs would share a run of pixels.
     let seeds =
         (0..1800_u32).chain((0..900_u32).map(|i| (1 << 31) + 0x9e37_79b9_u32.wrapping_mul(i)));
     for sampler in random_samplers() {
@@ -412,7 +411,7 @@ fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
             sampler.label()
         );
     }
-    // Within one seed pixels are keys of their own: over their samples, and over their dimensions.
+    // Within a seed pixels are independent keys, over their samples and over their dimensions.
     for sampler in &random_samplers()[..2] {
         let pixels = || (0..1_u32 << 14).map(|pixel| 1 + pixel * 3);
         let samples = |pixel| {

@@ -1,4 +1,4 @@
-//! First points, tables and discrepancies that are published.
+//! Published first points, tables and discrepancies.
 
 use super::*;
 use crate::support::Pcg;
@@ -26,7 +26,7 @@ fn first_points_are_the_published_ones() {
     let found: Vec<f64> = (0..8).map(|i| unit(corput.sample_u32(at(i, 0)))).collect();
     assert_eq!(found, [0.0, 0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]);
 
-    // The order of Gray's code, in which other programs list them.
+    // In Gray code order, as listed by other programs.
     let sobol = sampler("sobol", "none", &demand(8, 3));
     let listed = [
         [0.0, 0.0, 0.0],
@@ -96,13 +96,13 @@ fn star_discrepancies_equal_published_values() {
     let random = star(&sampler("pixel-hash", "none", &demand(1024, 2)), 1024);
     for (sequence, expected, tolerance) in [
         ("sobol", 0.004_299_163_818_36, 1e-13),
-        // A fraction is cut by less than 2^-32, which moves the supremum by less than 2^-31.
+        // Truncation moves a coordinate by less than 2^-32, and the supremum by less than 2^-31.
         ("halton", 0.006_835_937_5, 4.7e-10),
         ("hammersley", 0.004_665_374_76, 1e-11),
     ] {
         let found = star(&sampler(sequence, "none", &demand(1024, 2)), 1024);
         assert!((found - expected).abs() < tolerance, "{sequence}: {found}");
-        // Random points are far worse: the measure can tell.
+        // Random points are far worse: negative control.
         assert!(random > 2.0 * found);
     }
     for sequence in ["owen-sobol", "pmj02", "rank1-lattice", "r2"] {
@@ -125,7 +125,7 @@ fn owen_sobol_is_sobol_burley_to_the_bit_up_to_its_limit() {
         })
         .collect();
     coordinates.push(at(65_535, 255));
-    // The crate makes its floats of the upper 23 bits.
+    // The crate makes its floats from the upper 23 bits.
     let bits = |c: &Coordinate| ((owen.sample_u32(*c) >> 9) as f32 * 2.0_f32.powi(-23)).to_bits();
     let burley = |c: &Coordinate, key| sobol_burley::sample(c.sample, c.dimension, key).to_bits();
     for c in &coordinates {
@@ -190,7 +190,7 @@ fn direction_numbers_are_those_of_joe_and_kuo() {
     }
 }
 
-/// The radical inverse as a whole number over a power of the base, cut to a fraction of 2³².
+/// The exact radical inverse over a power of the base, truncated to a fraction of 2³².
 fn exact_inverse(n: u32, base: u32, digits: &[u32]) -> u32 {
     let (mut mirrored, mut power, mut rest) = (0_u128, 1_u128, n);
     while rest > 0 {
@@ -201,7 +201,6 @@ fn exact_inverse(n: u32, base: u32, digits: &[u32]) -> u32 {
     u32::try_from((mirrored << 32) / power).expect("a fraction")
 }
 
-/// Indices of all sizes.
 fn indices() -> Vec<u32> {
     let mut rng = Pcg::new(7);
     let random = (0..1500).map(|i| rng.next_u32() >> (i % 32));
@@ -284,7 +283,7 @@ fn permuted_digits_are_permutations_that_keep_zero_and_faure_s_are_the_published
         for dimension in 0..40 {
             let base = plain.table.sequence_word(2 * dimension);
             let draw = |s: &Sampler, i| s.sample_u32(at(i, dimension));
-            // The first `base` points are the same ones in another order, beginning with 0.
+            // The first `base` points are a permutation of the plain ones, beginning with 0.
             let set = |s: &Sampler| -> Vec<u32> { (0..base).map(|i| draw(s, i)).collect() };
             let (mut permuted, mut expected) = (set(&halton), set(&plain));
             assert_eq!(permuted[0], 0);
@@ -325,8 +324,8 @@ fn prefixes_of_the_lattice_are_lattices_that_hit_every_column_once() {
                 .all(|a| first.iter().all(|b| set.contains(&sum(*a, *b))))
         );
     }
-    // Pairs stay far below random points, late ones from 2^10 points on: a lattice of N has no more than
-    // N / 4 different components (but for the sign), so that small ones repeat them.
+    // Pairs stay far below random points, late ones from 2^10 points on: a lattice of N has at most
+    // N / 4 distinct components (up to sign), so small ones repeat them.
     for (pair, levels) in [
         ([0, 1], [6, 8, 10, 12]),
         ([2, 3], [6, 8, 10, 12]),

@@ -1,5 +1,5 @@
-//! Every registered sampler: the kernel's stream equals its twin's to the bit, the sequences are what
-//! the literature says they are, and what makes no sense is refused.
+//! Every registered sampler: the kernel's stream is bit-identical to its twin's, the sequences
+//! match the literature, and invalid combinations are refused.
 
 mod decorrelations;
 mod known;
@@ -18,10 +18,9 @@ use raystone::sampling::{
 };
 use std::path::{Path, PathBuf};
 
-/// Width of the image that pixels lie in.
 const WIDTH: u32 = 192;
 
-/// Tables of others, to compare with; says so if they are not there.
+/// External tables for comparison; reports if they are missing.
 fn shared_table(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../shared/tables")
@@ -40,7 +39,7 @@ fn demand(samples: u32, dimensions: u32) -> Demand {
     }
 }
 
-/// An entry with every parameter at its default and in turn at others.
+/// An entry with every parameter at its default and in turn at other values.
 fn variants(entry: &Entry) -> Vec<Variant> {
     let variant = |params: raystone::params::Params| Variant {
         name: entry.name.clone(),
@@ -66,7 +65,6 @@ fn variant(entries: &[Entry], name: &str, changes: &[(&str, ParamValue)]) -> Var
 
 type Changes<'a> = &'a [(&'a str, ParamValue)];
 
-/// A sampler, or why there is none.
 fn try_sampler(
     (sequence, sequence_changes): (&str, Changes),
     (decorrelation, changes): (&str, Changes),
@@ -78,7 +76,6 @@ fn try_sampler(
     registry.sampler(&sequence, &decorrelation, demand)
 }
 
-/// A sampler with default parameters.
 fn sampler(sequence: &str, decorrelation: &str, demand: &Demand) -> Sampler {
     try_sampler((sequence, &[]), (decorrelation, &[]), demand).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -100,7 +97,6 @@ fn unit(x: u32) -> f64 {
     f64::from(x) * 2.0_f64.powi(-32)
 }
 
-/// The first points of a pixel.
 fn points_of(sampler: &Sampler, count: u32, [x, y]: [u32; 2], pixel: u32) -> Vec<[u32; 2]> {
     let one = |sample, dimension| {
         sampler.sample_u32(Coordinate {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Whether each elementary interval of area 2^-m holds exactly one of 2^m points.
+/// True if each elementary interval of area 2^-m contains exactly one of 2^m points.
 fn is_net(points: &[[u32; 2]], m: u32) -> bool {
     assert_eq!(points.len(), 1 << m);
     (0..=m).all(|columns| {
@@ -15,7 +15,7 @@ fn is_net(points: &[[u32; 2]], m: u32) -> bool {
     })
 }
 
-/// Whether every prefix of 2^m points is a net.
+/// True if every prefix of 2^m points is a net.
 pub fn has_nets(points: &[[u32; 2]]) -> bool {
     (0..=points.len().ilog2()).all(|m| is_net(&points[..1 << m], m))
 }
@@ -27,7 +27,7 @@ fn prefixes_of_sobol_and_of_what_keeps_its_digits_are_nets_in_every_pixel() {
     assert!(has_nets(&net));
     net[1] = net[2];
     assert!(!has_nets(&net), "a point twice must be seen");
-    // Not every pair of dimensions is one: the test can tell.
+    // Not every pair of dimensions is one: negative control.
     assert!(!has_nets(&points(&plain, 256, [4, 5])));
     for (sequence, decorrelation) in [
         ("sobol", "digital-shift"),

@@ -1,13 +1,13 @@
-//! What samplers draw is part of a result: words that were once checked stay as they are, in late dimensions
-//! and samples, too. Kernels equal these twins.
+//! Sampler output is part of results: checked words must not change, including late dimensions and
+//! samples. Kernels equal these twins.
 
 use super::*;
 
-/// Name of each sampler and the digest of its words. A sampler that draws otherwise on purpose gets a new line,
-/// which the failing test prints, and a line in the change log, for older results do not compare.
+/// Name of each sampler and the digest of its words. An intentional change needs a new line,
+/// printed by the failing test, and a line in the change log, as older results are not comparable.
 const PINNED: &str = include_str!("pinned.txt");
 
-/// 512 coordinates a dimension, spread over samples, pixels and seeds.
+/// Digest of 512 coordinates per dimension, spread over samples, pixels and seeds.
 fn digest(sampler: &Sampler) -> String {
     let samples = sampler.demand.samples.expect("known");
     let mut words = blake3::Hasher::new();

@@ -1,12 +1,12 @@
-//! Projections on every pair of dimensions, on every dimension, and what pixels and seeds have in common.
+//! Projections on every dimension and pair, and correlations between pixels and seeds.
 
 use super::*;
 use raystone::discrepancy::star_2d;
 
-/// Dimensions whose pairs are looked at: a path's pixel position and its first three bounces.
+/// Dimensions whose pairs are tested: a path's pixel position and its first three bounces.
 const DIMENSIONS: u32 = 20;
 const POINTS: u32 = 1024;
-/// Bounds of every pair: 1024 random points have a D* of about 0.04, and 0.25 ± 0.014 of them in a quadrant.
+/// Bounds of every pair: 1024 random points have D* ≈ 0.04, and 0.25 ± 0.014 in a quadrant.
 const MOST_STAR: f64 = 0.12;
 const LEAST_QUADRANT: f64 = 0.10;
 /// Pixels and seeds: first and last pixels, rows and columns, large numbers.
@@ -17,7 +17,7 @@ const PLACES: [[u32; 2]; 4] = [
     [77 * WIDTH + 64, 0xdead_beef],
 ];
 
-/// What cannot keep the bounds by its nature: what its label contains, the worst D* that was measured, and why.
+/// Inherent exceptions from the bounds: part of the label, the worst measured D*, and the reason.
 const BY_NATURE: [(&str, f64, &str); 2] = [
     (
         r#""edge": Name("clamp")"#,
@@ -32,8 +32,7 @@ const BY_NATURE: [(&str, f64, &str); 2] = [
     ),
 ];
 
-/// Every pair of a sequence and a decorrelation that is accepted, with each of their parameters at its
-/// default and in turn at others.
+/// Every valid pair of a sequence and a decorrelation, with each parameter at all its values.
 fn all_samplers(samples: u32, dimensions: u32) -> Vec<Sampler> {
     let registry = SamplerRegistry::default();
     let all = |entries: &[Entry]| -> Vec<Variant> { entries.iter().flat_map(variants).collect() };
@@ -57,7 +56,7 @@ fn all_samplers(samples: u32, dimensions: u32) -> Vec<Sampler> {
     out
 }
 
-/// The words of one pixel, dimension by dimension.
+/// The words of one pixel by dimension.
 fn columns(sampler: &Sampler, [pixel, seed]: [u32; 2], samples: u32) -> Vec<Vec<u32>> {
     let word = |sample, dimension| {
         sampler.sample_u32(Coordinate {
@@ -71,8 +70,7 @@ fn columns(sampler: &Sampler, [pixel, seed]: [u32; 2], samples: u32) -> Vec<Vec<
     (0..sampler.demand.dimensions).map(column).collect()
 }
 
-/// D* if it is more than `bound`, which a grid of 64 × 64 cells tells of most sets: it misses less than two
-/// cells.
+/// D* if it exceeds `bound`, which a 64 × 64 grid mostly decides, within two cells.
 fn star_beyond(xs: &[u32], ys: &[u32], bound: f64) -> Option<f64> {
     const CELLS: usize = 64;
     let n = xs.len() as f64;
@@ -130,7 +128,7 @@ fn faults_of_pairs(columns: &[Vec<u32>]) -> Vec<(f64, String)> {
     faults
 }
 
-/// Pixels and seeds at which a sampler is looked at: one is enough where all draw the same.
+/// Pixels and seeds at which a sampler is tested: one is enough if all draw the same.
 fn places(sampler: &Sampler) -> &'static [[u32; 2]] {
     if sampler.is_random() {
         &PLACES
@@ -172,7 +170,7 @@ fn no_pair_of_dimensions_is_locked_together_in_any_sampler() {
 
 #[test]
 fn quadrants_and_stars_of_sets_that_are_locked_together_are_seen() {
-    // Two of the generator's sets in the generator's order: the quarter follows from the index modulo 4.
+    // Two of the generator's sets in the generator's order: the index modulo 4 gives the quarter.
     let random = sampler("pixel-hash", "none", &demand(POINTS, 4));
     let quarter = |i: usize, d: usize| [[0, 0], [1, 1], [1, 0], [0, 1]][i % 4][d % 2] << 31;
     let mut locked = columns(&random, [0, 0], POINTS);
@@ -198,7 +196,7 @@ fn quadrants_and_stars_of_sets_that_are_locked_together_are_seen() {
     assert!(faults_of_pairs(&columns(&random, [0, 0], POINTS)).is_empty());
 }
 
-/// Whether 2^m points take one place each of 2^m.
+/// True if 2^m points occupy one place each of 2^m.
 fn is_even(column: &[u32], m: u32) -> bool {
     let mut taken = vec![false; 1 << m];
     column
@@ -253,7 +251,7 @@ fn every_dimension_of_halton_has_a_base_of_its_own_and_each_digit_once() {
                 while (2..candidate).any(|d| candidate % d == 0) {
                     candidate += 1;
                 }
-                // One point of each of `base` intervals, which another base would miss.
+                // One point in each of `base` intervals, which another base would miss.
                 let mut digits: Vec<u64> = (0..candidate)
                     .map(|i| u64::from(sampler.sample_u32(at(i, dimension))))
                     .map(|x| (x * u64::from(candidate) + (1 << 31)) >> 32)
@@ -272,7 +270,7 @@ fn sets_of_pmj02_for_fewer_points_are_prefixes_and_parts_of_octaves_are_even() {
     for pair in [[0, 1], [2, 3], [4, 5]] {
         let long = points(&many, 4096, pair);
         assert_eq!(points(&few, 64, pair), long[..64]);
-        // Three quarters of an octave keep half of their evenness: the shuffle is nested.
+        // Three quarters of an octave preserve half of their uniformity: the shuffle is nested.
         let points: Vec<_> = long[..768].iter().map(|p| p.map(unit)).collect();
         let star = star_2d(&points).expect("points in the square");
         println!("pmj02 {pair:?}: D* of 768 points {star:.4}");
@@ -304,7 +302,7 @@ fn pixels_and_seeds_have_nothing_in_common_in_late_dimensions_either() {
                             (draw(pixel, seed) ^ draw(pixel + pixels, seed + seeds)) >> bit & 1 == 0
                         })
                         .count();
-                    // Five standard deviations of a coin thrown 4096 times.
+                    // Five standard deviations of a coin tossed 4096 times.
                     assert!(
                         agree.abs_diff(2048) < 160,
                         "{}, dimension {dimension}, bit {bit}, {pixels} {seeds}: {agree}",

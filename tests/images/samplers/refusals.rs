@@ -1,4 +1,4 @@
-//! What makes no sense or goes beyond a limit is refused with a reason that says what to do.
+//! Invalid combinations and exceeded limits are refused with an actionable reason.
 
 use super::*;
 use crate::support;
@@ -33,7 +33,7 @@ fn pairs_that_make_no_sense_are_refused_with_the_reason() {
         let made = try_sampler((sequence, &[]), (decorrelation, &[]), &demand);
         assert_refused(made, &[sequence, decorrelation, reason]);
     }
-    // Whether a pair makes sense may depend on parameters.
+    // The validity of a pair may depend on parameters.
     let shared = [("seeding", name("sample"))];
     assert!(try_sampler(("owen-sobol", &shared), ("digital-shift", &[]), &demand).is_ok());
     let third = [("base", ParamValue::Integer(3))];
@@ -123,7 +123,7 @@ fn a_plan_leaves_out_pairs_that_make_no_sense_and_says_why() {
     let axes = "sequence = [\"pixel-hash\", \"halton\", \"sobol\"]\n\
                 decorrelation = [\"none\", \"cranley-patterson\", \"owen-hash\"]\n";
     let plan = plan(axes).expect("a plan");
-    // Of nine pairs, pixel-hash has two that make no sense, halton one.
+    // Of nine pairs, two of pixel-hash and one of halton are invalid.
     assert_eq!(
         (plan.streams.len(), plan.samplers.len(), plan.times.len()),
         (6, 6, 6)

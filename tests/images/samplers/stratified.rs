@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// How many points lie in each of `columns` × `rows` cells.
+/// Number of points in each of `columns` × `rows` cells.
 fn counts(points: &[[u32; 2]], [columns, rows]: [u64; 2]) -> Vec<u32> {
     let cell = |x: u32, n: u64| (u64::from(x) * n) >> 32;
     let mut counts = vec![0; (columns * rows) as usize];
@@ -31,7 +31,7 @@ fn jittered_points_lie_one_in_each_stratum_of_every_pair_and_pixel() {
                 assert!(found.iter().all(|n| *n <= 1), "{count} {pair:?}: {found:?}");
             }
         }
-        // The strata of another pair are visited in another order: across pairs nothing is stratified.
+        // Another pair visits its strata in another order: there is no stratification across pairs.
         if count == 64 {
             let crossed = counts(&points_of(&sampler, count, [0, 2], 5), strata);
             assert!(crossed.iter().any(|n| *n > 1), "the test can tell");

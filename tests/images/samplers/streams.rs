@@ -1,4 +1,4 @@
-//! Kernels against their twins, to the bit.
+//! Kernels against their twins, bit by bit.
 
 use super::*;
 use crate::support::{self, Pcg, in_turn, is_full};
@@ -6,17 +6,17 @@ use raystone::measure::sampler_cost::sampler_cost;
 use raystone::measure::words::{Used, check_words, compare};
 use raystone::run::dump_stream;
 
-/// Coordinates of every sequence and of every decorrelation, with each of their parameters.
+/// Coordinates per sequence and decorrelation, with each of their parameters.
 const MANY: usize = 1 << 20;
-/// Coordinates of all other pairs.
+/// Coordinates per other pair.
 const FEW: usize = 1 << 15;
 
 fn name_of(variant: &Variant) -> &str {
     &variant.name
 }
 
-/// Every sequence without, and every decorrelation with one sequence, with every parameter; then every
-/// other pair that makes sense. Which of them are random follows from the registry.
+/// Every sequence without, and every decorrelation with one sequence, with every parameter; then
+/// every other valid pair. The registry tells which are random.
 fn samplers() -> Vec<(Sampler, usize)> {
     let registry = SamplerRegistry::default();
     let all = |entries: &[Entry]| -> Vec<Variant> { entries.iter().flat_map(variants).collect() };
@@ -62,7 +62,7 @@ fn samplers() -> Vec<(Sampler, usize)> {
     out
 }
 
-/// Random coordinates, small ones and the largest there are.
+/// Random coordinates, small ones, and the largest.
 fn coordinates(sampler: &Sampler, count: usize, seed: u64) -> Vec<Coordinate> {
     let mut rng = Pcg::new(seed);
     let coordinate = |i: usize| {
@@ -82,7 +82,6 @@ fn coordinates(sampler: &Sampler, count: usize, seed: u64) -> Vec<Coordinate> {
     (0..count).map(coordinate).collect()
 }
 
-/// The kernel's words.
 fn dump(sampler: &Sampler, coordinates: &[Coordinate]) -> Vec<u32> {
     dump_stream(support::gpu(), sampler, coordinates)
         .unwrap_or_else(|e| panic!("{}: {e}", sampler.label()))
@@ -110,7 +109,7 @@ fn streams_of_all_kernels_equal_their_twins_and_seeds_count_where_they_should() 
         let mut stream = dump(&sampler, &coordinates);
         assert_eq!(first_difference(&sampler, &coordinates, &stream), None);
 
-        // One wrong bit must be seen.
+        // A single wrong bit must be detected.
         let wrong = count - count / 3;
         stream[wrong] ^= 1;
         assert!(first_difference(&sampler, &coordinates[wrong..], &stream[wrong..]).is_some());
@@ -152,7 +151,7 @@ fn kernels_equal_their_twins_in_all_that_a_long_run_uses() {
             };
             let words = check_words(support::gpu(), &sampler, &used);
             compared += words.unwrap_or_else(|e| panic!("{e}"));
-            // One bit of one word must be seen, and the message says which.
+            // A single wrong bit must be detected, and the message names the word.
             let coordinates = used.coordinates();
             let mut words: Vec<u32> = coordinates.iter().map(|c| sampler.sample_u32(*c)).collect();
             words[40_000] ^= 1;
@@ -183,7 +182,7 @@ fn the_tables_of_heitz_are_read_by_kernel_and_twin_alike() {
     let stream = dump(&sampler, &coordinates);
     assert_eq!(first_difference(&sampler, &coordinates, &stream), None);
 
-    // A seed moves the tile; wherever it is, all pixels and dimensions agree on it.
+    // A seed moves the tile, consistently for all pixels and dimensions.
     let value = |x: usize, y: usize, sample: usize, dimension: usize| {
         let key = dimension % 8 + (x + y * 128) * 8;
         let ranked = sample ^ ranking[key] as usize;
@@ -229,7 +228,8 @@ fn the_cost_of_a_sampler_is_measured_without_its_loop() {
         .filter(|d| d.name() != "none");
     costs.extend(moved.map(|d| cost("sobol", d.name())));
     assert!(costs.len() >= 14);
-    // Divisions in a loop cost more than one product, whatever the adapter. Other programs can hide that, but not every time.
+    // Divisions in a loop cost more than one product on any adapter. Other load hides that only
+    // sometimes.
     let is_dearer = |_| cost("halton", "none").low > cost("rank1-lattice", "none").value;
     assert!((0..10).any(is_dearer), "halton is never dearer");
     let flat = sampler("van-der-corput", "none", &demand(256, 1));
