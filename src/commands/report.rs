@@ -31,10 +31,9 @@ impl Report {
         if is_suite && !records_file(&self.dir).exists() {
             let records = read(&self.dir)?;
             let page = write_stress_page(&self.dir, &records)?;
-            match self.output.json {
-                true => print_json("report", json!({ "report": page }))?,
-                false => print(&format!("report: {}\n", page.display()))?,
-            }
+            let text = format!("report: {}\n", page.display());
+            self.output
+                .show("report", json!({ "report": page }), &text)?;
             return Ok(ExitCode::SUCCESS);
         }
         let dir = &records_in(&self.dir);

@@ -1,7 +1,7 @@
 //! `raystone run`.
 
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
-use super::failure::{BAD_INPUT, FAILED};
+use super::failure::{BAD_INPUT, FAILED, ended};
 use super::output::{self, OutputArguments, print, print_json, screen};
 use super::report::findings;
 use super::signals;
@@ -94,15 +94,10 @@ impl Run {
             Kernels::load(&plan.kernels, &registries)?;
             let units = registries.measurements.units(&experiment, &plan);
             let cost = Cost::new(&experiment, &plan, &registries);
-            if self.output.json {
-                print_json("run", super::inspect::plan::as_json(&plan, &units, &cost))?;
-                return Ok(ExitCode::SUCCESS);
-            }
-            print(&format!(
-                "{}\n{}\n",
-                plan.describe().trim_end(),
-                cost.describe(&units)
-            ))?;
+            let cells = plan.describe();
+            let text = format!("{}\n{}\n", cells.trim_end(), cost.describe(&units));
+            let fields = super::inspect::plan::as_json(&plan, &units, &cost);
+            self.output.show("run", fields, &text)?;
             return Ok(ExitCode::SUCCESS);
         }
         let existing = match (self.force, self.number || self.out.is_none()) {
@@ -171,10 +166,7 @@ fn references(
     for failure in &failures {
         output::tell(&format!("failed: {failure}"));
     }
-    Ok(match failures.is_empty() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(FAILED),
-    })
+    Ok(ended(failures.is_empty()))
 }
 
 /// The image to compare with as an override of an experiment.

@@ -1,4 +1,4 @@
-//! Measures of point sets against published values and their definitions; `raystone discrepancy` as a
+//! Measures of point sets against published values and their definitions; `raystone points` as a
 //! user meets it, and SciPy's opinion of the same points.
 
 mod bounds;
@@ -18,7 +18,7 @@ use std::process::{Command, Output, Stdio};
 /// The program with these arguments and this text on its standard input.
 fn run(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_raystone"))
-        .arg("discrepancy")
+        .arg("points")
         .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
