@@ -1,13 +1,14 @@
 //! Arguments that several commands share.
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
 use raystone::run::{Registries, RunOptions, kernel_library};
 use raystone::scene::{SceneData, check_model};
-use raystone::text::nearest;
-use std::io::IsTerminal as _;
+use raystone::text::{nearest, plain_text};
+use std::fs::File;
+use std::io::{IsTerminal as _, Read as _};
 use std::path::{Path, PathBuf};
 
 /// Where kernels come from and run.
@@ -128,12 +129,37 @@ pub fn one_cell(experiment: &Experiment) -> Result<Cell> {
     Ok(cell)
 }
 
+/// The text of a file, of standard input behind the name `-`, and what it is called in messages.
+///
+/// # Errors
+/// A file that cannot be read, or is no text.
+pub fn read_text(file: &Path) -> Result<(String, String)> {
+    let mut bytes = Vec::new();
+    let (name, read) = if file.as_os_str() == "-" {
+        let read = std::io::stdin().lock().read_to_end(&mut bytes);
+        ("standard input".to_owned(), read)
+    } else {
+        let read = File::open(file).and_then(|mut file| file.read_to_end(&mut bytes));
+        (file.display().to_string(), read)
+    };
+    read.with_context(|| format!("cannot read {name}"))?;
+    match plain_text(bytes) {
+        Ok(text) => Ok((text, name)),
+        Err(error) => bail!("{name}:{}: it is not UTF-8 text", error.line),
+    }
+}
+
 /// What to say of a name that there is not.
 pub fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let hint = nearest(name, known.iter().copied());
     let hint = hint.map_or(String::new(), |near| format!(", did you mean `{near}`?"));
-    format!("there is no `{name}`{hint} (known: {})", known.join(", "))
+    let known = if known.is_empty() {
+        "none".to_owned()
+    } else {
+        known.join(", ")
+    };
+    format!("there is no `{name}`{hint} (known: {known})")
 }
 
 /// `512x384` as width and height.

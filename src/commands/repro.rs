@@ -12,7 +12,8 @@ use raystone::repro::claim::Row;
 use raystone::repro::judge::Verdict;
 use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
 use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
-use raystone::run::{Registries, RunError, RunOptions, user_cache};
+use raystone::run::{Registries, RunError, RunOptions};
+use raystone::store::user_folder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -77,7 +78,7 @@ impl Repro {
             program: raystone::PROGRAM,
             adapter: self.adapter.clone().unwrap_or_default(),
             warn: Some(super::output::warn),
-            cache: user_cache(),
+            cache: user_folder(),
             ..RunOptions::default()
         };
         // Without an adapter what is recorded can be judged all the same; a run says that there is none.

@@ -1,31 +1,24 @@
 //! A judge that was checked is not checked again: what brute force and the oracle said of it is kept on
-//! disk, under a hash of everything that it depends on.
+//! disk, under a hash of everything that it depends on ([`raystone_core::store`]).
 //!
-//! The hash covers the scene, the tests, every ray with the judge's answer, how much was checked, and the
+//! That is the scene, the tests, every ray with the judge's answer, how much was checked, and the
 //! program, so that a wrong answer never finds the checks of a right one. Only checks without a fault are
-//! kept; a file that is not whole, or stands under another's name, counts for nothing.
+//! kept.
 
 use crate::gate::Judge;
 use raystone_accel::Intersection;
 use raystone_config::Gate;
-use raystone_core::atomic::write_atomic;
+use raystone_core::store::Kept;
 use raystone_record::JudgeCheck;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::SystemTime;
 
-/// Names a folder for kept checks in place of the user's cache folder; `off` keeps none.
-pub(crate) const CACHE_VARIABLE: &str = "RAYSTONE_CACHE";
-
 /// Where the checks of one judge are kept.
-pub(super) struct KeptChecks {
-    folder: PathBuf,
-    key: String,
-}
+pub(super) struct KeptChecks(Kept);
 
 #[derive(Serialize, Deserialize)]
 struct Content {
-    key: String,
     checked_unix_s: u64,
     world: [JudgeCheck; 2],
     instances: Option<[JudgeCheck; 2]>,
@@ -34,29 +27,27 @@ struct Content {
 impl KeptChecks {
     /// The place in a folder for a judge with these rays; `None` without an identity of the program.
     pub(crate) fn of(
-        folder: PathBuf,
+        folder: &Path,
         judge: &Judge,
         scene_hash: &str,
         intersection: Intersection,
         settings: &Gate,
     ) -> Option<Self> {
         let mut hasher = blake3::Hasher::new();
-        let about = format!("{scene_hash} {intersection:?} {settings:?} {}", program()?);
-        hasher.update(about.as_bytes());
         let judges = [Some(judge), judge.instances.as_deref()];
         for set in judges.into_iter().flatten().flat_map(|judge| &judge.sets) {
             hasher.update(&(set.rays.len() as u64).to_le_bytes());
             hasher.update(bytemuck::cast_slice(&set.rays));
             hasher.update(bytemuck::cast_slice(&set.truth));
         }
-        Some(Self {
-            folder,
-            key: hasher.finalize().to_hex().to_string(),
-        })
-    }
-
-    fn path(&self) -> PathBuf {
-        self.folder.join(format!("judge-{}.json", self.key))
+        let settings = format!("{intersection:?} {settings:?}");
+        let rays = hasher.finalize().to_hex();
+        let depends_on = [
+            ("scene", scene_hash),
+            ("settings", &settings),
+            ("rays", &rays),
+        ];
+        Kept::new(folder, "checks", &depends_on).map(Self)
     }
 
     /// Puts kept checks into the judge; whether there were any.
@@ -77,18 +68,12 @@ impl KeptChecks {
     }
 
     fn read(&self) -> Option<Content> {
-        let text = std::fs::read_to_string(self.path()).ok()?;
-        let (line, sum) = text.trim_end().split_once('\n')?;
-        if blake3::hash(line.as_bytes()).to_hex().as_str() != sum {
-            return None;
-        }
-        let content: Content = serde_json::from_str(line).ok()?;
-        let checks = content
-            .world
-            .iter()
-            .chain(content.instances.iter().flatten());
-        let right = checks.clone().all(|c| c.wrong == 0) && checks.clone().all(|c| c.rays > 0);
-        (content.key == self.key && right).then_some(content)
+        let content: Content = serde_json::from_slice(&self.0.read()?).ok()?;
+        let world = content.world.iter();
+        let mut checks = world.chain(content.instances.iter().flatten());
+        checks
+            .all(|check| check.wrong == 0 && check.rays > 0)
+            .then_some(content)
     }
 
     /// Keeps what was found of a sound judge. What cannot be written is found again next time.
@@ -100,43 +85,15 @@ impl KeptChecks {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let checks = |judge: &Judge| [judge.brute_force.clone(), judge.oracle.clone()];
         let content = Content {
-            key: self.key.clone(),
             checked_unix_s: now.map_or(0, |d| d.as_secs()),
             world: checks(judge),
             instances: instances.map(checks),
         };
-        let Ok(line) = serde_json::to_string(&content) else {
-            return;
-        };
-        let sum = blake3::hash(line.as_bytes()).to_hex();
-        let written = std::fs::create_dir_all(&self.folder)
-            .and_then(|()| write_atomic(&self.path(), format!("{line}\n{sum}\n").as_bytes()));
-        // A cache that cannot be written costs time, nothing else.
-        drop(written);
-    }
-}
-
-/// The folder of kept checks, if they are to be kept.
-pub(super) fn folder() -> Option<PathBuf> {
-    let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    match named(CACHE_VARIABLE) {
-        Some(value) if value == "off" => None,
-        Some(value) => Some(value.into()),
-        None => {
-            let cache = named("XDG_CACHE_HOME").map(PathBuf::from);
-            let cache = cache.or_else(|| Some(PathBuf::from(named("HOME")?).join(".cache")));
-            Some(cache?.join("raystone"))
+        if let Ok(bytes) = serde_json::to_vec(&content) {
+            // A cache that cannot be written costs time, nothing else.
+            let _ = self.0.write(bytes);
         }
     }
-}
-
-/// What tells this program from another build of it.
-fn program() -> Option<String> {
-    let file = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
-    let built = file.modified().ok()?;
-    let since = built.duration_since(SystemTime::UNIX_EPOCH).ok()?;
-    let version = env!("CARGO_PKG_VERSION");
-    Some(format!("{version} {} {}", file.len(), since.as_nanos()))
 }
 
 #[cfg(test)]
@@ -145,7 +102,6 @@ mod tests {
     use crate::rays::RaySet;
     use raystone_accel::{Hit, Ray};
     use raystone_record::RayClass;
-    use std::path::Path;
 
     fn judge(t: f32) -> Judge {
         let checked = JudgeCheck {
@@ -176,13 +132,7 @@ mod tests {
     };
 
     fn place(folder: &Path, judge: &Judge, gate: &Gate) -> KeptChecks {
-        let place = KeptChecks::of(
-            folder.to_owned(),
-            judge,
-            "scene",
-            Intersection::default(),
-            gate,
-        );
+        let place = KeptChecks::of(folder, judge, "scene", Intersection::default(), gate);
         place.expect("a program")
     }
 
@@ -207,26 +157,19 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_changed_foreign_or_of_a_wrong_judge_count_for_nothing() {
+    fn checks_of_a_wrong_judge_or_that_were_changed_count_for_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let sound = judge(1.0);
         let here = place(folder.path(), &sound, &GATE);
         let mut wrong = judge(1.0);
         wrong.oracle.wrong = 1;
         here.keep(&wrong);
-        assert!(!here.path().exists());
+        assert!(!here.0.path().exists());
         here.keep(&sound);
-        let whole = std::fs::read_to_string(here.path()).unwrap();
-        for changed in [
-            whole.replace("\"rays\":7", "\"rays\":8"),
-            whole[..40].to_owned(),
-        ] {
-            assert_ne!(changed, whole);
-            std::fs::write(here.path(), changed).unwrap();
-            assert!(!here.restore(&mut judge(1.0)));
-        }
-        let there = place(folder.path(), &judge(2.0), &GATE);
-        std::fs::write(there.path(), &whole).unwrap();
-        assert!(!there.restore(&mut judge(2.0)));
+        let text = String::from_utf8(here.0.read().unwrap()).unwrap();
+        let faulty = text.replacen("\"wrong\":0", "\"wrong\":1", 1);
+        assert_ne!(faulty, text);
+        here.0.write(faulty.into_bytes()).unwrap();
+        assert!(!here.restore(&mut judge(1.0)));
     }
 }

@@ -1,8 +1,10 @@
 //! What the figures of a cell depend on, and whether those of an earlier run still hold.
 
 use super::kernels::Kernels;
+use super::reference_file::ReferenceFile;
 use super::{Registries, Unit};
 use raystone_config::{Axis, Experiment};
+use raystone_core::store;
 use raystone_core::text::cell_hash;
 use raystone_record::Environment;
 use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
@@ -26,7 +28,7 @@ pub(super) fn program() -> &'static str {
             let stem = path.file_stem();
             stem.is_some_and(|stem| stem == "raystone")
         });
-        match super::reference_cache::program().filter(|_| !is_own) {
+        match store::program().filter(|_| !is_own) {
             Some(bytes) => short(&[("host", own), ("program", bytes)]),
             None => own.to_owned(),
         }
@@ -54,14 +56,15 @@ pub(super) struct Current<'a> {
 }
 
 impl<'a> Current<'a> {
-    /// Of an experiment with these kernels; the hash of the image that is compared with, if it is a file's.
+    /// Of an experiment with these kernels; the image that is compared with, if it is a file's.
     pub(super) fn new(
         experiment: &Experiment,
-        reference_file: &str,
+        reference_file: Option<&ReferenceFile>,
         registries: &Registries,
         kernels: &'a Kernels,
     ) -> Self {
         let measurements = registries.measurements.iter();
+        let reference_file = reference_file.map_or("", |file| &file.hash);
         // Sections that others add may matter to any measurement.
         let further = if experiment.further.is_empty() {
             String::new()

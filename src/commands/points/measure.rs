@@ -1,13 +1,12 @@
 //! How evenly points fill the unit cube, as JSON.
 
-use crate::commands::arguments::unknown;
+use crate::commands::arguments::{read_text, unknown};
 use crate::commands::output::print_json;
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::discrepancy::{Budget, DiscrepancyError, Measure, PointSet, Value, measure};
-use raystone::text::plain_text;
 use serde_json::{Map, json};
-use std::io::{IsTerminal as _, Read as _};
+use std::io::IsTerminal as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -74,20 +73,10 @@ impl MeasureArguments {
 
 /// The points of a file, those dimensions of them that are asked for; of standard input where there is none.
 pub(super) fn read(file: Option<&Path>, dims: &[u32]) -> Result<PointSet> {
-    let (name, bytes) = match file.filter(|file| file.as_os_str() != "-") {
-        Some(file) => (file.display().to_string(), std::fs::read(file)),
-        None if file.is_none() && std::io::stdin().is_terminal() => {
-            bail!("give a --sequence to draw points from, or a file to measure")
-        }
-        None => {
-            let mut bytes = Vec::new();
-            let read = std::io::stdin().lock().read_to_end(&mut bytes);
-            ("standard input".to_owned(), read.map(|_| bytes))
-        }
-    };
-    let bytes = bytes.with_context(|| format!("cannot read {name}"))?;
-    let text = plain_text(bytes)
-        .map_err(|error| anyhow!("{name}:{}: it is not UTF-8 text", error.line))?;
+    if file.is_none() && std::io::stdin().is_terminal() {
+        bail!("give a --sequence to draw points from, or a file to measure");
+    }
+    let (text, name) = read_text(file.unwrap_or(Path::new("-")))?;
     let points = PointSet::parse(&text).map_err(|error| match error {
         DiscrepancyError::Line { line, reason } => anyhow!("{name}:{line}: {reason}"),
         error => anyhow!("{name}: {error}"),

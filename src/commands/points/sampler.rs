@@ -1,7 +1,7 @@
 //! The sampler that points are drawn from, and where it is computed.
 
 use super::fraction;
-use crate::commands::arguments::{DeviceArguments, of_flags, on_axis, one_cell};
+use crate::commands::arguments::{DeviceArguments, of_flags, on_axis, one_cell, unknown};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::config::{Axis, Catalogue};
@@ -9,7 +9,6 @@ use raystone::gpu::Gpu;
 use raystone::params::Entry;
 use raystone::run::{Registries, dump_stream};
 use raystone::sampling::{Coordinate, Demand, Sampler};
-use raystone::text::nearest;
 use std::ops::Range;
 
 /// Numbers that are computed at a time.
@@ -111,7 +110,10 @@ impl SamplerArguments {
             let has = |entry: &Entry| entry.schema.iter().any(|p| p.name == key);
             let owners: Vec<_> = entries.iter().filter(|(_, entry)| has(entry)).collect();
             if owners.is_empty() {
-                return Err(unknown_parameter(param, key, &entries));
+                let known = entries.iter().flat_map(|(_, entry)| &entry.schema);
+                let refusal = unknown(key, known.map(|p| p.name));
+                let decorrelation = &self.decorrelation;
+                bail!("--param {param}: for {sequence} × {decorrelation} {refusal}");
             }
             for (axis, entry) in owners {
                 overrides.push(format!("{axis}.{}.{param}", entry.name));
@@ -170,17 +172,6 @@ impl Stream {
             Ok(words.into_iter().map(fraction).collect())
         })
     }
-}
-
-fn unknown_parameter(param: &str, key: &str, entries: &[(Axis, &Entry)]) -> anyhow::Error {
-    let names = entries.iter().flat_map(|(_, entry)| &entry.schema);
-    let known: Vec<&str> = names.map(|p| p.name).collect();
-    let hint = match nearest(key, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`? Known: {}", known.join(", ")),
-        None => "neither has parameters".to_owned(),
-    };
-    let [sequence, decorrelation] = [0, 1].map(|i| entries[i].1.name.as_str());
-    anyhow!("--param {param}: {sequence} × {decorrelation} has no parameter `{key}`; {hint}")
 }
 
 fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
