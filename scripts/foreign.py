@@ -91,7 +91,7 @@ def ours(scene, size, spp, seed, flags, folder, name="ours.npy"):
 
 def export(scene, size, flags, folder):
     """Writes the scene for Mitsuba; its file."""
-    command = [PROGRAM, "export-mitsuba", scene, "--size", f"{size[0]}x{size[1]}", *flags, "--out", str(folder)]
+    command = [PROGRAM, "export", scene, "--to", "mitsuba", "--size", f"{size[0]}x{size[1]}", *flags, "--out", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"{' '.join(command)}\n{done.stderr}")

@@ -23,7 +23,7 @@ pub use raystone_accel::oracle;
 pub use raystone_bench::{coherence, peers, run};
 pub use raystone_config as config;
 pub use raystone_core::{
-    __parameter, atomic, geometry, parameters, params, program, random, structure, text,
+    __parameter, atomic, geometry, parameters, params, program, random, store, structure, text,
 };
 pub use raystone_discrepancy as discrepancy;
 pub use raystone_gpu as gpu;

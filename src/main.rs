@@ -15,17 +15,11 @@ const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 #[cfg(unix)]
 fn name_runtime_folder() {
     use std::os::unix::fs::DirBuilderExt as _;
-    use std::path::PathBuf;
     if std::env::var_os(RUNTIME_FOLDER).is_some() {
         return;
     }
-    let named = |name| {
-        std::env::var_os(name)
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-    };
-    let caches = named("XDG_CACHE_HOME").or_else(|| Some(named("HOME")?.join(".cache")));
-    let Some(folder) = caches.map(|caches| caches.join("raystone").join("runtime")) else {
+    let Some(folder) = raystone::store::caches().map(|caches| caches.join("raystone/runtime"))
+    else {
         return;
     };
     let mut private = std::fs::DirBuilder::new();

@@ -1,11 +1,12 @@
 //! Adapters in words.
 
+use super::list::Row;
 use raystone::gpu::AdapterSummary;
 use raystone::report::format::bytes;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// What kind of device it is.
-pub fn kind(adapter: &AdapterSummary) -> &'static str {
+fn kind(adapter: &AdapterSummary) -> &'static str {
     match adapter.info.device_type {
         wgpu::DeviceType::DiscreteGpu => "discrete GPU",
         wgpu::DeviceType::IntegratedGpu => "integrated GPU",
@@ -16,7 +17,7 @@ pub fn kind(adapter: &AdapterSummary) -> &'static str {
 }
 
 /// Driver and version; some drivers give only one of the two.
-pub fn driver(adapter: &AdapterSummary) -> String {
+fn driver(adapter: &AdapterSummary) -> String {
     let info = &adapter.info;
     let parts = [info.driver.as_str(), info.driver_info.as_str()];
     let parts: Vec<_> = parts.into_iter().filter(|part| !part.is_empty()).collect();
@@ -33,31 +34,29 @@ pub fn largest_binding(limits: &wgpu::Limits) -> u64 {
         .min(limits.max_buffer_size)
 }
 
-/// Two lines: number and name; then everything else.
-pub fn describe(adapter: &AdapterSummary) -> String {
+/// An adapter in lists: its number and name, and below them everything else.
+pub fn row(adapter: &AdapterSummary) -> Row {
     let timestamps = if adapter.timestamps { "yes" } else { "no" };
-    format!(
-        "  {}  {}\n     {}, {}, {}, timestamps: {timestamps}, largest binding: {}\n",
-        adapter.index,
-        adapter.info.name,
+    let (kind, driver, largest) = (
         kind(adapter),
-        adapter.info.backend,
         driver(adapter),
-        bytes(largest_binding(&adapter.limits)),
-    )
-}
-
-/// What [`describe`] says, as JSON.
-pub fn json(adapter: &AdapterSummary) -> Value {
-    json!({
+        largest_binding(&adapter.limits),
+    );
+    let backend = adapter.info.backend;
+    let about = format!(
+        "{kind}, {backend}, {driver}, timestamps: {timestamps}, largest binding: {}",
+        bytes(largest)
+    );
+    let json = json!({
         "index": adapter.index,
         "name": adapter.info.name,
-        "kind": kind(adapter),
-        "backend": adapter.info.backend.to_str(),
-        "driver": driver(adapter),
+        "kind": kind,
+        "backend": backend.to_str(),
+        "driver": driver,
         "timestamps": adapter.timestamps,
-        "largest_binding_bytes": largest_binding(&adapter.limits),
-    })
+        "largest_binding_bytes": largest,
+    });
+    Row::with(adapter.index, adapter.info.name.clone(), vec![about], json)
 }
 
 /// Major version of the Mesa that a driver is part of, if its version text says so.

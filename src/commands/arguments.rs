@@ -1,12 +1,14 @@
 //! Arguments that several commands share.
 
-use anyhow::Result;
+use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use raystone::config::{Axis, Experiment, Plan};
+use raystone::config::{Axis, Cell, Experiment, Plan};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
 use raystone::run::{Registries, RunOptions, kernel_library};
 use raystone::scene::{SceneData, check_model};
-use std::io::IsTerminal as _;
+use raystone::text::{nearest, plain_text};
+use std::fs::File;
+use std::io::{IsTerminal as _, Read as _};
 use std::path::{Path, PathBuf};
 
 /// Where kernels come from and run.
@@ -39,8 +41,7 @@ impl DeviceArguments {
 
     /// The folder of kernels as an override of an experiment.
     pub fn kernels_override(&self) -> Option<String> {
-        let folder = self.kernels.as_ref()?.display().to_string();
-        Some(list_override("axes.kernels", &[folder]))
+        on_axis(Axis::Kernels, self.kernels.iter().map(|f| f.display()))
     }
 
     /// Opens the adapter with the kernels.
@@ -82,9 +83,93 @@ pub struct ExperimentArguments {
     pub only: Vec<String>,
 }
 
-/// An override `key=value` whose value is the list of these texts, whatever characters are in them.
-pub fn list_override(key: &str, values: &[String]) -> String {
-    format!("{key}={}", toml::Value::from(values.to_vec()))
+/// What commands without an experiment file begin with: one cell, so that one parser checks names, parameters, flags and
+/// `--set` everywhere.
+const CELL: &str =
+    "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"pixel-hash\"]\n";
+
+/// These names on an axis as an override of an experiment, whatever characters are in them; nothing without any.
+pub fn on_axis<T: ToString>(axis: Axis, names: impl IntoIterator<Item = T>) -> Option<String> {
+    let names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
+    (!names.is_empty()).then(|| format!("axes.{axis}={}", toml::Value::from(names)))
+}
+
+/// The experiment of a command without a file: what its flags say, and `--set`, which has the last word.
+///
+/// # Errors
+/// Those of an experiment file.
+pub fn of_flags(
+    command: &str,
+    flags: impl IntoIterator<Item = String>,
+    set: &[String],
+    registries: &Registries,
+) -> Result<Experiment> {
+    let overrides: Vec<String> = flags.into_iter().chain(set.iter().cloned()).collect();
+    let name = format!("raystone {command}");
+    let catalogue = registries.catalogue();
+    Ok(Experiment::parse(CELL, &name, &overrides, &catalogue)?)
+}
+
+/// The one cell of an experiment.
+///
+/// # Errors
+/// An axis with several values.
+pub fn one_cell(experiment: &Experiment) -> Result<Cell> {
+    let mut cell = Cell::default();
+    for (axis, variants) in experiment.axes.iter() {
+        let [variant] = variants.as_slice() else {
+            let labels: Vec<&str> = variants.iter().map(|v| v.label.as_str()).collect();
+            let (count, labels) = (labels.len(), labels.join(", "));
+            bail!(
+                "{axis} has {count} values ({labels}), and one cell is asked for: give one value"
+            );
+        };
+        cell = cell.with(axis, variant);
+    }
+    Ok(cell)
+}
+
+/// The text of a file, of standard input behind the name `-`, and what it is called in messages.
+///
+/// # Errors
+/// A file that cannot be read, or is no text.
+pub fn read_text(file: &Path) -> Result<(String, String)> {
+    let mut bytes = Vec::new();
+    let (name, read) = if file.as_os_str() == "-" {
+        let read = std::io::stdin().lock().read_to_end(&mut bytes);
+        ("standard input".to_owned(), read)
+    } else {
+        let read = File::open(file).and_then(|mut file| file.read_to_end(&mut bytes));
+        (file.display().to_string(), read)
+    };
+    read.with_context(|| format!("cannot read {name}"))?;
+    match plain_text(bytes) {
+        Ok(text) => Ok((text, name)),
+        Err(error) => bail!("{name}:{}: it is not UTF-8 text", error.line),
+    }
+}
+
+/// What to say of a name that there is not.
+pub fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let hint = nearest(name, known.iter().copied());
+    let hint = hint.map_or(String::new(), |near| format!(", did you mean `{near}`?"));
+    let known = if known.is_empty() {
+        "none".to_owned()
+    } else {
+        known.join(", ")
+    };
+    format!("there is no `{name}`{hint} (known: {known})")
+}
+
+/// `512x384` as width and height.
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text
+        .split_once(['x', 'X', '×'])
+        .and_then(|(width, height)| {
+            Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+        });
+    parsed.ok_or_else(|| "must be width x height in pixels, for instance 512x384".to_owned())
 }
 
 /// The plan of an experiment whose models look like models: told before minutes are spent on other cells.

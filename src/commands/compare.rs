@@ -1,6 +1,6 @@
 //! `raystone compare`.
 
-use super::arguments::ValueArguments;
+use super::arguments::{ValueArguments, read_text};
 use super::failure::FAILED;
 use super::output::{print, print_json, screen, tell};
 use super::signals;
@@ -13,7 +13,7 @@ use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides, show};
 use raystone::gpu::AdapterChoice;
 use raystone::run::{Existing, RunOptions};
-use raystone::text::plain_text;
+use raystone::store::user_folder;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -166,13 +166,7 @@ impl Compare {
         work: &Temporary,
     ) -> Result<[Side; 2]> {
         let (text, name) = match file {
-            Some(path) => {
-                let name = path.display().to_string();
-                let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
-                let text = plain_text(bytes);
-                let text = text.map_err(|e| anyhow!("{name}:{}: it is not UTF-8 text", e.line))?;
-                (text, name)
-            }
+            Some(path) => read_text(path)?,
             None => (SMALL.0.to_owned(), SMALL.1.to_owned()),
         };
         let out = match &self.out {
@@ -210,7 +204,7 @@ impl Compare {
             allow_outside: self.values.allow_outside,
             warn: Some(super::output::warn),
             progress: std::io::stderr().is_terminal(),
-            cache: raystone::run::user_cache(),
+            cache: user_folder(),
             ..RunOptions::default()
         };
         signals::watch(options.interrupt.clone())?;

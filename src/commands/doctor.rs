@@ -2,7 +2,8 @@
 
 use super::adapters::{self, largest_binding, mesa_major};
 use super::failure::{NO_ADAPTER, tell_error};
-use super::output::{OutputArguments, print, print_json};
+use super::list::{Row, table};
+use super::output::OutputArguments;
 use super::system::{self, System};
 use anyhow::Result;
 use clap::Args;
@@ -32,9 +33,8 @@ impl Doctor {
         let found = gpu::adapters();
         let mut text = machine(&system);
         text += "\nAdapters, best first\n";
-        for adapter in &found {
-            text += &adapters::describe(adapter);
-        }
+        let rows: Vec<Row> = found.iter().map(adapters::row).collect();
+        text += &table(&rows);
         if found.is_empty() {
             text += "  none\n";
         }
@@ -51,10 +51,8 @@ impl Doctor {
         if found.is_empty() {
             text += &remedy(&system);
         }
-        match self.output.json {
-            true => print_json("doctor", as_json(&system, &found, examined.as_ref()))?,
-            false => print(&text)?,
-        }
+        let fields = as_json(&system, rows, examined.as_ref());
+        self.output.show("doctor", fields, &text)?;
         // Whatever it was: this is no adapter that a command could use.
         Ok(failed.map_or(ExitCode::SUCCESS, |failure| {
             tell_error(&failure.into());
@@ -64,7 +62,8 @@ impl Doctor {
 }
 
 /// What [`Doctor`] says, as JSON; `in_use` is null where no adapter works.
-fn as_json(system: &System, found: &[AdapterSummary], examined: Option<&Examined>) -> Value {
+fn as_json(system: &System, found: Vec<Row>, examined: Option<&Examined>) -> Value {
+    let remedy = found.is_empty().then(|| remedy(system).trim().to_owned());
     let in_use = examined.map(|examined| {
         let rows = examined.rows.iter().map(|(name, what)| {
             let words: Vec<&str> = what.split_whitespace().collect();
@@ -78,9 +77,9 @@ fn as_json(system: &System, found: &[AdapterSummary], examined: Option<&Examined
         "system": system.name,
         "architecture": std::env::consts::ARCH,
         "processor": system::processor(),
-        "adapters": found.iter().map(adapters::json).collect::<Vec<Value>>(),
+        "adapters": found.into_iter().map(|row| row.json).collect::<Vec<Value>>(),
         "in_use": in_use,
-        "remedy": found.is_empty().then(|| remedy(system).trim().to_owned()),
+        "remedy": remedy,
     })
 }
 

@@ -1,96 +1,135 @@
-//! `raystone export-mitsuba`.
+//! `raystone export`.
 
-use super::arguments::{ValueArguments, list_override, warn_of};
-use super::output::{print, warn};
-use anyhow::{Result, anyhow};
+use super::arguments::unknown;
+use super::mitsuba::{MITSUBA, SceneArguments};
+use super::output::{print, tell, warn};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
-use raystone::config::{Axis, Experiment};
-use raystone::measure::mitsuba::{MITSUBA_FILE, MitsubaSettings, export_mitsuba};
-use raystone::run::Registries;
-use raystone::scene::{LoadOptions, load};
-use std::path::PathBuf;
+use raystone::atomic::write_atomic;
+use raystone::export::select::Selection;
+use raystone::export::{FORMATS, Format, Source, Writer};
+use raystone::measure::record::read_records;
+use raystone::run::records_in;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What `raystone render` takes where nothing is said: both programs then make the same picture.
-const DEFAULTS: &str = r#"
-[run]
-name = "export"
-resolution = [512, 384]
-spp = { pow2 = [6, 6] }
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh"]
-sequence = ["sobol"]
-integrator = ["path"]
-"#;
-
-/// Write a scene for the renderer Mitsuba 3, with the camera and the path depth of `render`
+/// Write the figures, times, checks or images of a run, or a scene, in the format of another tool
 ///
-/// Meshes are written as PLY, textures as PNG or EXR. `mitsuba FOLDER/scene.xml -D spp=256` renders it.
+/// `raystone export SCENE --to mitsuba -o FOLDER` writes meshes as PLY and textures as PNG or EXR; `mitsuba FOLDER/scene.xml -D
+/// spp=256` renders them.
 #[derive(Args)]
-pub struct ExportMitsuba {
-    /// Built-in scene or path of a model
-    scene: String,
-    /// Folder to write into; made if it is missing
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// Width and height, pixels [default: 512x384]
-    #[arg(long, value_name = "WxH", value_parser = super::render::parse_size)]
-    size: Option<[u32; 2]>,
-    /// Leave out the backs of emitters: for scenes in which nothing sees them
-    #[arg(long)]
-    fronts_only: bool,
+pub struct Export {
+    /// Folder that a run wrote, with records.jsonl; for mitsuba a built-in scene or the path of a model
+    #[arg(value_name = "DIR|SCENE")]
+    what: PathBuf,
+    /// Format, by its name in `raystone list format`
+    #[arg(long, visible_alias = "to", value_name = "NAME", value_parser = target)]
+    format: Target,
+    /// File to write, for npy and mitsuba a folder [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
     #[command(flatten)]
-    values: ValueArguments,
+    choice: ChoiceArguments,
+    #[command(flatten)]
+    scene: SceneArguments,
 }
 
-impl ExportMitsuba {
+/// Which figures of runs.
+#[derive(Args)]
+pub struct ChoiceArguments {
+    /// Figure, by its id with or without the version, or a pattern of ids; may be given many times [default: all that
+    /// rank, or that the format holds]
+    #[arg(long, value_name = "ID")]
+    figure: Vec<String>,
+    /// Keep what fits: `--only 'accel=*bvh,uniform-grid(lambda=3),scene=cornell-box'`; patterns of one axis are alternatives
+    #[arg(long, value_name = "AXIS=PATTERN,…")]
+    only: Vec<String>,
+}
+
+impl ChoiceArguments {
+    pub fn selection(&self) -> Result<Selection> {
+        Ok(Selection::new(&self.figure, &self.only)?)
+    }
+
+    /// Ends where something is chosen of what holds no figures.
+    fn refuse(&self, format: &str) -> Result<()> {
+        if !self.figure.is_empty() || !self.only.is_empty() {
+            bail!(
+                "--format {format} holds no figures to choose from: leave out --figure and --only"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What is written.
+#[derive(Clone, Copy)]
+enum Target {
+    Run(&'static Format),
+    Scene,
+}
+
+fn target(name: &str) -> Result<Target, String> {
+    if name == MITSUBA.0 {
+        return Ok(Target::Scene);
+    }
+    let found = FORMATS.iter().find(|format| format.name == name);
+    let known = FORMATS.iter().map(|format| format.name).chain([MITSUBA.0]);
+    found.map(Target::Run).ok_or_else(|| unknown(name, known))
+}
+
+impl Export {
     pub fn execute(self) -> Result<ExitCode> {
-        let registries = Registries::default();
-        let mut overrides = vec![list_override(
-            "axes.scene",
-            std::slice::from_ref(&self.scene),
-        )];
-        if let Some([width, height]) = self.size {
-            overrides.push(format!("run.resolution=[{width}, {height}]"));
+        match self.format {
+            Target::Run(format) => self.figures(format)?,
+            Target::Scene => {
+                self.choice.refuse(MITSUBA.0)?;
+                self.scene.export(&self.what, self.folder(MITSUBA.0)?)?;
+            }
         }
-        overrides.extend(self.values.set.iter().cloned());
-        let experiment = Experiment::parse(
-            DEFAULTS,
-            "raystone export-mitsuba",
-            &overrides,
-            &registries.catalogue(),
-        )?;
-        let first = |axis: Axis| experiment.axes[axis].first();
-        let (Some(scene), Some(integrator)) = (first(Axis::Scene), first(Axis::Integrator)) else {
-            return Err(anyhow!("--set leaves no scene or no integrator"));
-        };
-        let options = LoadOptions {
-            allow_outside: self.values.allow_outside,
-            ..LoadOptions::default()
-        };
-        let scene = load(scene, &options)?;
-        warn_of(&scene);
-        let kind = registries.integrators.configured(integrator)?;
-        let constants = kind.kind.constants(&kind.params);
-        let bounces = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");
-        let bounces = bounces.ok_or_else(|| {
-            anyhow!("{integrator} has no bounces; Mitsuba's path tracer is compared with `path`")
-        })?;
-        let own = || scene.view(experiment.aspect());
-        let camera = experiment.camera.unwrap_or_else(own);
-        raystone::scene::check_camera(&camera)?;
-        let settings = MitsubaSettings {
-            camera,
-            size: experiment.run.resolution,
-            spp: experiment.run.spp.max(),
-            bounces: bounces.1,
-            fronts_only: self.fronts_only,
-        };
-        for line in export_mitsuba(&scene, &settings, &self.out)? {
-            warn(&line);
-        }
-        print(&format!("{}\n", self.out.join(MITSUBA_FILE).display()))?;
         Ok(ExitCode::SUCCESS)
+    }
+
+    fn folder(&self, name: &str) -> Result<&Path> {
+        let folder = self.out.as_deref();
+        folder.ok_or_else(|| anyhow!("--format {name} writes files: give their folder with -o"))
+    }
+
+    fn figures(&self, format: &Format) -> Result<()> {
+        if let Some(flag) = self.scene.first_given() {
+            bail!("{flag} is of scenes, for --to {}", MITSUBA.0);
+        }
+        if !format.selective {
+            self.choice.refuse(format.name)?;
+        }
+        let dir = records_in(&self.what);
+        let records = read_records(&dir)?;
+        for warning in &records.warnings {
+            warn(warning);
+        }
+        let choice = self.choice.selection()?;
+        let source = Source::new(&dir, &records.lines, &choice)?;
+        match &format.write {
+            Writer::Text(write) => {
+                let exported = write(&source);
+                for line in &exported.left_out {
+                    warn(&format!("left out: {line}"));
+                }
+                match &self.out {
+                    None => print(&exported.text)?,
+                    Some(file) => write_atomic(file, exported.text.as_bytes())
+                        .with_context(|| format!("cannot write {}", file.display()))?,
+                }
+            }
+            Writer::Folder(write) => {
+                let folder = self.folder(format.name)?;
+                let files = write(&source, folder)?;
+                for line in &files.left_out {
+                    warn(line);
+                }
+                tell(&format!("{} files in {}", files.count, folder.display()));
+            }
+        }
+        Ok(())
     }
 }

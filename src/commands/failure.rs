@@ -12,6 +12,15 @@ pub const BAD_INPUT: u8 = 2;
 /// No usable adapter.
 pub const NO_ADAPTER: u8 = 3;
 
+/// The exit code of a command that did all it was asked for, and found nothing wrong or something.
+pub fn ended(well: bool) -> ExitCode {
+    if well {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(FAILED)
+    }
+}
+
 /// Writes `error: …` to standard error.
 pub fn tell_error(error: &anyhow::Error) {
     tell_marked("error:", 31, &sentence(error));

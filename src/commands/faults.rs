@@ -1,7 +1,7 @@
 //! `raystone stress --mutants`: the planted faults are a test program of the project, which cargo builds and
 //! runs in a checkout.
 
-use super::failure::FAILED;
+use super::failure::ended;
 use super::output::print;
 use anyhow::{Context as _, Result, anyhow};
 use raystone::gpu::AdapterChoice;
@@ -42,10 +42,7 @@ pub fn plant_faults(out: &Path, adapter: Option<&AdapterChoice>) -> Result<ExitC
     })?;
     let records = out.join("mutants.jsonl");
     print(&format!("{text}records: {}\n", records.display()))?;
-    Ok(match status.success() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(FAILED),
-    })
+    Ok(ended(status.success()))
 }
 
 /// The folder of the checkout that the current folder is in.

@@ -1,9 +1,9 @@
 //! `raystone history`.
 
-use super::output::{OutputArguments, print, print_json, screen, warn};
+use super::export::ChoiceArguments;
+use super::output::{OutputArguments, screen, warn};
 use anyhow::Result;
 use clap::Args;
-use raystone::export::select::Selection;
 use raystone::history::History;
 use raystone::measure::record::read_records;
 use raystone::report::write_page;
@@ -18,13 +18,8 @@ pub struct HistoryOf {
     /// Folders that runs wrote; they are taken in the order of their time
     #[arg(required = true)]
     dirs: Vec<PathBuf>,
-    /// Figure, by its id with or without the version, or a pattern of ids; may be given many times [default: all that
-    /// rank]
-    #[arg(long, value_name = "ID")]
-    figure: Vec<String>,
-    /// Keep what fits: `--only 'accel=*bvh,uniform-grid(lambda=3),scene=cornell-box'`; patterns of one axis are alternatives
-    #[arg(long, value_name = "AXIS=PATTERN,…")]
-    only: Vec<String>,
+    #[command(flatten)]
+    choice: ChoiceArguments,
     /// Folder for the page and its plots [default: none is written]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -42,17 +37,11 @@ impl HistoryOf {
             }
             all.push((dir, records.lines));
         }
-        let history = History::new(&all, &Selection::new(&self.figure, &self.only)?)?;
+        let history = History::new(&all, &self.choice.selection()?)?;
         let page = match &self.out {
             Some(folder) => Some(write_page(folder, &mut history.document())?.0),
             None => None,
         };
-        if self.output.json {
-            let mut found = history.json();
-            found["page"] = json!(page);
-            print_json("history", found)?;
-            return Ok(ExitCode::SUCCESS);
-        }
         let screen = screen();
         let mut text = screen.table(&history.runs_table()) + "\n";
         let changes = history.changes_table();
@@ -60,10 +49,12 @@ impl HistoryOf {
             text += &(screen.table(&changes) + "\n");
         }
         text += &screen.lines(&history.summary());
-        if let Some(page) = page {
+        if let Some(page) = &page {
             text += &format!("page: {}\n", page.display());
         }
-        print(&text)?;
+        let mut fields = history.json();
+        fields["page"] = json!(page);
+        self.output.show("history", fields, &text)?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -1,7 +1,7 @@
 //! `raystone merge`.
 
-use super::failure::FAILED;
-use super::output::{OutputArguments, print, print_json, tell, warn};
+use super::failure::ended;
+use super::output::{OutputArguments, tell, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::{RunRecord, all_of, read_records};
@@ -41,30 +41,21 @@ impl Merge {
             tell(&format!("failed: {check}"));
         }
         let cells = merged.cells;
-        if self.output.json {
-            let fields = json!({
-                "cells": cells,
-                "whole": !merged.incomplete,
-                "notes": merged.notes,
-                "report": page,
-            });
-            print_json("merge", fields)?;
-        } else {
-            print(&format!(
-                "{cells} cells of {} folders\n\nreport: {}\n",
-                self.dirs.len(),
-                page.display()
-            ))?;
-        }
+        let fields = json!({
+            "cells": cells,
+            "whole": !merged.incomplete,
+            "notes": merged.notes,
+            "report": page,
+        });
+        let (folders, page) = (self.dirs.len(), page.display());
+        let text = format!("{cells} cells of {folders} folders\n\nreport: {page}\n");
+        self.output.show("merge", fields, &text)?;
         // As of the run that was divided.
         let is_lenient = all_of::<RunRecord>(&lines)
             .last()
             .is_some_and(|run| run.body.lenient);
-        Ok(
-            match merged.incomplete || !(failed.is_empty() || is_lenient) {
-                true => ExitCode::from(FAILED),
-                false => ExitCode::SUCCESS,
-            },
-        )
+        Ok(ended(
+            !merged.incomplete && (failed.is_empty() || is_lenient),
+        ))
     }
 }

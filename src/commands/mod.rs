@@ -2,27 +2,23 @@
 
 mod adapters;
 mod arguments;
-mod completions;
-mod discrepancy;
+mod compare;
 mod doctor;
 mod export;
-mod exporting;
 mod failure;
 mod faults;
+mod help;
 mod history;
 mod inspect;
 mod list;
-mod list_json;
 mod merge;
+mod mitsuba;
 mod output;
 mod points;
-mod points_plot;
 mod render;
 mod report;
 mod repro;
 mod run;
-mod scenes;
-mod schema;
 mod signals;
 mod stress;
 mod system;
@@ -30,10 +26,11 @@ mod trace;
 mod verify;
 mod verify_images;
 
-mod compare;
-
+use anyhow::Result;
 use clap::{Parser, Subcommand};
+use output::warn;
 use raystone::program::Program;
+use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
@@ -52,7 +49,7 @@ Examples:
   raystone run experiments/quick.toml
   raystone verify --accel bvh --scene path/to/model.obj
   raystone render --scene cornell-box --spp 256 -o box.png
-  raystone discrepancy --measure star,l2star points.txt";
+  raystone points --sequence sobol --count 64 --measure star";
 
 /// Version, commit and whether the sources differed from it.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -73,79 +70,78 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 #[derive(Parser)]
 #[command(name = "raystone", version = VERSION.as_str())]
 #[command(after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
+#[command(disable_help_subcommand = true)]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
 
-#[derive(Subcommand)]
-enum Command {
-    #[command(after_help = EXIT_CODES)]
+macro_rules! commands {
+    ($($name:ident($arguments:ty),)+) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $(#[command(after_help = EXIT_CODES)] $name($arguments),)+
+        }
+
+        impl Command {
+            fn execute(self) -> Result<ExitCode> {
+                match self {
+                    $(Self::$name(command) => command.execute(),)+
+                }
+            }
+        }
+    };
+}
+
+commands! {
     Run(run::Run),
-    #[command(after_help = EXIT_CODES)]
-    Render(render::Render),
-    #[command(after_help = EXIT_CODES)]
-    Verify(verify::Verify),
-    #[command(after_help = EXIT_CODES)]
+    Inspect(inspect::Inspect),
+    Merge(merge::Merge),
+    Report(report::Report),
     Compare(compare::Compare),
-    #[command(after_help = EXIT_CODES)]
+    History(history::HistoryOf),
+    Export(export::Export),
+    Repro(repro::Repro),
+    Render(render::Render),
+    Verify(verify::Verify),
+    Trace(trace::Trace),
+    Stress(stress::Stress),
     Points(points::Points),
     List(list::List),
-    #[command(after_help = EXIT_CODES)]
     Doctor(doctor::Doctor),
-    #[command(after_help = EXIT_CODES)]
-    Discrepancy(discrepancy::Discrepancy),
-    // The names that its parts once had.
-    #[command(after_help = EXIT_CODES, aliases = ["plan", "verify-run", "explain"])]
-    Inspect(inspect::Inspect),
-    #[command(after_help = EXIT_CODES)]
-    Merge(merge::Merge),
-    #[command(after_help = EXIT_CODES)]
-    Report(report::Report),
-    #[command(after_help = EXIT_CODES)]
-    Repro(repro::Repro),
-    Scenes(scenes::Scenes),
-    #[command(after_help = EXIT_CODES)]
-    Stress(stress::Stress),
-    #[command(after_help = EXIT_CODES)]
-    Trace(trace::Trace),
-    #[command(after_help = EXIT_CODES)]
-    ExportMitsuba(export::ExportMitsuba),
-    #[command(after_help = EXIT_CODES)]
-    Export(exporting::Export),
-    #[command(after_help = EXIT_CODES)]
-    History(history::HistoryOf),
-    Schema(schema::Schema),
-    Completions(completions::Completions),
-    Man(completions::Man),
+    Help(help::Help),
+}
+
+/// What commands were called before, and the words that they are now.
+const OLD: [(&str, &[&str]); 9] = [
+    ("plan", &["inspect"]),
+    ("verify-run", &["inspect"]),
+    ("explain", &["inspect"]),
+    ("discrepancy", &["points"]),
+    ("scenes", &["list", "model"]),
+    ("export-mitsuba", &["export", "--to", "mitsuba"]),
+    ("schema", &["help", "--schema"]),
+    ("completions", &["help", "--completions"]),
+    ("man", &["help", "--man"]),
+];
+
+/// The words of the command line, an old name replaced by what the command is called now.
+fn words(mut words: Vec<OsString>) -> Vec<OsString> {
+    let first = words.get(1);
+    if let Some((old, now)) = first.and_then(|word| OLD.iter().find(|(old, _)| word == old)) {
+        warn(&format!(
+            "`raystone {old}` is `raystone {}` now",
+            now.join(" ")
+        ));
+        words.splice(1..2, now.iter().map(OsString::from));
+    }
+    words
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
 pub fn main() -> ExitCode {
-    let done = match CommandLine::parse().command {
-        Command::Run(command) => command.execute(),
-        Command::Render(command) => command.execute(),
-        Command::Verify(command) => command.execute(),
-        Command::Compare(command) => command.execute(),
-        Command::Points(command) => command.execute(),
-        Command::List(command) => command.execute(),
-        Command::Doctor(command) => command.execute(),
-        Command::Discrepancy(command) => command.execute(),
-        Command::Inspect(command) => command.execute(),
-        Command::Merge(command) => command.execute(),
-        Command::Report(command) => command.execute(),
-        Command::Repro(command) => command.execute(),
-        Command::Scenes(command) => command.execute(),
-        Command::Stress(command) => command.execute(),
-        Command::Trace(command) => command.execute(),
-        Command::ExportMitsuba(command) => command.execute(),
-        Command::Export(command) => command.execute(),
-        Command::History(command) => command.execute(),
-        Command::Schema(command) => command.execute(),
-        Command::Completions(command) => command.execute(),
-        Command::Man(command) => command.execute(),
-    };
-    done.unwrap_or_else(failure::end)
+    let command = CommandLine::parse_from(words(std::env::args_os().collect())).command;
+    command.execute().unwrap_or_else(failure::end)
 }
 
 #[cfg(test)]
@@ -175,5 +171,19 @@ mod tests {
     #[test]
     fn the_commands_are_consistent() {
         CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn old_names_are_no_commands_and_lead_to_one() {
+        let command_line = CommandLine::command();
+        for (old, now) in OLD {
+            assert!(command_line.find_subcommand(old).is_none(), "{old}");
+            let found = words(["raystone", old, "more"].map(OsString::from).to_vec());
+            let expected = [&["raystone"], now, &["more"]].concat();
+            assert_eq!(found, expected);
+            assert!(command_line.find_subcommand(&found[1]).is_some(), "{old}");
+        }
+        let now = ["raystone", "run", "plan"].map(OsString::from);
+        assert_eq!(words(now.to_vec()), now);
     }
 }

@@ -16,6 +16,17 @@ pub struct OutputArguments {
     pub json: bool,
 }
 
+impl OutputArguments {
+    /// Prints what a command found as it was asked for: these fields, or this text.
+    pub fn show(self, command: &str, fields: Value, text: &str) -> Result<()> {
+        if self.json {
+            print_json(command, fields)
+        } else {
+            print(text)
+        }
+    }
+}
+
 /// Writes `text` to standard output.
 ///
 /// A reader that went away (`raystone list | head`) has what it wanted: that is no failure, and the

@@ -1,10 +1,12 @@
 //! `raystone render`.
 
-use super::arguments::{DeviceArguments, ValueArguments, list_override, plan};
-use super::output::print;
+use super::arguments::{
+    DeviceArguments, ValueArguments, of_flags, on_axis, one_cell, parse_size, plan,
+};
+use super::output::{print, tell};
 use anyhow::{Result, bail};
 use clap::Args;
-use raystone::config::{Axis, Experiment};
+use raystone::config::Axis;
 use raystone::image::FileFormat;
 use raystone::integrator::Order;
 use raystone::params::Choice as _;
@@ -12,48 +14,32 @@ use raystone::run::{Pictures, Registries, Rendering};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What is rendered where the command line says nothing: an experiment of one cell, so that one
-/// parser checks files, flags and `--set` alike.
-const DEFAULTS: &str = r#"
-[run]
-name = "render"
-replicates = 1
-resolution = [512, 384]
-spp = { pow2 = [6, 6] }
-[axes]
-scene = ["cornell-box"]
-accel = ["cwbvh"]
-sequence = ["sobol"]
-decorrelation = ["cranley-patterson"]
-integrator = ["path"]
-"#;
-
 /// Render one picture
 ///
 /// Every flag is a short form of --set: --accel bvh means --set axes.accel=bvh.
 #[derive(Args)]
 pub struct Render {
-    /// Built-in scene or path of a model [default: cornell-box]
-    #[arg(long)]
-    scene: Option<String>,
-    /// Acceleration structure [default: cwbvh]
-    #[arg(long)]
-    accel: Option<String>,
-    /// Sample sequence [default: sobol]
-    #[arg(long)]
-    sequence: Option<String>,
-    /// Decorrelation of the pixels [default: cranley-patterson]
-    #[arg(long)]
-    decorrelation: Option<String>,
-    /// What is computed [default: path]
-    #[arg(long)]
-    integrator: Option<String>,
-    /// Samples per pixel, at most 65536 [default: 64]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
-    spp: Option<u32>,
-    /// Width and height, pixels [default: 512x384]
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<[u32; 2]>,
+    /// Built-in scene or path of a model
+    #[arg(long, default_value = "cornell-box")]
+    scene: String,
+    /// Acceleration structure
+    #[arg(long, default_value = "cwbvh")]
+    accel: String,
+    /// Sample sequence
+    #[arg(long, default_value = "sobol")]
+    sequence: String,
+    /// Decorrelation of the pixels
+    #[arg(long, default_value = "cranley-patterson")]
+    decorrelation: String,
+    /// What is computed
+    #[arg(long, default_value = "path")]
+    integrator: String,
+    /// Samples per pixel, at most 65536
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
+    spp: u32,
+    /// Width and height, pixels
+    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse_size)]
+    size: [u32; 2],
     /// Seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
@@ -82,10 +68,8 @@ impl Render {
             check_output(preview)?;
         }
         let registries = Registries::default();
-        let catalogue = registries.catalogue();
-        let experiment =
-            Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
-        check_is_one(&experiment)?;
+        let experiment = of_flags("render", self.flags(), &self.values.set, &registries)?;
+        one_cell(&experiment)?;
         let plan = plan(&experiment, &[], &registries)?;
         // Only the picture is written: no folder is needed.
         let options = self.device.options(PathBuf::new(), &self.values, false);
@@ -100,35 +84,38 @@ impl Render {
                 preview: self.preview.as_deref(),
             },
         )?;
-        super::output::tell(summary(&rendering, experiment.run.resolution).trim_end());
+        tell(summary(&rendering, experiment.run.resolution).trim_end());
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
     }
 
-    fn overrides(&self) -> Vec<String> {
-        let mut overrides = Vec::new();
-        for (axis, name) in [
+    fn flags(&self) -> impl Iterator<Item = String> {
+        let axes = [
             (Axis::Scene, &self.scene),
             (Axis::Accel, &self.accel),
             (Axis::Sequence, &self.sequence),
             (Axis::Decorrelation, &self.decorrelation),
             (Axis::Integrator, &self.integrator),
-        ] {
-            let list = |name| list_override(&format!("axes.{axis}"), std::slice::from_ref(name));
-            overrides.extend(name.as_ref().map(list));
-        }
-        overrides.extend(self.spp.map(|spp| format!("run.spp=[{spp}]")));
-        if let Some([width, height]) = self.size {
-            overrides.push(format!("run.resolution=[{width}, {height}]"));
-        }
-        if let Some(seed) = self.seed {
-            overrides.push(format!("run.seed={seed}"));
-            // There is no reference image here, but its seeds have to differ all the same.
-            overrides.push(format!("reference.seed={}", seed.wrapping_add(1)));
-        }
-        overrides.extend(self.device.kernels_override());
-        overrides.extend(self.values.set.iter().cloned());
-        overrides
+        ];
+        let settings = [
+            "run.replicates=1".to_owned(),
+            format!("run.spp=[{}]", self.spp),
+            format!("run.resolution={:?}", self.size),
+        ];
+        // There is no reference image here, but its seeds have to differ all the same.
+        let seeds = self.seed.map(|seed| {
+            let other = seed.wrapping_add(1);
+            [
+                format!("run.seed={seed}"),
+                format!("reference.seed={other}"),
+            ]
+        });
+        let axes = axes
+            .into_iter()
+            .filter_map(|(axis, name)| on_axis(axis, [name]));
+        axes.chain(settings)
+            .chain(seeds.into_iter().flatten())
+            .chain(self.device.kernels_override())
     }
 }
 
@@ -172,39 +159,15 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
     )
 }
 
-/// One picture is one cell.
-fn check_is_one(experiment: &Experiment) -> Result<()> {
-    for axis in Axis::ALL {
-        let variants = &experiment.axes[axis];
-        if variants.len() > 1 {
-            let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
-            bail!(
-                "render makes one picture, but {axis} has {} values ({}); give one",
-                labels.len(),
-                labels.join(", ")
-            );
-        }
-    }
-    Ok(())
-}
-
 fn parse_order(text: &str) -> Result<Order, String> {
     Order::from_name(text).ok_or_else(|| format!("must be one of {}", Order::NAMES.join(", ")))
-}
-
-pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let parsed = text
-        .split_once(['x', 'X', '×'])
-        .and_then(|(width, height)| {
-            Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
-        });
-    parsed.ok_or_else(|| "must be width x height in pixels, for instance 512x384".to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::Parser;
+    use raystone::config::Experiment;
 
     #[derive(Parser)]
     struct Shell {
@@ -215,9 +178,10 @@ mod tests {
     fn experiment(arguments: &[&str]) -> Result<Experiment, String> {
         let arguments = std::iter::once(&"render").chain(arguments);
         let shell = Shell::try_parse_from(arguments).map_err(|e| e.to_string())?;
-        let catalogue = Registries::default().catalogue();
-        let overrides = shell.render.overrides();
-        Experiment::parse(DEFAULTS, "render", &overrides, &catalogue).map_err(|e| e.to_string())
+        let render = shell.render;
+        let set = &render.values.set;
+        let parsed = of_flags("render", render.flags(), set, &Registries::default());
+        parsed.map_err(|e| e.to_string())
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `raystone repro`.
 
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{OutputArguments, print, print_json, tell};
+use super::output::{OutputArguments, tell};
 use super::signals;
 use anyhow::{Result, anyhow};
 use clap::Args;
@@ -12,7 +12,8 @@ use raystone::repro::claim::Row;
 use raystone::repro::judge::Verdict;
 use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
 use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
-use raystone::run::{Registries, RunError, RunOptions, user_cache};
+use raystone::run::{Registries, RunError, RunOptions};
+use raystone::store::user_folder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,10 +56,9 @@ impl Repro {
         let sources = chosen(&self.name).map_err(|problem| anyhow!(problem))?;
         let not_covered = not_covered()?;
         if self.list {
-            match self.output.json {
-                true => print_json("repro", list_json(&sources, &not_covered)?)?,
-                false => print(&list(&sources, &not_covered)?)?,
-            }
+            let fields = list_json(&sources, &not_covered)?;
+            let text = list(&sources, &not_covered)?;
+            self.output.show("repro", fields, &text)?;
             return Ok(ExitCode::SUCCESS);
         }
         let folder = if self.quick { "repro-quick" } else { "repro" };
@@ -78,7 +78,7 @@ impl Repro {
             program: raystone::PROGRAM,
             adapter: self.adapter.clone().unwrap_or_default(),
             warn: Some(super::output::warn),
-            cache: user_cache(),
+            cache: user_folder(),
             ..RunOptions::default()
         };
         // Without an adapter what is recorded can be judged all the same; a run says that there is none.
@@ -111,14 +111,9 @@ impl Repro {
             return Ok(end(&tables, &failed));
         }
         let html = write(&settings, &tables, &failed, &not_covered)?;
-        match self.output.json {
-            true => print_json("repro", as_json(&tables, &failed, &html))?,
-            false => print(&format!(
-                "{}\nreport: {}\n",
-                in_words(&tables),
-                html.display()
-            ))?,
-        }
+        let text = format!("{}\nreport: {}\n", in_words(&tables), html.display());
+        let fields = as_json(&tables, &failed, &html);
+        self.output.show("repro", fields, &text)?;
         Ok(end(&tables, &failed))
     }
 }

@@ -1,7 +1,7 @@
 //! `raystone run`.
 
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
-use super::failure::{BAD_INPUT, FAILED};
+use super::failure::{BAD_INPUT, FAILED, ended};
 use super::output::{self, OutputArguments, print, print_json, screen};
 use super::report::findings;
 use super::signals;
@@ -14,8 +14,8 @@ use raystone::report::data::RunData;
 use raystone::report::{failed_checks, write_report};
 use raystone::run::{
     Cost, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
-    user_cache,
 };
+use raystone::store::user_folder;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -24,34 +24,16 @@ use std::process::ExitCode;
 pub struct Run {
     /// Experiment file (TOML), see docs/experiments.md
     file: PathBuf,
-    /// Folder for records, images and the report [default: results/NAME of the run, numbered]
-    #[arg(long, short, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Replace the results that the folder holds, once the new ones are whole
-    #[arg(long, conflicts_with = "number")]
-    force: bool,
-    /// Go on with the results that the folder holds: cells that still hold (same kernels, scene, parameters, program) are kept, all
-    /// others are measured
-    #[arg(long, conflicts_with_all = ["number", "force"])]
-    resume: bool,
-    /// Where another run is writing the folder, wait until it ends instead of ending
-    #[arg(long)]
-    wait: bool,
+    #[command(flatten)]
+    folder: FolderArguments,
     /// Run one of N parts of the plan, as 3/8; `raystone merge` joins them [default folder: results/NAME/shard-K-of-N]
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Render the references alone and keep them where runs find them; with --shard, a part of their samples
     #[arg(long, conflicts_with_all = ["no_cache", "resume", "force", "number"])]
     references: bool,
-    /// End with the first cell that fails; `--resume` goes on later
-    #[arg(long, conflicts_with = "keep_going")]
-    fail_fast: bool,
-    /// Go on after cells that fail (the default)
-    #[arg(long)]
-    keep_going: bool,
-    /// Where the folder holds results or is being written, take the first free one of DIR-2, DIR-3, …
-    #[arg(long)]
-    number: bool,
+    #[command(flatten)]
+    failures: FailureArguments,
     #[command(flatten)]
     experiment: ExperimentArguments,
     /// Image to compare with in place of a rendered reference, of the run's resolution: .exr, .hdr, .pfm, .npy;
@@ -66,9 +48,6 @@ pub struct Run {
     /// and keep none
     #[arg(long)]
     no_cache: bool,
-    /// End with exit code 0 even if gates, cells or checks fail; the report says so
-    #[arg(long)]
-    lenient: bool,
     /// Print the cells and an estimate of the time; start nothing
     #[arg(long)]
     dry_run: bool,
@@ -79,6 +58,52 @@ pub struct Run {
     quiet: bool,
     #[command(flatten)]
     output: OutputArguments,
+}
+
+/// The folder that a run writes.
+#[derive(Args)]
+struct FolderArguments {
+    /// Folder for records, images and the report [default: results/NAME of the run, numbered]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace the results that the folder holds, once the new ones are whole
+    #[arg(long, conflicts_with = "number")]
+    force: bool,
+    /// Go on with the results that the folder holds: cells that still hold (same kernels, scene, parameters, program) are kept, all
+    /// others are measured
+    #[arg(long, conflicts_with_all = ["number", "force"])]
+    resume: bool,
+    /// Where another run is writing the folder, wait until it ends instead of ending
+    #[arg(long)]
+    wait: bool,
+    /// Where the folder holds results or is being written, take the first free one of DIR-2, DIR-3, …
+    #[arg(long)]
+    number: bool,
+}
+
+impl FolderArguments {
+    fn existing(&self) -> Existing {
+        match (self.resume, self.force) {
+            (true, _) => Existing::Resume,
+            (_, true) => Existing::Replace,
+            _ if self.number || self.out.is_none() => Existing::Number,
+            _ => Existing::Refuse,
+        }
+    }
+}
+
+/// What becomes of failures.
+#[derive(Args)]
+struct FailureArguments {
+    /// End with the first cell that fails; `--resume` goes on later
+    #[arg(long, conflicts_with = "keep_going")]
+    fail_fast: bool,
+    /// Go on after cells that fail (the default)
+    #[arg(long)]
+    keep_going: bool,
+    /// End with exit code 0 even if gates, cells or checks fail; the report says so
+    #[arg(long)]
+    lenient: bool,
 }
 
 impl Run {
@@ -94,35 +119,24 @@ impl Run {
             Kernels::load(&plan.kernels, &registries)?;
             let units = registries.measurements.units(&experiment, &plan);
             let cost = Cost::new(&experiment, &plan, &registries.integrators);
-            if self.output.json {
-                print_json("run", super::inspect::plan::as_json(&plan, &units, &cost))?;
-                return Ok(ExitCode::SUCCESS);
-            }
-            print(&format!(
-                "{}\n{}\n",
-                plan.describe().trim_end(),
-                cost.whole(&units).describe()
-            ))?;
+            let cells = plan.describe();
+            let text = format!("{}\n{}\n", cells.trim_end(), cost.whole(&units).describe());
+            let fields = super::inspect::plan::as_json(&plan, &units, &cost);
+            self.output.show("run", fields, &text)?;
             return Ok(ExitCode::SUCCESS);
         }
-        let existing = match (self.force, self.number || self.out.is_none()) {
-            _ if self.resume => Existing::Resume,
-            (true, _) => Existing::Replace,
-            (_, true) => Existing::Number,
-            _ => Existing::Refuse,
-        };
         let default = || default_folder(&experiment.name, self.shard);
-        let out = self.out.clone().unwrap_or_else(default);
+        let out = self.folder.out.clone().unwrap_or_else(default);
         let mut options = self
             .device
             .options(out, &self.experiment.values, self.quiet);
-        options.existing = existing;
+        options.existing = self.folder.existing();
         options.images = self.images;
         options.shard = self.shard;
-        options.wait = self.wait;
-        options.fail_fast = self.fail_fast && !self.keep_going;
-        options.lenient = self.lenient;
-        options.cache = user_cache().filter(|_| !self.no_cache);
+        options.wait = self.folder.wait;
+        options.fail_fast = self.failures.fail_fast && !self.failures.keep_going;
+        options.lenient = self.failures.lenient;
+        options.cache = user_folder().filter(|_| !self.no_cache);
         if self.references {
             return references(&experiment, &plan, &registries, &options);
         }
@@ -190,10 +204,7 @@ fn references(
     for failure in &failures {
         output::tell(&format!("failed: {failure}"));
     }
-    Ok(match failures.is_empty() {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::from(FAILED),
-    })
+    Ok(ended(failures.is_empty()))
 }
 
 /// The image to compare with as an override of an experiment.

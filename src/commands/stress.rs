@@ -1,13 +1,13 @@
 //! `raystone stress`.
 
-use super::arguments::{DeviceArguments, ValueArguments, list_override, plan, warn_of};
+use super::arguments::{DeviceArguments, ValueArguments, on_axis, plan, warn_of};
 use super::faults::plant_faults;
 use super::output::OutputArguments;
 use super::run::carry_out;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::expect::Thesis;
-use raystone::config::{Experiment, STRESS};
+use raystone::config::{Axis, Experiment, STRESS};
 use raystone::run::Existing;
 use raystone::scene::named;
 use raystone::stress::EXPERIMENT;
@@ -56,6 +56,8 @@ pub struct Stress {
     output: OutputArguments,
 }
 
+/// Always takes part: the others are compared with it.
+const BRUTE_FORCE: &str = "brute-force";
 /// What messages call the experiment.
 const FILE: &str = "experiments/stress.toml";
 
@@ -96,18 +98,14 @@ impl Stress {
         if self.quick {
             overrides.extend(Thesis::parse(EXPERIMENT, FILE)?.unwrap_or_default().quick);
         }
-        if !self.triangle.is_empty() {
-            overrides.push(list_override("axes.triangle", &self.triangle));
-        }
+        overrides.extend(on_axis(Axis::Triangle, &self.triangle));
         if !self.accel.is_empty() {
-            let mut accels = vec!["brute-force".to_owned()];
-            accels.extend(
-                self.accel
-                    .iter()
-                    .filter(|name| *name != "brute-force")
-                    .cloned(),
-            );
-            overrides.push(list_override("axes.accel", &accels));
+            let others = self.accel.iter().map(String::as_str);
+            let others = others.filter(|name| *name != BRUTE_FORCE);
+            overrides.extend(on_axis(
+                Axis::Accel,
+                [BRUTE_FORCE].into_iter().chain(others),
+            ));
         }
         if !self.family.is_empty() {
             let shots = self
@@ -115,8 +113,8 @@ impl Stress {
                 .filter(|shots| *shots > 0)
                 .map(|_| "shots".to_owned());
             let parts = self.family.iter().cloned().chain(shots);
-            let parts: Vec<String> = parts.map(|part| format!("{STRESS}{part}")).collect();
-            overrides.push(list_override("axes.integrator", &parts));
+            let parts = parts.map(|part| format!("{STRESS}{part}"));
+            overrides.extend(on_axis(Axis::Integrator, parts));
         }
         overrides.extend(self.rays.map(|rays| format!("stress.rays={rays}")));
         overrides.extend(self.shots.map(|shots| format!("stress.shots={shots}")));

@@ -1,12 +1,12 @@
 //! `raystone trace`.
 
-use super::arguments::{ValueArguments, list_override, warn_of};
-use super::failure::FAILED;
+use super::arguments::{ValueArguments, of_flags, on_axis, one_cell, warn_of};
+use super::failure::ended;
 use super::output::print;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use raystone::accel::{Ray, TriangleSoup};
-use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan};
+use raystone::config::{Axis, Cell};
 use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, SceneData, load};
@@ -54,37 +54,21 @@ impl Trace {
         let explained = explain(&scene, &soup, kind, &accel.params, &ray);
         let (text, equal) = explained.map_err(|e| anyhow!(e))?;
         print(&text)?;
-        Ok(match equal {
-            true => ExitCode::SUCCESS,
-            false => ExitCode::from(FAILED),
-        })
+        Ok(ended(equal))
     }
 
     /// Scene, structure and tests with their parameters, read as those of an experiment file.
     fn cell(&self, registries: &Registries) -> Result<Cell> {
-        let catalogue = registries.catalogue();
         // A case of the suite is no scene of an experiment; any other one stands in its place there.
-        let scene = match Address::parse(&self.scene) {
-            Some(_) => "cornell-box".to_owned(),
-            None => self.scene.clone(),
-        };
-        let tests = [("triangle", &self.triangle), ("box_test", &self.box_test)];
-        let tests = tests
-            .into_iter()
-            .filter_map(|(axis, name)| Some((axis, name.as_ref()?)));
-        let named = [("scene", &scene), ("accel", &self.accel)]
-            .into_iter()
-            .chain(tests);
-        let one = |(axis, name): (&str, &String)| {
-            list_override(&format!("axes.{axis}"), std::slice::from_ref(name))
-        };
-        let mut overrides: Vec<String> = named.map(one).collect();
-        overrides.extend(self.values.set.iter().cloned());
-        let experiment =
-            Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
-        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
-        let cell = plan.structures.into_iter().next();
-        cell.ok_or_else(|| anyhow!("--set leaves no scene or no structure"))
+        let scene = Address::parse(&self.scene).is_none().then_some(&self.scene);
+        let flags = [
+            on_axis(Axis::Scene, scene),
+            on_axis(Axis::Accel, [&self.accel]),
+            on_axis(Axis::Triangle, &self.triangle),
+            on_axis(Axis::BoxTest, &self.box_test),
+        ];
+        let flags = flags.into_iter().flatten();
+        one_cell(&of_flags("trace", flags, &self.values.set, registries)?)
     }
 
     fn load(&self, variant: &Variant) -> Result<SceneData> {
@@ -100,15 +84,4 @@ impl Trace {
         warn_of(&scene);
         Ok(scene)
     }
-}
-
-/// An experiment with everything but scene and structure.
-fn text(catalogue: &Catalogue) -> String {
-    let sequence = catalogue[Axis::Sequence]
-        .first()
-        .map(|entry| entry.name.as_str());
-    format!(
-        "[run]\nname = \"trace\"\n[axes]\nsequence = {}\n",
-        toml::Value::from(sequence.unwrap_or_default()),
-    )
 }

@@ -1,12 +1,12 @@
 //! `raystone verify`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, list_override, plan};
+use super::arguments::{DeviceArguments, ExperimentArguments, of_flags, on_axis, plan};
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{OutputArguments, print, print_json, screen, tell};
+use super::output::{OutputArguments, screen, tell};
 use super::verify_images;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan, Skipped};
+use raystone::config::{Axis, Cell, Experiment, Plan, Skipped};
 use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, Key, PathsRecord, Verdict};
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::count;
@@ -61,16 +61,13 @@ impl Verify {
         if self.images {
             return verify_images::execute(&registries, &self.device, &self.experiment.values);
         }
-        let catalogue = registries.catalogue();
-        let overrides = self.overrides();
+        let (flags, set) = (self.flags(), &self.experiment.values.set);
         let experiment = match &self.file {
-            Some(file) => Experiment::load(file, &overrides, &catalogue)?,
-            None => Experiment::parse(
-                &defaults(&catalogue),
-                "raystone verify",
-                &overrides,
-                &catalogue,
-            )?,
+            Some(file) => {
+                let overrides: Vec<String> = flags.chain(set.iter().cloned()).collect();
+                Experiment::load(file, &overrides, &registries.catalogue())?
+            }
+            None => of_flags("verify", all(&registries).chain(flags), set, &registries)?,
         };
         let mut plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.file.is_none() {
@@ -91,17 +88,14 @@ impl Verify {
         let refused = verified.iter().filter(|v| v.refused).count();
         let failed = verified.iter().filter(|v| !passed(v)).count() - refused;
         let failed_paths = paths.iter().filter(|(_, p)| p.fault.is_some()).count();
-        match self.output.json {
-            true => print_json("verify", as_json(&verified, &plan.skipped))?,
-            false => {
-                print(&format!("{}{}", table(&verified), paths_table(&paths)))?;
-                print(&ending(verified.len() - refused, failed, refused))?;
-                if !paths.is_empty() {
-                    let (right, all) = (paths.len() - failed_paths, paths.len());
-                    print(&format!("{right} of {all} integrators did not fail\n"))?;
-                }
-            }
+        let mut text = format!("{}{}", table(&verified), paths_table(&paths));
+        text += &ending(verified.len() - refused, failed, refused);
+        if !paths.is_empty() {
+            let (right, all) = (paths.len() - failed_paths, paths.len());
+            text += &format!("{right} of {all} integrators did not fail\n");
         }
+        let fields = as_json(&verified, &plan.skipped);
+        self.output.show("verify", fields, &text)?;
         let bad_input = verified.iter().any(|v| v.bad_input);
         Ok(match failed + failed_paths {
             0 => ExitCode::SUCCESS,
@@ -110,36 +104,28 @@ impl Verify {
         })
     }
 
-    fn overrides(&self) -> Vec<String> {
-        let mut overrides = Vec::new();
-        for (key, names) in [("axes.scene", &self.scene), ("axes.accel", &self.accel)] {
-            if !names.is_empty() {
-                overrides.push(list_override(key, names));
-            }
-        }
-        overrides.extend(self.rays.map(|rays| format!("gate.rays={rays}")));
-        overrides.extend(self.device.kernels_override());
-        overrides.extend(self.experiment.values.set.iter().cloned());
-        overrides
+    fn flags(&self) -> impl Iterator<Item = String> {
+        let rays = self.rays.map(|rays| format!("gate.rays={rays}"));
+        let flags = [
+            on_axis(Axis::Scene, &self.scene),
+            on_axis(Axis::Accel, &self.accel),
+            rays,
+            self.device.kernels_override(),
+        ];
+        flags.into_iter().flatten()
     }
 }
 
-/// An experiment of every structure on the scenes of the gate.
-fn defaults(catalogue: &Catalogue) -> String {
-    let accel: Vec<_> = catalogue[Axis::Accel]
-        .iter()
-        .map(|entry| entry.name.clone())
-        .collect();
-    let sequence = catalogue[Axis::Sequence]
-        .first()
-        .map(|entry| entry.name.as_str());
-    format!(
-        "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\nintegrator = {}\n",
-        toml::Value::from(SCENES.to_vec()),
-        toml::Value::from(accel),
-        toml::Value::from(sequence.unwrap_or_default()),
-        toml::Value::from(INTEGRATORS.to_vec()),
-    )
+/// Every structure on the scenes of the gate.
+fn all(registries: &Registries) -> impl Iterator<Item = String> {
+    let catalogue = registries.catalogue();
+    let structures = catalogue[Axis::Accel].iter().map(|entry| &entry.name);
+    let axes = [
+        on_axis(Axis::Scene, SCENES),
+        on_axis(Axis::Accel, structures),
+        on_axis(Axis::Integrator, INTEGRATORS),
+    ];
+    axes.into_iter().flatten()
 }
 
 /// Leaves out brute force on scenes with many triangles, where other structures are checked.
@@ -388,10 +374,8 @@ mod tests {
 
     fn plan(scene: &str, accel: &str) -> Plan {
         let registries = Registries::default();
-        let catalogue = registries.catalogue();
-        let overrides = [format!("axes.scene={scene}"), format!("axes.accel={accel}")];
-        let experiment =
-            Experiment::parse(&defaults(&catalogue), "test", &overrides, &catalogue).unwrap();
+        let set = [format!("axes.scene={scene}"), format!("axes.accel={accel}")];
+        let experiment = of_flags("verify", all(&registries), &set, &registries).unwrap();
         let mut plan = Plan::new(&experiment, &[], |_, _| Ok(true)).unwrap();
         assert!(spare_brute_force(&mut plan, false).is_ok());
         plan
@@ -410,8 +394,9 @@ mod tests {
 
     #[test]
     fn without_a_file_every_structure_is_checked() {
-        let catalogue = Registries::default().catalogue();
-        let experiment = Experiment::parse(&defaults(&catalogue), "test", &[], &catalogue).unwrap();
+        let registries = Registries::default();
+        let catalogue = registries.catalogue();
+        let experiment = of_flags("verify", all(&registries), &[], &registries).unwrap();
         assert_eq!(
             experiment.axes[Axis::Accel].len(),
             catalogue[Axis::Accel].len()

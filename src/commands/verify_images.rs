@@ -1,7 +1,7 @@
 //! `raystone verify --images`.
 
 use super::arguments::{DeviceArguments, ValueArguments};
-use super::failure::FAILED;
+use super::failure::ended;
 use super::output::{print, screen};
 use anyhow::Result;
 use raystone::measure::known_images::{NOISE, SYSTEMATIC, Seen};
@@ -26,10 +26,7 @@ pub fn execute(
         all.len() - failed,
         all.len()
     ))?;
-    Ok(match failed {
-        0 => ExitCode::SUCCESS,
-        _ => ExitCode::from(FAILED),
-    })
+    Ok(ended(failed == 0))
 }
 
 /// A row per view with its worst channel, and what is wrong below.

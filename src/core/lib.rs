@@ -9,5 +9,6 @@ pub mod load;
 pub mod params;
 pub mod program;
 pub mod random;
+pub mod store;
 pub mod structure;
 pub mod text;

@@ -12,7 +12,7 @@
 
 use crate::holes::SceneHoles;
 use crate::instance_judge;
-use crate::kept_checks::{self, KeptChecks};
+use crate::kept_checks::KeptChecks;
 use crate::rays::{RaySet, record_rays};
 use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
 use raystone_accel::triangle::TriangleRecord;
@@ -22,6 +22,7 @@ use raystone_accel::{
 };
 use raystone_config::Gate;
 use raystone_core::geometry::Camera;
+use raystone_core::store::user_folder;
 use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use raystone_record::{ClassVerdict, GateVerdict, JudgeCheck};
 use raystone_scene::SceneData;
@@ -77,8 +78,8 @@ impl Judge {
         judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
         let kept = match past {
             Checks::Repeated => None,
-            Checks::Kept => kept_checks::folder().and_then(|folder| {
-                KeptChecks::of(folder, &judge, &scene.hash, soup.intersection, settings)
+            Checks::Kept => user_folder().and_then(|folder| {
+                KeptChecks::of(&folder, &judge, &scene.hash, soup.intersection, settings)
             }),
         };
         if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {

@@ -1,30 +1,24 @@
 //! A cache of checks of the reference tracer: the verdicts of brute force and the oracle are stored
-//! on disk under a hash of everything that they depend on.
+//! on disk under a hash of everything that they depend on ([`raystone_core::store`]).
 //!
 //! The hash covers the scene, the tests, every ray with its reference answer, how much was checked,
 //! and the program, so that a wrong answer never finds the checks of a right one. Only checks
-//! without a fault are stored; a file that is incomplete or has the wrong name is ignored.
+//! without a fault are stored.
 
 use crate::gate::Judge;
 use raystone_accel::Intersection;
 use raystone_config::Gate;
-use raystone_core::atomic::write_atomic;
+use raystone_core::store::Kept;
 use raystone_record::JudgeCheck;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::SystemTime;
 
-/// Names a cache folder to use instead of the user's; `off` disables the cache.
-pub(crate) const CACHE_VARIABLE: &str = "RAYSTONE_CACHE";
-
-pub(super) struct KeptChecks {
-    folder: PathBuf,
-    key: String,
-}
+/// Where the checks of one judge are kept.
+pub(super) struct KeptChecks(Kept);
 
 #[derive(Serialize, Deserialize)]
 struct Content {
-    key: String,
     checked_unix_s: u64,
     world: [JudgeCheck; 2],
     instances: Option<[JudgeCheck; 2]>,
@@ -33,29 +27,27 @@ struct Content {
 impl KeptChecks {
     /// The place in a folder for a reference with these rays; `None` without a program identity.
     pub(crate) fn of(
-        folder: PathBuf,
+        folder: &Path,
         judge: &Judge,
         scene_hash: &str,
         intersection: Intersection,
         settings: &Gate,
     ) -> Option<Self> {
         let mut hasher = blake3::Hasher::new();
-        let about = format!("{scene_hash} {intersection:?} {settings:?} {}", program()?);
-        hasher.update(about.as_bytes());
         let judges = [Some(judge), judge.instances.as_deref()];
         for set in judges.into_iter().flatten().flat_map(|judge| &judge.sets) {
             hasher.update(&(set.rays.len() as u64).to_le_bytes());
             hasher.update(bytemuck::cast_slice(&set.rays));
             hasher.update(bytemuck::cast_slice(&set.truth));
         }
-        Some(Self {
-            folder,
-            key: hasher.finalize().to_hex().to_string(),
-        })
-    }
-
-    fn path(&self) -> PathBuf {
-        self.folder.join(format!("judge-{}.json", self.key))
+        let settings = format!("{intersection:?} {settings:?}");
+        let rays = hasher.finalize().to_hex();
+        let depends_on = [
+            ("scene", scene_hash),
+            ("settings", &settings),
+            ("rays", &rays),
+        ];
+        Kept::new(folder, "checks", &depends_on).map(Self)
     }
 
     /// Restores cached checks; returns true if there were any.
@@ -76,18 +68,12 @@ impl KeptChecks {
     }
 
     fn read(&self) -> Option<Content> {
-        let text = std::fs::read_to_string(self.path()).ok()?;
-        let (line, sum) = text.trim_end().split_once('\n')?;
-        if blake3::hash(line.as_bytes()).to_hex().as_str() != sum {
-            return None;
-        }
-        let content: Content = serde_json::from_str(line).ok()?;
-        let checks = content
-            .world
-            .iter()
-            .chain(content.instances.iter().flatten());
-        let right = checks.clone().all(|c| c.wrong == 0) && checks.clone().all(|c| c.rays > 0);
-        (content.key == self.key && right).then_some(content)
+        let content: Content = serde_json::from_slice(&self.0.read()?).ok()?;
+        let world = content.world.iter();
+        let mut checks = world.chain(content.instances.iter().flatten());
+        checks
+            .all(|check| check.wrong == 0 && check.rays > 0)
+            .then_some(content)
     }
 
     /// Stores the checks of a sound reference. After a failed write they merely run again.
@@ -99,43 +85,15 @@ impl KeptChecks {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let checks = |judge: &Judge| [judge.brute_force.clone(), judge.oracle.clone()];
         let content = Content {
-            key: self.key.clone(),
             checked_unix_s: now.map_or(0, |d| d.as_secs()),
             world: checks(judge),
             instances: instances.map(checks),
         };
-        let Ok(line) = serde_json::to_string(&content) else {
-            return;
-        };
-        let sum = blake3::hash(line.as_bytes()).to_hex();
-        let written = std::fs::create_dir_all(&self.folder)
-            .and_then(|()| write_atomic(&self.path(), format!("{line}\n{sum}\n").as_bytes()));
-        // A cache that cannot be written only costs time.
-        drop(written);
-    }
-}
-
-/// The cache folder, if the cache is enabled.
-pub(super) fn folder() -> Option<PathBuf> {
-    let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    match named(CACHE_VARIABLE) {
-        Some(value) if value == "off" => None,
-        Some(value) => Some(value.into()),
-        None => {
-            let cache = named("XDG_CACHE_HOME").map(PathBuf::from);
-            let cache = cache.or_else(|| Some(PathBuf::from(named("HOME")?).join(".cache")));
-            Some(cache?.join("raystone"))
+        if let Ok(bytes) = serde_json::to_vec(&content) {
+            // A cache that cannot be written costs time, nothing else.
+            let _ = self.0.write(bytes);
         }
     }
-}
-
-/// Identifies this build of the program.
-fn program() -> Option<String> {
-    let file = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
-    let built = file.modified().ok()?;
-    let since = built.duration_since(SystemTime::UNIX_EPOCH).ok()?;
-    let version = env!("CARGO_PKG_VERSION");
-    Some(format!("{version} {} {}", file.len(), since.as_nanos()))
 }
 
 #[cfg(test)]
@@ -144,7 +102,6 @@ mod tests {
     use crate::rays::RaySet;
     use raystone_accel::{Hit, Ray};
     use raystone_record::RayClass;
-    use std::path::Path;
 
     fn judge(t: f32) -> Judge {
         let checked = JudgeCheck {
@@ -175,13 +132,7 @@ mod tests {
     };
 
     fn place(folder: &Path, judge: &Judge, gate: &Gate) -> KeptChecks {
-        let place = KeptChecks::of(
-            folder.to_owned(),
-            judge,
-            "scene",
-            Intersection::default(),
-            gate,
-        );
+        let place = KeptChecks::of(folder, judge, "scene", Intersection::default(), gate);
         place.expect("a program")
     }
 
@@ -206,26 +157,19 @@ mod tests {
     }
 
     #[test]
-    fn files_that_are_changed_foreign_or_of_a_wrong_judge_count_for_nothing() {
+    fn checks_of_a_wrong_judge_or_that_were_changed_count_for_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let sound = judge(1.0);
         let here = place(folder.path(), &sound, &GATE);
         let mut wrong = judge(1.0);
         wrong.oracle.wrong = 1;
         here.keep(&wrong);
-        assert!(!here.path().exists());
+        assert!(!here.0.path().exists());
         here.keep(&sound);
-        let whole = std::fs::read_to_string(here.path()).unwrap();
-        for changed in [
-            whole.replace("\"rays\":7", "\"rays\":8"),
-            whole[..40].to_owned(),
-        ] {
-            assert_ne!(changed, whole);
-            std::fs::write(here.path(), changed).unwrap();
-            assert!(!here.restore(&mut judge(1.0)));
-        }
-        let there = place(folder.path(), &judge(2.0), &GATE);
-        std::fs::write(there.path(), &whole).unwrap();
-        assert!(!there.restore(&mut judge(2.0)));
+        let text = String::from_utf8(here.0.read().unwrap()).unwrap();
+        let faulty = text.replacen("\"wrong\":0", "\"wrong\":1", 1);
+        assert_ne!(faulty, text);
+        here.0.write(faulty.into_bytes()).unwrap();
+        assert!(!here.restore(&mut judge(1.0)));
     }
 }

@@ -107,7 +107,7 @@ pub fn ply(bytes: &[u8]) -> Outcome {
     })
 }
 
-/// A list of points, as `raystone discrepancy` reads it.
+/// A list of points, as `raystone points` reads it.
 pub fn points(bytes: &[u8]) -> Outcome {
     let look = |points: PointSet| {
         assert!(points.len() > 0 && points.dim() > 0);

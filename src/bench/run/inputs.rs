@@ -1,9 +1,11 @@
 //! Inputs of a cell's figures, and validity of an earlier run's figures.
 
 use super::kernels::Kernels;
+use super::reference_file::ReferenceFile;
 use super::registries::Registries;
 use super::units::Unit;
 use raystone_config::{Axis, Experiment};
+use raystone_core::store;
 use raystone_core::text::cell_hash;
 use raystone_record::Environment;
 use raystone_record::{CellRecord, Inputs, KernelSetRecord, Key};
@@ -27,7 +29,7 @@ pub(super) fn program() -> &'static str {
             let stem = path.file_stem();
             stem.is_some_and(|stem| stem == "raystone")
         });
-        match super::reference_cache::program().filter(|_| !is_own) {
+        match store::program().filter(|_| !is_own) {
             Some(bytes) => short(&[("host", own), ("program", bytes)]),
             None => own.to_owned(),
         }
@@ -57,11 +59,12 @@ impl<'a> Current<'a> {
     /// Inputs of an experiment with these kernels; `reference_file` is the hash of that image.
     pub(super) fn new(
         experiment: &Experiment,
-        reference_file: &str,
+        reference_file: Option<&ReferenceFile>,
         registries: &Registries,
         kernels: &'a Kernels,
     ) -> Self {
         let measurements = registries.measurements.iter();
+        let reference_file = reference_file.map_or("", |file| &file.hash);
         // Sections added by others may matter to any measurement.
         let further = if experiment.further.is_empty() {
             String::new()

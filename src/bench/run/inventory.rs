@@ -2,22 +2,18 @@
 
 use super::cost::Cost;
 use super::error::RunError;
-use super::folder::records_in;
 use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
 use super::options::RunOptions;
+use super::reference_file::ReferenceFile;
 use super::registries::Registries;
-use super::resume::Earlier;
+use super::resume::{Earlier, made_of};
+use super::scene_hashes;
 use super::shard::shards;
 use super::units::Unit;
-use super::world::load_options;
-use raystone_config::{ConfigError, Experiment, Plan, Shard};
-use raystone_record::{
-    CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RecordError,
-    RunRecord, read_records, records_file,
-};
-use raystone_scene as scene;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use raystone_config::{Axis, Experiment, Plan, Shard};
+use raystone_record::{CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Outcome, RunRecord};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// The state of a cell of a plan.
@@ -60,90 +56,48 @@ pub struct Inventory {
     earlier: Earlier,
 }
 
-/// The plan that a run was made by.
-///
-/// # Errors
-/// The experiment in the records is none to this program.
-pub(super) fn planned(
-    run: &RunRecord,
-    registries: &Registries,
-) -> Result<(Experiment, Plan), ConfigError> {
-    // Overrides stand behind the text as comments, too.
-    let text = &run.experiment_text;
-    let experiment = Experiment::parse(
-        text,
-        &run.experiment,
-        &run.overrides,
-        &registries.catalogue(),
-    )?;
-    let plan = Plan::new(&experiment, &run.only, |s, d| {
-        registries.is_randomised(s, d)
-    })?;
-    Ok((experiment, plan))
-}
-
 impl Inventory {
     /// Reads the records of a folder, those of a run that goes on or was killed included.
     ///
     /// # Errors
     /// Records that cannot be read, without a first line, or of an experiment that this program does not know.
     pub fn read(dir: &Path, registries: &Registries) -> Result<Self, RunError> {
-        let dir = &records_in(dir);
-        let fault = |error: RecordError| RunError::Input(error.to_string());
-        let records = read_records(dir).map_err(fault)?;
-        let mut runs = records
-            .lines
-            .iter()
-            .filter_map(|line| RunRecord::of(&line.body));
-        let run = runs.next_back().cloned().ok_or_else(|| {
-            RunError::Input(format!(
-                "{} does not say of what experiment it is: its first line is missing",
-                records_file(dir).display()
-            ))
-        })?;
-        let (experiment, plan) = planned(&run, registries)
-            .map_err(|e| RunError::Input(format!("{}: {e}", dir.display())))?;
-        let mut ended = records
-            .lines
-            .iter()
-            .filter_map(|l| InterruptedRecord::of(&l.body));
-        let interrupted = ended.next_back().map(|record| record.reason.clone());
-        let mut of_unit: BTreeMap<String, Vec<CellRecord>> = BTreeMap::new();
-        for cell in records.lines.iter().filter_map(|l| CellRecord::of(&l.body)) {
-            of_unit
-                .entry(cell.unit.clone())
-                .or_default()
-                .push(cell.clone());
+        let earlier = Earlier::read(dir)?;
+        let (experiment, plan) = earlier.planned(registries)?;
+        let mut of_unit: BTreeMap<&str, Vec<&CellRecord>> = BTreeMap::new();
+        for cell in earlier.all::<CellRecord>() {
+            of_unit.entry(&cell.unit).or_default().push(cell);
         }
-        let units = wanted_units(&records.lines, &experiment, &plan, registries);
-        let all = registries.measurements.units(&experiment, &plan);
-        let known: BTreeSet<&str> = all.iter().map(|unit| unit.name.as_str()).collect();
-        let foreign = of_unit.keys().filter(|name| !known.contains(name.as_str()));
-        let foreign = foreign.cloned().collect();
-        let states = units.into_iter().map(|unit| State {
-            record: of_unit
-                .get(&unit.name)
-                .and_then(|records| records.last().cloned()),
-            unit,
-        });
-        let states = states.collect();
-        let earlier = Earlier::new(records.lines);
+        let units = registries.measurements.units(&experiment, &plan);
+        let known: HashSet<&str> = units.iter().map(|unit| unit.name.as_str()).collect();
+        let names = of_unit.keys().copied();
+        let foreign = names.filter(|name| !known.contains(name));
         let sets = earlier.kernel_sets();
         let contradicted = of_unit
             .iter()
             .filter(|(_, records)| is_contradicted(records, &sets));
-        let contradicted = contradicted.map(|(name, _)| name.clone()).collect();
+        let cost = Cost::new(&experiment, &plan, &registries.integrators);
+        let wanted = wanted(&earlier, &units, &cost);
+        let ended = earlier.all::<InterruptedRecord>().next_back();
         Ok(Self {
-            states,
-            dir: dir.to_owned(),
-            foreign,
-            contradicted,
-            interrupted,
-            warnings: records.warnings,
+            foreign: foreign.map(str::to_owned).collect(),
+            contradicted: contradicted.map(|(name, _)| (*name).to_owned()).collect(),
+            interrupted: ended.map(|record| record.reason.clone()),
+            states: (units.iter().zip(wanted))
+                .filter(|(_, wanted)| *wanted)
+                .map(|(unit, _)| State {
+                    record: of_unit
+                        .get(&*unit.name)
+                        .and_then(|r| r.last().copied().cloned()),
+                    unit: unit.clone(),
+                })
+                .collect(),
+            run: earlier.run()?.clone(),
+            dir: earlier.dir.clone(),
+            warnings: earlier.warnings.clone(),
             earlier,
             experiment,
             plan,
-            run,
         })
     }
 
@@ -178,68 +132,43 @@ impl Inventory {
             return Ok(Some(format!("it failed: {}", record.reason)));
         }
         let kernels = Kernels::load(&self.plan.kernels, registries)?;
-        let file = super::reference_file::ReferenceFile::load(&self.experiment)?;
-        let file = file.as_ref().map_or("", |file| &*file.hash);
-        let mut current = Current::new(&self.experiment, file, registries, &kernels);
-        current.scenes = HashMap::new();
-        if let Some(scene) = state.unit.cell.get(raystone_config::Axis::Scene) {
-            let load = load_options(options, self.earlier.table_bytes());
-            let loaded = scene::load(scene, &load);
-            let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
-            current.scenes.insert(scene.label.clone(), hash);
-        }
+        let file = ReferenceFile::load(&self.experiment)?;
+        let mut current = Current::new(&self.experiment, file.as_ref(), registries, &kernels);
+        let scene = state.unit.cell.get(Axis::Scene);
+        current.scenes = scene_hashes(scene, options, self.earlier.table_bytes());
         let sets = current.changed(&self.earlier.kernel_sets());
         Ok(current.stale(&state.unit, record, &sets))
     }
 
     /// Names of the modules that the kernels of a cell were made of.
     pub fn modules(&self, inputs: &Inputs) -> Vec<&str> {
-        let set = self
-            .earlier
-            .kernel_sets()
-            .get(inputs.kernels.as_str())
-            .copied();
+        let sets = self.earlier.kernel_sets();
+        let set = sets.get(inputs.kernels.as_str());
         let names = set.into_iter().flat_map(|set| set.modules.keys());
         names.map(String::as_str).collect()
     }
 }
 
-/// The units of the shards that the records are of; all of them where one run had no shard.
-fn wanted_units(
-    lines: &[Line],
-    experiment: &Experiment,
-    plan: &Plan,
-    registries: &Registries,
-) -> Vec<Unit> {
-    let mut units = registries.measurements.units(experiment, plan);
-    let runs = lines.iter().filter_map(|line| RunRecord::of(&line.body));
-    let parts: Option<Vec<Shard>> = runs.map(|run| run.shard.as_ref()?.parse().ok()).collect();
-    let Some(parts) = parts.filter(|parts| !parts.is_empty()) else {
-        return units;
-    };
-    let cost = Cost::new(experiment, plan, &registries.integrators);
-    let seconds = |unit: &Unit| cost.seconds_of(unit);
-    let mut wanted = vec![false; units.len()];
-    for part in parts {
-        let numbers = shards(&units, part.of, seconds);
+/// Which units are of the shards that the records are of; all of them where one run had no shard.
+fn wanted(earlier: &Earlier, units: &[Unit], cost: &Cost) -> Vec<bool> {
+    let parts = earlier.all::<RunRecord>();
+    let parts: Option<Vec<Shard>> = parts.map(|run| run.shard.as_ref()?.parse().ok()).collect();
+    let mut wanted = vec![parts.is_none(); units.len()];
+    for part in parts.into_iter().flatten() {
+        let numbers = shards(units, part.of, |unit| cost.seconds_of(unit));
         for (wanted, number) in wanted.iter_mut().zip(numbers) {
             *wanted |= number == part.number;
         }
     }
-    let mut wanted = wanted.into_iter();
-    units.retain(|_| wanted.next() == Some(true));
-    units
+    wanted
 }
 
 /// Whether records of one cell, all of them done, depend on different things.
-fn is_contradicted(records: &[CellRecord], sets: &HashMap<&str, &KernelSetRecord>) -> bool {
+fn is_contradicted(records: &[&CellRecord], sets: &HashMap<&str, &KernelSetRecord>) -> bool {
     let done = records
         .iter()
-        .filter(|record| record.outcome == Outcome::Done)
-        .map(|record| &record.inputs);
-    let made_of: Vec<MadeOf> = done
-        .map(|inputs| (inputs, sets.get(&*inputs.kernels).copied()))
-        .collect();
+        .filter(|record| record.outcome == Outcome::Done);
+    let made_of: Vec<MadeOf> = done.map(|record| made_of(record, sets)).collect();
     let Some((last, before)) = made_of.split_last() else {
         return false;
     };

@@ -4,20 +4,20 @@
 //! taken from one device alone. What does not depend on the device (errors, discrepancies, models) comes from any.
 
 use super::error::RunError;
-use super::folder::{lock_folder, records_in};
-use super::inputs::{MadeOf, differing};
+use super::folder::lock_folder;
+use super::inputs::differing;
 use super::registries::Registries;
-use super::resume::Earlier;
+use super::resume::{Earlier, made_of};
 use super::units::Unit;
 use raystone_config::Skipped;
 use raystone_core::atomic::write_atomic;
 use raystone_image::FileFormat;
 use raystone_record::{
-    Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
-    Pictures, RunRecord, SkippedRecord, read_records, records_file, text_of,
+    Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Line, Outcome, Pictures,
+    RunRecord, SkippedRecord, records_file, text_of,
 };
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -32,49 +32,18 @@ pub struct Merged {
     pub incomplete: bool,
 }
 
-/// The folder of a shard.
-struct Part {
-    dir: PathBuf,
-    earlier: Earlier,
-    run: RunRecord,
-}
-
 fn input(text: String) -> RunError {
     RunError::Input(text)
 }
 
-impl Part {
-    fn read(dir: &Path, merged: &mut Merged) -> Result<Self, RunError> {
-        let dir = records_in(dir);
-        let records = read_records(&dir).map_err(|e| input(e.to_string()))?;
-        let told = records.warnings.iter();
-        let told = told.map(|warning| format!("{}: {warning}", dir.display()));
-        merged.notes.extend(told);
-        // A folder that was resumed with other settings holds what of its earlier runs still holds.
-        let mut runs = records.lines.iter().rev();
-        let run = runs.find_map(|line| RunRecord::of(&line.body));
-        let run = run.cloned().ok_or_else(|| {
-            let dir = dir.display();
-            input(format!(
-                "{dir} does not say of what experiment it is: its first line is missing"
-            ))
-        })?;
-        Ok(Self {
-            earlier: Earlier::new(records.lines),
-            dir,
-            run,
-        })
-    }
-
-    /// Why its last run ended early; `None` if it did not.
-    fn unfinished(&self) -> Option<String> {
-        let reason = match &self.earlier.lines().last()?.body {
-            Body::Finished(_) => return None,
-            Body::Interrupted(record) => record.reason.as_str(),
-            _ => "it did not end",
-        };
-        Some(format!("{}: {reason}", self.dir.display()))
-    }
+/// Why the last run of a folder ended early; `None` if it did not.
+fn unfinished(part: &Earlier) -> Option<String> {
+    let reason = match &part.lines().last()?.body {
+        Body::Finished(_) => return None,
+        Body::Interrupted(record) => record.reason.as_str(),
+        _ => "it did not end",
+    };
+    Some(format!("{}: {reason}", part.dir.display()))
 }
 
 /// Joins the folders of shards to `out`, where nothing may be yet. Clocks speak of the devices alone whose name holds `device`, if that
@@ -90,23 +59,27 @@ pub fn merge(
     registries: &Registries,
 ) -> Result<Merged, RunError> {
     let mut merged = Merged::default();
-    let parts = dirs.iter().map(|dir| Part::read(dir, &mut merged));
-    let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
+    let parts = dirs.iter().map(|dir| Earlier::read(dir));
+    let parts: Vec<Earlier> = parts.collect::<Result<_, _>>()?;
+    for part in &parts {
+        let told = part.warnings.iter();
+        let told = told.map(|warning| format!("{}: {warning}", part.dir.display()));
+        merged.notes.extend(told);
+    }
     let first = parts
         .first()
         .ok_or_else(|| input("nothing to join: name the folders of the shards".to_owned()))?;
     for part in &parts[1..] {
         same_experiment(first, part)?;
     }
-    let (experiment, plan) = super::inventory::planned(&first.run, registries)
-        .map_err(|e| input(format!("{}: {e}", first.dir.display())))?;
+    let (experiment, plan) = first.planned(registries)?;
     let units = registries.measurements.units(&experiment, &plan);
     let chosen = choose(&parts, &units, device, &mut merged)?;
     check_devices(&parts, &units, &chosen)?;
     let mut lines = Vec::new();
     let mut pictures = Carried::default();
     for (part, cells) in parts.iter().zip(&chosen) {
-        let own = part.earlier.lines_of(cells);
+        let own = part.lines_of(cells);
         own.iter().for_each(|line| pictures.add(line, &part.dir));
         lines.extend(own);
         merged.cells += cells.len();
@@ -116,7 +89,7 @@ pub fn merge(
     tally.tell(&mut merged);
     lines.push(Line::about_all(Body::Run(RunRecord {
         shard: None,
-        ..first.run.clone()
+        ..first.run()?.clone()
     })));
     lines.push(Line::about_all(tally.end(&parts, &plan.skipped)));
     let _lock = lock_folder(out)?;
@@ -125,31 +98,26 @@ pub fn merge(
 }
 
 /// That two folders are of one experiment.
-fn same_experiment(first: &Part, other: &Part) -> Result<(), RunError> {
-    let of = |part: &Part| {
-        let run = &part.run;
-        [
-            ("the text", vec![run.experiment_text.clone()]),
-            ("the values of --set", run.overrides.clone()),
-            ("the filters of --only", run.only.clone()),
-        ]
-    };
-    for ((what, a), (_, b)) in of(first).into_iter().zip(of(other)) {
-        if a != b {
-            return Err(input(format!(
-                "{} and {} are of different experiments: {what} differ{}",
-                first.dir.display(),
-                other.dir.display(),
-                if what == "the text" { "s" } else { "" }
-            )));
-        }
+fn same_experiment(first: &Earlier, other: &Earlier) -> Result<(), RunError> {
+    let (a, b) = (first.run()?, other.run()?);
+    let differs = [
+        ("the text differs", a.experiment_text != b.experiment_text),
+        ("the values of --set differ", a.overrides != b.overrides),
+        ("the filters of --only differ", a.only != b.only),
+    ];
+    match differs.into_iter().find(|(_, differs)| *differs) {
+        None => Ok(()),
+        Some((what, _)) => Err(input(format!(
+            "{} and {} are of different experiments: {what}",
+            first.dir.display(),
+            other.dir.display()
+        ))),
     }
-    Ok(())
 }
 
 /// The cells that are taken of each folder.
 fn choose(
-    parts: &[Part],
+    parts: &[Earlier],
     units: &[Unit],
     device: Option<&str>,
     merged: &mut Merged,
@@ -169,8 +137,11 @@ fn choose(
             elsewhere += usize::from(holders.is_empty() && before > 0);
         }
         // What is done comes before what was left out, and that before what failed.
-        holders.sort_by_key(|(_, cell)| cell.outcome as u8 != Outcome::Done as u8);
-        holders.sort_by_key(|(_, cell)| cell.outcome == Outcome::Failed);
+        holders.sort_by_key(|(_, cell)| match cell.outcome {
+            Outcome::Done => 0,
+            Outcome::LeftOut => 1,
+            Outcome::Failed => 2,
+        });
         let Some(&(place, cell)) = holders.first() else {
             continue;
         };
@@ -208,32 +179,25 @@ fn choose(
 struct Holder<'a> {
     cells: BTreeMap<&'a str, &'a CellRecord>,
     sets: HashMap<&'a str, &'a KernelSetRecord>,
-    evidence: Vec<Evidence>,
+    evidence: HashMap<&'a str, Vec<(String, String)>>,
 }
 
 impl<'a> Holder<'a> {
-    fn new(part: &'a Part) -> Self {
+    fn new(part: &'a Earlier) -> Self {
         Self {
-            cells: part.earlier.cells(),
-            sets: part.earlier.kernel_sets(),
-            evidence: evidence_of(part.earlier.lines()),
+            cells: part.cells(),
+            sets: part.kernel_sets(),
+            evidence: evidence_of(part.lines()),
         }
-    }
-
-    fn made_of<'c>(&'c self, cell: &'c CellRecord) -> MadeOf<'c> {
-        (&cell.inputs, self.sets.get(&*cell.inputs.kernels).copied())
     }
 
     /// What was found for a cell, by what it is about.
     fn found(&self, cell: &CellRecord) -> BTreeMap<&str, BTreeSet<&str>> {
-        let lines: HashSet<&str> = cell.lines.iter().map(String::as_str).collect();
+        let lines = cell.lines.iter();
+        let of_cell = lines.filter_map(|line| self.evidence.get(line.as_str()));
         let mut found: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for one in self
-            .evidence
-            .iter()
-            .filter(|one| lines.contains(&*one.line))
-        {
-            found.entry(&one.about).or_default().insert(&one.value);
+        for (about, value) in of_cell.flatten() {
+            found.entry(about).or_default().insert(value);
         }
         found
     }
@@ -241,7 +205,7 @@ impl<'a> Holder<'a> {
 
 /// What two records of one cell differ in that they must not.
 fn contradiction(a: (&Holder, &CellRecord), b: (&Holder, &CellRecord)) -> Option<String> {
-    if let Some(what) = differing(a.0.made_of(a.1), b.0.made_of(b.1)) {
+    if let Some(what) = differing(made_of(a.1, &a.0.sets), made_of(b.1, &b.0.sets)) {
         return Some(format!("{what} that it was measured with differ"));
     }
     let (found_a, found_b) = (a.0.found(a.1), b.0.found(b.1));
@@ -253,18 +217,10 @@ fn contradiction(a: (&Holder, &CellRecord), b: (&Holder, &CellRecord)) -> Option
         .then(|| "figures that no clock is part of differ".to_owned())
 }
 
-/// What has to be the same whenever it is measured on one device.
-struct Evidence {
-    /// Hash of the line that has it.
-    line: String,
-    /// Device, cell, kind and number. Not the line's hash: that tells through which structure an image was rendered, and images are
-    /// equal whichever it was.
-    about: String,
-    value: String,
-}
-
-fn evidence_of(lines: &[Line]) -> Vec<Evidence> {
-    let mut found = Vec::new();
+/// What has to be the same whenever it is measured on one device, by the hash of the lines that have it: device, cell, kind and number,
+/// and the value. Nothing of the hash is in it, which tells through which structure an image was rendered: images are equal whichever it was.
+fn evidence_of(lines: &[Line]) -> HashMap<&str, Vec<(String, String)>> {
+    let mut found: HashMap<&str, Vec<(String, String)>> = HashMap::new();
     // Rounding may differ from device to device.
     let mut place = String::new();
     for line in lines {
@@ -292,18 +248,16 @@ fn evidence_of(lines: &[Line]) -> Vec<Evidence> {
             }
             _ => continue,
         };
-        found.push(Evidence {
-            line: line.hash.clone(),
-            about: format!("{place} {} {kind}", line.key),
-            value: value.to_string(),
-        });
+        let about = format!("{place} {} {kind}", line.key);
+        let of_line = found.entry(&line.hash).or_default();
+        of_line.push((about, value.to_string()));
     }
     found
 }
 
 /// That the clocks of one device speak.
 fn check_devices(
-    parts: &[Part],
+    parts: &[Earlier],
     units: &[Unit],
     chosen: &[Vec<CellRecord>],
 ) -> Result<(), RunError> {
@@ -334,9 +288,9 @@ fn check_devices(
 }
 
 /// Lines about the plan and warnings, which several folders have.
-fn told_once(parts: &[Part]) -> Vec<Line> {
+fn told_once(parts: &[Earlier]) -> Vec<Line> {
     let mut seen = BTreeSet::new();
-    let lines = parts.iter().flat_map(|part| part.earlier.lines());
+    let lines = parts.iter().flat_map(|part| part.lines());
     let lines = lines.filter(|line| {
         let text = |record: &SkippedRecord| format!("{}: {}", record.cell, record.reason);
         match &line.body {
@@ -389,7 +343,7 @@ impl<'a> Tally<'a> {
     }
 
     /// The last line: times are sums over all parts, cells are those of the joined records. Where cells are missing, the run has not ended.
-    fn end(&self, parts: &[Part], skipped: &[Skipped]) -> Body {
+    fn end(&self, parts: &[Earlier], skipped: &[Skipped]) -> Body {
         let mut sum = FinishedRecord {
             wall_s: 0.0,
             parts_s: BTreeMap::new(),
@@ -398,7 +352,7 @@ impl<'a> Tally<'a> {
             skipped: self.left_out + skipped.iter().map(|s| s.cells).sum::<usize>(),
             load: Default::default(),
         };
-        for line in parts.iter().flat_map(|part| part.earlier.lines()) {
+        for line in parts.iter().flat_map(|part| part.lines()) {
             match &line.body {
                 Body::Finished(finished) => {
                     sum.wall_s += finished.wall_s;
@@ -416,7 +370,7 @@ impl<'a> Tally<'a> {
             return Body::Finished(sum);
         }
         let reasons = self.faults().take(1);
-        let reasons = reasons.chain(parts.iter().filter_map(Part::unfinished));
+        let reasons = reasons.chain(parts.iter().filter_map(unfinished));
         Body::Interrupted(InterruptedRecord {
             reason: reasons.collect::<Vec<_>>().join("; "),
             wall_s: sum.wall_s,

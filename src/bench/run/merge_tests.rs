@@ -1,9 +1,10 @@
 //! Tests of joined folders: of records that are written here, without a run.
 
 use super::*;
-use raystone_config::Experiment;
 use raystone_core::text::slug;
-use raystone_record::{ErrorRecord, IMAGE_AXES, Key, PARTIAL, RECORDS_FILE, Ran};
+use raystone_record::{
+    ErrorRecord, IMAGE_AXES, Key, Kind as _, PARTIAL, RECORDS_FILE, Ran, read_records,
+};
 
 const TEXT: &str = "[run]\nreplicates = 2\nspp = { pow2 = [0, 1] }\n[axes]\nscene = [\"cornell-box\"]\n\
      accel = [\"bvh\", \"uniform-grid\"]\nsequence = [\"pixel-hash\"]\nintegrator = [\"primary\"]\n";
@@ -29,8 +30,8 @@ fn run(text: &str) -> RunRecord {
 
 fn units() -> Vec<Unit> {
     let registries = Registries::default();
-    let parsed = super::super::inventory::planned(&run(TEXT), &registries);
-    let (experiment, plan): (Experiment, _) = parsed.expect("a plan");
+    let earlier = Earlier::new(vec![Line::about_all(Body::Run(run(TEXT)))]);
+    let (experiment, plan) = earlier.planned(&registries).expect("a plan");
     assert!(plan.skipped.is_empty());
     registries.measurements.units(&experiment, &plan)
 }

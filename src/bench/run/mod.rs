@@ -29,7 +29,6 @@ mod primary;
 mod progress;
 mod recorder;
 mod reference;
-mod reference_cache;
 mod reference_file;
 mod registries;
 mod render;
@@ -56,7 +55,6 @@ pub use known_images::verify_images;
 pub use measurement::{Absent, At, Measurement, Preparation, Prepared, Through};
 pub use merge::{Merged, merge};
 pub use options::{RunOptions, RunSummary};
-pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
 pub use shard::shards;
@@ -109,10 +107,10 @@ pub fn run(
     let mut session = Session::new(experiment, plan, registries, options)?;
     session.keep_shard();
     let earlier = session.recorder.take_earlier();
-    let file = session.reference_file.as_ref().map(|file| &*file.hash);
-    let mut current = Current::new(experiment, file.unwrap_or_default(), registries, &kernels);
+    let file = session.reference_file.as_ref();
+    let mut current = Current::new(experiment, file, registries, &kernels);
     if !earlier.is_empty() {
-        current.scenes = scene_hashes(plan, options, earlier.table_bytes());
+        current.scenes = scene_hashes(&plan.scenes, options, earlier.table_bytes());
         let kept = earlier.kept(&session.ledger.units, &current);
         if session.open_beside(&kept) == 0 {
             session.recorder.abandon();
@@ -156,8 +154,8 @@ fn reason(error: &RunError) -> String {
 }
 
 /// Current content hash of each scene, for an adapter with this binding limit.
-fn scene_hashes(
-    plan: &Plan,
+fn scene_hashes<'s>(
+    scenes: impl IntoIterator<Item = &'s Variant>,
     options: &RunOptions,
     table_bytes: u64,
 ) -> HashMap<String, Result<String, String>> {
@@ -167,7 +165,7 @@ fn scene_hashes(
         let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
         (scene.label.clone(), hash)
     };
-    plan.scenes.iter().map(hash).collect()
+    scenes.into_iter().map(hash).collect()
 }
 
 /// Measures everything, writes the records, and moves them to their folder.

@@ -2,12 +2,12 @@
 
 use super::error::{Fault, RunError};
 use super::images::{Estimator, attributes};
-use super::reference_cache::Kept;
 use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
 use super::world::World;
 use raystone_config::{Axis, Cell, REFERENCE_PARTS};
 use raystone_core::params::{Entry, Variant};
+use raystone_core::store::Kept;
 use raystone_image::{Image, automatic_exposure, tone_map};
 use raystone_record::{Body, Key, Line, Ran, ReferenceRecord};
 use raystone_render::{Renderer, Traced, rounding_bound};
@@ -198,10 +198,9 @@ fn parts(
     let size = session.experiment.run.resolution;
     let mut parts = Vec::new();
     for number in wanted {
-        let folder = session.options.cache.as_ref();
-        let name = format!("{hash}, part {number}");
-        let place = folder.and_then(|folder| Kept::new(folder, world.gpu, &name, size));
+        let place = kept_part(session, world, &format!("{hash}, part {number}"));
         let kept = place.as_ref().and_then(Kept::read);
+        let kept = kept.and_then(|bytes| image_of(&bytes, size));
         let cached = kept.is_some();
         let image = match kept {
             Some(image) => image,
@@ -213,13 +212,33 @@ fn parts(
                 last.ok_or("nothing was rendered".to_owned())?.image
             }
         };
-        if let Some(Err(error)) = place.filter(|_| !cached).map(|place| place.write(&image)) {
+        if let Some(Err(error)) = place
+            .filter(|_| !cached)
+            .map(|place| place.write(bytemuck::cast_slice(&image.pixels).to_vec()))
+        {
             session.warn("reference", format!("is not kept for later runs: {error}"))?;
         }
         parts.push(Part { image, cached });
         session.progress.add(expected_s);
     }
     Ok(parts)
+}
+
+/// Where a part of a reference is kept for later runs, if any are: whoever edits a kernel and measures again need not render it
+/// again. The program's kernels, which alone render it, are part of its file.
+fn kept_part(session: &Session, world: &World, name: &str) -> Option<Kept> {
+    let about = &world.gpu.info;
+    let machine = format!("{:?}", (&about.name, &about.driver, &about.driver_info));
+    let depends_on = [("cell", name), ("machine", &machine)];
+    let folder = session.options.cache.as_ref()?;
+    Kept::new(folder, "references", &depends_on)
+}
+
+/// The image of the bytes of its pixels, if they are so many.
+fn image_of(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Image> {
+    let pixels = bytes.chunks_exact(size_of::<[f32; 3]>());
+    let pixels = pixels.map(bytemuck::pod_read_unaligned).collect();
+    Image::new(width, height, pixels).ok()
 }
 
 /// Content hash of a reference, made of these `points`.

@@ -10,9 +10,10 @@ use super::session::Session;
 use super::world::{load_options, table_bytes};
 use indicatif::ProgressStyle;
 use raystone_accel::{AccelError, TriangleSoup};
-use raystone_config::{Axis, Experiment, Plan};
+use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
-use raystone_gpu::probe_arithmetic;
+use raystone_gpu::{Gpu, probe_arithmetic};
 use raystone_image::{FileFormat, Image};
 use raystone_render::{
     InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
@@ -88,40 +89,25 @@ pub fn render(
         .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
     let kernels = Kernels::load(&plan.kernels, registries)?;
     let session = Session::unrecorded(experiment, plan, registries, options);
-    let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
-    session.say(format!("{scene}: loading"));
     let device = kernels.open(options)?;
-    let load = load_options(options, table_bytes(&device.gpu.limits));
-    let scene_data = scene::load(scene, &load).map_err(input)?;
-    // The camera of the experiment or scene, or one that frames the scene.
-    let own = || scene_data.view(experiment.aspect());
-    let camera = experiment.camera.unwrap_or_else(own);
-    raystone_scene::check_camera(&camera).map_err(input)?;
     let gpu = device.of(&cell[Axis::Kernels])?;
-    let tests = registries.intersection(cell).map_err(RunError::Input)?;
-    let kept = tests.kept_by(&probe_arithmetic(gpu)?);
-    kept.map_err(RunError::Input)?;
-    let mut stage = Stage::new(gpu, scene_data, tests)?;
-    session.say(format!("{scene}: building {accel}"));
-    let traced = build(&session, &stage, accel)?;
-    stage.soup = TriangleSoup::default();
-    let scene = &stage.scene;
+    let (stage, traced, camera) = staged(&session, gpu, cell)?;
     session.say("compiling the kernel");
     let spp = experiment.run.spp.max();
     let estimator = Estimator::new(&session, cell, spp);
     let estimator = estimator.map_err(RunError::Input)?;
     if let Some(reason) = estimator.integrator.refusal(&traced) {
-        return Err(RunError::Input(format!("{accel}: {reason}")));
+        return Err(RunError::Input(format!("{}: {reason}", cell[Axis::Accel])));
     }
     let job = estimator.job(&session, camera, true);
     let mut rendering = Rendering {
-        triangles: scene.triangles.len(),
+        triangles: stage.scene.triangles.len(),
         spp,
         first_picture_s: 0.0,
         samples_s: 0.0,
         total_s: 0.0,
         rays: 0,
-        report: scene.report.clone(),
+        report: stage.scene.report.clone(),
         non_finite_pixels: 0,
         in_order: None,
     };
@@ -168,6 +154,27 @@ fn input(error: impl ToString) -> RunError {
     RunError::Input(error.to_string())
 }
 
+/// The scene of a cell with its structure, and the camera: that of the experiment, of the scene, or one that frames the scene.
+fn staged(session: &Session, gpu: &Gpu, cell: &Cell) -> Result<(Stage, Traced, Camera), RunError> {
+    let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
+    session.say(format!("{scene}: loading"));
+    let load = load_options(session.options, table_bytes(&gpu.limits));
+    let scene_data = scene::load(scene, &load).map_err(input)?;
+    let own = || scene_data.view(session.experiment.aspect());
+    let camera = session.experiment.camera.unwrap_or_else(own);
+    scene::check_camera(&camera).map_err(input)?;
+    let tests = session.registries.intersection(cell);
+    let tests = tests.map_err(RunError::Input)?;
+    let kept = tests.kept_by(&probe_arithmetic(gpu)?);
+    kept.map_err(RunError::Input)?;
+    let mut stage = Stage::new(gpu, scene_data, tests)?;
+    session.say(format!("{scene}: building {accel}"));
+    let traced = build(session, &stage, accel)?;
+    stage.soup = TriangleSoup::default();
+    Ok((stage, traced, camera))
+}
+
+/// The structure of an experiment over the stage's scene.
 fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, RunError> {
     let kind = session.registries.accel.get(&accel.name);
     let kind = kind.ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;

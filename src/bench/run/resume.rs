@@ -1,14 +1,26 @@
-//! What an earlier run left in the folder of a run that is resumed: which cells still hold, and their lines.
+//! What earlier runs left in a folder, which is read here alone: a run that goes on with it keeps the cells that still hold, `merge` takes
+//! those of several folders, and `inspect` says what there is.
 
-use super::inputs::Current;
+use super::error::RunError;
+use super::folder::records_in;
+use super::inputs::{Current, MadeOf};
+use super::registries::Registries;
 use super::units::Unit;
-use raystone_record::{Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome};
+use raystone_config::{Experiment, Plan};
+use raystone_record::{
+    Body, CellRecord, KernelSetRecord, Kind, Line, Outcome, RunRecord, read_records,
+};
 use raystone_scene::LEAST_BINDING;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
-/// The lines that an earlier run left.
+/// The lines that earlier runs left.
 #[derive(Debug, Default)]
 pub(super) struct Earlier {
+    /// The folder of the records.
+    pub dir: PathBuf,
+    /// What was left out while reading.
+    pub warnings: Vec<String>,
     lines: Vec<Line>,
 }
 
@@ -24,38 +36,82 @@ pub(super) struct Kept {
 }
 
 impl Earlier {
+    /// These lines of the run that goes on.
     pub(super) fn new(lines: Vec<Line>) -> Self {
-        Self { lines }
+        Self {
+            lines,
+            ..Self::default()
+        }
+    }
+
+    /// Reads the records of a folder, those of a run that goes on or was killed included.
+    ///
+    /// # Errors
+    /// Records that cannot be read.
+    pub(super) fn read(dir: &Path) -> Result<Self, RunError> {
+        let dir = records_in(dir);
+        let records = read_records(&dir).map_err(|e| RunError::Input(e.to_string()))?;
+        Ok(Self {
+            dir,
+            warnings: records.warnings,
+            lines: records.lines,
+        })
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
 
+    /// Every record of a kind.
+    pub(super) fn all<'a, K: Kind + 'a>(&'a self) -> impl DoubleEndedIterator<Item = &'a K> {
+        self.lines.iter().filter_map(|line| K::of(&line.body))
+    }
+
+    /// The first line of the last run: a folder that goes on with other settings holds what of its earlier runs still holds.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(super) fn run(&self) -> Result<&RunRecord, RunError> {
+        self.all().next_back().ok_or_else(|| {
+            RunError::Input(format!(
+                "{} does not say of what experiment it is: its first line is missing",
+                self.dir.display()
+            ))
+        })
+    }
+
+    /// The experiment and the plan of the last run.
+    ///
+    /// # Errors
+    /// The experiment in the records is none to this program.
+    pub(super) fn planned(&self, registries: &Registries) -> Result<(Experiment, Plan), RunError> {
+        let run = self.run()?;
+        // Overrides stand behind the text as comments, too.
+        let (text, catalogue) = (&run.experiment_text, registries.catalogue());
+        let experiment = Experiment::parse(text, &run.experiment, &run.overrides, &catalogue);
+        let planned = experiment.and_then(|experiment| {
+            let is_randomised = |s: &_, d: &_| registries.is_randomised(s, d);
+            let plan = Plan::new(&experiment, &run.only, is_randomised)?;
+            Ok((experiment, plan))
+        });
+        planned.map_err(|e| RunError::Input(format!("{}: {e}", self.dir.display())))
+    }
+
     /// The last word on each cell.
     pub(super) fn cells(&self) -> BTreeMap<&str, &CellRecord> {
-        let cells = self
-            .lines
-            .iter()
-            .filter_map(|line| CellRecord::of(&line.body));
+        let cells = self.all::<CellRecord>();
         cells.map(|cell| (cell.unit.as_str(), cell)).collect()
     }
 
     /// Hashes of the modules of kernels, by their id.
     pub(super) fn kernel_sets(&self) -> HashMap<&str, &KernelSetRecord> {
-        let sets = self
-            .lines
-            .iter()
-            .filter_map(|line| KernelSetRecord::of(&line.body));
+        let sets = self.all::<KernelSetRecord>();
         sets.map(|set| (set.id.as_str(), set)).collect()
     }
 
     /// Bytes that the adapter of the last run binds, which decide how much of textures and maps is left.
     pub(super) fn table_bytes(&self) -> u64 {
-        let limits = self.lines.iter().rev().find_map(|line| match &line.body {
-            Body::Run(run) => Some(&run.environment.limits),
-            _ => None,
-        });
+        let limits = self.run().ok().map(|run| &run.environment.limits);
         let limit = |name| limits.and_then(|limits| limits.get(name)).copied();
         let binding = limit("max_storage_buffer_binding_size").unwrap_or(LEAST_BINDING);
         limit("max_buffer_size").map_or(binding, |buffer| buffer.min(binding))
@@ -107,6 +163,14 @@ impl Earlier {
         };
         once(self.lines.iter().filter(belongs))
     }
+}
+
+/// What a cell was made of, by the sets of its folder.
+pub(super) fn made_of<'a>(
+    cell: &'a CellRecord,
+    sets: &HashMap<&str, &'a KernelSetRecord>,
+) -> MadeOf<'a> {
+    (&cell.inputs, sets.get(&*cell.inputs.kernels).copied())
 }
 
 /// These lines, of equal ones the last.
@@ -195,7 +259,7 @@ mod tests {
         let registries = Registries::default();
         let units = registries.measurements.units(&experiment, &plan);
         let kernels = Kernels::load(&plan.kernels, &registries).expect("kernels");
-        let mut current = Current::new(&experiment, "", &registries, &kernels);
+        let mut current = Current::new(&experiment, None, &registries, &kernels);
         let scene = ("cornell-box".to_owned(), Ok("0123".to_owned()));
         current.scenes.insert(scene.0, scene.1);
         let library = raystone_gpu::KernelLibrary::default();

@@ -174,13 +174,7 @@ impl<'a> Session<'a> {
     pub(super) fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
         let skipped = self.plan.all_on(world, reason.clone());
         self.ledger.skipped += skipped.cells;
-        let hash = cell_hash(&[("left out", &skipped.cell), ("reason", &reason)]);
-        let record = SkippedRecord {
-            cell: skipped.cell,
-            reason: skipped.reason,
-        };
-        self.recorder
-            .write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        let hash = self.write_left_out(&skipped.cell, &reason)?;
         for name in self.ledger.open_names(|unit| unit.cell.is_on(world)) {
             let lines = vec![hash.clone()];
             self.close(&name, (Outcome::LeftOut, &reason), lines, &[])?;
@@ -300,12 +294,8 @@ impl<'a> Session<'a> {
     /// Issues a warning immediately, and in the report.
     pub(super) fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
         self.tell_warning(&format!("{about}: {reason}"));
-        let cell = about.to_owned();
-        self.recorder
-            .write(&Line::about_all(Body::Warning(SkippedRecord {
-                cell,
-                reason,
-            })))
+        let body = Body::Warning(told(about, &reason));
+        self.recorder.write(&Line::about_all(body))
     }
 
     /// Shows a warning above the progress bar.
@@ -353,25 +343,24 @@ impl<'a> Session<'a> {
 
     pub(super) fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
         self.ledger.skipped += skipped.cells;
-        let record = SkippedRecord {
-            cell: skipped.cell.clone(),
-            reason: skipped.reason.clone(),
-        };
-        self.recorder.write(&Line::about_all(Body::Skipped(record)))
+        let body = Body::Skipped(told(&skipped.cell, &skipped.reason));
+        self.recorder.write(&Line::about_all(body))
     }
 
     /// Records a cell that needs longer loops than the driver supports.
     pub(super) fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
         self.ledger.refused.insert(cell.clone(), reason.clone());
         self.ledger.skipped += 1;
-        let hash = cell_hash(&[("left out", &cell), ("reason", &reason)]);
-        let record = SkippedRecord {
-            cell: cell.clone(),
-            reason: reason.clone(),
-        };
-        self.recorder
-            .write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        let hash = self.write_left_out(&cell, &reason)?;
         self.close(&cell, (Outcome::LeftOut, &reason), vec![hash], &[])
+    }
+
+    /// Records why something was left out; the hash of the line.
+    fn write_left_out(&self, cell: &str, reason: &str) -> Result<String, RunError> {
+        let hash = cell_hash(&[("left out", cell), ("reason", reason)]);
+        let body = Body::Skipped(told(cell, reason));
+        self.recorder.write(&Line::about_all(body).hashed(&hash))?;
+        Ok(hash)
     }
 
     /// Writes the last record, moves the results to their folder, and reports it.
@@ -414,12 +403,8 @@ impl<'a> Session<'a> {
     pub(super) fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.ledger.failed += 1;
         let hash = failure_hash(cell, &reason);
-        let record = SkippedRecord {
-            cell: cell.to_owned(),
-            reason: reason.clone(),
-        };
-        self.recorder
-            .write(&Line::about_all(Body::Failed(record)).hashed(&hash))?;
+        let body = Body::Failed(told(cell, &reason));
+        self.recorder.write(&Line::about_all(body).hashed(&hash))?;
         self.close(cell, (Outcome::Failed, &reason), vec![hash], &[])
     }
 
@@ -463,12 +448,8 @@ impl<'a> Session<'a> {
                 .ok()
                 .filter(|_| is_small)
         };
-        let Some(format) = self.options.images.or_else(exr) else {
-            return Ok(());
-        };
-        let write = |path: &Path| format.write(path, image, attributes);
-        self.image_file(kind, labels, format.ending, write)?;
-        Ok(())
+        let format = self.options.images.or_else(exr);
+        self.radiance(format, kind, labels, image, attributes)
     }
 
     /// Writes linear radiance next to the pictures, if requested.
@@ -479,7 +460,18 @@ impl<'a> Session<'a> {
         image: &Image,
         attributes: &[Attribute],
     ) -> Result<(), RunError> {
-        let Some(format) = self.options.images else {
+        self.radiance(self.options.images, kind, labels, image, attributes)
+    }
+
+    fn radiance(
+        &self,
+        format: Option<&FileFormat>,
+        kind: &str,
+        labels: &[String],
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), RunError> {
+        let Some(format) = format else {
             return Ok(());
         };
         let write = |path: &Path| format.write(path, image, attributes);
@@ -501,6 +493,13 @@ impl<'a> Session<'a> {
             self.warn(&parts.join(", "), error.to_string())?;
             Ok(None)
         })
+    }
+}
+
+fn told(cell: &str, reason: &str) -> SkippedRecord {
+    SkippedRecord {
+        cell: cell.to_owned(),
+        reason: reason.to_owned(),
     }
 }
 

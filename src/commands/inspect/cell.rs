@@ -1,7 +1,6 @@
 //! One cell of the folder of a run: what it is, why it is up to date or not, and how to measure it alone.
 
 use super::Inspect;
-use crate::commands::output::{print, print_json};
 use anyhow::{Result, bail};
 use raystone::config::{Axis, Cell};
 use raystone::measure::record::{CellRecord, Outcome};
@@ -23,11 +22,9 @@ pub(super) fn inspect(command: &Inspect, name: &str) -> Result<ExitCode> {
         ..RunOptions::default()
     };
     let stale = inventory.stale(state, &registries, &options)?;
-    if command.output.json {
-        print_json("inspect", as_json(&inventory, state, stale))?;
-    } else {
-        print(&in_words(&inventory, state, stale)?)?;
-    }
+    let text = in_words(&inventory, state, stale.as_deref())?;
+    let fields = as_json(&inventory, state, stale);
+    command.output.show("inspect", fields, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -66,7 +63,7 @@ fn find<'i>(inventory: &'i Inventory, dir: &Path, name: &str) -> Result<&'i Stat
     }
 }
 
-fn in_words(inventory: &Inventory, state: &State, stale: Option<String>) -> Result<String> {
+fn in_words(inventory: &Inventory, state: &State, stale: Option<&str>) -> Result<String> {
     let mut text = format!("{}\n\n", state.unit.name);
     writeln!(text, "kind          {}", state.unit.measurement.plural())?;
     for (axis, variant) in variants(&state.unit.cell) {

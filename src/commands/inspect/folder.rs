@@ -1,8 +1,8 @@
 //! The folder of a run: whether it holds every cell of its plan.
 
 use super::Inspect;
-use crate::commands::failure::FAILED;
-use crate::commands::output::{print, print_json, warn};
+use crate::commands::failure::ended;
+use crate::commands::output::warn;
 use anyhow::Result;
 use raystone::run::Inventory;
 use serde_json::{Value, json};
@@ -18,16 +18,10 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
     let all = inventory.states.len();
     let settled = inventory.states.iter().filter(|s| s.is_settled()).count();
     let whole = settled == all && inventory.contradicted.is_empty() && inventory.foreign.is_empty();
-    if command.output.json {
-        print_json("inspect", as_json(&inventory, [settled, all], whole))?;
-    } else {
-        print(&in_words(&inventory, &command.path, [settled, all], whole)?)?;
-    }
-    Ok(if whole {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(FAILED)
-    })
+    let text = in_words(&inventory, &command.path, [settled, all], whole)?;
+    let fields = as_json(&inventory, [settled, all], whole);
+    command.output.show("inspect", fields, &text)?;
+    Ok(ended(whole))
 }
 
 fn in_words(

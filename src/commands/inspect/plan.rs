@@ -2,7 +2,6 @@
 
 use super::Inspect;
 use crate::commands::arguments::plan;
-use crate::commands::output::{print, print_json};
 use anyhow::Result;
 use raystone::config::{Axis, Experiment, Plan as Cells, Skipped};
 use raystone::run::{Cost, Unit, shards};
@@ -21,16 +20,12 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
     let cost = Cost::new(&experiment, &cells, &registries.integrators);
     let of = usize::from(command.shards.unwrap_or(1));
     let numbers = shards(&units, of, |unit| cost.seconds_of(unit));
-    if command.output.json {
-        let mut fields = as_json(&cells, &units, &cost);
-        let entries = fields["cells"].as_array_mut().into_iter().flatten();
-        for (entry, number) in entries.zip(&numbers) {
-            entry["shard"] = json!(number);
-        }
-        fields["shards"] = json!(of);
-        print_json("inspect", fields)?;
-        return Ok(ExitCode::SUCCESS);
+    let mut fields = as_json(&cells, &units, &cost);
+    let entries = fields["cells"].as_array_mut().into_iter().flatten();
+    for (entry, number) in entries.zip(&numbers) {
+        entry["shard"] = json!(number);
     }
+    fields["shards"] = json!(of);
     let mut text = String::new();
     if command.cells {
         for (unit, number) in units.iter().zip(&numbers) {
@@ -43,7 +38,7 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
         describe(&mut text, (&units, &numbers), of, &cost)?;
         writeln!(text, "\n{}", how_to_run(command, of))?;
     }
-    print(&text)?;
+    command.output.show("inspect", fields, &text)?;
     Ok(ExitCode::SUCCESS)
 }
 

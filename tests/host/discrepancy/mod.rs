@@ -1,5 +1,5 @@
 //! Measures of point sets against published values and their definitions, the `raystone
-//! discrepancy` command, and SciPy on the same points.
+//! points` command, and SciPy on the same points.
 
 mod bounds;
 mod nets;
@@ -17,7 +17,7 @@ use std::process::{Command, Output, Stdio};
 
 fn run(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_raystone"))
-        .arg("discrepancy")
+        .arg("points")
         .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

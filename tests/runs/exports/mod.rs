@@ -323,8 +323,8 @@ fn records_that_are_cut_or_of_another_version_are_named() {
 fn the_committed_schema_is_that_of_the_types() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/records.schema.json");
     let committed = std::fs::read_to_string(file).expect("the committed schema");
-    let remedy = "write it again: raystone schema > docs/records.schema.json";
-    assert!(committed == done(&["schema"]), "{remedy}");
+    let remedy = "write it again: raystone help --schema > docs/records.schema.json";
+    assert!(committed == done(&["help", "--schema"]), "{remedy}");
     assert_eq!(
         serde_json::from_str::<Value>(&committed).expect("JSON"),
         record_schema()
@@ -437,7 +437,7 @@ fn json_has_one_head_for_every_command() {
     std::fs::write(&points, "0.5 0.25\n0.75 0.5\n").expect("a file");
     let merged = RUN.path().join("merged");
     let tiny = "tests/data/tiny.toml";
-    let commands: [&[&str]; 18] = [
+    let commands: [&[&str]; 21] = [
         &[
             "compare",
             text(&folder),
@@ -455,9 +455,20 @@ fn json_has_one_head_for_every_command() {
         &["verify-run", text(&folder), "--json"],
         &["explain", text(&folder), "cornell-box, bvh", "--json"],
         &["repro", "--list", "--json"],
+        &["list", "model", "--json"],
         &["scenes", "--json"],
         &["points", "--sequence", "sobol", "--count", "3", "--json"],
+        &["points", text(&points)],
         &["discrepancy", text(&points)],
+        &[
+            "points",
+            "--sequence",
+            "sobol",
+            "--count",
+            "4",
+            "--measure",
+            "star",
+        ],
         &["list", "--json"],
         &["list", "figure", "--json"],
         &["doctor", "--json"],
@@ -467,17 +478,22 @@ fn json_has_one_head_for_every_command() {
     for command in commands {
         let found: Value = serde_json::from_str(&done(command)).expect("JSON");
         assert_eq!(found["schema"], "raystone-output/1", "{command:?}");
-        let old = ["plan", "verify-run", "explain"].contains(&command[0]);
-        assert_eq!(found["command"], if old { "inspect" } else { command[0] });
+        let now = match command[0] {
+            "plan" | "verify-run" | "explain" => "inspect",
+            "scenes" => "list",
+            "discrepancy" => "points",
+            name => name,
+        };
+        assert_eq!(found["command"], now);
     }
 }
 
 #[test]
 fn completions_and_manual_pages_know_every_command() {
-    let script = done(&["completions", "bash"]);
+    let script = done(&["help", "--completions", "bash"]);
     let man = RUN.path().join("man");
-    done(&["man", text(&man)]);
-    for command in ["run", "export", "history", "schema"] {
+    done(&["help", "--man", text(&man)]);
+    for command in ["run", "export", "history", "help"] {
         assert!(script.contains(command), "{command}");
         let page = std::fs::read_to_string(man.join(format!("raystone-{command}.1")));
         assert!(page.expect("a page").contains(".TH"), "{command}");
@@ -487,7 +503,7 @@ fn completions_and_manual_pages_know_every_command() {
         &["-c", "source /dev/stdin && complete -p raystone"],
         &script,
     );
-    let zsh = done(&["completions", "zsh"]);
+    let zsh = done(&["help", "--completions", "zsh"]);
     let check =
         "autoload -U compinit && compinit -u -D && source /dev/stdin && print $_comps[raystone]";
     consumers::shell("zsh", &["-f", "-c", check], &zsh);

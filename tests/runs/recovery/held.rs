@@ -26,7 +26,7 @@ impl Place {
     /// The files of a cache that it reads there.
     fn files(self, cache: &Path) -> Vec<PathBuf> {
         let folder = match self {
-            Self::Judge => cache.to_owned(),
+            Self::Judge => cache.join("checks"),
             Self::Reference => cache.join("references"),
         };
         let entries = std::fs::read_dir(&folder).expect("a folder of the cache");
@@ -64,7 +64,9 @@ struct Gate {
 impl Gate {
     fn new(place: Place) -> Self {
         let cache = tempfile::tempdir().expect("a temporary folder");
-        std::fs::create_dir(cache.path().join("references")).expect("a folder");
+        for kind in ["checks", "references"] {
+            std::fs::create_dir(cache.path().join(kind)).expect("a folder");
+        }
         for other in [Place::Judge, Place::Reference] {
             for file in other.files(kept()) {
                 let path = cache
