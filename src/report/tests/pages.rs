@@ -4,11 +4,57 @@
 use super::*;
 use crate::document::{Block, Illustration, Table, TableCell, Tone};
 use crate::plot::drawing::Shape;
+use crate::repro::claim::{Context, judge};
+use crate::repro::rounds::Rounds;
+use crate::repro::table::Reproduced;
 use serde_json::json;
 
 /// The page and the terminal's tables.
 fn page(lines: &[Line]) -> String {
     let document = sections::document(Path::new("no such folder"), &RunData::new(lines), &[]);
+    of_document(&document) + "\n# Terminal\n" + &terminal_tables(lines)
+}
+
+/// What the committed records say of tables of theses.
+fn thesis(names: [&str; 2]) -> String {
+    let reproduced = repro::chosen(&names.map(str::to_owned)).unwrap();
+    let reproduced = reproduced.iter().map(|source| {
+        let (lines, thesis) = (recorded(source.name), source.thesis().unwrap());
+        let (data, mut context) = (RunData::new(&lines), Context::default());
+        (context.software, context.rounds) = (true, Rounds::new(&lines));
+        let pattern = |scene: &String| format!("*{}*", scene.rsplit('/').next().unwrap());
+        context.scenes.extend(thesis.substitutes.iter().map(|s| {
+            let ours = s.scene.as_ref().map(pattern).ok_or(s.why.clone());
+            (s.original.clone(), ours)
+        }));
+        let placed = context.scenes.iter().cloned().zip(&thesis.substitutes);
+        let placed = placed.map(|((_, ours), s)| (s.clone(), ours.map(|name| (name, Some(36)))));
+        let (scenes, found) = (placed.collect(), values::values(&data));
+        let claims = thesis
+            .expects
+            .iter()
+            .map(|expect| judge(expect, &found, &context));
+        Reproduced {
+            name: source.name,
+            environment: data.run.map(|run| run.environment.clone()),
+            started: 0,
+            quick: false,
+            changes: vec!["run.replicates=4".into()],
+            scenes,
+            claims: claims.collect(),
+            thesis,
+        }
+    });
+    let reproduced: Vec<Reproduced> = reproduced.collect();
+    let failed = [("made".to_owned(), "no scene".to_owned())];
+    of_document(&repro::page::document(
+        &reproduced,
+        &failed,
+        &repro::not_covered().unwrap(),
+    ))
+}
+
+fn of_document(document: &Document) -> String {
     let mut text = format!("{}\n{}\n", document.title, document.subtitle);
     for banner in &document.banners {
         text += &format!("{:?}: {}\n", banner.tone, banner.text);
@@ -22,7 +68,7 @@ fn page(lines: &[Line]) -> String {
             _ => text += &blocks,
         }
     }
-    text + "\n# Terminal\n" + &terminal_tables(lines)
+    text
 }
 
 fn block(block: &Block) -> String {
@@ -217,15 +263,15 @@ fn pages_say_what_they_said() {
     let pages = [
         ("quick", quick),
         ("structures", recorded("dufay-h16-kd-tree")),
-        ("kernels", recorded("dufay-h3b-path-depth")),
         ("samplers", recorded("dufay-table-5-1")),
         ("compaction", recorded("roger-stream-reduction")),
         ("coherence", of_scene("nilsson-table-5-3", "cornell-box")),
     ];
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pages");
-    for (name, lines) in pages {
+    let theses = thesis(["dufay-table-5-1", "nilsson-table-5-3"]);
+    let pages = pages.map(|(name, lines)| (name, page(&lines)));
+    for (name, text) in pages.into_iter().chain([("thesis", theses)]) {
         let path = folder.join(name).with_extension("txt");
-        let text = page(&lines);
         if std::env::var_os("RAYSTONE_WRITE_PAGES").is_some() {
             std::fs::write(&path, &text).unwrap();
         }
