@@ -84,6 +84,13 @@ pub struct Files {
     pub left_out: Vec<String>,
 }
 
+impl Exported {
+    fn whole(text: String) -> Self {
+        let left_out = Vec::new();
+        Self { text, left_out }
+    }
+}
+
 /// How a format is written.
 pub enum Writer {
     /// As one text.
@@ -175,10 +182,7 @@ pub enum ExportError {
 }
 
 fn tidy_csv(source: &Source) -> Exported {
-    Exported {
-        text: values::csv(&source.values),
-        left_out: Vec::new(),
-    }
+    Exported::whole(values::csv(&source.values))
 }
 
 /// A name that tells a figure or time from all others, in the way of Google Benchmark's named arguments:

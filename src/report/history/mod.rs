@@ -13,6 +13,7 @@ use change::e_divisive;
 use raystone_record::figure::{Better, Figure, Spread};
 use raystone_record::{Interval, Key, Line};
 use raystone_stats::statistics::median;
+use serde::Serialize;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const LEVEL: f64 = 0.05;
 
 /// A run, in the order of time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
     /// Its folder.
     pub folder: PathBuf,
@@ -33,7 +34,7 @@ pub struct Run {
 }
 
 /// A level that differs from the one before.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Change {
     /// The first run of the new level.
     pub run: usize,
