@@ -370,6 +370,17 @@ impl Table {
         table
     }
 
+    /// A table of these rows.
+    pub fn of<const N: usize>(
+        caption: impl Into<String>,
+        columns: &[&str; N],
+        rows: impl IntoIterator<Item = [TableCell; N]>,
+    ) -> Self {
+        let mut table = Self::new(caption, columns);
+        table.rows.extend(rows.into_iter().map(Vec::from));
+        table
+    }
+
     /// Adds a column of figures.
     pub fn add_column(&mut self, title: impl Into<String>) {
         self.columns.push(Column {

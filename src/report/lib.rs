@@ -23,6 +23,7 @@ pub mod repro;
 pub(crate) mod ruling;
 pub mod samplers;
 pub mod sections;
+pub(crate) mod spec;
 pub mod terminal;
 pub mod terms;
 #[cfg(test)]

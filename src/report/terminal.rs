@@ -3,6 +3,7 @@
 use super::data::RunData;
 use super::document::{Check, Table, TableCell, Tone};
 use super::samplers::Metric;
+use super::sections::specs::{GAINS, TREES};
 use super::sections::{
     animation, belief, compactions, kernels, measured, rendering, run, samplers, stress,
     structures, verdict,
@@ -119,20 +120,21 @@ impl Screen {
 fn tables(data: &RunData) -> Vec<Table> {
     let against_original = kernels::against_original(data).into_iter();
     let mut tables: Vec<Table> = against_original.map(|(table, _)| table).collect();
+    let names = &data.names;
     for scene in &data.scenes {
         let values = of_structures(data, scene);
-        tables.push(structures::speed_table(scene, &values));
+        tables.push(structures::speed_table(names, scene, &values));
         tables.push(structures::outside_table(data, scene, &values));
         let of_frames = animation::values(data, scene);
-        tables.push(animation::costs_table(scene, &of_frames));
+        tables.push(TREES.table(names, &of_frames, &[]));
         let mut of_views = Vec::new();
         for view in &scene.views {
             let values = of_view(data, scene, view);
-            tables.push(samplers::error_table(view, &values, Metric::RelMse));
-            tables.push(samplers::efficiency_table(view, &values));
+            tables.push(samplers::error_table(names, view, &values, Metric::RelMse));
+            tables.push(samplers::efficiency_table(names, view, &values));
             of_views.extend(values);
         }
-        tables.push(kernels::gains_table(scene, &of_views));
+        tables.push(GAINS.table(names, &of_views, &[scene.name]));
         tables.push(verdict::table(scene));
     }
     let values = compactions::values(data);

@@ -5,84 +5,39 @@ use super::document::{Block, Document, Term};
 /// A word with other forms by which it is found, and what it means.
 type Entry = (&'static str, &'static [&'static str], &'static str);
 
+#[rustfmt::skip]
 const TERMS: &[Entry] = &[
-    (
-        "gate",
-        &["gate"],
-        "Before anything is timed, every structure answers the same recorded rays as the judge; each answer must be equal \
-         to the bit. A structure that differs once fails the gate and gets no speed.",
-    ),
-    (
-        "judge",
-        &["judge"],
-        "Plain code on the processor that answers the recorded rays; it is itself compared with testing every triangle \
-         and with exact arithmetic.",
-    ),
-    (
-        "relMSE",
-        &["relMSE"],
+    ("gate", &["gate"],
+        "Before anything is timed, every structure answers the same recorded rays as the judge; each answer must be equal to \
+         the bit. A structure that differs once fails the gate and gets no speed."),
+    ("judge", &["judge"],
+        "Plain code on the processor that answers the recorded rays; it is itself compared with testing every triangle and \
+         with exact arithmetic."),
+    ("relMSE", &["relMSE"],
         "Relative mean squared error: the mean over pixels of (value − reference)² / (reference² + 0.01). Half of it means \
-         half of the samples for the same quality. It is called unbiased where the noise of the reference is taken out.",
-    ),
+         half of the samples for the same quality. It is called unbiased where the noise of the reference is taken out."),
     ("spp", &["spp"], "Samples per pixel."),
-    (
-        "Mrays/s",
-        &["Mrays/s", "million rays per second"],
-        "Million rays answered per second, by the median of repeated timings of the same rays.",
-    ),
-    (
-        "chord",
-        &["chord"],
-        "Rays between two random points of the scene's bounding box: they come from nowhere that a camera looks from.",
-    ),
-    (
-        "bounce",
-        &["bounce rays", "bounce"],
-        "Rays that leave a surface in a random direction, as a path tracer sends them: neighbours have little in common.",
-    ),
-    (
-        "D*",
-        &["D*"],
-        "Star discrepancy: by how much the share of points in any box at the origin differs at most from the box's area. \
-         Less is more even.",
-    ),
-    (
-        "EPO",
-        &["EPO", "end-point overlap"],
-        "End-point overlap (Aila et al. 2013): the expected cost of boxes that lie over surfaces of other subtrees; less \
-         is better.",
-    ),
-    (
-        "SAH",
-        &["SAH"],
-        "Surface area heuristic: the expected number of steps and triangle tests of a random line through the tree; less \
-         is better.",
-    ),
-    (
-        "f64 oracle",
-        &["f64 oracle"],
-        "The same hits computed in double precision with a bound on their error.",
-    ),
-    (
-        "95 % interval",
-        &["95 % interval"],
-        "If the run were repeated many times, 95 of 100 such intervals would hold the true figure.",
-    ),
-    (
-        "Pareto front",
-        &["Pareto front"],
-        "The cells that no other beats in time and error at once.",
-    ),
-    (
-        "ulp",
-        &["ulp"],
-        "The distance from one floating-point number to the next.",
-    ),
-    (
-        "crack",
-        &["cracks"],
-        "A ray from inside of a closed mesh that leaves it without a hit.",
-    ),
+    ("Mrays/s", &["Mrays/s", "million rays per second"],
+        "Million rays answered per second, by the median of repeated timings of the same rays."),
+    ("chord", &["chord"],
+        "Rays between two random points of the scene's bounding box: they come from nowhere that a camera looks from."),
+    ("bounce", &["bounce rays", "bounce"],
+        "Rays that leave a surface in a random direction, as a path tracer sends them: neighbours have little in common."),
+    ("D*", &["D*"],
+        "Star discrepancy: by how much the share of points in any box at the origin differs at most from the box's area. Less \
+         is more even."),
+    ("EPO", &["EPO", "end-point overlap"],
+        "End-point overlap (Aila et al. 2013): the expected cost of boxes that lie over surfaces of other subtrees; less is \
+         better."),
+    ("SAH", &["SAH"],
+        "Surface area heuristic: the expected number of steps and triangle tests of a random line through the tree; less is \
+         better."),
+    ("f64 oracle", &["f64 oracle"], "The same hits computed in double precision with a bound on their error."),
+    ("95 % interval", &["95 % interval"],
+        "If the run were repeated many times, 95 of 100 such intervals would hold the true figure."),
+    ("Pareto front", &["Pareto front"], "The cells that no other beats in time and error at once."),
+    ("ulp", &["ulp"], "The distance from one floating-point number to the next."),
+    ("crack", &["cracks"], "A ray from inside of a closed mesh that leaves it without a hit."),
 ];
 
 /// Puts an explanation behind each block that is the first to use a word.

@@ -4,6 +4,7 @@ mod checks;
 mod exports;
 mod fixture;
 mod names;
+mod pages;
 mod rendering;
 
 use super::*;

@@ -15,10 +15,9 @@ pub(super) fn write(source: &Source) -> Exported {
     let benchmarks: Vec<Json> = rows
         .flat_map(|(family, s)| repetitions(family, s))
         .collect();
-    Exported {
-        text: pretty(&json!({ "context": context(source), "benchmarks": benchmarks })),
-        left_out: Vec::new(),
-    }
+    Exported::whole(pretty(
+        &json!({ "context": context(source), "benchmarks": benchmarks }),
+    ))
 }
 
 fn context(source: &Source) -> Json {

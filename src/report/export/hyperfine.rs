@@ -8,10 +8,7 @@ use serde_json::{Map, Value as Json, json};
 
 pub(super) fn write(source: &Source) -> Exported {
     let results: Vec<Json> = source.samples.iter().map(result).collect();
-    Exported {
-        text: pretty(&json!({ "results": results })),
-        left_out: Vec::new(),
-    }
+    Exported::whole(pretty(&json!({ "results": results })))
 }
 
 fn result(samples: &Samples) -> Json {

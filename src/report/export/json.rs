@@ -11,10 +11,9 @@ pub const OUTPUT_SCHEMA: &str = "raystone-output/1";
 
 pub(super) fn write(source: &Source) -> Exported {
     let figures = values_json(&source.values);
-    Exported {
-        text: pretty(&json!({ "schema": OUTPUT_SCHEMA, "figures": figures })),
-        left_out: Vec::new(),
-    }
+    Exported::whole(pretty(
+        &json!({ "schema": OUTPUT_SCHEMA, "figures": figures }),
+    ))
 }
 
 /// Returns one object for each value: its key, its row of the table of figures, and the reading: `value` with `low` and

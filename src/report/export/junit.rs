@@ -36,10 +36,7 @@ pub(super) fn write(source: &Source) -> Exported {
     suites.retain(|suite| !suite.cases.is_empty());
     let name = source.run().map_or("raystone", |run| &run.name);
     let time = source.data.finished.map(|finished| finished.wall_s);
-    Exported {
-        text: xml(name, time, &suites),
-        left_out: Vec::new(),
-    }
+    Exported::whole(xml(name, time, &suites))
 }
 
 fn suite(name: &str, cases: impl Iterator<Item = Case>) -> Suite {

@@ -84,6 +84,13 @@ pub struct Files {
     pub left_out: Vec<String>,
 }
 
+impl Exported {
+    fn whole(text: String) -> Self {
+        let left_out = Vec::new();
+        Self { text, left_out }
+    }
+}
+
 /// The writer of a format.
 pub enum Writer {
     /// Writes one text.
@@ -175,10 +182,7 @@ pub enum ExportError {
 }
 
 fn tidy_csv(source: &Source) -> Exported {
-    Exported {
-        text: values::csv(&source.values),
-        left_out: Vec::new(),
-    }
+    Exported::whole(values::csv(&source.values))
 }
 
 /// Returns a unique name of a figure or time, in the style of Google Benchmark's named arguments:

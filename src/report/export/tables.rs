@@ -1,6 +1,7 @@
 //! A table for each figure: rows by the axes in which its keys differ, columns by the last suitable one of these.
 
 use super::{Exported, Source};
+use crate::data::grouped;
 use crate::document::Table;
 use crate::markdown;
 use crate::pivot::Rows;
@@ -15,25 +16,13 @@ const MOST_COLUMNS: usize = 9;
 pub(super) fn markdown(source: &Source) -> Exported {
     let tables = tables(&source.values);
     let texts: Vec<String> = tables.iter().map(markdown::table).collect();
-    Exported {
-        text: texts.join("\n"),
-        left_out: Vec::new(),
-    }
+    Exported::whole(texts.join("\n"))
 }
 
 /// Returns a table for each figure, in the given order.
 pub(super) fn tables(values: &[Value]) -> Vec<Table> {
-    let mut figures: Vec<Vec<Value>> = Vec::new();
-    for value in values {
-        let known = figures
-            .iter_mut()
-            .find(|f| f[0].figure.id == value.figure.id);
-        match known {
-            Some(known) => known.push(value.clone()),
-            None => figures.push(vec![value.clone()]),
-        }
-    }
-    figures.iter().map(|values| table(values)).collect()
+    let figures = grouped(values.iter().cloned(), |value| value.figure.id.to_string());
+    figures.iter().map(|(_, values)| table(values)).collect()
 }
 
 /// Returns the table of one figure; labels that all its keys share are in the caption.

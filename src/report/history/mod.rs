@@ -12,6 +12,7 @@ use change::e_divisive;
 use raystone_record::figure::{Better, Figure, Spread};
 use raystone_record::{Interval, Key, Line};
 use raystone_stats::statistics::median;
+use serde::Serialize;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const LEVEL: f64 = 0.05;
 
 /// A run of the history.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
     /// Folder of the run.
     pub folder: PathBuf,
@@ -32,7 +33,7 @@ pub struct Run {
 }
 
 /// A level that differs from the one before.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Change {
     /// The first run of the new level.
     pub run: usize,

@@ -1,6 +1,7 @@
 //! A history as tables, JSON and a page with plots.
 
-use super::{Change, History, LEVEL, Series};
+use super::{Change, History, LEVEL, Run, Series};
+use crate::data::grouped;
 use crate::document::{Block, Document, Section, Table, TableCell};
 use crate::format;
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
@@ -16,20 +17,17 @@ const MOST_DRAWN: usize = 200;
 impl History<'_> {
     /// Returns the table of runs by number.
     pub fn runs_table(&self) -> Table {
-        let mut table = Table::new(
-            "Runs",
-            &["run", ":commit", ":started", ":device", ":folder"],
-        );
-        for (number, run) in self.runs.iter().enumerate() {
-            table.rows.push(vec![
+        let heads = ["run", ":commit", ":started", ":device", ":folder"];
+        let row = |(number, run): (usize, &Run)| {
+            [
                 number.to_string().into(),
                 short(&run.commit).into(),
                 format::utc(run.started_unix_s).into(),
                 run.device.as_str().into(),
                 run.folder.display().to_string().into(),
-            ]);
-        }
-        table
+            ]
+        };
+        Table::of("Runs", &heads, self.runs.iter().enumerate().map(row))
     }
 
     /// Returns the table of level changes, a row each.
@@ -37,35 +35,24 @@ impl History<'_> {
         let heads = [
             "figure", ":of", ":commit", "run", "before", "after", "ratio", "p",
         ];
-        let mut table = Table::new("Changes", &heads);
-        for (series, change) in self
-            .series
-            .iter()
-            .flat_map(|s| s.changes.iter().map(move |c| (s, c)))
-        {
-            table.rows.push(self.change_row(series, change));
-        }
-        table
-    }
-
-    fn change_row(&self, series: &Series, change: &Change) -> Vec<TableCell> {
-        let text = |value| TableCell::from(format::figure(&series.figure, value));
-        vec![
-            series.figure.heading().into(),
-            series.key.to_string().into(),
-            self.runs
-                .get(change.run)
-                .map_or("", |run| short(&run.commit))
-                .into(),
-            change.run.to_string().into(),
-            text(change.before),
-            text(change.after),
-            format::number(change.after / change.before).into(),
-            change
-                .p
-                .map_or_else(|| "exact".to_owned(), format::number)
-                .into(),
-        ]
+        let row = |(series, change): (&Series, &Change)| {
+            let text = |value| TableCell::from(format::figure(&series.figure, value));
+            let run = self.runs.get(change.run);
+            let p = change.p.map_or_else(|| "exact".to_owned(), format::number);
+            [
+                series.figure.heading().into(),
+                series.key.to_string().into(),
+                run.map_or("", |run| short(&run.commit)).into(),
+                change.run.to_string().into(),
+                text(change.before),
+                text(change.after),
+                format::number(change.after / change.before).into(),
+                p.into(),
+            ]
+        };
+        let series = self.series.iter();
+        let changes = series.flat_map(|s| s.changes.iter().map(move |change| (s, change)));
+        Table::of("Changes", &heads, changes.map(row))
     }
 
     /// Summarises the tested and untested series and the expected false alarms.
@@ -122,22 +109,13 @@ impl History<'_> {
     }
 
     fn figure_sections(&self) -> Vec<Section> {
-        let mut ids: Vec<&str> = Vec::new();
-        for series in &self.series {
-            if !ids.contains(&series.figure.id.as_ref()) {
-                ids.push(&series.figure.id);
-            }
-        }
         let is_drawn = |s: &&Series| !s.changes.is_empty() || self.draws_all();
-        let section = |id: &&str| {
-            let of_figure = self.series.iter().filter(|s| s.figure.id == **id);
-            let heading = of_figure.clone().next().map(|s| s.figure.heading());
-            let of_figure: Vec<&Series> = of_figure.filter(is_drawn).collect();
-            let name: String = id
-                .chars()
-                .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-                .collect();
-            let mut section = Section::new(name.clone(), heading.unwrap_or_default());
+        let figures = grouped(&self.series, |s| s.figure.id.to_string());
+        let section = |(id, of_figure): (String, Vec<&Series>)| {
+            let heading = of_figure[0].figure.heading();
+            let of_figure: Vec<&Series> = of_figure.into_iter().filter(is_drawn).collect();
+            let name = id.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+            let mut section = Section::new(name.clone(), heading);
             let plots = of_figure.chunks(IN_PLOT).enumerate();
             let plots = plots.map(|(i, some)| {
                 let shared = shared(some).to_string();
@@ -147,7 +125,7 @@ impl History<'_> {
             section.blocks.extend(Block::figures(plots));
             section
         };
-        let sections = ids.iter().map(section);
+        let sections = figures.into_iter().map(section);
         sections
             .filter(|section| !section.blocks.is_empty())
             .collect()
@@ -155,22 +133,10 @@ impl History<'_> {
 
     /// Returns runs and series as JSON.
     pub fn json(&self) -> Json {
-        let runs = self.runs.iter().map(|run| {
-            json!({
-                "commit": run.commit,
-                "started_unix_s": run.started_unix_s,
-                "device": run.device,
-                "folder": run.folder,
-            })
-        });
         let series = self.series.iter().map(|series| {
             let points = series.points.iter().map(
                 |(run, i)| json!({ "run": run, "value": i.value, "low": i.low, "high": i.high }),
             );
-            let changes = series
-                .changes
-                .iter()
-                .map(|c| json!({ "run": c.run, "before": c.before, "after": c.after, "p": c.p }));
             json!({
                 "figure": series.figure.id,
                 "unit": series.figure.unit,
@@ -179,11 +145,11 @@ impl History<'_> {
                 "device": series.device,
                 "tested": series.tested,
                 "points": points.collect::<Vec<Json>>(),
-                "changes": changes.collect::<Vec<Json>>(),
+                "changes": series.changes,
             })
         });
         json!({
-            "runs": runs.collect::<Vec<Json>>(),
+            "runs": self.runs,
             "series": series.collect::<Vec<Json>>(),
             "level": LEVEL,
             "left_out": self.left_out,
@@ -224,13 +190,12 @@ fn plot(series: &[&Series]) -> CurvePlot {
             points: points.collect(),
         });
     }
-    CurvePlot {
-        x_title: "run, by time".into(),
-        x_ticks: Ticks::Whole,
-        y_title: series[0].figure.heading(),
+    CurvePlot::new(
+        "run, by time",
+        Ticks::Whole,
+        series[0].figure.heading(),
         curves,
-        guides: Vec::new(),
-    }
+    )
 }
 
 /// Returns the labels that the keys of all series share.

@@ -99,6 +99,29 @@ const WIDTH: f64 = 580.0;
 const PLOT_HEIGHT: f64 = 400.0;
 
 impl CurvePlot {
+    /// The curves that have a point.
+    pub fn new(
+        x_title: impl Into<String>,
+        x_ticks: Ticks,
+        y_title: impl Into<String>,
+        curves: impl IntoIterator<Item = Curve>,
+    ) -> Self {
+        let curves = curves.into_iter().filter(|curve| !curve.points.is_empty());
+        Self {
+            x_title: x_title.into(),
+            x_ticks,
+            y_title: y_title.into(),
+            curves: curves.collect(),
+            guides: Vec::new(),
+        }
+    }
+
+    /// The same with lines for comparison.
+    pub fn with_guides(mut self, guides: impl IntoIterator<Item = Guide>) -> Self {
+        self.guides.extend(guides);
+        self
+    }
+
     /// Returns the plot as an illustration of a document, if there is anything to draw.
     pub fn figure(&self, name: String, caption: impl Into<String>) -> Option<Illustration> {
         Some(Illustration::new(name, caption, self.draw()?))

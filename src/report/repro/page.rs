@@ -2,11 +2,11 @@
 
 use super::claim::Row;
 use super::judge::{ONCE, ONCE_MS, Verdict};
-use super::table::Reproduced;
+use super::table::{Placed, Reproduced};
 use super::{NotCovered, plots};
 use crate::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::format;
-use raystone_config::expect::Expect;
+use raystone_config::expect::{Expect, Substitute};
 use raystone_record::Interval;
 use raystone_record::figure::FIGURES;
 
@@ -45,14 +45,17 @@ fn subtitle(tables: &[Reproduced]) -> String {
 
 /// Returns the number of claims with each verdict, in words.
 pub fn tally(tables: &[Reproduced]) -> String {
-    let verdicts = || {
-        let of = |t: &Reproduced| {
-            (0..t.claims.len())
-                .map(|i| t.verdict(i))
-                .collect::<Vec<_>>()
-        };
-        tables.iter().flat_map(of)
+    let of = |t: &Reproduced| {
+        (0..t.claims.len())
+            .map(|i| t.verdict(i))
+            .collect::<Vec<_>>()
     };
+    let verdicts: Vec<Verdict> = tables.iter().flat_map(of).collect();
+    counted(&verdicts)
+}
+
+/// How often each verdict is among them, in words.
+fn counted(verdicts: &[Verdict]) -> String {
     let all = [
         Verdict::Supported,
         Verdict::Contradicted,
@@ -60,7 +63,7 @@ pub fn tally(tables: &[Reproduced]) -> String {
         Verdict::NotTestable,
         Verdict::Faulty,
     ];
-    let counts = all.map(|v| (v, verdicts().filter(|found| *found == v).count()));
+    let counts = all.map(|v| (v, verdicts.iter().filter(|found| **found == v).count()));
     let said = counts.iter().filter(|(_, n)| *n > 0);
     let said: Vec<String> = said.map(|(v, n)| format!("{n} {}", v.word())).collect();
     said.join(", ")
@@ -84,22 +87,22 @@ fn summary(tables: &[Reproduced]) -> Section {
         ":verdict",
         ":places",
     ];
-    let mut table = Table::new("Every claim that was looked at", &columns);
-    for reproduced in tables {
-        for (index, expect) in reproduced.thesis.expects.iter().enumerate() {
-            let verdict = reproduced.verdict(index);
-            if verdict == Verdict::Shown {
-                continue;
-            }
-            table.rows.push(vec![
+    let rows = tables.iter().flat_map(|reproduced| {
+        let expects = reproduced.thesis.expects.iter().enumerate();
+        let judged =
+            expects.map(|(i, expect)| (reproduced.verdict(i), &reproduced.claims[i], expect));
+        let judged = judged.filter(|(verdict, ..)| *verdict != Verdict::Shown);
+        judged.map(|(verdict, rows, expect)| {
+            [
                 reproduced.name.into(),
                 claim_name(expect).into(),
                 expect.says.as_str().into(),
                 verdict_cell(verdict),
-                places(&reproduced.claims[index]).into(),
-            ]);
-        }
-    }
+                places(rows).into(),
+            ]
+        })
+    });
+    let table = Table::of("Every claim that was looked at", &columns, rows);
     section.blocks.extend(table.into_block());
     section
 }
@@ -125,46 +128,23 @@ fn verdict_cell(verdict: Verdict) -> TableCell {
 
 /// Summarises the verdicts of all places.
 fn places(rows: &[Row]) -> String {
-    match rows {
-        [row] => match row.ours {
-            Some(ours) => interval(ours),
-            None => row.reason.clone(),
-        },
-        _ => {
-            let count = |v| rows.iter().filter(|row| row.verdict == v).count();
-            let all = [
-                Verdict::Supported,
-                Verdict::Contradicted,
-                Verdict::Undecided,
-                Verdict::NotTestable,
-                Verdict::Faulty,
-            ];
-            let said = all.into_iter().filter(|v| count(*v) > 0);
-            let said: Vec<String> = said.map(|v| format!("{} {}", count(v), v.word())).collect();
-            // Where nothing could be tested, give the most frequent reason.
-            let reasons = rows.iter().map(|row| row.reason.as_str());
-            let times = |reason: &str| rows.iter().filter(|row| row.reason == reason).count();
-            let reason = reasons
-                .max_by_key(|reason| times(reason))
-                .unwrap_or_default();
-            if count(Verdict::NotTestable) == rows.len() {
-                format!("{} places: {reason}", rows.len())
-            } else {
-                said.join(", ")
-            }
-        }
+    if let [row] = rows {
+        return row.ours.map_or_else(|| row.reason.clone(), interval);
     }
+    if rows.iter().any(|row| row.verdict != Verdict::NotTestable) {
+        return counted(&rows.iter().map(|row| row.verdict).collect::<Vec<_>>());
+    }
+    // Where nothing could be tested, the reason of most places.
+    let reasons = rows.iter().map(|row| row.reason.as_str());
+    let times = |reason: &&str| rows.iter().filter(|row| row.reason == **reason).count();
+    let reason = reasons.max_by_key(times).unwrap_or_default();
+    format!("{} places: {reason}", rows.len())
 }
 
 /// Formats a figure with its interval.
 pub fn interval(i: Interval) -> String {
     if i.low < i.high {
-        format!(
-            "{} [{}, {}]",
-            format::number(i.value),
-            format::number(i.low),
-            format::number(i.high)
-        )
+        format::interval(&i)
     } else {
         format::number(i.value)
     }
@@ -203,22 +183,24 @@ fn section(table: &Reproduced) -> Section {
 
 fn scenes(table: &Reproduced) -> Table {
     let columns = ["thesis", "triangles", ":ours", "triangles", ":remark"];
-    let mut shown = Table::new("Scenes in the place of the thesis's", &columns);
     let count = |n: Option<u64>| n.map_or(format::ABSENT.to_owned(), format::count);
-    for (substitute, ours) in &table.scenes {
+    let row = |(substitute, ours): &(Substitute, Result<Placed, String>)| {
         let (scene, triangles, remark) = match ours {
             Ok((scene, n)) => (scene.clone(), n.map(|n| n as u64), substitute.why.clone()),
             Err(reason) => (format::ABSENT.to_owned(), None, reason.clone()),
         };
-        shown.rows.push(vec![
-            substitute.original.as_str().into(),
-            count(substitute.triangles).into(),
-            scene.into(),
-            count(triangles).into(),
-            remark.into(),
-        ]);
-    }
-    shown
+        let thesis = substitute.original.clone();
+        [
+            thesis,
+            count(substitute.triangles),
+            scene,
+            count(triangles),
+            remark,
+        ]
+        .map(TableCell::from)
+    };
+    let scenes = table.scenes.iter().map(row);
+    Table::of("Scenes in the place of the thesis's", &columns, scenes)
 }
 
 /// Rows and columns of the original, with the thesis's number before ours.
@@ -309,21 +291,21 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
         blocks.push(Block::Paragraph(expect.reading.clone()));
     }
     let columns = ["place", "thesis", "ours", ":verdict", ":why", ":counted"];
-    let mut shown = Table::new(how(expect), &columns);
-    for row in &table.claims[index] {
+    let row = |row: &Row| {
         let place = [row.row.as_str(), row.column.as_str()];
         let place: Vec<&str> = place.into_iter().filter(|s| !s.is_empty()).collect();
         let counted = row.counted.iter();
         let counted = counted.map(|(title, value)| format!("{title} {}", format::number(*value)));
-        shown.rows.push(vec![
+        [
             place.join(", ").into(),
             printed(row.thesis).into(),
             row.ours.map_or(format::ABSENT.to_owned(), interval).into(),
             verdict_cell(row.verdict),
             row.reason.as_str().into(),
             counted.collect::<Vec<_>>().join("; ").into(),
-        ]);
-    }
+        ]
+    };
+    let shown = Table::of(how(expect), &columns, table.claims[index].iter().map(row));
     blocks.extend(shown.into_block());
     blocks
 }
@@ -345,20 +327,14 @@ fn how(expect: &Expect) -> String {
 
 fn uncovered(not_covered: &NotCovered) -> Section {
     let mut section = Section::new("not-covered", "What is not tested");
-    let mut tables = Table::new(
-        "Tables and figures that cannot be run yet",
-        &["name", ":what", ":why"],
-    );
-    for table in &not_covered.table {
-        let row = [&table.name, &table.title, &table.why].map(|text| text.as_str().into());
-        tables.rows.push(row.to_vec());
-    }
-    let mut claims = Table::new("Claims that nothing tests", &["thesis", ":claims", ":why"]);
-    for claim in &not_covered.claim {
-        let ids = claim.ids.join(", ");
-        let row = [&claim.source, &ids, &claim.why].map(|text| text.as_str().into());
-        claims.rows.push(row.to_vec());
-    }
+    let tables = not_covered.table.iter();
+    let tables = tables.map(|t| [&t.name, &t.title, &t.why].map(|text| text.as_str().into()));
+    let caption = "Tables and figures that cannot be run yet";
+    let tables = Table::of(caption, &["name", ":what", ":why"], tables);
+    let claims = not_covered.claim.iter();
+    let claims = claims.map(|c| [&c.source, &c.ids.join(", "), &c.why].map(|t| t.as_str().into()));
+    let caption = "Claims that nothing tests";
+    let claims = Table::of(caption, &["thesis", ":claims", ":why"], claims);
     section.blocks.extend(tables.into_block());
     section.blocks.extend(claims.into_block());
     section

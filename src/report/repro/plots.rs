@@ -2,6 +2,7 @@
 
 use super::claim::Row;
 use super::table::Reproduced;
+use crate::data::{grouped, without_repeats};
 use crate::document::{Block, Illustration};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::plot::rates::{Bar, RatePlot};
@@ -40,29 +41,18 @@ fn curves(table: &Reproduced, figure: &str) -> Option<Illustration> {
 }
 
 fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
-    let mut plot = CurvePlot {
-        x_title: "N".to_owned(),
-        x_ticks: Ticks::PowersOfTwo,
-        y_title: FIGURES
-            .iter()
-            .find(|f| f.id == figure)
-            .map_or(figure.to_owned(), |f| f.heading()),
-        curves: Vec::new(),
-        guides: Vec::new(),
-    };
+    let known = FIGURES.iter().find(|f| f.id == figure);
+    let mut curves: Vec<Curve> = Vec::new();
     let pairs = table.thesis.expects.iter().zip(&table.claims);
     for (expect, rows) in pairs.filter(|(e, _)| e.figure == figure && !is_ratio(e)) {
-        for (column, rows) in by_column(rows) {
-            let name = if column.is_empty() {
-                &expect.id
-            } else {
-                column
-            };
-            let look = plot.curves.len() / 2;
+        for (column, rows) in grouped(rows, |row| row.column.as_str()) {
+            let name = Some(column).filter(|column| !column.is_empty());
+            let name = name.unwrap_or(&expect.id);
+            let look = curves.len() / 2;
             let ours = points(&rows, |row| row.ours);
             let thesis = points(&rows, |row| row.thesis.map(Interval::exact));
             for (label, exact, points) in [("ours", false, ours), ("thesis", true, thesis)] {
-                plot.curves.push(Curve {
+                curves.push(Curve {
                     label: format!("{name}, {label}"),
                     look,
                     exact,
@@ -72,7 +62,7 @@ fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
         }
     }
     let mut drawn: Vec<Curve> = Vec::new();
-    for curve in plot.curves {
+    for curve in curves {
         // Several claims may be about the same values.
         let is_new = |known: &Curve| known.exact != curve.exact || known.points != curve.points;
         let is_curve = curve.points.iter().any(|p| p.x != curve.points[0].x);
@@ -80,19 +70,8 @@ fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
             drawn.push(curve);
         }
     }
-    plot.curves = drawn;
-    plot
-}
-
-fn by_column(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
-    let mut columns: Vec<(&str, Vec<&Row>)> = Vec::new();
-    for row in rows {
-        match columns.iter_mut().find(|(column, _)| *column == row.column) {
-            Some((_, rows)) => rows.push(row),
-            None => columns.push((&row.column, vec![row])),
-        }
-    }
-    columns
+    let y_title = known.map_or(figure.to_owned(), |f| f.heading());
+    CurvePlot::new("N", Ticks::PowersOfTwo, y_title, drawn)
 }
 
 fn points(rows: &[&Row], of: impl Fn(&Row) -> Option<Interval>) -> Vec<CurvePoint> {
@@ -124,32 +103,25 @@ fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustra
 
 /// Returns the measured bars, grouped by the text before the dot of a row.
 fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
-    let mut groups: Vec<(String, Vec<Bar>)> = Vec::new();
+    let drawn = rows.iter().filter(|row| row.ours.is_some());
+    let named = drawn.map(|row| (row, row.row.split_once(" · ").unwrap_or(("", &row.row))));
+    let named: Vec<_> = named.collect();
     // A colour stands for one label, whichever bars a group lacks.
-    let mut labels: Vec<&str> = Vec::new();
-    for row in rows.iter().filter(|row| row.ours.is_some()) {
-        let (group, label) = row.row.split_once(" · ").unwrap_or(("", &row.row));
-        let bars = match groups.iter().position(|(name, _)| name == group) {
-            Some(at) => &mut groups[at].1,
-            None => {
-                groups.push((group.to_owned(), Vec::new()));
-                let last = groups.len() - 1;
-                &mut groups[last].1
-            }
-        };
-        let look = labels.iter().position(|known| *known == label);
-        let look = look.unwrap_or_else(|| {
-            labels.push(label);
-            labels.len() - 1
-        });
-        bars.push(Bar {
-            label: label.to_owned(),
-            look,
-            rate: row.ours,
-            instead: String::new(),
-        });
-    }
-    groups
+    let labels = without_repeats(
+        named
+            .iter()
+            .map(|(_, (_, label))| (*label).to_owned())
+            .collect(),
+    );
+    let bar = |(row, (_, label)): (&Row, (&str, &str))| Bar {
+        label: label.to_owned(),
+        look: labels.iter().position(|known| known == label).unwrap_or(0),
+        rate: row.ours,
+        instead: String::new(),
+    };
+    let groups = grouped(named, |(_, (group, _))| *group).into_iter();
+    let groups = groups.map(|(name, rows)| (name.to_owned(), rows.into_iter().map(bar).collect()));
+    groups.collect()
 }
 
 #[cfg(test)]

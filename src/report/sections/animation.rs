@@ -1,18 +1,14 @@
 //! Taking structures over from frame to frame of a moving scene, against building them anew.
 
+use super::specs::{FRAME_PLOTS, FRAME_RAYS, TREES};
 use crate::data::{Measured, RunData, SceneGroup};
 use crate::document::*;
 use crate::format;
-use crate::pivot::{FIGURES_ALONE, Rows};
-use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::{Reading, Value};
 use raystone_config::{Animation, Motion};
 use raystone_record::figure;
 use raystone_record::{AnimationRecord, FrameRays, FrameRecord, Interval, Key, RayClass, axis};
 use raystone_stats::statistics::median_interval;
-
-/// What tells rows apart.
-const ROWS: [&str; 3] = [axis::ACCEL, axis::KERNELS, axis::SUBJECT];
 
 type Animated<'a> = Measured<'a, AnimationRecord>;
 
@@ -22,13 +18,12 @@ pub fn blocks(data: &RunData, stem: &str, scene: &SceneGroup) -> Vec<Block> {
         return Vec::new();
     };
     let values = values(data, scene);
+    let tables = [TREES, FRAME_RAYS].map(|table| table.table(&data.names, &values, &[]));
     let mut blocks = vec![
         Block::Heading("In motion".into()),
         Block::Paragraph(introduction(&first.settings)),
     ];
-    blocks.extend(Block::figures(plots(data, stem, scene)));
-    blocks.extend(failures_table(scene).into_block());
-    let tables = [costs_table(scene, &values), rays_table(scene, &values)];
+    blocks.extend(plots(data, stem, scene, &values));
     let tables = tables.into_iter().filter_map(Table::into_block).collect();
     blocks.extend(Block::fold("Frames as numbers", tables));
     blocks
@@ -57,71 +52,18 @@ fn introduction(settings: &Animation) -> String {
 }
 
 /// The class of rays that curves show: those that leave surfaces, where there are any.
-fn shown(frame: &FrameRecord) -> Option<&FrameRays> {
-    let bounce = |rays: &&FrameRays| rays.class == RayClass::Bounce;
-    let classes = &frame.classes;
-    classes.iter().find(bounce).or(classes.first())
+fn shown(frame: &FrameRecord) -> &'static str {
+    let classes = || frame.classes.iter().map(|rays| rays.class);
+    let bounce = classes().find(|class| *class == RayClass::Bounce);
+    bounce.or(classes().next()).map_or("", RayClass::name)
 }
 
-fn plots(data: &RunData, stem: &str, scene: &SceneGroup) -> Vec<Option<Illustration>> {
-    let software = is_software(data);
-    let curve =
-        |cell: &Animated, what: &str, exact, y: &dyn Fn(&FrameRecord) -> Option<Interval>| {
-            let frames = cell.frames.iter();
-            let point = |f: &FrameRecord| Some(CurvePoint::new(f64::from(f.frame), &y(f)?));
-            Curve {
-                label: format!("{}{what}", cell.structure),
-                look: data.structure_look(&cell.structure),
-                exact,
-                points: frames.filter_map(point).collect(),
-            }
-        };
-    let figure = |name: &str, y_title: &str, caption: &str, curves: Vec<Curve>| {
-        let plot = CurvePlot {
-            x_title: "frame".into(),
-            x_ticks: Ticks::Whole,
-            y_title: y_title.into(),
-            curves: curves
-                .into_iter()
-                .filter(|c| !c.points.is_empty())
-                .collect(),
-            guides: Vec::new(),
-        };
-        plot.figure(format!("{stem}-animation-{name}"), caption)
-    };
-    let all = |y: &dyn Fn(&FrameRecord) -> Option<Interval>| -> Vec<Curve> {
-        let cells = scene.animations.iter();
-        cells.map(|cell| curve(cell, "", false, y)).collect()
-    };
-    let costs = scene.animations.iter().flat_map(|cell| {
-        let ms = |f: &FrameRecord| median_interval(f.refit.ms(software));
-        let anew = |f: &FrameRecord| median_interval(f.rebuild.ms(software));
-        [
-            curve(cell, ", refitted", false, &ms),
-            curve(cell, ", rebuilt", true, &anew),
-        ]
-    });
-    vec![
-        figure(
-            "sah",
-            "SAH, refitted over rebuilt",
-            "SAH cost of the refitted tree over that of the tree built anew, frame by frame.",
-            all(&|frame| sah_ratio(frame).map(Interval::exact)),
-        ),
-        figure(
-            "cost",
-            "cost of a frame, ms",
-            "What refitting (full lines) and building anew (dashed) cost in each frame, median with 95 % interval.",
-            costs.collect(),
-        ),
-        figure(
-            "nodes",
-            "nodes per ray, refitted over rebuilt",
-            "Nodes that a bounce ray (where there are none: the first class) visits in the refitted tree, over those in \
-             the tree built anew.",
-            all(&|frame| nodes_ratio(shown(frame)?).map(Interval::exact)),
-        ),
-    ]
+fn plots(data: &RunData, stem: &str, scene: &SceneGroup, values: &[Value]) -> Option<Block> {
+    let first = scene.animations.iter().find_map(|cell| cell.frames.first());
+    let rays = ["", first.map_or("", shown)];
+    let is_shown = |v: &&Value| rays.contains(&v.key.label(axis::RAYS));
+    let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
+    Block::figures(FRAME_PLOTS.map(|plot| plot.figure(data, &values, stem, &[])))
 }
 
 fn is_software(data: &RunData) -> bool {
@@ -212,70 +154,4 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
         }
     }
     values
-}
-
-const HEADS: [&str; 2] = ["structure", ":frame"];
-
-fn rows<'a>(scene: &SceneGroup) -> Rows<'a> {
-    let of_cell = |cell: &Animated| {
-        let row = |frame: &FrameRecord| {
-            let cells = vec![
-                cell.structure.clone().into(),
-                frame.frame.to_string().into(),
-            ];
-            (key_of(cell, frame), cells)
-        };
-        cell.frames.iter().map(row).collect::<Vec<_>>()
-    };
-    Rows::new(&ROWS, &HEADS, scene.animations.iter().flat_map(of_cell))
-}
-
-/// Trees and what they cost.
-pub(crate) fn costs_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    let of_trees: Vec<Value> = (values.iter().filter(|v| v.key.label(axis::RAYS).is_empty()))
-        .cloned()
-        .collect();
-    rows(scene).table(
-        &of_trees,
-        "Trees frame by frame: SAH cost, and what refitting and building anew cost (median [95 % interval]); rays of each \
-         gate",
-        &[
-            &figure::FRAME_SAH_REFITTED,
-            &figure::FRAME_SAH_REBUILT,
-            &figure::FRAME_SAH_RATIO,
-            &figure::FRAME_REFIT_MS,
-            &figure::FRAME_REFIT_HOST_MS,
-            &figure::FRAME_REBUILD_MS,
-            &figure::FRAME_JUDGED,
-        ],
-        FIGURES_ALONE,
-    )
-}
-
-/// Rays through both.
-fn rays_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    rows(scene).table(
-        values,
-        "Rays frame by frame: nodes visited and time in the refitted tree over those in the tree built anew, and from how \
-         many million rays of a class on building anew pays in that frame (none: its rays are slower; unresolved: \
-         the interval of the difference holds 0; any: it costs no more)",
-        &[
-            &figure::FRAME_NODES_RATIO,
-            &figure::FRAME_TIME_RATIO,
-            &figure::FRAME_BREAK_EVEN,
-        ],
-        &|key| key.label(axis::RAYS).to_owned(),
-    )
-}
-
-/// What failed.
-fn failures_table(scene: &SceneGroup) -> Table {
-    let mut table = Table::new("Animations that failed", &["structure", ":fault"]);
-    for cell in &scene.animations {
-        if let Some(fault) = &cell.failure {
-            let fault = TableCell::from(fault.clone()).toned(Tone::Bad);
-            table.rows.push(vec![cell.structure.clone().into(), fault]);
-        }
-    }
-    table
 }

@@ -85,53 +85,46 @@ fn gate(scene: &SceneGroup) -> Check {
         count(wrong as u64),
         plural(ties, "tie"),
     );
-    let faulty = || {
-        scene
-            .structures
-            .iter()
-            .filter_map(|s| Some((s, s.fault()?)))
-    };
-    for (s, fault) in faulty() {
+    let faulty = scene
+        .structures
+        .iter()
+        .filter_map(|s| Some((s, s.fault()?)));
+    let faulty: Vec<_> = faulty.collect();
+    for (s, fault) in &faulty {
         detail += &format!(" {} FAILED: {fault}.", s.structure);
     }
-    check(title, rays > 0, faulty().next().is_some(), detail)
+    check(title, rays > 0, !faulty.is_empty(), detail)
 }
 
 fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> Check {
     let mut details = Vec::new();
-    let (mut rays, mut wrong) = (0, 0);
+    let (mut all_rays, mut all_wrong) = (0, 0);
     for scene in &data.scenes {
         // The judge is the same for all structures of a scene: its widest check counts.
-        let checks = scene
-            .structures
-            .iter()
-            .filter_map(|s| s.gate.as_ref())
-            .map(pick);
+        let gates = scene.structures.iter().filter_map(|s| s.gate.as_ref());
+        let checks = gates.map(pick);
         let worst = checks.max_by_key(|check| (check.wrong, check.rays));
         let Some(check) = worst.filter(|check| check.rays > 0) else {
             details.push(format!("{}: not run", scene.name));
             continue;
         };
-        rays += check.rays;
-        wrong += check.wrong;
+        all_rays += check.rays;
+        all_wrong += check.wrong;
+        let [wrong, near] = [check.wrong, check.ambiguous].map(|n| count(n as u64));
         let mut text = format!(
-            "{}: {}, {} differ",
+            "{}: {}, {wrong} differ",
             scene.name,
-            plural(check.rays, "ray"),
-            count(check.wrong as u64)
+            plural(check.rays, "ray")
         );
         if check.ambiguous > 0 {
-            text += &format!(
-                ", {} within rounding of an edge or another surface",
-                count(check.ambiguous as u64)
-            );
+            text += &format!(", {near} within rounding of an edge or another surface");
         }
         if let Some(when) = check.reused_unix_s {
             text += &format!(", found on disk: checked {}", format::utc(when));
         }
         details.push(text);
     }
-    check(title, rays > 0, wrong > 0, join(details))
+    check(title, all_rays > 0, all_wrong > 0, join(details))
 }
 
 fn images(data: &RunData) -> Check {
@@ -149,34 +142,23 @@ fn images(data: &RunData) -> Check {
         times.iter().any(is_peer)
     };
     let compared = times.iter().filter(has_peer).count();
-    let unequal: Vec<String> = times
-        .iter()
-        .filter(|time| !time.image_equal)
-        .map(|t| {
-            let scene = t.key.label(axis::SCENE);
-            format!("{} with {} on {scene} differs", t.structure, t.sampler)
-        })
-        .collect();
-    let mut detail = format!(
-        "{} of {} equal to the bit",
-        compared.saturating_sub(unequal.len()),
-        plural(compared, "image")
-    );
+    let unequal = times.iter().filter(|time| !time.image_equal);
+    let unequal = unequal.map(|t| {
+        let scene = t.key.label(axis::SCENE);
+        format!("{} with {} on {scene} differs", t.structure, t.sampler)
+    });
+    let unequal: Vec<String> = unequal.collect();
+    let equal = compared.saturating_sub(unequal.len());
+    let mut detail = format!("{equal} of {} equal to the bit", plural(compared, "image"));
     if compared < times.len() {
-        detail += &format!(
-            "; {} rendered in one way alone",
-            count((times.len() - compared) as u64)
-        );
+        let alone = count((times.len() - compared) as u64);
+        detail += &format!("; {alone} rendered in one way alone");
     }
     if !unequal.is_empty() {
         detail += &format!(": {}", unequal.join(", "));
     }
-    check(
-        "Images equal across structures and organisations",
-        compared > 0,
-        !unequal.is_empty(),
-        detail + ".",
-    )
+    let title = "Images equal across structures and organisations";
+    check(title, compared > 0, !unequal.is_empty(), detail + ".")
 }
 
 /// Single paths of integrators against the oracle for images; nothing where a run judged none.
@@ -229,17 +211,17 @@ fn bias(data: &RunData) -> Check {
     }
     for (scene, view, sampler, _) in with(BiasVerdict::Biased) {
         let fault = sampler.fault().unwrap_or_default();
-        detail += &format!(
-            "; {} on {}, {}: {fault}",
-            sampler.name, scene.name, view.name
-        );
+        let place = format!("{} on {}, {}", sampler.name, scene.name, view.name);
+        detail += &format!("; {place}: {fault}");
     }
+    // What cannot be tested, or is biased by design, is told although it is no proof.
+    let detail = if records.is_empty() {
+        NOTHING.into()
+    } else {
+        detail + "."
+    };
     Check {
-        // What cannot be tested, or is biased by design, is told although it is no proof.
-        detail: match records.is_empty() {
-            true => NOTHING.into(),
-            false => detail + ".",
-        },
+        detail,
         ..check(
             "Samplers without bias",
             clean > 0,
@@ -262,11 +244,8 @@ fn finite_pixels(data: &RunData) -> Check {
             }
         }
     }
-    let detail = format!(
-        "{} in {}{names}.",
-        plural(bad, "non-finite pixel"),
-        plural(images, "image")
-    );
+    let (pixels, of) = (plural(bad, "non-finite pixel"), plural(images, "image"));
+    let detail = format!("{pixels} in {of}{names}.");
     check("Every pixel finite", images > 0, bad > 0, detail)
 }
 
@@ -283,24 +262,19 @@ fn reference_noise(data: &RunData) -> Check {
             None => "no reference".into(),
             Some(reference) => {
                 tested = true;
-                match (reference.exact, &reference.file, reference.mse) {
-                    (Some(_), ..) => "exact".into(),
-                    (None, Some(file), _) => format!("{file}, of unknown noise"),
-                    (None, None, mse) => format!(
-                        "MSE {} at {} spp",
-                        format::optional(mse),
-                        count(u64::from(reference.spp))
-                    ),
+                let spp = count(u64::from(reference.spp));
+                match (reference.exact, &reference.file) {
+                    (Some(_), _) => "exact".into(),
+                    (None, Some(file)) => format!("{file}, of unknown noise"),
+                    _ => format!("MSE {} at {spp} spp", format::optional(reference.mse)),
                 }
             }
         };
         let fault = fault.map_or(String::new(), |fault| format!(": {fault}"));
         details.push(format!("{}, {}: {known}{fault}", scene.name, view.name));
     }
-    let title = format!(
-        "Reference noise below {} of every error",
-        format::percent(REFERENCE_SHARE)
-    );
+    let share = format::percent(REFERENCE_SHARE);
+    let title = format!("Reference noise below {share} of every error");
     check(title, tested, wrong, join(details))
 }
 

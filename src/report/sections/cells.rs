@@ -135,22 +135,22 @@ impl Cell<'_> {
     fn fold(&self, data: &RunData) -> Block {
         let labels = self.key.labels().map(|(_, label)| label);
         let mut blocks = Vec::new();
-        let mut facts = Table::new("What it is", &["axis", ":value"]);
-        for (axis, label) in self.key.labels() {
-            facts.rows.push(vec![axis.into(), label.into()]);
-        }
-        if let Some(ran) = self.ran {
-            let hash: String = ran.kernel_hash.chars().take(SHORT_HASH).collect();
-            let further = [
+        let of_kernel = self.ran.into_iter().flat_map(|ran| {
+            let hash = ran.kernel_hash.chars().take(SHORT_HASH).collect();
+            let (inside, left_out) = (ran.features.join(", "), ran.left_out.join(", "));
+            [
                 ("kernel", hash),
-                ("features in it", ran.features.join(", ")),
-                ("features left out", ran.left_out.join(", ")),
-            ];
-            let known = further.into_iter().filter(|(_, text)| !text.is_empty());
-            let rows = known.map(|(what, text)| vec![what.into(), text.into()]);
-            facts.rows.extend(rows);
-        }
-        blocks.extend(facts.into_block());
+                ("features in it", inside),
+                ("features left out", left_out),
+            ]
+        });
+        let of_key = self
+            .key
+            .labels()
+            .map(|(axis, label)| (axis, label.to_owned()));
+        let facts = of_key.chain(of_kernel.filter(|(_, text)| !text.is_empty()));
+        let facts = facts.map(|(what, text)| [what.into(), text.into()]);
+        blocks.extend(Table::of("What it is", &["axis", ":value"], facts).into_block());
         if let Some(run) = data.run {
             let command = command(&run.experiment, &run.experiment_text, &self.key);
             blocks.push(Block::Verbatim(command));
@@ -166,26 +166,26 @@ impl Cell<'_> {
     }
 
     fn figures(&self) -> Table {
-        let mut table = Table::new("What was found", &["figure", ":of", "value", ":unit"]);
-        for value in &self.values {
-            let further = value
-                .key
-                .labels()
-                .filter(|(axis, _)| Axis::from_name(axis).is_none());
-            let further: BTreeMap<&str, &str> = further.collect();
+        let row = |value: &&Value| {
+            let labels = value.key.labels();
+            let further: BTreeMap<&str, &str> = labels
+                .filter(|(axis, _)| Axis::from_name(axis).is_none())
+                .collect();
             let of = |(axis, label): (&&str, &&str)| match *axis {
                 axis::RAYS | axis::SUBJECT => (*label).to_owned(),
                 axis => format!("{axis} {label}"),
             };
             let of: Vec<String> = further.iter().map(of).collect();
-            table.rows.push(vec![
-                (&*value.figure.title).into(),
+            let (title, unit) = (&*value.figure.title, &*value.figure.unit);
+            [
+                title.into(),
                 of.join(", ").into(),
                 value.cell(),
-                (&*value.figure.unit).into(),
-            ]);
-        }
-        table
+                unit.into(),
+            ]
+        };
+        let heads = ["figure", ":of", "value", ":unit"];
+        Table::of("What was found", &heads, self.values.iter().map(row))
     }
 }
 

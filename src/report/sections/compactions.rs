@@ -1,6 +1,7 @@
 //! Compactions of streams: time per element, growth with the number of elements, what parameters do.
 
-use crate::data::RunData;
+use super::specs::GROWTH;
+use crate::data::{RunData, grouped};
 use crate::document::*;
 use crate::format::ABSENT;
 use crate::pivot::{FIGURES_ALONE, Rows};
@@ -96,25 +97,13 @@ fn others(key: &Key, parameter: &str) -> (String, String) {
 
 /// Cells that differ in one parameter alone, by growing values of it.
 fn over<'a>(data: &RunData<'a>, name: &str) -> Vec<Vec<(f64, Measured<'a>)>> {
-    let mut groups: Vec<(_, Vec<(f64, Measured)>)> = Vec::new();
-    for cell in data
-        .measured_by(NAME)
-        .into_iter()
-        .filter(|c| time(c).is_some())
-    {
-        let Some(x) = parameter(cell.key, name) else {
-            continue;
-        };
-        let same = others(cell.key, name);
-        match groups.iter_mut().find(|(known, _)| *known == same) {
-            Some((_, cells)) => cells.push((x, cell)),
-            None => groups.push((same, vec![(x, cell)])),
-        }
-    }
+    let cells = data.measured_by(NAME).into_iter();
+    let timed = cells.filter(|cell| time(cell).is_some());
+    let placed = timed.filter_map(|cell| Some((parameter(cell.key, name)?, cell)));
+    let groups = grouped(placed, |(_, cell)| others(cell.key, name));
     let mut groups: Vec<_> = groups.into_iter().map(|(_, cells)| cells).collect();
-    groups
-        .iter_mut()
-        .for_each(|cells| cells.sort_by(|a, b| a.0.total_cmp(&b.0)));
+    let sort = |cells: &mut Vec<(f64, _)>| cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+    groups.iter_mut().for_each(sort);
     groups.retain(|cells| cells.len() >= LEAST_POINTS);
     groups
 }
@@ -169,28 +158,20 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
         "bytes" => ("bytes of an element", Ticks::PowersOfTwo),
         other => (other, Ticks::PowersOfTwo),
     };
-    let plot = CurvePlot {
-        x_title: x_title.to_owned(),
-        x_ticks,
-        y_title: y_title.to_owned(),
-        curves,
-        guides: Vec::new(),
-    };
+    let plot = CurvePlot::new(x_title, x_ticks, y_title, curves);
     let caption = format!("{says}, against {x_title}. Bands: 95 % interval of the median.");
     plot.figure(format!("compaction-{parameter}"), caption)
 }
 
 /// The same look for all variants of a method.
 fn look(data: &RunData, key: &Key) -> usize {
-    let mut names: Vec<&str> = Vec::new();
-    for cell in data.measured_by(NAME) {
-        let name = cell.key.name(axis::INTEGRATOR);
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
+    let cells = data.measured_by(NAME).into_iter();
+    let methods = grouped(cells, |cell| cell.key.name(axis::INTEGRATOR).to_owned());
     let own = key.name(axis::INTEGRATOR);
-    names.iter().position(|name| *name == own).unwrap_or(0)
+    methods
+        .iter()
+        .position(|(name, _)| name == own)
+        .unwrap_or(0)
 }
 
 /// Every figure of compactions.
@@ -260,21 +241,14 @@ fn growths(data: &RunData) -> Vec<(Key, Growth)> {
 pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
     let row = |(key, growth): (Key, Growth)| {
         let better = growth.better.map_or("neither", |model| model.name());
-        let cells = vec![key.label(axis::INTEGRATOR).into(), better.into()];
-        (key, cells)
+        (key, vec![better.into()])
     };
-    let rows = growths(data).into_iter().map(row);
-    Rows::new(&ROW, &["method", ":fits better"], rows).table(
+    GROWTH.beside(
+        &data.names,
         values,
-        "Growth with the number of elements n: relative residuals of both models, of two constants each, and the \
-         difference of Akaike's criteria, each fitted round by round: median [95 % interval]. A model is named where \
-         the whole interval is beyond ±2",
-        &[
-            &figure::GROWTH_LINEAR,
-            &figure::GROWTH_LINEARITHMIC,
-            &figure::GROWTH_DIFFERENCE,
-        ],
-        FIGURES_ALONE,
+        &[],
+        &[":fits better"],
+        growths(data).into_iter().map(row),
     )
 }
 

@@ -1,14 +1,14 @@
 //! What other kernels change, beside the program's own, and what kernels were made of: features compiled in and out, and what
 //! leaving them out gained.
 
+use super::specs::GAINS;
 use crate::compare::judge::Verdict;
 use crate::compare::show::change;
 use crate::compare::side::{EMBEDDED, Side};
 use crate::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
-use crate::data::{FULL_CELLS, Measured, RunData, SceneGroup, View, without_repeats};
+use crate::data::{FULL_CELLS, Measured, RunData, SceneGroup, View, grouped, without_repeats};
 use crate::document::*;
 use crate::format;
-use crate::pivot::Rows;
 use crate::values::Value;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, Key, Ran, TimeRecord, axis};
@@ -36,8 +36,7 @@ pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
         let found = compare_sides(&sides[0], &sides[1], &Options::default(), &Confirmed::new());
         let caption = format!("What the kernels @{idea} change, against {original}");
         let heads = ["structure", ":answer", ":change [95 % interval]"];
-        let mut table = Table::new(caption, &heads);
-        table.rows = structures(data, &found);
+        let table = Table::of(caption, &heads, structures(data, &found));
         let mut notes = found.notes.clone();
         notes.push(beside_times(&found));
         Some((table, notes)).filter(|(table, _)| !table.rows.is_empty())
@@ -63,7 +62,7 @@ pub(crate) fn ideas(data: &RunData) -> Vec<String> {
 }
 
 /// A row for each structure, those that the kernels change first.
-fn structures(data: &RunData, found: &Comparison) -> Vec<Vec<TableCell>> {
+fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
     const WHERE: [&str; 5] = [
         axis::SCENE,
         axis::ACCEL,
@@ -71,14 +70,8 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<Vec<TableCell>> {
         axis::BOX_TEST,
         axis::WORKGROUP,
     ];
-    let mut groups: Vec<(Key, Vec<&Finding>)> = Vec::new();
-    for finding in found.findings.iter().filter(|f| f.is_time) {
-        let key = finding.key.only(&WHERE);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, findings)) => findings.push(finding),
-            None => groups.push((key, vec![finding])),
-        }
-    }
+    let times = found.findings.iter().filter(|f| f.is_time);
+    let mut groups = grouped(times, |f| f.key.only(&WHERE));
     groups.sort_by_key(|(_, findings)| findings.iter().all(|f| f.is_control));
     let row = |(key, findings): (Key, Vec<&Finding>)| {
         let scene = key.label(axis::SCENE);
@@ -97,7 +90,7 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<Vec<TableCell>> {
         let told = findings.iter().filter(|f| all_are || !f.is_control);
         let changed: Vec<String> = told.map(|f| change_of(f)).collect();
         let answer = TableCell::from(answer).toned(tone);
-        vec![name.into(), answer, changed.join("; ").into()]
+        [name.into(), answer, changed.join("; ").into()]
     };
     groups.into_iter().map(row).collect()
 }
@@ -107,14 +100,11 @@ fn answer(findings: &[&Finding]) -> (String, Tone) {
     let changed: Vec<&&Finding> = findings.iter().filter(|f| !f.is_control).collect();
     if changed.is_empty() {
         let moved = findings.iter().any(|f| f.verdict == Verdict::Undecided);
-        return if moved {
-            (
-                "unchanged control, which moved all the same".into(),
-                Tone::Bad,
-            )
-        } else {
-            ("unchanged control".into(), Tone::Plain)
+        let (text, tone) = match moved {
+            true => ("unchanged control, which moved all the same", Tone::Bad),
+            false => ("unchanged control", Tone::Plain),
         };
+        return (text.into(), tone);
     }
     let words = [
         (Verdict::Worse, "slower", Tone::Bad),
@@ -128,15 +118,11 @@ fn answer(findings: &[&Finding]) -> (String, Tone) {
     });
     let found = || counted.iter().filter(|(count, ..)| *count > 0);
     let tone = found().next().map_or(Tone::Note, |(.., tone)| *tone);
-    let text: Vec<String> = found()
-        .map(|(count, word, _)| {
-            if *count == changed.len() {
-                (*word).to_owned()
-            } else {
-                format!("{word} in {count}")
-            }
-        })
-        .collect();
+    let text = found().map(|(count, word, _)| match changed.len() {
+        all if all == *count => (*word).to_owned(),
+        _ => format!("{word} in {count}"),
+    });
+    let text: Vec<String> = text.collect();
     (text.join(", "), tone)
 }
 
@@ -146,20 +132,13 @@ fn change_of(finding: &Finding) -> String {
         "" => {
             let axes = [axis::INTEGRATOR, axis::SEQUENCE, axis::DECORRELATION];
             let labels = finding.key.labels_on(&axes);
-            let labels: Vec<&str> = labels
-                .into_iter()
-                .filter(|label| !label.is_empty())
-                .collect();
-            labels.join(" × ")
+            let labels = labels.into_iter().filter(|label| !label.is_empty());
+            labels.collect::<Vec<_>>().join(" × ")
         }
         rays => format!("{rays} rays"),
     };
-    let change = change(finding);
-    let change = if change.is_empty() {
-        &finding.why
-    } else {
-        &change
-    };
+    let change = Some(change(finding)).filter(|change| !change.is_empty());
+    let change = change.as_ref().unwrap_or(&finding.why);
     format!("{of}: {} {change}", finding.figure.title)
 }
 
@@ -193,8 +172,9 @@ pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
 }
 
 /// The tables on the kernels of a scene.
-pub fn blocks(scene: &SceneGroup, values: &[Value]) -> Vec<Block> {
-    let tables = [features_table(scene), gains_table(scene, values)];
+pub fn blocks(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Vec<Block> {
+    let gains = GAINS.table(&data.names, values, &[scene.name]);
+    let tables = [features_table(scene), gains];
     tables.into_iter().filter_map(Table::into_block).collect()
 }
 
@@ -205,62 +185,21 @@ pub(crate) fn features_table(scene: &SceneGroup) -> Table {
         scene.name
     );
     let heads = ["integrator", ":structures", ":compiled in", ":compiled out"];
-    let mut table = Table::new(caption, &heads);
-    for view in &scene.views {
-        let mut known: Vec<(&Ran, Vec<&str>)> = Vec::new();
-        for time in &view.times {
-            let ran = time.ran;
-            if ran.features.is_empty() && ran.left_out.is_empty() {
-                continue;
-            }
-            let same = |(other, _): &&mut (&Ran, Vec<&str>)| {
-                other.features == ran.features && other.left_out == ran.left_out
-            };
-            match known.iter_mut().find(same) {
-                None => known.push((ran, vec![&time.structure])),
-                Some((_, names)) if names.contains(&&*time.structure) => {}
-                Some((_, names)) => names.push(&time.structure),
-            }
-        }
-        let listed = |names: &[String]| match names.is_empty() {
-            true => "nothing".to_owned(),
-            false => names.join(", "),
-        };
-        table.rows.extend(known.into_iter().map(|(ran, names)| {
-            vec![
-                view.name.clone().into(),
-                names.join(", ").into(),
-                listed(&ran.features).into(),
-                listed(&ran.left_out).into(),
-            ]
-        }));
-    }
-    table
-}
-
-/// Times of kernels that carry more than their scene needs, over those of the specialised ones.
-pub(crate) fn gains_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    let caption = format!(
-        "What compiling out gains on {}: time of the kernel that carries a group of features all the same, over that of \
-         the specialised one [95 % interval]",
-        scene.name
-    );
-    let gains = values.iter().filter(|v| v.figure.id == GAIN.id).cloned();
-    let gains: Vec<Value> = gains.collect();
-    let across = |key: &Key| {
-        format!(
-            "{} with {} × {}",
-            key.label(axis::ACCEL),
-            key.label(axis::SEQUENCE),
-            key.label(axis::DECORRELATION)
-        )
+    let listed = |names: &[String]| match names {
+        [] => "nothing".to_owned(),
+        names => names.join(", "),
     };
-    Rows::of_labels(&[axis::INTEGRATOR], &["integrator"], &gains).table(
-        &gains,
-        caption,
-        &[GAIN],
-        &across,
-    )
+    let rows = scene.views.iter().flat_map(|view| {
+        let is_known = |ran: &Ran| !(ran.features.is_empty() && ran.left_out.is_empty());
+        let times = view.times.iter().filter(|time| is_known(time.ran));
+        let alike = grouped(times, |time| (&time.ran.features, &time.ran.left_out));
+        alike.into_iter().map(|((inside, left_out), times)| {
+            let names = times.iter().map(|time| time.structure.clone()).collect();
+            let names = without_repeats(names).join(", ");
+            [view.name.clone(), names, listed(inside), listed(left_out)].map(TableCell::from)
+        })
+    });
+    Table::of(caption, &heads, rows)
 }
 
 /// Id of the figure.

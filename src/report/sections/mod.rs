@@ -8,16 +8,15 @@ pub(crate) mod compactions;
 mod comparer;
 pub mod kernels;
 pub(crate) mod measured;
-mod orders;
 pub(crate) mod organisations;
 pub mod peers;
 pub(crate) mod point_sets;
-mod primary;
 pub(crate) mod race;
 pub(crate) mod rendering;
 pub mod run;
 pub(crate) mod sampler_plots;
 pub mod samplers;
+pub(crate) mod specs;
 pub mod spectrum;
 pub(crate) mod streams;
 pub(crate) mod stress;
@@ -230,7 +229,7 @@ fn scene_section(
     let blocks = &mut section.blocks;
     blocks.extend(facts(scene));
     blocks.extend(structures::blocks(dir, data, index, scene));
-    blocks.extend(peers::blocks(scene));
+    blocks.extend(peers::blocks(data, scene));
     blocks.extend(animation::blocks(data, &format!("scene-{index}"), scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
@@ -243,9 +242,9 @@ fn scene_section(
         .collect();
     blocks.extend(Block::fold(
         "Kernels: gains, and what was compiled in and out",
-        kernels::blocks(scene, &values),
+        kernels::blocks(data, scene, &values),
     ));
-    blocks.extend(organisations::blocks(scene));
+    blocks.extend(organisations::blocks(data, scene));
     section
 }
 

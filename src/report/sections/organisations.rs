@@ -2,32 +2,18 @@
 
 use super::file_stem;
 use super::kernels::time_over;
-use crate::data::{Measured, SceneGroup, View};
+use super::specs::ORGANISATIONS;
+use crate::data::{Measured, RunData, SceneGroup, View};
 use crate::document::*;
 use crate::format;
-use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::values::Value;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, TimeRecord, axis};
 
-/// What tells the rows apart.
-const ROWS: [&str; 8] = [
-    axis::INTEGRATOR,
-    axis::ACCEL,
-    axis::KERNELS,
-    axis::SEQUENCE,
-    axis::DECORRELATION,
-    axis::OFFSET,
-    axis::ORGANISATION,
-    axis::WORKGROUP,
-];
-
 /// The organisation that others are compared with.
 const SINGLE: &str = "single-kernel";
 const AGAINST: &Figure = &figure::AGAINST_SINGLE_KERNEL;
-/// Figures of a row.
-const FIGURES: [&Figure; 3] = [&figure::MS_PER_SPP, AGAINST, &figure::RAY_QUERY_SHARE];
 
 fn is_single(time: &Measured<TimeRecord>) -> bool {
     matches!(time.key.label(axis::ORGANISATION), "" | SINGLE)
@@ -61,32 +47,26 @@ fn stages(time: &TimeRecord) -> String {
 }
 
 /// Table and plot; nothing where there is one kernel alone.
-pub(crate) fn blocks(scene: &SceneGroup) -> Vec<Block> {
+pub(crate) fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     let times: Vec<&Measured<TimeRecord>> =
         scene.views.iter().flat_map(View::valid_times).collect();
     if times.iter().all(|time| is_single(time)) {
         return Vec::new();
     }
-    let row = |time: &&Measured<TimeRecord>| {
-        let cells: Vec<TableCell> = vec![
-            time.structure.clone().into(),
-            time.sampler.clone().into(),
-            time.key.label(axis::ORGANISATION).to_owned().into(),
-            stages(time).into(),
-        ];
-        (time.key.clone(), cells)
-    };
-    let rows: Vec<_> = times.iter().map(row).collect();
-    let heads = ["structure", ":sampler", ":organisation", ":stages"];
     let views = scene.views.iter();
     let mut values: Vec<Value> = views.flat_map(|view| against_single(scene, view)).collect();
     for time in &times {
         let share = time.query_share().map(Interval::exact);
-        let figures = [(FIGURES[0], time.ms_per_spp), (FIGURES[2], share)];
+        let figures = [
+            (&figure::MS_PER_SPP, time.ms_per_spp),
+            (&figure::RAY_QUERY_SHARE, share),
+        ];
         values.extend(Value::known(&time.key, figures));
     }
-    let caption = "Organisations of the path tracer: the same image to the bit, in other passes";
-    let table = Rows::new(&ROWS, &heads, rows).table(&values, caption, &FIGURES, FIGURES_ALONE);
+    let rows = times
+        .iter()
+        .map(|time| (time.key.clone(), vec![stages(time).into()]));
+    let table = ORGANISATIONS.beside(&data.names, &values, &[], &[":stages"], rows);
     let mut blocks: Vec<Block> = table.into_block().into_iter().collect();
     let stem = format!("organisations-{}", file_stem(scene.name));
     blocks.extend(Block::figures(vec![live(stem, scene)]));
@@ -113,13 +93,12 @@ fn live(stem: String, scene: &SceneGroup) -> Option<Illustration> {
                 .collect(),
         });
     }
-    let plot = CurvePlot {
-        x_title: "bounces before the ray".into(),
-        x_ticks: Ticks::Whole,
-        y_title: "paths that are alive".into(),
+    let plot = CurvePlot::new(
+        "bounces before the ray",
+        Ticks::Whole,
+        "paths that are alive",
         curves,
-        guides: Vec::new(),
-    };
+    );
     let caption = "Share of the paths that send a ray after so many bounces, of the first sampler.";
     plot.figure(stem, caption.to_owned())
 }

@@ -1,10 +1,9 @@
 //! Ray casters of others beside the structures: times of the processors, ratios, and how their answers differ. No verdict is drawn from it.
 
-use super::structures::BY_RAYS;
-use crate::data::SceneGroup;
+use super::specs::PEERS;
+use crate::data::{RunData, SceneGroup};
 use crate::document::*;
 use crate::format;
-use crate::pivot::Rows;
 use crate::values::Value;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{ClassTiming, Interval, PeerRecord, PeerTiming, Recorded, axis};
@@ -16,15 +15,6 @@ const COST: &Figure = &figure::CPU_NS_PER_RAY;
 const RATIO: &Figure = &figure::CPU_OVER_PEER;
 const UNLIKE: &Figure = &figure::UNLIKE_JUDGE;
 const FARTHEST: &Figure = &figure::FARTHEST_DISTANCE;
-
-/// Who casts: a structure or a peer, and against whom.
-const ROWS: [&str; 5] = [
-    axis::ACCEL,
-    axis::KERNELS,
-    axis::TRIANGLE,
-    axis::BOX_TEST,
-    axis::PEER,
-];
 
 fn ns_per_ray(cpu_ms: &[f64], rays: usize) -> Option<Interval> {
     let ns: Vec<f64> = cpu_ms.iter().map(|ms| ms * 1e6 / rays as f64).collect();
@@ -100,7 +90,7 @@ fn told(peer: &Recorded<PeerRecord>) -> String {
 }
 
 /// Tables of a scene; nothing without peers.
-pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
+pub fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     if scene.peers.is_empty() {
         return Vec::new();
     }
@@ -114,46 +104,7 @@ pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
     ];
     blocks.extend(scene.peers.iter().map(|peer| Block::Paragraph(told(peer))));
     let values = values(scene);
-    let table = |figure: &Figure, rows: &[&'static str], heads: &[&str], caption: &str| {
-        let own: Vec<Value> = values
-            .iter()
-            .filter(|v| v.figure.id == figure.id)
-            .cloned()
-            .collect();
-        Rows::of_labels(rows, heads, &own)
-            .table(&own, caption, &[figure], BY_RAYS)
-            .into_block()
-    };
-    let who = [axis::PEER, axis::ACCEL, axis::KERNELS];
-    blocks.extend(table(
-        COST,
-        &who,
-        &[":peer", ":structure", ":kernels"],
-        "Time of all processors, ns per ray: median [95 % interval]",
-    ));
-    blocks.extend(table(
-        RATIO,
-        &ROWS[..],
-        &[":structure", ":kernels", ":triangle", ":box test", ":over"],
-        "Time of the processors over that of a peer: above 1 the peer needs less",
-    ));
-    blocks.extend(table(
-        SPEED,
-        &[axis::PEER],
-        &[":peer"],
-        "Speed by the wall clock, Mrays/s: median [95 % interval]",
-    ));
-    blocks.extend(table(
-        UNLIKE,
-        &[axis::PEER],
-        &[":peer"],
-        "Rays with another triangle than the judge's, or another answer, per million",
-    ));
-    blocks.extend(table(
-        FARTHEST,
-        &[axis::PEER],
-        &[":peer"],
-        "Greatest relative difference of a distance at the same triangle",
-    ));
+    let tables = PEERS.map(|table| table.table(&data.names, &values, &[]));
+    blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks
 }

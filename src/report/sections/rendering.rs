@@ -2,16 +2,13 @@
 
 use super::kernels::is_repeat;
 use super::verdict::{class_speed, ray_classes};
-use crate::data::{FULL_CELLS, Measured, STRUCTURE_AXES, SceneGroup, View};
+use crate::data::{FULL_CELLS, Measured, STRUCTURE_AXES, SceneGroup, View, grouped};
 use crate::ruling::{Contender, Ruling, judge};
 use crate::{format, trust};
 use raystone_record::figure::Better;
-use raystone_record::{Key, axis};
+use raystone_record::{Key, TimeRecord, axis};
 use raystone_stats::comparison::{LEVEL, LogFigure, Pairs};
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
-
-/// What else of a sampler than its kernels, which are those of the structure.
-const POINT_AXES: [&str; 3] = [axis::SEQUENCE, axis::DECORRELATION, axis::OFFSET];
 
 /// A structure that cells of a view were rendered through.
 struct Renderer {
@@ -25,38 +22,26 @@ struct Renderer {
 
 /// Structures that were timed with the most samplers, and how long each takes with these.
 fn renderers(scene: &SceneGroup, view: &View) -> Vec<Renderer> {
-    let mut found: Vec<(Key, Vec<Key>, Vec<LogFigure>, bool)> = Vec::new();
-    for time in view
-        .valid_times()
-        .filter(|time| !is_repeat(time, &view.times))
-    {
-        let Some(log) = time.rounds(FULL_CELLS, &time.ms) else {
-            continue;
-        };
-        let log = log.scaled(1.0 / f64::from(time.spp));
-        let key = time.key.only(&STRUCTURE_AXES);
-        let points = time.key.only(&POINT_AXES);
-        let often = time.ms.len() >= LEAST_FOR_MEDIAN;
-        match found.iter_mut().find(|(known, ..)| *known == key) {
-            None => found.push((key, vec![points], vec![log], often)),
-            Some((_, samplers, logs, all_often)) => {
-                samplers.push(points);
-                logs.push(log);
-                *all_often &= often;
-            }
-        }
-    }
-    let most = found.iter().map(|(_, samplers, ..)| samplers.len()).max();
-    found.retain(|(_, samplers, ..)| Some(samplers.len()) == most);
-    let renderer = |(key, _, logs, is_ranked): (Key, Vec<Key>, Vec<LogFigure>, bool)| {
+    let times = view.valid_times();
+    let times = times.filter(|time| !is_repeat(time, &view.times));
+    let timed = times.filter_map(|time| Some((time, time.rounds(FULL_CELLS, &time.ms)?)));
+    let mut found = grouped(timed, |(time, _)| time.key.only(&STRUCTURE_AXES));
+    let most = found.iter().map(|(_, times)| times.len()).max();
+    found.retain(|(_, times)| Some(times.len()) == most);
+    let renderer = |(key, times): (Key, Vec<(&Measured<TimeRecord>, LogFigure)>)| {
         let same = |s: &&Measured<_>| s.key.agrees(&key, &STRUCTURE_AXES);
         let structure = scene.structures.iter().find(same);
         let label = key.label(axis::ACCEL);
+        let per_spp = times
+            .iter()
+            .map(|(time, log)| log.scaled(1.0 / f64::from(time.spp)));
         Renderer {
             name: structure.map_or(label.to_owned(), |s| s.structure.clone()),
-            time: geometric_mean(&logs),
+            time: geometric_mean(&per_spp.collect::<Vec<_>>()),
+            is_ranked: times
+                .iter()
+                .all(|(time, _)| time.ms.len() >= LEAST_FOR_MEDIAN),
             key,
-            is_ranked,
         }
     };
     found.into_iter().map(renderer).collect()
@@ -85,9 +70,8 @@ pub(crate) fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
 /// A line for each class of rays of which some structure is faster than the one that renders fastest, though it
 /// renders slower: both by a test of the difference, corrected for all pairs of the comparison.
 pub(crate) fn disagreements(scene: &SceneGroup) -> Vec<String> {
-    scene
-        .views
-        .iter()
+    let views = scene.views.iter();
+    views
         .flat_map(|view| disagreements_of(scene, view))
         .collect()
 }

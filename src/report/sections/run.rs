@@ -54,19 +54,24 @@ pub(crate) fn overhead(data: &RunData) -> Option<String> {
 }
 
 fn wall_table(finished: &FinishedRecord) -> Table {
-    let mut table = Table::new("Where the wall time went", &["part", "seconds", "share"]);
     let parts = finished.parts_s.iter().map(|(name, s)| (name.as_str(), *s));
     let mut parts: Vec<(&str, f64)> = parts.collect();
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.push(("overhead", finished.overhead_s));
-    parts.push(("whole run", finished.wall_s));
-    for (name, seconds) in parts {
+    parts.extend([
+        ("overhead", finished.overhead_s),
+        ("whole run", finished.wall_s),
+    ]);
+    let row = |(name, seconds): (&str, f64)| {
         let share = Some(seconds / finished.wall_s).filter(|share| share.is_finite());
         let share = share.map_or(format::ABSENT.into(), percent);
-        let cells = [name.into(), format::number(seconds), share];
-        table.rows.push(cells.map(TableCell::from).into());
-    }
-    table
+        [name.into(), format::number(seconds).into(), share.into()]
+    };
+    let heads = ["part", "seconds", "share"];
+    Table::of(
+        "Where the wall time went",
+        &heads,
+        parts.into_iter().map(row),
+    )
 }
 
 /// State of a cell that failed.
@@ -110,6 +115,8 @@ pub(crate) fn failures(data: &RunData) -> Vec<Failure> {
     };
     let peers = data.scenes.iter().flat_map(|scene| &scene.peers);
     all.extend(peers.filter_map(|peer| failed(peer.key, &peer.failure)));
+    let animations = data.scenes.iter().flat_map(|scene| &scene.animations);
+    all.extend(animations.filter_map(|cell| failed(&cell.key, &cell.failure)));
     all.extend((data.measured.iter()).filter_map(|cell| failed(cell.key, &cell.failure)));
     for (records, state) in [
         (&data.failed, FAILED),
@@ -134,12 +141,11 @@ fn failures_section(data: &RunData) -> Option<Section> {
     };
     let mut section = Section::new("failures", title);
     let table = |caption: &str, failures: &[&Failure], tone| {
-        let mut table = Table::new(caption, &["cell", ":why"]);
-        for failure in failures {
+        let row = |failure: &&Failure| {
             let reason = TableCell::from(failure.reason.clone()).toned(tone);
-            table.rows.push(vec![failure.cell.clone().into(), reason]);
-        }
-        table.into_block()
+            [failure.cell.clone().into(), reason]
+        };
+        Table::of(caption, &["cell", ":why"], failures.iter().map(row)).into_block()
     };
     let blocks = &mut section.blocks;
     blocks.extend(table("Failed", &failed, Tone::Bad));
@@ -151,13 +157,12 @@ fn failures_section(data: &RunData) -> Option<Section> {
         let cells = left_out.iter().filter(|f| f.reason == reason);
         let cells: Vec<&str> = cells.map(|f| f.cell.as_str()).collect();
         let title = format!("Left out: {reason}");
-        let mut fold = Fold {
+        blocks.push(Block::Fold(Fold {
             title,
             note: format::plural(cells.len(), "cell"),
+            blocks: vec![Block::Verbatim(cells.join("\n"))],
             ..Fold::default()
-        };
-        fold.blocks.push(Block::Verbatim(cells.join("\n")));
-        blocks.push(Block::Fold(fold));
+        }));
     }
     Some(section)
 }
@@ -224,14 +229,16 @@ fn environment(data: &RunData) -> Option<Section> {
         ("raystone", e.version.clone()),
         ("commit", commit.unwrap_or_default()),
     ];
-    let mut table = Table::new("Environment", &["what", ":value"]);
-    for (what, value) in rows {
-        let value = match value.trim().is_empty() {
-            true => format::ABSENT.into(),
-            false => value,
+    let row = |(what, value): (&str, String)| {
+        let is_known = !value.trim().is_empty();
+        let value = if is_known {
+            value
+        } else {
+            format::ABSENT.into()
         };
-        table.rows.push(vec![what.into(), value.into()]);
-    }
+        [what.into(), value.into()]
+    };
+    let table = Table::of("Environment", &["what", ":value"], rows.map(row));
     let mut section = Section::new("environment", "Where it ran");
     section.blocks.extend(table.into_block());
     let text = vec![Block::Verbatim(run.experiment_text.clone())];

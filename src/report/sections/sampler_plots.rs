@@ -1,14 +1,16 @@
 //! Plots of samplers under one scene and integrator.
 
+use super::specs::ERROR_CURVES;
 use crate::data::{RunData, View};
 use crate::document::Illustration;
 use crate::format;
-use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::plot::curves::{Curve, CurvePlot, Ticks};
 use crate::plot::histogram::Histogram;
 use crate::plot::panels::{self, Panel};
 use crate::plot::pareto::{CellPoint, ParetoPlot};
-use crate::samplers::{MeanError, MeasuredSampler, Metric, UNRESOLVED, log_time};
-use raystone_record::Interval;
+use crate::samplers::{MeasuredSampler, Metric, UNRESOLVED, log_time};
+use crate::spec::{PlotSpec, filled};
+use crate::values::Value;
 use raystone_stats::bias::BiasVerdict;
 use raystone_stats::comparison::{Place, places};
 
@@ -25,40 +27,49 @@ pub(crate) fn error_figures(
     data: &RunData,
     stem: &str,
     view: &View,
+    values: &[Value],
     metric: Metric,
 ) -> [Option<Illustration>; 2] {
-    let name = metric.name();
-    let means = view.samplers.iter().flat_map(|s| s.mean_errors(metric));
-    let hidden = not_drawn(means.filter(|mean| !mean.resolved).count());
+    let (name, figure) = (metric.name(), metric.figure());
+    let hidden = values
+        .iter()
+        .filter(|v| v.figure.id == figure.id && v.is_unresolved());
+    let hidden = not_drawn(hidden.count());
+    let spec = PlotSpec {
+        figures: &[(figure, "")],
+        ..ERROR_CURVES
+    };
+    let by_spp = spec.plot(data, values).curves;
     // What stands behind a sampler's name, and what one sample per pixel is on the x axis.
-    let plot =
-        |x_title: String, x_ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
-            let curve = |s: &MeasuredSampler| {
-                let (says, x) = unit(s)?;
-                curve(data, s, metric, x, format!("{}{says}", s.name))
-            };
-            CurvePlot {
-                x_title,
-                x_ticks,
-                y_title: format!("{name} (mean over replicates)"),
-                curves: view.samplers.iter().filter_map(curve).collect(),
-                guides: Vec::new(),
-            }
+    let plot = |x_title: &str, ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
+        let curve = |mut curve: Curve| {
+            let sampler = view.samplers.iter().find(|s| s.name == curve.label)?;
+            let (says, per_spp) = unit(sampler)?;
+            curve.label += &says;
+            curve.exact = sampler.is_deterministic();
+            curve.points.iter_mut().for_each(|point| point.x *= per_spp);
+            Some(curve)
         };
-    let by_spp = plot("samples per pixel".into(), Ticks::PowersOfTwo, &|sampler| {
+        let curves = by_spp.iter().cloned().filter_map(curve);
+        CurvePlot::new(
+            x_title,
+            ticks,
+            format!("{name} (mean over replicates)"),
+            curves,
+        )
+    };
+    let of_samples = plot(spec.x_title, spec.x_ticks, &|sampler| {
         let slope = sampler.slope(metric);
         let slope = slope.map(|slope| format!(": slope {}", format::slope(&slope)));
         Some((slope.unwrap_or_default(), 1.0))
     });
-    let by_spp = by_spp.figure(
+    let of_samples = of_samples.figure(
         format!("{stem}-{}-spp", metric.stem()),
-        format!(
-            "{name} against samples. Bands: 95 % interval, of replicates and reference; dashed: deterministic.{hidden}"
-        ),
+        filled(spec.caption, &[name, &hidden]),
     );
-    let by_seconds = view.fastest_structure().and_then(|structure| {
+    let of_seconds = view.fastest_structure().and_then(|structure| {
         let x_title = format!("render time with {structure}, seconds");
-        let plot = plot(x_title, Ticks::PowersOfTen, &|sampler| {
+        let plot = plot(&x_title, Ticks::PowersOfTen, &|sampler| {
             let ms = view.ms_per_spp(&structure, &sampler.name)?.value;
             Some((format!(": {} ms per spp", format::number(ms)), ms / 1000.0))
         });
@@ -67,32 +78,7 @@ pub(crate) fn error_figures(
             format!("{name} against time: samples × measured ms per spp with {structure}.{hidden}"),
         )
     });
-    [by_spp, by_seconds]
-}
-
-fn curve(
-    data: &RunData,
-    sampler: &MeasuredSampler,
-    metric: Metric,
-    x_per_spp: f64,
-    label: String,
-) -> Option<Curve> {
-    let means = sampler.mean_errors(metric);
-    let resolved = means.iter().filter(|mean| mean.resolved);
-    let point = |mean: &MeanError| {
-        let error = match mean.heavy_tailed {
-            true => Interval::exact(mean.error.value),
-            false => mean.error,
-        };
-        CurvePoint::new(f64::from(mean.spp) * x_per_spp, &error)
-    };
-    let points: Vec<CurvePoint> = resolved.map(point).collect();
-    (!points.is_empty()).then(|| Curve {
-        label,
-        look: data.sampler_look(&sampler.name),
-        exact: sampler.is_deterministic(),
-        points,
-    })
+    [of_samples, of_seconds]
 }
 
 /// Run time against error at the common spp.

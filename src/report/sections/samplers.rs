@@ -3,16 +3,17 @@
 use super::cells::Cells;
 use super::coherence;
 use super::comparer;
-use super::orders;
-use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
+use super::specs::{BIAS, EFFICIENCY, ERRORS, FURTHER_ERRORS, ORDERS, PRIMARY};
 use super::spectrum;
 use super::verdict::Race;
-use crate::data::{RunData, SAMPLER_ROW, SceneGroup, View};
+use crate::data::{RunData, SceneGroup, View};
 use crate::document::*;
-use crate::pivot::{FIGURES_ALONE, Rows};
+use crate::names::Names;
+use crate::pivot::Rows;
 use crate::plot::pareto::letter;
-use crate::samplers::{FURTHER_METRICS, HEAVY_TAILED, MeasuredSampler, Metric, UNRESOLVED};
+use crate::samplers::{HEAVY_TAILED, MeasuredSampler, Metric, UNRESOLVED};
+use crate::spec::TableSpec;
 use crate::values::{Value, number, of_view};
 use crate::{format, pictures};
 use raystone_image::viridis_css;
@@ -31,82 +32,59 @@ pub fn blocks(
 ) -> Vec<Block> {
     let values = of_view(data, scene, view);
     let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.name))];
-    blocks.extend(Block::figures(error_figures(
-        data,
-        stem,
-        view,
-        Metric::RelMse,
-    )));
+    let names = &data.names;
+    let curves = |metric| Block::figures(error_figures(data, stem, view, &values, metric));
+    blocks.extend(curves(Metric::RelMse));
     blocks.extend(comparer::block(dir, data, stem, view));
     let table = |table: Table| table.into_block();
     let one = |block: Option<Block>| block.into_iter().collect::<Vec<Block>>();
-    let mut numbers = one(table(error_table(view, &values, Metric::RelMse)));
-    numbers.extend(Block::figures(error_figures(
-        data,
-        stem,
-        view,
-        Metric::Rmse,
-    )));
-    numbers.extend(table(error_table(view, &values, Metric::Rmse)));
-    numbers.extend(table(further_table(view, &values)));
+    let mut numbers = one(table(error_table(names, view, &values, Metric::RelMse)));
+    numbers.extend(curves(Metric::Rmse));
+    numbers.extend(table(error_table(names, view, &values, Metric::Rmse)));
+    numbers.extend(table(further_table(names, view, &values)));
     let mut matrix = one(Block::figures([pareto_figure(data, stem, view)]));
     matrix.extend(table(time_table(data, view, &values, cells)));
-    let mut rays = one(table(orders::table(view, &values)));
-    rays.extend(table(primary::table(view, &values)));
+    let counts = view.times.iter().map(|time| time.ms.len());
+    let words = [&*view.name, &format::median_bounds(counts)];
+    let rays = [ORDERS, PRIMARY].map(|spec| table(spec.table(names, &values, &words)));
+    let mut rays: Vec<Block> = rays.into_iter().flatten().collect();
     rays.extend(coherence::blocks(data, stem, view, &values));
-    let mut bias = one(table(bias_table(view, &values)));
+    let mut bias = one(table(bias_table(names, view, &values)));
     bias.extend(Block::figures([histograms(stem, view)]));
+    let bought = one(table(efficiency_table(names, view, &values)));
+    let spectra = spectrum::blocks(data, stem, view, &values);
+    let pictures = galleries(dir, view).into_iter().flatten().collect();
     let folds = [
         ("Errors as numbers, and other metrics", numbers),
-        (
-            "What a second buys",
-            one(table(efficiency_table(view, &values))),
-        ),
+        ("What a second buys", bought),
         (
             "Time against error: structure × sampler, Pareto front",
             matrix,
         ),
-        (
-            "What the error looks like: spectra and filters",
-            spectrum::blocks(data, stem, view, &values),
-        ),
+        ("What the error looks like: spectra and filters", spectra),
         ("Order and coherence of the rays", rays),
         ("Bias check", bias),
-        (
-            "Pictures and error maps",
-            galleries(dir, view).into_iter().flatten().collect(),
-        ),
+        ("Pictures and error maps", pictures),
     ];
-    blocks.extend(
-        folds
-            .into_iter()
-            .filter_map(|(title, inside)| Block::fold(title, inside)),
-    );
+    let folds = folds.into_iter();
+    blocks.extend(folds.filter_map(|(title, inside)| Block::fold(title, inside)));
     if blocks.len() == 1 {
         blocks.push(Block::Paragraph("Nothing was measured.".into()));
     }
     blocks
 }
 
-/// The one head of a table that says nothing of a sampler but its figures.
-pub const SAMPLER: [&str; 1] = ["sampler"];
-
-/// A row for each of some samplers, with further cells under further heads.
-pub(crate) fn rows<'a>(
-    samplers: impl IntoIterator<Item = &'a MeasuredSampler<'a>>,
-    heads: &'a [&'a str],
-    further: impl Fn(&MeasuredSampler) -> Vec<TableCell>,
-) -> Rows<'a> {
-    let row = |s: &MeasuredSampler| {
-        let mut cells = vec![s.name.clone().into()];
-        cells.extend(further(s));
-        (s.key.clone(), cells)
-    };
-    Rows::new(&SAMPLER_ROW, heads, samplers.into_iter().map(row))
+/// A row for each sampler with images, with a further cell.
+fn measured(
+    view: &View,
+    cell: impl Fn(&MeasuredSampler) -> TableCell,
+) -> Vec<(Key, Vec<TableCell>)> {
+    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
+    measured.map(|s| (s.key.clone(), vec![cell(s)])).collect()
 }
 
 /// Mean error per spp, slope and bias verdict.
-pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
+pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric) -> Table {
     let id = view.samplers.iter().find_map(|s| s.metric_id(metric));
     let shown = [metric.figure(), metric.slope_figure()];
     let of_metric = values
@@ -120,72 +98,50 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
     let errors = view.samplers.iter().flat_map(|s| &s.replicates);
     let errors = errors.flat_map(|replicate| &replicate.errors);
     let partial: Vec<u32> = errors.filter(|e| e.partial_net).map(|e| e.spp).collect();
-    let caption = format!(
-        "{} with {}: mean [95 % interval] at each spp; metric {}{id}{}{}{}",
-        metric.name(),
-        view.name,
-        match metric {
-            Metric::RelMse => "",
-            Metric::Rmse => "root of ",
-        },
-        match values.iter().any(Value::is_unresolved) {
-            true => format!("; <: {UNRESOLVED}"),
-            false => String::new(),
-        },
-        match values.iter().any(Value::is_heavy_tailed) {
-            true => format!("; ‡: an interval not to be trusted: {HEAVY_TAILED}"),
-            false => String::new(),
-        },
-        match partial.is_empty() {
-            true => "",
-            false => "; †: no whole net of samplers in base 2",
-        }
-    );
-    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
-    let rows = rows(measured, &["sampler", "replicates"], |s| {
-        vec![TableCell::repeats(
-            s.replicates.len(),
-            !s.is_deterministic(),
-        )]
+    let id = match metric {
+        Metric::RelMse => id.to_owned(),
+        Metric::Rmse => format!("root of {id}"),
+    };
+    let mut notes = String::new();
+    if values.iter().any(Value::is_unresolved) {
+        notes += &format!("; <: {UNRESOLVED}");
+    }
+    if values.iter().any(Value::is_heavy_tailed) {
+        notes += &format!("; ‡: an interval not to be trusted: {HEAVY_TAILED}");
+    }
+    if !partial.is_empty() {
+        notes += "; †: no whole net of samplers in base 2";
+    }
+    let rows = measured(view, |s| {
+        TableCell::repeats(s.replicates.len(), !s.is_deterministic())
     });
-    rows.table(
-        &values,
-        caption,
-        &shown,
-        &|key| match key.label(axis::SPP) {
-            "" => "slope".into(),
-            spp if partial.iter().any(|p| p.to_string() == spp) => format!("{spp} spp †"),
-            spp => format!("{spp} spp"),
-        },
-    )
+    let words = [metric.name(), &view.name, &id, &notes];
+    let spec = TableSpec {
+        figures: &shown,
+        ..ERRORS
+    };
+    let mut table = spec.beside(names, &values, &words, &["replicates"], rows);
+    for spp in partial {
+        let title = format!("{spp} spp");
+        let mut columns = table.columns.iter_mut();
+        if let Some(column) = columns.find(|column| column.title == title) {
+            column.title += " †";
+        }
+    }
+    table
 }
 
 /// What other metrics say at the highest spp.
-fn further_table(view: &View, values: &[Value]) -> Table {
-    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
-    let Some(spp) = measured.clone().find_map(MeasuredSampler::highest_spp) else {
-        return Table::default();
-    };
-    let caption = format!(
-        "Other metrics with {} at {spp} spp: mean [95 % interval] over replicates, the noise of the reference \
-         included; PSNR, SSIM and FLIP of tone-mapped pictures; `raystone list metrics` has the formulas",
-        view.name
-    );
-    let figures = FURTHER_METRICS.map(|(figure, _)| figure);
-    rows(measured, &SAMPLER, |_| Vec::new()).table(values, caption, &figures, FIGURES_ALONE)
+fn further_table(names: &Names, view: &View, values: &[Value]) -> Table {
+    let spp = view.samplers.iter().find_map(MeasuredSampler::highest_spp);
+    let spp = spp.map_or(String::new(), |spp| spp.to_string());
+    FURTHER_ERRORS.table(names, values, &[&view.name, &spp])
 }
 
 /// Verdict on the bias of every sampler.
-fn bias_table(view: &View, values: &[Value]) -> Table {
+fn bias_table(names: &Names, view: &View, values: &[Value]) -> Table {
     let levels = view.samplers.iter().filter_map(|s| s.bias.as_ref());
     let level = levels.map(|bias| bias.alpha).reduce(f64::min);
-    let caption = format!(
-        "Bias check with {}: biased if the p of the image or of the weighted mean is at most a third of {}, or \
-         tiles are rejected at another third (of more, once other samplers were found biased); of a bias of all \
-         pixels below the last column it says nothing",
-        view.name,
-        format::optional(level)
-    );
     let verdict = |sampler: &MeasuredSampler| match (sampler.fault(), &sampler.bias) {
         (Some(fault), _) => TableCell::from(fault).toned(Tone::Bad),
         (None, None) => "not tested".into(),
@@ -197,41 +153,21 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
         }
         (None, Some(bias)) => bias.verdict.to_string().into(),
     };
-    let figures = [
-        &figure::BIAS_TILES,
-        &figure::BIAS_REJECTED,
-        &figure::BIAS_LEAST_P,
-        &figure::BIAS_Z,
-        &figure::BIAS_P,
-        &figure::BIAS_FREEDOM,
-        &figure::BIAS_WEIGHTED_P,
-        &figure::BIAS_WEIGHTED_FREEDOM,
-        &figure::BIAS_DETECTABLE,
-    ];
-    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
-    let rows = rows(measured, &["sampler", ":verdict"], |s| vec![verdict(s)]);
-    rows.table(values, caption, &figures, FIGURES_ALONE)
+    let (words, rows) = (
+        [&*view.name, &format::optional(level)],
+        measured(view, verdict),
+    );
+    BIAS.beside(names, values, &words, &[":verdict"], rows)
 }
 
 /// What a second buys: time per sample, error × time, error at equal time.
-pub(crate) fn efficiency_table(view: &View, values: &[Value]) -> Table {
+pub(crate) fn efficiency_table(names: &Names, view: &View, values: &[Value]) -> Table {
     let Some(race) = Race::new(view) else {
         return Table::default();
     };
-    let caption = format!("Error per second with {}, {}", view.name, race.structure);
     let is_its = |value: &&Value| value.key.label(axis::ACCEL) == race.structure;
     let values: Vec<Value> = values.iter().filter(is_its).cloned().collect();
-    let timed = |s: &&MeasuredSampler| view.ms_per_spp(&race.structure, &s.name).is_some();
-    let rows = rows(view.samplers.iter().filter(timed), &SAMPLER, |_| Vec::new());
-    let figures = [
-        &figure::MS_PER_SPP,
-        &figure::ERROR_SECONDS,
-        &figure::ERROR_AT_TIME,
-        &figure::SPP_TO_ERROR,
-        &figure::SECONDS_TO_ERROR,
-    ];
-    let part = |key: &Key| key.label(axis::SUBJECT).to_owned();
-    rows.table(&values, caption, &figures, &part)
+    EFFICIENCY.table(names, &values, &[&view.name, &race.structure])
 }
 
 /// Milliseconds per spp of every cell.
@@ -278,13 +214,10 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
             (Some(value), _) => format!("reference: the exact value, {value}"),
             (None, Some(file)) => format!("reference: {file}"),
             (None, None) => {
-                let [spp, seconds] = [
-                    format::count(u64::from(reference.spp)),
-                    format::number(reference.seconds),
-                ];
+                let spp = format::count(u64::from(reference.spp));
                 let origin = match reference.cached {
                     true => "kept from an earlier run".to_owned(),
-                    false => format!("{seconds} s"),
+                    false => format!("{} s", format::number(reference.seconds)),
                 };
                 format!("reference: {spp} spp of {}, {origin}", reference.sampler)
             }

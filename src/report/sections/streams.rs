@@ -2,13 +2,16 @@
 //! and what drawing costs.
 
 use super::file_stem;
-use crate::data::{RunData, SAMPLER_ROW};
+use super::specs::{
+    DISCREPANCY, DRAWING, INTEGRAL, POINT_SETS, POINTS, SEVERAL_PIXELS, WORST_PAIRS,
+};
+use crate::data::{RunData, grouped};
 use crate::document::*;
-use crate::pivot::{FIGURES_ALONE, Part, Rows};
-use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::plot::curves::Guide;
+use crate::spec::{PlotSpec, TableSpec, filled};
 use crate::values::{Value, number, of_readings, of_stream};
 use raystone_record::figure::{self, Figure};
-use raystone_record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
+use raystone_record::{FigureAtCount, Recorded, StreamRecord, axis};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
@@ -30,16 +33,18 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
         return None;
     }
     let mut section = Section::new("discrepancy", "Point streams");
-    let mut pairs: Vec<Pair> = Vec::new();
-    for stream in data.streams.iter().filter(|s| s.named) {
-        let what = stream.pair();
-        match pairs.iter_mut().find(|pair| pair.what == what) {
-            Some(pair) => pair.streams.push(stream),
-            None => pairs.push(Pair::new(data, what, stream)),
-        }
+    let named = data.streams.iter().filter(|s| s.named);
+    for (what, streams) in grouped(named, |s| s.pair()) {
+        let [a, b] = streams[0].dimensions;
+        let stem = format!("discrepancy-{}-{a}-{b}", file_stem(&streams[0].purpose));
+        let pair = Pair {
+            data,
+            what,
+            stem,
+            streams,
+        };
+        section.blocks.extend(pair.blocks());
     }
-    let blocks = pairs.iter().flat_map(Pair::blocks);
-    section.blocks.extend(blocks);
     let further = [worst_table(data), cost_table(data)];
     let further = further.into_iter().filter_map(Table::into_block);
     let mut inside = vec![Block::Paragraph(TAPPED.into())];
@@ -59,31 +64,19 @@ struct Pair<'a> {
     streams: Vec<&'a Recorded<'a, StreamRecord>>,
 }
 
-impl<'a> Pair<'a> {
-    fn new(data: &'a RunData, what: String, first: &'a Recorded<StreamRecord>) -> Self {
-        let [a, b] = first.dimensions;
-        Self {
-            data,
-            what,
-            stem: format!("discrepancy-{}-{a}-{b}", file_stem(&first.purpose)),
-            streams: vec![first],
-        }
-    }
-
+impl Pair<'_> {
     fn blocks(&self) -> Vec<Block> {
-        let values: Vec<Value> = self
-            .streams
-            .iter()
-            .flat_map(|s| of_stream(self.data, **s))
-            .collect();
+        let data = self.data;
+        let values: Vec<Value> = (self.streams.iter().flat_map(|s| of_stream(data, **s))).collect();
+        let names = &data.names;
         let tables = [
             self.ranking_table(&values),
             self.count_table(&values, &figure::STAR_DISCREPANCY),
             self.count_table(&values, &figure::L2_STAR),
             self.count_table(&values, &figure::CENTERED),
-            self.pixel_table(&values),
+            SEVERAL_PIXELS.table(names, &values, &[&self.what]),
         ];
-        let mut figures = self.figures();
+        let mut figures = self.figures(&values);
         let integrals = figures.split_off(1);
         let mut blocks = vec![Block::Heading(self.what.clone())];
         blocks.extend(Block::figures(figures));
@@ -100,67 +93,38 @@ impl<'a> Pair<'a> {
         blocks
     }
 
-    fn figures(&self) -> Vec<Option<Illustration>> {
+    fn figures(&self, values: &[Value]) -> Vec<Option<Illustration>> {
         let dufay = |factor, of| {
             let label = format!("{factor}/√N, fit of Dufay 2017 for {of}");
             Guide::new(label, factor, -0.5)
         };
-        let guides = vec![dufay(2.5, "Halton"), dufay(1.5, "Hammersley")];
-        let figure = |ending: String, says: String, plot: CurvePlot| {
-            let caption = format!(
-                "{}: {says}. Bands: 95 % interval over seeds; dashed curves: deterministic.",
-                self.what
-            );
-            plot.figure(format!("{}{ending}", self.stem), caption)
+        let is_exact = |name: &str| {
+            let fixed = self.streams.iter().filter(|s| !s.randomised);
+            fixed
+                .map(|s| self.data.names.sampler(s.key))
+                .any(|known| known == name)
         };
-        let star = self.plot("star discrepancy D*", guides, |s| &s.star);
-        let says = "exact star discrepancy of the first N points".to_owned();
-        let mut figures = vec![figure(String::new(), says, star)];
+        let draw = |spec: PlotSpec, values: &[Value], guides: Vec<Guide>, function: &str| {
+            let mut plot = spec.plot(self.data, values).with_guides(guides);
+            let curves = plot.curves.iter_mut();
+            curves.for_each(|curve| curve.exact = is_exact(&curve.label));
+            let caption = filled(spec.caption, &[&self.what, function]);
+            plot.figure(format!("{}{}", self.stem, spec.name), caption)
+        };
+        let guides = vec![dufay(2.5, "Halton"), dufay(1.5, "Hammersley")];
+        let mut figures = vec![draw(DISCREPANCY, values, guides, "")];
         figures.extend(PLOTTED.map(|name| {
-            let says = format!("RMSE of the integral of integrand:{name} over the first N points");
-            let plot = self.plot(&format!("RMSE of {name}"), Vec::new(), |s| {
-                let found = s.figures.integrands.iter().find(|i| i.function == name);
-                found.map_or(&[], |i| i.rmse.as_slice())
-            });
-            figure(format!("-{name}"), says, plot)
+            let is_of = |v: &&Value| v.key.label(axis::SUBJECT) == name;
+            let of: Vec<Value> = values.iter().filter(is_of).cloned().collect();
+            let (y_title, ending) = (&*format!("RMSE of {name}"), &*format!("-{name}"));
+            let spec = PlotSpec {
+                y_title,
+                name: ending,
+                ..INTEGRAL
+            };
+            draw(spec, &of, Vec::new(), name)
         }));
         figures
-    }
-
-    fn plot(
-        &self,
-        y_title: &str,
-        guides: Vec<Guide>,
-        values: impl Fn(&StreamRecord) -> &[FigureAtCount],
-    ) -> CurvePlot {
-        let curve = |stream: &&Recorded<'a, StreamRecord>| {
-            let label = self.data.names.sampler(stream.key);
-            let point = |at: &FigureAtCount| CurvePoint::new(at.n as f64, &at.value);
-            Curve {
-                look: self.data.sampler_look(&label),
-                label,
-                exact: !stream.randomised,
-                points: values(stream).iter().map(point).collect(),
-            }
-        };
-        let curves = self.streams.iter().map(curve);
-        CurvePlot {
-            x_title: "number of points N".into(),
-            x_ticks: Ticks::PowersOfTwo,
-            y_title: y_title.into(),
-            curves: curves.filter(|c| !c.points.is_empty()).collect(),
-            guides,
-        }
-    }
-
-    fn rows<'r>(&self, heads: &'r [&'r str]) -> Rows<'r> {
-        let row = |s: &&Recorded<StreamRecord>| {
-            let name = self.data.names.sampler(s.key).into();
-            let cells = [name, TableCell::repeats(s.seeds, s.randomised)];
-            let cells = cells.into_iter().take(heads.len());
-            (s.key.clone(), cells.collect())
-        };
-        Rows::new(&SAMPLER_ROW, heads, self.streams.iter().map(row))
     }
 
     /// Exponents side by side: D* and errors do not rank alike.
@@ -171,21 +135,8 @@ impl<'a> Pair<'a> {
             v.figure.id != figure::STAR_DISCREPANCY.id || number(&v.key, axis::POINTS) == most
         };
         let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
-        let caption = format!(
-            "{}: D* at N = {most}, and exponents of N fitted over all N [95 % interval over seeds]: of D*, and of \
-             the RMSE of each integrand. Plain Monte Carlo has −0.5 everywhere. A small D* is no promise of a small \
-             error: D* ranks a digital shift before Owen scrambling, errors of smooth functions rank them the other \
-             way round",
-            self.what
-        );
-        let figures = [
-            &figure::STAR_DISCREPANCY,
-            &figure::STAR_EXPONENT,
-            &figure::INTEGRAL_EXPONENT,
-        ];
-        let function = |key: &Key| key.label(axis::SUBJECT).to_owned();
-        self.rows(&["sampler"])
-            .table(&values, caption, &figures, &function)
+        let words = [&*self.what, &most.to_string()];
+        POINT_SETS.table(&self.data.names, &values, &words)
     }
 
     /// One figure by N: mean over seeds.
@@ -200,29 +151,21 @@ impl<'a> Pair<'a> {
         let stride = counts.len().div_ceil(COLUMNS).max(1);
         let shown: Vec<usize> = counts.into_iter().rev().step_by(stride).collect();
         values.retain(|value| shown.contains(&n(value)));
-        if values.is_empty() {
-            return Table::default();
-        }
-        let title = &figure.title;
-        let caption = format!("{title} of {}: mean over seeds [95 % interval]", self.what);
-        self.rows(&["sampler", "seeds"])
-            .table(&values, caption, &[figure], BY_POINTS)
-    }
-
-    /// Coherence and coverage.
-    fn pixel_table(&self, values: &[Value]) -> Table {
-        let caption = format!(
-            "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
-             coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
-            self.what
-        );
-        let figures = [&figure::NEIGHBOUR_ANGLE, &figure::COVERAGE];
-        self.rows(&["sampler"])
-            .table(values, caption, &figures, BY_POINTS)
+        let rows = self.streams.iter().filter(|_| !values.is_empty());
+        let rows = rows.map(|s| {
+            (
+                s.key.clone(),
+                vec![TableCell::repeats(s.seeds, s.randomised)],
+            )
+        });
+        let table = TableSpec {
+            figures: &[figure],
+            ..POINTS
+        };
+        let words = [&*figure.title, &self.what];
+        table.beside(&self.data.names, &values, &words, &["seeds"], rows)
     }
 }
-
-const BY_POINTS: Part<'static> = &|key| format!("N = {}", key.label(axis::POINTS));
 
 /// The pair of dimensions with the greatest D* of each sampler.
 fn worst_table(data: &RunData) -> Table {
@@ -232,27 +175,20 @@ fn worst_table(data: &RunData) -> Table {
             .filter_map(|s| Some((s, s.worst_of?, s.star.last()?)))
     };
     let row = |(s, of, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
-        let name = data.names.sampler(s.key);
-        let cells = [name, s.pair(), of.to_string(), last.n.to_string()];
         let key = s.key.clone().with(axis::DIMENSIONS, s.pair());
-        (key, cells.map(TableCell::from).into())
+        (key, [of, last.n].map(|n| n.to_string().into()).to_vec())
     };
     let mut values = Vec::new();
     for (s, _, last) in worst() {
         let of_stream = of_stream(data, *s).into_iter();
         values.extend(of_stream.filter(|v| number(&v.key, axis::POINTS) == last.n));
     }
-    if values.is_empty() {
-        return Table::default();
-    }
-    let by = [&SAMPLER_ROW[..], &[axis::DIMENSIONS]].concat();
-    let heads = ["sampler", ":dimensions", "of pairs", "N"];
-    Rows::new(&by, &heads, worst().map(row)).table(
+    WORST_PAIRS.beside(
+        &data.names,
         &values,
-        "The worst pair of dimensions of each sampler, by D* in one pixel among all pairs that the integrators draw: \
-         mean D* over seeds [95 % interval]",
-        &[&figure::STAR_DISCREPANCY],
-        FIGURES_ALONE,
+        &[],
+        &["of pairs", "N"],
+        worst().map(row),
     )
 }
 
@@ -263,13 +199,5 @@ fn cost_table(data: &RunData) -> Table {
         .iter()
         .flat_map(|cost| of_readings(data, *cost))
         .collect();
-    let row = |key: &Key| (key.clone(), vec![data.names.sampler(key).into()]);
-    let rows = costs.iter().map(|cost| row(cost.key));
-    Rows::new(&SAMPLER_ROW, &["sampler"], rows).table(
-        &values,
-        "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], empty loop \
-         taken off, all units of the adapter together",
-        &[&figure::NS_PER_SAMPLE, &figure::LOOP_NS],
-        FIGURES_ALONE,
-    )
+    DRAWING.table(&data.names, &values, &[])
 }

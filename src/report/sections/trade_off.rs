@@ -1,10 +1,10 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
-use super::structures::BY_RAYS;
+use super::specs::{BREAK_EVENS, TIMES_TO_IMAGE};
 use crate::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
 use crate::document::*;
 use crate::format;
-use crate::pivot::Rows;
+use crate::names::Names;
 use crate::samplers::MeasuredSampler;
 use crate::values::{Reading, Value};
 use raystone_record::figure;
@@ -66,18 +66,13 @@ pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
 }
 
 /// The table of [`break_even`].
-pub(crate) fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
-    let (first, others) = by_build(scene)?;
-    let caption = format!(
-        "Break-even: thousand rays after which a structure, its build included, overtakes {}, which is built \
-         fastest ({} ms)",
-        first.structure,
-        format::number(first.build_ms)
-    );
-    let row = |s: &Measured<StructureRecord>| (s.key.clone(), vec![s.structure.clone().into()]);
-    let rows = Rows::new(&STRUCTURE_AXES, &["structure"], others.into_iter().map(row));
-    let figures = [&figure::BUILD_MS, &figure::BREAK_EVEN];
-    Some(rows.table(values, caption, &figures, BY_RAYS))
+pub(crate) fn break_even_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
+    let Some((first, others)) = by_build(scene) else {
+        return Table::default();
+    };
+    let rows = others.iter().map(|s| (s.key.clone(), Vec::new()));
+    let words = [&*first.structure, &format::number(first.build_ms)];
+    BREAK_EVENS.beside(names, values, &words, &[], rows)
 }
 
 /// The sampler that most structures were timed with.
@@ -112,30 +107,23 @@ pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'stat
 
 /// The table of [`times_to_image`].
 pub(crate) fn time_to_image_table(
+    names: &Names,
     scene: &SceneGroup,
     view: &View,
     builds: &[Value],
-) -> Option<Table> {
+) -> Table {
     let times = times_to_image(scene, view);
-    let sampler = &most_timed(view)?.name;
-    let row = |value: &Value| {
-        let structure = value.key.label(axis::ACCEL);
-        (value.key.clone(), vec![structure.into()])
-    };
-    let mut rows: Vec<(Key, Vec<TableCell>)> = times.iter().map(row).collect();
-    rows.dedup_by(|a, b| a.0.agrees(&b.0, &STRUCTURE_AXES));
-    let values = [builds, &times].concat();
-    let caption = format!(
-        "Time to image: build + rendering by {} with {sampler}, ms",
-        view.name
-    );
-    let spp = |key: &Key| match key.label(axis::SPP) {
-        "" => "build".to_owned(),
-        spp => format!("build + {spp} spp"),
-    };
-    let figures = [&figure::BUILD_MS, &figure::TIME_TO_IMAGE];
-    let rows = Rows::new(&STRUCTURE_AXES, &["structure"], rows);
-    (!times.is_empty()).then(|| rows.table(&values, caption, &figures, &spp))
+    let sampler = most_timed(view).map_or("", |sampler| &sampler.name);
+    let mut keys: Vec<Key> = times.iter().map(|value| value.key.clone()).collect();
+    keys.dedup_by(|a, b| a.agrees(b, &STRUCTURE_AXES));
+    let rows = keys.into_iter().map(|key| (key, Vec::new()));
+    TIMES_TO_IMAGE.beside(
+        names,
+        &[builds, &times].concat(),
+        &[&view.name, sampler],
+        &[],
+        rows,
+    )
 }
 
 #[cfg(test)]

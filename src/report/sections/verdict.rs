@@ -2,7 +2,7 @@
 
 use super::kernels::{self, is_repeat};
 use super::{belief, compactions, rendering, run, targets};
-use crate::data::{Measured, RAYS, RunData, SceneGroup, View, without_repeats};
+use crate::data::{Measured, RAYS, RunData, SceneGroup, View, grouped, without_repeats};
 use crate::document::*;
 use crate::ruling::{Contender, Ruling, judge};
 use crate::samplers::{MeasuredSampler, Metric};
@@ -53,19 +53,16 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
         "Verdict on further pairs of dimensions",
         further,
     ));
-    let text = match (data.scenes.is_empty(), data.measured.is_empty()) {
-        (true, true) => "Nothing was measured.",
-        (true, false) => {
-            "No structure and no sampler was measured on a scene. What was measured without one stands in sections of its \
-             own."
-        }
-        (false, _) => {
-            let how = vec![Block::Paragraph(rule(data))];
-            blocks.extend(Block::fold("How winners are found", how));
-            return section;
-        }
-    };
-    blocks.push(Block::Paragraph(text.into()));
+    if !data.scenes.is_empty() {
+        let how = vec![Block::Paragraph(rule(data))];
+        blocks.extend(Block::fold("How winners are found", how));
+        return section;
+    }
+    blocks.push(Block::Paragraph(if data.measured.is_empty() {
+        "Nothing was measured.".into()
+    } else {
+        "No structure and no sampler was measured on a scene. What was measured without one stands in sections of its own.".into()
+    }));
     section
 }
 
@@ -88,13 +85,13 @@ fn asked(dir: &Path, data: &RunData) -> Block {
 }
 
 fn question(data: &RunData) -> String {
-    let named = |names: &[String], noun: &str| match names.len() {
-        0 => None,
-        n => Some(format!(
+    let named = |names: &[String], noun: &str| {
+        let text = format!(
             "{} ({})",
-            format::plural(n, noun),
+            format::plural(names.len(), noun),
             names.join(", ")
-        )),
+        );
+        (!names.is_empty()).then_some(text)
     };
     let scenes: Vec<String> = data.scenes.iter().map(|s| s.name.to_owned()).collect();
     let views = data.views().map(|(_, view)| view.name.clone());
@@ -155,19 +152,18 @@ fn amounts(data: &RunData) -> String {
         .flat_map(|r| &r.errors);
     let spps = errors.map(|e| (e.spp, e.spp));
     let spp = spps.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let spp = spp.map_or(String::new(), |(low, high)| match low == high {
-        true => format!(", {} per pixel", format::plural(high as usize, "sample")),
-        false => format!(
-            ", {low} to {} samples per pixel",
-            format::count(high.into())
-        ),
+    let spp = spp.map_or(String::new(), |(low, high)| {
+        let samples = format::plural(high as usize, "sample");
+        if low == high {
+            format!(", {samples} per pixel")
+        } else {
+            format!(", {low} to {samples} per pixel")
+        }
     });
     let most = samplers().map(|s| s.replicates.len()).max().unwrap_or(0);
     let [width, height] = first.resolution;
-    format!(
-        " Images of {width} × {height} pixels{spp}, {}.",
-        format::plural(most, "replicate")
-    )
+    let replicates = format::plural(most, "replicate");
+    format!(" Images of {width} × {height} pixels{spp}, {replicates}.")
 }
 
 /// All checks in one.
@@ -179,10 +175,7 @@ fn summary(data: &RunData) -> Check {
     };
     let (failed, open) = (titles(Verdict::Fail), titles(Verdict::Open));
     let passed = checks.len() - failed.len() - open.len();
-    let of_all = format!(
-        "{passed} of {} passed",
-        format::plural(checks.len(), "check")
-    );
+    let of_all = format::plural(checks.len(), "check");
     let targets: Vec<String> = { targets::checks(data) }
         .into_iter()
         .map(|t| t.title)
@@ -194,7 +187,7 @@ fn summary(data: &RunData) -> Check {
         (true, false) => (Verdict::Open, "Not all could be checked"),
         (true, true) => (Verdict::Pass, "The figures can be believed"),
     };
-    let mut detail = of_all;
+    let mut detail = format!("{passed} of {of_all} passed");
     for (what, titles) in [("failed", failed), ("nothing to test for", open)] {
         if !titles.is_empty() {
             detail += &format!("; {what}: {}", titles.join(", "));
@@ -217,11 +210,12 @@ fn summary(data: &RunData) -> Check {
 fn failed(data: &RunData) -> Option<Block> {
     let failures = run::failures(data);
     let failed: Vec<_> = failures.iter().filter(|f| f.state == run::FAILED).collect();
-    let mut table = Table::new("What failed", &["what", ":why"]);
-    for failure in failed.iter().take(NAMED_FAILURES) {
+    let row = |failure: &&&run::Failure| {
         let reason = TableCell::from(failure.reason.clone()).toned(Tone::Bad);
-        table.rows.push(vec![failure.cell.clone().into(), reason]);
-    }
+        [failure.cell.clone().into(), reason]
+    };
+    let named = failed.iter().take(NAMED_FAILURES).map(|f| row(&f));
+    let mut table = Table::of("What failed", &["what", ":why"], named);
     if failed.len() > NAMED_FAILURES {
         let more = format!("and {} more", failed.len() - NAMED_FAILURES);
         let more = TableCell::from(more).linked("#failures");
@@ -256,12 +250,13 @@ fn of_scene(scene: &SceneGroup) -> Vec<Block> {
 fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
     let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
     let alone = by_answer(alone.cloned().collect());
-    let table = table_of(caption, rulings).into_block();
-    let place = match &table {
-        Some(_) => String::new(),
-        None => caption.replacen("Verdict on", " on", 1),
+    let mut blocks = Vec::from_iter(table_of(caption, rulings).into_block());
+    let place = caption.replacen("Verdict on", " on", 1);
+    let place = if blocks.is_empty() {
+        place
+    } else {
+        String::new()
     };
-    let mut blocks = Vec::from_iter(table);
     blocks.extend(alone.into_iter().map(|(questions, ruling)| {
         let (answer, questions) = (ruling.answer(), together(&questions));
         Block::Paragraph(format!(
@@ -276,23 +271,20 @@ const LISTED: usize = 2;
 
 /// Questions that have one answer.
 fn together(questions: &[String]) -> String {
-    match questions.len() <= LISTED {
-        true => questions.join("; "),
-        false => format!("{} questions", format::count(questions.len() as u64)),
+    if questions.len() <= LISTED {
+        return questions.join("; ");
     }
+    format!("{} questions", format::count(questions.len() as u64))
 }
 
 /// The rulings, with all questions that have the same answer in words together, where the first of them stood.
 fn by_answer(rulings: Vec<(String, Ruling)>) -> Vec<(Vec<String>, Ruling)> {
-    let mut grouped: Vec<(Vec<String>, Ruling)> = Vec::new();
-    for (question, ruling) in rulings {
-        let answer = ruling.answer();
-        match { grouped.iter_mut() }.find(|(_, other)| other.answer() == answer) {
-            Some((questions, _)) => questions.push(question),
-            None => grouped.push((vec![question], ruling)),
-        }
-    }
-    grouped
+    let together = grouped(rulings, |(_, ruling)| ruling.answer()).into_iter();
+    let unzip = |(_, rulings): (String, Vec<(String, Ruling)>)| {
+        let (questions, mut rulings): (Vec<_>, Vec<_>) = rulings.into_iter().unzip();
+        (questions, rulings.swap_remove(0))
+    };
+    together.map(unzip).collect()
 }
 
 /// How winners are found, and how many comparisons that took.
@@ -318,30 +310,24 @@ pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
         let question = format!("fastest, {} rays (Mrays/s)", class.name());
         rulings.push((question, fastest(scene, class)));
     }
-    for view in scene
-        .views
-        .iter()
-        .filter(|view| view.valid_times().next().is_some())
-    {
+    let timed = |view: &&View| view.valid_times().next().is_some();
+    for view in scene.views.iter().filter(timed) {
         let question = format!("fastest for rendering: {} (ms per spp)", view.name);
         rulings.push((question, rendering::fastest(scene, view)));
     }
     let metric = Metric::RelMse.name();
     for view in &scene.views {
         if let Some(spp) = view.common_spp() {
-            let question = format!(
-                "least error per sample: {}, {metric} at {spp} spp",
-                view.name
-            );
-            rulings.push((question, best_per_sample(view, spp)));
+            let what = format!("{}, {metric} at {spp} spp", view.name);
+            rulings.push((
+                format!("least error per sample: {what}"),
+                best_per_sample(view, spp),
+            ));
         }
         if let Some(race) = Race::new(view) {
-            let question = format!(
-                "least error per second: {}, {metric} after {} s",
-                view.name,
-                format::number(race.seconds)
-            );
-            rulings.push((question, race.ruling()));
+            let seconds = format::number(race.seconds);
+            let what = format!("{}, {metric} after {seconds} s", view.name);
+            rulings.push((format!("least error per second: {what}"), race.ruling()));
         }
     }
     rulings
@@ -353,43 +339,40 @@ pub fn table(scene: &SceneGroup) -> Table {
 }
 
 fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
+    let contests = rulings.iter().filter(|(_, ruling)| ruling.is_contest());
+    let is_withheld = |(_, ruling): &&(String, Ruling)| matches!(ruling, Ruling::Withheld(_));
+    let (withheld, ruled): (Vec<_>, Vec<_>) = contests.cloned().partition(|r| is_withheld(&r));
+    let ruled = ruled
+        .into_iter()
+        .map(|(question, ruling)| row(question.into(), &ruling));
+    // Questions that one failed check takes the answer from are a row of their own.
+    let withheld = by_answer(withheld).into_iter().map(|(questions, ruling)| {
+        let (short, all) = (together(&questions), questions.join("; "));
+        let detail = if short == all { String::new() } else { all };
+        row(TableCell::with_detail(short, detail), &ruling)
+    });
     let heads = [
         "question",
         ":answer",
         ":figure [95 % interval]",
         ":next best (ratio)",
     ];
-    let mut table = Table::new(caption, &heads);
-    let contests = rulings.iter().filter(|(_, ruling)| ruling.is_contest());
-    let is_withheld = |(_, ruling): &&(String, Ruling)| matches!(ruling, Ruling::Withheld(_));
-    let (withheld, ruled): (Vec<_>, Vec<_>) = contests.partition(is_withheld);
-    let ruled = ruled
-        .iter()
-        .map(|(question, ruling)| row(question.as_str().into(), ruling));
-    table.rows.extend(ruled);
-    // Questions that one failed check takes the answer from are a row of their own.
-    let withheld = by_answer(withheld.into_iter().cloned().collect());
-    let withheld = withheld.iter().map(|(questions, ruling)| {
-        let all = questions.join("; ");
-        let question = match together(questions) {
-            short if short == all => all.into(),
-            short => TableCell::with_detail(short, all),
-        };
-        row(question, ruling)
-    });
-    table.rows.extend(withheld);
-    table
+    Table::of(caption, &heads, ruled.chain(withheld))
 }
 
-fn row(question: TableCell, ruling: &Ruling) -> Vec<TableCell> {
+fn row(question: TableCell, ruling: &Ruling) -> [TableCell; 4] {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody | Ruling::Withheld(_) => Tone::Bad,
         Ruling::Alone(_) | Ruling::Unclear(..) => Tone::Note,
     };
     let answer = TableCell::from(ruling.answer()).toned(tone);
-    let (figure, next) = (ruling.figure(), ruling.runner_up());
-    vec![question, answer, figure.into(), next.into()]
+    [
+        question,
+        answer,
+        ruling.figure().into(),
+        ruling.runner_up().into(),
+    ]
 }
 
 /// Which sampler has the lowest D*, pair of dimensions by pair.
@@ -429,30 +412,32 @@ fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigur
 
 /// Who may not win, with the reason, and who is shown without being ranked.
 fn apart(scene: &SceneGroup) -> Vec<Block> {
-    let brief = |fault: String| fault.split(';').next().unwrap_or_default().to_owned();
-    let faulty = scene
-        .structures
-        .iter()
-        .filter_map(|s| Some(format!("{} ({})", s.structure, brief(s.fault()?))));
-    let samplers = || {
-        let views = scene.views.iter();
-        views.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)))
+    let brief = |name: String, fault: String| {
+        let fault = fault.split(';').next().unwrap_or_default();
+        format!("{name} ({fault})")
     };
-    let biased = samplers()
-        .filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, brief(s.fault()?))));
-    let contested = scene.views.iter().filter(|view| view.samplers.len() > 1);
-    let single = contested.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)));
-    let single = single.filter(|(s, _)| s.replicates.len() == 1);
-    let single = single.map(|(s, view)| format!("{} with {view}", s.name));
+    let faulty = scene.structures.iter();
+    let faulty = faulty.filter_map(|s| Some(brief(s.structure.clone(), s.fault()?)));
+    let with = |s: &MeasuredSampler, view: &View| format!("{} with {}", s.name, view.name);
+    let of_views = |least: usize| {
+        let views = scene
+            .views
+            .iter()
+            .filter(move |view| view.samplers.len() > least);
+        views.flat_map(|view| view.samplers.iter().map(move |s| (s, view)))
+    };
+    let biased = of_views(0).filter_map(|(s, view)| Some(brief(with(s, view), s.fault()?)));
+    let single = of_views(1).filter(|(s, _)| s.replicates.len() == 1);
+    let single = single.map(|(s, view)| with(s, view));
+    let name = scene.name;
     let said = [
         (
-            format!("Left out of the comparison on {}", scene.name),
+            format!("Left out of the comparison on {name}"),
             faulty.chain(biased).collect::<Vec<_>>(),
         ),
         (
             format!(
-                "Shown, but not ranked on {}, since one image tells nothing of their spread",
-                scene.name
+                "Shown, but not ranked on {name}, since one image tells nothing of their spread"
             ),
             single.collect(),
         ),

@@ -17,7 +17,7 @@ impl Noise {
 }
 
 /// A line with this key; axes with empty labels are left out.
-fn line(key: &[(&str, &str)], body: Value) -> Line {
+pub(super) fn line(key: &[(&str, &str)], body: Value) -> Line {
     let add = |key: Key, (axis, label): &(&str, &str)| key.with(axis, label);
     let key = key.iter().fold(Key::default(), add);
     let body = serde_json::from_value(body).expect("a record");
@@ -25,7 +25,7 @@ fn line(key: &[(&str, &str)], body: Value) -> Line {
 }
 
 /// A line of a sampler in a view.
-fn sampled([scene, integrator]: [&str; 2], sampler: &Sampler, body: Value) -> Line {
+pub(super) fn sampled([scene, integrator]: [&str; 2], sampler: &Sampler, body: Value) -> Line {
     let view = [(axis::SCENE, scene), (axis::INTEGRATOR, integrator)];
     let sampler = [
         (axis::SEQUENCE, sampler.0),
@@ -34,7 +34,7 @@ fn sampled([scene, integrator]: [&str; 2], sampler: &Sampler, body: Value) -> Li
     line(&[view, sampler].concat(), body)
 }
 
-fn around(value: f64, share: f64) -> Value {
+pub(super) fn around(value: f64, share: f64) -> Value {
     json!({ "value": value, "low": value * (1.0 - share), "high": value * (1.0 + share) })
 }
 
@@ -100,7 +100,7 @@ pub(super) fn gate(wrong: usize) -> GateVerdict {
 }
 
 /// Seven times around this one, its median.
-fn jittered(ms: f64) -> [f64; 7] {
+pub(super) fn jittered(ms: f64) -> [f64; 7] {
     [1.0, 1.03, 0.97, 1.0, 1.02, 0.98, 1.0].map(|factor| factor * ms)
 }
 
