@@ -1,5 +1,6 @@
 //! Box tests, ray offsets and the cost of triangle tests.
 
+use super::Found;
 use super::bench::Expected;
 use super::case;
 use super::families::Family;
@@ -8,13 +9,13 @@ use super::placement::Placement;
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Suite};
 use super::tally::Worst;
-use super::{Found, StressError};
 use glam::Vec3;
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{
-    BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
-    Query, Ray, RayBatch, Traced, TriangleSoup,
+    AccelError, BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit,
+    Intersection, NO_HIT, Query, Ray, RayBatch, Traced, TriangleSoup,
 };
+use raystone_bench::run::Absent;
 use raystone_config::{Axis, Cell};
 use raystone_core::params::Variant;
 use raystone_core::random::Pcg32;
@@ -73,7 +74,7 @@ struct Lost {
 pub(crate) fn box_tests(suite: &Suite, cells: &[Cell]) -> Results {
     let column = |cell| Ok((suite.kind(cell)?, vec![Lost::default(); BoxTest::ALL.len()]));
     let columns = cells.iter().map(column);
-    let mut columns = columns.collect::<Result<Vec<_>, StressError>>()?;
+    let mut columns = columns.collect::<Result<Vec<_>, Absent>>()?;
     let rays = BOX_RAYS * suite.scope.settings.rays_of_a_case();
     for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
         for case in family.cases(suite.seed, true, rays) {
@@ -132,7 +133,9 @@ pub(crate) fn offsets(suite: &Suite, cells: &[Cell]) -> Results {
                 let at = Key::default().with(axis::OFFSET, offset.name);
                 let at = at.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
                 let at = at.with(axis::PLACE, place);
-                found.add(&at, bounce(&mesh, offset, suite.seed, rays)?);
+                let figures = bounce(&mesh, offset, suite.seed, rays);
+                let figures = figures.map_err(|error| Absent::Failed(error.to_string()))?;
+                found.add(&at, figures);
             }
         }
     }
@@ -176,7 +179,7 @@ impl Suite<'_> {
         expected: &Expected,
         kind: Kind,
         column: &mut [Lost],
-    ) -> Result<(), StressError> {
+    ) -> Result<(), Absent> {
         let mut stage = Stage::new(gpu, case.scene.clone(), Intersection::default())?;
         let Ok(built) = kind.build(&stage.soup) else {
             return Ok(());
@@ -217,7 +220,7 @@ impl Suite<'_> {
         accel: &str,
         bands: usize,
         count: usize,
-    ) -> Result<Vec<Timed>, StressError> {
+    ) -> Result<Vec<Timed>, Absent> {
         let scene = Arc::new(case::scene(sphere(bands, &Placement::ORDINARY), None));
         let cell = Cell::default().with(Axis::Accel, &Variant::plain(accel));
         let kind = self.kind(&cell)?;
@@ -227,7 +230,7 @@ impl Suite<'_> {
         let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
         for test in tests {
             let stage = Stage::new(self.gpu(), Arc::clone(&scene), Self::with(*test))?;
-            let built = kind.build(&stage.soup).map_err(StressError::Unknown)?;
+            let built = kind.build(&stage.soup).map_err(Absent::Failed)?;
             let traced = Traced::upload(&stage.gpu, &*built)?;
             let work = stage.count_work(&traced, Query::Closest, &rays)?;
             let work = work.unwrap_or_default();
@@ -299,7 +302,7 @@ fn bounce(
     offset: RayOffset,
     seed: u64,
     rays: usize,
-) -> Result<[(&'static Figure, f64); 5], StressError> {
+) -> Result<[(&'static Figure, f64); 5], AccelError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
     let built = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default())?;
     let twin = built.twin(&soup);

@@ -2,7 +2,7 @@
 
 use super::families::FAMILIES;
 use super::suite::{BRUTE_FORCE, PLAIN, Suite};
-use super::{Found, StressError, axes, numerics, shots, suite};
+use super::{Found, axes, numerics, shots, suite};
 use raystone_accel::Intersection;
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Registries, Work};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan, STRESS, Settings as Section};
@@ -85,7 +85,7 @@ impl Scope {
 }
 
 /// Results of cells, in their order.
-pub(crate) type Results = Result<Vec<Found>, StressError>;
+pub(crate) type Results = Result<Vec<Found>, Absent>;
 
 /// A part of the suite.
 struct Part {
@@ -189,7 +189,11 @@ static PARTS: [Part; 6] = [
         },
         axes: &[],
         has: |_, _| true,
-        measure: |suite, cells| Ok(vec![numerics::found(suite)?; cells.len()]),
+        measure: |suite, cells| {
+            let found =
+                numerics::found(suite).map_err(|error| Absent::Failed(error.to_string()))?;
+            Ok(vec![found; cells.len()])
+        },
         seconds: [40.0, 3.0],
         is_timed: false,
     },
@@ -215,49 +219,10 @@ fn together(cell: &Cell) -> Cell {
 }
 
 impl Part {
-    /// Measures cells that belong together.
-    fn measure<'a>(&self, at: &At, cells: &[Cell]) -> Vec<Result<Box<dyn Prepared + 'a>, Absent>> {
-        let mut absent: Vec<Option<Absent>> = cells.iter().map(|_| None).collect();
-        let measured = self.suite(at, &cells[0]).and_then(|(suite, probe)| {
-            for (cell, absent) in cells.iter().zip(&mut absent) {
-                let Some(test) = cell.get(Axis::Triangle) else {
-                    continue;
-                };
-                let test = at.registries.triangles.named("triangle test", &test.name);
-                let test = test.map_err(Absent::Failed)?;
-                let kept = Suite::with(test).kept_by(&probe);
-                *absent = kept.err().map(Absent::Refused);
-            }
-            let kept = cells
-                .iter()
-                .zip(&absent)
-                .filter(|(_, absent)| absent.is_none());
-            let kept: Vec<Cell> = kept.map(|(cell, _)| cell.clone()).collect();
-            (self.measure)(&suite, &kept).map_err(|error| error.absent())
-        });
-        let (mut found, failure) = match measured {
-            Ok(found) => (found.into_iter(), "nothing was found of it".to_owned()),
-            Err(Absent::Failed(reason) | Absent::Refused(reason)) => {
-                (Vec::new().into_iter(), reason)
-            }
-        };
-        let result = |absent: Option<Absent>| match absent {
-            Some(absent) => Err(absent),
-            None => match found.next() {
-                Some(found) => Ok(Box::new(found) as Box<dyn Prepared>),
-                None => Err(Absent::Failed(failure.clone())),
-            },
-        };
-        absent.into_iter().map(result).collect()
-    }
-
-    fn suite<'a>(
-        &self,
-        at: &'a At,
-        cell: &Cell,
-    ) -> Result<(Suite<'a>, raystone_gpu::ArithmeticProbe), Absent> {
-        at.say(part_of(cell).to_owned());
-        let gpus = at.gpus(cell)?;
+    /// Measures cells that belong together, with a result for each.
+    fn measure(&self, at: &At, cells: &[Cell]) -> Result<Vec<Result<Found, Absent>>, Absent> {
+        at.say(part_of(&cells[0]).to_owned());
+        let gpus = at.gpus(&cells[0])?;
         let probe = probe_arithmetic(&gpus[0])?;
         let suite = Suite {
             exact: probe.is_exact(),
@@ -266,7 +231,24 @@ impl Part {
             seed: u64::from(at.experiment.run.seed),
             registries: at.registries,
         };
-        Ok((suite, probe))
+        let refusal = |cell: &Cell| match cell.get(Axis::Triangle) {
+            None => Ok(None),
+            Some(_) => Ok(Suite::with(suite.test(cell)?).kept_by(&probe).err()),
+        };
+        let refusals: Vec<Option<String>> =
+            cells.iter().map(refusal).collect::<Result<_, Absent>>()?;
+        let kept = cells
+            .iter()
+            .zip(&refusals)
+            .filter(|(_, refusal)| refusal.is_none());
+        let kept: Vec<Cell> = kept.map(|(cell, _)| cell.clone()).collect();
+        let mut found = (self.measure)(&suite, &kept)?.into_iter();
+        let none = || Absent::Failed("nothing was found of it".to_owned());
+        let result = |refusal: Option<String>| match refusal {
+            Some(reason) => Err(Absent::Refused(reason)),
+            None => found.next().ok_or_else(none),
+        };
+        Ok(refusals.into_iter().map(result).collect())
     }
 }
 
@@ -333,6 +315,11 @@ impl Measurement for Part {
 
     fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let groups = cells.chunk_by(|a, b| together(a) == together(b));
-        Box::new(groups.flat_map(|cells| self.measure(at, cells)))
+        Box::new(groups.flat_map(|cells| {
+            let results = self.measure(at, cells);
+            let results = results.unwrap_or_else(|absent| vec![Err(absent); cells.len()]);
+            let ready = |found| Box::new(found) as Box<dyn Prepared>;
+            results.into_iter().map(move |result| result.map(ready))
+        }))
     }
 }

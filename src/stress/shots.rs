@@ -6,10 +6,11 @@ use super::placement::Placement;
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{Kind, Suite};
 use super::tally::Worst;
-use super::{Found, StressError, bench, case};
+use super::{Found, bench, case};
 use raystone_accel::oracle::exact_truths;
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{NO_HIT, Ray, Traced};
+use raystone_bench::run::Absent;
 use raystone_config::Cell;
 use raystone_record::figure;
 use raystone_record::{Key, axis};
@@ -31,7 +32,7 @@ type Shooter<'a> = (Kind<'a>, AnyTriangleTest, Found);
 pub(crate) fn shots(suite: &Suite, cells: &[Cell]) -> Results {
     let shooter = |cell| Ok((suite.kind(cell)?, suite.test(cell)?, Found::default()));
     let shooters = cells.iter().map(shooter);
-    let mut shooters = shooters.collect::<Result<Vec<Shooter>, StressError>>()?;
+    let mut shooters = shooters.collect::<Result<Vec<Shooter>, Absent>>()?;
     let settings = &suite.scope.settings;
     let model = settings.model.as_ref();
     let model = model.map(|path| path.to_string_lossy().into_owned());
@@ -56,7 +57,7 @@ pub(crate) fn shots(suite: &Suite, cells: &[Cell]) -> Results {
 }
 
 impl Suite<'_> {
-    fn shoot_at(&self, target: &ShotMesh, shooters: &mut [Shooter]) -> Result<(), StressError> {
+    fn shoot_at(&self, target: &ShotMesh, shooters: &mut [Shooter]) -> Result<(), Absent> {
         let scene = Arc::new(case::scene(target.mesh.clone(), None));
         let at = Key::default().with(axis::MESH, target.short_name());
         let at = at.with(axis::PLACE, target.place);
@@ -85,7 +86,7 @@ impl Suite<'_> {
         names: [&str; 2],
         aim: usize,
         (at, found): (&Key, &mut Found),
-    ) -> Result<(), StressError> {
+    ) -> Result<(), Absent> {
         let mut failures = Vec::new();
         let mut looked_up: Vec<Ray> = Vec::new();
         let (mut shot, mut misses, mut chunk) = (0, 0, 0);

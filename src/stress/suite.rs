@@ -1,17 +1,17 @@
 //! The cells: every family through every structure with every triangle test.
 
+use super::Found;
 use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth};
 use super::families::Family;
 use super::measurement::{Results, Scope, part_of};
 use super::placement::Placement;
 use super::tally::{CaseJudge, Outcome, Tally};
-use super::{Found, StressError};
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
-use raystone_bench::run::Registries;
+use raystone_bench::run::{Absent, Registries};
 use raystone_config::{Axis, Cell};
 use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, GpuError};
@@ -93,7 +93,7 @@ struct OpenCell<'a> {
 }
 
 impl<'a> OpenCell<'a> {
-    fn new(suite: &Suite, cell: &'a Cell) -> Result<Self, StressError> {
+    fn new(suite: &Suite, cell: &'a Cell) -> Result<Self, Absent> {
         Ok(Self {
             kind: suite.kind(cell)?,
             test: suite.test(cell)?,
@@ -149,10 +149,10 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// It is not registered.
-    pub(crate) fn kind<'c>(&self, cell: &'c Cell) -> Result<Kind<'c>, StressError> {
+    pub(crate) fn kind<'c>(&self, cell: &'c Cell) -> Result<Kind<'c>, Absent> {
         let variant = &cell[Axis::Accel];
         let accel = self.registries.accel.get(&variant.name);
-        let unknown = || StressError::Unknown(format!("there is no structure {variant}"));
+        let unknown = || Absent::Failed(format!("there is no structure {variant}"));
         let accel = accel.ok_or_else(unknown)?;
         Ok(Kind { accel, variant })
     }
@@ -161,18 +161,18 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// It is not registered.
-    pub(crate) fn test(&self, cell: &Cell) -> Result<AnyTriangleTest, StressError> {
+    pub(crate) fn test(&self, cell: &Cell) -> Result<AnyTriangleTest, Absent> {
         let name = &cell[Axis::Triangle].name;
         let test = self.registries.triangles.named("triangle test", name);
-        test.map_err(StressError::Unknown)
+        test.map_err(Absent::Failed)
     }
 
     /// Deals the items out to the devices, which work at once.
     pub(super) fn on_devices<T: Send>(
         &self,
         items: &mut [T],
-        work: impl Fn(&Gpu, &mut T) -> Result<(), StressError> + Sync,
-    ) -> Result<(), StressError> {
+        work: impl Fn(&Gpu, &mut T) -> Result<(), Absent> + Sync,
+    ) -> Result<(), Absent> {
         let mut hands: Vec<Vec<&mut T>> = self.gpus.iter().map(|_| Vec::new()).collect();
         for (place, item) in items.iter_mut().enumerate() {
             hands[place % self.gpus.len()].push(item);
@@ -199,12 +199,7 @@ impl Suite<'_> {
     }
 
     /// One case through all structures with one triangle test.
-    fn case(
-        &self,
-        case: &Case,
-        judge: &CaseJudge,
-        cells: &mut [OpenCell],
-    ) -> Result<(), StressError> {
+    fn case(&self, case: &Case, judge: &CaseJudge, cells: &mut [OpenCell]) -> Result<(), Absent> {
         let test = cells[0].test;
         let quick = self.scope.settings.quick;
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
@@ -246,7 +241,7 @@ impl Suite<'_> {
 
     /// Times the case with the test that leads through every structure that can be built; not through brute
     /// force, which does the same whatever the rays, if it has to be quick.
-    fn time(&self, case: &Case, cells: &mut [OpenCell]) -> Result<(), StressError> {
+    fn time(&self, case: &Case, cells: &mut [OpenCell]) -> Result<(), Absent> {
         let stage = Stage::new(self.gpu(), case.scene.clone(), Intersection::default())?;
         let count = self.scope.settings.either(TIMED_RAYS);
         let ordinary = bench::ordinary_rays(case, self.seed, count);

@@ -114,7 +114,7 @@ pub trait Prepared {
 }
 
 /// Why a cell is not timed.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub enum Absent {
     /// It cannot be measured here, for this reason: the cell is skipped.
     Refused(String),

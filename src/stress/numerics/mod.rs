@@ -11,8 +11,8 @@ mod mappings;
 mod rig;
 mod sums;
 
+use super::Found;
 use super::suite::Suite;
-use super::{Found, StressError};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::{Key, axis, figure};
 use raystone_render::{IntegratorError, StageError};
@@ -103,7 +103,7 @@ pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
 }
 
 /// All figures with their notes, and how many are beyond their level. What is no number is an alarm without a figure.
-pub(crate) fn found(suite: &Suite) -> Result<Found, StressError> {
+pub(crate) fn found(suite: &Suite) -> Result<Found, NumericsError> {
     let mut found = Found::default();
     let gauges = run(suite.gpu(), suite.scope.settings.quick)?;
     for gauge in &gauges {
