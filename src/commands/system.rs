@@ -78,12 +78,6 @@ impl System {
         }
     }
 
-    fn is_like(&self, names: &[&str]) -> bool {
-        self.families
-            .iter()
-            .any(|family| names.contains(&family.as_str()))
-    }
-
     /// Whether `scripts/install-driver --backports` has a faster driver for this system.
     pub fn has_backports(&self) -> bool {
         self.families.first().is_some_and(|id| id == "debian") && self.version == "12"
@@ -94,19 +88,22 @@ impl System {
         if cfg!(any(target_os = "macos", windows)) {
             return "(the driver comes with the system: update it)";
         }
-        if self.is_like(&["debian", "ubuntu"]) {
-            "sudo apt-get install --no-install-recommends mesa-vulkan-drivers libvulkan1"
-        } else if self.is_like(&["fedora", "rhel"]) {
-            "sudo dnf install mesa-vulkan-drivers vulkan-loader"
-        } else if self.is_like(&["arch"]) {
-            "sudo pacman -S vulkan-swrast vulkan-icd-loader"
-        } else if self.is_like(&["suse", "opensuse", "opensuse-leap", "opensuse-tumbleweed"]) {
-            "sudo zypper install libvulkan_lvp libvulkan1"
-        } else if self.is_like(&["alpine"]) {
-            "sudo apk add mesa-vulkan-swrast vulkan-loader"
-        } else {
-            "(install Mesa's software Vulkan driver, lavapipe, and the Vulkan loader)"
-        }
+        #[rustfmt::skip]
+        let lines = [
+            ("debian ubuntu", "sudo apt-get install --no-install-recommends mesa-vulkan-drivers libvulkan1"),
+            ("fedora rhel", "sudo dnf install mesa-vulkan-drivers vulkan-loader"),
+            ("arch", "sudo pacman -S vulkan-swrast vulkan-icd-loader"),
+            ("suse opensuse opensuse-leap opensuse-tumbleweed", "sudo zypper install libvulkan_lvp libvulkan1"),
+            ("alpine", "sudo apk add mesa-vulkan-swrast vulkan-loader"),
+        ];
+        let is_ours = |name: &str| self.families.iter().any(|family| family == name);
+        let ours = lines
+            .iter()
+            .find(|(names, _)| names.split(' ').any(is_ours));
+        ours.map_or(
+            "(install Mesa's software Vulkan driver, lavapipe, and the Vulkan loader)",
+            |(_, line)| line,
+        )
     }
 }
 

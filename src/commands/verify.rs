@@ -352,18 +352,10 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
         let first = class.first_wrong.as_ref();
         faults.extend(first.map(|ray| format!("first wrong {} ray: {ray}", counts(class)[0])));
     }
-    faults.extend(
-        verdict
-            .structural
-            .iter()
-            .map(|fault| format!("structure: {fault}")),
-    );
-    faults.extend(
-        verdict
-            .kernel_errors
-            .iter()
-            .map(|error| format!("kernel: {error}")),
-    );
+    let structural = verdict.structural.iter();
+    let kernel = verdict.kernel_errors.iter();
+    faults.extend(structural.map(|fault| format!("structure: {fault}")));
+    faults.extend(kernel.map(|error| format!("kernel: {error}")));
     faults.extend(verdict.elsewhere.clone());
     faults
 }

@@ -76,11 +76,24 @@ pub(super) fn reference(
     let start = Instant::now();
     let cell = at_default_offset(cell);
     let key = Key::from(&cell);
-    if session.reference_file.is_some() {
-        return file_reference(session, world, &cell);
+    if let Some(file) = &session.reference_file {
+        let reference = file.reference.clone();
+        let record = ReferenceRecord {
+            file: Some(file.name.clone()),
+            sampler: "file".to_owned(),
+            ..reference_record(&reference)
+        };
+        // Nothing is known of its rounding but that it was written in f32.
+        let half_ulp = f64::from(f32::EPSILON) / 2.0;
+        return known_reference(session, world, &cell, (reference, record, half_ulp));
     }
     if let Some(value) = exact_value(session, &cell) {
-        return exact_reference(session, world, &cell, value);
+        let reference = constant(value, session.experiment.run.resolution)?;
+        let record = ReferenceRecord {
+            exact: Some(value),
+            ..reference_record(&reference)
+        };
+        return known_reference(session, world, &cell, (reference, record, EVALUATION));
     }
     let rendered = rendered(session, world, traced, &cell, 0..REFERENCE_PARTS as usize)?;
     let cached = rendered.parts.iter().all(|part| part.cached);
@@ -260,54 +273,27 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
     content_hash(line, &world.scene.hash, &made_of)
 }
 
-/// The image of a file: nothing is rendered, and nothing is known of its noise or rounding.
-fn file_reference(
-    session: &mut Session,
-    world: &World,
-    cell: &Cell,
-) -> Result<ReferenceImage, Fault> {
-    let file = session.reference_file.as_ref();
-    let file = file.ok_or_else(|| "no reference was read".to_owned())?;
-    let part = session.cost.reference_part(cell);
-    session
-        .progress
-        .add(f64::from(REFERENCE_PARTS) * part.seconds());
-    let reference = file.reference.clone();
-    let record = ReferenceRecord {
-        file: Some(file.name.clone()),
-        sampler: "file".to_owned(),
-        ..reference_record(&reference)
-    };
-    let line = Line::new(Key::from(cell), Ran::default(), record);
-    let half_ulp = f64::from(f32::EPSILON) / 2.0;
-    Ok(finish_reference(
-        session, world, cell, line, reference, half_ulp,
-    )?)
+/// The image of one value.
+fn constant(value: f64, [width, height]: [u32; 2]) -> Result<Reference, String> {
+    let pixels = vec![[value as f32; 3]; width as usize * height as usize];
+    Image::new(width, height, pixels)
+        .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
+        .map_err(|e| e.to_string())
 }
 
-/// The constant image of a known value: nothing is rendered.
-fn exact_reference(
+/// A reference that is not rendered, with its record and how far rounding may move it.
+fn known_reference(
     session: &mut Session,
     world: &World,
     cell: &Cell,
-    value: f64,
+    (reference, record, rounding): (Reference, ReferenceRecord, f64),
 ) -> Result<ReferenceImage, Fault> {
-    let [width, height] = session.experiment.run.resolution;
-    let pixels = vec![[value as f32; 3]; width as usize * height as usize];
-    let reference = Image::new(width, height, pixels)
-        .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
-        .map_err(|e| e.to_string())?;
     let part = session.cost.reference_part(cell);
-    session
-        .progress
-        .add(f64::from(REFERENCE_PARTS) * part.seconds());
-    let record = ReferenceRecord {
-        exact: Some(value),
-        ..reference_record(&reference)
-    };
+    let parts_s = f64::from(REFERENCE_PARTS) * part.seconds();
+    session.progress.add(parts_s);
     let line = Line::new(Key::from(cell), Ran::default(), record);
     Ok(finish_reference(
-        session, world, cell, line, reference, EVALUATION,
+        session, world, cell, line, reference, rounding,
     )?)
 }
 

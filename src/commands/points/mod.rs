@@ -23,6 +23,7 @@ use std::process::ExitCode;
 pub struct Points {
     /// File to measure, with a point a line, coordinates parted by blanks, commas or tabs, `#` for comments; `-` is standard
     /// input, as is none without --sequence
+    #[arg(conflicts_with_all = ["SamplerArguments", "plot"])]
     file: Option<PathBuf>,
     #[command(flatten)]
     sampler: SamplerArguments,
@@ -65,7 +66,7 @@ impl Points {
         if let Some(folder) = &self.plot {
             return self.draw(&stream, folder);
         }
-        let (count, dims) = (self.sampler.count, &self.dims);
+        let (count, dims) = (self.sampler.count(), &self.dims);
         let parts = stream.parts(count, dims);
         if !self.output.json && !self.measures.is_asked() {
             for part in parts {

@@ -22,7 +22,7 @@ impl Points {
         // Before the work, so that a folder that cannot be written costs no time.
         std::fs::create_dir_all(folder)
             .with_context(|| format!("--plot: cannot make the folder {}", folder.display()))?;
-        let words = stream.words(stream.pixel, 0..self.sampler.count, &self.dims)?;
+        let words = stream.words(stream.pixel, 0..self.sampler.count(), &self.dims)?;
         let numbers = words.into_iter().map(fraction).collect();
         let points = PointSet::new(self.dims.len(), numbers)?;
         let [x, y] = self.sampler.pixel;
@@ -45,7 +45,7 @@ impl Points {
     }
 
     fn check(&self, pixel: u32) -> Result<()> {
-        let (count, dims) = (self.sampler.count, self.dims.len());
+        let (count, dims) = (self.sampler.count(), self.dims.len());
         if !(2..=MOST_DIMENSIONS).contains(&dims) {
             bail!(
                 "--plot draws 2 to {MOST_DIMENSIONS} dimensions, {dims} is not among them: set --dims"
@@ -64,7 +64,7 @@ impl Points {
     /// The first two dimensions of the same samples in each pixel, no more of them than are drawn.
     fn copies(&self, stream: &Stream) -> Result<Vec<Vec<[f64; 2]>>> {
         let each = (MOST_DRAWN / self.copies as usize).max(1);
-        let samples = thinned(self.sampler.count as usize, each).into_iter();
+        let samples = thinned(self.sampler.count() as usize, each).into_iter();
         let samples: Vec<u32> = samples.map(|i| i as u32).collect();
         let of_pixel = |pixel| {
             let words = stream.words(pixel, samples.iter().copied(), &self.dims[..2])?;

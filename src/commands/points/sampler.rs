@@ -18,21 +18,14 @@ const BATCH: usize = 1 << 18;
 #[derive(Args)]
 pub struct SamplerArguments {
     /// Sample sequence
-    #[arg(long, requires = "count", conflicts_with = "file")]
+    #[arg(long, requires = "count")]
     pub(super) sequence: Option<String>,
     /// Decorrelation of the pixels
     #[arg(long, default_value = "none", requires = "sequence")]
     decorrelation: String,
     /// Number of points
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 0,
-        hide_default_value = true,
-        requires = "sequence"
-    )]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
-    pub(super) count: u32,
+    #[arg(long, value_name = "N", requires = "sequence", value_parser = clap::value_parser!(u32).range(1..))]
+    count: Option<u32>,
     /// Pixel whose points are drawn
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel, default_value = "0,0", requires = "sequence")]
     pub(super) pixel: [u32; 2],
@@ -54,6 +47,11 @@ pub struct SamplerArguments {
 }
 
 impl SamplerArguments {
+    /// The number of points, which there is with every sequence.
+    pub(super) fn count(&self) -> u32 {
+        self.count.unwrap_or_default()
+    }
+
     /// The sampler for these dimensions.
     pub(super) fn stream(&self, sequence: &str, dims: &[u32]) -> Result<Stream> {
         let registries = Registries::default();
@@ -61,7 +59,7 @@ impl SamplerArguments {
         let cell = one_cell(&of_flags("points", overrides, &[], &registries)?)?;
         let highest = dims.iter().copied().max().unwrap_or(0);
         let demand = Demand {
-            samples: Some(self.count),
+            samples: Some(self.count()),
             dimensions: highest.saturating_add(1),
             width: Some(self.width),
         };

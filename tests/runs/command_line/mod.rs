@@ -134,6 +134,55 @@ fn bad_usage_ends_with_2() {
 }
 
 #[test]
+fn a_scene_is_exported_by_its_old_name_too_and_flags_of_something_else_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = text(folder.path());
+    let new = [
+        "export",
+        "cornell-box",
+        "--to",
+        "mitsuba",
+        "--size",
+        "64x48",
+    ];
+    let old = ["export-mitsuba", "cornell-box", "--size", "64x48"];
+    let scene = |arguments: &[&str]| {
+        let output = run(&[arguments, &["--out", out]].concat());
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{told}");
+        let file = std::fs::read_to_string(stdout(&output).trim()).expect("a scene");
+        (file, told)
+    };
+    let (written, told) = scene(&new);
+    assert!(
+        written.contains("64") && !told.contains("is `raystone"),
+        "{told}"
+    );
+    let (again, told) = scene(&old);
+    assert!(
+        again == written && told.contains("`raystone export --to mitsuba`"),
+        "{told}"
+    );
+    for (arguments, says) in [
+        (
+            &[&new[..], &["-o", out, "--figure", "nodes"]].concat()[..],
+            "--figure",
+        ),
+        (&new, "give their folder"),
+        (&["export", out, "--to", "csv", "--size", "64x48"], "--size"),
+        (
+            &["export", out, "--to", "mitsubi"],
+            "did you mean `mitsuba`",
+        ),
+        (&["points", "points.txt", "--count", "4"], "cannot be used"),
+        (&["help", "rum"], "did you mean `run`"),
+    ] {
+        let message = error(&run(arguments), 2);
+        assert!(message.contains(says), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn an_unknown_adapter_ends_with_3() {
     for arguments in [
         &["doctor", "--adapter", "no such adapter"][..],
