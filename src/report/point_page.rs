@@ -18,8 +18,6 @@ const MOST_INTERVALS: usize = 1024;
 const MOST_HIGHLIGHTED: usize = 1024;
 /// Time for the spectra, seconds.
 const SPECTRUM_SECONDS: f64 = 60.0;
-/// Width of a drawing that fills the page, pixels.
-const WIDTH: f64 = 900.0;
 
 /// What the page is about.
 #[derive(Debug, Clone)]
@@ -112,7 +110,7 @@ impl PointPage {
         if self.net().is_some() {
             caption += " Lines: elementary intervals; tinted: an interval without a point.";
         }
-        let mut figures = vec![drawn("point-set", caption, &panels, 2)];
+        let mut figures = vec![panels::figure("point-set", caption, &panels, 2)];
         figures.extend(self.net().map(|m| intervals(&points, m)));
         Ok(figures)
     }
@@ -131,7 +129,7 @@ impl PointPage {
             false => "all dimensions given".into(),
         };
         let caption = format!("Every pair of {of}: {}.", drawn_in_words(self.points.len()));
-        let projections = drawn("projections", caption, &panels, 4);
+        let projections = panels::figure("projections", caption, &panels, 4);
         let stars = self.stars()?;
         let names: Vec<String> = self.dims.iter().map(u32::to_string).collect();
         let worst = stars.iter().max_by(|a, b| a.2.total_cmp(&b.2));
@@ -180,7 +178,7 @@ impl PointPage {
              another colour. Holes and stripes are directions that no pixel looks into.",
             self.points.len()
         );
-        drawn("pixels", caption, &panels, 2)
+        panels::figure("pixels", caption, &panels, 2)
     }
 
     /// Periodogram and its radial mean, or why there are none.
@@ -210,14 +208,10 @@ impl PointPage {
             pair.len(),
             self.names(0, 1)
         );
-        Ok(Block::Figures(vec![drawn("spectrum", caption, &panels, 3)]))
+        Ok(Block::Figures(vec![panels::figure(
+            "spectrum", caption, &panels, 3,
+        )]))
     }
-}
-
-/// Square panels, so many in a row that fills the page.
-fn drawn(name: &str, caption: impl Into<String>, panels: &[Panel], columns: usize) -> Illustration {
-    let drawing = panels::draw(panels, columns, panels::square(WIDTH, columns));
-    Illustration::new(name, caption, drawing)
 }
 
 /// Every pair `i < j` below `n`.
@@ -246,7 +240,7 @@ fn intervals(points: &[Pair], m: u32) -> Illustration {
     let panels: Vec<Panel> = (0..=m).rev().map(panel).collect();
     let caption =
         "Every shape of elementary intervals of volume 1/N. A (0, m, 2)-net has one point in each.";
-    drawn("elementary-intervals", caption, &panels, 4)
+    panels::figure("elementary-intervals", caption, &panels, 4)
 }
 
 #[cfg(test)]
