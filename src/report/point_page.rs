@@ -18,8 +18,6 @@ const MOST_INTERVALS: usize = 1024;
 const MOST_HIGHLIGHTED: usize = 1024;
 /// Time for the spectra, seconds.
 const SPECTRUM_SECONDS: f64 = 60.0;
-/// Width of a drawing that fills the page, pixels.
-const WIDTH: f64 = 900.0;
 
 /// What the page is about.
 #[derive(Debug, Clone)]
@@ -108,13 +106,11 @@ impl PointPage {
                 cloud(Domain::ConcentricDisc),
             ),
         ];
-        let drawn = drawn_in_words(points.len());
-        let mut caption = format!("{drawn}, {}.", self.names(0, 1));
+        let mut caption = format!("{}, {}.", drawn_in_words(points.len()), self.names(0, 1));
         if self.net().is_some() {
             caption += " Lines: elementary intervals; tinted: an interval without a point.";
         }
-        let drawing = panels::draw(&panels, 2, panels::square(WIDTH, 2));
-        let mut figures = vec![Illustration::new("point-set", caption, drawing)];
+        let mut figures = vec![panels::figure("point-set", caption, &panels, 2)];
         figures.extend(self.net().map(|m| intervals(&points, m)));
         Ok(figures)
     }
@@ -125,21 +121,15 @@ impl PointPage {
         let mut panels = Vec::new();
         for (i, j) in pairs_below(shown) {
             let title = format!("x: {}, y: {}", self.dims[i], self.dims[j]);
-            panels.push(Panel::new(
-                title,
-                "",
-                Cloud::new(Domain::Square, self.pairs(i, j)?),
-            ));
+            let cloud = Cloud::new(Domain::Square, self.pairs(i, j)?);
+            panels.push(Panel::new(title, "", cloud));
         }
         let of = match self.dims.len() > shown {
             true => format!("the first {shown} dimensions given"),
             false => "all dimensions given".into(),
         };
-        let drawn = drawn_in_words(self.points.len());
-        let caption = format!("Every pair of {of}: {drawn}.");
-        let columns = panels.len().min(4);
-        let drawing = panels::draw(&panels, columns, panels::square(WIDTH, 4));
-        let projections = Illustration::new("projections", caption, drawing);
+        let caption = format!("Every pair of {of}: {}.", drawn_in_words(self.points.len()));
+        let projections = panels::figure("projections", caption, &panels, 4);
         let stars = self.stars()?;
         let names: Vec<String> = self.dims.iter().map(u32::to_string).collect();
         let worst = stars.iter().max_by(|a, b| a.2.total_cmp(&b.2));
@@ -188,11 +178,7 @@ impl PointPage {
              another colour. Holes and stripes are directions that no pixel looks into.",
             self.points.len()
         );
-        Illustration::new(
-            "pixels",
-            caption,
-            panels::draw(&panels, 2, panels::square(WIDTH, 2)),
-        )
+        panels::figure("pixels", caption, &panels, 2)
     }
 
     /// Periodogram and its radial mean, or why there are none.
@@ -222,9 +208,8 @@ impl PointPage {
             pair.len(),
             self.names(0, 1)
         );
-        let drawing = panels::draw(&panels, 3, panels::square(WIDTH, 3));
-        Ok(Block::Figures(vec![Illustration::new(
-            "spectrum", caption, drawing,
+        Ok(Block::Figures(vec![panels::figure(
+            "spectrum", caption, &panels, 3,
         )]))
     }
 }
@@ -255,8 +240,7 @@ fn intervals(points: &[Pair], m: u32) -> Illustration {
     let panels: Vec<Panel> = (0..=m).rev().map(panel).collect();
     let caption =
         "Every shape of elementary intervals of volume 1/N. A (0, m, 2)-net has one point in each.";
-    let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
-    Illustration::new("elementary-intervals", caption, drawing)
+    panels::figure("elementary-intervals", caption, &panels, 4)
 }
 
 #[cfg(test)]

@@ -138,9 +138,8 @@ pub struct MeanError {
 impl<'a> MeasuredSampler<'a> {
     /// Whether no seed changes it, so that its one replicate is exact.
     pub(crate) fn is_deterministic(&self) -> bool {
-        self.replicates
-            .first()
-            .is_some_and(|replicate| !replicate.randomised)
+        let first = self.replicates.first();
+        first.is_some_and(|replicate| !replicate.randomised)
     }
 
     /// Whether it may be compared with others: from one image nothing is known of the spread, not even
@@ -186,10 +185,7 @@ impl<'a> MeasuredSampler<'a> {
 
     /// The full id of a metric as recorded.
     pub(crate) fn metric_id(&self, metric: Metric) -> Option<&'a str> {
-        let errors = self
-            .replicates
-            .iter()
-            .flat_map(|replicate| &replicate.errors);
+        let errors = self.replicates.iter().flat_map(|r| &r.errors);
         let ids = errors.flat_map(|error| error.metrics.keys());
         let [.., unbiased, plain] = metric.words();
         let id = |prefix| ids.clone().find(|id| id.starts_with(prefix));
@@ -215,10 +211,8 @@ impl<'a> MeasuredSampler<'a> {
             let value = estimate(Without::Nothing)?;
             let by_reference = jackknife_interval(value, &self.all().of_reference(id, estimate)?)?;
             let exact = by_reference.low == by_reference.high;
-            let error = metric.shown(positive_interval(
-                value,
-                &self.all().sources(id, estimate)?,
-            )?);
+            let sources = self.all().sources(id, estimate)?;
+            let error = metric.shown(positive_interval(value, &sources)?);
             let tail = self.all().tail(spp).filter(|_| self.all().have_spread());
             Some(MeanError {
                 spp,
@@ -252,9 +246,8 @@ impl<'a> MeasuredSampler<'a> {
 
     /// Mean error at this spp.
     pub fn mean_error_at(&self, metric: Metric, spp: u32) -> Option<MeanError> {
-        self.mean_errors(metric)
-            .into_iter()
-            .find(|mean| mean.spp == spp)
+        let mut means = self.mean_errors(metric).into_iter();
+        means.find(|mean| mean.spp == spp)
     }
 
     /// What error is compared by that lies between those at two numbers of samples, with this share of the way on
@@ -315,16 +308,10 @@ impl<'a> MeasuredSampler<'a> {
             let points: Vec<(f64, f64)> = spps.iter().filter_map(point).collect();
             let slope = log_log_fit(&points)?;
             // The root's slope is half of the square's.
-            Some(if metric == Metric::Rmse {
-                0.5 * slope
-            } else {
-                slope
-            })
+            Some(slope * if metric == Metric::Rmse { 0.5 } else { 1.0 })
         };
-        jackknife_interval(
-            estimate(Without::Nothing)?,
-            &self.all().sources(id, estimate)?,
-        )
+        let sources = self.all().sources(id, estimate)?;
+        jackknife_interval(estimate(Without::Nothing)?, &sources)
     }
 
     fn all(&self) -> Replicates<'_> {
@@ -369,9 +356,8 @@ impl View<'_> {
         if let Some(mean) = errors().find(|mean| !mean.resolved) {
             return Some(format!("an error at {} spp is {UNRESOLVED}", mean.spp));
         }
-        let least = errors()
-            .map(|mean| mean.error.value.powi(2))
-            .reduce(f64::min)?;
+        let squares = errors().map(|mean| mean.error.value.powi(2));
+        let least = squares.reduce(f64::min)?;
         let own = reference.mse.unwrap_or(f64::NAN);
         if own == 0.0 {
             // Rounding apart, equal parts are right only of a scene without noise.
@@ -405,19 +391,12 @@ impl View<'_> {
 
     /// The highest spp at which every measured sampler has an error.
     pub(crate) fn common_spp(&self) -> Option<u32> {
-        let measured = self
-            .samplers
-            .iter()
-            .map(|s| s.mean_errors(Metric::RelMse))
-            .filter(|m| !m.is_empty());
-        let sets: Vec<Vec<u32>> = measured
-            .map(|m| m.iter().map(|mean| mean.spp).collect())
-            .collect();
-        let first = sets.first()?;
-        first
-            .iter()
-            .rev()
-            .find(|spp| sets.iter().all(|set| set.contains(spp)))
+        let means = self.samplers.iter().map(|s| s.mean_errors(Metric::RelMse));
+        let measured = means.filter(|means| !means.is_empty());
+        let sets = measured.map(|means| means.iter().map(|mean| mean.spp).collect());
+        let sets: Vec<Vec<u32>> = sets.collect();
+        let mut spps = sets.first()?.iter().rev();
+        spps.find(|spp| sets.iter().all(|set| set.contains(spp)))
             .copied()
     }
 }

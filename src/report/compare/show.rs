@@ -42,16 +42,10 @@ pub fn verdict_line(comparison: &Comparison) -> String {
         _ => "SAME",
     };
     let verdicts = NOTABLE.into_iter().chain([Verdict::Same, Verdict::Told]);
-    let counts: Vec<String> = verdicts
-        .filter(|verdict| comparison.count(*verdict) > 0)
-        .map(|verdict| {
-            format!(
-                "{} {}",
-                format::count(comparison.count(verdict) as u64),
-                verdict.word()
-            )
-        })
-        .collect();
+    let counts = verdicts.map(|verdict| (verdict, comparison.count(verdict)));
+    let counts = counts.filter(|(_, n)| *n > 0);
+    let counts = counts.map(|(v, n)| format!("{} {}", format::count(n as u64), v.word()));
+    let counts: Vec<String> = counts.collect();
     let [base, candidate] = &comparison.names;
     format!("{word}: {candidate} against {base}: {}", counts.join(", "))
 }
@@ -72,10 +66,8 @@ fn varied(comparison: &Comparison) -> BTreeSet<String> {
 
 /// Returns the cell in words.
 fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
-    let known = finding
-        .key
-        .labels()
-        .filter(|(axis, _)| varied.contains(*axis));
+    let labels = finding.key.labels();
+    let known = labels.filter(|(axis, _)| varied.contains(*axis));
     let words = known.map(|(axis, label)| match axis {
         axis::RAYS => format!("{label} rays"),
         axis::SPP => format!("{label} spp"),
@@ -96,24 +88,14 @@ pub(crate) fn change(finding: &Finding) -> String {
     };
     let Interval { value, low, high } = measured.change;
     let absolute = finding.figure.shown == Shown::Exponent;
-    let number = |x: f64| match (x.is_finite(), absolute) {
-        (false, _) => {
-            if x > 0.0 {
-                "∞".into()
-            } else {
-                "−∞".to_owned()
-            }
-        }
-        (true, true) => format!("{x:+.3}").replace('-', "−"),
-        (true, false) => format!("{:+.1}", 100.0 * x).replace('-', "−"),
+    let number = |x: f64| match absolute {
+        _ if !x.is_finite() => if x > 0.0 { "∞" } else { "−∞" }.to_owned(),
+        true => format!("{x:+.3}").replace('-', "−"),
+        false => format!("{:+.1}", 100.0 * x).replace('-', "−"),
     };
     let unit = if absolute { "" } else { " %" };
-    format!(
-        "{}{unit} [{}, {}]",
-        number(value),
-        number(low),
-        number(high)
-    )
+    let [value, low, high] = [value, low, high].map(number);
+    format!("{value}{unit} [{low}, {high}]")
 }
 
 /// Returns the fraction by which an exact figure changed, where both are plain numbers.
@@ -145,24 +127,17 @@ fn listed(comparison: &Comparison, verdict: Verdict) -> (Vec<&Finding>, Vec<(Str
             kept.push(finding);
         }
     }
-    let more = seen.into_iter().filter(|(why, n)| {
-        *n > MOST_ALIKE
-            && !comparison
-                .findings
-                .iter()
-                .any(|f| f.why == **why && f.measured.is_some() && f.verdict == verdict)
-    });
+    let is_shown = |why: &str| {
+        let mut measured = kept.iter().filter(|f| f.measured.is_some());
+        verdict == Verdict::Worse || measured.any(|f| f.why == why)
+    };
+    let more = seen
+        .into_iter()
+        .filter(|(why, n)| *n > MOST_ALIKE && !is_shown(why));
     let more = more
         .map(|(why, n)| (why.to_owned(), n - MOST_ALIKE))
         .collect();
-    (
-        kept,
-        if verdict == Verdict::Worse {
-            Vec::new()
-        } else {
-            more
-        },
-    )
+    (kept, more)
 }
 
 /// Returns the text for a terminal: a table of changes first, the verdict last, where it stays visible.
@@ -186,17 +161,15 @@ pub fn terminal(comparison: &Comparison, screen: Screen) -> String {
 /// Returns the table of findings that are not the same, the numbered reasons of its last column, and notes on omissions.
 fn changes(comparison: &Comparison) -> (Table, Vec<&str>, Vec<String>) {
     let varied = varied(comparison);
-    let mut table = Table::new(
-        "What is not the same",
-        &[
-            "verdict",
-            ":figure",
-            "change [95 %]",
-            ":base → candidate",
-            ":cell",
-            "why",
-        ],
-    );
+    let heads = [
+        "verdict",
+        ":figure",
+        "change [95 %]",
+        ":base → candidate",
+        ":cell",
+        "why",
+    ];
+    let mut table = Table::new("What is not the same", &heads);
     let (mut reasons, mut more) = (Vec::new(), Vec::new());
     for verdict in NOTABLE {
         let (kept, left_out) = listed(comparison, verdict);
@@ -244,12 +217,11 @@ fn of_tests(comparison: &Comparison) -> String {
 
 /// Shortens a text to [`MOST_CHARACTERS`].
 fn shortened(text: &str) -> String {
-    if text.chars().count() > MOST_CHARACTERS {
-        let kept = text.chars().take(MOST_CHARACTERS - 1);
-        kept.chain(['…']).collect()
-    } else {
-        text.to_owned()
+    if text.chars().count() <= MOST_CHARACTERS {
+        return text.to_owned();
     }
+    let kept = text.chars().take(MOST_CHARACTERS - 1);
+    kept.chain(['…']).collect()
 }
 
 /// Returns a comment: a line with the verdict, a short table, everything else folded. Beyond the limit of a comment, rows
@@ -267,12 +239,8 @@ pub fn markdown(comparison: &Comparison) -> String {
     };
     let end = format!("\n{}\n", of_tests(comparison));
     comment.left -= comment.text.len() + end.len();
-    let decisive = |f: &&Finding| {
-        matches!(
-            f.verdict,
-            Verdict::Worse | Verdict::Better | Verdict::Changed
-        )
-    };
+    let decided = [Verdict::Worse, Verdict::Better, Verdict::Changed];
+    let decisive = |f: &&Finding| decided.contains(&f.verdict);
     let mut first: Vec<&Finding> = comparison.findings.iter().filter(decisive).collect();
     // Worse findings come before the others, in the order of the findings.
     first.sort_by_key(|f| f.verdict != Verdict::Worse);
@@ -283,21 +251,15 @@ pub fn markdown(comparison: &Comparison) -> String {
         comment.text += &format!("\n… and {} more below.\n", first.len() - kept);
     }
     let others = |f: &&Finding| f.verdict != Verdict::Same && !decisive(f);
-    let rest: Vec<&Finding> = first
+    let all = comparison.findings.iter();
+    let rest = first
         .into_iter()
         .skip(kept)
-        .chain(comparison.findings.iter().filter(others))
-        .collect();
-    comment.folded("Open, new and told", &rest);
-    let same: Vec<&Finding> = comparison
-        .findings
-        .iter()
-        .filter(|f| f.verdict == Verdict::Same && f.measured.is_some())
-        .collect();
-    comment.folded(
-        "Known to be the same within the effect that counts, and controls",
-        &same,
-    );
+        .chain(all.clone().filter(others));
+    comment.folded("Open, new and told", &rest.collect::<Vec<_>>());
+    let same = all.filter(|f| f.verdict == Verdict::Same && f.measured.is_some());
+    let title = "Known to be the same within the effect that counts, and controls";
+    comment.folded(title, &same.collect::<Vec<_>>());
     comment.text + &end
 }
 
@@ -401,12 +363,12 @@ impl Comment {
 /// Returns the comparison as JSON for other programs.
 pub fn json(comparison: &Comparison) -> Value {
     let finding = |f: &Finding| {
-        let key: serde_json::Map<String, Value> = f
+        let key = f
             .key
             .labels()
-            .map(|(axis, label)| (axis.to_owned(), label.into()))
-            .collect();
-        // JSON has no infinite numbers.
+            .map(|(axis, label)| (axis.to_owned(), label.into()));
+        let key: serde_json::Map<String, Value> = key.collect();
+        // Without bounds there is no number in JSON.
         let finite = |x: f64| x.is_finite().then_some(x);
         json!({
             "key": key,

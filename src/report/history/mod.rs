@@ -144,11 +144,8 @@ impl Series<'_> {
         let values: Vec<f64> = self.points.iter().map(|(_, value)| value.value).collect();
         let splits: Vec<(usize, Option<f64>)> = match self.figure.spread {
             Spread::Exact => {
-                let differs = |at: &usize| values[*at] != values[at - 1];
-                (1..values.len())
-                    .filter(differs)
-                    .map(|at| (at, None))
-                    .collect()
+                let places = (1..values.len()).filter(|at| values[*at] != values[at - 1]);
+                places.map(|at| (at, None)).collect()
             }
             _ => {
                 let found = e_divisive(&values, LEVEL);

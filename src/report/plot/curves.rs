@@ -188,11 +188,11 @@ impl CurvePlot {
                 high: p.high,
             };
             let (x, y) = (format::significant(p.x, 4), format::interval(&of));
-            let text = format!(
-                "{}\n{}: {x}\n{}: {y}",
-                curve.label, self.x_title, self.y_title
+            let (x, y) = (
+                format!("{}: {x}", self.x_title),
+                format!("{}: {y}", self.y_title),
             );
-            drawing.spot(axes.at(p.x, p.y), text);
+            drawing.spot(axes.at(p.x, p.y), format!("{}\n{x}\n{y}", curve.label));
         }
     }
 
@@ -210,12 +210,8 @@ impl CurvePlot {
             Some(format!("{}: {}{to}", curve.label, at(first)))
         };
         let curves: Vec<String> = self.curves.iter().filter_map(curve).collect();
-        format!(
-            "Curves of {} against {}. {}.",
-            self.y_title,
-            self.x_title,
-            curves.join("; ")
-        )
+        let (x, y) = (&self.x_title, &self.y_title);
+        format!("Curves of {y} against {x}. {}.", curves.join("; "))
     }
 }
 
@@ -232,10 +228,8 @@ impl Curve {
         let points: Vec<&CurvePoint> = points.collect();
         // An interval that reaches 0 ends at the bottom of the axis.
         let upper = points.iter().map(|p| axes.at(p.x, p.high));
-        let lower = points
-            .iter()
-            .rev()
-            .map(|p| axes.at(p.x, p.low.max(axes.y.min())));
+        let lower = points.iter().rev();
+        let lower = lower.map(|p| axes.at(p.x, p.low.max(axes.y.min())));
         if points.iter().any(|p| p.low < p.high) {
             drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.22));
         }

@@ -2,6 +2,7 @@
 
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
 use super::paint::fit_text;
+use crate::document::Illustration;
 
 /// Height of the title above a panel, pixels.
 const TITLE: f64 = 26.0;
@@ -68,8 +69,21 @@ impl Panel {
     }
 }
 
-/// Returns the size of square panels of which `columns` fill a drawing of `width` pixels.
-pub(crate) fn square(width: f64, columns: usize) -> (f64, f64) {
+/// Width of a drawing that fills the page, pixels.
+const WIDTH: f64 = 900.0;
+
+/// Square panels, `columns` in a row that fills the page.
+pub(crate) fn figure(
+    name: impl Into<String>,
+    caption: impl Into<String>,
+    panels: &[Panel],
+    columns: usize,
+) -> Illustration {
+    Illustration::new(name, caption, draw(panels, columns, square(WIDTH, columns)))
+}
+
+/// Size of square panels of which `columns` fill a drawing of `width` pixels.
+fn square(width: f64, columns: usize) -> (f64, f64) {
     let columns = columns.max(1) as f64;
     let side = ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor();
     (side, side)

@@ -130,28 +130,16 @@ impl ParetoPlot {
     fn draw_point(&self, point: &CellPoint, axes: &Axes, drawing: &mut Drawing) {
         let ink = marker::ink(self.structures[point.structure].1);
         let (seconds, error) = (point.seconds, point.error);
-        let whiskers = [
-            [
-                axes.at(seconds.low, error.value),
-                axes.at(seconds.high, error.value),
-            ],
-            [
-                axes.at(seconds.value, error.low.max(axes.y.min())),
-                axes.at(seconds.value, error.high),
-            ],
-        ];
-        for ends in whiskers {
+        let low = error.low.max(axes.y.min());
+        let across = [seconds.low, seconds.high].map(|x| axes.at(x, error.value));
+        let up = [low, error.high].map(|y| axes.at(seconds.value, y));
+        for ends in [across, up] {
             drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
         }
         let at = axes.at(seconds.value, error.value);
         let (time, off) = (format::interval(&seconds), format::interval(&error));
-        let text = format!(
-            "{}\n{}: {time}\n{}: {off}",
-            self.name(point),
-            self.x_title,
-            self.y_title
-        );
-        drawing.spot(at, text);
+        let (x, y) = (&self.x_title, &self.y_title);
+        drawing.spot(at, format!("{}\n{x}: {time}\n{y}: {off}", self.name(point)));
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
     }
 
@@ -164,10 +152,8 @@ impl ParetoPlot {
             axes.at(point.seconds.value, point.error.value)
         };
         let mut taken: Vec<Point> = (0..self.points.len()).map(at).collect();
-        let ranks = front
-            .iter()
-            .enumerate()
-            .map(|(rank, &i)| (i, self.rank(rank, i), INK));
+        let ranks = front.iter().enumerate();
+        let ranks = ranks.map(|(rank, &i)| (i, self.rank(rank, i), INK));
         let letters = (0..self.points.len()).map(|i| (i, letter(self.points[i].structure), DIM));
         for (i, text, ink) in ranks.chain(letters) {
             let (x, y) = at(i);

@@ -62,18 +62,9 @@ impl RatePlot {
                 let x_at = |rate: f64| left + axis.share(rate) * (right - left);
                 bar.draw(&mut drawing, left, y + ROW / 2.0, x_at);
                 if let Some(rate) = bar.rate {
-                    let text = format!(
-                        "{}, {class} rays\n{} Mrays/s",
-                        bar.label,
-                        format::interval(&rate)
-                    );
-                    drawing.spot(
-                        (
-                            left + axis.share(rate.value) * (right - left),
-                            y + ROW / 2.0,
-                        ),
-                        text,
-                    );
+                    let (name, speed) = (&bar.label, format::interval(&rate));
+                    let text = format!("{name}, {class} rays\n{speed} Mrays/s");
+                    drawing.spot((x_at(rate.value), y + ROW / 2.0), text);
                 }
                 y += ROW;
             }

@@ -40,16 +40,10 @@ impl Content for RadialCurve {
         }
         drawing.dashed_line(&across(1.0), DIM, 1.2, 5.0, 4.0);
         area.outline(drawing);
-        for (power, label) in [
-            (0.01, "0.01"),
-            (0.1, "0.1"),
-            (1.0, "1"),
-            (10.0, "10"),
-            (100.0, "100"),
-        ] {
+        for power in [0.01, 0.1, 1.0, 10.0, 100.0] {
             let (x, y) = area.at([left, share(power)]);
             let y = y.clamp(area.top + 10.0, area.top + area.size.1 - 10.0);
-            drawing.text((x - 6.0, y), label, DIM, Anchor::End);
+            drawing.text((x - 6.0, y), power.to_string(), DIM, Anchor::End);
         }
         let last = self.0.len().max(2) as f64;
         let at = |(i, power): (usize, &f64)| {

@@ -2,6 +2,7 @@
 
 use super::judge::{Bounds, Verdict, factor, spread};
 use super::select::{fits, merged, partner, select, words};
+use crate::data::grouped;
 use crate::format;
 use crate::samplers::HEAVY_TAILED;
 use crate::values::{Reading, Value};
@@ -446,17 +447,9 @@ impl<'e> Place<'e> {
         let chosen = self.chosen(values, &self.expect.figure, &pick)?;
         let along = self.expect.along.as_deref().unwrap_or_default();
         let without = |key: &Key| key.clone().with(along, "");
-        let mut groups: Vec<(Key, Vec<(f64, &Value)>)> = Vec::new();
-        for value in chosen {
-            let (Ok(x), Some(_)) = (value.key.label(along).parse::<f64>(), known(value)) else {
-                continue;
-            };
-            let key = without(&value.key);
-            match groups.iter_mut().find(|(known, _)| *known == key) {
-                Some((_, points)) => points.push((x, value)),
-                None => groups.push((key, vec![(x, value)])),
-            }
-        }
+        let placed = chosen.into_iter().filter(|value| known(value).is_some());
+        let placed = placed.filter_map(|v| Some((v.key.label(along).parse::<f64>().ok()?, v)));
+        let groups = grouped(placed, |(_, value)| without(&value.key));
         if groups.is_empty() {
             return Err((pick, format!("no number on the axis {along}")));
         }
@@ -465,9 +458,8 @@ impl<'e> Place<'e> {
                 let problem = format!("{problem} along {along} at {key}");
                 self.row(None, Verdict::Faulty, problem)
             };
-            let figures = points
-                .iter()
-                .map(|(x, value)| Some((*x, self.figure(value)?)));
+            let figures = points.iter();
+            let figures = figures.map(|(x, value)| Some((*x, self.figure(value)?)));
             let Some(figures) = figures.collect::<Option<Vec<(f64, LogFigure)>>>() else {
                 return fault("a figure that is not positive has no exponent: there is one");
             };

@@ -16,49 +16,29 @@ pub struct Model {
 }
 
 /// All models named by experiments in `experiments/thesis`.
+#[rustfmt::skip]
 pub static MODELS: [Model; 7] = [
-    Model {
-        path: "sponza-crytek/sponza.obj",
-        triangles: 262_267,
-        licence: "CC BY 3.0, Frank Meinl / Crytek, after Marko Dabrovic; conversion by Morgan McGuire",
-        from: "https://casual-effects.com/data (Crytek Sponza); its objects merged into one file",
-    },
-    Model {
-        path: "sponza-dabrovic/sponza_dabrovic.obj",
-        triangles: 66_454,
-        licence: "Marko Dabrovic; no licence stated",
-        from: "https://casual-effects.com/data (Dabrovic Sponza)",
-    },
-    Model {
-        path: "country-kitchen/kitchen.glb",
-        triangles: 1_021_815,
-        licence: "CC BY 3.0, Jay-Artist (BlendSwap 42851)",
-        from: "https://benedikt-bitterli.me/resources (Country Kitchen), converted to glTF",
-    },
-    Model {
-        path: "white-room/white_room.glb",
-        triangles: 394_263,
-        licence: "CC BY 3.0, Jay-Artist (BlendSwap 41683)",
-        from: "https://casual-effects.com/data (Living Room), converted to glTF",
-    },
-    Model {
-        path: "fireplace-room/fireplace_room.glb",
-        triangles: 105_299,
-        licence: "CC BY 3.0, Wig42 (BlendSwap 75795)",
-        from: "https://casual-effects.com/data (Fireplace Room), converted to glTF",
-    },
-    Model {
-        path: "stanford-bunny/stanford-bunny.obj",
-        triangles: 69_451,
-        licence: "Stanford 3D Scanning Repository, for research, with credit",
-        from: "https://graphics.stanford.edu/data/3Dscanrep",
-    },
-    Model {
-        path: "stanford-dragon/dragon_100k.obj",
-        triangles: 99_999,
-        licence: "Stanford 3D Scanning Repository, for research, with credit",
-        from: "https://graphics.stanford.edu/data/3Dscanrep, reduced to 100,000 triangles",
-    },
+    Model { path: "sponza-crytek/sponza.obj", triangles: 262_267,
+            licence: "CC BY 3.0, Frank Meinl / Crytek, after Marko Dabrovic; conversion by Morgan McGuire",
+            from: "https://casual-effects.com/data (Crytek Sponza); its objects merged into one file" },
+    Model { path: "sponza-dabrovic/sponza_dabrovic.obj", triangles: 66_454,
+            licence: "Marko Dabrovic; no licence stated",
+            from: "https://casual-effects.com/data (Dabrovic Sponza)" },
+    Model { path: "country-kitchen/kitchen.glb", triangles: 1_021_815,
+            licence: "CC BY 3.0, Jay-Artist (BlendSwap 42851)",
+            from: "https://benedikt-bitterli.me/resources (Country Kitchen), converted to glTF" },
+    Model { path: "white-room/white_room.glb", triangles: 394_263,
+            licence: "CC BY 3.0, Jay-Artist (BlendSwap 41683)",
+            from: "https://casual-effects.com/data (Living Room), converted to glTF" },
+    Model { path: "fireplace-room/fireplace_room.glb", triangles: 105_299,
+            licence: "CC BY 3.0, Wig42 (BlendSwap 75795)",
+            from: "https://casual-effects.com/data (Fireplace Room), converted to glTF" },
+    Model { path: "stanford-bunny/stanford-bunny.obj", triangles: 69_451,
+            licence: "Stanford 3D Scanning Repository, for research, with credit",
+            from: "https://graphics.stanford.edu/data/3Dscanrep" },
+    Model { path: "stanford-dragon/dragon_100k.obj", triangles: 99_999,
+            licence: "Stanford 3D Scanning Repository, for research, with credit",
+            from: "https://graphics.stanford.edu/data/3Dscanrep, reduced to 100,000 triangles" },
 ];
 
 /// The folder of models as written in experiments.

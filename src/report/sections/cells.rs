@@ -116,10 +116,9 @@ impl<'a> Cells<'a> {
     pub fn document(&self, data: &RunData) -> Option<Document> {
         let mut section = Section::new("cells", "Every cell, and how to repeat it");
         section.blocks = self.blocks(data);
+        let name = data.run.map(|run| format!("Cells of {}", run.name));
         (!self.is_inside()).then(|| Document {
-            title: data
-                .run
-                .map_or("Cells".into(), |run| format!("Cells of {}", run.name)),
+            title: name.unwrap_or("Cells".into()),
             subtitle: format::plural(self.found.len(), "cell"),
             sections: vec![section],
             ..Document::default()
@@ -144,10 +143,8 @@ impl Cell<'_> {
                 ("features left out", left_out),
             ]
         });
-        let of_key = self
-            .key
-            .labels()
-            .map(|(axis, label)| (axis, label.to_owned()));
+        let of_key = self.key.labels();
+        let of_key = of_key.map(|(axis, label)| (axis, label.to_owned()));
         let facts = of_key.chain(of_kernel.filter(|(_, text)| !text.is_empty()));
         let facts = facts.map(|(what, text)| [what.into(), text.into()]);
         blocks.extend(Table::of("What it is", &["axis", ":value"], facts).into_block());
@@ -193,10 +190,10 @@ impl Cell<'_> {
 /// they fit.
 fn command(file: &str, text: &str, key: &Key) -> String {
     let mut command = format!("raystone run {}", quoted(file));
-    for set in text
+    let sets = text
         .lines()
-        .filter_map(|line| line.strip_prefix("# --set "))
-    {
+        .filter_map(|line| line.strip_prefix("# --set "));
+    for set in sets {
         command += &format!(" --set {}", quoted(&visible(set)));
     }
     let of = |(axis, label): (&str, &str)| {

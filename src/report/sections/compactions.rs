@@ -125,11 +125,7 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
         let point = |(x, cell): &(f64, Measured)| {
             let time = time(cell)?;
             // The whole stream, in milliseconds.
-            let y = if whole {
-                time.value.scaled(x * 1e-6)
-            } else {
-                time.value
-            };
+            let y = time.value.scaled(if whole { x * 1e-6 } else { 1.0 });
             Some(CurvePoint::new(*x, &y))
         };
         Some(Curve {
@@ -139,9 +135,8 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
             points: cells.iter().filter_map(point).collect(),
         })
     };
-    let mut curves: Vec<Curve> = { over(data, parameter).into_iter() }
-        .filter_map(curve)
-        .collect();
+    let groups = over(data, parameter).into_iter();
+    let mut curves: Vec<Curve> = groups.filter_map(curve).collect();
     // Of one method there may be several: then no colour stands for a method.
     let looks: BTreeSet<usize> = curves.iter().map(|curve| curve.look).collect();
     if looks.len() < curves.len() {
@@ -168,19 +163,15 @@ fn look(data: &RunData, key: &Key) -> usize {
     let cells = data.measured_by(NAME).into_iter();
     let methods = grouped(cells, |cell| cell.key.name(axis::INTEGRATOR).to_owned());
     let own = key.name(axis::INTEGRATOR);
-    methods
-        .iter()
-        .position(|(name, _)| name == own)
-        .unwrap_or(0)
+    let at = methods.iter().position(|(name, _)| name == own);
+    at.unwrap_or(0)
 }
 
 /// Every figure of compactions.
 pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let cells = data.measured_by(NAME);
-    let mut values: Vec<Value> = cells
-        .iter()
-        .flat_map(|cell| of_readings(data, *cell))
-        .collect();
+    let read = cells.iter().flat_map(|cell| of_readings(data, *cell));
+    let mut values: Vec<Value> = read.collect();
     values.extend(derived(data));
     values
 }

@@ -172,8 +172,9 @@ pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
 }
 
 /// The tables on the kernels of a scene.
-pub fn blocks(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Vec<Block> {
-    let gains = GAINS.table(&data.names, values, &[scene.name]);
+pub fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
+    let gains = scene.views.iter().flat_map(|view| gains(scene, view));
+    let gains = GAINS.table(&data.names, &gains.collect::<Vec<_>>(), &[scene.name]);
     let tables = [features_table(scene), gains];
     tables.into_iter().filter_map(Table::into_block).collect()
 }

@@ -235,15 +235,9 @@ fn scene_section(
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         blocks.extend(samplers::blocks(dir, data, cells, &stem, (scene, view)));
     }
-    let values: Vec<_> = scene
-        .views
-        .iter()
-        .flat_map(|view| kernels::gains(scene, view))
-        .collect();
-    blocks.extend(Block::fold(
-        "Kernels: gains, and what was compiled in and out",
-        kernels::blocks(data, scene, &values),
-    ));
+    let kernels = kernels::blocks(data, scene);
+    let title = "Kernels: gains, and what was compiled in and out";
+    blocks.extend(Block::fold(title, kernels));
     blocks.extend(organisations::blocks(data, scene));
     section
 }
@@ -263,14 +257,14 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
     );
     let report = &record.report;
     if report.zero_area > 0 {
-        text += &format!(
-            " {} of zero area kept.",
-            format::plural(report.zero_area, "triangle")
-        );
+        let flat = format::plural(report.zero_area, "triangle");
+        text += &format!(" {flat} of zero area kept.");
     }
-    let warning = |w: String| Block::Paragraph(format!("While loading: {w}"));
-    std::iter::once(Block::Paragraph(text))
-        .chain(report.lines().into_iter().map(warning))
+    let warnings = report.lines().into_iter();
+    let warnings = warnings.map(|w| Block::Paragraph(format!("While loading: {w}")));
+    [Block::Paragraph(text)]
+        .into_iter()
+        .chain(warnings)
         .collect()
 }
 

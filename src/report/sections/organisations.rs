@@ -63,9 +63,8 @@ pub(crate) fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
         ];
         values.extend(Value::known(&time.key, figures));
     }
-    let rows = times
-        .iter()
-        .map(|time| (time.key.clone(), vec![stages(time).into()]));
+    let rows = times.iter();
+    let rows = rows.map(|time| (time.key.clone(), vec![stages(time).into()]));
     let table = ORGANISATIONS.beside(&data.names, &values, &[], &[":stages"], rows);
     let mut blocks: Vec<Block> = table.into_block().into_iter().collect();
     let stem = format!("organisations-{}", file_stem(scene.name));

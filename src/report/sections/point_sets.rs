@@ -8,9 +8,6 @@ use crate::plot::points::{Cloud, Domain, Pair, interval_counts};
 use crate::plot::spectrum::RadialCurve;
 use raystone_record::{Recorded, RecordedPoints, StreamRecord, axis};
 
-/// Width of a row of pictures, pixels.
-const WIDTH: f64 = 900.0;
-
 /// The section; `None` when no record holds points. Of a sampler without points nothing is drawn: today's
 /// samplers need not be those of the run.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
@@ -50,13 +47,9 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
     for (index, (name, found)) in found.into_iter().enumerate() {
         match found.and_then(|(_, points)| panels(name, points)) {
             Some(panels) => {
-                let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
                 let stem = format!("points-{index}-{}", file_stem(name));
-                figures.push(Illustration::new(
-                    stem,
-                    format!("Points of {name}."),
-                    drawing,
-                ));
+                let caption = format!("Points of {name}.");
+                figures.push(panels::figure(stem, caption, &panels, 4));
             }
             None => missing.push(Block::Paragraph(format!(
                 "{name} is not drawn: the records hold none of its points."

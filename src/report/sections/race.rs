@@ -101,10 +101,8 @@ impl<'a> Race<'a> {
             (!runner.curve.is_empty() && sampler.fault().is_none()).then_some(runner)
         };
         let runners: Vec<Runner> = view.samplers.iter().filter_map(runner).collect();
-        let seconds = runners
-            .iter()
-            .filter_map(|r| Some(r.curve.last()?.1))
-            .reduce(f64::min)?;
+        let ends = runners.iter().filter_map(|r| Some(r.curve.last()?.1));
+        let seconds = ends.reduce(f64::min)?;
         Some(Self {
             seconds,
             structure,
@@ -122,13 +120,8 @@ impl<'a> Race<'a> {
         }
         let last = |runner: &Runner| {
             let (spp, _) = runner.curve.last()?;
-            Some(
-                runner
-                    .sampler
-                    .mean_error_at(Metric::RelMse, *spp)?
-                    .error
-                    .value,
-            )
+            let mean = runner.sampler.mean_error_at(Metric::RelMse, *spp)?;
+            Some(mean.error.value)
         };
         let most = self.runners.iter().filter_map(last).reduce(f64::max)?;
         let unit = 10f64.powf(most.log10().floor() - 1.0);
@@ -165,12 +158,9 @@ impl<'a> Race<'a> {
             if let Some(target) = target {
                 let to = format!("to {metric} {}", format::significant(target, 2));
                 let spp = sampler.spp_to(Metric::RelMse, target);
+                let seconds = runner.seconds_to(target);
                 add(format!("spp {to}"), &figure::SPP_TO_ERROR, spp);
-                add(
-                    format!("seconds {to}"),
-                    &figure::SECONDS_TO_ERROR,
-                    runner.seconds_to(target),
-                );
+                add(format!("seconds {to}"), &figure::SECONDS_TO_ERROR, seconds);
             }
         }
         values

@@ -11,10 +11,8 @@ const OVERHEAD_TARGET: f64 = 0.1;
 
 /// The closing sections.
 pub fn sections(data: &RunData) -> Vec<Section> {
-    [failures_section(data), time(data), environment(data)]
-        .into_iter()
-        .flatten()
-        .collect()
+    let sections = [failures_section(data), time(data), environment(data)];
+    sections.into_iter().flatten().collect()
 }
 
 fn time(data: &RunData) -> Option<Section> {
@@ -30,9 +28,8 @@ fn time(data: &RunData) -> Option<Section> {
         )));
     }
     section.blocks.extend(overhead(data).map(Block::Paragraph));
-    section
-        .blocks
-        .extend(data.finished.and_then(|end| wall_table(end).into_block()));
+    let table = data.finished.and_then(|end| wall_table(end).into_block());
+    section.blocks.extend(table);
     (!section.blocks.is_empty()).then_some(section)
 }
 
@@ -41,15 +38,15 @@ fn time(data: &RunData) -> Option<Section> {
 pub(crate) fn overhead(data: &RunData) -> Option<String> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
     let share = finished.overhead_s / finished.wall_s;
-    let much = match share > OVERHEAD_TARGET {
-        true => "more than",
-        false => "within",
+    let much = if share > OVERHEAD_TARGET {
+        "more than"
+    } else {
+        "within"
     };
+    let [share, target] = [share, OVERHEAD_TARGET].map(percent);
     Some(format!(
-        "Harness overhead: {} of the wall time is neither GPU work nor building, judging or loading ({much} \
-         the {} that the harness is meant to take).",
-        percent(share),
-        percent(OVERHEAD_TARGET)
+        "Harness overhead: {share} of the wall time is neither GPU work nor building, judging or loading ({much} the \
+         {target} that the harness is meant to take)."
     ))
 }
 
@@ -57,21 +54,15 @@ fn wall_table(finished: &FinishedRecord) -> Table {
     let parts = finished.parts_s.iter().map(|(name, s)| (name.as_str(), *s));
     let mut parts: Vec<(&str, f64)> = parts.collect();
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.extend([
-        ("overhead", finished.overhead_s),
-        ("whole run", finished.wall_s),
-    ]);
+    parts.push(("overhead", finished.overhead_s));
+    parts.push(("whole run", finished.wall_s));
     let row = |(name, seconds): (&str, f64)| {
         let share = Some(seconds / finished.wall_s).filter(|share| share.is_finite());
         let share = share.map_or(format::ABSENT.into(), percent);
         [name.into(), format::number(seconds).into(), share.into()]
     };
-    let heads = ["part", "seconds", "share"];
-    Table::of(
-        "Where the wall time went",
-        &heads,
-        parts.into_iter().map(row),
-    )
+    let (heads, rows) = (["part", "seconds", "share"], parts.into_iter().map(row));
+    Table::of("Where the wall time went", &heads, rows)
 }
 
 /// State of a cell that failed.
@@ -105,10 +96,8 @@ impl Failure {
 /// Everything that failed, was left out, or is warned of.
 pub(crate) fn failures(data: &RunData) -> Vec<Failure> {
     let mut all: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
-    all.extend(
-        data.views()
-            .flat_map(|(scene, view)| failed_cells(scene, view)),
-    );
+    let of_views = data.views().map(|(scene, view)| failed_cells(scene, view));
+    all.extend(of_views.flatten());
     let failed = |key: &Key, failure: &Option<String>| {
         let reason = failure.as_ref()?;
         Some(Failure::new(key.to_string(), FAILED, reason))
@@ -180,10 +169,7 @@ fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
         let unequal =
             (!time.image_equal).then(|| "its image differs from the other structures'".to_owned());
         let reason = time.failure.clone().or(unequal)?;
-        let cell = format!(
-            "{} · {} · {} · {}",
-            scene.name, time.structure, time.sampler, view.name
-        );
+        let cell = [scene.name, &time.structure, &time.sampler, &view.name].join(" · ");
         Some(Failure::new(cell, FAILED, reason))
     };
     let sampler = |sampler: &MeasuredSampler| {
@@ -230,20 +216,14 @@ fn environment(data: &RunData) -> Option<Section> {
         ("commit", commit.unwrap_or_default()),
     ];
     let row = |(what, value): (&str, String)| {
-        let is_known = !value.trim().is_empty();
-        let value = if is_known {
-            value
-        } else {
-            format::ABSENT.into()
-        };
-        [what.into(), value.into()]
+        let known = Some(value).filter(|value| !value.trim().is_empty());
+        [what.into(), known.unwrap_or(format::ABSENT.into()).into()]
     };
     let table = Table::of("Environment", &["what", ":value"], rows.map(row));
     let mut section = Section::new("environment", "Where it ran");
     section.blocks.extend(table.into_block());
     let text = vec![Block::Verbatim(run.experiment_text.clone())];
-    section
-        .blocks
-        .extend(Block::fold("The experiment file", text));
+    let text = Block::fold("The experiment file", text);
+    section.blocks.extend(text);
     Some(section)
 }
