@@ -18,7 +18,7 @@ pub struct BruteForce;
 impl Structure for BruteForce {
     const NAME: &'static str = "brute-force";
     const DESCRIPTION: &'static str =
-        "every triangle for every ray: the simplest judge, for small scenes";
+        "every triangle for every ray: the simplest reference, for small scenes";
     type Parameters = NoParameters;
 
     fn build(soup: &TriangleSoup, _: &NoParameters, _: &mut BuildLog) -> BuildResult {

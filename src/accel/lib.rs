@@ -46,7 +46,7 @@ mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhParameters, RopedBvh};
-pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
+pub use instancing::{InstanceReference, MetaBvh, ObjectList, Placed, brute_force_instances};
 pub use intersection::{BoxTest, Intersection};
 pub(crate) use irregular_grid::IrregularGrid;
 pub(crate) use kd_tree::KdTree;

@@ -53,7 +53,7 @@ pub struct Compare {
     #[arg(long, conflicts_with = "base_program")]
     no_confirm: bool,
     /// Whether times decide or are only told
-    #[arg(long, value_enum, default_value_t = Times::Judge)]
+    #[arg(long, value_enum, default_value_t = Times::ReferenceTracer)]
     times: Times,
     /// Other images from the same seeds are meant: their errors decide
     #[arg(long)]
@@ -86,7 +86,7 @@ pub struct Compare {
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Times {
     /// They decide.
-    Judge,
+    ReferenceTracer,
     /// They are told.
     Show,
 }
@@ -254,7 +254,7 @@ impl Compare {
                 images: self.new_images,
                 ..Effects::default()
             },
-            judge_times: self.times == Times::Judge,
+            judge_times: self.times == Times::ReferenceTracer,
         }
     }
 

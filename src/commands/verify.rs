@@ -7,7 +7,9 @@ use super::verify_images;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan, Skipped};
-use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, Key, PathsRecord, Verdict};
+use raystone::measure::record::{
+    ClassVerdict, GateVerdict, Key, PathsRecord, ReferenceCheck, Verdict,
+};
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::count;
 use raystone::run::{Registries, Verified};
@@ -26,7 +28,7 @@ const BRUTE_FORCE: &str = "brute-force";
 /// Scenes from this size on are left to the other structures, unless brute force is asked for.
 const BRUTE_FORCE_TRIANGLES: usize = 5_000;
 
-/// Run the gate alone: does every structure answer every ray as the judge does?
+/// Run the gate alone: does every structure answer every ray as the reference tracer does?
 ///
 /// Without a file: every structure (brute force only where a scene has fewer than 5,000 triangles),
 /// on `cornell-box` and `displaced-sphere`, and the integrators on small trial scenes of every material, light and
@@ -220,7 +222,7 @@ fn table(verified: &[Verified]) -> String {
         ":brute force",
         ":oracle",
     ];
-    let mut table = Table::new("Hits against the judge", &columns);
+    let mut table = Table::new("Hits against the reference tracer", &columns);
     let mut details = String::new();
     for one in verified {
         let word = match (&one.verdict, passed(one)) {
@@ -240,8 +242,8 @@ fn table(verified: &[Verified]) -> String {
             let _ = writeln!(details, "{}: {detail}", one.cell);
         }
     }
-    let legend = "brute force: the judge against it, wrong of rays; \
-                  oracle: the judge against double precision, agree / ambiguous / wrong; \
+    let legend = "brute force: the reference tracer against it, wrong of rays; \
+                  oracle: the reference tracer against double precision, agree / ambiguous / wrong; \
                   kept: found on disk, checked before\n";
     format!(
         "{}{}{details}",
@@ -300,7 +302,7 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
     }
 }
 
-/// The rows of one structure; names and the judge's own checks stand in the first.
+/// The rows of one structure; names and the reference tracer's own checks stand in the first.
 fn rows(head: [TableCell; 3], verdict: &GateVerdict) -> Vec<Vec<TableCell>> {
     let brute_force = &verdict.brute_force;
     let kept = brute_force.reused_unix_s.map_or("", |_| " (kept)");
@@ -331,7 +333,7 @@ fn counts(class: &ClassVerdict) -> [String; 4] {
     [name.to_owned(), rays, wrong, ties]
 }
 
-fn oracle(check: &JudgeCheck) -> String {
+fn oracle(check: &ReferenceCheck) -> String {
     let agree = check.rays.saturating_sub(check.wrong + check.ambiguous);
     format!(
         "{} / {} / {}",

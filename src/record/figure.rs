@@ -144,7 +144,7 @@ figures! {
     CPU_NS_PER_RAY = "cpu-ns-per-ray/v1", "time of the processors", "ns per ray", Lower, THREE, Median;
     CPU_OVER_PEER = "cpu-over-peer/v1", "time of the processors over a peer's", "", Lower, THREE, Median;
     PEER_MRAYS_PER_S = "peer-mrays-per-s/v1", "speed of a peer", "Mrays/s", Higher, THREE, Median;
-    UNLIKE_JUDGE = "unlike-judge/v1", "unlike the judge", "per million", Neither, THREE, Exact;
+    UNLIKE_JUDGE = "unlike-judge/v1", "unlike the reference tracer", "per million", Neither, THREE, Exact;
     FARTHEST_DISTANCE = "farthest-distance/v1", "farthest distance", "", Neither, THREE, Exact;
     // A structure.
     BUILD_MS = "build-ms/v1", "build", "ms", Lower, THREE, Single;

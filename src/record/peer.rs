@@ -17,11 +17,11 @@ pub struct PeerTiming {
     pub cpu_ms: Vec<f64>,
     /// Million rays per second by the wall clock, median with interval.
     pub mrays_s: Interval,
-    /// Rays whose triangle (any hits: whether there is one) is not the judge's.
+    /// Rays whose triangle (any hits: whether there is one) is not the reference tracer's.
     pub unlike: usize,
     /// Of these, how many were put to the oracle; none of them was beyond rounding.
     pub judged: usize,
-    /// Greatest difference of a distance to the judge's where the triangle is the same, over the distance or a hundredth of
+    /// Greatest difference of a distance to the reference tracer's where the triangle is the same, over the distance or a hundredth of
     /// the greatest coordinate of the ray's origin.
     pub farthest: f64,
 }

@@ -82,9 +82,9 @@ pub struct ClassVerdict {
     pub first_wrong: Option<String>,
 }
 
-/// Comparison of the judge with a slower, simpler judge.
+/// Comparison of the reference tracer with a slower, simpler judge.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct JudgeCheck {
+pub struct ReferenceCheck {
     /// Rays compared.
     pub rays: usize,
     /// Rays that differ.
@@ -106,10 +106,10 @@ pub struct GateVerdict {
     pub passed: bool,
     /// Per ray class.
     pub classes: Vec<ClassVerdict>,
-    /// The judge (scalar plain BVH) against brute force.
-    pub brute_force: JudgeCheck,
-    /// The judge against the f64 oracle.
-    pub oracle: JudgeCheck,
+    /// The reference tracer (scalar plain BVH) against brute force.
+    pub brute_force: ReferenceCheck,
+    /// The reference tracer against the f64 oracle.
+    pub oracle: ReferenceCheck,
     /// Error words raised by kernels (step fuse, stack overflow), in words.
     pub kernel_errors: Vec<String>,
     /// Structural faults found by `validate`.
@@ -247,7 +247,7 @@ pub struct StructureRecord {
     /// counts as skipped.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub refused: bool,
-    /// Where triangles are met, which decides on the judge: see [`Space`].
+    /// Where triangles are met, which decides on the reference tracer: see [`Space`].
     #[serde(default)]
     pub space: Space,
     /// Timed build phases.
@@ -536,7 +536,7 @@ impl StructureRecord {
 }
 
 /// What is wrong, in words.
-pub fn fault_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
+pub fn fault_text(verdict: &GateVerdict, reference_fault: Option<&str>) -> String {
     let mut parts = Vec::new();
     let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
     if wrong > 0 {
@@ -547,7 +547,7 @@ pub fn fault_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
             .find_map(|c| c.first_wrong.as_deref())
             .unwrap_or_default();
         parts.push(format!(
-            "{wrong} of {rays} rays differ from the judge; first: {first}"
+            "{wrong} of {rays} rays differ from the reference tracer; first: {first}"
         ));
     }
     parts.extend(verdict.kernel_errors.iter().cloned());
@@ -555,10 +555,10 @@ pub fn fault_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
     parts.extend(verdict.elsewhere.clone());
     if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
         parts.push(format!(
-            "the judge itself is wrong on {} rays against brute force and {} against f64; first: {}",
+            "the reference tracer itself is wrong on {} rays against brute force and {} against f64; first: {}",
             verdict.brute_force.wrong,
             verdict.oracle.wrong,
-            judge_fault.unwrap_or_default()
+            reference_fault.unwrap_or_default()
         ));
     }
     parts.join("; ")

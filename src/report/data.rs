@@ -233,7 +233,7 @@ impl<'a> RunData<'a> {
         }
         data.doubt_integrators();
         data.name_competitors();
-        data.judge_biases_together();
+        data.test_biases_together();
         data
     }
 
@@ -323,7 +323,7 @@ impl<'a> RunData<'a> {
     /// Every sampler was tested at its share of the run's level. Those found biased need theirs no more: the
     /// others share the level anew, until no more are found (Holm 1979; the chance that any sampler without bias
     /// is called biased stays below the level).
-    fn judge_biases_together(&mut self) {
+    fn test_biases_together(&mut self) {
         let views = self.scenes.iter_mut().flat_map(|scene| &mut scene.views);
         let samplers = views.flat_map(|view| &mut view.samplers);
         let biases = samplers.filter_map(|sampler| sampler.bias.as_mut());

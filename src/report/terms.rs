@@ -8,7 +8,7 @@ type Entry = (&'static str, &'static [&'static str], &'static str);
 #[rustfmt::skip]
 const TERMS: &[Entry] = &[
     ("gate", &["gate"],
-        "Before anything is timed, every structure answers the same recorded rays as the judge; each answer must be equal to \
+        "Before anything is timed, every structure answers the same recorded rays as the reference tracer; each answer must be equal to \
          the bit. A structure that differs once fails the gate and gets no speed."),
     ("judge", &["judge"],
         "Plain code on the processor that answers the recorded rays; it is itself compared with testing every triangle and \

@@ -9,7 +9,7 @@ pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
     let gates = || scene.structures.iter().filter_map(|s| s.gate.as_ref());
     let differs = |gate: &GateVerdict| gate.brute_force.wrong > 0 || gate.oracle.wrong > 0;
     if gates().any(differs) {
-        return Some("the judge differs from what judges it".into());
+        return Some("the reference tracer differs from what judges it".into());
     }
     let failed = scene.structures.iter().filter(|s| s.fault().is_some());
     let names: Vec<&str> = failed.map(|s| s.structure.as_str()).collect();

@@ -47,7 +47,7 @@ pub fn explain(
     let any = is_ray && twin.any_hit(ray, &mut Counters::default());
     let equal = hit.same_bits(&expected) && any == (expected.triangle != NO_HIT);
     let _ = writeln!(text, "{:12} {hit}", kind.name());
-    let _ = writeln!(text, "{:12} {expected}", judge_name(&*built));
+    let _ = writeln!(text, "{:12} {expected}", reference_name(&*built));
     let _ = writeln!(text, "{:12} {}", "any hit", if any { "yes" } else { "no" });
     text += &oracle_text(scene, ray);
     text += match equal {
@@ -57,7 +57,7 @@ pub fn explain(
     Ok((text, equal))
 }
 
-fn judge_name(built: &dyn BuiltAccel) -> &'static str {
+fn reference_name(built: &dyn BuiltAccel) -> &'static str {
     match built.space() {
         Space::World => "brute force",
         Space::Instances => "brute force over instances",

@@ -6,7 +6,7 @@ use super::case::{Address, Case, Truth};
 use super::families::Family;
 use super::measurement::{Results, Scope, part_of};
 use super::placement::Placement;
-use super::tally::{CaseJudge, Outcome, Tally};
+use super::tally::{CaseTruth, Outcome, Tally};
 use raystone_accel::triangle::AnyTriangleTest;
 use raystone_accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
@@ -199,14 +199,19 @@ impl Suite<'_> {
     }
 
     /// One case through all structures with one triangle test.
-    fn case(&self, case: &Case, judge: &CaseJudge, cells: &mut [OpenCell]) -> Result<(), Absent> {
+    fn case(
+        &self,
+        case: &Case,
+        reference: &CaseTruth,
+        cells: &mut [OpenCell],
+    ) -> Result<(), Absent> {
         let test = cells[0].test;
         let quick = self.scope.settings.quick;
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
         let expected = Expected::new(&soup, &case.rays);
         // Structures mostly answer what brute force does: its answers are judged once.
         let known = expected.of(Space::World);
-        let outcomes = judge.judge_all(known);
+        let outcomes = reference.judge_all(known);
         self.on_devices(cells, |gpu, cell| {
             if !cell.takes(case, quick) {
                 return Ok(());
@@ -223,7 +228,7 @@ impl Suite<'_> {
             let trace = Trace {
                 suite: self,
                 case,
-                judge,
+                reference,
                 stage: &stage,
                 expected: &expected,
                 judged: known.iter().zip(&outcomes).collect(),
@@ -288,9 +293,9 @@ pub(crate) fn families(suite: &Suite, cells: &[Cell]) -> Results {
     let mut open = open.collect::<Result<Vec<_>, _>>()?;
     let mut timed = 0;
     for case in &cases {
-        let judge = CaseJudge::new(case);
+        let reference = CaseTruth::new(case);
         for row in open.chunk_by_mut(|a, b| a.test == b.test) {
-            suite.case(case, &judge, row)?;
+            suite.case(case, &reference, row)?;
         }
         if suite.is_timed(case, timed) {
             timed += 1;
@@ -304,7 +309,7 @@ pub(crate) fn families(suite: &Suite, cells: &[Cell]) -> Results {
 struct Trace<'a> {
     suite: &'a Suite<'a>,
     case: &'a Case,
-    judge: &'a CaseJudge<'a>,
+    reference: &'a CaseTruth<'a>,
     stage: &'a Stage,
     expected: &'a Expected,
     /// Answers whose outcomes are known.
@@ -331,7 +336,7 @@ impl Trace<'_> {
             let outcome = if hit.same_bits(known) {
                 *known_outcome
             } else {
-                self.judge.judge(index, hit)
+                self.reference.judge(index, hit)
             };
             tally.add(&outcome, closed, || replay(index));
             if !hit.same_bits(&expected[index]) {

@@ -24,13 +24,13 @@ pub struct Outcome {
 }
 
 /// What is right for every ray of a case: found once, whatever traces the case.
-pub(crate) struct CaseJudge<'a> {
+pub(crate) struct CaseTruth<'a> {
     case: &'a Case,
     /// Exact truths; empty where there is no exact truth.
     truths: Vec<ExactTruth>,
 }
 
-impl<'a> CaseJudge<'a> {
+impl<'a> CaseTruth<'a> {
     /// Looks up the truth of every ray.
     pub(crate) fn new(case: &'a Case) -> Self {
         let truths = match case.truth {

@@ -8,10 +8,10 @@
 //! and reported.
 //!
 //! Instanced scenes have a second reference for structures that transform rays to object space: see
-//! `instance_judge`.
+//! `instance_reference`.
 
 use crate::holes::SceneHoles;
-use crate::instance_judge;
+use crate::instance_reference;
 use crate::kept_checks::KeptChecks;
 use crate::rays::{RaySet, record_rays};
 use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
@@ -24,7 +24,7 @@ use raystone_config::Gate;
 use raystone_core::geometry::Camera;
 use raystone_core::store::user_folder;
 use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
-use raystone_record::{ClassVerdict, GateVerdict, JudgeCheck};
+use raystone_record::{ClassVerdict, GateVerdict, ReferenceCheck};
 use raystone_scene::SceneData;
 
 /// Minimum number of rays on which the reference tracer is checked against brute force.
@@ -33,17 +33,17 @@ const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
 const TIE_ULPS: f64 = 4.0;
 
 /// The reference answers of a scene: recorded rays with their hits.
-pub struct Judge {
+pub struct ReferenceTracer {
     /// Rays and reference hits, per class.
     pub sets: Vec<RaySet>,
     /// The reference tracer against brute force.
-    pub brute_force: JudgeCheck,
+    pub brute_force: ReferenceCheck,
     /// The reference tracer against the f64 oracle.
-    pub oracle: JudgeCheck,
+    pub oracle: ReferenceCheck,
     /// The first ray on which the reference tracer itself is wrong.
     pub first_wrong: Option<String>,
     /// The reference for structures that trace instances; `None` if no ray is transformed.
-    pub instances: Option<Box<Judge>>,
+    pub instances: Option<Box<ReferenceTracer>>,
 }
 
 /// How to treat earlier checks of the reference tracer.
@@ -55,7 +55,7 @@ pub enum Checks {
     Kept,
 }
 
-impl Judge {
+impl ReferenceTracer {
     /// Builds the reference tracer, records the rays and checks the reference itself.
     ///
     /// # Errors
@@ -74,27 +74,36 @@ impl Judge {
         let twin = tree.twin(soup);
         let sets = record_rays(scene, soup, camera, &twin, settings, seed);
         drop(tree);
-        let mut judge = Self::of_sets(sets);
-        judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
+        let mut reference = Self::of_sets(sets);
+        reference.instances = instance_reference::new(soup, &reference.sets, seed)?.map(Box::new);
         let kept = match past {
             Checks::Repeated => None,
             Checks::Kept => user_folder().and_then(|folder| {
-                KeptChecks::of(&folder, &judge, &scene.hash, soup.intersection, settings)
+                KeptChecks::of(
+                    &folder,
+                    &reference,
+                    &scene.hash,
+                    soup.intersection,
+                    settings,
+                )
             }),
         };
-        if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
-            judge.check(scene, soup, settings);
-            kept.iter().for_each(|kept| kept.keep(&judge));
+        if !kept
+            .as_ref()
+            .is_some_and(|kept| kept.restore(&mut reference))
+        {
+            reference.check(scene, soup, settings);
+            kept.iter().for_each(|kept| kept.keep(&reference));
         }
-        Ok(judge)
+        Ok(reference)
     }
 
     /// A reference with these answers, not yet checked.
     pub(super) fn of_sets(sets: Vec<RaySet>) -> Self {
         Self {
             sets,
-            brute_force: JudgeCheck::default(),
-            oracle: JudgeCheck::default(),
+            brute_force: ReferenceCheck::default(),
+            oracle: ReferenceCheck::default(),
             first_wrong: None,
             instances: None,
         }
@@ -105,8 +114,8 @@ impl Judge {
             brute_force_hits(soup, rays)
         });
         self.check_oracle(scene, soup, settings.oracle_rays as usize);
-        if let (Some(judge), Some(placed)) = (&mut self.instances, &soup.placed) {
-            instance_judge::check(judge, (scene, placed), settings);
+        if let (Some(reference), Some(placed)) = (&mut self.instances, &soup.placed) {
+            instance_reference::check(reference, (scene, placed), settings);
         }
     }
 
@@ -126,14 +135,14 @@ impl Judge {
             instances: self
                 .instances
                 .as_ref()
-                .map(|judge| Box::new(judge.thinned(every))),
+                .map(|reference| Box::new(reference.thinned(every))),
         }
     }
 
     /// The reference for structures that intersect triangles in this space.
     pub fn of(&self, space: Space) -> &Self {
         match (space, &self.instances) {
-            (Space::Instances, Some(judge)) => judge,
+            (Space::Instances, Some(reference)) => reference,
             _ => self,
         }
     }
@@ -210,8 +219,9 @@ impl Judge {
                 }
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
-                    self.first_wrong
-                        .get_or_insert_with(|| format!("ray {ray} | judge {hit} | f64: {fault}"));
+                    self.first_wrong.get_or_insert_with(|| {
+                        format!("ray {ray} | reference {hit} | f64: {fault}")
+                    });
                 }
             }
         }
@@ -233,14 +243,14 @@ pub fn gate(
     triangles: &TriangleBuffers,
     soup: &TriangleSoup,
     traced: &Traced,
-    judge: &Judge,
+    reference: &ReferenceTracer,
     probe: &ArithmeticProbe,
     runtime_checks: bool,
 ) -> Result<GateVerdict, GpuError> {
-    let judge = judge.of(traced.space);
+    let reference = reference.of(traced.space);
     let mut errors = 0;
     let mut classes = Vec::new();
-    for set in &judge.sets {
+    for set in &reference.sets {
         let batch = |query: Query| {
             let ask = Ask {
                 coherent: set.is_coherent(),
@@ -273,10 +283,10 @@ pub fn gate(
     }
     let right = classes.iter().all(|c| c.wrong == 0);
     Ok(GateVerdict {
-        passed: right && errors == 0 && judge.is_sound(),
+        passed: right && errors == 0 && reference.is_sound(),
         classes,
-        brute_force: judge.brute_force.clone(),
-        oracle: judge.oracle.clone(),
+        brute_force: reference.brute_force.clone(),
+        oracle: reference.oracle.clone(),
         kernel_errors: kernel_errors(errors),
         structural: None,
         elsewhere: None,
@@ -305,7 +315,7 @@ pub fn timed_fault(
     let verdict = compare(set, &hits, &found, soup, space, exact);
     if let Some(first) = verdict.first_wrong {
         faults.push(format!(
-            "{} of {} rays of the last timed turn differ from the judge; first: {first}",
+            "{} of {} rays of the last timed turn differ from the reference tracer; first: {first}",
             verdict.wrong, verdict.rays
         ));
     }
@@ -389,7 +399,7 @@ impl Meeting {
         }
         match (space, &soup.placed) {
             (Space::Instances, Some(placed)) => {
-                instance_judge::meeting(placed, ray, hit.triangle, hit.t)
+                instance_reference::meeting(placed, ray, hit.triangle, hit.t)
             }
             _ => Some(Self {
                 ray: soup.intersection.raised(ray),

@@ -25,7 +25,7 @@ const LENGTHS: [f32; 8] = [1.0, 1e-4, 1e-7, 1e-10, 1e4, 1e7, 1e10, 0.3];
 const NEXT_TO_ZERO: [f32; 8] = [0.0, -0.0, 1e-12, -1e-12, 1e-25, -1e-25, 1e-37, -1e-37];
 
 /// The hard rays of a scene. Intervals end at hits found by `judge`.
-pub fn hard_rays(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Vec<Ray> {
+pub fn hard_rays(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Vec<Ray> {
     if soup.records.is_empty() {
         return Vec::new();
     }
@@ -35,7 +35,7 @@ pub fn hard_rays(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Vec<Ray
         .iter()
         .enumerate()
         .map(|(turn, ray)| {
-            let hit = judge.closest_hit(ray, &mut Counters::default());
+            let hit = reference.closest_hit(ray, &mut Counters::default());
             let t = (hit.triangle != NO_HIT).then_some(hit.t);
             part(ray, t.unwrap_or(maker.diagonal), turn)
         })

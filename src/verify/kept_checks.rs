@@ -5,11 +5,11 @@
 //! and the program, so that a wrong answer never finds the checks of a right one. Only checks
 //! without a fault are stored.
 
-use crate::gate::Judge;
+use crate::gate::ReferenceTracer;
 use raystone_accel::Intersection;
 use raystone_config::Gate;
 use raystone_core::store::Kept;
-use raystone_record::JudgeCheck;
+use raystone_record::ReferenceCheck;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::SystemTime;
@@ -20,22 +20,26 @@ pub(super) struct KeptChecks(Kept);
 #[derive(Serialize, Deserialize)]
 struct Content {
     checked_unix_s: u64,
-    world: [JudgeCheck; 2],
-    instances: Option<[JudgeCheck; 2]>,
+    world: [ReferenceCheck; 2],
+    instances: Option<[ReferenceCheck; 2]>,
 }
 
 impl KeptChecks {
     /// The place in a folder for a reference with these rays; `None` without a program identity.
     pub(crate) fn of(
         folder: &Path,
-        judge: &Judge,
+        reference: &ReferenceTracer,
         scene_hash: &str,
         intersection: Intersection,
         settings: &Gate,
     ) -> Option<Self> {
         let mut hasher = blake3::Hasher::new();
-        let judges = [Some(judge), judge.instances.as_deref()];
-        for set in judges.into_iter().flatten().flat_map(|judge| &judge.sets) {
+        let judges = [Some(reference), reference.instances.as_deref()];
+        for set in judges
+            .into_iter()
+            .flatten()
+            .flat_map(|reference| &reference.sets)
+        {
             hasher.update(&(set.rays.len() as u64).to_le_bytes());
             hasher.update(bytemuck::cast_slice(&set.rays));
             hasher.update(bytemuck::cast_slice(&set.truth));
@@ -51,18 +55,18 @@ impl KeptChecks {
     }
 
     /// Restores cached checks; returns true if there were any.
-    pub(crate) fn restore(&self, judge: &mut Judge) -> bool {
+    pub(crate) fn restore(&self, reference: &mut ReferenceTracer) -> bool {
         let Some(content) = self.read() else {
             return false;
         };
         let since = Some(content.checked_unix_s);
-        let kept = |check| JudgeCheck {
+        let kept = |check| ReferenceCheck {
             reused_unix_s: since,
             ..check
         };
-        [judge.brute_force, judge.oracle] = content.world.map(kept);
-        if let (Some(judge), Some(checks)) = (&mut judge.instances, content.instances) {
-            [judge.brute_force, judge.oracle] = checks.map(kept);
+        [reference.brute_force, reference.oracle] = content.world.map(kept);
+        if let (Some(reference), Some(checks)) = (&mut reference.instances, content.instances) {
+            [reference.brute_force, reference.oracle] = checks.map(kept);
         }
         true
     }
@@ -77,16 +81,17 @@ impl KeptChecks {
     }
 
     /// Stores the checks of a sound reference. After a failed write they merely run again.
-    pub(crate) fn keep(&self, judge: &Judge) {
-        let instances = judge.instances.as_deref();
-        if !judge.is_sound() || instances.is_some_and(|judge| !judge.is_sound()) {
+    pub(crate) fn keep(&self, reference: &ReferenceTracer) {
+        let instances = reference.instances.as_deref();
+        if !reference.is_sound() || instances.is_some_and(|reference| !reference.is_sound()) {
             return;
         }
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-        let checks = |judge: &Judge| [judge.brute_force.clone(), judge.oracle.clone()];
+        let checks =
+            |reference: &ReferenceTracer| [reference.brute_force.clone(), reference.oracle.clone()];
         let content = Content {
             checked_unix_s: now.map_or(0, |d| d.as_secs()),
-            world: checks(judge),
+            world: checks(reference),
             instances: instances.map(checks),
         };
         if let Ok(bytes) = serde_json::to_vec(&content) {
@@ -103,10 +108,10 @@ mod tests {
     use raystone_accel::{Hit, Ray};
     use raystone_record::RayClass;
 
-    fn judge(t: f32) -> Judge {
-        let checked = JudgeCheck {
+    fn judge(t: f32) -> ReferenceTracer {
+        let checked = ReferenceCheck {
             rays: 7,
-            ..JudgeCheck::default()
+            ..ReferenceCheck::default()
         };
         let ray = Ray::new([0.0; 3], [1.0; 3]).between(0.0, t);
         let set = RaySet {
@@ -115,10 +120,10 @@ mod tests {
             rays: vec![ray],
             shadow: Vec::new(),
         };
-        Judge {
+        ReferenceTracer {
             brute_force: checked.clone(),
             oracle: checked,
-            ..Judge::of_sets(vec![set])
+            ..ReferenceTracer::of_sets(vec![set])
         }
     }
 
@@ -131,8 +136,8 @@ mod tests {
         shadow_orders: false,
     };
 
-    fn place(folder: &Path, judge: &Judge, gate: &Gate) -> KeptChecks {
-        let place = KeptChecks::of(folder, judge, "scene", Intersection::default(), gate);
+    fn place(folder: &Path, reference: &ReferenceTracer, gate: &Gate) -> KeptChecks {
+        let place = KeptChecks::of(folder, reference, "scene", Intersection::default(), gate);
         place.expect("a program")
     }
 

@@ -36,10 +36,10 @@ pub struct RaySet {
 }
 
 impl RaySet {
-    pub(super) fn new(class: RayClass, rays: Vec<Ray>, judge: &dyn CpuTwin) -> Self {
+    pub(super) fn new(class: RayClass, rays: Vec<Ray>, reference: &dyn CpuTwin) -> Self {
         let truth = rays
             .par_iter()
-            .map(|ray| judge.closest_hit(ray, &mut Counters::default()))
+            .map(|ray| reference.closest_hit(ray, &mut Counters::default()))
             .collect();
         Self {
             class,
@@ -49,15 +49,15 @@ impl RaySet {
         }
     }
 
-    pub(super) fn hard(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Self {
-        Self::new(RayClass::Hard, hard_rays(soup, judge, seed), judge)
+    pub(super) fn hard(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Self {
+        Self::new(RayClass::Hard, hard_rays(soup, reference, seed), reference)
     }
 
     /// The same rays with the answers of another reference.
-    pub fn judged_by(&self, judge: &dyn CpuTwin) -> Self {
+    pub fn judged_by(&self, reference: &dyn CpuTwin) -> Self {
         Self {
             shadow: self.shadow.clone(),
-            ..Self::new(self.class, self.rays.clone(), judge)
+            ..Self::new(self.class, self.rays.clone(), reference)
         }
     }
 
@@ -145,12 +145,16 @@ pub fn record_rays(
     scene: &SceneData,
     soup: &TriangleSoup,
     camera: Camera,
-    judge: &dyn CpuTwin,
+    reference: &dyn CpuTwin,
     settings: &Gate,
     seed: u64,
 ) -> Vec<RaySet> {
     let side = ((f64::from(settings.rays).sqrt() / f64::from(TILE)).round() as u32).max(1) * TILE;
-    let primary = RaySet::new(RayClass::Primary, primary_rays(camera, side, side), judge);
+    let primary = RaySet::new(
+        RayClass::Primary,
+        primary_rays(camera, side, side),
+        reference,
+    );
     let bounds = scene.bounds();
     let diagonal = 2.0 * bounds.radius();
     let or_default = |set: f32, default: f32| if set > 0.0 { set } else { default };
@@ -185,12 +189,12 @@ pub fn record_rays(
         let bounce = starts()
             .map(|(p, n)| Ray::new(p, cosine_direction(n, &mut random)))
             .collect();
-        sets.push(RaySet::new(RayClass::Shadow, shadow, judge));
+        sets.push(RaySet::new(RayClass::Shadow, shadow, reference));
         if settings.shadow_orders {
-            sets.extend(other_orders(&segments, judge));
+            sets.extend(other_orders(&segments, reference));
         }
-        sets.push(RaySet::new(RayClass::Ao, ao, judge));
-        sets.push(RaySet::new(RayClass::Bounce, bounce, judge));
+        sets.push(RaySet::new(RayClass::Ao, ao, reference));
+        sets.push(RaySet::new(RayClass::Bounce, bounce, reference));
     }
     let inside = |random: &mut Pcg32| {
         let u = Vec3::new(
@@ -207,9 +211,9 @@ pub fn record_rays(
             .unwrap_or(Vec3::X);
         Ray::new(from, direction)
     });
-    sets.push(RaySet::new(RayClass::Chord, chords.collect(), judge));
+    sets.push(RaySet::new(RayClass::Chord, chords.collect(), reference));
     if soup.intersection.bears_hard_rays() {
-        sets.push(RaySet::hard(soup, judge, seed));
+        sets.push(RaySet::hard(soup, reference, seed));
     }
     sets.insert(0, primary);
     sets

@@ -64,14 +64,14 @@ pub fn by_light(segments: &[Segment]) -> Vec<u32> {
 }
 
 /// The three classes derived from [`RayClass::Shadow`].
-pub(super) fn other_orders(segments: &[Segment], judge: &dyn CpuTwin) -> Vec<RaySet> {
+pub(super) fn other_orders(segments: &[Segment], reference: &dyn CpuTwin) -> Vec<RaySet> {
     let as_they_are: Vec<u32> = (0..segments.len() as u32).collect();
     let clustered = by_light(segments);
     let set = |class, order: &[u32], ray: fn(&Segment) -> Ray| {
         let rays = order.iter().map(|place| ray(&segments[*place as usize]));
         RaySet {
             shadow: order.to_vec(),
-            ..RaySet::new(class, rays.collect(), judge)
+            ..RaySet::new(class, rays.collect(), reference)
         }
     };
     vec![

@@ -115,9 +115,9 @@ fn fault(
     if let Err(error) = built.validate(soup) {
         return Some(error.to_string());
     }
-    let judge = stage.judge(Checks::Repeated, [1000, 1_000_000, 64]);
+    let reference = stage.judge(Checks::Repeated, [1000, 1_000_000, 64]);
     let traced = Traced::upload(gpu, &*built).expect("buffers that fit");
-    let verdict = stage.verdict(gpu, &traced, &judge).expect("a verdict");
+    let verdict = stage.verdict(gpu, &traced, &reference).expect("a verdict");
     (!verdict.passed).then(|| format!("{verdict:?}"))
 }
 

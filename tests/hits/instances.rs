@@ -6,7 +6,7 @@ use crate::support::Stage;
 use crate::support::{Pcg, assert_same_hits, build, default_params, differences, scenes, trace};
 use glam::{Mat3, Quat, Vec3};
 use raystone::accel::{
-    AccelKind, Counters, CpuTwin, Hit, InstanceJudge, MetaBvh, NO_HIT, ObjectList, Placed, Ray,
+    AccelKind, Counters, CpuTwin, Hit, InstanceReference, MetaBvh, NO_HIT, ObjectList, Placed, Ray,
     Space, TriangleSoup, brute_force_hits, brute_force_instances,
 };
 use raystone::geometry::Triangle;
@@ -182,7 +182,7 @@ fn twins_and_the_judge_equal_brute_force_on_many_random_scenes() {
         let placed = soup.placed.as_ref().expect("instances");
         let hits = brute_force_instances(placed, &rays);
         struck += hits.iter().filter(|h| h.triangle != NO_HIT).count();
-        let judge = InstanceJudge::new(placed).expect("a judge");
+        let reference = InstanceReference::new(placed).expect("a judge");
         let mut built = Vec::new();
         for kind in KINDS {
             for params in variants(kind) {
@@ -190,7 +190,8 @@ fn twins_and_the_judge_equal_brute_force_on_many_random_scenes() {
                 built.push((what, build(kind, &soup, &params)));
             }
         }
-        let mut twins: Vec<(String, Box<dyn CpuTwin>)> = vec![("judge".into(), Box::new(judge))];
+        let mut twins: Vec<(String, Box<dyn CpuTwin>)> =
+            vec![("judge".into(), Box::new(reference))];
         for (what, built) in &built {
             twins.push((what.clone(), built.cpu_twin(&soup).expect("a twin")));
         }
@@ -326,12 +327,15 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
     }
     let changes = [("count", ParamValue::Integer(16))];
     let stage = Stage::builtin(gpu, "instances", &changes);
-    let judge = stage.judge(Checks::Repeated, [1024, 20_000_000, 256]);
-    let over_instances = judge.instances.as_deref().expect("a judge of instances");
-    for judge in [&judge, over_instances] {
-        assert!(judge.is_sound(), "{:?}", judge.first_wrong);
-        assert!(judge.brute_force.rays >= 2000 && judge.oracle.rays >= 64);
-        let oracle = &judge.oracle;
+    let reference = stage.judge(Checks::Repeated, [1024, 20_000_000, 256]);
+    let over_instances = reference
+        .instances
+        .as_deref()
+        .expect("a reference of instances");
+    for reference in [&reference, over_instances] {
+        assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+        assert!(reference.brute_force.rays >= 2000 && reference.oracle.rays >= 64);
+        let oracle = &reference.oracle;
         let [ambiguous, rays] = [
             oracle.ambiguous - oracle.hard_ambiguous,
             oracle.rays - HARD_RAYS,
@@ -339,12 +343,12 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         assert!(ambiguous * 4 < rays, "{oracle:?}");
     }
     for kind in support::in_turn("structures at the gate of instances", support::structures()) {
-        let verdict = stage.verdict(gpu, &stage.traced(gpu, kind), &judge);
+        let verdict = stage.verdict(gpu, &stage.traced(gpu, kind), &reference);
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
     }
     // The flat reference would call instances wrong bit by bit; as ties, none of it is hidden.
-    let rounded = judge.sets.iter().zip(&over_instances.sets);
+    let rounded = reference.sets.iter().zip(&over_instances.sets);
     let wrong = rounded.map(|(flat, set)| {
         let found: Vec<_> = (set.truth.iter())
             .map(|h| Some(h.triangle != NO_HIT))

@@ -5,7 +5,7 @@ use crate::support::{Stage, brute_force, builtin, from_file, gpu};
 use raystone::accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
 use raystone::gpu::{Elapsed, Gpu, GpuError, Stopwatch};
 use raystone::measure::gate::Checks;
-use raystone::measure::peer_judge::{Differences, differences};
+use raystone::measure::peer_check::{Differences, differences};
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::{Body, PeerRecord, RayClass};
 use raystone::params::ParamValue;
@@ -374,7 +374,7 @@ fn a_run_shows_peers_apart_and_goes_on_without_one() {
     );
     assert!(summary.contains("Time of the processors over that of a peer"));
     let figures = read("figures.csv");
-    assert!(figures.contains("cpu-over-peer/v1") && figures.contains("unlike-judge/v1"));
+    assert!(figures.contains("cpu-over-peer/v1") && figures.contains("unlike-reference/v1"));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::support::*;
 use raystone::accel::{AccelError, AccelKind};
 use raystone::gpu::GpuError;
 use raystone::integrator::Traced;
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::{Checks, ReferenceTracer};
 use std::path::{Path, PathBuf};
 
 /// Models below `../shared/scenes`; a run that is not full uses one of the first ones.
@@ -52,7 +52,7 @@ enum Outcome {
     Wrong(String),
 }
 
-fn outcome(stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Outcome {
+fn outcome(stage: &Stage, kind: &dyn AccelKind, reference: &ReferenceTracer) -> Outcome {
     let built = match stage.build(kind) {
         Ok(built) => built,
         Err(error @ AccelError::Limit { .. }) => return Outcome::TooLarge(error.to_string()),
@@ -66,7 +66,7 @@ fn outcome(stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Outcome {
         Err(error @ GpuError::TooLarge { .. }) => return Outcome::TooLarge(error.to_string()),
         Err(error) => return Outcome::Wrong(error.to_string()),
     };
-    match stage.verdict(gpu(), &traced, judge) {
+    match stage.verdict(gpu(), &traced, reference) {
         Ok(verdict) if verdict.passed => Outcome::Passed,
         Ok(verdict) => Outcome::Wrong(format!("{verdict:?}")),
         Err(error) => Outcome::Wrong(error.to_string()),
@@ -83,12 +83,12 @@ fn every_structure_passes_the_gate_on_real_models() {
         }
         let stage = Stage::new(gpu(), from_file(&path));
         let rays = rays_by_flag().unwrap_or(FEW_RAYS);
-        let judge = stage.judge(Checks::Repeated, [rays, 500_000_000, 512]);
+        let reference = stage.judge(Checks::Repeated, [rays, 500_000_000, 512]);
         assert!(
-            judge.is_sound(),
+            reference.is_sound(),
             "{}: {:?}",
             path.display(),
-            judge.first_wrong
+            reference.first_wrong
         );
         let (mut asked, mut passed) = (0, 0);
         for kind in in_turn("structures on real models", structures()) {
@@ -98,7 +98,7 @@ fn every_structure_passes_the_gate_on_real_models() {
             }
             asked += 1;
             let what = format!("{}: {}", path.display(), kind.name());
-            match outcome(&stage, kind, &judge) {
+            match outcome(&stage, kind, &reference) {
                 Outcome::Passed => passed += 1,
                 Outcome::TooLarge(why) => println!("{what}: too large: {why}"),
                 Outcome::Wrong(why) => faults.push(format!("{what}: {why}")),

@@ -4,7 +4,7 @@ use crate::support;
 use crate::support::Stage;
 use raystone::accel::{BuildLog, BuiltBvh, BvhParameters, CpuTwin, Ray};
 use raystone::config::Gate;
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::{Checks, ReferenceTracer};
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::RayClass;
 use raystone::measure::shadow_rays::{Segment, by_light, unlike_shadow};
@@ -27,13 +27,14 @@ fn many_lights(lamps: i64) -> Stage {
     )
 }
 
-fn judge(stage: &Stage) -> Judge {
+fn judge(stage: &Stage) -> ReferenceTracer {
     let past = Checks::Repeated;
-    Judge::new(&stage.scene, &stage.soup, stage.camera, &SETTINGS, 1, past).expect("a judge")
+    ReferenceTracer::new(&stage.scene, &stage.soup, stage.camera, &SETTINGS, 1, past)
+        .expect("a judge")
 }
 
-fn of(judge: &Judge, class: RayClass) -> &RaySet {
-    let mut sets = judge.sets.iter();
+fn of(reference: &ReferenceTracer, class: RayClass) -> &RaySet {
+    let mut sets = reference.sets.iter();
     sets.find(|set| set.class == class).expect("a class")
 }
 
@@ -51,10 +52,10 @@ const ORDERS: [RayClass; 3] = [
 fn all_orders_hold_the_same_segments_and_those_of_a_light_lie_side_by_side() {
     for lamps in [1, 2, 32] {
         let stage = many_lights(lamps);
-        let judge = judge(&stage);
-        let shadow = of(&judge, RayClass::Shadow);
+        let reference = judge(&stage);
+        let shadow = of(&reference, RayClass::Shadow);
         for class in ORDERS {
-            let set = of(&judge, class);
+            let set = of(&reference, class);
             let mut places = set.shadow.clone();
             places.sort_unstable();
             assert!(places.iter().copied().eq(0..shadow.rays.len() as u32));
@@ -68,10 +69,10 @@ fn all_orders_hold_the_same_segments_and_those_of_a_light_lie_side_by_side() {
                     }
                 }
             }
-            assert!(share(set, &judge.sets) < 2e-3, "{class:?}");
+            assert!(share(set, &reference.sets) < 2e-3, "{class:?}");
         }
         // A ray from a light begins on it: the lamp changes once less than there are lamps.
-        let reversed = of(&judge, RayClass::ShadowReversedClustered);
+        let reversed = of(&reference, RayClass::ShadowReversedClustered);
         let lamp = |ray: &Ray| {
             let on = |t: &raystone::geometry::Triangle| {
                 let [low, high] = [t.vertices.map(|v| v.min_element()), t.vertices.map(|v| v.y)];
@@ -90,7 +91,7 @@ fn all_orders_hold_the_same_segments_and_those_of_a_light_lie_side_by_side() {
         let lamps_met: Vec<u32> = reversed.rays.iter().map(lamp).collect();
         let changes = lamps_met.windows(2).filter(|pair| pair[0] != pair[1]);
         assert_eq!(changes.count() as i64, lamps - 1);
-        assert_eq!(unlike_shadow(shadow, &judge.sets), None);
+        assert_eq!(unlike_shadow(shadow, &reference.sets), None);
     }
 }
 
@@ -109,10 +110,10 @@ fn segments_of_one_light_stay_in_order() {
 #[test]
 fn every_structure_answers_them_as_the_judge_does() {
     let stage = many_lights(8);
-    let judge = judge(&stage);
+    let reference = judge(&stage);
     for kind in support::in_turn("structures and shadow rays", support::structures()) {
         let traced = stage.traced(support::gpu(), kind);
-        let verdict = stage.verdict(support::gpu(), &traced, &judge);
+        let verdict = stage.verdict(support::gpu(), &traced, &reference);
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
         let has = |class| verdict.classes.iter().any(|found| found.class == class);
@@ -123,7 +124,7 @@ fn every_structure_answers_them_as_the_judge_does() {
 /// Fraction of a class that differs from the shadow rays with a fault in its rays or places.
 fn with_fault(class: RayClass, fault: impl Fn(&mut RaySet)) -> f64 {
     let stage = many_lights(8);
-    let judge = judge(&stage);
+    let reference = judge(&stage);
     let tree = BuiltBvh::build(
         &stage.soup,
         &BvhParameters::default(),
@@ -131,9 +132,9 @@ fn with_fault(class: RayClass, fault: impl Fn(&mut RaySet)) -> f64 {
     );
     let tree = tree.expect("a tree");
     let twin: &dyn CpuTwin = &tree.twin(&stage.soup);
-    let mut set = of(&judge, class).clone();
+    let mut set = of(&reference, class).clone();
     fault(&mut set);
-    share(&set.judged_by(twin), &judge.sets)
+    share(&set.judged_by(twin), &reference.sets)
 }
 
 #[test]

@@ -379,10 +379,10 @@ fn real_scenes_are_seen_as_the_judge_sees_them() {
         let scene = scene::load(&variant, &options).unwrap_or_else(|e| panic!("{path}: {e}"));
         let soup = TriangleSoup::new(&scene);
         let mut rays = scenes::aimed_rays(&mut Pcg::new(16), &soup, 3000);
-        let judge = build(kind("bvh"), &soup, &with("bvh", &[]));
-        let first = twin_hits(&*judge, &soup, &rays);
+        let reference = build(kind("bvh"), &soup, &with("bvh", &[]));
+        let first = twin_hits(&*reference, &soup, &rays);
         rays.extend(scenes::cut_at_hits(&rays, &first));
-        let expected = twin_hits(&*judge, &soup, &rays);
+        let expected = twin_hits(&*reference, &soup, &rays);
         let hits = expected.iter().filter(|h| h.triangle != NO_HIT).count();
         assert!(hits > 1000, "{model}: {hits} hits");
         for name in KINDS {

@@ -261,7 +261,7 @@ fn any_hit_answers_are_judged_by_whether_something_blocks() {
 }
 
 /// Checks the answers of `test` over a soup; returns (hits, ambiguous).
-fn judge_soup(test: Test32, triangles: &[Triangle], rays: &[Ray]) -> (usize, usize) {
+fn reference_soup(test: Test32, triangles: &[Triangle], rays: &[Ray]) -> (usize, usize) {
     let answer = |ray: &Ray| (*ray, closest(test, triangles, ray));
     let queries: Vec<_> = rays.iter().map(answer).collect();
     let verdicts = judge_closest_hits(triangles, &queries);
@@ -282,7 +282,7 @@ fn straightforward_f32_tests_are_never_wrong_on_random_rays() {
         let soup = random.soup(count, size);
         let rays: Vec<_> = (0..10_000).map(|_| random.ray()).collect();
         for test in [normal_first, moeller_trumbore, sheared] {
-            let (hits, ambiguous) = judge_soup(test, &soup, &rays);
+            let (hits, ambiguous) = reference_soup(test, &soup, &rays);
             println!("size {size}: {hits} hits, {ambiguous} ambiguous");
             assert!(hits > 100, "{hits}");
             assert!(
@@ -315,7 +315,7 @@ fn rays_aimed_at_edges_needles_and_far_scenes_are_never_wrong() {
         };
         let rays: Vec<_> = (0..10_000).map(aimed).collect();
         for test in [normal_first, moeller_trumbore, sheared] {
-            let (_, ambiguous) = judge_soup(test, &triangles, &rays);
+            let (_, ambiguous) = reference_soup(test, &triangles, &rays);
             // Far from the origin the vertices' own spacing keeps most targets off the edges.
             assert!(ambiguous > 3000 || scale > 1.0, "{ambiguous} near edges");
         }

@@ -394,10 +394,14 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     (
         "accel/brute_force",
         "brute_force_hits",
-        "the judge, in batches",
+        "the reference tracer, in batches",
     ),
     ("accel/bvh4", "child", "one expression of the kernel"),
-    ("accel/brute_force", "mask", "the judge, in batches"),
+    (
+        "accel/brute_force",
+        "mask",
+        "the reference tracer, in batches",
+    ),
     (
         "accel/triangle/watertight",
         "products",

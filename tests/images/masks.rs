@@ -4,7 +4,7 @@
 use crate::support::*;
 use raystone::accel::{AccelRegistry, Intersection, NO_HIT, Ray, TriangleRegistry, TriangleSoup};
 use raystone::gpu::Gpu;
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::{Checks, ReferenceTracer};
 use raystone::measure::record::GateVerdict;
 use raystone::params::{ParamValue, Variant};
 use raystone::scene::SceneData;
@@ -15,7 +15,7 @@ fn few_plants() -> SceneData {
     builtin("foliage", &[("plants", ParamValue::Integer(9))])
 }
 
-fn judge(stage: &Stage) -> Judge {
+fn judge(stage: &Stage) -> ReferenceTracer {
     stage.judge(Checks::Repeated, [2048, 4_000_000, 1024])
 }
 
@@ -95,9 +95,9 @@ fn every_triangle_test_has_the_same_masks() {
 fn the_gate_passes_what_is_right() {
     let gpu = gpu();
     let stage = Stage::new(gpu, few_plants());
-    let judge = judge(&stage);
+    let reference = judge(&stage);
     for name in ["bvh", "cwbvh", "object-list", "meta-bvh"] {
-        let verdict = stage.verdict(gpu, &stage.traced(gpu, structure(name)), &judge);
+        let verdict = stage.verdict(gpu, &stage.traced(gpu, structure(name)), &reference);
         let verdict = verdict.expect("a verdict");
         assert!(verdict.passed, "{name}: {verdict:?}");
         let oracle = &verdict.oracle;
@@ -107,7 +107,7 @@ fn the_gate_passes_what_is_right() {
             "{oracle:?}"
         );
     }
-    let unsound = judge.first_wrong.as_deref();
+    let unsound = reference.first_wrong.as_deref();
     assert_eq!(unsound, None);
 }
 
@@ -188,12 +188,12 @@ const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
 #[test]
 fn planted_faults_turn_the_gate_red() {
     let right = Stage::new(gpu(), few_plants());
-    let judge = judge(&right);
-    assert!(judge.is_sound(), "{:?}", judge.first_wrong);
+    let reference = judge(&right);
+    assert!(reference.is_sound(), "{:?}", reference.first_wrong);
     for (what, module, from, to, name) in in_turn("faults of masks", FAULTS) {
         let gpu = open(kernels_with(module, &[(from, to)]));
         let stage = Stage::new(&gpu, few_plants());
-        let verdict = stage.verdict(&gpu, &stage.traced(&gpu, structure(name)), &judge);
+        let verdict = stage.verdict(&gpu, &stage.traced(&gpu, structure(name)), &reference);
         let verdict = verdict.expect("a verdict");
         assert!(
             !verdict.passed && wrong(&verdict) > 0,

@@ -5,9 +5,9 @@ use crate::world::plain_scene;
 use glam::Vec3;
 use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
 use raystone::geometry::Triangle;
-use raystone::measure::gate::Judge;
+use raystone::measure::gate::ReferenceTracer;
 use raystone::measure::rays::RaySet;
-use raystone::measure::record::{JudgeCheck, RayClass};
+use raystone::measure::record::{RayClass, ReferenceCheck};
 use raystone::random::Pcg32;
 use raystone::scene::SceneData;
 
@@ -35,8 +35,8 @@ pub fn lattice_scene(seed: u64) -> SceneData {
     plain_scene(format!("lattice soup {seed}"), triangles)
 }
 
-/// Brute force as the judge of rays through a lattice scene.
-pub fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
+/// Brute force as the reference tracer of rays through a lattice scene.
+pub fn lattice_reference(soup: &TriangleSoup, seed: u64) -> ReferenceTracer {
     let mut random = Pcg32::with_stream(seed, 1);
     let lattice = (0..).map(|_| lattice_ray(&mut random));
     let mut rays: Vec<Ray> = lattice.filter(Ray::is_ray).take(RAYS).collect();
@@ -44,15 +44,15 @@ pub fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
     let cut = cut_at_hits(&rays, &brute_force_hits(soup, &rays));
     rays.extend(cut);
     let truth = brute_force_hits(soup, &rays);
-    Judge {
+    ReferenceTracer {
         sets: vec![RaySet {
             class: RayClass::Chord,
             rays,
             truth,
             shadow: Vec::new(),
         }],
-        brute_force: JudgeCheck::default(),
-        oracle: JudgeCheck::default(),
+        brute_force: ReferenceCheck::default(),
+        oracle: ReferenceCheck::default(),
         first_wrong: None,
         instances: None,
     }

@@ -1,7 +1,7 @@
 //! What all mutants are put through, made once: scenes with rays and answers, and reference images.
 
 use crate::plan::open;
-use crate::soups::{lattice_judge, lattice_scene};
+use crate::soups::{lattice_reference, lattice_scene};
 use crate::{CheckError, Mutant, Options, Plant, Subject, checks};
 use glam::Vec3;
 use raystone::accel::TriangleSoup;
@@ -9,7 +9,7 @@ use raystone::config::Gate;
 use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::{Checks, ReferenceTracer};
 use raystone::params::ParamValue;
 use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
@@ -37,7 +37,7 @@ const GATE: Gate = Gate {
 /// A scene with rays and answers.
 pub struct Case {
     pub stage: Stage,
-    pub judge: Judge,
+    pub reference: ReferenceTracer,
 }
 
 /// A scene on the host.
@@ -138,8 +138,8 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
 
 fn soup(seed: u64) -> Case {
     let stage = Stage::new(lattice_scene(seed));
-    let judge = lattice_judge(&stage.soup, seed);
-    Case { stage, judge }
+    let reference = lattice_reference(&stage.soup, seed);
+    Case { stage, reference }
 }
 
 fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
@@ -148,7 +148,7 @@ fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
         .map(|&(key, value)| (key, ParamValue::Integer(value)))
         .collect();
     let stage = Stage::builtin(name, &changes)?;
-    let judge = Judge::new(
+    let reference = ReferenceTracer::new(
         &stage.scene,
         &stage.soup,
         stage.camera,
@@ -156,9 +156,11 @@ fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
         1,
         Checks::Repeated,
     )?;
-    if judge.is_sound() {
-        return Ok(Case { stage, judge });
+    if reference.is_sound() {
+        return Ok(Case { stage, reference });
     }
-    let wrong = judge.first_wrong.unwrap_or_default();
-    Err(CheckError::Other(format!("the judge is wrong: {wrong}")))
+    let wrong = reference.first_wrong.unwrap_or_default();
+    Err(CheckError::Other(format!(
+        "the reference tracer is wrong: {wrong}"
+    )))
 }

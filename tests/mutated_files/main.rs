@@ -15,7 +15,7 @@ mod judge;
 mod mutation;
 
 use fuzz_entry::{OBJ_SEPARATOR, Outcome, TARGETS, Target};
-use judge::{Judge, MemoryBound};
+use judge::{MemoryBound, ReferenceTracer};
 use mutation::{Pcg, mutate};
 use std::path::{Path, PathBuf};
 
@@ -82,7 +82,7 @@ fn run(target: &str, read: Target) {
     if seeds.is_empty() {
         return;
     }
-    let judge = Judge::new(bound(target));
+    let judge = ReferenceTracer::new(bound(target));
     let mut faults = Vec::new();
     let mut accepted = 0;
     for (name, bytes) in &seeds {
@@ -134,7 +134,7 @@ fn files_cut_off_at_any_byte_are_refused_with_a_place_or_sound() {
     let mut faults = Vec::new();
     let mut files = 0;
     for (target, read) in TARGETS {
-        let judge = Judge::new(bound(target));
+        let judge = ReferenceTracer::new(bound(target));
         for (name, bytes) in seeds(target).iter().filter(|(_, b)| b.len() <= 4000) {
             for end in 1..bytes.len() {
                 let judged = judge.read(
@@ -157,7 +157,7 @@ fn files_cut_off_at_any_byte_are_refused_with_a_place_or_sound() {
 fn dense_files_stay_within_the_bound_of_memory() {
     let mut faults = Vec::new();
     for (target, read) in TARGETS {
-        let judge = Judge::new(bound(target));
+        let judge = ReferenceTracer::new(bound(target));
         let files = dense::files(target);
         assert!(!files.is_empty(), "{target} has no dense file");
         for (name, bytes) in files {
@@ -267,7 +267,7 @@ fn readers_that_misbehave_are_caught() {
     fn refused(message: &str) -> Outcome {
         Outcome::Refused(message.to_owned())
     }
-    let judge = Judge::new(MemoryBound {
+    let judge = ReferenceTracer::new(MemoryBound {
         per_byte: 64,
         fixed: 1 << 10,
     });

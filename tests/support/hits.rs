@@ -145,7 +145,7 @@ pub fn trace(
     run().unwrap_or_else(|e| panic!("{} {features:?}: {e}", built.buffers().kernel))
 }
 
-/// The judge: every triangle for every ray.
+/// The reference tracer: every triangle for every ray.
 pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
     let closest = |ray: &Ray| {
         let ray = &soup.intersection.raised(ray);

@@ -19,7 +19,7 @@ use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::gate::{Checks, Judge, gate};
+use raystone::measure::gate::{Checks, ReferenceTracer, gate};
 use raystone::measure::record::{GateVerdict, Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::params::{Entry, ParamValue, Params, Variant};
@@ -213,8 +213,12 @@ impl Stage {
         Traced::upload(gpu, &*built).expect("buffers that fit")
     }
 
-    /// The judge of this scene: rays of each class, triangles that brute force tests, rays of the oracle.
-    pub fn judge(&self, checks: Checks, [rays, brute_force_tests, oracle_rays]: [u32; 3]) -> Judge {
+    /// The reference tracer of this scene: rays of each class, triangles that brute force tests, rays of the oracle.
+    pub fn judge(
+        &self,
+        checks: Checks,
+        [rays, brute_force_tests, oracle_rays]: [u32; 3],
+    ) -> ReferenceTracer {
         let settings = Gate {
             rays,
             brute_force_tests: brute_force_tests.into(),
@@ -223,7 +227,8 @@ impl Stage {
             offset: 0.0,
             shadow_orders: false,
         };
-        Judge::new(&self.scene, &self.soup, self.camera, &settings, 1, checks).expect("a judge")
+        ReferenceTracer::new(&self.scene, &self.soup, self.camera, &settings, 1, checks)
+            .expect("a judge")
     }
 
     /// The verdict on what is on the GPU.
@@ -231,11 +236,11 @@ impl Stage {
         &self,
         gpu: &Gpu,
         traced: &Traced,
-        judge: &Judge,
+        reference: &ReferenceTracer,
     ) -> Result<GateVerdict, GpuError> {
         let probe = probe_arithmetic(gpu)?;
         let triangles = &self.buffers.triangles;
-        gate(gpu, triangles, &self.soup, traced, judge, &probe, true)
+        gate(gpu, triangles, &self.soup, traced, reference, &probe, true)
     }
 
     /// A compiled image of `size` pixels. The AO radius is a fraction of the scene's diagonal, as

@@ -31,12 +31,12 @@ pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
 
 /// The same answers, faster: the scalar plain BVH of every object, for one instance after the
 /// other. It uses no world box, so it can check those of the structures.
-pub struct InstanceJudge<'a> {
+pub struct InstanceReference<'a> {
     placed: &'a Placed,
     objects: Vec<(Bounds, BuiltBvh)>,
 }
 
-impl<'a> InstanceJudge<'a> {
+impl<'a> InstanceReference<'a> {
     /// Builds and validates the BVH of each object, all parameters at their defaults.
     ///
     /// # Errors
@@ -55,7 +55,7 @@ impl<'a> InstanceJudge<'a> {
     }
 }
 
-impl CpuTwin for InstanceJudge<'_> {
+impl CpuTwin for InstanceReference<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
         let mut best = Hit::miss(ray);
         for instance in &self.placed.instances {

@@ -22,7 +22,7 @@ mod tests;
 mod top;
 mod world_box;
 
-pub use judge::{InstanceJudge, brute_force_instances};
+pub use judge::{InstanceReference, brute_force_instances};
 pub use meta_bvh::MetaBvh;
 pub use object_list::ObjectList;
 pub use placed::Placed;

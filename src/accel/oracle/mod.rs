@@ -10,13 +10,13 @@
 
 mod brute_force;
 mod exact;
-mod exact_judge;
+mod exact_verdict;
 mod groups;
 mod holes;
 mod triangle;
 
 pub use exact::{ExactCrossing, Side};
-pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
+pub use exact_verdict::{Crossed, ExactTruth, ExactVerdict, exact_truths};
 pub(crate) use groups::GROUP;
 pub use groups::{Groups, Line};
 pub use holes::{Cut, Holes, Surfaces, Weight};

@@ -15,7 +15,7 @@ use raystone_gpu::{ArithmeticProbe, Elapsed, Gpu, GpuError, Stopwatch};
 use raystone_record::fault_text;
 use raystone_record::{Cost, CountersPerRay, FrameRays, FrameRecord};
 use raystone_render::Stage;
-use raystone_verify::gate::{Judge, gate, timed_fault};
+use raystone_verify::gate::{ReferenceTracer, gate, timed_fault};
 use raystone_verify::rays::RaySet;
 use std::cell::RefCell;
 
@@ -28,7 +28,7 @@ pub(crate) struct Frame<'a> {
     /// The scene in this frame.
     pub stage: &'a Stage,
     /// Rays with their true hits.
-    pub judge: &'a Judge,
+    pub reference: &'a ReferenceTracer,
     /// Arithmetic of the adapter.
     pub probe: &'a ArithmeticProbe,
     /// True to keep the driver's runtime checks in kernels.
@@ -130,18 +130,26 @@ impl Frame<'_> {
         let triangles = &self.stage.buffers.triangles;
         let soup = &self.stage.soup;
         let checks = self.runtime_checks;
-        let verdict = gate(gpu, triangles, soup, traced, self.judge, self.probe, checks);
+        let verdict = gate(
+            gpu,
+            triangles,
+            soup,
+            traced,
+            self.reference,
+            self.probe,
+            checks,
+        );
         let verdict = verdict.map_err(|e| e.to_string())?;
-        let judge = self.judge.of(traced.space);
+        let reference = self.reference.of(traced.space);
         if verdict.passed {
-            Ok(judge.sets.iter().map(|set| set.rays.len()).sum())
+            Ok(reference.sets.iter().map(|set| set.rays.len()).sum())
         } else {
-            Err(fault_text(&verdict, judge.first_wrong.as_deref()))
+            Err(fault_text(&verdict, reference.first_wrong.as_deref()))
         }
     }
 
     fn sets<'s>(&'s self, traced: &Traced) -> impl Iterator<Item = &'s RaySet> {
-        let sets = &self.judge.of(traced.space).sets;
+        let sets = &self.reference.of(traced.space).sets;
         sets.iter().filter(|set| set.is_timed())
     }
 

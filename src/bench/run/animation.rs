@@ -11,7 +11,7 @@ use raystone_config::{Animation, Axis, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
 use raystone_record::{AnimationRecord, Body, Key, Line, Ran};
 use raystone_render::Stage;
-use raystone_verify::gate::{Checks, Judge};
+use raystone_verify::gate::{Checks, ReferenceTracer};
 
 /// Structures from frame to frame of a moving scene.
 pub(super) struct Animations;
@@ -150,7 +150,7 @@ fn part<'a>(
     })
 }
 
-/// Takes all that have not failed over to a frame, which gets a stage and a judge of its own.
+/// Takes all that have not failed over to a frame, which gets a stage and a reference tracer of its own.
 fn frame(
     session: &mut Session,
     world: &World,
@@ -163,10 +163,10 @@ fn frame(
     let scene = moved(&world.scene, animation, number)?;
     let tests = world.soup.intersection;
     let stage = Stage::new(world.gpu, scene, tests).map_err(|e| e.to_string())?;
-    let judge = session.clock.time("judge", || {
+    let reference = session.clock.time("judge", || {
         let settings = &experiment.gate;
         let past = Checks::Repeated;
-        Judge::new(
+        ReferenceTracer::new(
             &stage.scene,
             &stage.soup,
             world.camera,
@@ -179,7 +179,7 @@ fn frame(
         number,
         first: &world.soup,
         stage: &stage,
-        judge: &judge.map_err(|e| e.to_string())?,
+        reference: &reference.map_err(|e| e.to_string())?,
         probe: &world.probe,
         runtime_checks: experiment.run.runtime_checks,
         timing: &experiment.timing,

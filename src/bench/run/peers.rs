@@ -11,7 +11,7 @@ use crate::timing::{Measured, Samples, Watch, millions_per_second};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError};
 use raystone_record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
-use raystone_verify::peer_judge::differences;
+use raystone_verify::peer_check::differences;
 use raystone_verify::rays::RaySet;
 
 /// Speed of external tracers.
@@ -111,7 +111,7 @@ pub(super) fn batches<'a>(
 ) -> (Vec<Timed<'a>>, Vec<Option<String>>) {
     let (mut timed, mut refused) = (Vec::new(), vec![None; built.len()]);
     for (place, one) in built.iter().enumerate() {
-        let sets = world.judge.sets.iter().filter(|set| set.is_timed());
+        let sets = world.reference.sets.iter().filter(|set| set.is_timed());
         for (set, peer) in sets.zip(std::iter::repeat(&one.peer)) {
             match peer.as_ref().map(|peer| peer.batch(set.query(), &set.rays)) {
                 Some(Ok(batch)) => timed.push(Timed {

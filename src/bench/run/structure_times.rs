@@ -74,7 +74,7 @@ pub(super) fn time_all(
     let mut timed = Vec::new();
     for (structure, one) in gated.iter().enumerate() {
         let gpu = world.device.of(&one.cell[Axis::Kernels])?;
-        let sets = &world.judge.of(one.traced.space).sets;
+        let sets = &world.reference.of(one.traced.space).sets;
         for set in sets.iter().filter(|set| set.is_timed()) {
             match prepare(gpu, world, one, set) {
                 Ok(batch) => timed.push(Timed {
@@ -183,7 +183,7 @@ fn class_timing(
         class: set.class,
         rays: set.rays.len(),
         hit_fraction: set.hit_fraction(),
-        unlike_shadow: unlike_shadow(set, &world.judge.of(one.traced.space).sets),
+        unlike_shadow: unlike_shadow(set, &world.reference.of(one.traced.space).sets),
         ms,
         wall_ms: samples.wall_ms,
         cpu_ms: match gpu.is_software() {

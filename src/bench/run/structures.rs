@@ -182,8 +182,8 @@ fn gate_with(
             super::trial::fault(session, world, gpu, cell).unwrap_or_else(|e| Some(e.to_string()));
         verdict.passed = verdict.elsewhere.is_none();
     }
-    let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
-    let fault = (!verdict.passed).then(|| fault_text(&verdict, judge_fault));
+    let reference_fault = world.reference.of(traced.space).first_wrong.as_deref();
+    let fault = (!verdict.passed).then(|| fault_text(&verdict, reference_fault));
     candidate.record.body.gate = Some(verdict);
     Ok(match fault {
         Some(fault) => candidate.failed(fault),
@@ -226,7 +226,7 @@ fn gate_twice(
             &world.buffers.triangles,
             &world.soup,
             traced,
-            &world.judge,
+            &world.reference,
             &world.probe,
             checks,
         )

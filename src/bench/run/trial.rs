@@ -9,7 +9,7 @@ use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
 use raystone_render::{Stage, StageError};
 use raystone_scene::{LoadOptions, SceneData, builtin_scenes, load};
-use raystone_verify::gate::{Checks, Judge, gate};
+use raystone_verify::gate::{Checks, ReferenceTracer, gate};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -30,26 +30,26 @@ const EVERY: usize = 8;
 #[derive(Default)]
 pub(super) struct Trial {
     /// By the tests used for checking.
-    scenes: BTreeMap<String, Arc<JudgedScene>>,
+    scenes: BTreeMap<String, Arc<CheckedScene>>,
     outcomes: BTreeMap<String, Option<String>>,
 }
 
-struct JudgedScene {
+struct CheckedScene {
     scene: Arc<SceneData>,
-    judge: Judge,
+    reference: ReferenceTracer,
 }
 
-impl JudgedScene {
+impl CheckedScene {
     fn new(intersection: Intersection) -> Result<Self, String> {
         let entry = builtin_scenes().into_iter().find(|e| e.name == SCENE);
         let variant = entry.ok_or("it is not registered")?.default_variant();
         let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
         let soup = TriangleSoup::new(&scene).intersecting(intersection);
         let camera = scene.view(1.0);
-        let judge =
-            Judge::new(&scene, &soup, camera, &GATE, 1, Checks::Kept).map_err(|e| e.to_string())?;
+        let reference = ReferenceTracer::new(&scene, &soup, camera, &GATE, 1, Checks::Kept)
+            .map_err(|e| e.to_string())?;
         let scene = Arc::new(scene);
-        Ok(Self { scene, judge })
+        Ok(Self { scene, reference })
     }
 }
 
@@ -84,7 +84,7 @@ pub(super) fn fault(
     let judged = match session.checked.trial.scenes.get(&of_tests) {
         Some(judged) => Arc::clone(judged),
         None => {
-            let made = session.clock.time("judge", || JudgedScene::new(tests));
+            let made = session.clock.time("judge", || CheckedScene::new(tests));
             match made {
                 Ok(judged) => Arc::new(judged),
                 Err(reason) => return Ok(Some(format!("{SCENE}: {reason}"))),
@@ -100,7 +100,7 @@ pub(super) fn fault(
     Ok(found)
 }
 
-impl JudgedScene {
+impl CheckedScene {
     fn fault_of(
         &self,
         registries: &super::Registries,
@@ -123,11 +123,11 @@ impl JudgedScene {
         };
         let workgroup = registries.workgroup(cell).map_err(GpuError::Kernel)?;
         let traced = traced.in_workgroups(gpu, &workgroup)?;
-        let thinned = (accel.name == "brute-force").then(|| self.judge.thinned(EVERY));
-        let judge = thinned.as_ref().unwrap_or(&self.judge);
+        let thinned = (accel.name == "brute-force").then(|| self.reference.thinned(EVERY));
+        let reference = thinned.as_ref().unwrap_or(&self.reference);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);
-        let verdict = gate(gpu, triangles, &stage.soup, &traced, judge, probe, true)?;
-        let judge_fault = judge.of(traced.space).first_wrong.as_deref();
-        Ok((!verdict.passed).then(|| fault_text(&verdict, judge_fault)))
+        let verdict = gate(gpu, triangles, &stage.soup, &traced, reference, probe, true)?;
+        let reference_fault = reference.of(traced.space).first_wrong.as_deref();
+        Ok((!verdict.passed).then(|| fault_text(&verdict, reference_fault)))
     }
 }

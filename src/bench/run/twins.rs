@@ -39,7 +39,7 @@ pub(super) fn of_recorded_rays(
     (cell, space): (&Cell, Space),
     settings: &Coherence,
 ) -> Result<ClassCoherence, String> {
-    let sets = &world.judge.of(space).sets;
+    let sets = &world.reference.of(space).sets;
     with_twin(session, world, cell, |session, twin, memory| {
         let timed: Vec<&RaySet> = sets.iter().filter(|set| set.is_timed()).collect();
         let of_set = |set: &&RaySet| of_rays(&set.rays, set.query(), (twin, memory), settings);

@@ -11,7 +11,7 @@ use raystone_gpu::{ArithmeticProbe, Gpu};
 use raystone_record::{Body, Key, Line, Ran, SceneRecord};
 use raystone_render::Stage;
 use raystone_scene::{self as scene, LoadOptions, SceneData};
-use raystone_verify::gate::{Checks, Judge};
+use raystone_verify::gate::{Checks, ReferenceTracer};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -30,7 +30,7 @@ pub(super) struct World<'a> {
     pub cell: Cell,
     pub stage: Stage,
     pub camera: Camera,
-    pub judge: Judge,
+    pub reference: ReferenceTracer,
 }
 
 impl std::ops::Deref for World<'_> {
@@ -119,7 +119,7 @@ impl<'a> World<'a> {
         cell: &Cell,
     ) -> Result<Self, NoWorld> {
         let gpu = &device.gpu;
-        session.say(format!("{cell}: checking the judge"));
+        session.say(format!("{cell}: checking the reference tracer"));
         let tests = session.registries.intersection(cell)?;
         let probe = match session.options.arithmetic {
             Some(known) => known,
@@ -135,9 +135,9 @@ impl<'a> World<'a> {
         let experiment = session.experiment;
         let mut settings = experiment.gate;
         settings.rays = settings.rays.max(experiment.timing.rays);
-        let judge = session.clock.time("judge", || {
+        let reference = session.clock.time("judge", || {
             let seed = u64::from(experiment.run.seed);
-            Judge::new(
+            ReferenceTracer::new(
                 &stage.scene,
                 &stage.soup,
                 loaded.camera,
@@ -153,7 +153,7 @@ impl<'a> World<'a> {
             cell: cell.clone(),
             stage,
             camera: loaded.camera,
-            judge: judge.map_err(|e| e.to_string())?,
+            reference: reference.map_err(|e| e.to_string())?,
         })
     }
 }

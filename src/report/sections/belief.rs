@@ -5,7 +5,7 @@ use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, without_repeats};
 use crate::document::*;
 use crate::format::{self, count, plural};
 use crate::samplers::REFERENCE_SHARE;
-use raystone_record::{GateVerdict, JudgeCheck, PathsRecord, TimeRecord, Verdict, axis};
+use raystone_record::{GateVerdict, PathsRecord, ReferenceCheck, TimeRecord, Verdict, axis};
 use raystone_stats::bias::BiasVerdict;
 
 /// The section.
@@ -42,12 +42,16 @@ pub fn checks(data: &RunData) -> Vec<Check> {
         return checks;
     }
     checks.extend(data.scenes.iter().map(gate));
-    checks.push(judge(data, "The judge against brute force", |gate| {
-        &gate.brute_force
-    }));
-    checks.push(judge(data, "The judge against the f64 oracle", |gate| {
-        &gate.oracle
-    }));
+    checks.push(judge(
+        data,
+        "The reference tracer against brute force",
+        |gate| &gate.brute_force,
+    ));
+    checks.push(judge(
+        data,
+        "The reference tracer against the f64 oracle",
+        |gate| &gate.oracle,
+    ));
     checks.push(images(data));
     checks.extend(paths(data));
     checks.push(bias(data));
@@ -96,11 +100,11 @@ fn gate(scene: &SceneGroup) -> Check {
     check(title, rays > 0, !faulty.is_empty(), detail)
 }
 
-fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> Check {
+fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &ReferenceCheck) -> Check {
     let mut details = Vec::new();
     let (mut all_rays, mut all_wrong) = (0, 0);
     for scene in &data.scenes {
-        // The judge is the same for all structures of a scene: its widest check counts.
+        // The reference tracer is the same for all structures of a scene: its widest check counts.
         let gates = scene.structures.iter().filter_map(|s| s.gate.as_ref());
         let checks = gates.map(pick);
         let worst = checks.max_by_key(|check| (check.wrong, check.rays));

@@ -95,7 +95,7 @@ pub(crate) const PEERS: [TableSpec; 5] = [
         caption: "Speed by the wall clock, Mrays/s: median [95 % interval]", figures: &[&PEER_MRAYS_PER_S], across: BY_RAYS, rows: &[PEER],
     },
     TableSpec {
-        caption: "Rays with another triangle than the judge's, or another answer, per million", figures: &[&UNLIKE_JUDGE],
+        caption: "Rays with another triangle than the reference tracer's, or another answer, per million", figures: &[&UNLIKE_JUDGE],
         across: BY_RAYS, rows: &[PEER],
     },
     TableSpec {

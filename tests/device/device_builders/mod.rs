@@ -220,12 +220,14 @@ fn every_structure_over_a_binary_tree_is_the_same_with_either_twin() {
 #[test]
 fn the_gate_passes_compressed_wide_trees_built_on_the_device() {
     let stage = Stage::builtin(gpu(), "cornell-box", &[]);
-    let judge = stage.judge(Checks::Repeated, [4000, 1_000_000, 64]);
+    let reference = stage.judge(Checks::Repeated, [4000, 1_000_000, 64]);
     for (method, _) in METHODS {
         let built = built(gpu(), &Cwbvh, &stage.soup, &format!("device-{method}"));
         let built = built.unwrap_or_else(|e| panic!("{e}"));
         let traced = Traced::upload(gpu(), &*built).expect("buffers that fit");
-        let verdict = stage.verdict(gpu(), &traced, &judge).expect("a verdict");
+        let verdict = stage
+            .verdict(gpu(), &traced, &reference)
+            .expect("a verdict");
         assert!(verdict.passed, "{method}: {verdict:?}");
     }
 }

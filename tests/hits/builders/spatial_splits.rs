@@ -122,8 +122,8 @@ fn structures_over_clipped_triangles_pass_the_gate() {
         ("teapot-in-a-stadium", &[]),
     ] {
         let stage = Stage::builtin(gpu, scene, changes);
-        let judge = stage.judge(Checks::Repeated, [2_048, 4_000_000, 256]);
-        assert!(judge.is_sound(), "{:?}", judge.first_wrong);
+        let reference = stage.judge(Checks::Repeated, [2_048, 4_000_000, 256]);
+        assert!(reference.is_sound(), "{:?}", reference.first_wrong);
         let names = ["bvh", "roped-bvh", "bvh4", "cwbvh", "meta-bvh"];
         for name in support::in_turn("structures over clipped triangles", names) {
             let kind = support::structure(name);
@@ -138,7 +138,7 @@ fn structures_over_clipped_triangles_pass_the_gate() {
             let built = support::build(kind, &stage.soup, &params);
             let listed = built.stats().references;
             let traced = Traced::upload(gpu, &*built).expect("buffers that fit");
-            let verdict = stage.verdict(gpu, &traced, &judge).expect("a verdict");
+            let verdict = stage.verdict(gpu, &traced, &reference).expect("a verdict");
             let triangles = stage.soup.records.len();
             println!("{scene}, {name}: {listed} references to {triangles} triangles");
             assert!(listed > triangles as u64, "{scene}, {name}");

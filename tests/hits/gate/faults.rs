@@ -5,7 +5,7 @@ use super::{judge, verdict, wrong};
 use crate::support::*;
 use raystone::accel::{NO_HIT, Ray, TriangleSoup, brute_force_hits};
 use raystone::gpu::KERNEL_ERRORS;
-use raystone::measure::gate::Judge;
+use raystone::measure::gate::ReferenceTracer;
 use raystone::measure::record::{GateVerdict, RayClass};
 use raystone::params::ParamValue;
 use raystone::scene::SceneData;
@@ -30,7 +30,7 @@ fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     for class in told {
         let text = class.first_wrong.as_deref().expect("a text");
         let hit = brute_force_hits(soup, &[parse_ray(text)])[0];
-        let expected = format!("| judge {hit}");
+        let expected = format!("| reference {hit}");
         assert!(text.contains(&expected), "{text}: no `{expected}`");
     }
     for class in &verdict.classes {
@@ -38,8 +38,8 @@ fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
     }
 }
 
-fn hits_of(judge: &Judge, triangle: u32) -> usize {
-    let truth = judge.sets.iter().flat_map(|set| &set.truth);
+fn hits_of(reference: &ReferenceTracer, triangle: u32) -> usize {
+    let truth = reference.sets.iter().flat_map(|set| &set.truth);
     truth.filter(|hit| hit.triangle == triangle).count()
 }
 
@@ -49,11 +49,11 @@ fn one_triangle_index_changed_in_a_leaf_is_wrong_on_exactly_the_rays_that_hit_it
         return;
     }
     let stage = cornell();
-    let judge = judge(&stage, RAYS);
-    let expected = hits_of(&judge, 0);
+    let reference = judge(&stage, RAYS);
+    let expected = hits_of(&reference, 0);
     assert!(expected > 0);
     for kind in [&WRONG_INDEX, &WRONG_INDEX_ROPED] {
-        let verdict = verdict(gpu(), &stage, kind, &judge);
+        let verdict = verdict(gpu(), &stage, kind, &reference);
         assert!(!verdict.passed);
         assert_eq!(wrong(&verdict), expected, "{}", kind.name);
         check_replay(&verdict, &stage.soup);
@@ -67,13 +67,13 @@ fn a_kernel_that_drops_the_far_child_is_wrong() {
         &[("if (far_enter < MISSED &&", "if (far_enter < 0.0 &&")],
     ));
     let stage = Stage::builtin(&gpu, "cornell-box", &[]);
-    let judge = judge(&stage, RAYS);
-    let faulty = verdict(&gpu, &stage, structure("bvh"), &judge);
+    let reference = judge(&stage, RAYS);
+    let faulty = verdict(&gpu, &stage, structure("bvh"), &reference);
     assert!(!faulty.passed && wrong(&faulty) > 0, "{faulty:?}");
     assert!(faulty.kernel_errors.is_empty(), "{faulty:?}");
     check_replay(&faulty, &stage.soup);
     // The other structures do not use that kernel.
-    let other = verdict(&gpu, &stage, structure("roped-bvh"), &judge);
+    let other = verdict(&gpu, &stage, structure("roped-bvh"), &reference);
     assert!(other.passed, "{other:?}");
 }
 
@@ -89,8 +89,8 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
     let nearer = "t < (*hit).t || (t == (*hit).t && triangle.v0.w < (*hit).triangle)";
     let scene = || doubled(builtin("cornell-box", &[]));
     let right = Stage::new(gpu(), scene());
-    let judge = judge(&right, RAYS);
-    let hits: usize = judge
+    let reference = judge(&right, RAYS);
+    let hits: usize = reference
         .sets
         .iter()
         .map(|set| {
@@ -101,12 +101,12 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
         })
         .sum();
     assert!(hits > 0);
-    assert!(verdict(gpu(), &right, structure("brute-force"), &judge).passed);
+    assert!(verdict(gpu(), &right, structure("brute-force"), &reference).passed);
 
     // Brute force tests the copies last: the last of equals always wins.
     let last_wins = open(kernels_with("accel/triangle", &[(nearer, "t <= (*hit).t")]));
     let stage = Stage::new(&last_wins, scene());
-    let faulty = verdict(&last_wins, &stage, structure("brute-force"), &judge);
+    let faulty = verdict(&last_wins, &stage, structure("brute-force"), &reference);
     assert!(!faulty.passed);
     assert_eq!(wrong(&faulty), hits);
     check_replay(&faulty, &stage.soup);
@@ -114,13 +114,13 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
     // The first of equals wins: correct only if triangles come in order.
     let first_wins = open(kernels_with("accel/triangle", &[(nearer, "t < (*hit).t")]));
     let stage = Stage::new(&first_wins, scene());
-    let in_order = verdict(&first_wins, &stage, structure("brute-force"), &judge);
+    let in_order = verdict(&first_wins, &stage, structure("brute-force"), &reference);
     // Hard rays that end exactly at a hit lose it.
     for class in &in_order.classes {
         let is_hard = class.class == RayClass::Hard;
         assert_eq!(class.wrong > 0, is_hard, "{in_order:?}");
     }
-    let faulty = verdict(&first_wins, &stage, structure("bvh"), &judge);
+    let faulty = verdict(&first_wins, &stage, structure("bvh"), &reference);
     assert!(!faulty.passed && wrong(&faulty) > 0, "{faulty:?}");
     check_replay(&faulty, &stage.soup);
 }
@@ -137,16 +137,16 @@ fn a_blown_step_fuse_and_a_stack_overflow_are_named() {
     ));
     let sphere = [("triangles", ParamValue::Integer(500))];
     let stage = Stage::builtin(&impatient, "displaced-sphere", &sphere);
-    let judge = judge(&stage, RAYS);
-    let faulty = verdict(&impatient, &stage, structure("roped-bvh"), &judge);
+    let reference = judge(&stage, RAYS);
+    let faulty = verdict(&impatient, &stage, structure("roped-bvh"), &reference);
     assert!(!faulty.passed);
     assert_eq!(faulty.kernel_errors, [fuse]);
 
     let stage = Stage::builtin(gpu(), "displaced-sphere", &sphere);
-    let faulty = verdict(gpu(), &stage, &SHORT_STACK, &judge);
+    let faulty = verdict(gpu(), &stage, &SHORT_STACK, &reference);
     assert!(!faulty.passed && wrong(&faulty) > 0);
     assert_eq!(faulty.kernel_errors, [overflow]);
-    let right = verdict(gpu(), &stage, structure("bvh"), &judge);
+    let right = verdict(gpu(), &stage, structure("bvh"), &reference);
     assert!(right.passed && right.kernel_errors.is_empty());
 }
 
@@ -161,14 +161,14 @@ fn a_structure_does_not_pass_before_a_judge_that_is_itself_wrong() {
     for record in &mut misled.soup.records[..2] {
         record.v0[1] += 50.0;
     }
-    let wrong_judge = judge(&misled, 1024);
-    assert!(!wrong_judge.is_sound() && wrong_judge.oracle.wrong > 0);
-    let text = wrong_judge.first_wrong.as_deref().expect("a ray");
+    let wrong_reference = judge(&misled, 1024);
+    assert!(!wrong_reference.is_sound() && wrong_reference.oracle.wrong > 0);
+    let text = wrong_reference.first_wrong.as_deref().expect("a ray");
     assert!(text.contains("f64:"), "{text}");
     parse_ray(text);
     let buffers = raystone::integrator::SceneBuffers::upload(gpu(), &misled.scene, &misled.soup);
     misled.buffers = buffers.expect("buffers that fit");
-    let agreed = verdict(gpu(), &misled, structure("bvh"), &wrong_judge);
+    let agreed = verdict(gpu(), &misled, structure("bvh"), &wrong_reference);
     assert_eq!(wrong(&agreed), 0, "{agreed:?}");
     assert!(!agreed.passed);
 

@@ -11,16 +11,21 @@ mod timed;
 use crate::support::Stage;
 use raystone::accel::AccelKind;
 use raystone::gpu::Gpu;
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::{Checks, ReferenceTracer};
 use raystone::measure::record::GateVerdict;
 
-fn judge(stage: &Stage, rays: u32) -> Judge {
+fn judge(stage: &Stage, rays: u32) -> ReferenceTracer {
     stage.judge(Checks::Repeated, [rays, 20_000_000, 512])
 }
 
-fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> GateVerdict {
+fn verdict(
+    gpu: &Gpu,
+    stage: &Stage,
+    kind: &dyn AccelKind,
+    reference: &ReferenceTracer,
+) -> GateVerdict {
     let traced = stage.traced(gpu, kind);
-    let verdict = stage.verdict(gpu, &traced, judge);
+    let verdict = stage.verdict(gpu, &traced, reference);
     verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
 }
 

@@ -11,9 +11,9 @@ const MOST_FOR_BRUTE_FORCE: usize = 6000;
 
 fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
     let stage = Stage::builtin(gpu(), scene, changes);
-    let judge = judge(&stage, RAYS);
-    assert!(judge.is_sound(), "{:?}", judge.first_wrong);
-    assert!(judge.brute_force.rays >= 2000 && judge.oracle.rays >= 256);
+    let reference = judge(&stage, RAYS);
+    assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+    assert!(reference.brute_force.rays >= 2000 && reference.oracle.rays >= 256);
     // In any turn, each structure is checked in one scene.
     let kinds = match scene {
         "triangle-soup" => structures(),
@@ -25,7 +25,7 @@ fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
             println!("skipped: brute-force on the {triangles} triangles of {scene}");
             continue;
         }
-        let verdict = verdict(gpu(), &stage, kind, &judge);
+        let verdict = verdict(gpu(), &stage, kind, &reference);
         let what = format!("{scene}, {}: {verdict:?}", kind.name());
         assert!(verdict.passed, "{what}");
         let rays: usize = verdict.classes.iter().map(|class| class.rays).sum();
@@ -34,7 +34,11 @@ fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
         assert!(ties == 0 || !is_exact(gpu()), "{what}");
     }
     // Rays that all miss, or all hit, would prove little.
-    let fractions: Vec<f64> = judge.sets.iter().map(|set| set.hit_fraction()).collect();
+    let fractions: Vec<f64> = reference
+        .sets
+        .iter()
+        .map(|set| set.hit_fraction())
+        .collect();
     let hits = fractions.iter().sum::<f64>() / fractions.len() as f64;
     assert!((0.05..0.98).contains(&hits), "{fractions:?}");
 }

@@ -36,7 +36,7 @@ fn structures_that_fail_the_gate_are_told_and_get_no_figures() {
     let faults = [
         (
             WRONG_INDEX.name(),
-            "rays differ from the judge; first: ray ",
+            "rays differ from the reference tracer; first: ray ",
         ),
         (SHORT_STACK.name(), "a traversal stack overflowed"),
         (NOT_VALID.name(), "node 3: planted fault"),

@@ -6,7 +6,7 @@ use crate::support::*;
 use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::image_gate::{Pixels, answers, judge, out_of_bounds, sums};
+use raystone::measure::image_gate::{Pixels, answers, out_of_bounds, judge, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
 use raystone::measure::trial_scenes::{layers, trial_scenes};
@@ -106,7 +106,7 @@ fn independent() -> Sampler {
 }
 
 /// Checks the trial scenes in a range, split into five tests for their duration.
-fn judge_trials(places: std::ops::Range<usize>) {
+fn check_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
     assert_eq!(scenes.len(), 15);
     for trial in &scenes[places] {
@@ -121,27 +121,27 @@ fn judge_trials(places: std::ops::Range<usize>) {
 
 #[test]
 fn single_paths_of_lamps_points_and_glass_are_those_of_the_oracle() {
-    judge_trials(0..3);
+    check_trials(0..3);
 }
 
 #[test]
 fn single_paths_of_gloss_textures_and_instances_are_those_of_the_oracle() {
-    judge_trials(3..6);
+    check_trials(3..6);
 }
 
 #[test]
 fn single_paths_of_maps_luminaires_and_many_lamps_are_those_of_the_oracle() {
-    judge_trials(6..9);
+    check_trials(6..9);
 }
 
 #[test]
 fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
-    judge_trials(9..12);
+    check_trials(9..12);
 }
 
 #[test]
 fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_oracle() {
-    judge_trials(12..15);
+    check_trials(12..15);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.

@@ -22,12 +22,14 @@ pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) ->
         exact_products: bench.exact,
         denormals: bench.exact,
     };
-    for Case { stage, judge } in cases {
+    for Case { stage, reference } in cases {
         let built = build(name, changes, &stage.soup)?;
         let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
         let triangles = TriangleBuffers::upload(bench.gpu, &stage.soup)?;
         let soup = &stage.soup;
-        let verdict = gate(bench.gpu, &triangles, soup, &traced, judge, &probe, true)?;
+        let verdict = gate(
+            bench.gpu, &triangles, soup, &traced, reference, &probe, true,
+        )?;
         if !verdict.passed {
             let what = evidence(&verdict);
             return Ok(Some(format!("{}: {what}", stage.scene.name)));
@@ -53,14 +55,14 @@ fn evidence(verdict: &GateVerdict) -> String {
 /// scene.
 pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
     let soups = bench.world.soups.iter().take(1);
-    for Case { stage, judge } in soups.chain(bench.world.scenes.iter().skip(2).take(1)) {
+    for Case { stage, reference } in soups.chain(bench.world.scenes.iter().skip(2).take(1)) {
         let built = build(name, changes, &stage.soup)?;
         let Some(twin) = built.cpu_twin(&stage.soup) else {
             continue;
         };
         let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
         let triangles = TriangleBuffers::upload(bench.gpu, &stage.soup)?;
-        let all = judge.sets.iter().flat_map(|set| &set.rays);
+        let all = reference.sets.iter().flat_map(|set| &set.rays);
         let count = all.clone().count();
         let rays: Vec<Ray> = all
             .step_by((count / COUNTED_RAYS).max(1))

@@ -101,7 +101,7 @@ fn a_killed_rerun_leaves_the_earlier_results() {
     let before = std::fs::read(out.join("records.jsonl")).expect("records");
     // Before anything is measured, while records are written, and behind the structures.
     for (place, at, least) in [
-        (Place::Judge, None, 1),
+        (Place::ReferenceTracer, None, 1),
         (Place::Reference, Some(2), 2),
         (Place::Reference, None, 4),
     ] {
@@ -234,7 +234,7 @@ fn long_labels_and_names_that_differ_in_case_have_pictures_of_their_own() {
 #[test]
 fn a_picture_that_cannot_be_written_is_a_warning() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut held = Held::start(folder.path(), &[], Place::Judge);
+    let mut held = Held::start(folder.path(), &[], Place::ReferenceTracer);
     held.wait();
     let images = folder.path().join("partial/images");
     std::fs::remove_dir(&images).expect("an empty folder");

@@ -17,7 +17,7 @@ const PATIENCE: Duration = Duration::from_secs(600);
 #[derive(Clone, Copy)]
 pub enum Place {
     /// Before anything is measured: it asks whether its judge was checked before.
-    Judge,
+    ReferenceTracer,
     /// Behind its structures: it asks for its reference.
     Reference,
 }
@@ -26,7 +26,7 @@ impl Place {
     /// The files of a cache that it reads there.
     fn files(self, cache: &Path) -> Vec<PathBuf> {
         let folder = match self {
-            Self::Judge => cache.join("checks"),
+            Self::ReferenceTracer => cache.join("checks"),
             Self::Reference => cache.join("references"),
         };
         let entries = std::fs::read_dir(&folder).expect("a folder of the cache");
@@ -67,7 +67,7 @@ impl Gate {
         for kind in ["checks", "references"] {
             std::fs::create_dir(cache.path().join(kind)).expect("a folder");
         }
-        for other in [Place::Judge, Place::Reference] {
+        for other in [Place::ReferenceTracer, Place::Reference] {
             for file in other.files(kept()) {
                 let path = cache
                     .path()

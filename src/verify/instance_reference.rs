@@ -3,13 +3,13 @@
 //! bit-identical here too. Flat triangles in world space round differently and are the reference
 //! for flat structures only.
 
-use crate::gate::{Judge, Meeting};
+use crate::gate::{Meeting, ReferenceTracer};
 use crate::holes::SceneHoles;
 use crate::rays::RaySet;
 use glam::DVec3;
 use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
 use raystone_accel::{
-    AccelError, Hit, InstanceJudge, Placed, Ray, TriangleSoup, brute_force_instances,
+    AccelError, Hit, InstanceReference, Placed, Ray, TriangleSoup, brute_force_instances,
 };
 use raystone_config::Gate;
 use raystone_core::geometry::Triangle;
@@ -27,31 +27,37 @@ pub(super) fn new(
     soup: &TriangleSoup,
     sets: &[RaySet],
     seed: u64,
-) -> Result<Option<Judge>, AccelError> {
+) -> Result<Option<ReferenceTracer>, AccelError> {
     let placed = soup.placed.as_ref();
     let Some(placed) = placed.filter(|p| !p.instances.iter().all(Instance::is_identity)) else {
         return Ok(None);
     };
-    let twin = InstanceJudge::new(placed)?;
+    let twin = InstanceReference::new(placed)?;
     // The intervals of hard rays end at this reference's hits.
     let of_class = |set: &RaySet| match set.class {
         RayClass::Hard => RaySet::hard(soup, &twin, seed),
         _ => set.judged_by(&twin),
     };
-    Ok(Some(Judge::of_sets(sets.iter().map(of_class).collect())))
+    Ok(Some(ReferenceTracer::of_sets(
+        sets.iter().map(of_class).collect(),
+    )))
 }
 
 /// Compares this reference with brute force and the oracle.
-pub(super) fn check(judge: &mut Judge, (scene, placed): (&SceneData, &Placed), settings: &Gate) {
+pub(super) fn check(
+    reference: &mut ReferenceTracer,
+    (scene, placed): (&SceneData, &Placed),
+    settings: &Gate,
+) {
     let triangles = scene.triangles.len();
-    judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
+    reference.check_brute_force(settings.brute_force_tests, triangles, |rays| {
         brute_force_instances(placed, rays)
     });
     let at_once = (ORACLE_QUESTIONS / placed.instances.len()).max(64);
-    let mut pairs = judge.subset((settings.oracle_rays as usize).min(at_once));
-    pairs.extend(judge.hard().take(at_once));
+    let mut pairs = reference.subset((settings.oracle_rays as usize).min(at_once));
+    pairs.extend(reference.hard().take(at_once));
     let verdicts = oracle_verdicts((scene, placed), &pairs);
-    judge.note_oracle(&pairs, verdicts);
+    reference.note_oracle(&pairs, verdicts);
 }
 
 /// The oracle's verdict on each answer. Every instance is tested with the ray in its object space:

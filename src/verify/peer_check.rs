@@ -57,7 +57,7 @@ pub fn differences(
             let off = off_by(ray, hit.t, f64::from(truth.t)).min(off_the_plane(soup, ray, hit));
             if !off.is_finite() || off > EXPLAINED {
                 return Err(format!(
-                    "ray {ray} | it {hit} | judge {truth}: the distance is wrong"
+                    "ray {ray} | it {hit} | reference {truth}: the distance is wrong"
                 ));
             }
             found.farthest = found.farthest.max(off);
