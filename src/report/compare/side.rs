@@ -1,5 +1,6 @@
 //! The two sides of a comparison: where their records come from, and what must be known of them before.
 
+use crate::data::without_repeats;
 use raystone_record::Environment;
 use raystone_record::*;
 use std::path::{Path, PathBuf};
@@ -111,15 +112,8 @@ impl Side {
 
     /// Labels of the kernels of its cells, in the order in which they first appear.
     pub fn kernels(&self) -> Vec<String> {
-        let mut labels: Vec<String> = Vec::new();
         let of_cells = self.lines.iter().filter(|line| is_of_kernels(&line.body));
-        for line in of_cells {
-            let label = label(&line.key);
-            if !labels.iter().any(|known| known == label) {
-                labels.push(label.to_owned());
-            }
-        }
-        labels
+        without_repeats(of_cells.map(|line| label(&line.key).to_owned()).collect())
     }
 
     /// The two sides that one run holds: by these labels of kernels, or by the only two that there are.
