@@ -539,12 +539,12 @@ fn place(names: &[String], name: &str) -> usize {
     names.position(|known| known == name).unwrap_or(0)
 }
 
-/// The names, each once, in their order.
-pub fn without_repeats(names: Vec<String>) -> Vec<String> {
-    let mut kept: Vec<String> = Vec::new();
-    for name in names {
-        if !kept.contains(&name) {
-            kept.push(name);
+/// The items, each once, in their order.
+pub fn without_repeats<T: PartialEq>(items: Vec<T>) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
         }
     }
     kept

@@ -1,5 +1,6 @@
 //! The two sides of a comparison: their records and the notes on them.
 
+use crate::data::without_repeats;
 use raystone_record::Environment;
 use raystone_record::*;
 use std::path::{Path, PathBuf};
@@ -112,15 +113,8 @@ impl Side {
 
     /// Returns the labels of the kernels of its cells, in order of first appearance.
     pub fn kernels(&self) -> Vec<String> {
-        let mut labels: Vec<String> = Vec::new();
         let of_cells = self.lines.iter().filter(|line| is_of_kernels(&line.body));
-        for line in of_cells {
-            let label = label(&line.key);
-            if !labels.iter().any(|known| known == label) {
-                labels.push(label.to_owned());
-            }
-        }
-        labels
+        without_repeats(of_cells.map(|line| label(&line.key).to_owned()).collect())
     }
 
     /// Returns the two sides of one run: by these labels of kernels, or by the only two present.

@@ -1,7 +1,7 @@
 //! A table for each figure: rows by the axes in which its keys differ, columns by the last suitable one of these.
 
 use super::{Exported, Source};
-use crate::data::grouped;
+use crate::data::{grouped, without_repeats};
 use crate::document::Table;
 use crate::markdown;
 use crate::pivot::Rows;
@@ -33,12 +33,8 @@ fn table(values: &[Value]) -> Table {
         labels.dedup();
         labels
     };
-    let mut axes: Vec<&str> = Vec::new();
-    for (axis, _) in values.iter().flat_map(|value| value.key.labels()) {
-        if !axes.contains(&axis) {
-            axes.push(axis);
-        }
-    }
+    let all = values.iter().flat_map(|value| value.key.labels());
+    let axes = without_repeats(all.map(|(axis, _)| axis).collect());
     let (shared, varying): (Vec<&str>, Vec<&str>) =
         axes.into_iter().partition(|axis| labels(axis).len() == 1);
     let fits = |axis: &&str| varying.contains(axis) && labels(axis).len() <= MOST_COLUMNS;

@@ -4,6 +4,7 @@ use super::claim::Row;
 use super::judge::{ONCE, ONCE_MS, Verdict};
 use super::table::{Placed, Reproduced};
 use super::{NotCovered, plots};
+use crate::data::without_repeats;
 use crate::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::format;
 use raystone_config::expect::{Expect, Substitute};
@@ -218,15 +219,8 @@ impl<'t> Grid<'t> {
             let rows = table.claims.iter().flatten();
             rows.filter(|row| !row.column.is_empty() && !row.row.is_empty())
         };
-        let (mut columns, mut names) = (Vec::new(), Vec::new());
-        for row in placed() {
-            if !columns.contains(&row.column.as_str()) {
-                columns.push(row.column.as_str());
-            }
-            if !names.contains(&row.row.as_str()) {
-                names.push(row.row.as_str());
-            }
-        }
+        let columns = without_repeats(placed().map(|row| row.column.as_str()).collect());
+        let names = without_repeats(placed().map(|row| row.row.as_str()).collect());
         let cell =
             |name: &str, column: &str| placed().find(|row| row.row == name && row.column == column);
         let rows = names.into_iter().map(|name| {

@@ -13,13 +13,14 @@ use raystone_record::figure::FIGURES;
 /// Returns all plots of a table.
 pub(super) fn of(table: &Reproduced) -> Option<Block> {
     let pairs = || table.thesis.expects.iter().zip(&table.claims);
-    let mut figures: Vec<&str> = Vec::new();
-    for (expect, rows) in pairs() {
-        let drawn = rows.iter().any(|row| row.x.is_some() && row.ours.is_some());
-        if drawn && !is_ratio(expect) && !figures.contains(&expect.figure.as_str()) {
-            figures.push(&expect.figure);
-        }
-    }
+    let is_drawn = |(expect, rows): &(&Expect, &Vec<Row>)| {
+        let mut rows = rows.iter();
+        !is_ratio(expect) && rows.any(|row| row.x.is_some() && row.ours.is_some())
+    };
+    let figures = pairs()
+        .filter(is_drawn)
+        .map(|(expect, _)| expect.figure.as_str());
+    let figures = without_repeats(figures.collect());
     let curves = figures.into_iter().map(|figure| curves(table, figure));
     let bars = pairs().filter(|(expect, _)| expect.figure.contains("mrays") && !is_ratio(expect));
     let bars = bars.map(|(expect, rows)| bars_of(table, expect, rows));

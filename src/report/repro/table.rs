@@ -4,7 +4,7 @@ use super::Source;
 use super::claim::{Context, Row, judge, unused};
 use super::judge::Verdict;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
-use crate::data::RunData;
+use crate::data::{RunData, without_repeats};
 use crate::values::values;
 use raystone_config::expect::{Compare, Substitute, Thesis, same_experiment};
 use raystone_config::{Catalogue, ConfigError, Experiment, Pattern};
@@ -110,13 +110,8 @@ pub fn prepare(
         (false, false) => Vec::new(),
     };
     let mut overrides = changes.clone();
-    let mut there: Vec<String> = Vec::new();
-    for scene in scenes.iter().filter_map(|(_, scene)| scene.as_ref().ok()) {
-        let scene = name_of(scene).to_owned();
-        if !there.contains(&scene) {
-            there.push(scene);
-        }
-    }
+    let there = scenes.iter().filter_map(|(_, scene)| scene.as_ref().ok());
+    let there = without_repeats(there.map(|scene| name_of(scene).to_owned()).collect());
     if !there.is_empty() {
         overrides.insert(0, format!("axes.scene={}", toml::Value::from(there)));
     }

@@ -1,7 +1,7 @@
 //! Measurements that have no section of their own: a table of all their figures.
 
 use super::{compactions, streams, stress};
-use crate::data::{RunData, without_repeats};
+use crate::data::{RunData, grouped, without_repeats};
 use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::values::{Value, of_readings};
@@ -23,12 +23,8 @@ fn table(data: &RunData, name: &str) -> Table {
         .iter()
         .flat_map(|cell| of_readings(data, *cell))
         .collect();
-    let mut figures: Vec<&Figure> = Vec::new();
-    for value in &values {
-        if figures.iter().all(|known| known.id != value.figure.id) {
-            figures.push(&value.figure);
-        }
-    }
+    let figures = grouped(values.iter(), |value| &value.figure.id).into_iter();
+    let figures: Vec<&Figure> = figures.map(|(_, values)| &*values[0].figure).collect();
     let failed = cells.iter().filter(|cell| cell.failure.is_some()).count();
     let mut caption = format!("Measured: {name}");
     if failed > 0 {

@@ -6,7 +6,7 @@ use crate::support::*;
 use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::image_gate::{Pixels, answers, out_of_bounds, judge, sums};
+use raystone::measure::image_gate::{Pixels, answers, judge, out_of_bounds, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
 use raystone::measure::trial_scenes::{layers, trial_scenes};
