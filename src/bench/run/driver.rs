@@ -94,7 +94,8 @@ fn sound(readings: Vec<Reading>) -> Result<Vec<Reading>, String> {
 /// Seconds of one step of a cell, which consist of preparation, warm-up, and each round.
 fn step_s(session: &Session, measurement: &dyn Measurement, cell: &Cell) -> f64 {
     let seconds = measurement.cost(cell, &session.cost).seconds();
-    if measurement.is_timed() {
+    // What is shared is done once it is prepared.
+    if measurement.is_timed() && !measurement.is_shared() {
         seconds / f64::from(session.experiment.timing.rounds + 2)
     } else {
         seconds
