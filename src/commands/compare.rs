@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use raystone::atomic::write_atomic;
 use raystone::compare::confirm::{LEAST_ROUNDS, in_this_process, in_turns, measure_kernels};
-use raystone::compare::judge::{Effects, Verdict};
+use raystone::compare::judge::{ChangeVerdict, Effects};
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides, show};
 use raystone::gpu::AdapterChoice;
@@ -131,8 +131,8 @@ impl Compare {
         }
         self.write(&found)?;
         Ok(match found.verdict() {
-            Verdict::Worse => ExitCode::from(FAILED),
-            Verdict::Undecided => ExitCode::from(UNDECIDED),
+            ChangeVerdict::Worse => ExitCode::from(FAILED),
+            ChangeVerdict::Undecided => ExitCode::from(UNDECIDED),
             _ => ExitCode::SUCCESS,
         })
     }

@@ -9,7 +9,7 @@ use raystone::config::Shard;
 use raystone::gpu::{AdapterChoice, GpuError, is_software};
 use raystone::report::{html, markdown, write_file, write_page};
 use raystone::repro::claim::Row;
-use raystone::repro::judge::Verdict;
+use raystone::repro::judge::ClaimVerdict;
 use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
 use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
 use raystone::run::{Registries, RunError, RunOptions};
@@ -130,7 +130,7 @@ fn end(tables: &[Reproduced], failed: &[(String, String)]) -> ExitCode {
     let mut faults = 0;
     for table in tables {
         for row in table.claims.iter().flatten() {
-            if row.verdict == Verdict::Faulty {
+            if row.verdict == ClaimVerdict::Faulty {
                 tell(&format!(
                     "faulty expectation: {}: {}",
                     table.name, row.reason
@@ -173,7 +173,7 @@ fn in_words(tables: &[Reproduced]) -> String {
         text += &format!("\n{}: {}\n", table.name, table.thesis.title);
         for (index, expect) in table.thesis.expects.iter().enumerate() {
             let verdict = table.verdict(index);
-            if verdict != Verdict::Shown {
+            if verdict != ClaimVerdict::Shown {
                 let claim = page::claim_name(expect);
                 text += &format!("  {:17}  {claim}: {}\n", verdict.word(), expect.says);
             }

@@ -5,7 +5,7 @@ use super::document::{Illustration, Table, TableCell};
 use super::names::Names;
 use super::pivot::Rows;
 use super::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use super::values::{Reading, Value};
+use super::values::{Estimate, Value};
 use raystone_record::figure::Figure;
 use raystone_record::{Interval, Key, axis};
 use std::collections::HashSet;
@@ -196,10 +196,10 @@ impl PlotSpec<'_> {
             let (Some(place), Some(x)) = (place, (self.x)(&value.key)) else {
                 continue;
             };
-            let y = match value.reading {
-                Reading::Known(y) => y,
-                Reading::HeavyTailed(y) => Interval::exact(y.value),
-                Reading::Below(_) | Reading::Word(_) => continue,
+            let y = match value.estimate {
+                Estimate::Known(y) => y,
+                Estimate::HeavyTailed(y) => Interval::exact(y.value),
+                Estimate::Below(_) | Estimate::Word(_) => continue,
             };
             let name = self.curves.text(&data.names, &value.key);
             let label = format!("{name}{}", self.figures[place].1);

@@ -25,7 +25,7 @@ pub struct Value<'a> {
     /// Its row in the table of figures.
     pub figure: Cow<'a, Figure>,
     /// What was found.
-    pub reading: Reading,
+    pub estimate: Estimate,
     /// What it was made of.
     pub source: Source<'a>,
 }
@@ -46,7 +46,7 @@ pub struct Source<'a> {
 
 /// What is known of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reading {
+pub enum Estimate {
     /// The value, with an interval that has no width where none is known.
     Known(Interval),
     /// The value, with an interval that is not to be trusted: one pixel decides over it, see
@@ -58,7 +58,7 @@ pub enum Reading {
     Word(&'static str),
 }
 
-impl Reading {
+impl Estimate {
     /// The value with its interval, and whether that is not to be trusted.
     pub fn of(interval: Interval, heavy_tailed: bool) -> Self {
         match heavy_tailed {
@@ -68,13 +68,13 @@ impl Reading {
     }
 }
 
-impl From<Interval> for Reading {
+impl From<Interval> for Estimate {
     fn from(value: Interval) -> Self {
         Self::Known(value)
     }
 }
 
-impl From<f64> for Reading {
+impl From<f64> for Estimate {
     fn from(value: f64) -> Self {
         Self::Known(Interval::exact(value))
     }
@@ -82,17 +82,17 @@ impl From<f64> for Reading {
 
 impl Value<'static> {
     /// A figure of this crate.
-    pub fn new(key: &Key, figure: &'static Figure, reading: impl Into<Reading>) -> Self {
+    pub fn new(key: &Key, figure: &'static Figure, estimate: impl Into<Estimate>) -> Self {
         Self {
             key: key.clone(),
             figure: Cow::Borrowed(figure),
-            reading: reading.into(),
+            estimate: estimate.into(),
             source: Source::default(),
         }
     }
 
     /// Those figures of a key that are known.
-    pub fn known<T: Into<Reading>>(
+    pub fn known<T: Into<Estimate>>(
         key: &Key,
         figures: impl IntoIterator<Item = (&'static Figure, Option<T>)>,
     ) -> Vec<Self> {
@@ -112,7 +112,7 @@ impl<'a> Value<'a> {
         Self {
             key: key.clone().beside(&reading.at),
             figure: data.figure(&reading.figure),
-            reading: Reading::Known(reading.value),
+            estimate: Estimate::Known(reading.value),
             source: Source {
                 samples: reading.samples,
                 work: reading.work,
@@ -146,40 +146,40 @@ impl<'a> Value<'a> {
 
     /// Whether what is known is a number, with ends that are numbers.
     fn is_a_number(&self) -> bool {
-        match self.reading {
-            Reading::Known(i) | Reading::HeavyTailed(i) => {
+        match self.estimate {
+            Estimate::Known(i) | Estimate::HeavyTailed(i) => {
                 [i.value, i.low, i.high].iter().all(|x| x.is_finite())
             }
-            Reading::Below(bound) => bound.is_finite(),
-            Reading::Word(_) => true,
+            Estimate::Below(bound) => bound.is_finite(),
+            Estimate::Word(_) => true,
         }
     }
 
     /// Whether the reference is too noisy for it.
     pub(crate) fn is_unresolved(&self) -> bool {
-        matches!(self.reading, Reading::Below(_))
+        matches!(self.estimate, Estimate::Below(_))
     }
 
     /// Whether its interval is not to be trusted.
     pub(crate) fn is_heavy_tailed(&self) -> bool {
-        matches!(self.reading, Reading::HeavyTailed(_))
+        matches!(self.estimate, Estimate::HeavyTailed(_))
     }
 
     /// The value as a table shows it.
     pub fn cell(&self) -> TableCell {
         let text = |value| format::figure(&self.figure, value);
-        match self.reading {
-            Reading::Word(word) => word.into(),
-            Reading::Below(bound) => format!("<{}", text(bound)).into(),
-            Reading::HeavyTailed(i) => TableCell::with_detail(
+        match self.estimate {
+            Estimate::Word(word) => word.into(),
+            Estimate::Below(bound) => format!("<{}", text(bound)).into(),
+            Estimate::HeavyTailed(i) => TableCell::with_detail(
                 format!("{} ‡", text(i.value)),
                 format!("[{}, {}], not to be trusted", text(i.low), text(i.high)),
             ),
-            Reading::Known(i) if i.low < i.high => TableCell::with_detail(
+            Estimate::Known(i) if i.low < i.high => TableCell::with_detail(
                 text(i.value),
                 format!("[{}, {}]", text(i.low), text(i.high)),
             ),
-            Reading::Known(i) => text(i.value).into(),
+            Estimate::Known(i) => text(i.value).into(),
         }
     }
 }
@@ -287,15 +287,17 @@ fn of_sampler<'a>(data: &RunData<'a>, sampler: &MeasuredSampler<'a>) -> Vec<Valu
     for metric in [Metric::RelMse, Metric::Rmse] {
         for mean in sampler.mean_errors(metric) {
             let reading = if mean.resolved {
-                Reading::of(mean.error, mean.heavy_tailed)
+                Estimate::of(mean.error, mean.heavy_tailed)
             } else {
-                Reading::Below(mean.error.high.max(0.0))
+                Estimate::Below(mean.error.high.max(0.0))
             };
             let key = key.clone().with(axis::SPP, mean.spp);
             values.push(Value::new(&key, metric.figure(), reading));
         }
         let heavy = metric == Metric::RelMse && sampler.is_heavy_tailed();
-        let slope = sampler.slope(metric).map(|slope| Reading::of(slope, heavy));
+        let slope = sampler
+            .slope(metric)
+            .map(|slope| Estimate::of(slope, heavy));
         values.extend(Value::known(key, [(metric.slope_figure(), slope)]));
     }
     if let Some(spp) = sampler.highest_spp() {
@@ -351,20 +353,20 @@ pub fn csv(values: &[Value]) -> String {
     for Value {
         key,
         figure,
-        reading,
+        estimate,
         ..
     } in values
     {
-        let numbers = match reading {
-            Reading::Known(i) | Reading::HeavyTailed(i) => {
+        let numbers = match estimate {
+            Estimate::Known(i) | Estimate::HeavyTailed(i) => {
                 [i.value, i.low, i.high].map(|x| x.to_string())
             }
-            Reading::Below(bound) => [String::new(), String::new(), bound.to_string()],
-            Reading::Word(_) => Default::default(),
+            Estimate::Below(bound) => [String::new(), String::new(), bound.to_string()],
+            Estimate::Word(_) => Default::default(),
         };
-        let spread = match reading {
-            Reading::Word(word) => (*word).to_owned(),
-            Reading::HeavyTailed(_) => format!(
+        let spread = match estimate {
+            Estimate::Word(word) => (*word).to_owned(),
+            Estimate::HeavyTailed(_) => format!(
                 "{}, not to be trusted: {HEAVY_TAILED}",
                 figure.spread.words()
             ),
@@ -408,8 +410,8 @@ mod tests {
         };
         let values = [
             Value::new(&key, &figure::BUILD_MS, known),
-            Value::new(&other, &figure::RMSE_UNBIASED, Reading::Below(0.5)),
-            Value::new(&other, &figure::BREAK_EVEN, Reading::Word("never")),
+            Value::new(&other, &figure::RMSE_UNBIASED, Estimate::Below(0.5)),
+            Value::new(&other, &figure::BREAK_EVEN, Estimate::Word("never")),
         ];
         assert_eq!(
             csv(&values),

@@ -11,7 +11,7 @@ use raystone_stats::statistics::{mean, median};
 /// The verdict of a comparison on a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum ChangeVerdict {
     /// Worse by more than the effect that counts, or a new failure.
     Worse,
     /// The noise leaves it open, or there is no comparable figure on the other side.
@@ -28,7 +28,7 @@ pub enum Verdict {
     Same,
 }
 
-impl Verdict {
+impl ChangeVerdict {
     /// Returns the verdict as text.
     pub fn word(self) -> &'static str {
         match self {
@@ -88,12 +88,12 @@ pub struct Measured {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// A verdict that needs no statistics, with the reason.
-    Known(Verdict, String),
+    Known(ChangeVerdict, String),
     /// A difference whose verdict needs the p-values of all others first.
     Tested(Measured),
 }
 
-fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
+fn known(verdict: ChangeVerdict, why: impl Into<String>) -> Outcome {
     Outcome::Known(verdict, why.into())
 }
 
@@ -101,8 +101,8 @@ fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
 pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -> Outcome {
     match (a, b) {
         (Evidence::Exact(a), Evidence::Exact(b)) => exact(figure, *a, *b, effects),
-        (Evidence::Once(a), Evidence::Once(b)) if a == b => known(Verdict::Same, ""),
-        (Evidence::Once(_), Evidence::Once(_)) => known(Verdict::Told, "measured once"),
+        (Evidence::Once(a), Evidence::Once(b)) if a == b => known(ChangeVerdict::Same, ""),
+        (Evidence::Once(_), Evidence::Once(_)) => known(ChangeVerdict::Told, "measured once"),
         (
             Evidence::Fact {
                 text: a,
@@ -124,7 +124,7 @@ pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -
             },
         ) => seeds(figure, a, b, r == s, effects),
         _ => known(
-            Verdict::Undecided,
+            ChangeVerdict::Undecided,
             "recorded in two ways, which cannot be compared",
         ),
     }
@@ -140,11 +140,11 @@ fn badness(figure: &Figure) -> f64 {
 }
 
 /// Returns worse, better or changed, for a difference of this sign.
-pub(crate) fn direction(figure: &Figure, change: f64) -> Verdict {
+pub(crate) fn direction(figure: &Figure, change: f64) -> ChangeVerdict {
     match badness(figure) * change {
-        x if x > 0.0 => Verdict::Worse,
-        x if x < 0.0 => Verdict::Better,
-        _ => Verdict::Changed,
+        x if x > 0.0 => ChangeVerdict::Worse,
+        x if x < 0.0 => ChangeVerdict::Better,
+        _ => ChangeVerdict::Changed,
     }
 }
 
@@ -153,17 +153,17 @@ const HITS: &Figure = &figure::HIT_SHARE;
 
 fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if a == b {
-        return known(Verdict::Same, "");
+        return known(ChangeVerdict::Same, "");
     }
     if !a.is_finite() || !b.is_finite() {
-        return known(Verdict::Undecided, "a value is no finite number");
+        return known(ChangeVerdict::Undecided, "a value is no finite number");
     }
     let part = (b - a) / a.abs();
     if part.abs() <= effects.exact {
-        return known(Verdict::Same, "within what --exact allows");
+        return known(ChangeVerdict::Same, "within what --exact allows");
     }
     if figure.id == HITS.id {
-        known(Verdict::Worse, "other rays hit")
+        known(ChangeVerdict::Worse, "other rays hit")
     } else {
         known(direction(figure, b - a), "exact")
     }
@@ -171,10 +171,10 @@ fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
 
 fn facts(a: &str, b: &str, fails: [bool; 2]) -> Outcome {
     match fails {
-        [false, true] => known(Verdict::Worse, b),
-        [true, false] => known(Verdict::Better, format!("before: {a}")),
-        _ if a == b => known(Verdict::Same, ""),
-        _ => known(Verdict::Changed, ""),
+        [false, true] => known(ChangeVerdict::Worse, b),
+        [true, false] => known(ChangeVerdict::Better, format!("before: {a}")),
+        _ if a == b => known(ChangeVerdict::Same, ""),
+        _ => known(ChangeVerdict::Changed, ""),
     }
 }
 
@@ -195,7 +195,7 @@ fn seeds(
     effects: &Effects,
 ) -> Outcome {
     if a == b {
-        return known(Verdict::Same, "equal for every seed");
+        return known(ChangeVerdict::Same, "equal for every seed");
     }
     let (margin, relative) = margin_of(figure, effects);
     let values = |of: &[(u32, f64)]| of.iter().map(|(_, x)| *x).collect::<Vec<f64>>();
@@ -203,12 +203,12 @@ fn seeds(
     let unit = match (relative, mean(&old)) {
         (false, _) => 1.0,
         (true, Some(mean)) if mean != 0.0 => mean.abs(),
-        _ => return known(Verdict::Undecided, "the base is 0 or no number"),
+        _ => return known(ChangeVerdict::Undecided, "the base is 0 or no number"),
     };
     let paired = a.iter().map(|(s, _)| s).eq(b.iter().map(|(s, _)| s));
     match (old.len().min(new.len()), paired && same_reference) {
         (0 | 1, _) => known(
-            Verdict::Undecided,
+            ChangeVerdict::Undecided,
             "one image, of whose spread nothing is known",
         ),
         (_, true) => {
@@ -221,7 +221,7 @@ fn seeds(
 
 fn pairs(gaps: &[f64], margin: f64) -> Outcome {
     let Some(test) = SignedRank::new(gaps) else {
-        return known(Verdict::Undecided, "a value is no finite number");
+        return known(ChangeVerdict::Undecided, "a value is no finite number");
     };
     let [low, high] = test.interval(LEVEL);
     Outcome::Tested(Measured {
@@ -239,7 +239,7 @@ fn pairs(gaps: &[f64], margin: f64) -> Outcome {
 fn two_samples(old: &[f64], new: &[f64], unit: f64, margin: f64, same_reference: bool) -> Outcome {
     if !same_reference {
         return known(
-            Verdict::Undecided,
+            ChangeVerdict::Undecided,
             "the references differ, and what is measured against them shares their noise",
         );
     }
@@ -248,7 +248,7 @@ fn two_samples(old: &[f64], new: &[f64], unit: f64, margin: f64, same_reference:
         mean(&scaled).zip(Spread::of_mean(&scaled))
     };
     let Some(((old, a), (new, b))) = side(old).zip(side(new)) else {
-        return known(Verdict::Undecided, "a value is no finite number");
+        return known(ChangeVerdict::Undecided, "a value is no finite number");
     };
     let spread = Spread::of_difference(a, b);
     Outcome::Tested(student(
@@ -267,7 +267,7 @@ fn summaries(
     effects: &Effects,
 ) -> Outcome {
     if a.0 == b.0 {
-        return known(Verdict::Same, "");
+        return known(ChangeVerdict::Same, "");
     }
     let (margin, relative) = margin_of(figure, effects);
     let unit = if relative { a.0.value.abs() } else { 1.0 };
@@ -276,7 +276,7 @@ fn summaries(
     };
     let together = Spread::of_difference(spread(a), spread(b));
     if unit == 0.0 || !together.variance.is_finite() || together.variance == 0.0 {
-        return known(Verdict::Undecided, "nothing is known of its spread");
+        return known(ChangeVerdict::Undecided, "nothing is known of its spread");
     }
     let gap = (b.0.value - a.0.value) / unit;
     Outcome::Tested(student(gap, together, margin, "two intervals"))

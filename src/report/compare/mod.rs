@@ -13,7 +13,7 @@ pub mod side;
 pub mod taken;
 mod work;
 
-use judge::{Effects, Measured, TimeRatio, Verdict};
+use judge::{ChangeVerdict, Effects, Measured, TimeRatio};
 use raystone_record::Key;
 use raystone_record::figure::Figure;
 use raystone_stats::comparison::LEVEL;
@@ -57,7 +57,7 @@ pub struct Finding {
     /// The fraction by which an exact figure changed.
     pub exact_change: Option<f64>,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: ChangeVerdict,
     /// The reason in words; empty if it is obvious.
     pub why: String,
     /// `true` for a time.
@@ -85,7 +85,7 @@ pub struct Comparison {
 
 impl Comparison {
     /// Returns the number of findings with this verdict.
-    pub fn count(&self, verdict: Verdict) -> usize {
+    pub fn count(&self, verdict: ChangeVerdict) -> usize {
         self.findings
             .iter()
             .filter(|f| f.verdict == verdict)
@@ -94,7 +94,8 @@ impl Comparison {
 
     /// Returns times of two runs that look worse and are not known to be the same.
     pub fn suspects(&self) -> impl Iterator<Item = &Finding> {
-        let open = |f: &&Finding| matches!(f.verdict, Verdict::Worse | Verdict::Undecided);
+        let open =
+            |f: &&Finding| matches!(f.verdict, ChangeVerdict::Worse | ChangeVerdict::Undecided);
         self.findings.iter().filter(|f| f.looks_worse).filter(open)
     }
 
@@ -103,7 +104,7 @@ impl Comparison {
         for finding in self
             .findings
             .iter_mut()
-            .filter(|f| f.looks_worse && f.verdict == Verdict::Worse)
+            .filter(|f| f.looks_worse && f.verdict == ChangeVerdict::Worse)
         {
             finding.why += "; not confirmed";
         }
@@ -114,10 +115,14 @@ impl Comparison {
     }
 
     /// Returns the verdict of all findings together: worse, undecided, better or same.
-    pub fn verdict(&self) -> Verdict {
-        let decisive = [Verdict::Worse, Verdict::Undecided, Verdict::Better];
+    pub fn verdict(&self) -> ChangeVerdict {
+        let decisive = [
+            ChangeVerdict::Worse,
+            ChangeVerdict::Undecided,
+            ChangeVerdict::Better,
+        ];
         let found = decisive.into_iter().find(|v| self.count(*v) > 0);
-        found.unwrap_or(Verdict::Same)
+        found.unwrap_or(ChangeVerdict::Same)
     }
 }
 

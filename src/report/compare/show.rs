@@ -1,6 +1,6 @@
 //! A comparison as text: for a terminal, as Markdown for a pull request, as JSON.
 
-use super::judge::Verdict;
+use super::judge::ChangeVerdict;
 use super::{Comparison, Finding};
 use crate::document::{Table, TableCell, Tone};
 use crate::format;
@@ -25,23 +25,25 @@ const RESERVE: usize = 1_000;
 const MOST_CHARACTERS: usize = 40;
 
 /// Verdicts listed first, in this order.
-const NOTABLE: [Verdict; 5] = [
-    Verdict::Worse,
-    Verdict::Undecided,
-    Verdict::Changed,
-    Verdict::Better,
-    Verdict::New,
+const NOTABLE: [ChangeVerdict; 5] = [
+    ChangeVerdict::Worse,
+    ChangeVerdict::Undecided,
+    ChangeVerdict::Changed,
+    ChangeVerdict::Better,
+    ChangeVerdict::New,
 ];
 
 /// Returns the overall verdict as one sentence.
 pub fn verdict_line(comparison: &Comparison) -> String {
     let word = match comparison.verdict() {
-        Verdict::Worse => "WORSE",
-        Verdict::Undecided => "UNDECIDED",
-        Verdict::Better => "BETTER",
+        ChangeVerdict::Worse => "WORSE",
+        ChangeVerdict::Undecided => "UNDECIDED",
+        ChangeVerdict::Better => "BETTER",
         _ => "SAME",
     };
-    let verdicts = NOTABLE.into_iter().chain([Verdict::Same, Verdict::Told]);
+    let verdicts = NOTABLE
+        .into_iter()
+        .chain([ChangeVerdict::Same, ChangeVerdict::Told]);
     let counts = verdicts.map(|verdict| (verdict, comparison.count(verdict)));
     let counts = counts.filter(|(_, n)| *n > 0);
     let counts = counts.map(|(v, n)| format!("{} {}", format::count(n as u64), v.word()));
@@ -117,19 +119,22 @@ fn values(finding: &Finding) -> String {
 }
 
 /// Returns the findings of a verdict, and the numbers of those left out because they are undecided for the same reason.
-fn listed(comparison: &Comparison, verdict: Verdict) -> (Vec<&Finding>, Vec<(String, usize)>) {
+fn listed(
+    comparison: &Comparison,
+    verdict: ChangeVerdict,
+) -> (Vec<&Finding>, Vec<(String, usize)>) {
     let mut seen = std::collections::BTreeMap::<&str, usize>::new();
     let mut kept = Vec::new();
     for finding in comparison.findings.iter().filter(|f| f.verdict == verdict) {
         let alike = seen.entry(&finding.why).or_default();
         *alike += 1;
-        if verdict == Verdict::Worse || finding.measured.is_some() || *alike <= MOST_ALIKE {
+        if verdict == ChangeVerdict::Worse || finding.measured.is_some() || *alike <= MOST_ALIKE {
             kept.push(finding);
         }
     }
     let is_shown = |why: &str| {
         let mut measured = kept.iter().filter(|f| f.measured.is_some());
-        verdict == Verdict::Worse || measured.any(|f| f.why == why)
+        verdict == ChangeVerdict::Worse || measured.any(|f| f.why == why)
     };
     let more = seen
         .into_iter()
@@ -197,11 +202,11 @@ fn changes(comparison: &Comparison) -> (Table, Vec<&str>, Vec<String>) {
     (table, reasons, more)
 }
 
-fn tone(verdict: Verdict) -> Tone {
+fn tone(verdict: ChangeVerdict) -> Tone {
     match verdict {
-        Verdict::Worse => Tone::Bad,
-        Verdict::Better => Tone::Good,
-        Verdict::Undecided => Tone::Note,
+        ChangeVerdict::Worse => Tone::Bad,
+        ChangeVerdict::Better => Tone::Good,
+        ChangeVerdict::Undecided => Tone::Note,
         _ => Tone::Plain,
     }
 }
@@ -228,8 +233,8 @@ fn shortened(text: &str) -> String {
 /// at the end are cut, those that are the same first, and then notes; the text counts what was cut.
 pub fn markdown(comparison: &Comparison) -> String {
     let sign = match comparison.verdict() {
-        Verdict::Worse => "❌",
-        Verdict::Undecided => "❔",
+        ChangeVerdict::Worse => "❌",
+        ChangeVerdict::Undecided => "❔",
         _ => "✅",
     };
     let mut comment = Comment {
@@ -239,25 +244,29 @@ pub fn markdown(comparison: &Comparison) -> String {
     };
     let end = format!("\n{}\n", of_tests(comparison));
     comment.left -= comment.text.len() + end.len();
-    let decided = [Verdict::Worse, Verdict::Better, Verdict::Changed];
+    let decided = [
+        ChangeVerdict::Worse,
+        ChangeVerdict::Better,
+        ChangeVerdict::Changed,
+    ];
     let decisive = |f: &&Finding| decided.contains(&f.verdict);
     let mut first: Vec<&Finding> = comparison.findings.iter().filter(decisive).collect();
     // Worse findings come before the others, in the order of the findings.
-    first.sort_by_key(|f| f.verdict != Verdict::Worse);
+    first.sort_by_key(|f| f.verdict != ChangeVerdict::Worse);
     let table = comment.rows(&first[..first.len().min(MOST_ROWS)]);
     comment.notes(&comparison.notes);
     let kept = comment.table(table);
     if first.len() > kept {
         comment.text += &format!("\n… and {} more below.\n", first.len() - kept);
     }
-    let others = |f: &&Finding| f.verdict != Verdict::Same && !decisive(f);
+    let others = |f: &&Finding| f.verdict != ChangeVerdict::Same && !decisive(f);
     let all = comparison.findings.iter();
     let rest = first
         .into_iter()
         .skip(kept)
         .chain(all.clone().filter(others));
     comment.folded("Open, new and told", &rest.collect::<Vec<_>>());
-    let same = all.filter(|f| f.verdict == Verdict::Same && f.measured.is_some());
+    let same = all.filter(|f| f.verdict == ChangeVerdict::Same && f.measured.is_some());
     let title = "Known to be the same within the effect that counts, and controls";
     comment.folded(title, &same.collect::<Vec<_>>());
     comment.text + &end

@@ -6,7 +6,7 @@ use super::side::Side;
 use crate::data::{RunData, View};
 use crate::failed_checks;
 use crate::samplers::{FURTHER_METRICS, MeasuredSampler, Metric};
-use crate::values::{Reading, Value, values};
+use crate::values::{Estimate, Value, values};
 use raystone_record::figure::{self, Better, Figure, Spread};
 use raystone_record::*;
 use raystone_stats::statistics::{log_log_fit, mean};
@@ -251,14 +251,14 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
 type Seeds = BTreeMap<Identity, (Evidence, String)>;
 
 fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
-    let number = match value.reading {
-        Reading::Known(interval) | Reading::HeavyTailed(interval) => interval,
-        Reading::Below(bound) => Interval {
+    let number = match value.estimate {
+        Estimate::Known(interval) | Estimate::HeavyTailed(interval) => interval,
+        Estimate::Below(bound) => Interval {
             value: bound,
             low: 0.0,
             high: bound,
         },
-        Reading::Word(_) => return None,
+        Estimate::Word(_) => return None,
     };
     let mut own = Taken {
         key: value.key.clone(),

@@ -2,7 +2,7 @@
 
 use super::drift::{Drift, Place};
 use super::facts::IMAGE;
-use super::judge::{IN_TURNS, Measured, Outcome, TimeRatio, Verdict, compare, direction};
+use super::judge::{ChangeVerdict, IN_TURNS, Measured, Outcome, TimeRatio, compare, direction};
 use super::side::{self, Side};
 use super::taken::{Evidence, Taken, contradictions, taken};
 use super::{Confirmed, Finding, Identity, Options};
@@ -95,8 +95,8 @@ impl<'a> Work<'a> {
         let ended = all_of::<FinishedRecord>(&base.lines).next().is_some();
         let rest = rest.map(|new| {
             let mut open = self.alone(&new, 1);
-            if open.finding.verdict == Verdict::New && !ended {
-                open.finding.verdict = Verdict::Undecided;
+            if open.finding.verdict == ChangeVerdict::New && !ended {
+                open.finding.verdict = ChangeVerdict::Undecided;
                 open.finding.why = "the base did not reach its end, and lacks it".into();
             }
             open
@@ -112,15 +112,18 @@ impl<'a> Work<'a> {
         let is_copy = is_time && self.refused.is_none() && old.evidence == new.evidence;
         let outcome = if self.contradicted.contains(&identity) {
             Outcome::Known(
-                Verdict::Undecided,
+                ChangeVerdict::Undecided,
                 "the records contradict themselves: two lines on it differ".into(),
             )
         } else if let Some(why) = other_work(old, new).or_else(|| other_seeds(old, new)) {
-            Outcome::Known(Verdict::Undecided, why)
+            Outcome::Known(ChangeVerdict::Undecided, why)
         } else if is_copy {
-            Outcome::Known(Verdict::Same, "the same measurement".into())
+            Outcome::Known(ChangeVerdict::Same, "the same measurement".into())
         } else if is_time {
-            Outcome::Known(Verdict::Undecided, "its times cannot be compared".into())
+            Outcome::Known(
+                ChangeVerdict::Undecided,
+                "its times cannot be compared".into(),
+            )
         } else if old.figure.id == IMAGE && old.evidence != new.evidence {
             self.image()
         } else {
@@ -142,9 +145,11 @@ impl<'a> Work<'a> {
         );
         let (verdict, why, measured) = match outcome {
             Outcome::Known(verdict, why) => (verdict, why, None),
-            Outcome::Tested(measured) => {
-                (Verdict::Undecided, measured.how.to_owned(), Some(measured))
-            }
+            Outcome::Tested(measured) => (
+                ChangeVerdict::Undecided,
+                measured.how.to_owned(),
+                Some(measured),
+            ),
         };
         Open {
             finding: Finding {
@@ -167,9 +172,12 @@ impl<'a> Work<'a> {
     /// Returns the finding on a figure of one side alone. A test that failed with other seeds says nothing about the change.
     fn alone(&self, taken: &Taken, side: usize) -> Open {
         let mut open = alone(taken, side);
-        let decided = matches!(open.finding.verdict, Verdict::Worse | Verdict::Better);
+        let decided = matches!(
+            open.finding.verdict,
+            ChangeVerdict::Worse | ChangeVerdict::Better
+        );
         if decided && taken.seed.is_some() && self.other_seeds {
-            open.finding.verdict = Verdict::Undecided;
+            open.finding.verdict = ChangeVerdict::Undecided;
             open.finding.why += ", with other seeds (run.seed)";
         }
         open
@@ -177,13 +185,13 @@ impl<'a> Work<'a> {
 
     fn image(&self) -> Outcome {
         match (self.options.effects.images, self.same_place) {
-            (true, _) => Outcome::Known(Verdict::Changed, "other images are meant".into()),
+            (true, _) => Outcome::Known(ChangeVerdict::Changed, "other images are meant".into()),
             (_, false) => Outcome::Known(
-                Verdict::Changed,
+                ChangeVerdict::Changed,
                 "another device may round otherwise".into(),
             ),
             _ => Outcome::Known(
-                Verdict::Worse,
+                ChangeVerdict::Worse,
                 "another image from the same seeds: if that is meant, say --new-images".into(),
             ),
         }
@@ -192,7 +200,9 @@ impl<'a> Work<'a> {
     /// Adds notes on effects in times of changed kernels that rounds and controls do not show.
     pub(super) fn warn_of_compilations(&mut self) {
         let is_alarm = |f: &Finding| {
-            f.is_time && !f.is_control && matches!(f.verdict, Verdict::Worse | Verdict::Better)
+            f.is_time
+                && !f.is_control
+                && matches!(f.verdict, ChangeVerdict::Worse | ChangeVerdict::Better)
         };
         if !self.in_rounds || !self.findings.iter().any(|open| is_alarm(&open.finding)) {
             return;
@@ -234,7 +244,7 @@ impl<'a> Work<'a> {
             let own = finding.is_control.then_some(ratio.log);
             let spread = drift.of(&place(finding, ratio.clock), ratio.rounds.variance, own);
             let measured = ratio.measured(&finding.figure, spread, margin);
-            let grew = direction(&finding.figure, measured.change.value) == Verdict::Worse;
+            let grew = direction(&finding.figure, measured.change.value) == ChangeVerdict::Worse;
             finding.looks_worse =
                 grew && measured.change.value.abs() > margin && !in_rounds && again.is_none();
             if spread.is_none() && !in_rounds && again.is_none() {
@@ -275,7 +285,7 @@ impl<'a> Work<'a> {
         let of = |f: &Finding| [axis::SCENE, axis::ACCEL].map(|axis| f.key.label(axis).to_owned());
         let differs = |f: &&Open| {
             let exact = !f.finding.is_time && f.finding.figure.spread == Spread::Exact;
-            exact && !matches!(f.finding.verdict, Verdict::Same | Verdict::New)
+            exact && !matches!(f.finding.verdict, ChangeVerdict::Same | ChangeVerdict::New)
         };
         let touched: BTreeSet<[String; 2]> = self
             .findings
@@ -309,7 +319,7 @@ impl<'a> Work<'a> {
         }
         if !self.options.judge_times {
             for open in self.findings.iter_mut().filter(|open| open.finding.is_time) {
-                open.finding.verdict = Verdict::Told;
+                open.finding.verdict = ChangeVerdict::Told;
             }
         }
         tests
@@ -324,10 +334,10 @@ fn decide(finding: &mut Finding, rejected: bool) {
     let counts = rejected && change.value.abs() >= margin;
     finding.verdict = match (finding.is_control, counts) {
         (false, true) => direction(&finding.figure, change.value),
-        (false, false) if within => Verdict::Same,
-        (false, false) => Verdict::Undecided,
-        (true, false) => Verdict::Same,
-        (true, true) => Verdict::Undecided,
+        (false, false) if within => ChangeVerdict::Same,
+        (false, false) => ChangeVerdict::Undecided,
+        (true, false) => ChangeVerdict::Same,
+        (true, true) => ChangeVerdict::Undecided,
     };
     if finding.is_control {
         finding.why = if counts {
@@ -373,10 +383,13 @@ fn place(finding: &Finding, clock: &'static str) -> Place {
 fn alone(taken: &Taken, side: usize) -> Open {
     let fails = matches!(taken.evidence, Evidence::Fact { fails: true, .. });
     let (verdict, why) = match (side, fails) {
-        (0, true) => (Verdict::Better, "it failed before".to_owned()),
-        (0, false) => (Verdict::Undecided, "missing in the candidate".to_owned()),
-        (_, true) => (Verdict::Worse, "a new failure".to_owned()),
-        _ => (Verdict::New, String::new()),
+        (0, true) => (ChangeVerdict::Better, "it failed before".to_owned()),
+        (0, false) => (
+            ChangeVerdict::Undecided,
+            "missing in the candidate".to_owned(),
+        ),
+        (_, true) => (ChangeVerdict::Worse, "a new failure".to_owned()),
+        _ => (ChangeVerdict::New, String::new()),
     };
     let mut shown = [None, None];
     shown[side] = Some(taken.shown.clone());

@@ -3,7 +3,7 @@
 use super::{Exported, Source, pretty};
 use crate::document::Check;
 use crate::samplers::HEAVY_TAILED;
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use serde_json::{Map, Value as Json, json};
 
 /// Version of the output of `--json`, incremented with any change of a field's meaning.
@@ -34,14 +34,14 @@ fn value_json(value: &Value) -> Json {
         "better": figure.better,
         "interval": figure.spread,
     });
-    let known = match value.reading {
-        Reading::Known(i) => vec![("value", i.value), ("low", i.low), ("high", i.high)],
-        Reading::HeavyTailed(i) => {
+    let known = match value.estimate {
+        Estimate::Known(i) => vec![("value", i.value), ("low", i.low), ("high", i.high)],
+        Estimate::HeavyTailed(i) => {
             object["doubt"] = json!(format!("its interval is not to be trusted: {HEAVY_TAILED}"));
             vec![("value", i.value), ("low", i.low), ("high", i.high)]
         }
-        Reading::Below(bound) => vec![("below", bound)],
-        Reading::Word(word) => {
+        Estimate::Below(bound) => vec![("below", bound)],
+        Estimate::Word(word) => {
             object["word"] = json!(word);
             Vec::new()
         }

@@ -19,7 +19,7 @@ pub(crate) use npy::linear as linear_file;
 pub use schema::record_schema;
 
 use crate::data::RunData;
-use crate::values::{self, Reading, Value};
+use crate::values::{self, Estimate, Value};
 use raystone_config::ConfigError;
 use raystone_image::ImageError;
 use raystone_record::figure::Better;
@@ -207,9 +207,9 @@ fn numbers<'v, 'a>(
 ) -> (Vec<Number<'v, 'a>>, Vec<String>) {
     let (mut numbers, mut below, mut words, mut other_way) = (Vec::new(), 0, 0, 0);
     for value in values {
-        match value.reading {
+        match value.estimate {
             _ if !directions.contains(&value.figure.better) => other_way += 1,
-            Reading::Known(i) if i.value.is_finite() => {
+            Estimate::Known(i) if i.value.is_finite() => {
                 let bounds = [i.low, i.high];
                 let has_width = i.low < i.high && bounds.iter().all(|end| end.is_finite());
                 numbers.push(Number {
@@ -219,13 +219,13 @@ fn numbers<'v, 'a>(
                 });
             }
             // A point estimate alone, since its bounds are unreliable.
-            Reading::HeavyTailed(i) if i.value.is_finite() => numbers.push(Number {
+            Estimate::HeavyTailed(i) if i.value.is_finite() => numbers.push(Number {
                 value,
                 at: i.value,
                 bounds: None,
             }),
-            Reading::Below(_) => below += 1,
-            Reading::Known(_) | Reading::HeavyTailed(_) | Reading::Word(_) => words += 1,
+            Estimate::Below(_) => below += 1,
+            Estimate::Known(_) | Estimate::HeavyTailed(_) | Estimate::Word(_) => words += 1,
         }
     }
     let told = [

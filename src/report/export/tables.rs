@@ -5,7 +5,7 @@ use crate::data::{grouped, without_repeats};
 use crate::document::Table;
 use crate::markdown;
 use crate::pivot::Rows;
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use raystone_record::{Key, axis};
 
 /// Axes suitable as columns, the best first.
@@ -47,7 +47,7 @@ fn table(values: &[Value]) -> Table {
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let figure = &values[0].figure;
     let known = values.iter().any(
-        |v| matches!(v.reading, Reading::Known(i) | Reading::HeavyTailed(i) if i.low < i.high),
+        |v| matches!(v.estimate, Estimate::Known(i) | Estimate::HeavyTailed(i) if i.low < i.high),
     );
     let spread = if known { figure.spread.words() } else { "" };
     let shared = values[0].key.only(&shared).to_string();

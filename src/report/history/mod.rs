@@ -7,7 +7,7 @@ pub mod page;
 use crate::data::RunData;
 use crate::export::ExportError;
 use crate::export::select::Selection;
-use crate::values::{Reading, Value, values};
+use crate::values::{Estimate, Value, values};
 use change::e_divisive;
 use raystone_record::figure::{Better, Figure, Spread};
 use raystone_record::{Interval, Key, Line};
@@ -107,8 +107,8 @@ impl<'a> History<'a> {
     }
 
     fn add(&mut self, run: usize, device: &str, value: Value<'a>) {
-        let point = match value.reading {
-            Reading::Known(interval) if interval.value.is_finite() => (run, interval),
+        let point = match value.estimate {
+            Estimate::Known(interval) if interval.value.is_finite() => (run, interval),
             _ => {
                 self.left_out += 1;
                 return;

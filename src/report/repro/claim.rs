@@ -1,11 +1,11 @@
 //! An expectation against what a run found: a row for each place where it speaks.
 
-use super::judge::{Bounds, Verdict, factor, spread};
+use super::judge::{Bounds, ClaimVerdict, factor, spread};
 use super::select::{fits, merged, partner, select, words};
 use crate::data::grouped;
 use crate::format;
 use crate::samplers::HEAVY_TAILED;
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use raystone_config::Pattern;
 use raystone_config::expect::{At, Compare, Expect, Pick, Speaks};
 use raystone_record::{Interval, Key};
@@ -38,7 +38,7 @@ pub struct Row {
     /// The number on the axis of a curve, where the place has one (samples, points).
     pub x: Option<f64>,
     /// What is found of the claim.
-    pub verdict: Verdict,
+    pub verdict: ClaimVerdict,
     /// Why, or what agrees.
     pub reason: String,
     /// Counted figures: title and value.
@@ -128,10 +128,10 @@ impl<'e> Place<'e> {
     fn rows(&self, values: &[Value]) -> Vec<Row> {
         if self.at.full_only && self.context.quick {
             let reason = "a short run leaves this size out".to_owned();
-            return vec![self.row(None, Verdict::NotTestable, reason)];
+            return vec![self.row(None, ClaimVerdict::NotTestable, reason)];
         }
         if let Some(Err(reason)) = &self.scene {
-            return vec![self.row(None, Verdict::NotTestable, reason.clone())];
+            return vec![self.row(None, ClaimVerdict::NotTestable, reason.clone())];
         }
         let found = match self.expect.compare {
             Compare::Shown | Compare::Bound => self.single(values),
@@ -171,12 +171,14 @@ impl<'e> Place<'e> {
         // What no cell is called, measured or not, is misspelt.
         let is_sound = pick.iter().all(is_known);
         match self.context.absent.iter().find(explains) {
-            Some((_, reason)) if is_sound => self.row(None, Verdict::NotTestable, reason.clone()),
-            _ => self.row(None, Verdict::Faulty, problem),
+            Some((_, reason)) if is_sound => {
+                self.row(None, ClaimVerdict::NotTestable, reason.clone())
+            }
+            _ => self.row(None, ClaimVerdict::Faulty, problem),
         }
     }
 
-    fn row(&self, ours: Option<Interval>, verdict: Verdict, reason: String) -> Row {
+    fn row(&self, ours: Option<Interval>, verdict: ClaimVerdict, reason: String) -> Row {
         let column = match self.at.column.is_empty() {
             true => &self.expect.column,
             false => &self.at.column,
@@ -243,10 +245,10 @@ impl<'e> Place<'e> {
     fn judged(&self, ours: Interval, unit: &str, key: &Key) -> Row {
         let speaks = self.expect.device == Speaks::Any || !self.context.software;
         let judged = match self.bounds(unit) {
-            Err(problem) => (Verdict::Faulty, problem),
-            Ok(_) if self.expect.compare == Compare::Shown => (Verdict::Shown, String::new()),
+            Err(problem) => (ClaimVerdict::Faulty, problem),
+            Ok(_) if self.expect.compare == Compare::Shown => (ClaimVerdict::Shown, String::new()),
             Ok(_) if !speaks => (
-                Verdict::NotTestable,
+                ClaimVerdict::NotTestable,
                 "times of a software adapter say nothing of a GPU".to_owned(),
             ),
             Ok(bounds) => (bounds.judge(ours), format!("agrees: {}", bounds.words())),
@@ -263,17 +265,17 @@ impl<'e> Place<'e> {
 
     /// A row whose reading is no number.
     fn unread(&self, value: &Value) -> Option<Row> {
-        let row = match value.reading {
-            Reading::Known(_) => return None,
-            Reading::HeavyTailed(i) => {
+        let row = match value.estimate {
+            Estimate::Known(_) => return None,
+            Estimate::HeavyTailed(i) => {
                 let reason = format!("its interval is not to be trusted: {HEAVY_TAILED}");
-                self.row(Some(i), Verdict::Undecided, reason)
+                self.row(Some(i), ClaimVerdict::Undecided, reason)
             }
-            Reading::Below(bound) => {
+            Estimate::Below(bound) => {
                 let reason = format!("below {bound:.3e}, which the reference resolves");
-                self.row(None, Verdict::Undecided, reason)
+                self.row(None, ClaimVerdict::Undecided, reason)
             }
-            Reading::Word(word) => self.row(None, Verdict::NotTestable, word.to_owned()),
+            Estimate::Word(word) => self.row(None, ClaimVerdict::NotTestable, word.to_owned()),
         };
         Some(row)
     }
@@ -419,13 +421,16 @@ impl<'e> Place<'e> {
             .map(|pair| over(pair[1].clone(), pair[0].clone()))
             .collect();
         let ascends = Bounds::new(Some(1.0), None);
-        let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
+        let verdict = ClaimVerdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
         let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
         let Some(least) = least else {
-            return self.row(None, Verdict::Faulty, "an order of one".to_owned());
+            return self.row(None, ClaimVerdict::Faulty, "an order of one".to_owned());
         };
         let mut row = self.judged(least, "", &chain[0].value.key);
-        if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
+        if !matches!(
+            row.verdict,
+            ClaimVerdict::NotTestable | ClaimVerdict::Faulty
+        ) {
             row.verdict = verdict;
         }
         let named = picks.iter().zip(chain).map(|(pick, gain)| {
@@ -436,7 +441,7 @@ impl<'e> Place<'e> {
         });
         let named = named.collect::<Vec<_>>().join(" → ");
         row.reason = match row.verdict {
-            Verdict::NotTestable | Verdict::Faulty => format!("{}; {named}", row.reason),
+            ClaimVerdict::NotTestable | ClaimVerdict::Faulty => format!("{}; {named}", row.reason),
             _ => format!("{named} (least step shown)"),
         };
         row
@@ -456,7 +461,7 @@ impl<'e> Place<'e> {
         let row = |(key, points): &(Key, Vec<(f64, &Value)>)| {
             let fault = |problem: &str| {
                 let problem = format!("{problem} along {along} at {key}");
-                self.row(None, Verdict::Faulty, problem)
+                self.row(None, ClaimVerdict::Faulty, problem)
             };
             let figures = points.iter();
             let figures = figures.map(|(x, value)| Some((*x, self.figure(value)?)));
@@ -487,8 +492,8 @@ impl<'v, 'a> Gain<'v, 'a> {
 
 /// The number of a value, with the spread that is assumed of what was measured once.
 fn known(value: &Value) -> Option<Interval> {
-    match value.reading {
-        Reading::Known(i) if i.value.is_finite() => Some(spread(&value.figure, i)),
+    match value.estimate {
+        Estimate::Known(i) if i.value.is_finite() => Some(spread(&value.figure, i)),
         _ => None,
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum ClaimVerdict {
     /// Shown without a verdict.
     Shown,
     /// It cannot be tested where this ran.
@@ -22,7 +22,7 @@ pub enum Verdict {
     Faulty,
 }
 
-impl Verdict {
+impl ClaimVerdict {
     /// Returns the verdict as text.
     pub fn word(self) -> &'static str {
         match self {
@@ -70,16 +70,16 @@ impl Bounds {
     }
 
     /// Compares an interval with the bounds.
-    pub fn judge(self, i: Interval) -> Verdict {
+    pub fn judge(self, i: Interval) -> ClaimVerdict {
         if ![i.low, i.value, i.high].into_iter().all(|x| !x.is_nan()) {
-            return Verdict::Undecided;
+            return ClaimVerdict::Undecided;
         }
         if i.low >= self.least && i.high <= self.most {
-            Verdict::Supported
+            ClaimVerdict::Supported
         } else if i.high < self.least || i.low > self.most {
-            Verdict::Contradicted
+            ClaimVerdict::Contradicted
         } else {
-            Verdict::Undecided
+            ClaimVerdict::Undecided
         }
     }
 
@@ -147,14 +147,20 @@ mod tests {
     #[test]
     fn an_interval_agrees_disagrees_or_spans_the_bound() {
         let at_least = Bounds::new(Some(1.0), None);
-        assert_eq!(at_least.judge(i(1.1, 1.2, 1.3)), Verdict::Supported);
-        assert_eq!(at_least.judge(i(0.7, 0.8, 0.9)), Verdict::Contradicted);
-        assert_eq!(at_least.judge(i(0.9, 1.2, 1.3)), Verdict::Undecided);
+        assert_eq!(at_least.judge(i(1.1, 1.2, 1.3)), ClaimVerdict::Supported);
+        assert_eq!(at_least.judge(i(0.7, 0.8, 0.9)), ClaimVerdict::Contradicted);
+        assert_eq!(at_least.judge(i(0.9, 1.2, 1.3)), ClaimVerdict::Undecided);
         let between = Bounds::new(Some(0.975), Some(1.025));
-        assert_eq!(between.judge(i(0.99, 1.0, 1.01)), Verdict::Supported);
-        assert_eq!(between.judge(i(1.03, 1.04, 1.05)), Verdict::Contradicted);
-        assert_eq!(between.judge(i(0.9, 1.0, 1.1)), Verdict::Undecided);
-        assert_eq!(between.judge(i(f64::NAN, 1.0, 1.1)), Verdict::Undecided);
+        assert_eq!(between.judge(i(0.99, 1.0, 1.01)), ClaimVerdict::Supported);
+        assert_eq!(
+            between.judge(i(1.03, 1.04, 1.05)),
+            ClaimVerdict::Contradicted
+        );
+        assert_eq!(between.judge(i(0.9, 1.0, 1.1)), ClaimVerdict::Undecided);
+        assert_eq!(
+            between.judge(i(f64::NAN, 1.0, 1.1)),
+            ClaimVerdict::Undecided
+        );
         let at_most = Bounds::new(None, Some(2.0));
         let words = [at_least, at_most, between, Bounds::new(None, None)].map(Bounds::words);
         assert_eq!(words, ["≥ 1", "≤ 2", "0.975 … 1.025", "anything"]);
@@ -162,15 +168,15 @@ mod tests {
 
     #[test]
     fn one_place_that_contradicts_a_claim_is_enough_and_none_proves_nothing() {
-        use Verdict::*;
+        use ClaimVerdict::*;
         assert_eq!(
-            Verdict::of_all([Supported, Contradicted, Undecided]),
+            ClaimVerdict::of_all([Supported, Contradicted, Undecided]),
             Contradicted
         );
-        assert_eq!(Verdict::of_all([Supported, NotTestable]), Supported);
-        assert_eq!(Verdict::of_all([Supported, Undecided]), Undecided);
-        assert_eq!(Verdict::of_all([]), NotTestable);
-        assert_eq!(Verdict::of_all([Contradicted, Faulty]), Faulty);
+        assert_eq!(ClaimVerdict::of_all([Supported, NotTestable]), Supported);
+        assert_eq!(ClaimVerdict::of_all([Supported, Undecided]), Undecided);
+        assert_eq!(ClaimVerdict::of_all([]), NotTestable);
+        assert_eq!(ClaimVerdict::of_all([Contradicted, Faulty]), Faulty);
     }
 
     #[test]
@@ -195,7 +201,7 @@ mod tests {
         let [slow, fast] =
             [6.0, 0.1].map(|ms| LogFigure::of_interval(short(ms), f64::INFINITY).expect("a time"));
         let faster = Bounds::new(Some(1.0), None).judge(slow.compared_with(&fast).ratio);
-        assert_eq!(faster, Verdict::Undecided);
+        assert_eq!(faster, ClaimVerdict::Undecided);
         let nodes = spread(&figure::NODES_PER_RAY, Interval::exact(3.0));
         assert_eq!(nodes, Interval::exact(3.0));
     }

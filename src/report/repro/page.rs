@@ -1,7 +1,7 @@
 //! The page of all tables: verdicts first, then each table in the layout of the original with both numbers.
 
 use super::claim::Row;
-use super::judge::{ONCE, ONCE_MS, Verdict};
+use super::judge::{ClaimVerdict, ONCE, ONCE_MS};
 use super::table::{Placed, Reproduced};
 use super::{NotCovered, plots};
 use crate::data::without_repeats;
@@ -51,18 +51,18 @@ pub fn tally(tables: &[Reproduced]) -> String {
             .map(|i| t.verdict(i))
             .collect::<Vec<_>>()
     };
-    let verdicts: Vec<Verdict> = tables.iter().flat_map(of).collect();
+    let verdicts: Vec<ClaimVerdict> = tables.iter().flat_map(of).collect();
     counted(&verdicts)
 }
 
 /// How often each verdict is among them, in words.
-fn counted(verdicts: &[Verdict]) -> String {
+fn counted(verdicts: &[ClaimVerdict]) -> String {
     let all = [
-        Verdict::Supported,
-        Verdict::Contradicted,
-        Verdict::Undecided,
-        Verdict::NotTestable,
-        Verdict::Faulty,
+        ClaimVerdict::Supported,
+        ClaimVerdict::Contradicted,
+        ClaimVerdict::Undecided,
+        ClaimVerdict::NotTestable,
+        ClaimVerdict::Faulty,
     ];
     let counts = all.map(|v| (v, verdicts.iter().filter(|found| **found == v).count()));
     let said = counts.iter().filter(|(_, n)| *n > 0);
@@ -92,7 +92,7 @@ fn summary(tables: &[Reproduced]) -> Section {
         let expects = reproduced.thesis.expects.iter().enumerate();
         let judged =
             expects.map(|(i, expect)| (reproduced.verdict(i), &reproduced.claims[i], expect));
-        let judged = judged.filter(|(verdict, ..)| *verdict != Verdict::Shown);
+        let judged = judged.filter(|(verdict, ..)| *verdict != ClaimVerdict::Shown);
         judged.map(|(verdict, rows, expect)| {
             [
                 reproduced.name.into(),
@@ -117,11 +117,11 @@ pub fn claim_name(expect: &Expect) -> String {
     }
 }
 
-fn verdict_cell(verdict: Verdict) -> TableCell {
+fn verdict_cell(verdict: ClaimVerdict) -> TableCell {
     let tone = match verdict {
-        Verdict::Supported => Tone::Good,
-        Verdict::Contradicted | Verdict::Faulty => Tone::Bad,
-        Verdict::Undecided => Tone::Note,
+        ClaimVerdict::Supported => Tone::Good,
+        ClaimVerdict::Contradicted | ClaimVerdict::Faulty => Tone::Bad,
+        ClaimVerdict::Undecided => Tone::Note,
         _ => Tone::Plain,
     };
     TableCell::from(verdict.word()).toned(tone)
@@ -132,7 +132,10 @@ fn places(rows: &[Row]) -> String {
     if let [row] = rows {
         return row.ours.map_or_else(|| row.reason.clone(), interval);
     }
-    if rows.iter().any(|row| row.verdict != Verdict::NotTestable) {
+    if rows
+        .iter()
+        .any(|row| row.verdict != ClaimVerdict::NotTestable)
+    {
         return counted(&rows.iter().map(|row| row.verdict).collect::<Vec<_>>());
     }
     // Where nothing could be tested, the reason of most places.
@@ -272,7 +275,7 @@ fn original(table: &Reproduced) -> Option<Table> {
 /// Returns the blocks of a claim with its places.
 fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
     let verdict = table.verdict(index);
-    if verdict == Verdict::Shown && expect.explain.is_empty() {
+    if verdict == ClaimVerdict::Shown && expect.explain.is_empty() {
         return Vec::new();
     }
     let mut blocks = vec![Block::Heading(format!(

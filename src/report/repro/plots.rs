@@ -128,7 +128,7 @@ fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::repro::judge::Verdict;
+    use crate::repro::judge::ClaimVerdict;
     use raystone_config::expect::Thesis;
 
     const TEXT: &str = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[expect]]\nid = \"a\"\nsays = \"b\"\nfigure = \"rmse-unbiased/v1\"\ncompare = \"shown\"\n";
@@ -144,7 +144,7 @@ mod tests {
             thesis: Some(thesis),
             ours: Some(Interval::exact(ours)),
             x: Some(x),
-            verdict: Verdict::Shown,
+            verdict: ClaimVerdict::Shown,
             reason: String::new(),
             counted: Vec::new(),
         }

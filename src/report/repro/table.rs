@@ -2,7 +2,7 @@
 
 use super::Source;
 use super::claim::{Context, Row, judge, unused};
-use super::judge::Verdict;
+use super::judge::ClaimVerdict;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::data::{RunData, without_repeats};
 use crate::values::values;
@@ -65,12 +65,12 @@ pub struct Reproduced {
 
 impl Reproduced {
     /// The verdict on an expectation as a whole.
-    pub fn verdict(&self, index: usize) -> Verdict {
-        let found = Verdict::of_all(self.claims[index].iter().map(|row| row.verdict));
+    pub fn verdict(&self, index: usize) -> ClaimVerdict {
+        let found = ClaimVerdict::of_all(self.claims[index].iter().map(|row| row.verdict));
         // What is only shown is no claim, whether there is something to show or not.
         let only_shown = self.thesis.expects[index].compare == Compare::Shown;
-        match found != Verdict::Faulty && only_shown {
-            true => Verdict::Shown,
+        match found != ClaimVerdict::Faulty && only_shown {
+            true => ClaimVerdict::Shown,
             false => found,
         }
     }

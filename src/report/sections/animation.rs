@@ -4,7 +4,7 @@ use super::specs::{FRAME_PLOTS, FRAME_RAYS, TREES};
 use crate::data::{Measured, RunData, SceneGroup};
 use crate::document::*;
 use crate::format;
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use raystone_config::{Animation, Motion};
 use raystone_record::figure;
 use raystone_record::{AnimationRecord, FrameRays, FrameRecord, Interval, Key, RayClass, axis};
@@ -90,23 +90,23 @@ fn time_ratio(rays: &FrameRays, software: bool) -> Option<Interval> {
 /// From how many million rays of the class in the frame on building anew pays: what it costs more, over what a ray costs
 /// less. No number where the interval
 /// of the difference holds 0.
-fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<Reading> {
+fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<Estimate> {
     let of = |ms: &[f64]| median_interval(ms).map(|i| i.value);
     let more = of(frame.rebuild.ms(software))? - of(frame.refit.ms(software))?;
     let [refitted, rebuilt] = [0, 1].map(|place| rays.cost[place].ms(software));
     let differences: Vec<f64> = refitted.iter().zip(rebuilt).map(|(a, b)| a - b).collect();
     let saved = median_interval(&differences)?;
     if more <= 0.0 {
-        return Some(Reading::Word("any"));
+        return Some(Estimate::Word("any"));
     }
     if saved.high <= 0.0 {
-        return Some(Reading::Word("none"));
+        return Some(Estimate::Word("none"));
     }
     if saved.low <= 0.0 {
-        return Some(Reading::Word("unresolved"));
+        return Some(Estimate::Word("unresolved"));
     }
     let million_rays = rays.rays as f64 * 1e-6;
-    Some(Reading::from(million_rays * more / saved.value))
+    Some(Estimate::from(million_rays * more / saved.value))
 }
 
 /// The key of a frame.
@@ -141,11 +141,11 @@ pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
                 let read = [
                     (
                         &figure::FRAME_NODES_RATIO,
-                        nodes_ratio(rays).map(Reading::from),
+                        nodes_ratio(rays).map(Estimate::from),
                     ),
                     (
                         &figure::FRAME_TIME_RATIO,
-                        time_ratio(rays, software).map(Reading::from),
+                        time_ratio(rays, software).map(Estimate::from),
                     ),
                     (&figure::FRAME_BREAK_EVEN, break_even(frame, rays, software)),
                 ];

@@ -6,7 +6,7 @@ use crate::document::*;
 use crate::format::ABSENT;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::values::{Reading, Value, of_readings};
+use crate::values::{Estimate, Value, of_readings};
 use raystone_core::params::ParamValue;
 use raystone_record::figure::{self, COMPACTION_NS};
 use raystone_record::{Interval, Key, MeasuredRecord, Recorded, axis};
@@ -185,7 +185,7 @@ pub(crate) fn derived(data: &RunData) -> Vec<Value<'static>> {
     }
     for (key, growth) in growths(data) {
         let figures = [
-            (&figure::GROWTH_LINEAR, Reading::from(growth.linear)),
+            (&figure::GROWTH_LINEAR, Estimate::from(growth.linear)),
             (&figure::GROWTH_LINEARITHMIC, growth.linearithmic.into()),
             (&figure::GROWTH_DIFFERENCE, growth.difference.into()),
         ];

@@ -2,7 +2,7 @@
 //! leaving them out gained.
 
 use super::specs::GAINS;
-use crate::compare::judge::Verdict;
+use crate::compare::judge::ChangeVerdict;
 use crate::compare::show::change;
 use crate::compare::side::{EMBEDDED, Side};
 use crate::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
@@ -99,7 +99,9 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
 fn answer(findings: &[&Finding]) -> (String, Tone) {
     let changed: Vec<&&Finding> = findings.iter().filter(|f| !f.is_control).collect();
     if changed.is_empty() {
-        let moved = findings.iter().any(|f| f.verdict == Verdict::Undecided);
+        let moved = findings
+            .iter()
+            .any(|f| f.verdict == ChangeVerdict::Undecided);
         let (text, tone) = match moved {
             true => ("unchanged control, which moved all the same", Tone::Bad),
             false => ("unchanged control", Tone::Plain),
@@ -107,10 +109,10 @@ fn answer(findings: &[&Finding]) -> (String, Tone) {
         return (text.into(), tone);
     }
     let words = [
-        (Verdict::Worse, "slower", Tone::Bad),
-        (Verdict::Better, "faster", Tone::Good),
-        (Verdict::Undecided, "undecided", Tone::Note),
-        (Verdict::Same, "same", Tone::Plain),
+        (ChangeVerdict::Worse, "slower", Tone::Bad),
+        (ChangeVerdict::Better, "faster", Tone::Good),
+        (ChangeVerdict::Undecided, "undecided", Tone::Note),
+        (ChangeVerdict::Same, "same", Tone::Plain),
     ];
     let counted = words.map(|(verdict, word, tone)| {
         let count = changed.iter().filter(|f| f.verdict == verdict).count();
@@ -146,7 +148,7 @@ fn change_of(finding: &Finding) -> String {
 fn beside_times(found: &Comparison) -> String {
     let others = || found.findings.iter().filter(|f| !f.is_time);
     // What was measured once is shown, and decides nothing.
-    let is_other = |f: &&Finding| !matches!(f.verdict, Verdict::Same | Verdict::Told);
+    let is_other = |f: &&Finding| !matches!(f.verdict, ChangeVerdict::Same | ChangeVerdict::Told);
     let not_same = others().filter(is_other).count();
     let of = format!(
         "{not_same} of {} beside times are not the same",

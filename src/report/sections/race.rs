@@ -6,7 +6,7 @@ use crate::data::View;
 use crate::format;
 use crate::ruling::{Contender, Ruling};
 use crate::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use raystone_record::axis;
 use raystone_record::figure::{self, Figure};
 use raystone_stats::comparison::LogFigure;
@@ -143,7 +143,7 @@ impl<'a> Race<'a> {
             };
             let mut add = |what: String, row: &'static Figure, figure: Option<LogFigure>| {
                 let key = time.key.clone().with(axis::SUBJECT, what);
-                let figure = figure.map(|f| Reading::of(f.interval(), sampler.is_heavy_tailed()));
+                let figure = figure.map(|f| Estimate::of(f.interval(), sampler.is_heavy_tailed()));
                 values.extend(Value::known(&key, [(row, figure)]));
             };
             let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);

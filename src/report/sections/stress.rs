@@ -5,7 +5,7 @@ use crate::document::*;
 use crate::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::plot::heat::HeatMap;
-use crate::values::{Reading, Value, of_readings};
+use crate::values::{Estimate, Value, of_readings};
 use raystone_config::STRESS;
 use raystone_record::figure::{self, FIGURES, Figure, Shown};
 use raystone_record::{Interval, Key, axis};
@@ -76,7 +76,8 @@ pub(crate) fn tables(data: &RunData) -> Vec<Table> {
         let of_figure = families.iter().filter(|value| value.figure.id == figure.id);
         // Only where anything is lost or differs.
         let mut seen: Vec<Value> = of_figure.cloned().collect();
-        let nothing = |value: &Value| matches!(value.reading, Reading::Known(i) if i.value == 0.0);
+        let nothing =
+            |value: &Value| matches!(value.estimate, Estimate::Known(i) if i.value == 0.0);
         if seen.iter().all(nothing) {
             continue;
         }
@@ -167,8 +168,8 @@ fn lost_hits<'v>(families: &'v [Value]) -> Vec<(&'v Key, f64, bool)> {
 }
 
 fn number(value: &Value) -> f64 {
-    match value.reading {
-        Reading::Known(interval) => interval.value,
+    match value.estimate {
+        Estimate::Known(interval) => interval.value,
         _ => f64::NAN,
     }
 }

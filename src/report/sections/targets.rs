@@ -4,7 +4,7 @@ use crate::data::RunData;
 use crate::document::Check;
 use crate::format;
 use crate::repro::claim::{Context, Row, judge};
-use crate::repro::judge::Verdict as Claimed;
+use crate::repro::judge::ClaimVerdict as Claimed;
 use crate::values::{Value, values};
 use raystone_config::expect::{Expect, Thesis};
 use raystone_record::Verdict;

@@ -6,19 +6,19 @@ use crate::document::*;
 use crate::format;
 use crate::names::Names;
 use crate::samplers::MeasuredSampler;
-use crate::values::{Reading, Value};
+use crate::values::{Estimate, Value};
 use raystone_record::figure;
 use raystone_record::*;
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
 /// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
 /// Speeds in Mrays/s.
-fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Reading {
+fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Estimate {
     if slow_build.high < fast_build.low {
-        return Reading::Word("never");
+        return Estimate::Word("never");
     }
     if slow_build.low <= fast_build.high {
-        return Reading::Word("undecided");
+        return Estimate::Word("undecided");
     }
     let seconds_per_million = 1.0 / fast_build.value - 1.0 / slow_build.value;
     (extra_build_ms.max(0.0) / seconds_per_million).into()
@@ -139,11 +139,11 @@ mod tests {
         };
         let of = |slow, fast| caught_up(100.0, &speed(slow), &speed(fast));
         // 100 ms more; 1 s/M rays against 2 s/M rays: after 100,000 rays.
-        let Reading::Known(found) = of(1.0, 0.5) else {
+        let Estimate::Known(found) = of(1.0, 0.5) else {
             panic!("no number");
         };
         assert!((found.value - 100.0).abs() < 1e-9, "{found:?}");
-        assert_eq!(of(0.5, 1.0), Reading::Word("never"));
-        assert_eq!(of(1.0, 0.98), Reading::Word("undecided"));
+        assert_eq!(of(0.5, 1.0), Estimate::Word("never"));
+        assert_eq!(of(1.0, 0.98), Estimate::Word("undecided"));
     }
 }

@@ -3,7 +3,7 @@
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
 use raystone::compare::confirm::COMPILATIONS;
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
 
@@ -12,7 +12,7 @@ const REPEATED: u64 = 120;
 const MOST: usize = 14;
 
 fn alarms(found: &Comparison) -> usize {
-    found.count(Verdict::Worse) + found.count(Verdict::Better)
+    found.count(ChangeVerdict::Worse) + found.count(ChangeVerdict::Better)
 }
 
 fn with_alarm(pair: impl Fn(u64) -> [Side; 2]) -> usize {
@@ -116,7 +116,7 @@ fn images_of_another_pattern_that_is_no_worse_give_no_more_false_alarms_than_sta
         let found = compare_sides(&base.side(), &candidate.side(), &options, &Confirmed::new());
         let errors = found.findings.iter().filter(|f| !f.is_time);
         errors
-            .filter(|f| matches!(f.verdict, Verdict::Worse | Verdict::Better))
+            .filter(|f| matches!(f.verdict, ChangeVerdict::Worse | ChangeVerdict::Better))
             .count()
             > 0
     };
@@ -129,7 +129,7 @@ fn images_of_another_pattern_that_is_no_worse_give_no_more_false_alarms_than_sta
 fn a_structure_that_is_five_percent_slower_is_found() {
     let slower: fn(usize) -> f64 = |structure| if structure == 8 { 1.05 } else { 1.0 };
     let is_found = |found: &Comparison| {
-        let worse = said(found, "mrays-per-s/v1").filter(|f| f.verdict == Verdict::Worse);
+        let worse = said(found, "mrays-per-s/v1").filter(|f| f.verdict == ChangeVerdict::Worse);
         worse
             .filter(|f| f.key.label("accel") == "structure-8")
             .count()
@@ -167,8 +167,8 @@ fn a_faster_structure_is_better_and_not_worse() {
         let of_it = of_it.filter(|f| f.key.label("accel") == "structure-8");
         of_it.map(|f| f.verdict).collect::<Vec<_>>()
     };
-    let verdicts: Vec<Verdict> = (0..10).flat_map(of_pair).collect();
-    assert_eq!(verdicts, [Verdict::Better; 20]);
+    let verdicts: Vec<ChangeVerdict> = (0..10).flat_map(of_pair).collect();
+    assert_eq!(verdicts, [ChangeVerdict::Better; 20]);
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn an_error_that_is_one_percent_larger_is_found_for_every_seed_together() {
         let change = finding.measured.expect("a difference").change;
         assert_eq!(
             (finding.verdict, finding.key.label("sequence")),
-            (Verdict::Worse, "sequence-2")
+            (ChangeVerdict::Worse, "sequence-2")
         );
         assert!((change.value - 0.01).abs() < 0.002, "{change:?}");
     }

@@ -3,7 +3,7 @@
 use super::records::Made;
 use super::{compared, said};
 use raystone::compare::drift::{Drift, Place};
-use raystone::compare::judge::{Effects, Measured, Outcome, TimeRatio, Verdict, compare};
+use raystone::compare::judge::{ChangeVerdict, Effects, Measured, Outcome, TimeRatio, compare};
 use raystone::compare::side::Side;
 use raystone::compare::taken::{Evidence, taken};
 use raystone::measure::figure::figure;
@@ -23,7 +23,7 @@ fn tested(outcome: Outcome) -> Measured {
     }
 }
 
-fn verdict(outcome: Outcome) -> Verdict {
+fn verdict(outcome: Outcome) -> ChangeVerdict {
     match outcome {
         Outcome::Known(verdict, _) => verdict,
         Outcome::Tested(measured) => panic!("{measured:?}"),
@@ -46,11 +46,17 @@ fn verdicts_and_hashes_know_a_failure_from_another_text() {
     let of = |a: (&str, bool), b: (&str, bool)| {
         verdict(outcome(ERROR, &fact(a.0, a.1), &fact(b.0, b.1)))
     };
-    assert_eq!(of(("PASS", false), ("3 wrong", true)), Verdict::Worse);
-    assert_eq!(of(("3 wrong", true), ("PASS", false)), Verdict::Better);
-    assert_eq!(of(("a", false), ("b", false)), Verdict::Changed);
-    assert_eq!(of(("3 wrong", true), ("4 wrong", true)), Verdict::Changed);
-    assert_eq!(of(("a", false), ("a", false)), Verdict::Same);
+    assert_eq!(of(("PASS", false), ("3 wrong", true)), ChangeVerdict::Worse);
+    assert_eq!(
+        of(("3 wrong", true), ("PASS", false)),
+        ChangeVerdict::Better
+    );
+    assert_eq!(of(("a", false), ("b", false)), ChangeVerdict::Changed);
+    assert_eq!(
+        of(("3 wrong", true), ("4 wrong", true)),
+        ChangeVerdict::Changed
+    );
+    assert_eq!(of(("a", false), ("a", false)), ChangeVerdict::Same);
 }
 
 #[test]
@@ -77,7 +83,7 @@ fn differences_of_exponents_are_absolute_and_those_of_errors_parts_of_the_base()
     let one = |value| seeds(1, &[value]);
     assert_eq!(
         verdict(outcome(ERROR, &one(1.0), &one(2.0))),
-        Verdict::Undecided
+        ChangeVerdict::Undecided
     );
     // With other seeds they are two samples, whose interval is also relative to the base.
     let larger = |scale: f64| {
@@ -101,11 +107,11 @@ fn intervals_without_samples_are_tested_by_their_widths() {
         (both.change.high - 0.1 - half).abs() < 1e-6,
         "{both:?} {half}"
     );
-    assert_eq!(verdict(outcome(ERROR, &base, &base)), Verdict::Same);
+    assert_eq!(verdict(outcome(ERROR, &base, &base)), ChangeVerdict::Same);
     let exact = |value| interval(value, value, value);
     assert_eq!(
         verdict(outcome(ERROR, &exact(1.0), &exact(2.0))),
-        Verdict::Undecided
+        ChangeVerdict::Undecided
     );
 }
 
@@ -266,7 +272,7 @@ fn an_error_is_that_of_its_count_of_samples_and_its_root_half_of_it() {
         assert_eq!(worse.len(), 1, "{worse:?}");
         assert_eq!(
             (worse[0].verdict, worse[0].key.label("spp")),
-            (Verdict::Worse, "8")
+            (ChangeVerdict::Worse, "8")
         );
         let measured = worse[0].measured.expect("a difference");
         assert!(
@@ -319,7 +325,8 @@ fn errors_of_another_reference_or_resolution_are_open_and_their_order_is_nothing
         assert_eq!(open.len(), 16);
         assert!(
             open.iter()
-                .all(|f| f.verdict == Verdict::Undecided && f.why.contains("references differ"))
+                .all(|f| f.verdict == ChangeVerdict::Undecided
+                    && f.why.contains("references differ"))
         );
     }
     let wide = with(|line| {
@@ -339,7 +346,12 @@ fn errors_of_another_reference_or_resolution_are_open_and_their_order_is_nothing
         &Made::default().side(),
         &Side::new("made", turned, Vec::new()),
     );
-    assert_eq!(found.verdict(), Verdict::Same, "{:?}", found.findings[0]);
+    assert_eq!(
+        found.verdict(),
+        ChangeVerdict::Same,
+        "{:?}",
+        found.findings[0]
+    );
 }
 
 #[test]
@@ -376,10 +388,10 @@ fn random_point_sets_are_intervals_and_others_exact() {
     assert_eq!(
         verdicts,
         [
-            Verdict::Worse,
-            Verdict::Worse,
-            Verdict::Worse,
-            Verdict::Undecided
+            ChangeVerdict::Worse,
+            ChangeVerdict::Worse,
+            ChangeVerdict::Worse,
+            ChangeVerdict::Undecided
         ]
     );
 }

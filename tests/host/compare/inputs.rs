@@ -2,7 +2,7 @@
 
 use super::records::{Made, environment};
 use super::{compared, said};
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::{Side, SideError};
 use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
 use raystone::measure::record::{Body, Line, RecordError, text_of};
@@ -28,14 +28,17 @@ fn with_structure(change: impl Fn(&mut raystone::measure::record::StructureRecor
 #[test]
 fn equal_records_are_the_same() {
     let found = with(|_| ());
-    assert_eq!(found.verdict(), Verdict::Same);
-    assert!(found.count(Verdict::Same) > 100 && found.count(Verdict::Told) == 0);
-    assert_eq!(found.findings.len(), found.count(Verdict::Same));
+    assert_eq!(found.verdict(), ChangeVerdict::Same);
+    assert!(found.count(ChangeVerdict::Same) > 100 && found.count(ChangeVerdict::Told) == 0);
+    assert_eq!(found.findings.len(), found.count(ChangeVerdict::Same));
 }
 
 #[test]
 fn a_counter_that_is_off_by_one_ray_is_worse_and_less_work_is_better() {
-    for (part, verdict) in [(0.001, Verdict::Worse), (-0.001, Verdict::Better)] {
+    for (part, verdict) in [
+        (0.001, ChangeVerdict::Worse),
+        (-0.001, ChangeVerdict::Better),
+    ] {
         let found = with_structure(|record| {
             let counters = record.timings[1].counters.as_mut().expect("counters");
             counters.nodes += part;
@@ -56,17 +59,17 @@ fn one_wrong_hit_and_one_hit_more_are_worse() {
         gate.passed = false;
         record.timings.clear();
     });
-    assert_eq!(wrong.verdict(), Verdict::Worse);
-    assert!(said(&wrong, "gate/v1").any(|f| f.verdict == Verdict::Worse));
+    assert_eq!(wrong.verdict(), ChangeVerdict::Worse);
+    assert!(said(&wrong, "gate/v1").any(|f| f.verdict == ChangeVerdict::Worse));
     // Figures lost with the correctness check are reported as missing, too.
     assert!(
         said(&wrong, "mrays-per-s/v1")
-            .all(|f| f.verdict == Verdict::Undecided && f.why.contains("missing"))
+            .all(|f| f.verdict == ChangeVerdict::Undecided && f.why.contains("missing"))
     );
     for other in [0.749, 0.751] {
         let hits = with_structure(|record| record.timings[0].hit_fraction = other);
-        assert!(said(&hits, "hit-share/v1").all(|f| f.verdict == Verdict::Worse));
-        assert_eq!(hits.verdict(), Verdict::Worse);
+        assert!(said(&hits, "hit-share/v1").all(|f| f.verdict == ChangeVerdict::Worse));
+        assert_eq!(hits.verdict(), ChangeVerdict::Worse);
     }
 }
 
@@ -80,8 +83,8 @@ fn another_image_and_another_discrepancy_are_told() {
         error.expect("an error").image_hash = "another".into();
     });
     assert_eq!(
-        (image.verdict(), image.count(Verdict::Worse)),
-        (Verdict::Worse, 1)
+        (image.verdict(), image.count(ChangeVerdict::Worse)),
+        (ChangeVerdict::Worse, 1)
     );
     let star = with(|lines| {
         let stream = lines.iter_mut().find_map(|line| match &mut line.body {
@@ -94,17 +97,17 @@ fn another_image_and_another_discrepancy_are_told() {
     let said: Vec<_> = said(&star, "star-discrepancy/v1")
         .map(|f| f.verdict)
         .collect();
-    assert_eq!(said, [Verdict::Worse]);
+    assert_eq!(said, [ChangeVerdict::Worse]);
 }
 
 #[test]
 fn a_missing_cell_is_named_and_a_new_one_is_no_fault() {
     let gone = with(|lines| lines.retain(|line| line.key.label("accel") != "structure-3"));
-    assert_eq!(gone.verdict(), Verdict::Undecided);
+    assert_eq!(gone.verdict(), ChangeVerdict::Undecided);
     let missing = gone
         .findings
         .iter()
-        .filter(|f| f.verdict == Verdict::Undecided);
+        .filter(|f| f.verdict == ChangeVerdict::Undecided);
     assert!(missing.clone().count() > 10);
     assert!(
         missing
@@ -117,7 +120,7 @@ fn a_missing_cell_is_named_and_a_new_one_is_no_fault() {
         ..base.clone()
     };
     let found = compared(&base.side(), &more.side());
-    assert!(found.count(Verdict::New) > 10 && found.count(Verdict::Undecided) == 0);
+    assert!(found.count(ChangeVerdict::New) > 10 && found.count(ChangeVerdict::Undecided) == 0);
 }
 
 #[test]
@@ -145,9 +148,9 @@ fn times_of_another_machine_are_refused_and_all_else_is_compared() {
             .findings
             .iter()
             .filter(|f| f.is_time)
-            .all(|f| f.verdict == Verdict::Undecided && f.measured.is_none())
+            .all(|f| f.verdict == ChangeVerdict::Undecided && f.measured.is_none())
     );
-    assert!(said(&found, "sah-cost/v1").all(|f| f.verdict == Verdict::Worse));
+    assert!(said(&found, "sah-cost/v1").all(|f| f.verdict == ChangeVerdict::Worse));
     // If times do not decide, a refusal leaves nothing open.
     let base = Made::default();
     let mut other = base.side();
@@ -163,7 +166,7 @@ fn times_of_another_machine_are_refused_and_all_else_is_compared() {
     };
     assert_eq!(
         compare_sides(&base.side(), &other, &options, &Confirmed::new()).verdict(),
-        Verdict::Same
+        ChangeVerdict::Same
     );
 }
 
@@ -176,7 +179,7 @@ fn other_scenes_rays_and_parameters_are_not_compared_as_if_they_were_the_same() 
     });
     assert!(
         said(&scene, "nodes-per-ray/v1")
-            .all(|f| f.verdict == Verdict::Undecided && f.why.contains("scene abc"))
+            .all(|f| f.verdict == ChangeVerdict::Undecided && f.why.contains("scene abc"))
     );
     assert_eq!(said(&scene, "nodes-per-ray/v1").count(), 24);
     let rays = with_structure(|record| record.timings[0].rays = 999);
@@ -197,12 +200,12 @@ fn records_that_contradict_themselves_are_named() {
     let said: Vec<_> = said(&found, "sah-cost/v1").collect();
     assert_eq!(said.len(), 1);
     assert!(
-        said[0].verdict == Verdict::Undecided && said[0].why.contains("contradict"),
+        said[0].verdict == ChangeVerdict::Undecided && said[0].why.contains("contradict"),
         "{said:?}"
     );
     // A repeated line is no contradiction.
     let twice = with(|lines| lines.extend(lines.clone()));
-    assert_eq!(twice.verdict(), Verdict::Same);
+    assert_eq!(twice.verdict(), ChangeVerdict::Same);
 }
 
 fn of(found: &Comparison, figure: &str) -> usize {
@@ -227,7 +230,7 @@ fn a_run_of_many_cells_whose_checks_failed_is_the_same_as_itself() {
     let side = Side::new("made", lines, Vec::new());
     let found = compared(&side, &side.clone());
     assert!(of(&found, "check/v1") > 0);
-    assert_eq!(found.verdict(), Verdict::Same, "{:?}", found.findings);
+    assert_eq!(found.verdict(), ChangeVerdict::Same, "{:?}", found.findings);
 }
 
 #[test]
@@ -246,7 +249,7 @@ fn cells_that_share_a_reference_say_its_error_once() {
     let side = Side::new("made", lines, Vec::new());
     let found = compared(&side, &side.clone());
     assert_eq!(of(&found, "reference-mse/v1"), 1);
-    assert_eq!(found.verdict(), Verdict::Same, "{:?}", found.findings);
+    assert_eq!(found.verdict(), ChangeVerdict::Same, "{:?}", found.findings);
 }
 
 fn read(text: &str) -> Result<Side, SideError> {
@@ -328,7 +331,7 @@ fn two_sets_of_kernels_of_one_run_are_its_two_sides() {
     assert!(a.in_rounds && b.lines.iter().all(|line| line.key.get("kernels").is_none()));
     let found = compared(&a, &b);
     assert_eq!(
-        found.count(Verdict::Worse) + found.count(Verdict::Better),
+        found.count(ChangeVerdict::Worse) + found.count(ChangeVerdict::Better),
         0,
         "{:?}",
         found.findings[0]
@@ -386,7 +389,7 @@ fn cells_that_failed_belong_to_their_kernels_alone() {
             .map(|f| f.key.label("subject"))
             .collect();
         assert_eq!(names, ["box, grid"; 1][..worse], "{:?}", found.findings[0]);
-        assert_eq!(found.count(Verdict::Worse), worse);
+        assert_eq!(found.count(ChangeVerdict::Worse), worse);
     }
 }
 
@@ -412,5 +415,5 @@ fn a_run_of_other_kernels_alone_is_compared_cell_by_cell() {
         "{} findings",
         found.findings.len()
     );
-    assert_eq!(found.findings.len(), found.count(Verdict::Same));
+    assert_eq!(found.findings.len(), found.count(ChangeVerdict::Same));
 }

@@ -2,7 +2,7 @@
 
 use super::records::Made;
 use super::{compared, said};
-use raystone::compare::judge::{IN_TURNS, TimeRatio, Verdict};
+use raystone::compare::judge::{ChangeVerdict, IN_TURNS, TimeRatio};
 use raystone::compare::{Confirmed, Options, compare_sides};
 use raystone::measure::figure::figure;
 use raystone::measure::interval::Spread;
@@ -84,9 +84,9 @@ fn what_was_measured_again_in_turns_counts_even_of_equal_kernels() {
         [((identity.0.to_owned(), identity.1.to_owned()), ratio)].into()
     };
     for (ratio, verdict) in [
-        (1.2, Verdict::Worse),
-        (0.8, Verdict::Better),
-        (1.0, Verdict::Same),
+        (1.2, ChangeVerdict::Worse),
+        (0.8, ChangeVerdict::Better),
+        (1.0, ChangeVerdict::Same),
     ] {
         let found = compare_sides(
             &base.side(),

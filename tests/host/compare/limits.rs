@@ -5,7 +5,7 @@ use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
 use raystone::compare::Finding;
 use raystone::compare::drift::{Drift, Place};
-use raystone::compare::judge::{Effects, Outcome, TimeRatio, Verdict, compare};
+use raystone::compare::judge::{ChangeVerdict, Effects, Outcome, TimeRatio, compare};
 use raystone::compare::side::Side;
 use raystone::compare::taken::Evidence;
 use raystone::measure::figure::figure;
@@ -55,7 +55,7 @@ fn a_control_that_moves_alone_is_not_called_worse() {
     let found = compared(&base.side(), &side(lines));
     let moved = times(&found.findings, "structure-2");
     assert!(moved.len() >= 2 && moved.iter().all(|f| f.is_control));
-    assert!(moved.iter().all(|f| f.verdict != Verdict::Worse));
+    assert!(moved.iter().all(|f| f.verdict != ChangeVerdict::Worse));
     let told = |f: &&Finding| f.why.contains("moved unlike all others");
     assert!(moved.into_iter().any(|f| told(&f)));
 }
@@ -85,14 +85,17 @@ fn a_copied_measurement_is_the_same_and_tells_no_drift() {
     let of = |side: &Side| compared(&base.side(), side);
     let copied = of(&base.side());
     let times: Vec<_> = copied.findings.iter().filter(|f| f.is_time).collect();
-    assert!(!times.is_empty() && times.iter().all(|f| f.verdict == Verdict::Same));
+    assert!(!times.is_empty() && times.iter().all(|f| f.verdict == ChangeVerdict::Same));
     assert!(times.iter().all(|f| !f.is_control && f.measured.is_none()));
     // Too few cells for a drift; copied results are the same nevertheless.
     let few = Made {
         structures: 1,
         ..Made::default()
     };
-    assert_eq!(compared(&few.side(), &few.side()).verdict(), Verdict::Same);
+    assert_eq!(
+        compared(&few.side(), &few.side()).verdict(),
+        ChangeVerdict::Same
+    );
     // A candidate with all but one cell copied has one control.
     let later = Made {
         seed: 2,
@@ -142,7 +145,10 @@ fn the_same_is_said_only_where_the_whole_interval_is_within_the_effect() {
         let (change, margin) = (measured.change, measured.margin);
         let within = change.low > -margin && change.high < margin;
         open += usize::from(!within && change.value.abs() < margin);
-        assert!(within || finding.verdict != Verdict::Same, "{finding:?}");
+        assert!(
+            within || finding.verdict != ChangeVerdict::Same,
+            "{finding:?}"
+        );
     }
     assert!(open > 10, "only {open} of small value and wide interval");
 }
@@ -156,7 +162,7 @@ fn times_of_another_machine_are_refused_even_where_controls_tell_its_drift() {
     }
     let found = compared(&base.side(), &side(lines));
     let mut of_time = found.findings.iter().filter(|f| f.is_time);
-    assert!(of_time.all(|f| f.verdict == Verdict::Undecided && f.measured.is_none()));
+    assert!(of_time.all(|f| f.verdict == ChangeVerdict::Undecided && f.measured.is_none()));
 }
 
 #[test]
@@ -180,11 +186,11 @@ fn another_default_under_the_same_label_is_other_work() {
     let told: Vec<_> = found
         .findings
         .iter()
-        .filter(|f| f.verdict != Verdict::Same)
+        .filter(|f| f.verdict != ChangeVerdict::Same)
         .collect();
     assert!(told.len() > 5);
     for finding in told {
-        assert_eq!(finding.verdict, Verdict::Undecided, "{finding:?}");
+        assert_eq!(finding.verdict, ChangeVerdict::Undecided, "{finding:?}");
         assert!(
             finding.why.contains("leaf_size was 4 and is 8"),
             "{}",
@@ -203,8 +209,8 @@ fn a_cell_that_fails_now_is_worse_and_one_that_failed_before_is_better() {
     };
     failing.insert(2, Line::about_all(Body::Failed(failed)));
     for (base, candidate, verdict) in [
-        (&sound, &failing, Verdict::Worse),
-        (&failing, &sound, Verdict::Better),
+        (&sound, &failing, ChangeVerdict::Worse),
+        (&failing, &sound, ChangeVerdict::Better),
     ] {
         let found = compared(&side(base.clone()), &side(candidate.clone()));
         let said: Vec<_> = said(&found, "cell/v1").map(|f| f.verdict).collect();
@@ -224,8 +230,8 @@ fn what_was_measured_once_is_told_and_decides_nothing() {
     }
     let found = compared(&base.side(), &side(lines));
     assert!(said(&found, "build-ms/v1").count() == 12);
-    assert!(said(&found, "build-ms/v1").all(|f| f.verdict == Verdict::Told));
-    assert_eq!(found.verdict(), Verdict::Same);
+    assert!(said(&found, "build-ms/v1").all(|f| f.verdict == ChangeVerdict::Told));
+    assert_eq!(found.verdict(), ChangeVerdict::Same);
 }
 
 fn seeds(first: u32, values: [f64; 8]) -> Evidence {
@@ -260,7 +266,7 @@ fn errors_against_other_references_are_paired_by_nothing() {
         let reference = "another".to_owned();
         let other = outcome(&Evidence::Seeds { values, reference });
         assert!(
-            matches!(other, Outcome::Known(Verdict::Undecided, _)),
+            matches!(other, Outcome::Known(ChangeVerdict::Undecided, _)),
             "{other:?}"
         );
     }
@@ -354,18 +360,18 @@ fn what_is_no_number_any_more_is_open_and_a_base_of_zero_hides_nothing() {
             Outcome::Tested(_) => panic!("nothing is tested"),
         };
     for (a, b, wanted) in [
-        (1.0, f64::NAN, Verdict::Undecided),
-        (1.0, f64::INFINITY, Verdict::Undecided),
-        (f64::NAN, 1.0, Verdict::Undecided),
-        (f64::INFINITY, f64::INFINITY, Verdict::Same),
-        (0.0, 1e-9, Verdict::Worse),
-        (0.0, -1e-9, Verdict::Better),
-        (-2.0, -1.0, Verdict::Same),
-        (-1.0, -2.0, Verdict::Better),
+        (1.0, f64::NAN, ChangeVerdict::Undecided),
+        (1.0, f64::INFINITY, ChangeVerdict::Undecided),
+        (f64::NAN, 1.0, ChangeVerdict::Undecided),
+        (f64::INFINITY, f64::INFINITY, ChangeVerdict::Same),
+        (0.0, 1e-9, ChangeVerdict::Worse),
+        (0.0, -1e-9, ChangeVerdict::Better),
+        (-2.0, -1.0, ChangeVerdict::Same),
+        (-1.0, -2.0, ChangeVerdict::Better),
         // Half of the base, not of the candidate.
-        (2.0, 3.0, Verdict::Same),
-        (2.0, 3.1, Verdict::Worse),
-        (3.0, 1.4, Verdict::Better),
+        (2.0, 3.0, ChangeVerdict::Same),
+        (2.0, 3.1, ChangeVerdict::Worse),
+        (3.0, 1.4, ChangeVerdict::Better),
     ] {
         assert_eq!(verdict(a, b), wanted, "{a} {b}");
     }

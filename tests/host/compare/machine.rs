@@ -2,7 +2,7 @@
 
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};
-use raystone::compare::judge::{IN_TURNS, TimeRatio, Verdict};
+use raystone::compare::judge::{ChangeVerdict, IN_TURNS, TimeRatio};
 use raystone::compare::side::{Side, differences};
 use raystone::compare::taken::taken;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
@@ -148,7 +148,7 @@ fn times_without_a_place_or_of_several_are_refused() {
             found.notes
         );
         let mut times = found.findings.iter().filter(|f| f.is_time);
-        assert!(times.all(|f| f.verdict == Verdict::Undecided && !f.is_control));
+        assert!(times.all(|f| f.verdict == ChangeVerdict::Undecided && !f.is_control));
     }
 }
 
@@ -168,7 +168,7 @@ fn another_image_is_expected_of_another_device_alone() {
     assert!(
         images
             .iter()
-            .all(|f| f.verdict == Verdict::Changed && f.why.contains("another device"))
+            .all(|f| f.verdict == ChangeVerdict::Changed && f.why.contains("another device"))
     );
 }
 
@@ -192,7 +192,7 @@ fn times_of_other_work_are_open_and_no_controls() {
         .collect();
     assert_eq!(open.len(), 1);
     assert!(
-        open[0].verdict == Verdict::Undecided && open[0].why.contains("999 rays"),
+        open[0].verdict == ChangeVerdict::Undecided && open[0].why.contains("999 rays"),
         "{open:?}"
     );
     assert!(open[0].measured.is_none() && !open[0].is_control && !open[0].looks_worse);
@@ -214,7 +214,9 @@ fn cells_without_a_hash_of_their_kernels_are_no_controls() {
     );
     assert!(found.findings.iter().all(|f| !f.is_control));
     let open = found.findings.iter().filter(|f| f.is_time);
-    assert!(open.clone().count() == 24 && open.clone().all(|f| f.verdict == Verdict::Undecided));
+    assert!(
+        open.clone().count() == 24 && open.clone().all(|f| f.verdict == ChangeVerdict::Undecided)
+    );
     assert!(
         open.clone()
             .all(|f| f.measured.is_none() && f.why.contains("without enough unchanged cells"))
@@ -286,8 +288,8 @@ fn a_control_that_moves_alone_is_open_and_all_others_are_the_same() {
     let (mut open, mut same) = (0, 0);
     for finding in found.findings.iter().filter(|f| f.is_control) {
         match finding.verdict {
-            Verdict::Undecided => open += 1,
-            Verdict::Same => same += 1,
+            ChangeVerdict::Undecided => open += 1,
+            ChangeVerdict::Same => same += 1,
             other => panic!("{other:?}"),
         }
     }
@@ -325,7 +327,7 @@ fn rounds_of_one_process_need_no_controls_and_nothing_is_suspect() {
     assert!(
         worse
             .iter()
-            .all(|f| f.verdict == Verdict::Worse && f.why.ends_with("the same rounds")),
+            .all(|f| f.verdict == ChangeVerdict::Worse && f.why.ends_with("the same rounds")),
         "{worse:?}"
     );
     assert_eq!(found.suspects().count(), 0);
@@ -393,7 +395,7 @@ fn what_was_measured_again_replaces_the_two_runs() {
     let again_the_same = times(&calm, "structure-8");
     assert!(!again_the_same.is_empty());
     for finding in again_the_same {
-        assert_eq!(finding.verdict, Verdict::Same, "{finding:?}");
+        assert_eq!(finding.verdict, ChangeVerdict::Same, "{finding:?}");
         assert!(
             finding.why.contains("the same rounds, widened")
                 && finding.why.ends_with("side by side"),
@@ -410,7 +412,7 @@ fn what_was_measured_again_replaces_the_two_runs() {
     assert!(
         slower
             .iter()
-            .all(|f| f.verdict == Verdict::Worse && !f.looks_worse)
+            .all(|f| f.verdict == ChangeVerdict::Worse && !f.looks_worse)
     );
     // Alternating programs have no controls: all may be slower.
     let turns = found(&again(&base, IN_TURNS, |_| 1.2));
@@ -419,7 +421,7 @@ fn what_was_measured_again_replaces_the_two_runs() {
             .findings
             .iter()
             .filter(|f| f.is_time)
-            .all(|f| f.verdict == Verdict::Worse),
+            .all(|f| f.verdict == ChangeVerdict::Worse),
         "{:?}",
         turns.notes
     );
@@ -432,12 +434,12 @@ fn a_base_that_was_cut_leaves_what_it_lacks_open() {
         line.key.label("accel") != "structure-3" && !matches!(line.body, Body::Finished(_))
     });
     let found = compared(&side(lines), &Made::default().side());
-    assert_eq!(found.count(Verdict::New), 0);
-    assert_eq!(found.verdict(), Verdict::Undecided);
+    assert_eq!(found.count(ChangeVerdict::New), 0);
+    assert_eq!(found.verdict(), ChangeVerdict::Undecided);
     let open = found
         .findings
         .iter()
-        .filter(|f| f.verdict == Verdict::Undecided);
+        .filter(|f| f.verdict == ChangeVerdict::Undecided);
     assert!(
         open.clone().count() > 10
             && open

@@ -12,7 +12,7 @@ mod records;
 mod seeds;
 mod shown;
 
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
 
@@ -22,6 +22,6 @@ fn compared(base: &Side, candidate: &Side) -> Comparison {
 
 /// Findings of a figure other than "same".
 fn said<'a>(found: &'a Comparison, figure: &'a str) -> impl Iterator<Item = &'a Finding> {
-    let of = move |f: &&Finding| f.figure.id == figure && f.verdict != Verdict::Same;
+    let of = move |f: &&Finding| f.figure.id == figure && f.verdict != ChangeVerdict::Same;
     found.findings.iter().filter(of)
 }

@@ -2,7 +2,7 @@
 
 use super::compared;
 use super::records::Made;
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Confirmed, Options, compare_sides};
 use raystone::measure::record::{Body, Line, RunRecord};
@@ -65,10 +65,10 @@ fn another_seed_is_undecided_and_the_same_seed_is_worse() {
     let others = || of_other_rays(Made::default().lines());
     let found = compared(&base(), &of_text("[run]\nseed = 2\n", others()));
     assert_eq!(
-        found.count(Verdict::Worse) + found.count(Verdict::Better),
+        found.count(ChangeVerdict::Worse) + found.count(ChangeVerdict::Better),
         0
     );
-    assert_eq!(found.verdict(), Verdict::Undecided);
+    assert_eq!(found.verdict(), ChangeVerdict::Undecided);
     let is_other = |f: &&raystone::compare::Finding| f.why.contains("other seeds");
     // Hits, nodes, stack and times of two classes of twelve structures.
     assert_eq!(found.findings.iter().filter(is_other).count(), 24 * 4);
@@ -86,9 +86,9 @@ fn another_seed_is_undecided_and_the_same_seed_is_worse() {
         }
     }
     let found = compared(&base(), &of_text("[run]\nseed = 2\n", slower));
-    assert_eq!(found.count(Verdict::Worse), 12);
+    assert_eq!(found.count(ChangeVerdict::Worse), 12);
     let found = compared(&base(), &of_text("[run]\nseed = 1\n", others()));
-    assert!(found.count(Verdict::Worse) >= 48, "{:?}", found.notes);
+    assert!(found.count(ChangeVerdict::Worse) >= 48, "{:?}", found.notes);
 }
 
 fn run(out: &Path, seed: u32) -> Side {
@@ -118,7 +118,7 @@ fn two_seeds_of_a_real_run_are_never_worse_and_a_worsening_of_one_is_found() {
         let worse = found
             .findings
             .iter()
-            .filter(|f| f.verdict == Verdict::Worse);
+            .filter(|f| f.verdict == ChangeVerdict::Worse);
         let worse: Vec<_> = worse.map(|f| (&f.key, &f.figure.id, &f.why)).collect();
         assert!(worse.is_empty(), "{worse:?}");
     }
@@ -134,5 +134,5 @@ fn two_seeds_of_a_real_run_are_never_worse_and_a_worsening_of_one_is_found() {
         }
     }
     let found = of(&first, &changed);
-    assert_eq!(found.verdict(), Verdict::Worse);
+    assert_eq!(found.verdict(), ChangeVerdict::Worse);
 }

@@ -2,7 +2,7 @@
 
 use super::compared;
 use super::records::Made;
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::show::{json, markdown, terminal, verdict_line};
 use raystone::compare::side::Side;
 use raystone::measure::record::{Body, axis};
@@ -38,7 +38,7 @@ fn hostile() -> [Side; 2] {
 fn hostile_names_are_inert() {
     let [base, candidate] = hostile();
     let found = compared(&base, &candidate);
-    assert_eq!(found.verdict(), Verdict::Worse);
+    assert_eq!(found.verdict(), ChangeVerdict::Worse);
     for width in [60, 80, 120] {
         let text = terminal(&found, screen(width));
         assert!(!text.contains(['\u{1b}', '\u{202e}', '\r']), "{text}");
@@ -139,12 +139,12 @@ fn a_comment_holds_the_verdict_and_the_worst_however_much_there_is_to_say() {
     // Both folded sections are full, reasons and notes are long, and worse findings come last.
     let mut same = found.findings.clone();
     for (index, finding) in same.iter_mut().enumerate() {
-        finding.verdict = [Verdict::Same, Verdict::Undecided][index % 2];
+        finding.verdict = [ChangeVerdict::Same, ChangeVerdict::Undecided][index % 2];
         finding.why = format!("@ {index} ").repeat(20);
     }
     found.findings.extend(same);
     let mut worst = found.findings[0].clone();
-    (worst.verdict, worst.why) = (Verdict::Worse, "the worst".to_owned());
+    (worst.verdict, worst.why) = (ChangeVerdict::Worse, "the worst".to_owned());
     found.findings.push(worst);
     for count in [0, 60] {
         found.notes.resize(count, "&\u{202e}".repeat(3000));

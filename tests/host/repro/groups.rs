@@ -5,7 +5,7 @@ use raystone::measure::record::{COST, Interval, Key, Line, Ran, Tally};
 use raystone::report::data::RunData;
 use raystone::report::values::values;
 use raystone::repro::claim::{Context, Row, judge};
-use raystone::repro::judge::Verdict;
+use raystone::repro::judge::ClaimVerdict;
 use serde_json::json;
 
 /// Rays of six groups.
@@ -85,7 +85,7 @@ fn what_all_groups_share_is_no_noise_of_a_ratio() {
     ];
     let row = found(&lines, &ratio("least = 1.05"));
     let i = ours(&row);
-    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Supported, "{row:?}");
     assert!(
         (i.value - 1.1).abs() < 1e-3 && i.high - i.low < 1e-3,
         "{i:?}"
@@ -100,7 +100,7 @@ fn groups_that_disagree_leave_it_open() {
     ];
     let row = found(&lines, &ratio("least = 1.0"));
     let i = ours(&row);
-    assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Undecided, "{row:?}");
     // The quotient of sums, as in reports, and the delete-one jackknife by hand.
     let sums = |own: [f64; 6], without: usize| {
         let kept = (0..6).filter(|i| *i != without);
@@ -130,11 +130,14 @@ fn a_gain_that_grows_is_judged_by_what_groups_say_of_all_four_figures() {
     };
     // The same groups gain and lose: the growth is known although no gain is.
     let row = found(&lines(MIXED), order);
-    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Supported, "{row:?}");
     assert!((ours(&row).value - 1.3).abs() < 1e-3, "{row:?}");
     let mut turned = MIXED;
     turned.reverse();
-    assert_eq!(found(&lines(turned), order).verdict, Verdict::Undecided);
+    assert_eq!(
+        found(&lines(turned), order).verdict,
+        ClaimVerdict::Undecided
+    );
 }
 
 #[test]
@@ -161,14 +164,14 @@ fn one_group_says_nothing_of_others_and_older_records_have_none() {
         &[one("shift", 2e5), one("jitter", 1e5)],
         &ratio("least = 1.0"),
     );
-    assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Undecided, "{row:?}");
     // A ratio of sides with different numbers of groups is not certain either.
     let fewer = [
         at_16("shift", cycles(2e5, SAME)),
         at_16("jitter", cycles(1e5, SAME)[..5].to_vec()),
     ];
     let row = found(&fewer, &ratio("least = 1.0"));
-    assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Undecided, "{row:?}");
     // Without groups in the records it is a counted figure like others.
     let strip = |line: Line| {
         let mut json = serde_json::to_value(&line).expect("JSON");

@@ -7,7 +7,7 @@ use raystone::measure::record::{Body, Interval, Key, Line, Ran, text_of};
 use raystone::report::data::RunData;
 use raystone::report::document::{Block, Document, Tone};
 use raystone::report::{html, markdown, sections};
-use raystone::repro::judge::Verdict;
+use raystone::repro::judge::ClaimVerdict;
 use raystone::repro::run::{Placed, Reproduced, Settings, is_done, prepare, recorded};
 use raystone::repro::{NotCovered, Source, latex, page};
 use raystone::run::Registries;
@@ -211,13 +211,13 @@ fn judged(settings: &Settings, lines: &[Line]) -> Option<Reproduced> {
     recorded(&source(), settings, &Registries::default().catalogue()).expect("readable")
 }
 
-fn verdicts(table: &Reproduced) -> Vec<Verdict> {
+fn verdicts(table: &Reproduced) -> Vec<ClaimVerdict> {
     (0..table.claims.len()).map(|i| table.verdict(i)).collect()
 }
 
 #[test]
 fn records_are_judged_and_a_clock_speaks_on_a_device_alone() {
-    use Verdict::{Contradicted, NotTestable, Shown, Supported};
+    use ClaimVerdict::{Contradicted, NotTestable, Shown, Supported};
     let out = tempfile::tempdir().expect("a folder");
     let settings = settings(&out);
     let device = judged(&settings, &lines(&settings, false)).expect("a table");
@@ -310,19 +310,19 @@ fn a_structure_that_failed_or_was_left_out_is_not_testable_and_never_supported()
     let row = &table.claims[1][1];
     assert_eq!(
         (row.verdict, &*row.reason),
-        (Verdict::NotTestable, "out of memory")
+        (ClaimVerdict::NotTestable, "out of memory")
     );
     // The other places decide.
-    assert_eq!(table.verdict(1), Verdict::Supported);
+    assert_eq!(table.verdict(1), ClaimVerdict::Supported);
     // Without any mention of it, the expectation is at fault.
     let mut absent = lines(&settings, false);
     absent.remove(6);
     let table = judged(&settings, &absent).expect("a table");
-    assert_eq!(table.verdict(1), Verdict::Faulty);
+    assert_eq!(table.verdict(1), ClaimVerdict::Faulty);
     // Figures that are only shown have faults, too.
     absent.remove(5);
     let table = judged(&settings, &absent).expect("a table");
-    assert_eq!(table.verdict(0), Verdict::Faulty);
+    assert_eq!(table.verdict(0), ClaimVerdict::Faulty);
     // A failed time states the reason.
     let mut slow = lines(&settings, false);
     for line in &mut slow {
@@ -334,7 +334,7 @@ fn a_structure_that_failed_or_was_left_out_is_not_testable_and_never_supported()
     let row = judged(&settings, &slow).expect("a table").claims[4].remove(0);
     assert_eq!(
         (row.verdict, &*row.reason),
-        (Verdict::NotTestable, "another image")
+        (ClaimVerdict::NotTestable, "another image")
     );
 }
 
@@ -408,7 +408,7 @@ fn the_page_begins_with_counts_and_shows_the_theses_number_before_ours() {
         ..settings
     };
     let table = judged(&quick, &lines(&quick, true)).expect("a table");
-    assert_eq!(table.claims[1][1].verdict, Verdict::NotTestable);
+    assert_eq!(table.claims[1][1].verdict, ClaimVerdict::NotTestable);
     let text = shown(&[table], &failures).1;
     assert!(
         text.contains("A short run on small built-in scenes"),

@@ -8,7 +8,7 @@ use raystone::measure::record::{Interval, Key, Line, Ran, Reading, Samples};
 use raystone::report::data::RunData;
 use raystone::report::values::values;
 use raystone::repro::claim::{Context, Row, judge};
-use raystone::repro::judge::Verdict;
+use raystone::repro::judge::ClaimVerdict;
 use serde_json::json;
 
 /// The machine in each of eight rounds: three of them at half speed.
@@ -155,7 +155,7 @@ fn a_drift_that_both_share_is_none_of_the_ratios_noise() {
     let row = found(&pair(HERE, HERE), RATIO);
     assert!(width(&row) < 0.03, "{row:?}");
     assert!((row.ours.expect("a ratio").value - 2.0).abs() < 0.02);
-    assert_eq!(row.verdict, Verdict::Supported);
+    assert_eq!(row.verdict, ClaimVerdict::Supported);
     // The interval is that of the estimator used in comparisons.
     let ratios: Vec<f64> = A.iter().zip(B).map(|(a, b)| a / b).collect();
     let paired = TimeRatio::of_rounds(&ratios, "").expect("rounds");
@@ -201,7 +201,7 @@ fn only_what_was_timed_in_the_same_rounds_is_paired() {
         );
         let row = found(&pair(HERE, other), &body);
         assert!(width(&row) > 0.5, "{row:?}");
-        assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
+        assert_eq!(row.verdict, ClaimVerdict::Undecided, "{row:?}");
     }
     // Records of older programs lack the time of measurement.
     let unsaid = Sitting { began: 0, ..HERE };
@@ -218,12 +218,12 @@ fn an_order_of_times_is_paired_too() {
     let near: Vec<f64> = drifted(B).iter().map(|ms| 1.1 * ms).collect();
     let of =
         |slow: Sitting| [timed("slow", slow, &near), timed("fast", HERE, &drifted(B))].concat();
-    assert_eq!(found(&of(HERE), order).verdict, Verdict::Supported);
+    assert_eq!(found(&of(HERE), order).verdict, ClaimVerdict::Supported);
     let later = Sitting {
         began: HERE.began + 60,
         ..HERE
     };
-    assert_eq!(found(&of(later), order).verdict, Verdict::Undecided);
+    assert_eq!(found(&of(later), order).verdict, ClaimVerdict::Undecided);
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn a_time_per_sample_is_paired_as_such() {
     ];
     let body = RATIO.replace("least = 1.9", "most = 0.51");
     let row = found(&lines.concat(), &body);
-    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Supported, "{row:?}");
     // 4,000 rays in twice the time of 2,500.
     let rate = RATIO.replace("ms-per-spp", "cell-mrays-per-s");
     let row = found(&lines.concat(), &rate);

@@ -4,9 +4,9 @@ use raystone::config::Experiment;
 use raystone::config::expect::{Expect, Thesis};
 use raystone::measure::figure::{STAR_DISCREPANCY, figure as figure_of};
 use raystone::measure::record::{Interval, Key};
-use raystone::report::values::{Reading, Value};
+use raystone::report::values::{Estimate, Value};
 use raystone::repro::claim::{Context, Row, judge};
-use raystone::repro::judge::Verdict;
+use raystone::repro::judge::ClaimVerdict;
 use raystone::repro::run::{Settings, prepare};
 use raystone::repro::{SOURCES, Source};
 use raystone::run::Registries;
@@ -66,17 +66,17 @@ const RATIO: &str = "figure = \"ms-per-spp/v1\"\ncompare = \"ratio\"\nof = { acc
 #[test]
 fn a_ratio_upside_down_is_seen_and_its_interval_counts() {
     let at = |body: String| found(&body, &gpu()).verdict;
-    assert_eq!(at(format!("{RATIO}least = 1.5")), Verdict::Supported);
-    assert_eq!(at(format!("{RATIO}most = 1.0")), Verdict::Contradicted);
+    assert_eq!(at(format!("{RATIO}least = 1.5")), ClaimVerdict::Supported);
+    assert_eq!(at(format!("{RATIO}most = 1.0")), ClaimVerdict::Contradicted);
     // 2.0 is above 1.9, but its interval is not.
-    assert_eq!(at(format!("{RATIO}least = 1.9")), Verdict::Undecided);
+    assert_eq!(at(format!("{RATIO}least = 1.9")), ClaimVerdict::Undecided);
     let upside_down = RATIO
         .replace("slow", "_")
         .replace("fast", "slow")
         .replace('_', "fast");
     assert_eq!(
         at(format!("{upside_down}least = 1.5")),
-        Verdict::Contradicted
+        ClaimVerdict::Contradicted
     );
     let row = found(
         &format!("{RATIO}least = 1.5\nexplain = [\"nodes-per-ray/v1\"]"),
@@ -92,13 +92,13 @@ fn times_of_a_software_adapter_are_shown_and_not_judged() {
         &format!("{RATIO}least = 1.5\ndevice = \"gpu\""),
         &software(),
     );
-    assert_eq!(row.verdict, Verdict::NotTestable);
+    assert_eq!(row.verdict, ClaimVerdict::NotTestable);
     assert!(row.ours.is_some() && row.reason.contains("software"));
     let anywhere = found(&format!("{RATIO}least = 1.5"), &software());
-    assert_eq!(anywhere.verdict, Verdict::Supported);
+    assert_eq!(anywhere.verdict, ClaimVerdict::Supported);
     let order = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\ndevice = \"gpu\"\norder = [{ accel = \"fast\" }, { accel = \"slow\" }]\n";
     let row = found(order, &software());
-    assert_eq!(row.verdict, Verdict::NotTestable);
+    assert_eq!(row.verdict, ClaimVerdict::NotTestable);
     assert!(row.reason.contains("software") && row.reason.contains("fast 1.00 → slow 2.00"));
 }
 
@@ -111,9 +111,9 @@ fn an_order_reversed_is_seen() {
         let body = format!("figure = \"ms-per-spp/v1\"\ncompare = \"order\"\norder = [{picks}]\n");
         found(&body, &gpu()).verdict
     };
-    assert_eq!(order(["fast", "slow"]), Verdict::Supported);
-    assert_eq!(order(["slow", "fast"]), Verdict::Contradicted);
-    assert_eq!(order(["fast", "near"]), Verdict::Undecided);
+    assert_eq!(order(["fast", "slow"]), ClaimVerdict::Supported);
+    assert_eq!(order(["slow", "fast"]), ClaimVerdict::Contradicted);
+    assert_eq!(order(["fast", "near"]), ClaimVerdict::Undecided);
 }
 
 #[test]
@@ -123,9 +123,12 @@ fn a_slope_is_judged_against_the_thesis() {
             "figure = \"rmse-unbiased/v1\"\ncompare = \"slope\"\nalong = \"spp\"\noff_by = 0.1\nat = [{{ thesis = {thesis:?} }}]\n"
         )
     };
-    assert_eq!(found(&body(-0.5), &gpu()).verdict, Verdict::Supported);
-    assert_eq!(found(&body(0.5), &gpu()).verdict, Verdict::Contradicted);
-    assert_eq!(found(&body(-0.6), &gpu()).verdict, Verdict::Undecided);
+    assert_eq!(found(&body(-0.5), &gpu()).verdict, ClaimVerdict::Supported);
+    assert_eq!(
+        found(&body(0.5), &gpu()).verdict,
+        ClaimVerdict::Contradicted
+    );
+    assert_eq!(found(&body(-0.6), &gpu()).verdict, ClaimVerdict::Undecided);
 }
 
 #[test]
@@ -138,15 +141,15 @@ fn a_thesis_in_another_unit_is_converted_and_one_that_measures_something_else_is
     let seconds = found(&body("s", "0.002"), &gpu());
     assert_eq!(
         (seconds.verdict, seconds.thesis),
-        (Verdict::Supported, Some(2.0))
+        (ClaimVerdict::Supported, Some(2.0))
     );
     assert_eq!(
         found(&body("ms", "0.002"), &gpu()).verdict,
-        Verdict::Contradicted
+        ClaimVerdict::Contradicted
     );
     assert_eq!(
         found(&body("Mrays/s", "2.0"), &gpu()).verdict,
-        Verdict::Faulty
+        ClaimVerdict::Faulty
     );
 }
 
@@ -154,7 +157,7 @@ fn a_thesis_in_another_unit_is_converted_and_one_that_measures_something_else_is
 fn an_expectation_that_selects_nothing_is_a_fault_unless_it_was_left_out_for_a_reason() {
     let body = RATIO.replace("\"fast\"", "\"fst\"") + "least = 1.0";
     let row = found(&body, &gpu());
-    assert_eq!(row.verdict, Verdict::Faulty);
+    assert_eq!(row.verdict, ClaimVerdict::Faulty);
     assert!(row.reason.contains("accel = fst"), "{}", row.reason);
     let context = Context {
         absent: vec![(
@@ -166,11 +169,11 @@ fn an_expectation_that_selects_nothing_is_a_fault_unless_it_was_left_out_for_a_r
     let row = found(&body, &context);
     assert_eq!(
         (row.verdict, row.reason.as_str()),
-        (Verdict::NotTestable, "it was too big")
+        (ClaimVerdict::NotTestable, "it was too big")
     );
     let two = "figure = \"rmse-unbiased/v1\"\ncompare = \"ratio\"\nof = { spp = \"8\" }\nover = { spp = \"*\" }\nleast = 1.0";
     let row = found(two, &gpu());
-    assert_eq!(row.verdict, Verdict::Faulty);
+    assert_eq!(row.verdict, ClaimVerdict::Faulty);
     assert!(row.reason.contains("name the axis"), "{}", row.reason);
 }
 
@@ -197,8 +200,8 @@ fn a_missing_scene_is_told_and_the_rest_is_judged() {
     assert_eq!(
         verdicts,
         [
-            (Verdict::Supported, "There"),
-            (Verdict::NotTestable, "Gone")
+            (ClaimVerdict::Supported, "There"),
+            (ClaimVerdict::NotTestable, "Gone")
         ]
     );
     assert_eq!(rows[1].reason, "get it from there");
@@ -228,21 +231,21 @@ fn a_place_that_a_short_run_leaves_out_is_tested_by_a_whole_one_alone() {
         };
         found(&(RATIO.to_owned() + at), &context).verdict
     };
-    assert_eq!(said(true), Verdict::NotTestable);
-    assert_eq!(said(false), Verdict::Supported);
+    assert_eq!(said(true), ClaimVerdict::NotTestable);
+    assert_eq!(said(false), ClaimVerdict::Supported);
 }
 
 #[test]
 fn what_a_place_says_goes_before_what_the_expectation_says() {
     let bounds = RATIO.to_owned() + "least = 1.5\nat = [{ least = 2.5 }]\n";
-    assert_eq!(found(&bounds, &gpu()).verdict, Verdict::Contradicted);
+    assert_eq!(found(&bounds, &gpu()).verdict, ClaimVerdict::Contradicted);
     let most = RATIO.to_owned() + "most = 1.5\nat = [{ most = 2.5 }]\n";
-    assert_eq!(found(&most, &gpu()).verdict, Verdict::Supported);
+    assert_eq!(found(&most, &gpu()).verdict, ClaimVerdict::Supported);
     let of = "figure = \"nodes-per-ray/v1\"\ncompare = \"bound\"\nof = { accel = \"slow\" }\nmost = 15\nat = [{ of = { accel = \"fast\" } }]\n";
     let row = found(of, &gpu());
     assert_eq!(
         (row.verdict, row.ours.map(|i| i.value)),
-        (Verdict::Supported, Some(10.0))
+        (ClaimVerdict::Supported, Some(10.0))
     );
     let over = RATIO.to_owned() + "least = 1.0\nat = [{ over = { accel = \"near\" } }]\n";
     assert_eq!(found(&over, &gpu()).ours.map(|i| i.value), Some(2.0 / 1.05));
@@ -251,17 +254,17 @@ fn what_a_place_says_goes_before_what_the_expectation_says() {
 #[test]
 fn an_error_that_the_reference_does_not_resolve_leaves_it_open_and_a_word_is_no_number() {
     let key = Key::default().with("accel", "a");
-    let of = |reading: Reading, figure: &str| {
+    let of = |reading: Estimate, figure: &str| {
         let values = [Value::new(&key, figure_of(figure), reading)];
         let body = format!("figure = \"{figure}\"\ncompare = \"bound\"\nmost = 1.0\n");
         judge(&expect(&body), &values, &gpu()).remove(0)
     };
-    let below = of(Reading::Below(0.5), "rmse-unbiased/v1");
-    assert_eq!((below.verdict, below.ours), (Verdict::Undecided, None));
-    let word = of(Reading::Word("never"), "break-even/v1");
+    let below = of(Estimate::Below(0.5), "rmse-unbiased/v1");
+    assert_eq!((below.verdict, below.ours), (ClaimVerdict::Undecided, None));
+    let word = of(Estimate::Word("never"), "break-even/v1");
     assert_eq!(
         (word.verdict, &*word.reason),
-        (Verdict::NotTestable, "never")
+        (ClaimVerdict::NotTestable, "never")
     );
 }
 
@@ -278,10 +281,10 @@ fn every_step_of_an_order_counts_and_the_least_is_shown() {
         (row.verdict, row.ours.expect("a step").value, row.reason)
     };
     let (verdict, step, reason) = of(["a", "b", "c"]);
-    assert_eq!((verdict, step), (Verdict::Supported, 1.5));
+    assert_eq!((verdict, step), (ClaimVerdict::Supported, 1.5));
     assert!(reason.starts_with("a 1.00 → b 3.00 → c 4.50"), "{reason}");
-    assert_eq!(of(["a", "c", "b"]).0, Verdict::Contradicted);
-    assert_eq!(of(["b", "a", "c"]).0, Verdict::Contradicted);
+    assert_eq!(of(["a", "c", "b"]).0, ClaimVerdict::Contradicted);
+    assert_eq!(of(["b", "a", "c"]).0, ClaimVerdict::Contradicted);
 }
 
 /// Gains of `slow` over `fast` at two sizes: 1.2 and 3, while the times of both fall.
@@ -301,7 +304,7 @@ const RISES: &str = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\nof = { acc
 fn an_order_of_gains_is_one_of_ratios_and_not_of_the_values_above() {
     let verdict = |body: &str, values: &[Value]| judge(&expect(body), values, &gpu()).remove(0);
     let row = verdict(RISES, &gains());
-    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    assert_eq!(row.verdict, ClaimVerdict::Supported, "{row:?}");
     let ours = row.ours.expect("a step");
     assert!((ours.value - 2.5).abs() < 1e-12, "{row:?}");
     // Four parts of 5 % each.
@@ -314,31 +317,37 @@ fn an_order_of_gains_is_one_of_ratios_and_not_of_the_values_above() {
     let values_alone = RISES.replace("over = { accel = \"fast\" }\n", "");
     assert_eq!(
         verdict(&values_alone, &gains()).verdict,
-        Verdict::Contradicted
+        ClaimVerdict::Contradicted
     );
     let falls = RISES.replace(
         "[{ spp = \"8\" }, { spp = \"32\" }]",
         "[{ spp = \"32\" }, { spp = \"8\" }]",
     );
-    assert_eq!(verdict(&falls, &gains()).verdict, Verdict::Contradicted);
+    assert_eq!(
+        verdict(&falls, &gains()).verdict,
+        ClaimVerdict::Contradicted
+    );
     // A place may also name the other side.
     let of_places = RISES.replace(
         "over = { accel = \"fast\" }\n",
         "at = [{ over = { accel = \"fast\" } }]\n",
     );
-    assert_eq!(verdict(&of_places, &gains()).verdict, Verdict::Supported);
+    assert_eq!(
+        verdict(&of_places, &gains()).verdict,
+        ClaimVerdict::Supported
+    );
     // Parts that differ by less than their noise.
     let mut close = gains();
     close[2] = value("slow", 32, "ms-per-spp/v1", 1.1, 1.22, 1.3);
-    assert_eq!(verdict(RISES, &close).verdict, Verdict::Undecided);
+    assert_eq!(verdict(RISES, &close).verdict, ClaimVerdict::Undecided);
     // The other side is missing, or not a number.
-    assert_eq!(verdict(RISES, &gains()[..3]).verdict, Verdict::Faulty);
+    assert_eq!(verdict(RISES, &gains()[..3]).verdict, ClaimVerdict::Faulty);
     let mut word = gains();
-    word[3].reading = Reading::Word("never");
+    word[3].estimate = Estimate::Word("never");
     let row = verdict(RISES, &word);
     assert_eq!(
         (row.verdict, row.reason.as_str()),
-        (Verdict::NotTestable, "never")
+        (ClaimVerdict::NotTestable, "never")
     );
 }
 
@@ -364,7 +373,10 @@ fn what_was_measured_once_is_undecided_where_it_is_close() {
         );
         judge(&expect(&body), &once, &gpu()).remove(0).verdict
     };
-    assert_eq!((of("b"), of("c")), (Verdict::Undecided, Verdict::Supported));
+    assert_eq!(
+        (of("b"), of("c")),
+        (ClaimVerdict::Undecided, ClaimVerdict::Supported)
+    );
 }
 
 #[test]
@@ -443,7 +455,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
         "points = \"46\"",
     ] {
         let (verdict, reason) = found(&discrepancy(of), &left_out);
-        assert_eq!(verdict, Verdict::Faulty, "{of}: {reason}");
+        assert_eq!(verdict, ClaimVerdict::Faulty, "{of}: {reason}");
         assert!(
             reason.contains("no star-discrepancy/v1 was found"),
             "{of}: {reason}"
@@ -458,7 +470,7 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
         "accel = \"grid\", spp = \"9\"",
         "scene = \"bx\"",
     ] {
-        assert_eq!(found(&rmse(of), &left_out).0, Verdict::Faulty, "{of}");
+        assert_eq!(found(&rmse(of), &left_out).0, ClaimVerdict::Faulty, "{of}");
     }
     // The cell itself, and everything derived from it, cannot be tested.
     for of in [
@@ -469,13 +481,13 @@ fn what_is_misspelt_is_a_fault_whatever_was_left_out() {
         let said = found(&rmse(of), &left_out);
         assert_eq!(
             said,
-            (Verdict::NotTestable, "it was too big".to_owned()),
+            (ClaimVerdict::NotTestable, "it was too big".to_owned()),
             "{of}"
         );
     }
     // If a figure was measured nowhere, its axes are unknown, and one reason suffices.
     let body = rmse("accel = \"grid\", rays = \"primary\"").replace("rmse-unbiased", "nowhere");
-    assert_eq!(found(&body, &left_out).0, Verdict::NotTestable);
+    assert_eq!(found(&body, &left_out).0, ClaimVerdict::NotTestable);
 }
 
 #[test]
@@ -546,24 +558,30 @@ fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
     // The middle of three points has no weight in the slope, whatever its interval.
     assert_eq!(
         at([0.99, 0.0, 0.99], "least = -0.6\nmost = -0.4\n"),
-        Verdict::Supported
+        ClaimVerdict::Supported
     );
     assert_eq!(
         at([0.99, 0.0, 0.99], "least = 0.5\n"),
-        Verdict::Contradicted
+        ClaimVerdict::Contradicted
     );
     // The last is unbounded below: the fall may be steeper but not flatter.
-    assert_eq!(at([0.99, 0.99, 0.0], "most = -0.4\n"), Verdict::Supported);
-    assert_eq!(at([0.99, 0.99, 0.0], "least = -0.6\n"), Verdict::Undecided);
+    assert_eq!(
+        at([0.99, 0.99, 0.0], "most = -0.4\n"),
+        ClaimVerdict::Supported
+    );
+    assert_eq!(
+        at([0.99, 0.99, 0.0], "least = -0.6\n"),
+        ClaimVerdict::Undecided
+    );
     // A count of zero is a number and has a ratio; zero over zero has none.
     let ratio = |a: f64, b: f64, bound: &str| {
         let of = |accel: &str, x: f64| value(accel, 8, "nodes-per-ray/v1", x, x, x);
         let body = RATIO.replace("ms-per-spp", "nodes-per-ray") + bound;
         judge(&expect(&body), &[of("slow", a), of("fast", b)], &gpu())[0].verdict
     };
-    assert_eq!(ratio(0.0, 3.0, "most = 0.5\n"), Verdict::Supported);
-    assert_eq!(ratio(0.0, 3.0, "least = 0.5\n"), Verdict::Contradicted);
-    assert_eq!(ratio(0.0, 0.0, "least = 0.5\n"), Verdict::Undecided);
+    assert_eq!(ratio(0.0, 3.0, "most = 0.5\n"), ClaimVerdict::Supported);
+    assert_eq!(ratio(0.0, 3.0, "least = 0.5\n"), ClaimVerdict::Contradicted);
+    assert_eq!(ratio(0.0, 0.0, "least = 0.5\n"), ClaimVerdict::Undecided);
     // A non-positive figure is reported, not omitted.
-    assert_eq!(ratio(-1.0, 3.0, "most = 0.5\n"), Verdict::Undecided);
+    assert_eq!(ratio(-1.0, 3.0, "most = 0.5\n"), ClaimVerdict::Undecided);
 }

@@ -1,7 +1,7 @@
 //! Records that were damaged: whatever they say, nothing panics that reads them, and no figure comes of what cannot be.
 
 use super::{folder_of, records, run_folder};
-use raystone::compare::judge::Verdict;
+use raystone::compare::judge::ChangeVerdict;
 use raystone::compare::side::Side;
 use raystone::compare::{Confirmed, Options, compare_sides, show};
 use raystone::export::select::Selection;
@@ -211,7 +211,7 @@ fn said(text: &str) -> Result<(Verdict, usize), String> {
     let sound = Side::read(&run_folder()).expect("sound records");
     let side = Side::read(folder.path()).map_err(|e| e.to_string())?;
     let found = compare_sides(&sound, &side, &Options::default(), &Confirmed::new());
-    Ok((found.verdict(), found.count(Verdict::Undecided)))
+    Ok((found.verdict(), found.count(ChangeVerdict::Undecided)))
 }
 
 #[test]
@@ -249,7 +249,7 @@ fn what_is_missing_or_nothing_is_not_compared() {
         ("time", "/body/cpu_ms/0"),
     ] {
         let (verdict, open) = said(&with(kind, at, Some(json!(0.0)))).expect("records");
-        assert_eq!(verdict, Verdict::Undecided, "{at}");
+        assert_eq!(verdict, ChangeVerdict::Undecided, "{at}");
         assert!(open > 0, "{at}");
     }
     // Called otherwise, as by a program to come.
@@ -262,7 +262,11 @@ fn what_is_missing_or_nothing_is_not_compared() {
         ("time", "/body/ms_per_spp"),
     ] {
         let (verdict, open) = said(&with(kind, at, None)).expect("records");
-        assert_eq!((verdict, open > 0), (Verdict::Undecided, true), "{at}");
+        assert_eq!(
+            (verdict, open > 0),
+            (ChangeVerdict::Undecided, true),
+            "{at}"
+        );
     }
     for (kind, at) in [
         ("structure", "/body/timings/0/ms"),
