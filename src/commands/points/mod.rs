@@ -23,7 +23,7 @@ use std::process::ExitCode;
 pub struct Points {
     /// File to measure, with a point a line, coordinates parted by blanks, commas or tabs, `#` for comments; `-` is standard
     /// input, as is none without --sequence
-    #[arg(conflicts_with_all = ["SamplerArguments", "plot"])]
+    #[arg(conflicts_with_all = ["sequence", "decorrelation", "count", "pixel", "width", "seed", "param", "gpu", "plot"])]
     file: Option<PathBuf>,
     #[command(flatten)]
     sampler: SamplerArguments,

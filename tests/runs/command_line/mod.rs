@@ -174,12 +174,9 @@ fn a_scene_is_exported_by_its_old_name_too_and_flags_of_something_else_are_refus
             &["export", out, "--to", "mitsubi"],
             "did you mean `mitsuba`",
         ),
+        (&["points", "a.txt", "--count", "4"], "cannot be used"),
         (
-            &["points", "points.txt", "--count", "4"],
-            "required arguments",
-        ),
-        (
-            &["points", "a.txt", "--sequence", "sobol"],
+            &["points", "a.txt", "--sequence", "sobol", "--count", "4"],
             "cannot be used",
         ),
         (&["help", "rum"], "did you mean `run`"),
