@@ -206,7 +206,7 @@ fn with(kind: &str, at: &str, value: Option<Value>) -> String {
 }
 
 /// What a comparison with damaged records says: an error, or what it comes to.
-fn said(text: &str) -> Result<(Verdict, usize), String> {
+fn said(text: &str) -> Result<(ChangeVerdict, usize), String> {
     let folder = folder_of(text);
     let sound = Side::read(&run_folder()).expect("sound records");
     let side = Side::read(folder.path()).map_err(|e| e.to_string())?;
