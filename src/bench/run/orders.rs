@@ -1,7 +1,7 @@
 //! Full cells rendered in pixel orders: time per sample, and time to the first picture.
 
 use super::images::Estimator;
-use super::recorder::image_hash;
+use super::reference_file::image_hash;
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;

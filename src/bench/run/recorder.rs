@@ -9,7 +9,7 @@ use super::units::Unit;
 use raystone_config::Axis;
 use raystone_core::params::Variant;
 use raystone_gpu::Gpu;
-use raystone_image::{Image, ImageError};
+use raystone_image::ImageError;
 use raystone_record::{Body, CellRecord, KernelSetRecord, Line, text_of};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -169,11 +169,4 @@ impl<'a> Recorder<'a> {
 
 fn unwritable(error: serde_json::Error) -> RunError {
     RunError::Input(format!("a record cannot be written: {error}"))
-}
-
-/// BLAKE3 of the f32 pixels.
-pub(super) fn image_hash(image: &Image) -> String {
-    blake3::hash(bytemuck::cast_slice(&image.pixels))
-        .to_hex()
-        .to_string()
 }

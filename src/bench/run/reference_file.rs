@@ -2,7 +2,7 @@
 
 use super::error::RunError;
 use raystone_config::Experiment;
-use raystone_image::read_linear;
+use raystone_image::{Image, read_linear};
 use raystone_stats::metrics::Reference;
 
 /// An image that was read, fit for the experiment.
@@ -35,7 +35,7 @@ impl ReferenceFile {
                  of the size, or set run.resolution=[{w}, {h}]"
             )));
         }
-        let hash = super::recorder::image_hash(&image);
+        let hash = image_hash(&image);
         let reference = Reference::single(image)
             .map_err(|e| RunError::Input(format!("reference {name}: {e}")))?;
         Ok(Some(Self {
@@ -44,4 +44,11 @@ impl ReferenceFile {
             reference,
         }))
     }
+}
+
+/// BLAKE3 of the f32 pixels.
+pub(super) fn image_hash(image: &Image) -> String {
+    blake3::hash(bytemuck::cast_slice(&image.pixels))
+        .to_hex()
+        .to_string()
 }

@@ -6,7 +6,7 @@ use super::error::{Fault, RunError};
 use super::images::{self, Estimator};
 use super::measurement::Measurement;
 use super::paths;
-use super::recorder::image_hash;
+use super::reference_file::image_hash;
 use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
