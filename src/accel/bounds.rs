@@ -91,3 +91,17 @@ pub(crate) fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) 
     let exit = far[0].min(far[1]).min(far[2]);
     (enter, exit)
 }
+
+/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the default
+/// pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
+pub(crate) fn enter_box(
+    bounds: &Bounds,
+    ray: &Ray,
+    inverse: [f32; 3],
+    pad: f32,
+    t_best: f32,
+) -> Option<f32> {
+    let (enter, exit) = slab(bounds, ray, inverse);
+    let enter = enter.max(ray.t_min);
+    (enter <= exit.min(t_best) * pad).then_some(enter)
+}

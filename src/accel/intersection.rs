@@ -1,7 +1,6 @@
 //! How rays intersect triangles and boxes: the choice of tests that every structure follows, on the
 //! device by composition and on the host through [`Reciprocal`].
 
-use super::bounds::{Bounds, slab};
 use super::ray::{Ray, raised};
 use super::triangle::{AnyTriangleTest, Watertight};
 use raystone_core::params::Named;
@@ -189,19 +188,6 @@ impl Deref for Reciprocal {
     fn deref(&self) -> &[f32; 3] {
         &self.inverse
     }
-}
-
-/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the default
-/// pad ([`BoxTest`]) no accepted hit is culled.
-pub(crate) fn enter_box(
-    bounds: &Bounds,
-    ray: &Ray,
-    inverse: Reciprocal,
-    t_best: f32,
-) -> Option<f32> {
-    let (enter, exit) = slab(bounds, ray, *inverse);
-    let enter = enter.max(ray.t_min);
-    (enter <= exit.min(t_best) * inverse.pad).then_some(enter)
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@
 //! common start and end are here. CPU version of `kernels/accel/query.wesl`.
 
 use super::TriangleSoup;
-use super::bounds::Bounds;
-use super::intersection::{Reciprocal, enter_box};
+use super::bounds::{Bounds, enter_box};
+use super::intersection::Reciprocal;
 use super::mask::Masks;
 use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::{TriangleRecord, intersect_triangle};
@@ -69,7 +69,8 @@ impl<'a> Walk<'a> {
     /// Distance at which the ray enters a box before the hit so far, or `None`; see `enter_box`.
     pub fn enter(&mut self, bounds: &Bounds) -> Option<f32> {
         self.counters.box_tests += 1;
-        enter_box(bounds, &self.ray, self.inverse, self.hit.t)
+        let inverse = self.inverse;
+        enter_box(bounds, &self.ray, *inverse, inverse.pad, self.hit.t)
     }
 
     /// Tests a triangle.

@@ -4,8 +4,7 @@
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
 use super::super::AccelError;
-use super::super::bounds::Bounds;
-use super::super::intersection::enter_box;
+use super::super::bounds::{Bounds, enter_box};
 use super::super::leaf::{LEAF, LeafReader, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::twin::Walk;
@@ -194,7 +193,7 @@ impl Nodes for Pairs {
         let node = walk.visit(node as usize, &self.0[node as usize]);
         walk.counters.box_tests += 2;
         let (ray, inverse) = (&walk.ray, walk.inverse);
-        let enter = |bounds| enter_box(bounds, ray, inverse, ray.t_max);
+        let enter = |bounds| enter_box(bounds, ray, *inverse, inverse.pad, ray.t_max);
         let [(left, left_box), (right, right_box)] = node.children();
         let (enter_left, enter_right) = (enter(&left_box), enter(&right_box));
         let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));

@@ -1,9 +1,8 @@
 //! The reference for structures that transform rays: every instance is tested, without world boxes.
 
-use super::super::bounds::Bounds;
+use super::super::bounds::{Bounds, enter_box};
 use super::super::brute_force::EveryTriangle;
 use super::super::bvh::BvhParameters;
-use super::super::intersection::enter_box;
 use super::super::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };
@@ -66,7 +65,7 @@ impl CpuTwin for InstanceReference<'_> {
             local.t_max = best.t;
             let (bounds, built) = &self.objects[instance.object as usize];
             let inverse = tests.inverse(local.direction);
-            if enter_box(bounds, &local, inverse, best.t).is_none() {
+            if enter_box(bounds, &local, *inverse, inverse.pad, best.t).is_none() {
                 continue;
             }
             let hit = built.twin(object).closest_hit(&local, counters);

@@ -138,11 +138,14 @@ fn time(
     Ok(of_cells.into_iter().map(own).collect())
 }
 
+/// Readings of a cell, and what they cannot say.
+type Found = (Vec<Reading>, Vec<Note>);
+
 fn write(
     session: &mut Session,
     measurement: &dyn Measurement,
     at: &At,
-    (cell, found): (&Cell, Result<(Vec<Reading>, Vec<Note>), String>),
+    (cell, found): (&Cell, Result<Found, String>),
 ) -> Result<(), RunError> {
     let (readings, notes, failure) = match found {
         Ok((readings, notes)) => (readings, notes, None),

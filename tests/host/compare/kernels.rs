@@ -71,7 +71,7 @@ fn a_run_of_two_sets_of_kernels_leads_with_what_the_idea_changes() {
 #[test]
 fn what_the_idea_does_not_change_is_no_rival_of_itself() {
     let tables = terminal_tables(&run(|_| 1.0));
-    let verdict = table(&tables, "ChangeVerdict on box").join("\n");
+    let verdict = table(&tables, "Verdict on box").join("\n");
     assert!(verdict.contains("structure-0"), "{verdict}");
     assert!(!verdict.contains("structure-0 @my-idea"), "{verdict}");
     assert!(!verdict.contains("none @my-idea"), "{verdict}");
@@ -81,7 +81,7 @@ fn what_the_idea_does_not_change_is_no_rival_of_itself() {
         .iter_mut()
         .for_each(|line| line.ran.kernel_hash.clear());
     let tables = terminal_tables(&unsaid);
-    let verdict = table(&tables, "ChangeVerdict on box").join("\n");
+    let verdict = table(&tables, "Verdict on box").join("\n");
     assert!(verdict.contains("structure-0 @my-idea"), "{verdict}");
 }
 
@@ -94,7 +94,7 @@ fn the_page_leads_with_it_too_and_a_run_of_one_set_has_no_such_table() {
     };
     let text = page(&run(idea_is_slower));
     let lead = text.find("What the kernels @my-idea change, against embedded");
-    let winners = text.find("ChangeVerdict on box");
+    let winners = text.find("Verdict on box");
     assert!(lead.is_some() && lead < winners, "{lead:?} {winners:?}");
     assert!(
         text.contains("Asked: what the kernels @my-idea change"),
