@@ -10,7 +10,7 @@ const TERMS: &[Entry] = &[
     ("gate", &["gate"],
         "Before anything is timed, every structure answers the same recorded rays as the reference tracer; each answer must be equal to \
          the bit. A structure that differs once fails the gate and gets no speed."),
-    ("judge", &["judge"],
+    ("reference tracer", &["reference tracer"],
         "Plain code on the processor that answers the recorded rays; it is itself compared with testing every triangle and \
          with exact arithmetic."),
     ("relMSE", &["relMSE"],

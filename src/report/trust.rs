@@ -9,7 +9,7 @@ pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
     let gates = || scene.structures.iter().filter_map(|s| s.gate.as_ref());
     let differs = |gate: &GateVerdict| gate.brute_force.wrong > 0 || gate.oracle.wrong > 0;
     if gates().any(differs) {
-        return Some("the reference tracer differs from what judges it".into());
+        return Some("the reference tracer differs from brute force or the oracle".into());
     }
     let failed = scene.structures.iter().filter(|s| s.fault().is_some());
     let names: Vec<&str> = failed.map(|s| s.structure.as_str()).collect();
@@ -29,11 +29,11 @@ pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<Stri
     unequal.or_else(|| doubt_of_rays(scene))
 }
 
-/// Why no sampler may be called the best: the reference, the judgement of the integrator, or a check of its images.
+/// Why no sampler may be called the best: the reference, the check of the integrator, or a check of its images.
 pub(crate) fn doubt_of_errors(view: &View) -> Option<String> {
     let judged = || {
         let fault = view.paths_fault.as_ref()?;
-        Some(format!("the integrator differs from its judge: {fault}"))
+        Some(format!("the integrator differs from its reference: {fault}"))
     };
     view.reference_fault()
         .or_else(judged)

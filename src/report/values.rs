@@ -35,8 +35,8 @@ pub struct Value<'a> {
 pub struct Source<'a> {
     /// The samples.
     pub samples: Samples,
-    /// What the samples of two values have in common if they belong together one by one, see [`sitting`]; empty where that is
-    /// not known.
+    /// Equal for two values whose samples belong together one by one, as those timed in the same rounds
+    /// do; empty where that is not known.
     pub sitting: String,
     /// What must be equal for two values to be of the same work.
     pub work: String,

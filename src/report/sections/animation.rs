@@ -46,7 +46,7 @@ fn introduction(settings: &Animation) -> String {
     format!(
         "{motion}. Refitted: the first frame's tree with new boxes, fitted on the device (a tree refitted on the host is \
          equal to the bit), or new transforms under what was built over the objects. Rebuilt: by the structure's own \
-         builder. Each frame has a judge of its own, whose rays both answer as it does, to the bit. Costs are those of the \
+         builder. Each frame has a reference tracer of its own, whose rays both answer as it does, to the bit. Costs are those of the \
          tree alone, transfers included; the layout is the same for both."
     )
 }
