@@ -181,7 +181,7 @@ impl ReferenceTracer {
             if !judged.same_bits(brute) {
                 self.brute_force.wrong += 1;
                 self.first_wrong
-                    .get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
+                    .get_or_insert_with(|| describe(ray, "reference", judged, "brute force", brute));
             }
         }
     }
@@ -359,7 +359,7 @@ pub fn compare(
             } else {
                 " | any-hit answer differs"
             };
-            describe(ray, "structure", &hit, "judge", truth) + any
+            describe(ray, "structure", &hit, "reference", truth) + any
         });
     }
     verdict

@@ -374,7 +374,7 @@ fn a_run_shows_peers_apart_and_goes_on_without_one() {
     );
     assert!(summary.contains("Time of the processors over that of a peer"));
     let figures = read("figures.csv");
-    assert!(figures.contains("cpu-over-peer/v1") && figures.contains("unlike-reference/v1"));
+    assert!(figures.contains("cpu-over-peer/v1") && figures.contains("unlike-judge/v1"));
 }
 
 #[test]
