@@ -33,7 +33,9 @@ pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<Stri
 pub(crate) fn doubt_of_errors(view: &View) -> Option<String> {
     let judged = || {
         let fault = view.paths_fault.as_ref()?;
-        Some(format!("the integrator differs from its reference: {fault}"))
+        Some(format!(
+            "the integrator differs from its reference: {fault}"
+        ))
     };
     view.reference_fault()
         .or_else(judged)

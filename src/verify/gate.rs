@@ -180,8 +180,9 @@ impl ReferenceTracer {
         for ((ray, judged), brute) in pairs.iter().zip(&truth) {
             if !judged.same_bits(brute) {
                 self.brute_force.wrong += 1;
-                self.first_wrong
-                    .get_or_insert_with(|| describe(ray, "reference", judged, "brute force", brute));
+                self.first_wrong.get_or_insert_with(|| {
+                    describe(ray, "reference", judged, "brute force", brute)
+                });
             }
         }
     }
