@@ -1,10 +1,10 @@
 //! Adaptive sampling by tile: the first samples decide how many more each tile takes.
 
 use super::error::Fault;
-use super::errors::{
+use super::reference::ReferenceImage;
+use super::replicates::{
     Pass, Replicates, add_error, blank_record, check_finite, draw, replicate_s, replicates,
 };
-use super::reference::ReferenceImage;
 use super::session::Session;
 use raystone_config::{Cell, StopRule};
 use raystone_image::Image;

@@ -32,6 +32,7 @@ mod reference;
 mod reference_file;
 mod registries;
 mod render;
+mod replicates;
 mod resume;
 mod session;
 mod shard;
