@@ -58,7 +58,7 @@ pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::BuildLog;
 pub use structure::{OverTree, Structure};
 pub use tracer::{
-    Answers, Ask, GroupShape, LiveRays, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
+    Answers, Ask, GroupShape, LiveRays, Load, LoadRegistry, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
     Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
 };
 pub use twin::CpuTwin;

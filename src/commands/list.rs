@@ -88,7 +88,7 @@ const fn other(
 const ADAPTER: &str = "adapter";
 
 #[rustfmt::skip]
-static TOPICS: [Topic; 20] = [
+static TOPICS: [Topic; 21] = [
     axis(Axis::Scene, "scene", &[], "built in, or the path of a .obj, .gltf, .glb, .ply or Nori .xml file"),
     axis(Axis::Accel, "accel", &["structure"], ""),
     axis(Axis::Sequence, "sequence", &[], ""),
@@ -104,6 +104,7 @@ static TOPICS: [Topic; 20] = [
     axis(Axis::Organisation, "organisation", &[], "of the path tracer on the device"),
     axis(Axis::Peer, "peer", &[], "ray casters of others, to measure against"),
     axis(Axis::Workgroup, "workgroup", &[], "of kernels that trace"),
+    axis(Axis::Load, "load", &[], "how kernels read nodes and triangles"),
     other("setting", "sections of experiment files, and their keys", |catalogue, _| {
         let sections = catalogue.sections().iter().map(|section| section.entry.clone());
         entries(&sections.collect::<Vec<_>>())

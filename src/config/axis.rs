@@ -65,6 +65,9 @@ axes! {
     /// Workgroups of the kernels that trace: so many rays, and pixels of this shape. All give the same hits and images to
     /// the bit.
     Workgroup = "workgroup" or "auto";
+    /// Whether kernels read nodes and triangles from storage buffers or as texels of textures. Both give the same hits and
+    /// images to the bit.
+    Load = "load" or "auto";
     /// Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current
     /// directory; `""` are the embedded ones.
     Kernels = "kernels" or "";

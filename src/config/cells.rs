@@ -41,12 +41,13 @@ static NOTHING: Variant = Variant {
 
 impl Cell {
     /// Axes that build, correctness check and timings of a structure depend on.
-    pub const STRUCTURE: [Axis; 6] = [
+    pub const STRUCTURE: [Axis; 7] = [
         Axis::Scene,
         Axis::Triangle,
         Axis::BoxTest,
         Axis::Accel,
         Axis::Workgroup,
+        Axis::Load,
         Axis::Kernels,
     ];
     /// Axes that a sampler's error depends on: not the structure, as hits are bit-identical.
@@ -63,7 +64,7 @@ impl Cell {
     /// Axes that the times of an external tracer depend on.
     pub const PEER: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Peer];
     /// Axes that an image and its time depend on.
-    pub(crate) const FULL: [Axis; 11] = [
+    pub(crate) const FULL: [Axis; 12] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
@@ -74,6 +75,7 @@ impl Cell {
         Axis::Offset,
         Axis::Organisation,
         Axis::Workgroup,
+        Axis::Load,
         Axis::Kernels,
     ];
     /// Axes that a measurement without a scene depends on.
@@ -128,8 +130,8 @@ impl Cell {
         axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
     }
 
-    /// Labels on these axes, followed by non-default tests, offset, organisation, workgroup and
-    /// kernels (`offset none`, `@idea`), to distinguish the cells of a run.
+    /// Labels on these axes, followed by non-default tests, offset, organisation, workgroup,
+    /// load path and kernels (`offset none`, `@idea`), to distinguish the cells of a run.
     pub fn labels(&self, axes: &[Axis]) -> Vec<String> {
         let named = axes.iter().map(|&axis| self[axis].label.clone());
         named.chain(self.unusual()).collect()
@@ -149,6 +151,7 @@ impl Cell {
             Axis::Offset,
             Axis::Organisation,
             Axis::Workgroup,
+            Axis::Load,
             Axis::Kernels,
         ];
         further.into_iter().filter_map(|axis| {

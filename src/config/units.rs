@@ -13,7 +13,7 @@ impl Plan {
         let is_first = |cell: &Cell, axis| cell.get(axis) == experiment.axes[axis].first();
         let cells = self.times.iter();
         let cells =
-            cells.filter(|c| is_first(c, Axis::Organisation) && is_first(c, Axis::Workgroup));
+            cells.filter(|c| is_first(c, Axis::Organisation) && is_first(c, Axis::Workgroup) && is_first(c, Axis::Load));
         cells.cloned().collect()
     }
 }

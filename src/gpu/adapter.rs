@@ -5,7 +5,7 @@ use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// The adapter to use.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -68,6 +68,8 @@ pub struct Gpu {
     compilations: usize,
     turn: Arc<AtomicUsize>,
     lost: Arc<Mutex<Option<String>>>,
+    /// See [`Gpu::reads_texels_faster`].
+    pub(super) texels_faster: Arc<OnceLock<bool>>,
 }
 
 fn instance(backends: wgpu::Backends) -> wgpu::Instance {
@@ -268,6 +270,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         compilations: 1,
         turn: Arc::default(),
         lost,
+        texels_faster: Arc::default(),
     };
     gpu.loop_limit = super::probe::probe_loops(&gpu)?;
     Ok(gpu)

@@ -11,6 +11,9 @@ use std::sync::{Arc, OnceLock};
 
 const TEXEL_BYTES: u64 = 16;
 
+/// Feature of kernels that read the arrays of a structure as texels of textures.
+pub const TEXELS: &str = "texels";
+
 /// Maximum parts of an array; kernels declare as many.
 pub(crate) const MAX_PARTS: usize = 4;
 
@@ -134,11 +137,15 @@ impl Bindings {
     }
 
     /// `composition` with the features of the bound resources, and those of arrays in several
-    /// parts: the features `name_1`, … and the constant `NAME_PART`.
+    /// parts: the features `name_1`, … and the constant `NAME_PART`. With the feature [`TEXELS`]
+    /// such arrays are whole textures.
     #[must_use]
     pub fn compose(&self, mut composition: Composition) -> Composition {
         for name in &self.features {
             composition = composition.feature(name, true);
+        }
+        if composition.features.contains(TEXELS) {
+            return composition;
         }
         for (name, (count, vec4s)) in &self.parts {
             for index in 1..*count {
@@ -176,7 +183,10 @@ impl Bindings {
             Storage::Scratch { name, .. } => lend(name).ok_or_else(unbound)?,
         };
         if binding.kind == BindingKind::Texels {
-            return texels_of(gpu, name, array, buffer).map(Resource::Texels);
+            let parts = self.parts.get(name).map_or(1, |(parts, _)| *parts);
+            let further = (1..parts).filter_map(|index| self.buffers.get(&part_name(name, index)));
+            let arrays: Vec<&Array> = std::iter::once(array).chain(further).collect();
+            return texels_of(gpu, name, &arrays).map(Resource::Texels);
         }
         let limit = gpu.limits.max_storage_buffer_binding_size;
         check(name, buffer.size(), limit)?;
@@ -192,42 +202,43 @@ fn part_name(name: &str, index: usize) -> String {
     }
 }
 
-fn texels_of(
-    gpu: &Gpu,
-    name: &str,
-    array: &Array,
-    buffer: &wgpu::Buffer,
-) -> Result<wgpu::TextureView, GpuError> {
-    if matches!(array.storage, Storage::Scratch { .. }) {
-        let text = format!("`{name}` is scratch, whose content changes: it cannot be a texture");
-        return Err(GpuError::Driver(text));
+/// The texture of an array, which may be in several parts.
+fn texels_of(gpu: &Gpu, name: &str, parts: &[&Array]) -> Result<wgpu::TextureView, GpuError> {
+    let mut buffers = Vec::new();
+    for part in parts {
+        let Storage::Own(buffer) = &part.storage else {
+            let text =
+                format!("`{name}` is scratch, whose content changes: it cannot be a texture");
+            return Err(GpuError::Driver(text));
+        };
+        buffers.push(buffer);
     }
-    let rows = (buffer.size() / TEXEL_BYTES).div_ceil(u64::from(TEXELS_PER_ROW));
+    let bytes: u64 = buffers.iter().map(|buffer| buffer.size()).sum();
+    let rows = (bytes / TEXEL_BYTES).div_ceil(u64::from(TEXELS_PER_ROW));
     let limit = u64::from(gpu.limits.max_texture_dimension_2d);
     if rows.max(u64::from(TEXELS_PER_ROW)) > limit {
         return Err(GpuError::TooLarge {
             name: format!("{name}, as a texture"),
-            needed: buffer.size(),
+            needed: bytes,
             limit: limit * u64::from(TEXELS_PER_ROW) * TEXEL_BYTES,
         });
     }
-    let made = array
+    let made = parts[0]
         .texels
-        .get_or_init(|| copy_to_texture(gpu, name, buffer, rows as u32));
+        .get_or_init(|| copy_to_texture(gpu, name, &buffers, rows as u32));
     Ok(made.clone())
 }
 
-/// The content of `buffer` as a texture.
-fn copy_to_texture(gpu: &Gpu, name: &str, buffer: &wgpu::Buffer, rows: u32) -> wgpu::TextureView {
-    let texels = (buffer.size() / TEXEL_BYTES) as u32;
-    let extent = |width, height| wgpu::Extent3d {
-        width,
-        height,
-        depth_or_array_layers: 1,
-    };
+/// The content of `buffers`, one behind the other, as a texture.
+fn copy_to_texture(
+    gpu: &Gpu,
+    name: &str,
+    buffers: &[&wgpu::Buffer],
+    rows: u32,
+) -> wgpu::TextureView {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(name),
-        size: extent(TEXELS_PER_ROW, rows.max(1)),
+        size: extent([TEXELS_PER_ROW, rows.max(1)]),
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
@@ -236,21 +247,66 @@ fn copy_to_texture(gpu: &Gpu, name: &str, buffer: &wgpu::Buffer, rows: u32) -> w
         view_formats: &[],
     });
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    let (whole, rest) = (texels / TEXELS_PER_ROW, texels % TEXELS_PER_ROW);
-    for (first, size) in [(0, extent(TEXELS_PER_ROW, whole)), (whole, extent(rest, 1))] {
-        if size.width == 0 || size.height == 0 {
-            continue;
+    let mut first = 0;
+    for buffer in buffers {
+        let texels = (buffer.size() / TEXEL_BYTES) as u32;
+        let mut done = 0;
+        while done < texels {
+            let (at, size) = next_rectangle(first + done, texels - done);
+            let layout = wgpu::TexelCopyBufferLayout {
+                offset: u64::from(done) * TEXEL_BYTES,
+                bytes_per_row: Some(TEXELS_PER_ROW * TEXEL_BYTES as u32),
+                rows_per_image: None,
+            };
+            let mut target = texture.as_image_copy();
+            [target.origin.x, target.origin.y] = at;
+            let source = wgpu::TexelCopyBufferInfo { buffer, layout };
+            encoder.copy_buffer_to_texture(source, target, extent(size));
+            done += size[0] * size[1];
         }
-        let row_bytes = TEXELS_PER_ROW * TEXEL_BYTES as u32;
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: u64::from(first) * u64::from(row_bytes),
-            bytes_per_row: Some(row_bytes),
-            rows_per_image: None,
-        };
-        let mut target = texture.as_image_copy();
-        target.origin.y = first;
-        encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, target, size);
+        first += texels;
     }
     gpu.queue.submit([encoder.finish()]);
     texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Where the texels from `first` on go that fill a rectangle, and its width and height: the rest of
+/// a row, whole rows, or a last row.
+fn next_rectangle(first: u32, count: u32) -> ([u32; 2], [u32; 2]) {
+    let at = [first % TEXELS_PER_ROW, first / TEXELS_PER_ROW];
+    let size = if at[0] > 0 || count < TEXELS_PER_ROW {
+        [count.min(TEXELS_PER_ROW - at[0]), 1]
+    } else {
+        [TEXELS_PER_ROW, count / TEXELS_PER_ROW]
+    };
+    (at, size)
+}
+
+fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers: 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rectangles_of_texels_follow_one_another() {
+        const ROW: u32 = TEXELS_PER_ROW;
+        for (first, count) in [(0, 1), (0, 3 * ROW), (5, ROW), (ROW - 1, 2 * ROW + 3), (7, 2)] {
+            let (mut done, mut places) = (0, Vec::new());
+            while done < count {
+                let ([x, y], [width, height]) = next_rectangle(first + done, count - done);
+                for row in y..y + height {
+                    places.extend((x..x + width).map(|column| row * ROW + column));
+                }
+                done += width * height;
+            }
+            assert!(places.into_iter().eq(first..first + count), "{first}, {count}");
+        }
+    }
 }

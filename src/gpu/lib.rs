@@ -12,6 +12,7 @@ pub mod compaction;
 mod compose;
 mod diagnose;
 mod kernel_errors;
+mod load_probe;
 mod pipeline;
 mod player;
 mod probe;
@@ -24,7 +25,7 @@ mod uniform;
 pub use adapter::{
     AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, device_type, is_software, open,
 };
-pub use bindings::{Bindings, Storage};
+pub use bindings::{Bindings, Storage, TEXELS};
 pub use clock::{Elapsed, Stopwatch};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub(crate) use kernel_errors::LOOPS_CUT;

@@ -34,6 +34,8 @@ pub mod axis {
     pub const PEER: &str = Axis::Peer.name();
     /// In which workgroups kernels trace; absent where none does.
     pub const WORKGROUP: &str = Axis::Workgroup.name();
+    /// How kernels read nodes and triangles; absent where none does.
+    pub const LOAD: &str = Axis::Load.name();
     /// Mesh that is shot at.
     pub const MESH: &str = "mesh";
     /// Scale and translation of a mesh.
@@ -51,7 +53,7 @@ pub mod axis {
     /// Any other thing that figures are of.
     pub const SUBJECT: &str = "subject";
     /// All of them.
-    pub const ALL: [&str; 20] = [
+    pub const ALL: [&str; 21] = [
         SCENE,
         ACCEL,
         INTEGRATOR,
@@ -64,6 +66,7 @@ pub mod axis {
         ORGANISATION,
         PEER,
         WORKGROUP,
+        LOAD,
         MESH,
         PLACE,
         AIM,
@@ -77,8 +80,19 @@ pub mod axis {
 
 /// Axis → what was taken of it. An axis that does not matter to a figure is absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(transparent)]
+#[serde(from = "BTreeMap<String, Written>")]
 pub struct Key(BTreeMap<String, Written>);
+
+/// Records from before there was a choice of load paths have the default one.
+impl From<BTreeMap<String, Written>> for Key {
+    fn from(mut axes: BTreeMap<String, Written>) -> Self {
+        if axes.contains_key(axis::WORKGROUP) && !axes.contains_key(axis::LOAD) {
+            let load = Axis::Load.default_name().unwrap_or_default();
+            axes.insert(axis::LOAD.to_owned(), Written(plain(load)));
+        }
+        Self(axes)
+    }
+}
 
 /// A variant as it is written: a plain name where its label says all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

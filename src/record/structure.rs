@@ -250,6 +250,10 @@ pub struct StructureRecord {
     /// Where triangles are met, which decides on the reference tracer: see [`Space`].
     #[serde(default)]
     pub space: Space,
+    /// How kernels read nodes and triangles, which `auto` leaves to the adapter: `buffer` or `texture`;
+    /// absent in records from before there was a choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load: Option<String>,
     /// Timed build phases.
     pub build: Vec<Phase>,
     /// Sum of the phases, milliseconds.

@@ -178,12 +178,13 @@ const VIEW_AXES: [&str; 4] = [
 ];
 
 /// What tells the structures of a scene apart.
-pub(crate) const STRUCTURE_AXES: [&str; 5] = [
+pub(crate) const STRUCTURE_AXES: [&str; 6] = [
     axis::ACCEL,
     axis::KERNELS,
     axis::TRIANGLE,
     axis::BOX_TEST,
     axis::WORKGROUP,
+    axis::LOAD,
 ];
 
 /// What tells the samplers of a view apart.

@@ -3,12 +3,13 @@
 use raystone_record::{Body, Key, Line, axis};
 
 /// Axes that are named only where a run has more than one value of them.
-const NAMED_IF_VARIED: [&str; 5] = [
+const NAMED_IF_VARIED: [&str; 6] = [
     axis::TRIANGLE,
     axis::BOX_TEST,
     axis::OFFSET,
     axis::ORGANISATION,
     axis::WORKGROUP,
+    axis::LOAD,
 ];
 
 /// The names of one run.
@@ -38,7 +39,7 @@ impl Names {
     /// A structure among all of its scene.
     pub fn structure(&self, key: &Key) -> String {
         let main = key.label(axis::ACCEL).to_owned();
-        let further = [axis::TRIANGLE, axis::BOX_TEST, axis::WORKGROUP];
+        let further = [axis::TRIANGLE, axis::BOX_TEST, axis::WORKGROUP, axis::LOAD];
         self.with_further(main + &kernels(key), key, &further)
     }
 

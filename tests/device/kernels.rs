@@ -67,10 +67,11 @@ fn fault(library: &KernelLibrary, kernel: &Composition, must_count: bool) -> Opt
     let asked = ["counters", "ray_counts"]
         .iter()
         .any(|f| kernel.features.contains(*f));
-    // Ordered shading uses one more buffer if the scene is not in textures, or is refused.
+    // Ordered shading uses one more buffer if nothing is in textures, or is refused.
     let has = |feature: &str| kernel.features.contains(feature);
     let in_order = has("sorted_hits") || has("by_kind");
-    let has_more = kernel.entry == "organisation/shade" && in_order && !has("scene_texels");
+    let has_textures = has("scene_texels") || has("texels");
+    let has_more = kernel.entry == "organisation/shade" && in_order && !has_textures;
     let buffers = BUFFERS + usize::from(has_more);
     match (broken_limit(&wgsl, buffers), counts(&wgsl)) {
         (Some(limit), _) => Some(limit),

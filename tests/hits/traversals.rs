@@ -412,7 +412,7 @@ fn a_link_or_content_that_leads_astray_is_no_valid_structure() {
 
 #[test]
 fn arrays_in_two_to_four_parts_give_the_same_hits() {
-    use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
+    use raystone::accel::{Load, Query, Traced, Tracer, TriangleBuffers};
     if !support::is_exact(support::gpu()) {
         return;
     }
@@ -439,14 +439,19 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
             gpu.limits.max_storage_buffer_binding_size = largest / (2 + index as u64 % 3) + 400;
             let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
             let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
-            let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest);
-            let batch = tracer.and_then(|tracer| tracer.batch(&rays));
-            let batch = batch.unwrap_or_else(|e| panic!("{params:?}: {e}"));
-            batch.trace().unwrap_or_else(|e| panic!("{params:?}: {e}"));
-            assert_eq!(batch.error_word().expect("the error word"), 0);
-            let hits = batch.hits().expect("hits");
-            assert_same_hits(&format!("{params:?}"), &rays, &expected, &hits);
-            seen.extend(batch.tracer().features());
+            // The parts are bound one by one, or become one texture.
+            for load in &Load::ALL[1..] {
+                let what = format!("{params:?}, load {}", load.name);
+                let traced = traced.clone().loading(&gpu, load).expect(&what);
+                let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest);
+                let batch = tracer.and_then(|tracer| tracer.batch(&rays));
+                let batch = batch.unwrap_or_else(|e| panic!("{what}: {e}"));
+                batch.trace().unwrap_or_else(|e| panic!("{what}: {e}"));
+                assert_eq!(batch.error_word().expect("the error word"), 0);
+                let hits = batch.hits().expect("hits");
+                assert_same_hits(&what, &rays, &expected, &hits);
+                seen.extend(batch.tracer().features());
+            }
         }
     }
     for array in ["nodes", "leaf_triangles", "triangles"] {
@@ -457,7 +462,7 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
 
 #[test]
 fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
-    use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
+    use raystone::accel::{Load, Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
     let sphere = catalogue[Axis::Scene]
         .iter()
@@ -471,6 +476,7 @@ fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
     let built = build(&Bvh, &soup, &params(&[("triangles", "indexed")]));
     let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
     let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
+    let traced = traced.loading(&gpu, &Load::ALL[1]).expect("buffers");
     let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest);
     let told = tracer.err().expect("too many buffers").to_string();
     assert!(told.contains("at most 8"), "{told}");

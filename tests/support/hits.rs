@@ -2,7 +2,7 @@
 
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
-    AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Query, Ray, Traced, Tracer,
+    AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Load, Query, Ray, Traced, Tracer,
     TriangleBuffers, TriangleSoup,
 };
 use raystone::gpu::Gpu;
@@ -121,6 +121,18 @@ pub fn trace(
     rays: &[Ray],
     features: &[&str],
 ) -> Batch {
+    trace_by(&Load::default(), gpu, built, soup, rays, features)
+}
+
+/// [`trace`] by a load path.
+pub fn trace_by(
+    load: &Load,
+    gpu: &Gpu,
+    built: &dyn BuiltAccel,
+    soup: &TriangleSoup,
+    rays: &[Ray],
+    features: &[&str],
+) -> Batch {
     let ask = Ask {
         query: match features.contains(&"any") {
             true => Query::Any,
@@ -132,7 +144,7 @@ pub fn trace(
     };
     let run = || {
         let triangles = TriangleBuffers::upload(gpu, soup)?;
-        let traced = Traced::upload(gpu, built)?;
+        let traced = Traced::upload(gpu, built)?.loading(gpu, load)?;
         let batch = Tracer::new(gpu, &triangles, &traced, ask)?.batch(rays)?;
         batch.trace()?;
         gpu.check_error_word(batch.error_word()?)?;

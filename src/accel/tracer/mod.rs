@@ -8,6 +8,7 @@ mod batch;
 mod passes;
 mod refill;
 mod traced;
+mod load;
 mod workgroup;
 
 pub use batch::{Answers, RayBatch, count_work};
@@ -15,6 +16,7 @@ pub use passes::{LiveRays, TracePasses, TraceSteps};
 pub(crate) use refill::Refill;
 pub use refill::RefillParameters;
 pub use traced::{Traced, TriangleBuffers};
+pub use load::{Load, LoadRegistry};
 pub use workgroup::{GroupShape, Workgroup, WorkgroupRegistry};
 
 use raystone_core::text::cell_hash;

@@ -1,9 +1,10 @@
 //! Triangles and a built structure on the device.
 
+use super::load::Load;
 use super::passes::{OnePass, TracePasses};
 use super::workgroup::{GroupShape, Workgroup};
 use crate::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
-use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, TEXELS};
 use std::sync::Arc;
 
 /// The canonical triangles on the device, and how rays intersect them.
@@ -48,15 +49,19 @@ pub struct Traced {
     pub bindings: Bindings,
     /// Workgroup shape of the kernels that trace with it.
     pub workgroup: GroupShape,
+    /// True if kernels read arrays as texels.
+    pub texels: bool,
     /// The space in which triangles are intersected: selects the reference for hits and images.
     pub space: Space,
 }
 
 impl Traced {
-    /// Uploads a built structure; arrays that its build left on the device stay there.
+    /// Uploads a built structure, read by the default load path; arrays that its build left on the
+    /// device stay there.
     ///
     /// # Errors
-    /// An array needs more parts, or more bytes, than the adapter offers.
+    /// An array needs more parts, or more bytes, than the adapter offers; or the load paths cannot
+    /// be measured.
     pub fn upload(gpu: &Gpu, built: &dyn BuiltAccel) -> Result<Self, GpuError> {
         let buffers = built.buffers();
         let mut bindings = Bindings::new();
@@ -95,6 +100,7 @@ impl Traced {
             inline,
             bindings,
             workgroup,
+            texels: Load::default().reads_texels(gpu)?,
             space: built.space(),
         })
     }
@@ -121,9 +127,19 @@ impl Traced {
         Ok(self)
     }
 
-    /// `composition` with this structure as the active one, in its workgroups.
+    /// The same by another load path.
+    ///
+    /// # Errors
+    /// The load paths cannot be measured.
+    pub fn loading(mut self, gpu: &Gpu, load: &Load) -> Result<Self, GpuError> {
+        self.texels = load.reads_texels(gpu)?;
+        Ok(self)
+    }
+
+    /// `composition` with this structure as the active one, in its workgroups and by its load path.
     #[must_use]
     pub fn compose(&self, composition: Composition) -> Composition {
-        self.workgroup.activate(self.active.activate(composition))
+        let composition = self.active.activate(composition);
+        (self.workgroup.activate(composition)).feature(TEXELS, self.texels)
     }
 }

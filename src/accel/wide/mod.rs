@@ -27,12 +27,10 @@ use std::ops::Range;
 const MAX_LEAF: usize = 3;
 
 parameters! {
-    /// The tree, and where kernels read a wide structure from.
+    /// The tree of a wide structure, and how its rays are handed out.
     pub struct WideParameters {
         /// The binary tree that is collapsed.
         tree: TreeParameters { leaf_size = MAX_LEAF, in 1..=MAX_LEAF; };
-        /// read nodes and triangles as texels of textures instead of from buffers
-        texels: bool = true;
         /// How the batch kernel hands out rays.
         refill: RefillParameters;
     }
@@ -77,7 +75,6 @@ pub(crate) struct Wide<N> {
     /// Triangle records, leaf by leaf.
     pub leaf_triangles: Vec<TriangleRecord>,
     stats: StructureStats,
-    texels: bool,
     refill: RefillParameters,
 }
 
@@ -131,7 +128,6 @@ impl<N: WideNode> Wide<N> {
                 },
                 nodes,
                 leaf_triangles,
-                texels: parameters.texels,
                 refill: parameters.refill.clone(),
             }
         }))
@@ -191,11 +187,7 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             kernel: N::KERNEL,
-            features: if self.texels {
-                vec!["texels"]
-            } else {
-                Vec::new()
-            },
+            features: Vec::new(),
             arrays: vec![
                 NamedWords::new("nodes", &self.nodes),
                 NamedWords::new("leaf_triangles", &self.leaf_triangles),
@@ -204,6 +196,10 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
             // A multiple of 8, so that scenes of similar depth share a kernel, and one spare entry.
             constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
         }
+    }
+
+    fn divisible(&self) -> &'static [&'static str] {
+        &["nodes", "leaf_triangles"]
     }
 
     fn refill(&self) -> RefillParameters {

@@ -5,7 +5,7 @@ use crate::compaction::benches;
 use crate::figure_registry::FigureRegistry;
 use crate::peers::PeerRegistry;
 use raystone_accel::{
-    AccelRegistry, BoxRegistry, Intersection, TriangleRegistry, Workgroup, WorkgroupRegistry,
+    AccelRegistry, BoxRegistry, Intersection, TriangleRegistry, Load, LoadRegistry, Workgroup, WorkgroupRegistry,
 };
 use raystone_config::{Axis, Catalogue, Cell};
 use raystone_core::params::Variant;
@@ -38,6 +38,8 @@ pub struct Registries {
     pub peers: PeerRegistry,
     /// Workgroups of tracing kernels.
     pub workgroups: WorkgroupRegistry,
+    /// How kernels read nodes and triangles.
+    pub loads: LoadRegistry,
     /// Stream compactions.
     pub compactions: CompactionRegistry,
     /// Checks of material and light kinds.
@@ -64,6 +66,7 @@ impl Registries {
         catalogue[Axis::Organisation] = self.organisations.0.entries();
         catalogue[Axis::Peer] = self.peers.entries();
         catalogue[Axis::Workgroup] = self.workgroups.entries();
+        catalogue[Axis::Load] = self.loads.entries();
         self.measurements
             .iter()
             .for_each(|m| m.declare(&mut catalogue));
@@ -98,6 +101,17 @@ impl Registries {
         match cell.get(Axis::Workgroup) {
             Some(variant) => self.workgroups.named("workgroup", &variant.name).copied(),
             None => Ok(Workgroup::default()),
+        }
+    }
+
+    /// The load path of a cell, or the default.
+    ///
+    /// # Errors
+    /// The load path is not registered.
+    pub fn load(&self, cell: &Cell) -> Result<Load, String> {
+        match cell.get(Axis::Load) {
+            Some(variant) => self.loads.named("load path", &variant.name).copied(),
+            None => Ok(Load::default()),
         }
     }
 

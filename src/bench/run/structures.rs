@@ -153,11 +153,8 @@ fn gate_with(
         return Ok(candidate);
     };
     let gpu = world.device.of(&cell[Axis::Kernels])?;
-    let workgroup = session.registries.workgroup(cell);
-    let traced = workgroup.map(|workgroup| traced.in_workgroups(gpu, &workgroup));
-    let traced = match traced {
-        Ok(Ok(traced)) => traced,
-        Ok(Err(error)) => return Ok(candidate.failed(error)),
+    let traced = match as_configured(session, gpu, cell, traced) {
+        Ok(traced) => traced,
         Err(reason) => return Ok(candidate.failed(reason)),
     };
     candidate.traced = Some(traced.clone());
@@ -175,6 +172,7 @@ fn gate_with(
         }
     };
     candidate.record.ran.kernel_hash = hash;
+    candidate.record.body.load = Some(if traced.texels { "texture" } else { "buffer" }.to_owned());
     verdict.passed &= candidate.structural.is_none();
     verdict.structural.clone_from(&candidate.structural);
     if verdict.passed {
@@ -189,6 +187,19 @@ fn gate_with(
         Some(fault) => candidate.failed(fault),
         None => candidate,
     })
+}
+
+/// A structure in the workgroups and by the load path of a cell.
+fn as_configured(
+    session: &Session,
+    gpu: &Gpu,
+    cell: &Cell,
+    traced: Traced,
+) -> Result<Traced, String> {
+    let (workgroup, load) = (session.registries.workgroup(cell)?, session.registries.load(cell)?);
+    let traced = traced.in_workgroups(gpu, &workgroup);
+    let traced = traced.and_then(|traced| traced.loading(gpu, &load));
+    traced.map_err(|error| error.to_string())
 }
 
 /// Updates of which the median is taken.
@@ -247,6 +258,7 @@ fn empty_record(cell: &Cell, runtime_checks: bool) -> Line<StructureRecord> {
     let record = StructureRecord {
         refused: false,
         space: Space::World,
+        load: None,
         build: Vec::new(),
         build_ms: 0.0,
         build_peak_bytes: None,

@@ -68,12 +68,13 @@ pub(super) fn fault(
     if world.cell[Axis::Scene].name == SCENE || !tests.bears_hard_rays() {
         return Ok(None);
     }
-    // Structures with equal parameters, tests, workgroups and kernels are the same.
+    // Structures with equal parameters, tests, workgroups, load paths and kernels are the same.
     let parts = [
         Axis::Accel,
         Axis::Triangle,
         Axis::BoxTest,
         Axis::Workgroup,
+        Axis::Load,
         Axis::Kernels,
     ];
     let key = format!("{:?}", cell.on(&parts));
@@ -122,7 +123,8 @@ impl CheckedScene {
             Err(_) => return Ok(None),
         };
         let workgroup = registries.workgroup(cell).map_err(GpuError::Kernel)?;
-        let traced = traced.in_workgroups(gpu, &workgroup)?;
+        let load = registries.load(cell).map_err(GpuError::Kernel)?;
+        let traced = traced.in_workgroups(gpu, &workgroup)?.loading(gpu, &load)?;
         let thinned = (accel.name == "brute-force").then(|| self.reference.thinned(EVERY));
         let reference = thinned.as_ref().unwrap_or(&self.reference);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);

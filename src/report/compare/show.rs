@@ -75,7 +75,7 @@ fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
         axis::SPP => format!("{label} spp"),
         axis::POINTS => format!("{label} points"),
         axis::KERNELS => format!("@{label}"),
-        axis::OFFSET | axis::TRIANGLE | axis::BOX_TEST | axis::WORKGROUP => {
+        axis::OFFSET | axis::TRIANGLE | axis::BOX_TEST | axis::WORKGROUP | axis::LOAD => {
             format!("{axis} {label}")
         }
         _ => label.to_owned(),

@@ -63,12 +63,13 @@ pub(crate) fn ideas(data: &RunData) -> Vec<String> {
 
 /// A row for each structure, those that the kernels change first.
 fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
-    const WHERE: [&str; 5] = [
+    const WHERE: [&str; 6] = [
         axis::SCENE,
         axis::ACCEL,
         axis::TRIANGLE,
         axis::BOX_TEST,
         axis::WORKGROUP,
+        axis::LOAD,
     ];
     let times = found.findings.iter().filter(|f| f.is_time);
     let mut groups = grouped(times, |f| f.key.only(&WHERE));

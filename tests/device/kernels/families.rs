@@ -320,6 +320,7 @@ pub fn batches() -> Family {
         "refill",
         "counted",
         "alpha_masks",
+        "texels",
         "loops_cut",
     ];
     factors.extend(features.map(Factor::feature));
@@ -357,7 +358,7 @@ pub fn renderers() -> Family {
     factors.extend(samplers);
     factors.extend([offsets(), workgroups(), Factor::entry(&entries)]);
     factors.extend(intersections());
-    factors.extend(flags(&["alpha_masks", "block_list", "scene_texels"]));
+    factors.extend(flags(&["alpha_masks", "block_list", "scene_texels", "texels"]));
     let clash = |a: Level, b: Level| {
         let is_whole = b.factor == "integrator" && !staged.contains(&text_of(b.part));
         (a.part.entry == REGENERATION && is_whole)
@@ -392,7 +393,7 @@ pub fn queued() -> Family {
     let mut factors = vec![integrator, Factor::entry(&entries)];
     factors.extend(samplers);
     factors.extend([offsets(), workgroups()]);
-    factors.extend(flags(&["scene_texels", "compacted"]));
+    factors.extend(flags(&["scene_texels", "texels", "compacted"]));
     factors.extend(OF_QUEUES.map(Factor::feature));
     let clash = |a: Level, b: Level| {
         let needs_queue = compacted.contains(&b.part.entry) || OF_QUEUES.iter().any(|f| b.is_on(f));

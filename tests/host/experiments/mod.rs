@@ -70,6 +70,7 @@ fn catalogue() -> Catalogue {
     catalogue[Axis::Organisation] = plain(&["single-kernel", "wavefront"]);
     catalogue[Axis::Peer] = plain(&["none", "obvhs-bvh2"]);
     catalogue[Axis::Workgroup] = plain(&["auto", "32", "16x16"]);
+    catalogue[Axis::Load] = plain(&["auto", "buffer", "texture"]);
     catalogue
 }
 
@@ -524,10 +525,10 @@ fn committed_experiments_parse_and_plan() {
             let renders = !plan.times.is_empty() && !plan.streams.is_empty();
             assert!(renders || !plan.benches.is_empty());
             // The saving is in what no image depends on.
-            let unseen = [Axis::Accel, Axis::Organisation, Axis::Workgroup];
+            let unseen = [Axis::Accel, Axis::Organisation, Axis::Workgroup, Axis::Load];
             match unseen.map(|axis| experiment.axes[axis].len()) {
                 _ if !renders => {}
-                [1, 1, 1] => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
+                [1, 1, 1, 1] => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
                 _ => assert!(plan.renders_planned() < plan.renders_full_product()),
             }
             seen += 1;
