@@ -1,7 +1,8 @@
 //! Work in slices: short dispatches, so that no watchdog triggers and progress is shown.
 
-use super::Elapsed;
+use super::{Elapsed, Gpu};
 use std::cell::Cell;
+use std::thread::available_parallelism;
 
 /// Target milliseconds of a slice.
 const SLICE_MS: f64 = 250.0;
@@ -15,6 +16,8 @@ const GROWTH: u64 = 8;
 pub struct Slices {
     fitting: Cell<u64>,
     least: u64,
+    /// Threads that share the work of a software adapter; `None` on others.
+    threads: Option<f64>,
     longest_ms: Cell<f64>,
 }
 
@@ -24,6 +27,7 @@ impl Slices {
         Self {
             fitting: Cell::new(first.max(1)),
             least: 1,
+            threads: None,
             longest_ms: Cell::new(0.0),
         }
     }
@@ -33,6 +37,21 @@ impl Slices {
     pub fn at_least(mut self, least: u64) -> Self {
         self.least = least.max(1);
         self
+    }
+
+    /// Bounds slices by the work of this adapter: on a software adapter the CPU time of the process,
+    /// so that a busy machine does not cut them finer.
+    #[must_use]
+    pub fn on(mut self, gpu: &Gpu) -> Self {
+        let threads = available_parallelism().map_or(1, usize::from);
+        self.threads = gpu.is_software().then_some(threads as f64);
+        self
+    }
+
+    /// Milliseconds that a slice would take on an adapter of its own.
+    fn work_ms(&self, elapsed: Elapsed) -> f64 {
+        let shared = elapsed.cpu_ms.zip(self.threads).map(|(ms, threads)| ms / threads);
+        shared.map_or(elapsed.ms(), |ms| ms.min(elapsed.ms()))
     }
 
     /// Items per slice.
@@ -53,7 +72,7 @@ impl Slices {
     /// Learns from a slice of `items`. A short remainder never reduces the size.
     pub fn learn(&self, items: u64, elapsed: Elapsed) {
         let was = self.fitting();
-        let ms = elapsed.ms().max(0.1);
+        let ms = self.work_ms(elapsed).max(0.1);
         self.longest_ms.set(self.longest_ms.get().max(ms));
         if 2 * items >= was || ms > SLICE_MS {
             let now = (items as f64 * SLICE_MS / ms) as u64;
@@ -102,6 +121,24 @@ mod tests {
         // The last remainder did not reduce the size.
         assert_eq!(slices(&known, 2_600, 0.1), [2500, 100]);
         assert_eq!(known.fitting(), 2500);
+    }
+
+    #[test]
+    fn a_busy_machine_does_not_cut_a_software_adapter_s_slices_finer() {
+        let busy = Elapsed {
+            wall_ms: 2000.0,
+            cpu_ms: Some(400.0),
+            ..Elapsed::default()
+        };
+        let of_hardware = Slices::starting_with(64);
+        let of_software = Slices {
+            threads: Some(2.0),
+            ..Slices::starting_with(64)
+        };
+        of_hardware.learn(64, busy);
+        of_software.learn(64, busy);
+        assert_eq!((of_hardware.fitting(), of_software.fitting()), (8, 80));
+        assert_eq!(of_software.longest_ms(), 200.0);
     }
 
     #[test]

@@ -204,7 +204,7 @@ impl<'a> Renderer<'a> {
             done: Cell::new(0),
             pending: Cell::new(0),
             blocks: RefCell::default(),
-            slices: Slices::starting_with(FIRST_SLICE),
+            slices: Slices::starting_with(FIRST_SLICE).on(gpu),
             most: most_samples(gpu, job.integrator),
             stages: RefCell::default(),
             spent: Cell::default(),

@@ -58,7 +58,9 @@ impl Tracer {
             poison: Storage::Own(poison),
             rays: rays.len() as u32,
             row: Cell::new(u32::MAX),
-            slices: Slices::starting_with(FIRST_SLICE).at_least(FIRST_SLICE),
+            slices: Slices::starting_with(FIRST_SLICE)
+                .at_least(FIRST_SLICE)
+                .on(gpu),
             tracer: self,
         })
     }
