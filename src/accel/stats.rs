@@ -15,6 +15,8 @@ pub struct BuildLog {
     player: Option<Arc<Player>>,
     /// Bytes of the largest array, if not the device's limit.
     binding: Option<u64>,
+    /// See [`BuildLog::noting_quality`].
+    pub(crate) notes_quality: bool,
 }
 
 impl BuildLog {
@@ -23,7 +25,7 @@ impl BuildLog {
         Self {
             phases: Vec::new(),
             player: Some(Arc::new(Player::new(gpu))),
-            binding: None,
+            ..Self::default()
         }
     }
 
@@ -32,6 +34,16 @@ impl BuildLog {
     pub fn binding(self, bytes: u64) -> Self {
         Self {
             binding: Some(bytes),
+            ..self
+        }
+    }
+
+    /// Has quality figures computed that only records show, such as the end-point overlap of a tree,
+    /// which takes longer than some builds.
+    #[must_use]
+    pub fn noting_quality(self) -> Self {
+        Self {
+            notes_quality: true,
             ..self
         }
     }
@@ -50,6 +62,7 @@ impl BuildLog {
             phases: Vec::new(),
             player: self.player.clone(),
             binding: self.binding,
+            notes_quality: self.notes_quality,
         }
     }
 

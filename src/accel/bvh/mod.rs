@@ -121,7 +121,9 @@ impl BuiltBvh {
     ) -> Result<Self, AccelError> {
         params.check()?;
         let mut tree = Tree::build(soup, &params.tree, log)?;
-        tree.note_epo(soup);
+        if log.notes_quality {
+            tree.note_epo(soup);
+        }
         Self::of_tree(&tree, soup, params, log)
     }
 

@@ -112,7 +112,7 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
         Err(reason) => return candidate.failed(reason),
     };
     let record = &mut candidate.record.body;
-    let mut log = BuildLog::with_gpu(world.gpu);
+    let mut log = BuildLog::with_gpu(world.gpu).noting_quality();
     let (built, peak) = session.clock.time("build", || {
         peak_bytes(|| kind.build(&world.soup, &accel.params, &mut log))
     });
