@@ -3,9 +3,11 @@
 
 mod covering;
 mod families;
+mod translators;
 
 use covering::{Choice, pairs, pairwise};
 use families::{Chosen, Family, batches, queued, renderers};
+use crate::support::in_turn;
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{Counters, Hit, Ray};
@@ -113,6 +115,26 @@ fn kernels_that_make_images_compose_stay_within_the_limits_and_count_only_when_a
 #[test]
 fn kernels_with_queues_between_them_compose_stay_within_the_limits_and_count_only_when_asked() {
     see_that_all_are_sound(&FAMILIES[2], 50, |_| false);
+}
+
+#[test]
+fn other_translators_take_every_kernel() {
+    let (library, tint) = (KernelLibrary::default(), translators::tint());
+    let kernels = FAMILIES.iter().flat_map(|family| &family.kernels);
+    let kernels = in_turn("kernels through other translators", kernels);
+    let faults = kernels.par_iter().filter_map(|kernel| {
+        let composed = library.compose(kernel);
+        let wgsl = composed.unwrap_or_else(|e| panic!("{kernel:?}: {e}")).wgsl;
+        let by_tint = tint.and_then(|tint| translators::tint_fault(tint, &wgsl));
+        let fault = by_tint.or_else(|| translators::naga_fault(&wgsl))?;
+        Some(format!("{kernel:?}: {fault}"))
+    });
+    let faults: Vec<String> = faults.collect();
+    let first = &faults[..faults.len().min(3)];
+    assert!(faults.is_empty(), "{} of {}: {first:#?}", faults.len(), kernels.len());
+    // What each of them must refuse.
+    let broken = "@compute @workgroup_size(1) fn main() { let x: u32 = 1.0; }";
+    assert!(tint.is_none_or(|tint| translators::tint_fault(tint, broken).is_some()));
 }
 
 #[test]

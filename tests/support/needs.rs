@@ -4,7 +4,7 @@
 use std::fmt::Display;
 
 /// What may be missing, by the words that `RAYSTONE_REQUIRE` takes, separated by blanks.
-const KNOWN: [&str; 13] = [
+const KNOWN: [&str; 14] = [
     // Adapter: one that computes as the host does; the very driver of the table of image hashes.
     "exact-adapter",
     "known-driver",
@@ -17,6 +17,7 @@ const KNOWN: [&str; 13] = [
     "slurm",
     "shells",
     "pdflatex",
+    "tint",
     "embree",
     "mitsuba",
     // Modules of Python.
