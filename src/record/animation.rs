@@ -1,20 +1,20 @@
-//! What is recorded of a structure whose scene moves.
+//! Records of structures whose scene moves.
 
 use super::{CountersPerRay, RayClass};
 use raystone_config::Animation;
 use serde::{Deserialize, Serialize};
 
-/// A structure over the frames of an animation: what was built over the first, taken over to each (*refitted*), and built
-/// anew for each (*rebuilt*).
+/// A structure over the frames of an animation: the one built over the first frame, updated for each (*refitted*), and
+/// one built anew for each (*rebuilt*).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct AnimationRecord {
-    /// What moves, and how.
+    /// The motion of the scene.
     pub settings: Animation,
     /// Triangles of the scene.
     pub triangles: u64,
     /// By time; those before the failure, if there is one.
     pub frames: Vec<FrameRecord>,
-    /// What went wrong, and in which frame.
+    /// The fault, and its frame.
     pub failure: Option<String>,
 }
 
@@ -23,14 +23,14 @@ pub struct AnimationRecord {
 pub struct FrameRecord {
     /// Number, from 0.
     pub frame: u32,
-    /// Rays of each of both gates, closest and any hit.
+    /// Rays of each of the two gates, closest and any hit.
     pub judged: usize,
-    /// What taking over costs, on the device where there is a way to do it there.
+    /// Cost of the update, on the device where it can be done there.
     pub refit: Cost,
     /// The same on the host, equal to the bit; absent where there is only one way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refit_on_host: Option<Cost>,
-    /// What building anew costs.
+    /// Cost of a full build.
     pub rebuild: Cost,
     /// SAH cost: refitted, rebuilt; absent where not defined.
     pub sah: [Option<f64>; 2],
@@ -41,20 +41,20 @@ pub struct FrameRecord {
 /// Rays of a class through the refitted and the rebuilt structure, in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrameRays {
-    /// What they are.
+    /// Their class.
     pub class: RayClass,
-    /// How many.
+    /// Their number.
     pub rays: usize,
     /// Counted work.
     pub counters: [Option<CountersPerRay>; 2],
-    /// What tracing all of them costs.
+    /// Cost of tracing all of them.
     pub cost: [Cost; 2],
 }
 
 /// Milliseconds of the same work in each round, by several clocks.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Cost {
-    /// Of all threads of the process; empty where the system does not tell.
+    /// Of all threads of the process; empty where the system does not report it.
     pub processor_ms: Vec<f64>,
     /// By the wall clock.
     pub wall_ms: Vec<f64>,
@@ -63,7 +63,8 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// What counts: a software adapter computes on the processor, on which others may compute, too.
+    /// Returns the times that count: those of the processor on a software adapter, which shares it with other
+    /// processes.
     pub fn ms(&self, software: bool) -> &[f64] {
         match software && !self.processor_ms.is_empty() {
             true => &self.processor_ms,

@@ -1,15 +1,15 @@
-//! What is recorded of cells as such: that they are done, and what their figures depend on, so that a later run knows whether they still hold.
+//! Records of cells as such: their outcome, and the inputs of their figures, by which a later run sees whether the figures still hold.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a cell ended.
+/// The outcome of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// All its records are written.
     Done,
-    /// It failed: a run that is resumed takes it again.
+    /// It failed: a resumed run measures it again.
     Failed,
     /// It cannot be measured on this adapter, and was left out with a reason.
     LeftOut,
@@ -27,21 +27,21 @@ pub struct KernelSetRecord {
     pub modules: BTreeMap<String, String>,
 }
 
-/// That a cell ended, and what it depends on.
+/// The end of a cell, and its inputs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CellRecord {
     /// Its name, unique in its plan.
     pub unit: String,
-    /// How it ended.
+    /// Its outcome.
     pub outcome: Outcome,
-    /// Why, if it is not done.
+    /// The reason, unless it is done.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub reason: String,
-    /// When the run began that measured it, in seconds since 1970; 0 in records of older programs. Cells with another
-    /// value than their neighbours' were measured in another run that this one went on with, or was merged with.
+    /// Start of the run that measured it, in seconds since 1970; 0 in records of older programs. A value other than
+    /// the neighbouring cells' marks a run that this one resumed or was merged with.
     #[serde(default)]
     pub run_began_unix_s: u64,
-    /// What it depends on.
+    /// Its inputs.
     #[serde(flatten)]
     pub inputs: Inputs,
     /// Content hashes of the lines that belong to it.
@@ -49,7 +49,7 @@ pub struct CellRecord {
     pub lines: Vec<String>,
 }
 
-/// What the figures of a cell depend on.
+/// All that the figures of a cell depend on.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct Inputs {
@@ -62,10 +62,10 @@ pub struct Inputs {
     /// Hash of the scene's content; empty where there is none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub scene: String,
-    /// [`KernelSetRecord::id`]; empty if no kernel ran.
+    /// [`KernelSetRecord::id`]; empty without a kernel.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub kernels: String,
-    /// Where clocks were read; empty where none was.
+    /// The device whose clocks were read; empty if none was.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub device: String,
 }

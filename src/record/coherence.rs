@@ -1,4 +1,4 @@
-//! What is recorded of the coherence of rays: counts of a model, see [`crate::coherence`].
+//! Records of the coherence of rays: counts of a model, see [`crate::coherence`].
 
 use crate::figure::{self, Figure};
 use crate::{Key, Reading, Samples, axis};
@@ -10,13 +10,13 @@ use std::ops::AddAssign;
 /// The organisation in which a lane keeps its pixel, the baseline of the others.
 pub const SINGLE_KERNEL: &str = "single kernel";
 
-/// What stands on the axis of rays for all of them.
+/// The label of all rays on the axis of rays.
 pub const ALL_RAYS: &str = "all";
 
 /// Coherence of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CoherenceRecord {
-    /// The machine, and what was looked at.
+    /// The modelled machine, and the sample of paths.
     pub settings: Coherence,
     /// Samples per pixel of the sampler with which the cell was timed.
     pub timed_spp: u32,
@@ -29,14 +29,14 @@ pub struct CoherenceRecord {
 pub struct CoherenceAt {
     /// Samples per pixel that the sampler was made for.
     pub spp: u32,
-    /// Which rays the lanes of a warp have.
+    /// Assignment of rays to the lanes of a warp.
     pub organisation: String,
-    /// Paths that were looked at.
+    /// Paths in the sample.
     pub paths: u64,
     /// Counts by class of rays (`primary`, `shadow 0`, `bounce 1`, …), in the order in which they are traced.
     pub classes: Vec<(String, Tally)>,
-    /// For each class, rays and predicted cycles of each group of warps. Groups are a sample of the image: how far they
-    /// differ tells how far others may. Older records have none.
+    /// For each class, rays and predicted cycles of each group of warps. Groups are a sample of the image: their spread
+    /// bounds that of others. Older records have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<Vec<[u64; 2]>>,
 }
@@ -60,7 +60,7 @@ impl CoherenceRecord {
             .collect()
     }
 
-    /// What is predicted of what was timed.
+    /// Returns the prediction for the timed number of samples.
     pub fn timed(&self, organisation: &str) -> Option<&CoherenceAt> {
         let is_it = |at: &&CoherenceAt| at.spp == self.timed_spp && at.organisation == organisation;
         self.at.iter().find(is_it)
@@ -91,7 +91,7 @@ impl CoherenceAt {
         let groups = self.groups_of_all();
         readings.extend(self.all().readings(&key, line_bytes, groups.as_deref()));
         let per_path = Reading::known([(&figure::CYCLES_PER_PATH, self.cost_of_path())]);
-        // What is traced first are the primary rays: one for each path.
+        // Primary rays are traced first: one for each path.
         let paths = self.groups.first().zip(groups);
         let parts = paths.map(|(primary, all)| {
             let of_one = |([paths, _], [_, cycles]): (&[u64; 2], &[u64; 2])| [*paths, *cycles];
@@ -147,7 +147,7 @@ pub struct Tally {
     pub active: u64,
     /// Lanes of the warps, over all issues.
     pub lanes: u64,
-    /// Bytes that lanes asked for.
+    /// Bytes that lanes requested.
     pub bytes: u64,
     /// Cache lines that were needed, over all issues: accesses to the L1.
     pub lines: u64,

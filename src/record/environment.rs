@@ -1,4 +1,4 @@
-//! Where a run happened.
+//! The machine and the program of a run.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,14 +17,14 @@ pub struct Environment {
     pub driver_info: String,
     /// `discrete-gpu`, `integrated-gpu`, `virtual-gpu`, `cpu`, `other`.
     pub device_type: String,
-    /// Whether the adapter is a software rasteriser: its times compare structures on it only.
+    /// True if the adapter is a software rasteriser: its times compare structures on it only.
     pub software: bool,
-    /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
+    /// True if GPU timestamps are available; without them the wall clock is used, and marked.
     pub timestamps: bool,
     /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
     #[serde(default)]
     pub loop_limit: Option<u32>,
-    /// Whether denormal numbers are kept, when known.
+    /// True if denormal numbers are preserved; absent if unknown.
     #[serde(default)]
     pub denormals: Option<bool>,
     /// Operating system and architecture.
@@ -37,9 +37,9 @@ pub struct Environment {
     pub version: String,
     /// Commit the program was built from, when known.
     pub commit: Option<String>,
-    /// Whether the working tree had uncommitted changes when it was built.
+    /// True if the working tree had uncommitted changes when it was built.
     pub dirty: Option<bool>,
-    /// Where the adapter sits on the PCI bus, as `0000:65:00.0`; empty if it has no such place.
+    /// Address of the adapter on the PCI bus, as `0000:65:00.0`; empty without one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub pci: String,
     /// Least and greatest number of invocations of a subgroup.
@@ -51,7 +51,7 @@ pub struct Environment {
     /// Memory of the host, bytes.
     #[serde(default)]
     pub memory_bytes: Option<u64>,
-    /// How the clocks of the processors are governed.
+    /// Governor of the processors' clocks.
     #[serde(default)]
     pub governor: Option<String>,
     /// The state of the machine when the run began.
@@ -62,17 +62,17 @@ pub struct Environment {
     pub command: Vec<String>,
 }
 
-/// How busy a machine is, as far as it can be read.
+/// The load of a machine, as far as it can be read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct MachineLoad {
-    /// Processes that ran or waited to, mean of a minute.
+    /// Runnable processes, mean of a minute.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub minute: Option<f64>,
     /// Mean clock of the processors, MHz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock_mhz: Option<f64>,
-    /// How often processors were throttled for heat since the system started.
+    /// Number of thermal throttling events of the processors since the system started.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub throttled: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! What is recorded of the errors of samplers and of the references they are measured against.
+//! Records of the errors of samplers and of their references.
 
 use super::{Interval, Key, Reading, axis};
 use crate::figure;
@@ -16,7 +16,7 @@ pub struct ReferenceRecord {
     /// The value of every pixel, if it is known: then this is the reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<f64>,
-    /// Whether an earlier run rendered it; then `seconds` are those of reading it.
+    /// True if an earlier run rendered it; then `seconds` are those of reading it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub cached: bool,
     /// The file it was read from, if it was not rendered.
@@ -49,11 +49,11 @@ pub struct ErrorAtSpp {
     /// first half first: the reference's share in the metric's uncertainty.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub without_part: BTreeMap<String, Vec<f64>>,
-    /// What single pixels do to the mean relMSE of the replicates up to this one. Unknown in old records, and for references
-    /// without parts.
+    /// Influence of single pixels on the mean relMSE of the replicates up to this one. Unknown in old records, and for
+    /// references without parts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tail: Option<Tail>,
-    /// Whether the points come from a net in base 2 of which so many samples are no whole one.
+    /// True if the points are an incomplete net in base 2 at this number of samples.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub partial_net: bool,
 }
@@ -61,7 +61,7 @@ pub struct ErrorAtSpp {
 /// Error of one replicate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ErrorRecord {
-    /// Whether the pair is randomised by its seed; a deterministic pair has one replicate.
+    /// True if the pair is randomised by its seed; a deterministic pair has one replicate.
     pub randomised: bool,
     /// Number of this replicate, from 0.
     pub replicate: u32,
@@ -107,8 +107,8 @@ pub struct BiasRecord {
     /// Histogram of the p-values in ten equal bins, without tiles whose difference rounding explains: flat when
     /// there is no bias.
     pub p_histogram: Vec<usize>,
-    /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
-    /// explains, in standard errors; absent where it is not testable or has no spread.
+    /// Difference of the mean luminance of all replicates from the reference's beyond rounding, in standard errors;
+    /// absent where it is not testable or has no spread.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
     /// p-value of `z`.
@@ -127,11 +127,11 @@ pub struct BiasRecord {
     /// found in 90 % of all cases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detectable: Option<f64>,
-    /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
+    /// True if the sampler's mean over seeds is not the integral by design, so that a bias is no fault.
     #[serde(default)]
     pub by_design: bool,
-    /// What the check of this sampler says alone. A report holds the samplers of a run together: what it finds
-    /// biased leaves a larger share of `alpha_of_run` to the others.
+    /// The verdict on this sampler alone. A report tests the samplers of a run together: those found biased leave a
+    /// larger share of `alpha_of_run` to the others.
     pub verdict: BiasVerdict,
 }
 
@@ -152,7 +152,7 @@ pub struct SpectrumRecord {
     pub loudest: Option<Interval>,
     /// Correlation of the errors of neighbouring pixels.
     pub autocorrelation: Option<Interval>,
-    /// What Gaussian filters leave of the error.
+    /// Errors left by Gaussian filters.
     pub filtered: Vec<FilteredError>,
 }
 
@@ -190,7 +190,7 @@ impl BiasRecord {
 }
 
 impl SpectrumRecord {
-    /// The error that shares of filtered ones are of; `None` if there is none.
+    /// Returns the error before any filter, the divisor of filtered shares; `None` if there is none.
     pub fn unfiltered(&self) -> Option<f64> {
         let at = self.filtered.iter().find(|at| at.sigma == 0.0)?;
         (at.rmse.value > 0.0).then_some(at.rmse.value)
@@ -231,7 +231,7 @@ pub struct PowerAt {
     /// Mean power around that frequency, white noise being 1.
     pub power: Interval,
     /// Quantiles over replicates, [`OUTLIER_QUANTILES`], of the power in units of the mean variance of all
-    /// replicates: what a single image may have.
+    /// replicates: the range of single images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantiles: Option<[f64; 4]>,
 }
@@ -241,6 +241,6 @@ pub struct PowerAt {
 pub struct FilteredError {
     /// Standard deviation of the filter, pixels; 0 is no filter.
     pub sigma: f64,
-    /// Root mean square of what is left of the luminance error.
+    /// Root mean square of the luminance error after the filter.
     pub rmse: Interval,
 }

@@ -1,6 +1,6 @@
-//! The table of figures: what each is called, in which unit, which direction is better, how it is shown and
-//! how its interval was made. Pages, tables, plots and exports read it; adding a figure is a row here (or,
-//! from outside, in the registry of figures) and the code that measures it.
+//! The table of figures: the title, unit, better direction, format and interval of each. Pages, tables, plots and
+//! exports read it; adding a figure is a row here (or, from outside, in the registry of figures) and the code that
+//! measures it.
 
 use Better::{Higher, Lower, Neither};
 use Shown::{Bytes, Count, Digits, Exponent, Percent};
@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Which values are better.
+/// The direction of better values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Better {
@@ -22,7 +22,7 @@ pub enum Better {
     Neither,
 }
 
-/// How a value is written.
+/// The format of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shown {
@@ -38,7 +38,7 @@ pub enum Shown {
     Exponent,
 }
 
-/// How an interval was made.
+/// The method behind an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Spread {
@@ -55,7 +55,7 @@ pub enum Spread {
 }
 
 impl Spread {
-    /// What a reader is told.
+    /// Returns the description shown to readers.
     pub fn words(self) -> &'static str {
         match self {
             Median => "median, 95 % interval of order statistics",
@@ -72,15 +72,15 @@ impl Spread {
 pub struct Figure {
     /// Name with version, for instance `sah-cost/v1`: another definition is another version.
     pub id: Cow<'static, str>,
-    /// What it is called.
+    /// Its title.
     pub title: Cow<'static, str>,
     /// Its unit; empty for plain numbers and for units that are written with the value.
     pub unit: Cow<'static, str>,
-    /// Which values are better.
+    /// The direction of better values.
     pub better: Better,
-    /// How it is written.
+    /// Its format.
     pub shown: Shown,
-    /// How its interval was made.
+    /// The method behind its interval.
     pub spread: Spread,
 }
 
@@ -140,7 +140,7 @@ figures! {
     BOX_TESTS_PER_RAY = "box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact;
     TRIANGLE_TESTS_PER_RAY = "triangle-tests-per-ray/v1", "triangle tests/ray", "", Lower, THREE, Exact;
     DEEPEST_STACK = "deepest-stack/v1", "deepest stack", "", Lower, Count, Exact;
-    // Ray casters of others, and structures beside them.
+    // External ray casters, and structures beside them.
     CPU_NS_PER_RAY = "cpu-ns-per-ray/v1", "time of the processors", "ns per ray", Lower, THREE, Median;
     CPU_OVER_PEER = "cpu-over-peer/v1", "time of the processors over a peer's", "", Lower, THREE, Median;
     PEER_MRAYS_PER_S = "peer-mrays-per-s/v1", "speed of a peer", "Mrays/s", Higher, THREE, Median;
@@ -256,7 +256,7 @@ figures! {
     FRAME_NODES_RATIO = "frame-nodes-ratio/v1", "nodes/ray, refitted over rebuilt", "", Lower, THREE, Exact;
     FRAME_TIME_RATIO = "frame-time-ratio/v1", "time of rays, refitted over rebuilt", "", Lower, THREE, Median;
     FRAME_BREAK_EVEN = "frame-break-even/v1", "rebuilding pays from", "million rays", Neither, THREE, Single;
-    // Hard scenes and rays, judged exactly.
+    // Hard scenes and rays, checked exactly.
     FALSE_MISSES = "false-misses/v1", "false misses", "", Lower, Count, Exact;
     UNEXPLAINED_MISSES = "unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact;
     CRACKS = "cracks/v1", "cracks", "", Lower, Count, Exact;

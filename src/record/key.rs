@@ -1,4 +1,4 @@
-//! What a figure is of: a value on each of some axes.
+//! The subject of a figure: a value on each of some axes.
 
 use raystone_config::{Axis, Cell};
 use raystone_core::params::{Params, Variant};
@@ -10,15 +10,15 @@ use std::fmt;
 pub mod axis {
     use raystone_config::Axis;
 
-    /// What is traced.
+    /// The traced scene.
     pub const SCENE: &str = Axis::Scene.name();
     /// Acceleration structure.
     pub const ACCEL: &str = Axis::Accel.name();
-    /// What is computed.
+    /// The computed quantity.
     pub const INTEGRATOR: &str = Axis::Integrator.name();
     /// Sample sequence.
     pub const SEQUENCE: &str = Axis::Sequence.name();
-    /// How the sequence is moved from pixel to pixel.
+    /// Transform of the sequence from pixel to pixel.
     pub const DECORRELATION: &str = Axis::Decorrelation.name();
     /// Kernels in the place of the embedded ones; absent for these.
     pub const KERNELS: &str = Axis::Kernels.name();
@@ -26,31 +26,31 @@ pub mod axis {
     pub const TRIANGLE: &str = Axis::Triangle.name();
     /// Ray–box test; absent where no ray is traced.
     pub const BOX_TEST: &str = Axis::BoxTest.name();
-    /// How rays are moved off the surface that they leave; absent where none is.
+    /// Offset of rays from the surface that they leave; absent where there is none.
     pub const OFFSET: &str = Axis::Offset.name();
-    /// How the path tracer is organised; absent where none runs.
+    /// Organisation of the path tracer; absent where none runs.
     pub const ORGANISATION: &str = Axis::Organisation.name();
-    /// Ray caster of others; absent for what is this crate's.
+    /// External ray caster; absent for this crate's own.
     pub const PEER: &str = Axis::Peer.name();
-    /// In which workgroups kernels trace; absent where none does.
+    /// Workgroups of the tracing kernels; absent where none trace.
     pub const WORKGROUP: &str = Axis::Workgroup.name();
-    /// How kernels read nodes and triangles; absent where none does.
+    /// Load path of nodes and triangles in kernels; absent without kernels.
     pub const LOAD: &str = Axis::Load.name();
-    /// Mesh that is shot at.
+    /// Target mesh.
     pub const MESH: &str = "mesh";
     /// Scale and translation of a mesh.
     pub const PLACE: &str = "place";
-    /// What is aimed at.
+    /// The target of rays.
     pub const AIM: &str = "aim";
     /// Class of rays.
     pub const RAYS: &str = "rays";
     /// Samples per pixel.
     pub const SPP: &str = "spp";
-    /// Dimensions of a point set, and what they are used for.
+    /// Dimensions of a point set, and their use.
     pub const DIMENSIONS: &str = "dimensions";
     /// Number of points.
     pub const POINTS: &str = "points";
-    /// Any other thing that figures are of.
+    /// Any other subject of figures.
     pub const SUBJECT: &str = "subject";
     /// All of them.
     pub const ALL: [&str; 21] = [
@@ -78,7 +78,7 @@ pub mod axis {
     ];
 }
 
-/// Axis → what was taken of it. An axis that does not matter to a figure is absent.
+/// Axis → its value. An axis that does not matter to a figure is absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(from = "BTreeMap<String, Written>")]
 pub struct Key(BTreeMap<String, Written>);
@@ -94,7 +94,7 @@ impl From<BTreeMap<String, Written>> for Key {
     }
 }
 
-/// A variant as it is written: a plain name where its label says all.
+/// A variant as it is written: a plain name where its label says no more.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(from = "PlainOrWhole", into = "PlainOrWhole")]
 struct Written(Variant);
@@ -143,7 +143,7 @@ impl From<&Cell> for Key {
     }
 }
 
-/// The cell that a line is of, for its name.
+/// The cell of a line, for its name.
 impl From<&Key> for Cell {
     fn from(key: &Key) -> Self {
         let axes = Axis::ALL.into_iter();
@@ -172,7 +172,7 @@ impl Key {
         self
     }
 
-    /// What was taken of an axis.
+    /// Returns the value on an axis.
     pub fn get(&self, axis: &str) -> Option<&Variant> {
         self.0.get(axis).map(|written| &written.0)
     }
@@ -210,14 +210,14 @@ impl Key {
         )
     }
 
-    /// The same key with what stands on the axes of another one.
+    /// Returns this key, extended and overridden by another one.
     #[must_use]
     pub fn beside(mut self, other: &Self) -> Self {
         self.0.extend(other.0.clone());
         self
     }
 
-    /// Whether two keys have the same labels on these axes.
+    /// Returns `true` if two keys have the same labels on these axes.
     pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
         axes.iter()
             .all(|axis| self.label(axis) == other.label(axis))
@@ -230,7 +230,7 @@ impl Key {
         axes.iter().map(|axis| self.label(axis)).collect()
     }
 
-    /// Whether no axis matters.
+    /// Returns `true` if no axis matters.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -1,6 +1,5 @@
-//! Records: one JSON line per thing measured. A line is a [`Key`], which says what was measured by axis,
-//! and a body. Every table, plot and export derives from these lines alone; an absent value is absent,
-//! never 0.
+//! Records: one JSON line per measurement. A line is a [`Key`], which names its subject by axis, and a body. Every
+//! table, plot and export derives from these lines alone; an absent value is absent, never 0.
 #![warn(missing_docs)]
 
 mod animation;
@@ -52,19 +51,19 @@ pub const SCHEMA: &str = "raystone/3";
 pub struct Line<B = Body> {
     /// Always [`SCHEMA`].
     pub schema: String,
-    /// What was measured, by axis; empty for lines about the whole run.
+    /// The subject, by axis; empty for lines about the whole run.
     #[serde(default, skip_serializing_if = "Key::is_empty")]
     pub key: Key,
     /// Content hash of the cell that this line belongs to (hex), see [`raystone_config`].
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub hash: String,
-    /// What it ran with.
+    /// Its kernels and features.
     #[serde(default, skip_serializing_if = "Ran::is_empty")]
     pub ran: Ran,
     /// The figures that were measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<Reading>,
-    /// What was found.
+    /// The result.
     pub body: B,
 }
 
@@ -129,18 +128,18 @@ impl<B> Line<B> {
 pub struct Recorded<'a, T> {
     /// Content hash of the cell that the line belongs to; empty if it belongs to none.
     pub hash: &'a str,
-    /// What was measured.
+    /// The subject.
     pub key: &'a Key,
-    /// What it ran with.
+    /// Its kernels and features.
     pub ran: &'a Ran,
     /// The figures that were measured.
     pub readings: &'a [Reading],
-    /// What was found.
+    /// The result.
     pub body: &'a T,
 }
 
 impl<T> Recorded<'_, T> {
-    /// The reading of a figure, of all that the line is of.
+    /// Returns the reading of a figure for the whole line, not a part of it.
     pub fn reading(&self, id: &str) -> Option<&Reading> {
         let mut readings = self.readings.iter();
         readings.find(|reading| reading.figure == id && reading.at.is_empty())
@@ -163,19 +162,19 @@ impl<T> Deref for Recorded<'_, T> {
     }
 }
 
-/// What a line of a run holds.
+/// The content of a line of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Body {
-    /// First line: what is run, where, and how many runs the plan saves.
+    /// First line: the experiment, the machine, and the number of renders that the plan saves.
     Run(RunRecord),
     /// A scene was loaded.
     Scene(SceneRecord),
     /// A structure was built, gated and traced with the recorded rays.
     Structure(StructureRecord),
-    /// A ray caster of others was traced with the recorded rays.
+    /// An external ray caster was traced with the recorded rays.
     Peer(PeerRecord),
-    /// Single paths of an integrator were judged.
+    /// Single paths of an integrator were checked.
     Paths(PathsRecord),
     /// A reference image was rendered.
     Reference(ReferenceRecord),
@@ -183,13 +182,13 @@ pub enum Body {
     Error(ErrorRecord),
     /// Verdict on the bias of a sampler over all its replicates.
     Bias(BiasRecord),
-    /// What the error of a sampler looks like, over all its replicates.
+    /// The spectrum of a sampler's error, over all its replicates.
     Spectrum(SpectrumRecord),
     /// Time of a full cell (structure × sampler × integrator).
     Time(TimeRecord),
-    /// How alike the rays of neighbouring lanes are in a full cell, by a model.
+    /// Modelled coherence of the rays of neighbouring lanes in a full cell.
     Coherence(CoherenceRecord),
-    /// A structure was taken from frame to frame of a moving scene.
+    /// A structure was updated from frame to frame of a moving scene.
     Animation(AnimationRecord),
     /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
     /// renderer's modules.
@@ -200,9 +199,9 @@ pub enum Body {
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
     Failed(SkippedRecord),
-    /// Something that went wrong beside the measuring, which is not touched by it.
+    /// A problem outside the measurements, which does not affect them.
     Warning(SkippedRecord),
-    /// What kernels were made of, for the cells that name it.
+    /// The source files of kernels, for the cells that name them.
     Kernels(KernelSetRecord),
     /// A cell is done, failed or left out: the last line of all that were written of it.
     Cell(CellRecord),
@@ -214,7 +213,7 @@ pub enum Body {
 
 /// A kind of record of a run.
 pub trait Kind: Sized {
-    /// What a body holds of this kind.
+    /// Returns the record of this kind in a body.
     fn of(body: &Body) -> Option<&Self>;
 }
 
@@ -260,11 +259,11 @@ pub fn all_of<'a, T: Kind + 'a>(lines: &'a [Line]) -> impl Iterator<Item = Recor
         .filter_map(|line| Some(line.of(T::of(&line.body)?)))
 }
 
-/// What figures were taken with, beyond their key.
+/// The conditions of figures beyond their key.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct Ran {
-    /// BLAKE3 of the composed text of the kernels that ran; empty if it did not come to that.
+    /// BLAKE3 of the composed text of the kernels; empty if none was composed.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub kernel_hash: String,
     /// Feature flags of the composed kernel.
@@ -273,13 +272,13 @@ pub struct Ran {
     /// Feature flags that other scenes need and that were compiled out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
-    /// Whether the driver's bounds checks and loop bounds were off: another competitor.
+    /// True if the driver's bounds checks and loop bounds were off: another competitor.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub unchecked: bool,
 }
 
 impl Ran {
-    /// A kernel that ran with the driver's checks.
+    /// Describes a kernel under the driver's checks.
     pub fn kernel(kernel_hash: String) -> Self {
         Self {
             kernel_hash,
@@ -292,7 +291,7 @@ impl Ran {
     }
 }
 
-/// What a check says.
+/// The verdict of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -314,7 +313,7 @@ impl Verdict {
         }
     }
 
-    /// `PASS`, `FAIL` or `OPEN`: what is shown must not depend on colour.
+    /// Returns `PASS`, `FAIL` or `OPEN`: a verdict must not depend on colour.
     pub fn word(self) -> &'static str {
         match self {
             Self::Pass => "PASS",

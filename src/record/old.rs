@@ -11,12 +11,12 @@ use serde_json::{Map, Value, json};
 /// The versions before this one.
 const OLD_SCHEMAS: [&str; 2] = ["raystone/1", "raystone/2"];
 
-/// Whether a file of records of the schema `wanted` may have lines of this one, which can be [`renewed`].
+/// Returns `true` if a file of records of the schema `wanted` may have lines of this one, which can be [`renewed`].
 pub(crate) fn is_old(schema: &str, wanted: &str) -> bool {
     wanted == SCHEMA && OLD_SCHEMAS.contains(&schema)
 }
 
-/// Axes that stood in bodies, and in what they ran with.
+/// Axes that older schemas wrote into bodies, and into `ran`.
 const IN_BODY: [&str; 5] = [
     axis::SCENE,
     axis::ACCEL,
@@ -26,7 +26,7 @@ const IN_BODY: [&str; 5] = [
 ];
 const IN_RAN: [&str; 4] = [axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST, axis::OFFSET];
 
-/// What stood between a name and its kernels.
+/// The separator of a name and its kernels.
 const KERNELS_MARK: &str = " @";
 
 /// The same line in the present schema.
@@ -115,7 +115,7 @@ impl Compaction {
     }
 }
 
-/// What drawing from a sampler costs, as `raystone/2` wrote it.
+/// Cost of drawing from a sampler, as `raystone/2` wrote it.
 #[derive(Deserialize)]
 struct SamplerCost {
     ns_per_sample: Interval,

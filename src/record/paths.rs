@@ -1,4 +1,4 @@
-//! What is recorded of the gate of integrators.
+//! Records of the gate of integrators.
 
 use super::Verdict;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Single paths of an integrator against the oracle for images, see `image_gate`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PathsRecord {
-    /// Paths judged; 0 if none could be.
+    /// Paths checked; 0 if none could be.
     pub paths: usize,
     /// Paths that differ by no more than rounding makes them differ, all decisions being the same.
     pub ill_conditioned: usize,
@@ -15,10 +15,10 @@ pub struct PathsRecord {
     /// Of those the ones that meet another surface which lies within rounding of the first.
     #[serde(default)]
     pub surfaces: usize,
-    /// Of those the ones that pass an edge of what is met or in the way.
+    /// Of those the ones that pass an edge of a surface that they hit or that blocks them.
     #[serde(default)]
     pub edges: usize,
-    /// Paths that meet a surface with another one within rounding, whatever they make of it.
+    /// Paths that hit a surface with another one within rounding, whatever their result.
     #[serde(default)]
     pub layered: usize,
     /// Paths that differ, not to be explained by rounding.
@@ -27,16 +27,16 @@ pub struct PathsRecord {
     pub median: f64,
     /// Greatest relative difference of the paths that agree.
     pub worst: f64,
-    /// What is wrong: the first wrong path with its vertices, or a number beyond its bound.
+    /// The fault: the first wrong path with its vertices, or a number beyond its bound.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
-    /// What there is no formula for in the oracle, so that nothing was judged.
+    /// The feature without a formula in the oracle, because of which nothing was checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
 }
 
 impl PathsRecord {
-    /// Nothing was judged, for this reason.
+    /// Returns a record without checked paths, with this reason.
     pub fn not_judged(reason: impl Into<String>) -> Self {
         Self {
             not_judged: Some(reason.into()),
@@ -61,7 +61,7 @@ impl PathsRecord {
         }
     }
 
-    /// What the gate says.
+    /// Returns the verdict of the gate.
     pub fn verdict(&self) -> Verdict {
         Verdict::new(self.paths > 0, self.fault.is_some())
     }

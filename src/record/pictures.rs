@@ -4,7 +4,7 @@ use super::{Body, Key, Line};
 use raystone_config::{Axis, Cell};
 use raystone_core::text::slug;
 
-/// The axes that tell the images of samplers apart.
+/// The axes that distinguish the images of samplers.
 pub const IMAGE_AXES: [Axis; 4] = [
     Axis::Scene,
     Axis::Integrator,
@@ -20,9 +20,10 @@ pub const SPREAD: [&str; 2] = ["mean", "variance"];
 pub struct Pictures {
     /// PNG files.
     pub shown: Vec<String>,
-    /// Linear images beside them, without the ending, which is that of the format the run was asked for. Runs keep small ones unasked.
+    /// Linear images beside them, without the extension, which is that of the requested format. Runs store small ones unasked.
     pub linear: Vec<String>,
-    /// Linear images of what all replicates say together, without the ending: of randomised samplers, where a run was asked for images.
+    /// Linear images of the statistics of all replicates, without the extension: of randomised samplers, where a run was asked for
+    /// images.
     pub spread: Vec<String>,
 }
 
@@ -65,7 +66,7 @@ fn named(folder: &str, kind: &str, key: &Key) -> String {
     format!("{folder}/{}", slug(&parts))
 }
 
-/// Whether a name is that of a file in a folder of images.
+/// Returns `true` if a name is that of a file in a folder of images.
 fn is_plain(name: &str) -> bool {
     name.split_once('/').is_some_and(|(folder, file)| {
         folder.starts_with("images")

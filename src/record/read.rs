@@ -11,28 +11,27 @@ use std::path::{Path, PathBuf};
 /// Name of the records in a run's folder.
 pub const RECORDS_FILE: &str = "records.jsonl";
 
-/// Name of records that were packed by gzip, as results are kept that many people fetch.
+/// Name of records packed by gzip, as published results are stored.
 const PACKED_FILE: &str = "records.jsonl.gz";
 
-/// The first bytes of what gzip packed (RFC 1952).
+/// The first bytes of a gzip file (RFC 1952).
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// Folder, below that of a run, that holds records and images until the run ends; what a killed run
-/// leaves.
+/// Folder, below that of a run, that holds records and images until the run ends; left over by a killed run.
 pub const PARTIAL: &str = "partial";
 
-/// What a file of records says.
+/// The content of a file of records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Records<B = super::Body> {
     /// Every whole line, in order.
     pub lines: Vec<Line<B>>,
-    /// What was left out while reading, in words.
+    /// Parts left out while reading, in words.
     pub warnings: Vec<String>,
-    /// How many lines are of versions before this one.
+    /// Number of lines of older versions.
     pub old: usize,
 }
 
-/// Why records cannot be read.
+/// A reason why records cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file cannot be read.
@@ -40,7 +39,7 @@ pub enum RecordError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file holds no record.
@@ -71,28 +70,28 @@ pub enum RecordError {
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// Why.
+        /// The cause.
         source: serde_json::Error,
     },
-    /// A line says what no run writes.
+    /// A line holds values that no run writes.
     #[error("{}:{line}: a damaged record: {what}; remove the line to read the rest", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// What cannot be.
+        /// The impossible value.
         what: String,
     },
 }
 
-/// Only the tag, so that a line of another version is told from a broken one.
+/// Only the tag, by which a line of another version is distinguished from a broken one.
 #[derive(Deserialize)]
 struct Tag {
     schema: String,
 }
 
-/// The file with the records of a run's folder: packed ones stand for those that are not there.
+/// Returns the file with the records of a run's folder: packed ones only where there are no plain ones.
 pub fn records_file(dir: &Path) -> PathBuf {
     let plain = dir.join(RECORDS_FILE);
     let packed = dir.join(PACKED_FILE);
@@ -122,11 +121,11 @@ fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// Reads a file of records of this schema, packed by gzip or not, those of a run also if they are of a version before. A
-/// last line without its newline that does not parse is what a crash leaves: it is left out with a warning.
+/// Reads a file of records of this schema, packed by gzip or not, those of a run also if they are of an older version. A
+/// last line without its newline that does not parse is left by a crash: it is left out with a warning.
 ///
 /// # Errors
-/// A missing or empty file, a line of another schema, a broken line elsewhere, or one that says what no run writes.
+/// A missing or empty file, a line of another schema, a broken line elsewhere, or one that no run writes.
 pub fn read_lines<B: DeserializeOwned + Sound>(
     path: &Path,
     wanted: &'static str,
@@ -191,7 +190,7 @@ pub fn read_lines<B: DeserializeOwned + Sound>(
     }
 }
 
-/// Lines as they stand in a file.
+/// Returns lines as they are written to a file.
 ///
 /// # Errors
 /// A body cannot be written as JSON.

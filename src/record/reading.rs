@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 pub struct Reading {
     /// [`Figure::id`].
     pub figure: String,
-    /// What it is of beyond the key of its line, for instance a class of rays; empty if nothing.
+    /// Its subject beyond the key of its line, for instance a class of rays; empty for the whole line.
     #[serde(default, skip_serializing_if = "Key::is_empty")]
     pub at: Key,
     /// The value with its 95 % interval, which has no width where the figure is exact or was measured once.
     pub value: Interval,
-    /// What it was made of.
+    /// The samples behind the value.
     #[serde(default, skip_serializing_if = "Samples::is_once")]
     pub samples: Samples,
-    /// What must be equal for two readings to be of the same work, in words.
+    /// Description of the work, equal for two readings of the same work.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub work: String,
 }
@@ -77,7 +77,7 @@ impl Reading {
         known.collect()
     }
 
-    /// The same reading of a part of what its line is of.
+    /// Returns the same reading for a part of its line's subject.
     #[must_use]
     pub fn at(mut self, at: Key) -> Self {
         self.at = at;
@@ -98,7 +98,7 @@ impl Reading {
         self
     }
 
-    /// The value in each round by the clock of the adapter; empty for what was not timed in rounds.
+    /// Returns the value in each round by the clock of the adapter; empty unless it was timed in rounds.
     pub fn rounds(&self) -> &[f64] {
         match &self.samples {
             Samples::Rounds { adapter, .. } => adapter,
@@ -107,15 +107,15 @@ impl Reading {
     }
 }
 
-/// What a measurement says of a cell beside its [readings](Reading).
+/// The part of a measurement of a cell beside its [readings](Reading).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct MeasuredRecord {
     /// Name of the measurement, for instance `compaction`.
     pub measurement: String,
-    /// Why there are no readings.
+    /// The reason why there are no readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// What figures cannot say.
+    /// Findings that are no figures.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<Note>,
 }
@@ -123,10 +123,10 @@ pub struct MeasuredRecord {
 /// Something that was found, in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Note {
-    /// What it is of beyond the key of its line.
+    /// Its subject beyond the key of its line.
     #[serde(default, skip_serializing_if = "Key::is_empty")]
     pub at: Key,
-    /// What kind of thing it is.
+    /// Its kind.
     pub what: String,
     /// The words: a reason, or a command that shows it.
     pub text: String,

@@ -1,4 +1,4 @@
-//! What the error records of a sampler's replicates say together, and how it depends on each of them and on each part
+//! Statistics of the error records of a sampler's replicates, and their dependence on each replicate and on each part
 //! of the reference.
 
 use crate::{ErrorRecord, Tail};
@@ -9,7 +9,7 @@ use raystone_stats::statistics::mean;
 #[derive(Debug, Clone, Copy)]
 pub struct Replicates<'a>(pub &'a [&'a ErrorRecord]);
 
-/// What an estimate leaves out, to see what it depends on.
+/// The sample that an estimate leaves out, to see its influence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Without {
     /// The estimate itself.
@@ -21,18 +21,18 @@ pub enum Without {
 }
 
 impl Replicates<'_> {
-    /// Whether anything is known of their spread.
+    /// Returns `true` if their spread can be estimated.
     pub fn have_spread(self) -> bool {
         self.0.len() > 1
     }
 
-    /// What single pixels do to their mean relMSE.
+    /// Returns the influence of single pixels on their mean relMSE.
     pub fn tail(self, spp: u32) -> Option<Tail> {
         let last = self.0.iter().max_by_key(|r| r.replicate)?;
         last.errors.iter().find(|error| error.spp == spp)?.tail
     }
 
-    /// Whether each has the metric of this id at this number of samples.
+    /// Returns `true` if each has the metric of this id at this number of samples.
     pub fn all_have(self, id: &str, spp: u32) -> bool {
         self.0.iter().all(|r| value(r, spp, id).is_some())
     }
@@ -51,8 +51,8 @@ impl Replicates<'_> {
         mean(&values.collect::<Vec<f64>>())
     }
 
-    /// What `estimate` gives without each part of each source of noise: those of [`Replicates::of_reference`], and
-    /// the replicates as the last one. No source for a single replicate, of whose own noise nothing is known.
+    /// Returns `estimate` without each part of each source of noise: those of [`Replicates::of_reference`], and the
+    /// replicates as the last one. No source for a single replicate, whose own noise is unknown.
     pub fn sources(
         self,
         id: &str,
@@ -70,7 +70,7 @@ impl Replicates<'_> {
         Some(sources)
     }
 
-    /// What `estimate` gives without each part of the reference, its halves apart; empty where parts are unknown.
+    /// Returns `estimate` without each part of the reference, its halves apart; empty where parts are unknown.
     pub fn of_reference(
         self,
         id: &str,

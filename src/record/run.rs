@@ -1,4 +1,4 @@
-//! What is recorded of a run as a whole, and of its scenes.
+//! Records of a run as a whole, and of its scenes.
 
 use super::{Environment, MachineLoad};
 use crate::figure::Figure;
@@ -27,7 +27,7 @@ pub struct KernelFile {
     pub file: String,
     /// BLAKE3 of its text.
     pub hash: String,
-    /// Whether it replaces an embedded kernel; if not, another kernel imports it.
+    /// True if it replaces an embedded kernel; if not, another kernel imports it.
     pub replaces: bool,
 }
 
@@ -42,13 +42,13 @@ pub struct RunRecord {
     pub experiment_text: String,
     /// Seconds since 1970-01-01 UTC.
     pub started_unix_s: u64,
-    /// Where it ran.
+    /// The machine and the program.
     pub environment: Environment,
     /// Renders (image × replicate) that the full product of all axes would need.
     pub renders_full_product: usize,
     /// Renders that this plan needs, since images are equal across structures.
     pub renders_planned: usize,
-    /// Folders of kernels that stood in the place of embedded ones.
+    /// Folders of kernels that replaced embedded ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kernels: Vec<KernelFolder>,
     /// Values that were laid over the experiment, `section.key=value`.
@@ -63,10 +63,10 @@ pub struct RunRecord {
     /// Figures from outside the crate that its records hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// Whether the run was to end with exit code 0 whatever fails.
+    /// True if the run was to end with exit code 0 whatever fails.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub lenient: bool,
-    /// How often every timed kernel was compiled: the rounds took the compilations in turns.
+    /// Number of compilations of every timed kernel: the rounds used them in turns.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub compilations: usize,
 }
@@ -80,7 +80,7 @@ fn is_once(compilations: &usize) -> bool {
 }
 
 impl RunRecord {
-    /// `run.seed` of the experiment, as it was run; `None` where its text says nothing that can be read.
+    /// Returns `run.seed` of the experiment, with overrides; `None` where its text has no readable one.
     pub fn seed(&self) -> Option<i64> {
         const DEFAULT: i64 = 1;
         let of_file: toml::Table = self.experiment_text.parse().ok()?;
@@ -133,7 +133,7 @@ pub struct SceneRecord {
 pub struct SkippedRecord {
     /// The cell, in words.
     pub cell: String,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -144,7 +144,7 @@ pub struct FinishedRecord {
     pub wall_s: f64,
     /// Named parts of it, seconds: `load`, `build`, `gate`, `gpu`, `judge`, `report`, …
     pub parts_s: BTreeMap<String, f64>,
-    /// Wall time that is neither GPU work nor building, judging or loading.
+    /// Wall time outside GPU work, builds, checks and loading.
     pub overhead_s: f64,
     /// Cells that failed.
     pub failed: usize,
@@ -155,10 +155,10 @@ pub struct FinishedRecord {
     pub load: MachineLoad,
 }
 
-/// Last line of a run that was ended early: what it had not measured by then is missing.
+/// Last line of a run that was ended early: all not measured by then is missing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InterruptedRecord {
-    /// What ended it, for instance `SIGINT`.
+    /// The cause of the end, for instance `SIGINT`.
     pub reason: String,
     /// Wall time until then, seconds.
     pub wall_s: f64,

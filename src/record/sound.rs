@@ -1,11 +1,11 @@
-//! What no run writes: negative times and counts, shares above one, rounds that lack one of their clocks. A record that says so
-//! was damaged, and no figure of it is one.
+//! Values that no run writes: negative times and counts, shares above one, rounds that lack one of their clocks. A record that
+//! holds one was damaged, and none of its figures counts.
 
 use super::*;
 
-/// A body of a record, which can tell that it was damaged.
+/// A body of a record that can detect its own damage.
 pub trait Sound {
-    /// What in it cannot be, in words.
+    /// Describes an impossible value in it.
     fn fault(&self) -> Option<String> {
         None
     }
@@ -38,8 +38,7 @@ impl Sound for Body {
     }
 }
 
-/// What in readings cannot be, in words: values that are no numbers, times and rates below zero, rounds that lack one of their
-/// clocks.
+/// Describes an impossible value in readings: no number, a time or rate below zero, rounds that lack one of their clocks.
 pub fn fault_of(readings: &[Reading]) -> Option<String> {
     let mut faults = Vec::new();
     for reading in readings {

@@ -1,4 +1,4 @@
-//! What is recorded of the words that samplers draw.
+//! Records of the words that samplers draw.
 
 use super::{Interval, Key, Reading, axis};
 use crate::figure::{self, Figure};
@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 pub struct StreamRecord {
     /// The two dimensions of the path's table.
     pub dimensions: [u32; 2],
-    /// What the path uses them for, for instance `bounce 0: direction`.
+    /// Their use in the path, for instance `bounce 0: direction`.
     pub purpose: String,
-    /// Whether the experiment names the pair.
+    /// True if the experiment names the pair.
     #[serde(default = "yes")]
     pub named: bool,
-    /// Among how many pairs that the integrators draw this one has the sampler's greatest D*; absent where it
+    /// Number of pairs drawn by the integrators among which this one has the sampler's greatest D*; absent where it
     /// is not the worst.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst_of: Option<usize>,
-    /// Whether each seed gives another point set.
+    /// True if each seed gives another point set.
     pub randomised: bool,
     /// Seeds measured (one for a deterministic stream).
     pub seeds: usize,
@@ -39,7 +39,7 @@ pub struct StreamRecord {
 }
 
 impl StreamRecord {
-    /// What the dimensions are used for, with their numbers.
+    /// Returns the use of the dimensions, with their numbers.
     pub fn pair(&self) -> String {
         let [a, b] = self.dimensions;
         format!("{} (dimensions {a} and {b})", self.purpose)
@@ -144,7 +144,7 @@ pub struct StreamFigures {
     pub centered: Vec<FigureAtCount>,
     /// Errors of integrals that are known.
     pub integrands: Vec<IntegrandFigures>,
-    /// What neighbouring and superposed pixels draw; only of pairs that are a direction.
+    /// Figures of neighbouring and superposed pixels; only of pairs that are a direction.
     pub pixels: Vec<PixelsAtCount>,
 }
 
@@ -170,7 +170,7 @@ pub struct IntegrandFigures {
     pub slope: Option<Interval>,
 }
 
-/// What several pixels draw for N samples each, one seed.
+/// Figures of several pixels of N samples each, one seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PixelsAtCount {
     /// Samples of a pixel.

@@ -1,4 +1,4 @@
-//! What is recorded of a structure on a scene, and of full cells.
+//! Records of a structure on a scene, and of full cells.
 
 use super::{Interval, Key, Reading, Samples, Tally, axis};
 use crate::figure;
@@ -41,7 +41,7 @@ pub enum RayClass {
     Bounce,
     /// Rays between random points of the bounding box; closest hit.
     Chord,
-    /// Rays that faults hide behind (see `hard_rays`); both queries, never timed.
+    /// Rays that are likely to expose faults (see `hard_rays`); both queries, never timed.
     Hard,
 }
 
@@ -61,7 +61,7 @@ impl RayClass {
         }
     }
 
-    /// What readings of this class are at.
+    /// Returns the key of readings of this class.
     pub fn key(self) -> Key {
         Key::default().with(axis::RAYS, self.name())
     }
@@ -70,7 +70,7 @@ impl RayClass {
 /// Gate result for one ray class.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassVerdict {
-    /// Which rays.
+    /// Class of the rays.
     pub class: RayClass,
     /// Rays compared to the bit (id, t, u, v; hit or miss for any-hit queries).
     pub rays: usize,
@@ -82,7 +82,7 @@ pub struct ClassVerdict {
     pub first_wrong: Option<String>,
 }
 
-/// Comparison of the reference tracer with a slower, simpler judge.
+/// Comparison of the reference tracer with a slower, simpler one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReferenceCheck {
     /// Rays compared.
@@ -91,10 +91,10 @@ pub struct ReferenceCheck {
     pub wrong: usize,
     /// Rays that pass within rounding error of an edge or of another surface (oracle only).
     pub ambiguous: usize,
-    /// How many of these are hard rays, made to pass there.
+    /// Number of these that are hard rays, made to pass there.
     #[serde(default)]
     pub hard_ambiguous: usize,
-    /// When it was carried out, if that was before this run: the same rays and answers, found again on disk.
+    /// Time of the check, if it was before this run: the same rays and answers, found in the cache.
     #[serde(default)]
     pub reused_unix_s: Option<u64>,
 }
@@ -102,7 +102,7 @@ pub struct ReferenceCheck {
 /// The verdict of the gate on one structure and scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GateVerdict {
-    /// Nothing wrong, no fuse blown, judge itself sound.
+    /// Nothing wrong, no fuse blown, the reference tracer itself sound.
     pub passed: bool,
     /// Per ray class.
     pub classes: Vec<ClassVerdict>,
@@ -114,7 +114,7 @@ pub struct GateVerdict {
     pub kernel_errors: Vec<String>,
     /// Structural faults found by `validate`.
     pub structural: Option<String>,
-    /// What is wrong on the gate's second scene.
+    /// The fault on the gate's second scene.
     #[serde(default)]
     pub elsewhere: Option<String>,
 }
@@ -150,7 +150,7 @@ impl CountersPerRay {
 /// Speed of one ray class through one structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassTiming {
-    /// Which rays.
+    /// Class of the rays.
     pub class: RayClass,
     /// Rays per dispatch.
     pub rays: usize,
@@ -160,7 +160,7 @@ pub struct ClassTiming {
     /// shadow rays in another order or direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unlike_shadow: Option<usize>,
-    /// Every kept sample, milliseconds, an empty dispatch already subtracted.
+    /// Every sample after warm-up, milliseconds, an empty dispatch already subtracted.
     pub ms: Vec<f64>,
     /// The same dispatches by the wall clock, milliseconds.
     pub wall_ms: Vec<f64>,
@@ -243,15 +243,15 @@ impl ClassCoherence {
 /// A structure on a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StructureRecord {
-    /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
-    /// counts as skipped.
+    /// True if the driver caused the failure by ending loops too early for this structure: the cell then counts as
+    /// skipped.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub refused: bool,
-    /// Where triangles are met, which decides on the reference tracer: see [`Space`].
+    /// The space in which triangles are intersected, by which the reference tracer is chosen: see [`Space`].
     #[serde(default)]
     pub space: Space,
-    /// How kernels read nodes and triangles, which `auto` leaves to the adapter: `buffer` or `texture`;
-    /// absent in records from before there was a choice.
+    /// Load path of nodes and triangles, which `auto` leaves to the adapter: `buffer` or `texture`; absent in records
+    /// from before there was a choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load: Option<String>,
     /// Timed build phases.
@@ -262,8 +262,8 @@ pub struct StructureRecord {
     /// bytes; absent where allocations are not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build_peak_bytes: Option<u64>,
-    /// Milliseconds to take over new transforms of all instances, objects kept: median of several;
-    /// absent where a moved object needs a full build.
+    /// Milliseconds to update the transforms of all instances, with the objects unchanged: median of several; absent
+    /// where a moved object needs a full build.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub update_ms: Option<f64>,
     /// Static figures.
@@ -282,14 +282,14 @@ pub struct StructureRecord {
     pub heat_map: Option<String>,
     /// Cost (nodes + triangle tests) at the top of the heat map's colour scale.
     pub heat_map_max: Option<f64>,
-    /// Why there are no figures.
+    /// The reason why there are no figures.
     pub failure: Option<String>,
 }
 
-/// Time of a full cell whose pixels are taken in an order of passes: see `Order`.
+/// Time of a full cell whose pixels are rendered in an order of passes: see `Order`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct OrderTime {
-    /// Which.
+    /// The order.
     pub order: String,
     /// Passes of a sample, each a submission of its own.
     pub passes: usize,
@@ -299,7 +299,8 @@ pub struct OrderTime {
     pub first_picture_ms: Option<Interval>,
 }
 
-/// Paths that begin at rasterised triangles, against rays through the same points with the same samples behind them.
+/// Paths that begin at rasterised triangles, compared with rays through the same points that go on with the same
+/// samples.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PrimaryRecord {
     /// Pixels that were compared.
@@ -327,7 +328,7 @@ pub struct TimeRecord {
     pub resolution: [u32; 2],
     /// Samples per pixel of each timed render.
     pub spp: u32,
-    /// Every kept sample, milliseconds per render on the GPU clock.
+    /// Every sample after warm-up, milliseconds per render on the GPU clock.
     pub ms: Vec<f64>,
     /// The same renders by the wall clock, milliseconds.
     pub wall_ms: Vec<f64>,
@@ -352,14 +353,14 @@ pub struct TimeRecord {
     /// The same cell in orders of passes; empty where these were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<OrderTime>,
-    /// Of paths that begin at rasterised triangles: what that changes.
+    /// Effect of paths that begin at rasterised triangles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub primary: Option<PrimaryRecord>,
     /// BLAKE3 of the image.
     pub image_hash: String,
-    /// Whether the image equals to the bit that of the scene's first gated structure.
+    /// True if the image equals to the bit that of the scene's first gated structure.
     pub image_equal: bool,
-    /// Why there are no figures.
+    /// The reason why there are no figures.
     pub failure: Option<String>,
 }
 
@@ -417,7 +418,7 @@ impl PrimaryRecord {
 }
 
 impl TimeRecord {
-    /// Whether the time may be used: the cell ran, and its image is the one that all structures give.
+    /// Returns `true` if the time may be used: the cell completed, and its image is that of all structures.
     pub fn is_valid(&self) -> bool {
         self.failure.is_none() && self.image_equal && self.ms_per_spp.is_some()
     }
@@ -479,7 +480,7 @@ impl TimeRecord {
 }
 
 impl StructureRecord {
-    /// Whether it was built at all.
+    /// Returns `true` if it was built at all.
     pub fn is_built(&self) -> bool {
         !self.build.is_empty() || self.gate.is_some()
     }
@@ -529,7 +530,7 @@ impl StructureRecord {
         readings
     }
 
-    /// Why the structure gets no figures; `None` when it passed the gate.
+    /// Returns the reason why the structure gets no figures; `None` when it passed the gate.
     pub fn fault(&self) -> Option<String> {
         match (&self.failure, &self.gate) {
             (Some(failure), _) => Some(failure.clone()),
@@ -539,7 +540,7 @@ impl StructureRecord {
     }
 }
 
-/// What is wrong, in words.
+/// Describes the faults that the gate found.
 pub fn fault_text(verdict: &GateVerdict, reference_fault: Option<&str>) -> String {
     let mut parts = Vec::new();
     let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
