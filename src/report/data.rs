@@ -1,4 +1,4 @@
-//! Records sorted by what they speak of: scene, integrator, sampler.
+//! Records sorted by subject: scene, integrator, sampler.
 
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
@@ -23,7 +23,7 @@ pub struct RunData<'a> {
     pub finished: Option<&'a FinishedRecord>,
     /// Last line of a run that was ended early.
     pub interrupted: Option<&'a InterruptedRecord>,
-    /// What went wrong beside the measuring.
+    /// Problems outside the measurements.
     pub warnings: Vec<&'a SkippedRecord>,
     /// Scenes in the order in which they first appear.
     pub scenes: Vec<SceneGroup<'a>>,
@@ -37,13 +37,13 @@ pub struct RunData<'a> {
     pub skipped: Vec<&'a SkippedRecord>,
     /// The lines that it was sorted from.
     pub lines: &'a [Line],
-    /// What failed without a record of its own kind.
+    /// Failures without a record of their own kind.
     pub failed: Vec<&'a SkippedRecord>,
     /// The cell that each line belongs to.
     by_line: Cells<'a>,
     /// The last word on each cell; empty in old records.
     pub cells: BTreeMap<&'a str, &'a CellRecord>,
-    /// What competitors are called.
+    /// Names of competitors.
     pub names: Names,
     /// Every structure of the run; the index is its look in all plots.
     pub structures: Vec<String>,
@@ -51,7 +51,7 @@ pub struct RunData<'a> {
     pub samplers: Vec<String>,
 }
 
-/// What was recorded of one scene.
+/// The records of one scene.
 #[derive(Debug)]
 pub struct SceneGroup<'a> {
     /// Name or path.
@@ -60,9 +60,9 @@ pub struct SceneGroup<'a> {
     pub record: Option<&'a SceneRecord>,
     /// Structures in the order measured.
     pub structures: Vec<Measured<'a, StructureRecord>>,
-    /// Ray casters of others in the order measured.
+    /// External ray casters in the order measured.
     pub peers: Vec<Recorded<'a, PeerRecord>>,
-    /// Structures that were taken from frame to frame.
+    /// Structures that were updated from frame to frame.
     pub animations: Vec<Measured<'a, AnimationRecord>>,
     /// One per integrator, triangle test and box test.
     pub views: Vec<View<'a>>,
@@ -71,11 +71,11 @@ pub struct SceneGroup<'a> {
 /// A scene under one integrator, triangle test and box test: images with one reference.
 #[derive(Debug)]
 pub struct View<'a> {
-    /// What all its images are of.
+    /// The common key of its images.
     key: Key,
-    /// The integrator, with what else tells this view from others.
+    /// The integrator, with all that distinguishes this view from others.
     pub name: String,
-    /// What the integrator's judge found wrong with single paths.
+    /// The fault that the check of the integrator found with single paths.
     pub paths_fault: Option<String>,
     /// The reference image.
     pub reference: Option<Recorded<'a, ReferenceRecord>>,
@@ -87,19 +87,18 @@ pub struct View<'a> {
     pub coherence: Vec<Measured<'a, CoherenceRecord>>,
 }
 
-/// What was measured of a structure, alone or with a sampler; reads like the record.
+/// A measurement of a structure, alone or with a sampler; reads like the record.
 #[derive(Debug)]
 pub struct Measured<'a, T> {
-    /// What was measured. With the driver's checks off the structure is another competitor, and its
-    /// label says so.
+    /// Its subject. With the driver's checks off the structure is another competitor, with a label of its own.
     pub key: Key,
     /// Name of the structure: among all of the scene, or among those that one view was timed with.
     pub structure: String,
     /// Name of the sampler that it was timed with.
     pub sampler: String,
-    /// What ran.
+    /// Its kernels and features.
     pub ran: &'a Ran,
-    /// The cell that it was recorded of, where a line says.
+    /// Its cell, if a line names it.
     pub cell: Option<&'a CellRecord>,
     /// The record.
     pub body: &'a T,
@@ -125,13 +124,13 @@ impl<'a, T> Measured<'a, T> {
     }
 }
 
-/// What takes turns in rounds of its own: structures with the rays of all classes, full cells, compactions.
+/// Kinds of rounds of their own: structures with the rays of all classes, full cells, compactions.
 pub(crate) const RAYS: &str = "rays";
 pub(crate) const FULL_CELLS: &str = "full cells";
 
-/// What times have in common that were measured in the same rounds: one process took them, on one scene with one triangle
-/// test and box test, all of one kind in turns. Empty where that is not known: records of older programs do not say
-/// when they were taken, so that their rounds may be those of several runs.
+/// Returns the common name of times that were measured in the same rounds: by one process, on one scene with one triangle
+/// test and box test, all of one kind in turns. Empty if unknown: records of older programs do not hold their time, so
+/// that their rounds may be those of several runs.
 pub(crate) fn sitting(kind: &str, key: &Key, cell: Option<&CellRecord>) -> String {
     let Some(cell) = cell.filter(|cell| cell.run_began_unix_s > 0) else {
         return String::new();
@@ -144,7 +143,7 @@ pub(crate) fn sitting(kind: &str, key: &Key, cell: Option<&CellRecord>) -> Strin
     )
 }
 
-/// What the rays of cells have in common that meet the same triangles.
+/// Returns the common name of cells whose rays meet the same triangles.
 pub(crate) fn world(key: &Key) -> String {
     [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST]
         .map(|axis| key.label(axis))
@@ -169,7 +168,7 @@ impl<T> Deref for Measured<'_, T> {
     }
 }
 
-/// What the images of a view have in common.
+/// Axes that the images of a view share.
 const VIEW_AXES: [&str; 4] = [
     axis::SCENE,
     axis::INTEGRATOR,
@@ -177,7 +176,7 @@ const VIEW_AXES: [&str; 4] = [
     axis::BOX_TEST,
 ];
 
-/// What tells the structures of a scene apart.
+/// Axes that distinguish the structures of a scene.
 pub(crate) const STRUCTURE_AXES: [&str; 6] = [
     axis::ACCEL,
     axis::KERNELS,
@@ -187,7 +186,7 @@ pub(crate) const STRUCTURE_AXES: [&str; 6] = [
     axis::LOAD,
 ];
 
-/// What tells the samplers of a view apart.
+/// Axes that distinguish the samplers of a view.
 pub(crate) const SAMPLER_ROW: [&str; 4] = [
     axis::SEQUENCE,
     axis::DECORRELATION,
@@ -195,7 +194,7 @@ pub(crate) const SAMPLER_ROW: [&str; 4] = [
     axis::OFFSET,
 ];
 
-/// What a sampler's errors are of, and what an image depends on: all but the structure.
+/// Axes of a sampler's errors, on which an image depends: all but the structure.
 pub(crate) const SAMPLER_AXES: [&str; 8] = [
     axis::SCENE,
     axis::INTEGRATOR,
@@ -207,7 +206,7 @@ pub(crate) const SAMPLER_AXES: [&str; 8] = [
     axis::OFFSET,
 ];
 
-/// The key of a line; a structure that ran without the driver's checks has another label, and is chosen by the same name.
+/// Returns the key of a line; a structure without the driver's checks has another label, and is chosen by the same name.
 pub(crate) fn competitor(line: &Line) -> Key {
     let Some(accel) = line.key.get(axis::ACCEL).filter(|_| line.ran.unchecked) else {
         return line.key.clone();
@@ -295,7 +294,7 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// What was measured of a structure alone.
+    /// Returns the measurement of a structure alone.
     fn of_structure<T>(&self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
@@ -308,7 +307,7 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// What was measured of a full cell.
+    /// Returns the measurement of a full cell.
     fn of_cell<T>(&mut self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
         let key = competitor(line);
         Measured {
@@ -346,8 +345,8 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// Gives a reference to every view that it is of. One whose value is known was not rendered, so that
-    /// it is of every test.
+    /// Assigns a reference to every view that it belongs to. One whose value is known was not rendered, so that it
+    /// belongs to every test.
     fn refer_to(&mut self, reference: Recorded<'a, ReferenceRecord>) {
         let scene = self.scene(reference.key.label(axis::SCENE));
         let is_of = |view: &&mut View| {
@@ -367,7 +366,7 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// Tells views of what was found wrong with single paths of their integrators.
+    /// Gives views the faults found with single paths of their integrators.
     fn doubt_integrators(&mut self) {
         let views = self.scenes.iter_mut().flat_map(|scene| &mut scene.views);
         for view in views {
@@ -467,7 +466,8 @@ impl<'a> RunData<'a> {
         cells.copied().collect()
     }
 
-    /// What failed, of any kind, each with the reason: what is told once of many cells, and cells by their last word.
+    /// Returns all failures, each with the reason: those recorded once for many cells, and cells by their last
+    /// outcome.
     pub fn failures(&self) -> BTreeMap<&'a str, &'a str> {
         let cells = self
             .cells
@@ -479,7 +479,8 @@ impl<'a> RunData<'a> {
         cells.chain(told).collect()
     }
 
-    /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
+    /// Returns the starts of the runs in which times were measured: several after a run that was resumed, or merged
+    /// from parts.
     pub(crate) fn sittings(&self) -> BTreeSet<u64> {
         let cells = all_of::<CellRecord>(self.lines);
         let timed = cells.filter(|cell| !cell.inputs.device.is_empty());

@@ -12,7 +12,7 @@ use serde::Serialize;
 const MOST_FOR_PRINT: usize = 48;
 const MOST_PNG: usize = 192;
 
-/// Figures that are painted before they are written: painted ones are larger than what they show.
+/// Figures that are painted before they are written: painted ones are larger than their data.
 const AT_ONCE: usize = 64;
 
 /// Bytes of plots that a page holds.
@@ -25,7 +25,7 @@ pub struct Document {
     pub title: String,
     /// One line: when and where.
     pub subtitle: String,
-    /// What a reader must know first.
+    /// Notes for the top of the page.
     pub banners: Vec<Banner>,
     /// Sections in order.
     pub sections: Vec<Section>,
@@ -33,7 +33,7 @@ pub struct Document {
 
 impl Document {
     /// Paints every figure, on all cores, and hands each to `write` with its files: SVG, and PNG unless there are too many. The first
-    /// figures stand in the page, as many as it has room for; what was painted of the others, to which it leads, is let go.
+    /// figures stand in the page, as many as it has room for; the others, to which it links, are dropped once written.
     ///
     /// # Errors
     /// If the drawing backend fails, or `write` does.
@@ -148,17 +148,17 @@ pub enum Block {
     Checks(Vec<Check>),
     /// A table.
     Table(Table),
-    /// Plots; narrow ones stand side by side.
+    /// Plots; narrow ones side by side.
     Figures(Vec<Illustration>),
     /// Pictures.
     Gallery(Gallery),
     /// Text as typed.
     Verbatim(String),
-    /// What opens on demand.
+    /// Blocks that open on demand.
     Fold(Fold),
     /// Pictures beside other blocks.
     Beside(Beside),
-    /// Words of the field, explained where they first stand.
+    /// Terms of the field, explained at their first use.
     Terms(Vec<Term>),
     /// Images of one scene, to be compared pixel by pixel.
     Comparer(Comparer),
@@ -207,16 +207,16 @@ impl Block {
     }
 }
 
-/// Blocks that open on demand; print, Markdown and whoever searches the page see all of them.
+/// Blocks that open on demand; print, Markdown and a search of the page see all of them.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Fold {
     /// Anchor, unique in the document, or empty.
     pub id: String,
-    /// What is inside.
+    /// Its heading.
     pub title: String,
     /// The gist of it in a few words.
     pub note: String,
-    /// Whether it is open at first.
+    /// True if it is open at first.
     pub open: bool,
     /// Content.
     pub blocks: Vec<Block>,
@@ -227,11 +227,11 @@ pub struct Fold {
 pub struct Beside {
     /// The pictures, one below the other.
     pub pictures: Vec<Picture>,
-    /// What stands beside them.
+    /// The blocks beside them.
     pub blocks: Vec<Block>,
 }
 
-/// A word and what it means.
+/// A term and its meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Term {
     /// The word.
@@ -240,7 +240,7 @@ pub struct Term {
     pub meaning: &'static str,
 }
 
-/// How a text is meant.
+/// The tone of a text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
@@ -258,9 +258,9 @@ pub enum Tone {
 /// A statement that passes, fails, or could not be tested.
 #[derive(Debug, Clone, Serialize)]
 pub struct Check {
-    /// Whether it holds.
+    /// True, false or open.
     pub verdict: Verdict,
-    /// What is claimed.
+    /// The claim.
     pub title: String,
     /// The evidence.
     pub detail: String,
@@ -276,7 +276,7 @@ impl Check {
 /// A table.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Table {
-    /// What it shows, with units.
+    /// Its subject, with units.
     pub caption: String,
     /// Heads of the columns; all but the first are aligned to the right unless `text`.
     pub columns: Vec<Column>,
@@ -289,7 +289,7 @@ pub struct Table {
 pub struct Column {
     /// Its text.
     pub title: String,
-    /// Whether it holds text (left) and not figures (right).
+    /// True if it holds text (left) and not figures (right).
     pub text: bool,
 }
 
@@ -298,9 +298,9 @@ pub struct Column {
 pub struct TableCell {
     /// Main text.
     pub text: String,
-    /// Smaller text behind it, for instance an interval.
+    /// Smaller text after it, for instance an interval.
     pub detail: String,
-    /// How it is meant.
+    /// Its tone.
     pub tone: Tone,
     /// Address that the text leads to, or empty.
     pub link: String,
@@ -322,7 +322,7 @@ impl TableCell {
         self
     }
 
-    /// How many replicates or seeds there are.
+    /// Returns the number of replicates or seeds.
     pub(crate) fn repeats(n: usize, randomised: bool) -> Self {
         let detail = if randomised { "" } else { "deterministic" };
         Self::with_detail(n.to_string(), detail)
@@ -400,20 +400,20 @@ impl Table {
 pub struct Illustration {
     /// File stem under `plots/`, unique.
     pub name: String,
-    /// What it shows.
+    /// Its caption.
     pub caption: String,
-    /// What is to be seen, for those who do not see it.
+    /// Description for readers who do not see it.
     pub alt: String,
-    /// Whether it takes the full width.
+    /// True if it has the full width.
     pub wide: bool,
-    /// What is painted.
+    /// The drawing.
     #[serde(skip)]
     pub drawing: Drawing,
     /// SVG document; empty until `paint`.
     pub svg: String,
-    /// Whether the page holds it; else it leads to the file.
+    /// True if the page holds it; else it links to the file.
     pub inline: bool,
-    /// Whether it has a PNG file, too.
+    /// True if it has a PNG file, too.
     pub has_png: bool,
 }
 
@@ -436,7 +436,7 @@ impl Illustration {
 /// Pictures in a grid.
 #[derive(Debug, Clone, Serialize)]
 pub struct Gallery {
-    /// What they show.
+    /// Their caption.
     pub caption: String,
     /// The pictures.
     pub items: Vec<Picture>,
@@ -447,15 +447,15 @@ pub struct Gallery {
 /// One picture.
 #[derive(Debug, Clone, Serialize)]
 pub struct Picture {
-    /// What it is.
+    /// Its caption.
     pub caption: String,
-    /// What is to be seen, for those who do not see it.
+    /// Description for readers who do not see it.
     pub alt: String,
     /// File relative to the run's folder.
     pub path: String,
     /// `data:` address, or `None` with the reason in `missing`.
     pub data: Option<String>,
-    /// Why there is no picture.
+    /// The reason why there is no picture.
     pub missing: String,
 }
 
@@ -464,7 +464,7 @@ pub struct Picture {
 pub struct ColorScale {
     /// CSS gradient.
     pub gradient: String,
-    /// What the numbers count.
+    /// The quantity of the numbers.
     pub title: String,
     /// Numbers at equal distances from left to right.
     pub labels: Vec<String>,
@@ -473,24 +473,24 @@ pub struct ColorScale {
 /// Images of one scene under one integrator.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparer {
-    /// What they show.
+    /// Their caption.
     pub caption: String,
     /// Anchor, unique in the document.
     pub id: String,
     /// Pixels in x and y.
     pub size: [u32; 2],
-    /// What radiance is multiplied by before tone mapping.
+    /// Factor of radiance before tone mapping.
     pub exposure: f32,
     /// The reference first.
     pub layers: Vec<Layer>,
-    /// What is missing, in words; empty if nothing is.
+    /// Missing layers, in words; empty if there are none.
     pub note: String,
 }
 
 /// One image of a [`Comparer`].
 #[derive(Debug, Clone, Serialize)]
 pub struct Layer {
-    /// What made it.
+    /// Its source.
     pub name: String,
     /// Linear radiance: 16-bit floats, red, green, blue, row by row from the top, low byte first, in Base64.
     pub radiance: String,

@@ -1,4 +1,4 @@
-//! Numbers as text: three significant digits, units, and a dash for what is absent.
+//! Numbers as text: three significant digits, units, and a dash for absent ones.
 
 use raystone_core::text::escape::raised;
 use raystone_record::Environment;
@@ -6,11 +6,11 @@ use raystone_record::Interval;
 use raystone_record::figure::{Figure, Shown};
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
-/// What stands for an absent value.
+/// The text of an absent value.
 pub(crate) const ABSENT: &str = "–";
 
-/// A number with `digits` significant digits and a true minus; `6.33·10⁻⁴` below 10⁻³ and from 10⁶ on, the dash for
-/// what is no number.
+/// Formats a number with `digits` significant digits and a true minus; `6.33·10⁻⁴` below 10⁻³ and from 10⁶ on, the
+/// dash for NaN and infinities.
 pub fn significant(value: f64, digits: usize) -> String {
     let text = plain(value, digits);
     match text.split_once('e') {
@@ -70,7 +70,7 @@ fn with_bounds(i: &Interval, text: impl Fn(f64) -> String) -> String {
     }
 }
 
-/// What the bounds of medians of so many samples are.
+/// Describes the bounds of medians of so many samples.
 pub(crate) fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
     match samples.filter(|n| *n > 0).min() {
         Some(few) if few < LEAST_FOR_MEDIAN => {

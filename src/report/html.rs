@@ -5,7 +5,7 @@ use super::document::Document;
 use minijinja::value::Serde;
 use minijinja::{Environment, context};
 
-/// What stands in the place of the nonce until that is known.
+/// Placeholder of the nonce until that is known.
 const PLACE: &str = "NONCE-OF-THIS-PAGE";
 
 /// The page: plots inlined as SVG, pictures as `data:` addresses, nothing fetched. Its policy lets no script run but its

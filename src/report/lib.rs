@@ -40,7 +40,7 @@ use raystone_record::{RecordError, read_records};
 use sections::cells::{self, Cells};
 use std::path::{Path, PathBuf};
 
-/// What can go wrong while a report is written.
+/// An error while a report is written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The records cannot be read.
@@ -51,7 +51,7 @@ pub enum ReportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// A plot cannot be drawn.
@@ -62,7 +62,7 @@ pub enum ReportError {
     Template(#[from] minijinja::Error),
 }
 
-/// Where a report was written.
+/// Files of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReportPaths {
     /// The page.
@@ -73,7 +73,7 @@ pub struct ReportPaths {
     pub figures: PathBuf,
     /// Every plot, SVG and PNG.
     pub plots: Vec<PathBuf>,
-    /// What was left out while reading the records, in words.
+    /// Parts left out while reading the records, in words.
     pub warnings: Vec<String>,
 }
 

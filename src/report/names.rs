@@ -1,4 +1,4 @@
-//! What competitors are called: by their main label, and by the further axes on which their run varies.
+//! Names of competitors: their main label, and the further axes on which their run varies.
 
 use raystone_record::{Body, Key, Line, axis};
 
@@ -19,8 +19,8 @@ pub struct Names {
 }
 
 impl Names {
-    /// Finds out on which axes the competitors of a run differ. References are none: whatever the
-    /// offset of a sampler, they are rendered with the default one.
+    /// Finds the axes on which the competitors of a run differ. References are none: they are rendered with the
+    /// default offset, whatever a sampler's.
     pub fn new(lines: &[Line]) -> Self {
         let keys = || {
             let competing = |line: &&Line| !matches!(line.body, Body::Reference(_));
@@ -51,12 +51,12 @@ impl Names {
         self.with_further(main, key, &[axis::OFFSET])
     }
 
-    /// What the images of a view are of: the integrator, the tests that its rays meet triangles and
-    /// boxes with, and how it is organised.
+    /// Returns the name of the images of a view: the integrator, the tests of its rays against triangles and boxes,
+    /// and its organisation.
     pub fn view(&self, key: &Key) -> String {
         let main = key.label(axis::INTEGRATOR).to_owned();
         let name = self.with_further(main, key, &[axis::TRIANGLE, axis::BOX_TEST]);
-        // Errors are those of any organisation, and told with the default one.
+        // Errors are those of any organisation, and shown with the default one.
         match key.label(axis::ORGANISATION) {
             "" | "single-kernel" => name,
             _ => self.with_further(name, key, &[axis::ORGANISATION]),

@@ -26,7 +26,7 @@ pub(crate) fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Pictur
 }
 
 impl Picture {
-    /// The same picture with what is to be seen on it.
+    /// Returns the same picture with a description of its content.
     pub fn described(mut self, alt: impl Into<String>) -> Self {
         self.alt = alt.into();
         self

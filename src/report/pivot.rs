@@ -14,7 +14,7 @@ pub type Part<'a> = &'a dyn Fn(&Key) -> String;
 /// One column per figure.
 pub const FIGURES_ALONE: Part<'static> = &|_| String::new();
 
-/// The rows of a table, and the columns that stand before the figures.
+/// The rows of a table, and the columns before the figures.
 pub struct Rows<'a> {
     by: &'a [&'a str],
     heads: Vec<&'a str>,
@@ -22,7 +22,7 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Rows that `by` tells apart, each with its cells under `heads` (as [`Table::new`] takes them).
+    /// Creates rows that `by` distinguishes, each with its cells under `heads` (in the notation of [`Table::new`]).
     pub fn new(
         by: &'a [&'a str],
         heads: &'a [&'a str],
@@ -78,7 +78,7 @@ impl<'a> Rows<'a> {
                 }
             }
         }
-        // The first of several values of one cell stands there.
+        // The first of several values of one cell is shown.
         let mut found: HashMap<_, &Value> = HashMap::new();
         for (value, part) in &shown {
             let place = (value.key.labels_on(self.by), &*value.figure.id, &**part);

@@ -19,12 +19,12 @@ const MOST_HIGHLIGHTED: usize = 1024;
 /// Time for the spectra, seconds.
 const SPECTRUM_SECONDS: f64 = 60.0;
 
-/// What the page is about.
+/// The content of the page.
 #[derive(Debug, Clone)]
 pub struct PointPage {
     /// Name of the sampler.
     pub label: String,
-    /// Where the points come from: pixel, seed, parameters.
+    /// Origin of the points: pixel, seed, parameters.
     pub origin: String,
     /// Dimensions of the sampler, one for each coordinate of `points`; two at least.
     pub dims: Vec<u32>,
@@ -247,7 +247,7 @@ fn intervals(points: &[Pair], m: u32) -> Illustration {
 mod tests {
     use super::*;
 
-    /// Four points in three dimensions that tell the dimensions apart, two pixels.
+    /// Returns a page of four points that distinguish the three dimensions, two pixels.
     fn page() -> PointPage {
         let points = [
             [0.0, 0.0, 0.9],

@@ -1,4 +1,4 @@
-//! Who wins: named only where a test of the difference says so.
+//! Winners: named only where a test of the difference supports it.
 
 use super::format;
 use raystone_record::Interval;
@@ -15,7 +15,7 @@ pub(crate) struct Contender {
     pub name: String,
     /// Its figure.
     pub figure: Interval,
-    /// What it is compared by; absent where the spread is not known: then it is not ranked, neither as winner
+    /// Its logarithm with its noise; absent where the spread is not known: then it is not ranked, neither as winner
     /// nor as beaten.
     pub log: Option<LogFigure>,
 }
@@ -29,17 +29,17 @@ pub(crate) enum Ruling {
     Withheld(String),
     /// There was no competition.
     Alone(Contender),
-    /// The winner, the next one and how many times the figure of either that is, if both are positive: the winner differs from
-    /// every other. How many pairs were compared.
+    /// The winner, the next one and the ratio of their figures, if both are positive: the winner differs from every other.
+    /// Then the number of pairs compared.
     Winner(Contender, Contender, f64, usize),
-    /// The best one and all that it does not differ from, best first, and the ratio of the first two. How many pairs were
-    /// compared.
+    /// The best one and all that it does not differ from, best first, and the ratio of the first two. Then the number of
+    /// pairs compared.
     Unclear(Vec<Contender>, f64, usize),
 }
 
-/// Judges the contenders: the best one wins if it differs from every other by the test of their ratio on logarithms, corrected
-/// for all pairs ([`Pairs`]). Which one is best, and how much better, the pairs say too: what was timed in the same rounds is
-/// known better against each other than by itself.
+/// Ranks the contenders: the best one wins if it differs from every other by the test of their ratio on logarithms, corrected
+/// for all pairs ([`Pairs`]). The pairs also decide which one is best, and by how much: figures timed in the same rounds are
+/// known better against each other than by themselves.
 pub(crate) fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
     if let [only] = &contenders[..] {
@@ -108,7 +108,7 @@ impl Ruling {
         }
     }
 
-    /// Whether there was any competition: two contenders, or a reason that none may win.
+    /// Returns `true` if there was any competition: two contenders, or a reason that none may win.
     pub(crate) fn is_contest(&self) -> bool {
         !matches!(self, Self::Nobody | Self::Alone(_))
     }
@@ -138,7 +138,7 @@ impl Ruling {
         format!("{text} ({}×)", format::number(*ratio))
     }
 
-    /// How many pairs were compared.
+    /// Returns the number of pairs compared.
     pub(crate) fn comparisons(&self) -> usize {
         match self {
             Self::Nobody | Self::Withheld(_) | Self::Alone(_) => 0,
@@ -152,7 +152,8 @@ mod tests {
     use super::*;
     use raystone_stats::interval::Spread;
 
-    /// What is said of contenders with these figures, relative standard errors and known spreads, called a, b, c.
+    /// Returns the verdict on contenders with these figures, relative standard errors and known spreads, called a, b,
+    /// c.
     fn said(better: Better, figures: &[(f64, f64, bool)]) -> [String; 3] {
         let contenders = figures.iter().zip(["a", "b", "c"]);
         let contenders = contenders.map(|((value, error, has_spread), name)| {
@@ -188,7 +189,7 @@ mod tests {
                 &[(1.0, 0.1, true), (2.0, 0.05, true), (3.0, 1.5, true)],
                 "undecided: a, c",
             ),
-            // Three pairs need more than one: what was clear of two is not of three.
+            // Three pairs need more than one: a difference significant for two is not for three.
             (
                 Lower,
                 &[(1.0, 0.055, true), (1.2, 0.055, true), (1.2, 0.055, true)],

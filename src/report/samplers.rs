@@ -1,4 +1,4 @@
-//! What the replicates of a sampler say together.
+//! Statistics of the replicates of a sampler.
 
 use super::data::{FULL_CELLS, Measured, View};
 use super::format;
@@ -14,10 +14,10 @@ use raystone_stats::statistics::{
 
 use std::sync::OnceLock;
 
-/// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
+/// Label of an error for which the reference is too noisy: its estimate is not clearly above 0.
 pub(crate) const UNRESOLVED: &str = "below what the reference can resolve";
 
-/// What an interval is that a single pixel decides over.
+/// Label of an interval that a single pixel dominates.
 pub(crate) const HEAVY_TAILED: &str =
     "a single pixel, of which the replicates may have missed what is bright, decides over it";
 
@@ -27,31 +27,31 @@ pub(crate) const REFERENCE_SHARE: f64 = 0.01;
 /// A sampler under one scene, integrator, triangle test and box test.
 #[derive(Debug)]
 pub struct MeasuredSampler<'a> {
-    /// What it draws for what.
+    /// The sampler and the images it draws for.
     pub key: Key,
-    /// `sequence × decorrelation`, with what else tells it from others, see `names`.
+    /// `sequence × decorrelation`, with all that distinguishes it from others, see `names`.
     pub name: String,
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,
-    /// Mean errors, relMSE and RMSE, once they were asked for.
+    /// Mean errors, relMSE and RMSE, computed on demand.
     pub means: [OnceLock<Vec<MeanError>>; 2],
     /// Verdict on its bias.
     pub bias: Option<BiasRecord>,
-    /// What its error looks like.
+    /// The spectrum of its error.
     pub spectrum: Option<&'a SpectrumRecord>,
 }
 
 /// An error metric that the report shows: free of the reference's own noise on average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Metric {
-    /// Relative mean squared error: what samplers are ranked by.
+    /// Relative mean squared error, by which samplers are ranked.
     RelMse,
     /// Root of the mean squared error, the mean being over replicates, too.
     Rmse,
 }
 
 impl Metric {
-    /// How files are named after it, what the recorded metric's versioned id starts with, and that of the metric that is left
+    /// Returns its stem in file names, the start of the recorded metric's versioned id, and that of the metric used instead
     /// for a reference of one image.
     const fn words(self) -> [&'static str; 3] {
         match self {
@@ -76,18 +76,18 @@ impl Metric {
         }
     }
 
-    /// How tables and axes name it.
+    /// Returns its name in tables and on axes.
     pub fn name(self) -> &'static str {
         &self.figure().title
     }
 
-    /// How files are named after it.
+    /// Returns its stem in file names.
     pub(crate) fn stem(self) -> &'static str {
         self.words()[0]
     }
 
-    /// From means of what was recorded. No true error is negative, so intervals end at 0. Negative means
-    /// have no root: 0 stands for them, and they are not resolved.
+    /// Returns the interval shown for a recorded mean. No true error is negative, so intervals end at 0. Negative
+    /// means have no root: they are shown as 0 and not resolved.
     fn shown(self, recorded: Interval) -> Interval {
         let root = |x: f64| x.max(0.0).sqrt();
         match self {
@@ -127,36 +127,35 @@ pub struct MeanError {
     /// Mean over replicates. The interval follows from their spread and from that of the reference's
     /// parts; it has no width for a single replicate.
     pub error: Interval,
-    /// Whether the estimate is clearly above 0 for the noise of this reference. Otherwise only the upper
-    /// end says something.
+    /// True if the estimate is clearly above 0 for the noise of this reference. Otherwise only the upper end has a
+    /// meaning.
     pub resolved: bool,
-    /// Whether the interval is not to be trusted, since a single pixel decides over it: see [`raystone_stats::heavy_tails`]. Never said of
-    /// roots of the MSE, in which dark pixels count for little.
+    /// True if the interval is unreliable, since a single pixel dominates it: see [`raystone_stats::heavy_tails`]. Never set for roots of
+    /// the MSE, to which dark pixels contribute little.
     pub heavy_tailed: bool,
 }
 
 impl<'a> MeasuredSampler<'a> {
-    /// Whether no seed changes it, so that its one replicate is exact.
+    /// Returns `true` if no seed changes it, so that its one replicate is exact.
     pub(crate) fn is_deterministic(&self) -> bool {
         let first = self.replicates.first();
         first.is_some_and(|replicate| !replicate.randomised)
     }
 
-    /// Whether it may be compared with others: from one image nothing is known of the spread, not even
-    /// of a deterministic sampler, which is lucky or not in this one scene. Nor is a spread known that a pixel decides over which
-    /// replicates seldom hit.
+    /// Returns `true` if it may be compared with others: one image has no known spread, not even that of a deterministic sampler,
+    /// which is lucky or not in this one scene. Nor is a spread known that is dominated by a pixel which replicates seldom hit.
     pub fn is_ranked(&self) -> bool {
         self.all().have_spread() && !self.is_heavy_tailed()
     }
 
-    /// Whether a single pixel decides over the interval of its relMSE at the most samples, so that neither this interval nor what
-    /// follows from it is to be trusted.
+    /// Returns `true` if a single pixel dominates the interval of its relMSE at the most samples, so that neither this interval
+    /// nor its consequences are reliable.
     pub(crate) fn is_heavy_tailed(&self) -> bool {
         let means = self.mean_errors(Metric::RelMse);
         means.last().is_some_and(|mean| mean.heavy_tailed)
     }
 
-    /// Why it may not win, however small its error.
+    /// Returns the reason why it may not win, however small its error.
     pub fn fault(&self) -> Option<String> {
         let bad: usize = self.replicates.iter().map(|r| r.non_finite_pixels).sum();
         if bad > 0 {
@@ -250,7 +249,7 @@ impl<'a> MeasuredSampler<'a> {
         means.find(|mean| mean.spp == spp)
     }
 
-    /// What error is compared by that lies between those at two numbers of samples, with this share of the way on
+    /// Returns the error interpolated between those at two numbers of samples, at this fraction of the way on
     /// logarithms. `None` unless both are positive, whatever is left out.
     pub(crate) fn log_error(
         &self,
@@ -320,8 +319,8 @@ impl<'a> MeasuredSampler<'a> {
 }
 
 impl View<'_> {
-    /// Whether the images of a sampler are, to the bit, those of the same sampler with the program's own kernels: then it has no
-    /// error of its own.
+    /// Returns `true` if the images of a sampler are, to the bit, those of the same sampler with the program's own kernels: then
+    /// it has no error of its own.
     pub(crate) fn is_same_image(&self, sampler: &MeasuredSampler) -> bool {
         if sampler.key.label(axis::KERNELS).is_empty() {
             return false;
@@ -338,8 +337,8 @@ impl View<'_> {
         is_known && samplers.any(|s| s.key == original && hashes(s) == hashes(sampler))
     }
 
-    /// Why the errors of this view may not be ranked: the reference is absent, or too noisy for the
-    /// least of them.
+    /// Returns the reason why the errors of this view may not be ranked: the reference is absent, or too noisy for
+    /// the least of them.
     pub(crate) fn reference_fault(&self) -> Option<String> {
         let errors = || {
             let of = |s: &MeasuredSampler| s.mean_errors(Metric::Rmse);
@@ -349,7 +348,7 @@ impl View<'_> {
         let Some(reference) = self.reference else {
             return Some("the reference has no record".into());
         };
-        // Of a file no more is known than that the user takes it for right.
+        // A reference file is trusted: nothing is known of its noise.
         if reference.exact.is_some() || reference.file.is_some() {
             return None;
         }
@@ -415,8 +414,8 @@ pub(crate) fn log_time(time: &Measured<TimeRecord>) -> Option<LogFigure> {
     known.or_else(|| Some(LogFigure::exact(time.ms_per_spp?.value)))
 }
 
-/// Where `seconds` lies on a curve of growing seconds: the indices of the neighbours, and the share of the way
-/// between them on logarithms; `None` outside the curve.
+/// Returns the position of `seconds` on a curve of growing seconds: the indices of the neighbours, and the fraction
+/// of the way between them on logarithms; `None` outside the curve.
 pub(crate) fn place_on(curve: &[f64], seconds: f64) -> Option<([usize; 2], f64)> {
     let exact = |x: &f64| (x / seconds - 1.0).abs() < 1e-9;
     if let Some(i) = curve.iter().position(exact) {

@@ -7,7 +7,7 @@ use raystone_record::ErrorAtSpp;
 use raystone_stats::metrics::{Reference, measure};
 
 const PIXELS: usize = 40;
-/// What every pixel should have.
+/// The true value of every pixel.
 const TRUTH: f64 = 0.5;
 /// Standard deviation of a pixel at one sample; it falls as the root of the samples.
 const NOISE: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! Tables and plots by declaration: which figures, and what of their keys makes rows, columns and curves.
+//! Tables and plots by declaration: their figures, and the parts of keys that make rows, columns and curves.
 
 use super::data::{RunData, SAMPLER_ROW, STRUCTURE_AXES};
 use super::document::{Illustration, Table, TableCell};
@@ -10,14 +10,14 @@ use raystone_record::figure::Figure;
 use raystone_record::{Interval, Key, axis};
 use std::collections::HashSet;
 
-/// A column before the figures: what of a key it shows, and tells rows apart.
+/// A column before the figures: a part of the key, which distinguishes rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Head {
     /// A structure among all of its scene.
     Structure,
     /// A sampler among those of its view.
     Sampler,
-    /// Under this head (as [`Table::new`] takes it) the label on this axis; no column where no key has one.
+    /// The label on this axis under this head (in the notation of [`Table::new`]); no column where no key has one.
     Axis(&'static str, &'static str),
     /// The same, and no column either where all have the same label.
     Varied(&'static str, &'static str),
@@ -71,13 +71,13 @@ impl Head {
 /// A table of figures.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TableSpec<'a> {
-    /// What it shows; each `{}` stands for a word.
+    /// Its caption; each `{}` is replaced by a word.
     pub caption: &'a str,
-    /// What tells rows apart.
+    /// The columns that distinguish rows.
     pub rows: &'a [Head],
     /// Figures in the order of their columns.
     pub figures: &'a [&'a Figure],
-    /// What of a key is a column; see [`BY_FIGURE`] and [`BY_RAYS`].
+    /// The column of a key; see [`BY_FIGURE`] and [`BY_RAYS`].
     pub across: fn(&Key) -> String,
 }
 
@@ -85,7 +85,7 @@ pub(crate) struct TableSpec<'a> {
 pub(crate) const BY_FIGURE: fn(&Key) -> String = |_| String::new();
 /// A column for each class of rays.
 pub(crate) const BY_RAYS: fn(&Key) -> String = |key| key.label(axis::RAYS).to_owned();
-/// A column for each thing that a figure is of.
+/// A column for each subject.
 pub(crate) const BY_SUBJECT: fn(&Key) -> String = |key| key.label(axis::SUBJECT).to_owned();
 
 impl TableSpec<'_> {
@@ -98,7 +98,7 @@ impl TableSpec<'_> {
         let keys: Vec<&Key> = keys
             .filter(|key| known.insert(key.labels_on(&by)))
             .collect();
-        // What the first column has in common stands together.
+        // Rows with the same first column are adjacent.
         let first = self.rows[0].axes();
         let mut order: Vec<&Key> = keys.clone();
         order.sort_by_key(|key| keys.iter().position(|other| other.agrees(key, &first)));
@@ -154,9 +154,9 @@ pub(crate) fn filled(text: &str, words: &[&str]) -> String {
 /// Curves of figures against a number of their keys.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlotSpec<'a> {
-    /// What ends the name of its files.
+    /// The end of the names of its files.
     pub name: &'a str,
-    /// What it shows; each `{}` stands for a word.
+    /// Its caption; each `{}` is replaced by a word.
     pub caption: &'a str,
     /// Title of the x axis.
     pub x_title: &'a str,
@@ -166,9 +166,9 @@ pub(crate) struct PlotSpec<'a> {
     pub x: fn(&Key) -> Option<f64>,
     /// Title of the y axis.
     pub y_title: &'a str,
-    /// Figures, each with what its curves are called by beside their competitor; those after the first are dashed.
+    /// Figures, each with the suffix of its curves' names; those after the first are dashed.
     pub figures: &'a [(&'a Figure, &'a str)],
-    /// What has a curve.
+    /// The part of the key that has a curve of its own.
     pub curves: Head,
 }
 

@@ -12,12 +12,12 @@ use super::values::{of_structures, of_view};
 use raystone_core::text::escape::visible;
 use raystone_record::{Line, Verdict};
 
-/// Where text is shown.
+/// The screen or file that shows text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Screen {
     /// Columns of characters; `None` for a file or a pipe, where lines may have any length.
     pub width: Option<usize>,
-    /// Whether it shows colours.
+    /// True if it shows colours.
     pub colour: bool,
 }
 
@@ -26,7 +26,7 @@ pub fn terminal_tables(records: &[Line]) -> String {
     Screen::default().tables(records)
 }
 
-/// The checks that failed, each with what it found: any is a failure of the run.
+/// Returns the failed checks with their findings: any is a failure of the run.
 pub fn failed_checks(records: &[Line]) -> Vec<String> {
     let checks = belief::checks(&RunData::new(records)).into_iter();
     let failed = checks.filter(|check| check.verdict == Verdict::Fail);
@@ -59,7 +59,7 @@ impl Screen {
         out
     }
 
-    /// A check, its verdict in colour where the screen shows any: the word alone says it.
+    /// Formats a check, its verdict in colour if the screen has any: the word alone suffices.
     pub fn check(self, check: &Check) -> String {
         let text = self.lines(check.line().trim_end());
         let word = check.verdict.word();
@@ -97,9 +97,9 @@ impl Screen {
         }
     }
 
-    /// The table with columns padded to equal width; of figures only the value is kept, since intervals
-    /// would not fit a terminal, except in tables of text. Where the lines are too long, heads and texts go on in
-    /// the next line, and then columns go on below, beside the first one again: a figure is never cut.
+    /// Formats the table with columns padded to equal width; figures lose their intervals, which would not fit a
+    /// terminal, except in tables of text. Where the lines are too long, heads and texts continue in the next line,
+    /// and then columns continue below, beside the first one again: a figure is never cut.
     pub fn table(self, table: &Table) -> String {
         let grid = Grid::new(table);
         let mut out = self.lines(&table.caption);
@@ -181,7 +181,7 @@ impl Grid {
         self.is_text.len()
     }
 
-    /// The greatest width of what a column holds, below its head or with it.
+    /// Returns the greatest width of a column's cells, with or without its head.
     fn widest(&self, column: usize, with_head: bool) -> usize {
         let rows = self.texts.iter().skip(usize::from(!with_head));
         let cells = rows.filter_map(|row| row.get(column));
@@ -216,7 +216,7 @@ impl Grid {
             }
             widths[widest] -= 1;
         }
-        // What is left over goes back to the heads.
+        // The remaining width goes back to the heads.
         let mut spare = width.saturating_sub(widths.iter().sum());
         for (wide, natural) in widths.iter_mut().zip(natural) {
             let more = natural.saturating_sub(*wide).min(spare);
@@ -226,7 +226,7 @@ impl Grid {
         widths
     }
 
-    /// Columns that stand beside each other: all, or as many as fit beside the first.
+    /// Returns the columns of each block: all, or as many as fit beside the first.
     fn blocks(&self, widths: &[usize], width: usize) -> Vec<Vec<usize>> {
         let mut blocks = Vec::new();
         let mut block = vec![0];
@@ -267,7 +267,7 @@ impl Grid {
             for line in 0..height {
                 let mut parts = Vec::new();
                 for (cell, column) in cells.iter().zip(columns) {
-                    // Broken heads stand on the rule.
+                    // Broken heads are aligned to the rule.
                     let from = if number == 0 { height - cell.len() } else { 0 };
                     let text = line.checked_sub(from).and_then(|at| cell.get(at));
                     let text = text.map_or("", String::as_str);
@@ -288,7 +288,7 @@ impl Grid {
     }
 }
 
-/// Cells of a terminal that a text takes: two for a wide character of East Asia.
+/// Returns the width of a text in cells of a terminal: two for a wide character of East Asia.
 fn width_of(text: &str) -> usize {
     console::measure_text_width(text)
 }
@@ -362,7 +362,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[3], "bvh                5.02");
         assert_eq!(lines[4], "uniform-grid λ        1");
-        // What fits is the same.
+        // A table that fits is unchanged.
         assert_eq!(screen(80).table(&table), text);
     }
 

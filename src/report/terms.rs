@@ -1,8 +1,8 @@
-//! Words of the field, each explained where it first stands.
+//! Terms of the field, each explained at its first use.
 
 use super::document::{Block, Document, Term};
 
-/// A word with other forms by which it is found, and what it means.
+/// A term with other forms by which it is found, and its meaning.
 type Entry = (&'static str, &'static [&'static str], &'static str);
 
 #[rustfmt::skip]
@@ -40,7 +40,7 @@ const TERMS: &[Entry] = &[
     ("crack", &["cracks"], "A ray from inside of a closed mesh that leaves it without a hit."),
 ];
 
-/// Puts an explanation behind each block that is the first to use a word.
+/// Adds an explanation after each block that is the first to use a term.
 pub fn explain(document: &mut Document) {
     let mut left: Vec<&Entry> = TERMS.iter().collect();
     for section in &mut document.sections {
@@ -74,7 +74,7 @@ fn explain_among(blocks: &mut Vec<Block>, left: &mut Vec<&Entry>) {
     *blocks = explained;
 }
 
-/// Whether a word stands in a text by itself.
+/// Returns `true` if a word occurs in a text by itself.
 fn has_word(text: &str, word: &str) -> bool {
     let outside = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric() && c != '-' && c != '_');
     text.match_indices(word).any(|(at, _)| {
@@ -82,7 +82,7 @@ fn has_word(text: &str, word: &str) -> bool {
     })
 }
 
-/// What a block itself says, without names of files and what was typed.
+/// Returns the texts of a block, without names of files and typed text.
 fn texts(block: &Block) -> Vec<&str> {
     match block {
         Block::Heading(text) | Block::Paragraph(text) => vec![text],

@@ -14,8 +14,8 @@ use raystone_stats::bias::BiasVerdict;
 use sections::verdict::{Race, best_per_sample, fastest};
 use std::collections::BTreeSet;
 
-/// Page and summary of these records, with pictures for the first scene only. With `RAYSTONE_REPORT_DIR`
-/// set, they are kept there to be looked at.
+/// Returns page and summary of these records, with pictures for the first scene only. If `RAYSTONE_REPORT_DIR` is
+/// set, they are left there for inspection.
 fn report(name: &str, lines: &[Line]) -> (String, String) {
     let folder = tempfile::tempdir().unwrap();
     let keep = std::env::var_os("RAYSTONE_REPORT_DIR").map(|keep| Path::new(&keep).join(name));

@@ -1,10 +1,10 @@
-//! Why a question has no winner: a check that it rests on failed.
+//! Reasons why a question has no winner: a failed check behind its figures.
 
 use super::data::{SceneGroup, View};
 use super::samplers::MeasuredSampler;
 use raystone_record::GateVerdict;
 
-/// Why no structure may be called the fastest on a scene.
+/// Returns the reason why no structure may be called the fastest on a scene.
 pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
     let gates = || scene.structures.iter().filter_map(|s| s.gate.as_ref());
     let differs = |gate: &GateVerdict| gate.brute_force.wrong > 0 || gate.oracle.wrong > 0;
@@ -17,7 +17,7 @@ pub(crate) fn doubt_of_rays(scene: &SceneGroup) -> Option<String> {
     (!names.is_empty()).then(|| format!("{} {verb} failed the gate", names.join(", ")))
 }
 
-/// Why no structure may be called the fastest for rendering.
+/// Returns the reason why no structure may be called the fastest for rendering.
 pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<String> {
     let unequal = view.times.iter().find(|time| !time.image_equal);
     let unequal = unequal.map(|time| {
@@ -29,7 +29,8 @@ pub(crate) fn doubt_of_rendering(scene: &SceneGroup, view: &View) -> Option<Stri
     unequal.or_else(|| doubt_of_rays(scene))
 }
 
-/// Why no sampler may be called the best: the reference, the check of the integrator, or a check of its images.
+/// Returns the reason why no sampler may be called the best: the reference, the check of the integrator, or a check
+/// of its images.
 pub(crate) fn doubt_of_errors(view: &View) -> Option<String> {
     let judged = || {
         let fault = view.paths_fault.as_ref()?;
@@ -42,7 +43,7 @@ pub(crate) fn doubt_of_errors(view: &View) -> Option<String> {
         .or_else(|| view.samplers.iter().find_map(failure))
 }
 
-/// What a check found wrong with a sampler, unless it is meant to be so.
+/// Describes the fault that a check found with a sampler, unless it is meant to be so.
 fn failure(sampler: &MeasuredSampler) -> Option<String> {
     Some(format!(
         "{} is at fault ({})",

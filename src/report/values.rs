@@ -1,4 +1,4 @@
-//! What the records say, figure by figure: each value with its key. Tables and exports read these.
+//! The values of the records, figure by figure, each with its key. Tables and exports read these.
 
 use super::data::{FULL_CELLS, RAYS, RunData, SceneGroup, View, sitting, world};
 use super::document::TableCell;
@@ -20,17 +20,17 @@ use std::collections::BTreeSet;
 /// A figure of one key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Value<'a> {
-    /// What it is of.
+    /// Its subject.
     pub key: Key,
     /// Its row in the table of figures.
     pub figure: Cow<'a, Figure>,
-    /// What was found.
+    /// Its estimate.
     pub estimate: Estimate,
-    /// What it was made of.
+    /// Its source.
     pub source: Source<'a>,
 }
 
-/// What a value was made of.
+/// The source of a value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Source<'a> {
     /// The samples.
@@ -38,13 +38,13 @@ pub struct Source<'a> {
     /// Equal for two values whose samples belong together one by one, as those timed in the same rounds
     /// do; empty where that is not known.
     pub sitting: String,
-    /// What must be equal for two values to be of the same work.
+    /// Description of the work, equal for two values of the same work.
     pub work: String,
-    /// Hash of the kernels that ran; empty where none is recorded.
+    /// Hash of the kernels; empty if none is recorded.
     pub kernel: &'a str,
 }
 
-/// What is known of a figure.
+/// An estimate of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Estimate {
     /// The value, with an interval that has no width where none is known.
@@ -54,12 +54,12 @@ pub enum Estimate {
     HeavyTailed(Interval),
     /// Only that it is below this: the reference resolves no more.
     Below(f64),
-    /// No number, for the reason that the word says.
+    /// No number, for the reason given by the word.
     Word(&'static str),
 }
 
 impl Estimate {
-    /// The value with its interval, and whether that is not to be trusted.
+    /// Returns a value with its interval; `heavy_tailed` if that is unreliable.
     pub fn of(interval: Interval, heavy_tailed: bool) -> Self {
         match heavy_tailed {
             true => Self::HeavyTailed(interval),
@@ -103,7 +103,7 @@ impl Value<'static> {
 }
 
 impl<'a> Value<'a> {
-    /// What a line with this key reads.
+    /// Returns the value of a reading in a line with this key.
     pub(crate) fn of_reading(
         data: &RunData<'a>,
         key: &Key,
@@ -127,7 +127,7 @@ impl<'a> Value<'a> {
         self.source.sitting = match &self.source.samples {
             Samples::Once => String::new(),
             Samples::Rounds { .. } => sitting(kind, &self.key, cell),
-            // Where sides were followed in different numbers of groups, no group belongs to another.
+            // If the numbers of groups differ, groups cannot be paired.
             Samples::Groups(groups) => {
                 format!("{} groups of warps\n{}", groups.len(), world(&self.key))
             }
@@ -144,7 +144,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// Whether what is known is a number, with ends that are numbers.
+    /// Returns `true` if its number, if any, is finite, as are the ends of its interval.
     fn is_a_number(&self) -> bool {
         match self.estimate {
             Estimate::Known(i) | Estimate::HeavyTailed(i) => {
@@ -155,12 +155,12 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// Whether the reference is too noisy for it.
+    /// Returns `true` if the reference is too noisy for it.
     pub(crate) fn is_unresolved(&self) -> bool {
         matches!(self.estimate, Estimate::Below(_))
     }
 
-    /// Whether its interval is not to be trusted.
+    /// Returns `true` if its interval is unreliable.
     pub(crate) fn is_heavy_tailed(&self) -> bool {
         matches!(self.estimate, Estimate::HeavyTailed(_))
     }
@@ -206,7 +206,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
             .flat_map(|cell| of_readings(data, *cell)),
     );
     values.extend(compactions::derived(data));
-    // What a damaged record makes of a division is no figure.
+    // A quotient from a damaged record that is no number is no figure.
     values.retain(Value::is_a_number);
     values
 }
@@ -239,7 +239,7 @@ pub(crate) fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> V
     values
 }
 
-/// What a build is per triangle of its scene.
+/// Returns the figures of a build per triangle of its scene.
 fn of_triangles(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'static>> {
     let known = s.is_built() && triangles > 0;
     let per_triangle = |x: u64| known.then(|| x as f64 / triangles as f64);
@@ -280,7 +280,7 @@ pub(crate) fn of_view<'a>(
     values
 }
 
-/// What the replicates of a sampler say together.
+/// Returns the statistics of the replicates of a sampler.
 fn of_sampler<'a>(data: &RunData<'a>, sampler: &MeasuredSampler<'a>) -> Vec<Value<'a>> {
     let key = &sampler.key;
     let mut values = Vec::new();

@@ -1,7 +1,7 @@
 //! Compares two sets of records: per cell and figure the candidate is better, worse, the same, or undecided because of
 //! noise. `docs/compare.md` has the rules.
 //!
-//! Data flows one way: [`side`] reads, [`taken`] finds the evidence behind each figure, [`judge`] compares two pieces of it,
+//! Data flows one way: [`side`] reads, [`taken`] collects the evidence of each figure, [`judge`] compares two pieces of it,
 //! [`drift`] estimates the machine's drift from unchanged cells, this module corrects for the number of tests and gives
 //! verdicts, and [`show`] writes them.
 

@@ -19,7 +19,7 @@ const MOST_ALIKE: usize = 4;
 const MOST_OF_COMMENT: usize = 65_536;
 /// Greatest length of the verdict and of each note in a comment.
 const MOST_OF_LINE: usize = 2_000;
-/// Reserve for lines that count what was cut, and for the mark by which continuous integration finds its comment.
+/// Reserve for lines that count the rows cut, and for the mark by which continuous integration finds its comment.
 const RESERVE: usize = 1_000;
 /// Greatest number of characters of a fact's text; the records have it whole.
 const MOST_CHARACTERS: usize = 40;

@@ -1,4 +1,4 @@
-//! What a side says, figure by figure, with the evidence behind it: raw samples where the records keep them.
+//! The figures of a side with their evidence: raw samples where the records have them.
 
 use super::Identity;
 use super::facts::{BIAS, IMAGE, fact, facts};
@@ -12,7 +12,7 @@ use raystone_record::*;
 use raystone_stats::statistics::{log_log_fit, mean};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a figure rests on.
+/// The evidence of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Evidence {
     /// It is counted or computed: any difference is one.
@@ -21,15 +21,15 @@ pub enum Evidence {
     Times {
         /// By the adapter's clock, or the wall clock where it has none.
         adapter: Vec<f64>,
-        /// Of all threads of the process together, in which others on the machine do not count; empty where that is not
-        /// what the adapter computes with.
+        /// CPU time of all threads of the process together, independent of other processes; empty where the adapter
+        /// does not compute on the processor.
         processors: Vec<f64>,
     },
     /// A value for each seed, whose mean is the figure.
     Seeds {
         /// Seed and value; of a figure that is no mean, the jackknife's pseudo-values (Tukey 1958).
         values: Vec<(u32, f64)>,
-        /// What they were held against.
+        /// The reference of the values.
         reference: String,
     },
     /// No more than an interval that is about Student's with so many degrees of freedom.
@@ -38,9 +38,9 @@ pub enum Evidence {
     Once(f64),
     /// A verdict or a hash.
     Fact {
-        /// What it says.
+        /// Its text.
         text: String,
-        /// Whether that is a failure.
+        /// True if it is a failure.
         fails: bool,
     },
 }
@@ -48,24 +48,25 @@ pub enum Evidence {
 /// A figure of a cell with its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taken {
-    /// What it is of.
+    /// Its subject.
     pub key: Key,
     /// Its row in the table of figures.
     pub figure: Figure,
     /// The value as it is shown.
     pub shown: String,
-    /// What it rests on.
+    /// Its evidence.
     pub evidence: Evidence,
-    /// What must be the same for two values to be of the same work.
+    /// Description of the work, equal for two values of the same work.
     pub work: String,
-    /// `run.seed`, where it is of rays, pictures or tests of that seed alone: with another it is another sample of the same.
+    /// `run.seed`, if the figure is of rays, pictures or tests of that seed alone: another seed gives another sample of the
+    /// same.
     pub seed: Option<i64>,
-    /// Hash of the kernels that ran; empty where none is recorded.
+    /// Hash of the kernels; empty if none is recorded.
     pub kernel: String,
 }
 
 impl Taken {
-    /// What tells it from all others: labels, since programs of different versions may know different parameters.
+    /// Returns its unique name: labels, since programs of different versions may know different parameters.
     pub fn identity(&self) -> Identity {
         identity(&self.key, &self.figure)
     }
@@ -76,7 +77,7 @@ fn identity(key: &Key, figure: &Figure) -> Identity {
     (labels.join("\u{1}"), figure.id.to_string())
 }
 
-/// Figures that follow from others, or hold times beside what they are of: they are told by reports and decide nothing.
+/// Figures that follow from others, or other times of the same subject: reports show them, verdicts ignore them.
 const DERIVED: [&Figure; 24] = [
     &figure::BUILD_RATE,
     &figure::BYTES_PER_TRIANGLE,
@@ -104,8 +105,8 @@ const DERIVED: [&Figure; 24] = [
     &figure::RAYS,
 ];
 
-/// Figures of cells that the seed of the run changes, beside those of its rays: what is counted in one picture of that seed, or
-/// timed of it.
+/// Figures of cells that the seed of the run changes, beside those of its rays: counts in one picture of that seed, or times of
+/// it.
 const OF_ONE_SEED: [&Figure; 11] = [
     &figure::MS_PER_SPP,
     &figure::RAY_QUERY_SHARE,
@@ -127,8 +128,8 @@ fn is_among(figures: &[&Figure], id: &str) -> bool {
     figures.iter().any(|figure| figure.id == id)
 }
 
-/// Whether a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by seed, and
-/// structures know none.
+/// Returns `true` if a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by
+/// seed, and structures depend on none.
 fn is_of_one_seed(taken: &Taken) -> bool {
     if let Evidence::Summary(_, freedom) = taken.evidence
         && freedom < FEWEST_FREE
@@ -146,18 +147,18 @@ fn is_of_one_seed(taken: &Taken) -> bool {
 /// A check of the run that failed.
 const CHECK: &str = "check/v1";
 
-/// Whether a figure follows from others; those of the check for bias do, which has a verdict.
+/// Returns `true` if a figure follows from others; those of the check for bias do, which has a verdict.
 fn is_derived(id: &str) -> bool {
     is_among(&DERIVED, id) || id.starts_with("bias-") || id.starts_with("growth-")
 }
 
-/// Everything that a side says.
+/// Returns all figures of a side.
 pub fn taken(side: &Side) -> Vec<Taken> {
     of_lines(&side.lines)
 }
 
-/// Names of what a side says in two ways that contradict each other: of two lines on one thing a report takes the later
-/// one, a comparison neither.
+/// Returns the names of figures with two contradictory values on one side: of two lines on one subject a report uses
+/// the later one, a comparison neither.
 pub(crate) fn contradictions(side: &Side) -> Vec<Identity> {
     if !repeats(&side.lines) {
         return Vec::new();
@@ -170,7 +171,7 @@ pub(crate) fn contradictions(side: &Side) -> Vec<Identity> {
     let earlier = by_identity(of_lines(&turned));
     let of_record = |e: &Evidence| !matches!(e, Evidence::Times { .. } | Evidence::Once(_));
     let later = by_identity(of_lines(&side.lines)).into_iter();
-    // A check tells what others say, in their order.
+    // A check repeats other figures, in their order.
     let differing = later.filter(|((_, figure), _)| figure != CHECK);
     let differing = differing.filter(|(id, evidence)| {
         let other = earlier.get(id);
@@ -179,10 +180,10 @@ pub(crate) fn contradictions(side: &Side) -> Vec<Identity> {
     differing.map(|(id, _)| id).collect()
 }
 
-/// Whether two lines are on the same thing, as far as keys tell.
+/// Returns `true` if two lines are on the same subject, as far as keys show.
 fn repeats(lines: &[Line]) -> bool {
     let mut seen = BTreeSet::new();
-    // What has no key is of the run, and of cells and modules, of which there are many.
+    // Lines without a key are of the run, and of cells and modules, of which there are many.
     let is_new = |line: &Line| {
         if line.key.is_empty() {
             return true;
@@ -202,7 +203,7 @@ fn repeats(lines: &[Line]) -> bool {
     !lines.iter().all(is_new)
 }
 
-/// Whether two evidences are equal but for the order of seeds and the rounding of their sums.
+/// Returns `true` if two pieces of evidence are equal but for the order of seeds and the rounding of their sums.
 fn is_like(a: &Evidence, b: &Evidence) -> bool {
     let near = |x: f64, y: f64| x == y || (x - y).abs() <= 1e-9 * x.abs().max(y.abs());
     match (a, b) {
@@ -217,7 +218,7 @@ fn is_like(a: &Evidence, b: &Evidence) -> bool {
     }
 }
 
-/// Whether it is a test's verdict, which other seeds may turn.
+/// Returns `true` for a test's verdict, which other seeds may turn.
 fn is_a_chance(taken: &Taken) -> bool {
     [CHECK, BIAS].contains(&&*taken.figure.id)
 }
@@ -247,7 +248,7 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
     all
 }
 
-/// Values seed by seed, and the work that they are of.
+/// Values seed by seed, and their work.
 type Seeds = BTreeMap<Identity, (Evidence, String)>;
 
 fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
@@ -269,7 +270,8 @@ fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
         seed: None,
         kernel: value.source.kernel.to_owned(),
     };
-    // Seeds that have missed the pixel that decides agree with each other by that: with one degree of freedom, what differs is undecided.
+    // Seeds that all missed the decisive pixel agree with each other for that reason: with one degree of freedom, any difference is
+    // undecided.
     if value.is_heavy_tailed() {
         own.evidence = Evidence::Summary(number, 1.0);
     }
@@ -282,7 +284,7 @@ fn of_value(data: &RunData, of_seeds: &Seeds, value: &Value) -> Option<Taken> {
     Some(own)
 }
 
-/// What a value rests on by itself.
+/// Returns the evidence of a value by itself.
 fn evidence(data: &RunData, value: &Value, number: Interval) -> Evidence {
     if let Samples::Rounds {
         adapter,
@@ -302,13 +304,13 @@ fn evidence(data: &RunData, value: &Value, number: Interval) -> Evidence {
     }
     match value.figure.spread {
         Spread::Exact => Evidence::Exact(number.value),
-        // Of a median the rounds are not kept.
+        // The rounds of a median are not recorded.
         Spread::Single | Spread::Median => Evidence::Once(number.value),
         Spread::Mean | Spread::Jackknife => of_means(data, value, number),
     }
 }
 
-/// Means over seeds whose values are not kept. What no seed changes is exact.
+/// Returns the evidence of means over seeds whose values are not recorded. A value that no seed changes is exact.
 fn of_means(data: &RunData, value: &Value, number: Interval) -> Evidence {
     let key = &value.key;
     let is_it = |stream: &&Recorded<StreamRecord>| {
@@ -418,7 +420,7 @@ fn of_sampler(view: &View, sampler: &MeasuredSampler) -> Seeds {
     all
 }
 
-/// What each value brings to an estimate: n times it less n − 1 times that without the value.
+/// Returns the contribution of each value to an estimate: n times it less n − 1 times that without the value.
 fn pseudo_values(values: &[f64], estimate: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     let n = values.len() as f64;
     let all = estimate(values);

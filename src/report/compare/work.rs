@@ -169,7 +169,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Returns the finding on a figure of one side alone. A test that failed with other seeds says nothing about the change.
+    /// Returns the finding on a figure of one side alone. A test that failed with other seeds is no evidence on the change.
     fn alone(&self, taken: &Taken, side: usize) -> Open {
         let mut open = alone(taken, side);
         let decided = matches!(

@@ -1,4 +1,4 @@
-//! JUnit XML (as Jenkins, GitLab and `junitparser` read it): gates, judged paths, checks and cells as test cases.
+//! JUnit XML (as Jenkins, GitLab and `junitparser` read it): gates, checked paths, checks and cells as test cases.
 
 use super::{Exported, Source};
 use crate::data::{Measured, RunData, SceneGroup};
@@ -7,7 +7,7 @@ use crate::sections::belief::checks;
 use raystone_core::text::escape::xml as escape;
 use raystone_record::{PathsRecord, Recorded, StructureRecord, Verdict, axis};
 
-/// A name and cases: what is open is skipped.
+/// A name and cases: an open one is skipped.
 type Suite = (String, Vec<Check>);
 
 pub(super) fn write(source: &Source) -> Exported {
@@ -62,7 +62,7 @@ fn paths(paths: &Recorded<PathsRecord>) -> Check {
     )
 }
 
-/// Cells without figures, and whether the run came to its end.
+/// Returns cells without figures, and the end of the run as a case.
 fn cells(data: &RunData) -> Vec<Check> {
     let failed = data.failures().into_iter();
     let failed = failed.map(|(name, why)| case(name, Verdict::Fail, why));

@@ -1,4 +1,4 @@
-//! Raw times: every kept round, by the clock that the figure is made of and by others.
+//! Raw times: every recorded round, by the clock of the figure and by others.
 
 use crate::data::RunData;
 use raystone_record::figure::{self, Figure};
@@ -7,19 +7,19 @@ use raystone_record::{Key, axis};
 /// The rounds of one measurement, milliseconds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
-    /// What was measured.
+    /// Its subject.
     pub key: Key,
     /// The figure that is made of them.
     pub figure: &'static Figure,
-    /// By the clock of the adapter where it has one: what the figure is made of.
+    /// By the clock of the adapter where it has one: the samples of the figure.
     pub ms: Vec<f64>,
     /// In time of the processors; empty on adapters that work elsewhere.
     pub cpu_ms: Vec<f64>,
-    /// Rays that a round traces, if that is what is timed.
+    /// Rays that a round traces, if rays are timed.
     pub rays: Option<u64>,
 }
 
-/// All raw times of a run: builds, classes of rays, and full cells. Of what failed its gate there is none.
+/// Returns all raw times of a run: builds, classes of rays, and full cells; none where a gate failed.
 pub fn samples(data: &RunData) -> Vec<Samples> {
     let mut all = Vec::new();
     for scene in &data.scenes {

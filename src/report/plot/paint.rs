@@ -116,7 +116,7 @@ pub(crate) fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, Repo
     let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
     paint(drawing, backend, scale, 0.625 * scale)?;
     let mut png = Vec::new();
-    // Flat colours compress best unfiltered; the usual level 6 takes twice the time for 3 % fewer bytes.
+    // Flat colours compress best unfiltered; the usual level 6 needs twice the time for 3 % fewer bytes.
     PngEncoder::new_with_quality(&mut png, CompressionType::Level(4), FilterType::NoFilter)
         .write_image(
             &halve(&pixels, width as usize),

@@ -312,7 +312,7 @@ mod tests {
             let distance = (x - expected[0]).hypot(y - expected[1]);
             assert!(distance < 1e-12, "{point:?}: {x} {y}");
         }
-        // The concentric map takes the border to the border and the middle to the middle.
+        // The concentric map sends the border to the border and the middle to the middle.
         let [x, y] = Domain::ConcentricDisc.place([1.0, 0.3]);
         assert!(((x - 0.5).hypot(y - 0.5) - 0.5).abs() < 1e-12);
         assert_eq!(Domain::ConcentricDisc.place([0.5, 0.5]), [0.5, 0.5]);

@@ -1,4 +1,4 @@
-//! An expectation against what a run found: a row for each place where it speaks.
+//! Compares an expectation with the values of a run: a row for each of its places.
 
 use super::judge::{Bounds, ClaimVerdict, factor, spread};
 use super::select::{fits, merged, partner, select, words};
@@ -11,41 +11,41 @@ use raystone_config::expect::{At, Compare, Expect, Pick, Speaks};
 use raystone_record::{Interval, Key};
 use raystone_stats::comparison::LogFigure;
 
-/// What is known of a run beside its values.
+/// Facts about a run beside its values.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
-    /// Whether it ran on a software adapter.
+    /// True if it was on a software adapter.
     pub software: bool,
-    /// Whether it is a short run.
+    /// True if it is a short run.
     pub quick: bool,
     /// Original scene → pattern of ours, or why there is none.
     pub scenes: Vec<(String, Result<String, String>)>,
-    /// What was left out or failed: the cell in words, and why.
+    /// Cells left out or failed, with the reason.
     pub absent: Vec<(Key, String)>,
 }
 
 /// One place of a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Where, in the thesis's words or by key.
+    /// The place, in the thesis's words or by key.
     pub row: String,
     /// Column of the original's table.
     pub column: String,
-    /// What the thesis prints.
+    /// The thesis's number.
     pub thesis: Option<f64>,
-    /// What we found.
+    /// Our value.
     pub ours: Option<Interval>,
     /// The number on the axis of a curve, where the place has one (samples, points).
     pub x: Option<f64>,
-    /// What is found of the claim.
+    /// The verdict on the claim.
     pub verdict: ClaimVerdict,
-    /// Why, or what agrees.
+    /// The reason, or the values that would agree.
     pub reason: String,
     /// Counted figures: title and value.
     pub counted: Vec<(String, f64)>,
 }
 
-/// Judges an expectation wherever it speaks.
+/// Compares an expectation with the values in each of its places.
 pub fn judge(expect: &Expect, values: &[Value], context: &Context) -> Vec<Row> {
     let everywhere = [At::default()];
     let places = match expect.at.is_empty() {
@@ -56,8 +56,8 @@ pub fn judge(expect: &Expect, values: &[Value], context: &Context) -> Vec<Row> {
     places.iter().flat_map(at).collect()
 }
 
-/// What an expectation says that its comparison has no use for, and what to do about it: a bound of an order would be passed over,
-/// and the claim judged as if it were not there.
+/// Describes a key of an expectation that its comparison does not use, and what to do about it: a bound of an order would be
+/// ignored, and the claim checked as if it were not there.
 pub(crate) fn unused(expect: &Expect) -> Option<String> {
     use Compare::{Order, Ratio, Shown, Slope};
     let compare = expect.compare;
@@ -116,7 +116,7 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// A pick of the expectation with what this place adds.
+    /// Returns a pick of the expectation with this place's additions.
     fn pick(&self, base: &Pick, more: &Pick) -> Pick {
         let mut pick = merged(base, more);
         if let Some(Ok(pattern)) = &self.scene {
@@ -145,7 +145,8 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// Nothing was found: what was left out for a reason cannot be tested, else the expectation is at fault.
+    /// Returns the row of an empty selection: a cell left out for a reason cannot be tested, else the expectation is
+    /// at fault.
     fn absent(&self, pick: &Pick, problem: String, values: &[Value]) -> Row {
         let is_known = |(axis, pattern): (&String, &String)| {
             let keys = values.iter().map(|value| &value.key);
@@ -168,7 +169,7 @@ impl<'e> Place<'e> {
             shared.retain(|axis, _| key.get(axis).is_some());
             !shared.is_empty() && fits(key, &shared) && is_its(key)
         };
-        // What no cell is called, measured or not, is misspelt.
+        // A label that no cell has, measured or not, is misspelt.
         let is_sound = pick.iter().all(is_known);
         match self.context.absent.iter().find(explains) {
             Some((_, reason)) if is_sound => {
@@ -196,7 +197,7 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// The values of a selection; the pick and what is wrong if there are none.
+    /// Returns the values of a selection; the pick and the problem if there are none.
     fn chosen<'v, 'a>(
         &self,
         values: &'v [Value<'a>],
@@ -213,7 +214,7 @@ impl<'e> Place<'e> {
         }
     }
 
-    /// What agrees, in the unit of ours; `unit` is that of the compared number.
+    /// Returns the range that agrees, in the unit of ours; `unit` is that of the compared number.
     fn bounds(&self, unit: &str) -> Result<Bounds, String> {
         let (expect, at) = (self.expect, self.at);
         let mut bounds = Bounds::new(at.least.or(expect.least), at.most.or(expect.most));
@@ -324,7 +325,7 @@ impl<'e> Place<'e> {
         upper.into_iter().map(pair).collect()
     }
 
-    /// What a value is compared by: what is known of it part by part (times round by round), else its interval.
+    /// Returns the compared figure of a value: part by part if known (times round by round), else by its interval.
     fn figure(&self, value: &Value) -> Option<LogFigure> {
         let by_parts = value.by_parts();
         by_parts.or_else(|| LogFigure::of_interval(known(value)?, f64::INFINITY))
@@ -352,15 +353,15 @@ impl<'e> Place<'e> {
         Ok(self.pairs(values, figure)?.iter().filter_map(row).collect())
     }
 
-    /// The picks of an order, with what all of them share.
+    /// Returns the picks of an order, with their common part.
     fn steps(&self, shared: &Pick, more: &Pick) -> Vec<Pick> {
         let shared = merged(shared, more);
         let order = self.expect.order.iter();
         order.map(|pick| self.pick(&shared, pick)).collect()
     }
 
-    /// The least ratio of a selection to the one before it: at least 1 where they ascend. With `over` it is what each
-    /// gains over another one that should ascend.
+    /// Returns the least ratio of a selection to the one before it: at least 1 where they ascend. With `over` it is
+    /// the gain of each over another one that should ascend.
     fn orders(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
         let picks = self.steps(&self.expect.of, &self.at.of);
         let lower = match self.expect.over.is_empty() && self.at.over.is_empty() {
@@ -391,7 +392,7 @@ impl<'e> Place<'e> {
         Ok(rows)
     }
 
-    /// What a part of an order is compared by.
+    /// Returns the compared figure of a part of an order.
     fn gained(&self, gain: &Gain) -> Option<LogFigure> {
         let value = self.figure(gain.value)?;
         let Some(over) = gain.over else {
@@ -477,7 +478,7 @@ impl<'e> Place<'e> {
     }
 }
 
-/// A value, and what it is divided by where that is what is compared.
+/// A value, and its divisor where a quotient is compared.
 #[derive(Clone, Copy)]
 struct Gain<'v, 'a> {
     value: &'v Value<'a>,
@@ -490,7 +491,7 @@ impl<'v, 'a> Gain<'v, 'a> {
     }
 }
 
-/// The number of a value, with the spread that is assumed of what was measured once.
+/// Returns the number of a value, with the assumed spread if it was measured once.
 fn known(value: &Value) -> Option<Interval> {
     match value.estimate {
         Estimate::Known(i) if i.value.is_finite() => Some(spread(&value.figure, i)),
@@ -508,7 +509,7 @@ fn over(a: Option<LogFigure>, b: Option<LogFigure>) -> Interval {
     a.zip(b).map_or(unknown, |(a, b)| a.compared_with(&b).ratio)
 }
 
-/// Whether two keys agree on all axes that both have.
+/// Returns `true` if two keys agree on all axes that both have.
 fn agrees(a: &Key, b: &Key) -> bool {
     let both = a.labels().filter(|(axis, _)| b.get(axis).is_some());
     both.into_iter().all(|(axis, label)| b.label(axis) == label)

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum ClaimVerdict {
     /// Shown without a verdict.
     Shown,
-    /// It cannot be tested where this ran.
+    /// It cannot be tested in this run.
     NotTestable,
     /// The whole interval agrees.
     Supported,
@@ -196,7 +196,7 @@ mod tests {
         use raystone_stats::comparison::LogFigure;
         let build = spread(&figure::BUILD_MS, Interval::exact(100.0));
         assert_eq!((build.low, build.high), (60.0, 165.0));
-        // A build of a millisecond may have taken no time at all: neither is faster than the other.
+        // A build of a millisecond may read as no time at all: neither is faster than the other.
         let short = |ms| spread(&figure::BUILD_MS, Interval::exact(ms));
         let [slow, fast] =
             [6.0, 0.1].map(|ms| LogFigure::of_interval(short(ms), f64::INFINITY).expect("a time"));

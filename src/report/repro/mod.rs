@@ -1,8 +1,8 @@
 //! Tables, figures and claims of four theses, each by an experiment, with the thesis's numbers beside ours and a
 //! verdict on every claim. docs/repro.md.
 //!
-//! An experiment of `experiments/thesis` says what is expected ([`raystone_config::expect`]); `run` runs it unless its
-//! records are there; [`claim`] holds what it found against what was expected; [`page`] and [`latex`] show both.
+//! An experiment of `experiments/thesis` has the expectations ([`raystone_config::expect`]); `run` runs it unless its
+//! records are there; [`claim`] compares its values with them; [`page`] and [`latex`] show both.
 
 pub mod claim;
 pub mod judge;
@@ -57,10 +57,10 @@ pub static SOURCES: [Source; 17] = sources![
     "roger-stream-reduction",
 ];
 
-/// What is not tested, and why.
+/// The list of untested parts, with reasons.
 const NOT_COVERED: &str = include_str!("not-covered.toml");
 
-/// What of the digests no experiment tests.
+/// Parts of the digests that no experiment tests.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NotCovered {
@@ -76,9 +76,9 @@ pub struct NotCovered {
 pub struct NotYet {
     /// Name, as a table's.
     pub name: String,
-    /// What the thesis shows.
+    /// Its title in the thesis.
     pub title: String,
-    /// What is missing.
+    /// The missing part.
     pub why: String,
 }
 
@@ -94,7 +94,7 @@ pub struct Untested {
     pub why: String,
 }
 
-/// What no experiment tests.
+/// Returns the parts that no experiment tests.
 ///
 /// # Errors
 /// The embedded list is not readable: a fault of this program.
@@ -103,7 +103,7 @@ pub fn not_covered() -> Result<NotCovered, toml::de::Error> {
 }
 
 impl Source {
-    /// What its thesis says.
+    /// Returns the description of its thesis.
     ///
     /// # Errors
     /// A fault of the file.
@@ -117,10 +117,10 @@ impl Source {
     }
 }
 
-/// The experiments with these names, all without any, in their own order.
+/// Returns the experiments with these names, all without any, in their own order.
 ///
 /// # Errors
-/// An unknown name, with the nearest and all known ones; one whose parts do not exist yet, with what is missing.
+/// An unknown name, with the nearest and all known ones; one whose parts do not exist yet, with the missing part.
 pub fn chosen(names: &[String]) -> Result<Vec<Source>, String> {
     for name in names {
         if SOURCES.iter().any(|source| source.name == name) {

@@ -55,7 +55,7 @@ pub fn tally(tables: &[Reproduced]) -> String {
     counted(&verdicts)
 }
 
-/// How often each verdict is among them, in words.
+/// Returns the number of each verdict among them, in words.
 fn counted(verdicts: &[ClaimVerdict]) -> String {
     let all = [
         ClaimVerdict::Supported,
@@ -138,7 +138,7 @@ fn places(rows: &[Row]) -> String {
     {
         return counted(&rows.iter().map(|row| row.verdict).collect::<Vec<_>>());
     }
-    // Where nothing could be tested, the reason of most places.
+    // If nothing could be tested, the reason of most places.
     let reasons = rows.iter().map(|row| row.reason.as_str());
     let times = |reason: &&str| rows.iter().filter(|row| row.reason == **reason).count();
     let reason = reasons.max_by_key(times).unwrap_or_default();

@@ -107,7 +107,7 @@ fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
     let drawn = rows.iter().filter(|row| row.ours.is_some());
     let named = drawn.map(|row| (row, row.row.split_once(" · ").unwrap_or(("", &row.row))));
     let named: Vec<_> = named.collect();
-    // A colour stands for one label, whichever bars a group lacks.
+    // A colour belongs to one label, even if a group lacks some bars.
     let labels = without_repeats(
         named
             .iter()

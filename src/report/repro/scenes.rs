@@ -1,4 +1,4 @@
-//! Models that stand for the theses' scenes, with licences and sources.
+//! Substitutes for the theses' scenes, with licences and sources.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ pub struct Model {
     pub triangles: u64,
     /// Licence and author.
     pub licence: &'static str,
-    /// Where to get it.
+    /// Its source.
     pub from: &'static str,
 }
 
@@ -44,7 +44,7 @@ pub static MODELS: [Model; 7] = [
 /// The folder of models as written in experiments.
 pub(crate) const IN_FILES: &str = "../shared/scenes";
 
-/// Returns the scene directory: the one asked for, `../shared/scenes` if it exists, otherwise that of the user's data.
+/// Returns the scene directory: `asked` if given, `../shared/scenes` if it exists, otherwise that of the user's data.
 pub fn directory(asked: Option<&Path>) -> PathBuf {
     if let Some(asked) = asked {
         return asked.to_owned();

@@ -1,4 +1,4 @@
-//! What runs for a table, and what its records say of each expectation.
+//! Prepares the experiment of a table, and compares its records with each expectation.
 
 use super::Source;
 use super::claim::{Context, Row, judge, unused};
@@ -13,22 +13,22 @@ use raystone_record::{Body, Key, Line, RecordError, RunRecord, read_records, rec
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// How tables are run.
+/// Settings of the runs of tables.
 #[derive(Debug, Clone, Default)]
 pub struct Settings {
     /// Short runs on built-in scenes.
     pub quick: bool,
-    /// Whether the adapter is a software rasteriser, which runs some tables smaller.
+    /// True if the adapter is a software rasteriser, which runs some tables smaller.
     pub software: bool,
     /// The scene directory.
     pub scenes: PathBuf,
     /// Folder of all tables.
     pub out: PathBuf,
-    /// Run again what is there.
+    /// Repeats runs that exist.
     pub force: bool,
 }
 
-/// Why a table has no verdicts.
+/// A reason why a table has no verdicts.
 #[derive(Debug, Error)]
 pub enum TableError {
     /// Its file or an override is wrong.
@@ -39,23 +39,23 @@ pub enum TableError {
     Records(#[from] RecordError),
 }
 
-/// A scene that ran, and its triangles if it was loaded.
+/// A scene of the run, and its triangles if it was loaded.
 pub type Placed = (String, Option<usize>);
 
-/// A table with what was found.
+/// A table with its results.
 #[derive(Debug, Clone)]
 pub struct Reproduced {
     /// Its name.
     pub name: &'static str,
-    /// What the thesis says.
+    /// Its description of the thesis.
     pub thesis: Thesis,
-    /// Where it ran; `None` if nothing did.
+    /// Machine and program of the run; `None` if there was none.
     pub environment: Option<Environment>,
-    /// When, seconds since 1970-01-01 UTC.
+    /// Start of the run, seconds since 1970-01-01 UTC.
     pub started: u64,
-    /// Whether it was a short run.
+    /// True if it was a short run.
     pub quick: bool,
-    /// What the run changed of the experiment.
+    /// Changes of the run to the experiment.
     pub changes: Vec<String>,
     /// Original scene → ours with its triangles, or why there is none.
     pub scenes: Vec<(Substitute, Result<Placed, String>)>,
@@ -67,7 +67,7 @@ impl Reproduced {
     /// The verdict on an expectation as a whole.
     pub fn verdict(&self, index: usize) -> ClaimVerdict {
         let found = ClaimVerdict::of_all(self.claims[index].iter().map(|row| row.verdict));
-        // What is only shown is no claim, whether there is something to show or not.
+        // A row that is only shown is no claim, whether there is something to show or not.
         let only_shown = self.thesis.expects[index].compare == Compare::Shown;
         match found != ClaimVerdict::Faulty && only_shown {
             true => ClaimVerdict::Shown,
@@ -76,19 +76,19 @@ impl Reproduced {
     }
 }
 
-/// What runs for a table: the experiment, and which scenes stand for which.
+/// The runnable part of a table: the experiment, and its substitute scenes.
 pub struct Prepared {
     /// The experiment.
     pub experiment: Experiment,
-    /// What the thesis says.
+    /// Its description of the thesis.
     pub thesis: Thesis,
     /// Scene of each substitute, or why it has none.
     pub scenes: Vec<(Substitute, Result<String, String>)>,
-    /// What a short run, or one on a software adapter, changes.
+    /// Changes of a short run, or of one on a software adapter.
     pub changes: Vec<String>,
 }
 
-/// Reads a table's file, with the scenes that are there and, if asked for, what makes it short.
+/// Reads a table's file, with the scenes that exist and, if asked for, the changes of a short run.
 ///
 /// # Errors
 /// A fault of the file.
@@ -156,7 +156,7 @@ pub fn recorded(
     catalogue: &Catalogue,
 ) -> Result<Option<Reproduced>, TableError> {
     let out = settings.out.join(source.name);
-    // Which adapter it ran on is not known.
+    // The adapter of the run is not known.
     for software in [settings.software, !settings.software] {
         let settings = Settings {
             software,
@@ -170,14 +170,14 @@ pub fn recorded(
     Ok(None)
 }
 
-/// Whether a folder holds records of this experiment, be they whole or what is left of a killed run.
+/// Returns `true` if a folder holds records of this experiment, whole or left by a killed run.
 pub fn is_of(folder: &Path, text: &str) -> bool {
     let same = |line: &Line| matches!(&line.body, Body::Run(r) if same_experiment(&r.experiment_text, text));
     let records = read_records(folder);
     records.is_ok_and(|records| records.lines.iter().any(same))
 }
 
-/// Whether a folder holds the whole records of this experiment.
+/// Returns `true` if a folder holds the whole records of this experiment.
 pub fn is_done(out: &Path, text: &str) -> bool {
     if !records_file(out).is_file() || !is_of(out, text) {
         return false;
@@ -186,7 +186,7 @@ pub fn is_done(out: &Path, text: &str) -> bool {
     read_records(out).is_ok_and(|records| records.lines.iter().any(finished))
 }
 
-/// The verdicts on a table that ran, from the records in `out`.
+/// Returns the verdicts on a completed table, from the records in `out`.
 ///
 /// # Errors
 /// Records that cannot be read.
@@ -216,7 +216,7 @@ pub fn judged(
         let mut scenes = data.scenes.iter();
         let scene = scenes.find(|scene| wanted.fits_text(scene.name));
         let count = scene.and_then(|scene| Some(scene.record?.triangles));
-        // A pattern is shown as what it chose, a path as the name of its file.
+        // A pattern is shown as the scene it matched, a path as the name of its file.
         (scene.map_or(ours, |scene| scene.name.to_owned()), count)
     };
     let scenes = prepared.scenes.into_iter();
@@ -233,7 +233,8 @@ pub fn judged(
     })
 }
 
-/// The pattern of a scene's label: a path by its file's name, a built-in scene whatever its parameters, unless it is a pattern itself.
+/// Returns the pattern of a scene's label: a path by its file's name, a built-in scene with any parameters, unless it is a pattern
+/// itself.
 fn pattern(scene: &str) -> String {
     if name_of(scene) != scene {
         return scene.to_owned();
@@ -246,7 +247,7 @@ fn pattern(scene: &str) -> String {
     }
 }
 
-/// What a line says was left out, or failed, and why.
+/// Returns the key of a line that was left out or failed, with the reason.
 fn absent(line: &Line) -> Option<(Key, String)> {
     let reason = match &line.body {
         Body::Skipped(record) | Body::Failed(record) => record.reason.clone(),

@@ -12,7 +12,7 @@ use raystone_stats::statistics::median_interval;
 
 type Animated<'a> = Measured<'a, AnimationRecord>;
 
-/// What the tables of a scene begin with, its plots and tables.
+/// Returns the blocks of a scene: heading, introduction, plots and tables.
 pub fn blocks(data: &RunData, stem: &str, scene: &SceneGroup) -> Vec<Block> {
     let Some(first) = scene.animations.first() else {
         return Vec::new();
@@ -87,9 +87,8 @@ fn time_ratio(rays: &FrameRays, software: bool) -> Option<Interval> {
     median_interval(&ratios.collect::<Vec<_>>())
 }
 
-/// From how many million rays of the class in the frame on building anew pays: what it costs more, over what a ray costs
-/// less. No number where the interval
-/// of the difference holds 0.
+/// Returns the number of million rays of the class in the frame from which a rebuild pays: its additional cost over the
+/// saving per ray. A word if it costs no more, or if the interval of the saving is not above 0.
 fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<Estimate> {
     let of = |ms: &[f64]| median_interval(ms).map(|i| i.value);
     let more = of(frame.rebuild.ms(software))? - of(frame.refit.ms(software))?;

@@ -1,4 +1,4 @@
-//! Why to believe the figures: every check of the run, with what it rests on.
+//! Reasons to believe the figures: every check of the run, with its evidence.
 
 use super::targets;
 use crate::data::{Measured, RunData, SAMPLER_AXES, SceneGroup, without_repeats};
@@ -33,7 +33,7 @@ const NOTHING: &str = "nothing to test.";
 /// Reasons why cells were left out that a check names.
 const MOST_REASONS: usize = 3;
 
-/// Every check: the experiment's own targets, and what its figures rest on.
+/// Returns every check: the experiment's own targets, and those behind its figures.
 pub fn checks(data: &RunData) -> Vec<Check> {
     let mut checks = targets::checks(data);
     if data.scenes.is_empty() && !data.measured.is_empty() {
@@ -165,7 +165,7 @@ fn images(data: &RunData) -> Check {
     check(title, compared > 0, !unequal.is_empty(), detail + ".")
 }
 
-/// Single paths of integrators against the oracle for images; nothing where a run judged none.
+/// Returns the check of single paths of integrators against the oracle for images; none if a run checked none.
 fn paths(data: &RunData) -> Option<Check> {
     let sum = |of: fn(&PathsRecord) -> usize| data.paths.iter().map(|p| of(p.body)).sum::<usize>();
     let [judged, wrong] = [sum(|p| p.paths), sum(|p| p.wrong)];
@@ -218,7 +218,7 @@ fn bias(data: &RunData) -> Check {
         let place = format!("{} on {}, {}", sampler.name, scene.name, view.name);
         detail += &format!("; {place}: {fault}");
     }
-    // What cannot be tested, or is biased by design, is told although it is no proof.
+    // Samplers that cannot be tested, or are biased by design, are listed although they are no proof.
     let detail = if records.is_empty() {
         NOTHING.into()
     } else {
@@ -253,7 +253,7 @@ fn finite_pixels(data: &RunData) -> Check {
     check("Every pixel finite", images > 0, bad > 0, detail)
 }
 
-/// A reference that is itself noisy bounds from below what errors can be told apart.
+/// Checks the noise of references, which limits from below the errors that can be distinguished.
 fn reference_noise(data: &RunData) -> Check {
     let mut details = Vec::new();
     let (mut tested, mut wrong) = (false, false);
@@ -296,7 +296,7 @@ fn complete(data: &RunData) -> Check {
     check(title, true, finished.failed > 0, detail)
 }
 
-/// Why cells were left out, each reason once; the first few.
+/// Returns the reasons for which cells were left out, each once; the first few.
 fn reasons(data: &RunData) -> String {
     let all = data.skipped.iter().map(|skipped| skipped.reason.clone());
     let all = without_repeats(all.collect());

@@ -1,4 +1,4 @@
-//! Every cell: what it is, what ran, what was found, and how to repeat it.
+//! Every cell: its key, its kernels, its figures, and the command that repeats it.
 
 use crate::data::RunData;
 use crate::document::*;
@@ -8,11 +8,11 @@ use raystone_config::Axis;
 use raystone_record::{Key, Ran, axis};
 use std::collections::{BTreeMap, HashMap};
 
-/// Cells that the page itself holds; more stand in a file of their own.
+/// Cells that the page itself holds; more are in a file of their own.
 pub(crate) const MOST_INSIDE: usize = 200;
 /// That file.
 pub const FILE: &str = "cells.html";
-/// Digits of a hash that tell two kernels apart.
+/// Digits of a hash that distinguish two kernels.
 const SHORT_HASH: usize = 16;
 
 /// All cells of a run, in the order of their values.
@@ -26,7 +26,7 @@ struct Cell<'a> {
     values: Vec<&'a Value<'a>>,
 }
 
-/// The axes that a cell is chosen by; what else is in a key tells its figures apart.
+/// Returns the axes that a cell is chosen by; the rest of a key distinguishes its figures.
 fn of_cell(key: &Key) -> Key {
     let axes = Axis::ALL.map(Axis::name);
     key.only(&axes)
@@ -39,7 +39,7 @@ fn anchor(key: &Key) -> String {
 }
 
 impl<'a> Cells<'a> {
-    /// The cells that these values are of.
+    /// Returns the cells of these values.
     pub fn new(data: &RunData<'a>, values: &'a [Value<'a>]) -> Self {
         let mut ran: HashMap<String, &Ran> = HashMap::new();
         for scene in &data.scenes {
@@ -69,7 +69,7 @@ impl<'a> Cells<'a> {
             });
             found[place].values.push(value);
         }
-        // What failed has no figure, but a key.
+        // A failure has no figure, but a key.
         let views = data.scenes.iter().flat_map(|scene| &scene.views);
         for time in views.flat_map(|view| &view.times) {
             let key = of_cell(&time.key);
@@ -84,13 +84,13 @@ impl<'a> Cells<'a> {
         Self { found }
     }
 
-    /// Where the cell of a key is told of.
+    /// Returns the address of the cell of a key.
     pub fn link(&self, key: &Key) -> String {
         let file = if self.is_inside() { "" } else { FILE };
         format!("{file}#{}", anchor(&of_cell(key)))
     }
 
-    /// Whether all of them stand in the page itself.
+    /// Returns `true` if all of them are in the page itself.
     fn is_inside(&self) -> bool {
         self.found.len() <= MOST_INSIDE
     }
@@ -186,8 +186,8 @@ impl Cell<'_> {
     }
 }
 
-/// The command that repeats a cell: names with what a pattern or a shell would take for its own are patterns that
-/// they fit.
+/// Returns the command that repeats a cell: names with special characters of patterns or shells are replaced by
+/// patterns that match them.
 fn command(file: &str, text: &str, key: &Key) -> String {
     let mut command = format!("raystone run {}", quoted(file));
     let sets = text
@@ -225,7 +225,7 @@ fn pattern(label: &str) -> String {
     label.chars().enumerate().map(plain).collect()
 }
 
-/// Whether a character shows as itself, and turns no text round.
+/// Returns `true` if a character is visible as itself, and does not change the direction of text.
 fn is_visible(c: char) -> bool {
     let turns = matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
     !c.is_control() && !turns

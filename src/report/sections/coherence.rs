@@ -1,4 +1,4 @@
-//! How alike the rays of neighbouring lanes are, by the model; and what it predicts, against what was measured.
+//! Modelled coherence of the rays of neighbouring lanes, and its predictions against measurements.
 
 use super::specs::{COHERENCE, COHERENCE_OF_CLASSES, CYCLES_BY_SPP, EFFICIENCY_BY_BOUNCE};
 use crate::data::{Measured, RunData, View, grouped};

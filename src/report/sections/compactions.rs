@@ -1,4 +1,4 @@
-//! Compactions of streams: time per element, growth with the number of elements, what parameters do.
+//! Compactions of streams: time per element, growth with the number of elements, effects of parameters.
 
 use super::specs::GROWTH;
 use crate::data::{RunData, grouped};
@@ -19,7 +19,7 @@ type Measured<'a> = Recorded<'a, MeasuredRecord>;
 /// Name of the measurement in records.
 pub(crate) const NAME: &str = "compaction";
 
-/// What tells compactions of a run apart.
+/// Axes that distinguish the compactions of a run.
 const ROW: [&str; 2] = [axis::INTEGRATOR, axis::KERNELS];
 /// Parameters of the stream.
 const STREAM: [&str; 3] = ["elements", "valid", "bytes"];
@@ -84,7 +84,7 @@ fn parameter(key: &Key, name: &str) -> Option<f64> {
     }
 }
 
-/// What is the same in all cells of a curve over a parameter.
+/// Returns the common part of all cells of a curve over a parameter.
 fn others(key: &Key, parameter: &str) -> (String, String) {
     let Some(variant) = key.get(axis::INTEGRATOR) else {
         return Default::default();
@@ -137,7 +137,7 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
     };
     let groups = over(data, parameter).into_iter();
     let mut curves: Vec<Curve> = groups.filter_map(curve).collect();
-    // Of one method there may be several: then no colour stands for a method.
+    // If one method has several curves, colours do not stand for methods.
     let looks: BTreeSet<usize> = curves.iter().map(|curve| curve.look).collect();
     if looks.len() < curves.len() {
         let numbered = curves.iter_mut().enumerate();
@@ -206,7 +206,7 @@ fn over_baseline(data: &RunData, cell: &Measured) -> Option<Interval> {
     median_interval(&ratios.collect::<Vec<_>>())
 }
 
-/// How each method grows, where there are sizes enough.
+/// Returns the growth of each method that has enough sizes.
 fn growths(data: &RunData) -> Vec<(Key, Growth)> {
     let of = |cells: Vec<(f64, Measured)>| {
         let timed = cells
@@ -228,7 +228,7 @@ fn growths(data: &RunData) -> Vec<(Key, Growth)> {
     over(data, "elements").into_iter().filter_map(of).collect()
 }
 
-/// Which model of growth fits each method better.
+/// Returns the table of the model of growth that fits each method better.
 pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
     let row = |(key, growth): (Key, Growth)| {
         let better = growth.better.map_or("neither", |model| model.name());

@@ -85,7 +85,7 @@ fn linear(dir: &Path, picture: &str) -> Option<Image> {
     read_linear(&linear_file(dir, picture.strip_suffix(".png")?)?).ok()
 }
 
-/// 16-bit floats in Base64; what is larger than they reach is their largest.
+/// Returns 16-bit floats in Base64; values beyond their range become the largest.
 fn radiance(image: &Image) -> String {
     let bits = |v: &f32| match v.is_finite() {
         true => f16::from_f32(v.clamp(-65504.0, 65504.0)),

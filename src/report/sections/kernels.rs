@@ -1,5 +1,5 @@
-//! What other kernels change, beside the program's own, and what kernels were made of: features compiled in and out, and what
-//! leaving them out gained.
+//! Effects of other kernels, against the program's own, and the composition of kernels: features compiled in and out, and the
+//! gain of leaving them out.
 
 use super::specs::GAINS;
 use crate::compare::judge::ChangeVerdict;
@@ -14,7 +14,7 @@ use raystone_record::figure::{self, Figure};
 use raystone_record::{Interval, Key, Ran, TimeRecord, axis};
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
-/// The parameter that makes a kernel carry what its scene does not need.
+/// The parameter that compiles features into a kernel that its scene does not need.
 const CARRY: &str = "carry";
 
 /// The answer that a run with several sets of kernels was made for: each against the first, by the comparison of
@@ -45,7 +45,7 @@ pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
     ideas.filter_map(against).collect()
 }
 
-/// Names of the sets of kernels that stand against the first one.
+/// Returns the names of the sets of kernels that are compared with the first one.
 pub(crate) fn ideas(data: &RunData) -> Vec<String> {
     let structures = data.scenes.iter().flat_map(|scene| &scene.structures);
     let times = data.views().flat_map(|(_, view)| &view.times);
@@ -86,7 +86,7 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
             structure
         };
         let (answer, tone) = answer(&findings);
-        // Where some kernels of a structure changed, the times of the others are no part of the answer.
+        // If some kernels of a structure changed, the times of the others are no part of the answer.
         let all_are = findings.iter().all(|f| f.is_control);
         let told = findings.iter().filter(|f| all_are || !f.is_control);
         let changed: Vec<String> = told.map(|f| change_of(f)).collect();
@@ -96,7 +96,7 @@ fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
     groups.into_iter().map(row).collect()
 }
 
-/// What the times of one structure come to.
+/// Sums up the verdicts on the times of one structure.
 fn answer(findings: &[&Finding]) -> (String, Tone) {
     let changed: Vec<&&Finding> = findings.iter().filter(|f| !f.is_control).collect();
     if changed.is_empty() {
@@ -129,7 +129,7 @@ fn answer(findings: &[&Finding]) -> (String, Tone) {
     (text.join(", "), tone)
 }
 
-/// One time: what it is of, and by how much it changed.
+/// Describes one time: its subject, and its change.
 fn change_of(finding: &Finding) -> String {
     let of = match finding.key.label(axis::RAYS) {
         "" => {
@@ -145,10 +145,10 @@ fn change_of(finding: &Finding) -> String {
     format!("{of}: {} {change}", finding.figure.title)
 }
 
-/// What of the figures beside times is not the same.
+/// Counts the figures beside times that are not the same.
 fn beside_times(found: &Comparison) -> String {
     let others = || found.findings.iter().filter(|f| !f.is_time);
-    // What was measured once is shown, and decides nothing.
+    // A figure measured once is shown, and decides nothing.
     let is_other = |f: &&Finding| !matches!(f.verdict, ChangeVerdict::Same | ChangeVerdict::Told);
     let not_same = others().filter(is_other).count();
     let of = format!(
@@ -158,7 +158,7 @@ fn beside_times(found: &Comparison) -> String {
     format!("{of}; `raystone compare` on this run lists all.")
 }
 
-/// Whether what was measured is another's over again: the same but for the label of its kernels, which are equal to the letter.
+/// Returns `true` if a measurement repeats another: the same but for the label of its kernels, which are equal to the letter.
 /// In a contest it would be a rival of itself.
 pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
     let bare = |key: &Key| key.clone().with(axis::KERNELS, "");
@@ -209,7 +209,7 @@ pub(crate) fn features_table(scene: &SceneGroup) -> Table {
 /// Id of the figure.
 const GAIN: &Figure = &figure::SPECIALISATION;
 
-/// What each full cell of a view that carries more than its scene needs takes, over the cell of the specialised
+/// Returns the time of each full cell of a view with more features than its scene needs, over that of the specialised
 /// kernel: both timed in the same rounds, often enough for an interval.
 pub(crate) fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let mut gains = Vec::new();
@@ -228,7 +228,7 @@ pub(crate) fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     gains
 }
 
-/// What a full cell takes over another, if both were timed often enough for an interval.
+/// Returns the time of a full cell over that of another, if both were timed often enough for an interval.
 pub(crate) fn time_over(
     time: &Measured<TimeRecord>,
     base: &Measured<TimeRecord>,

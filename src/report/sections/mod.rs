@@ -118,7 +118,7 @@ const BUSY: f64 = 0.7;
 /// Half-width of the intervals of times, relative, above which a machine is called busy.
 const CALM: f64 = 0.05;
 
-/// Whether times of the same work spread so widely that the machine did other things, too.
+/// Warns if times of the same work spread so widely that the machine must have been busy.
 fn busy(data: &RunData) -> Option<String> {
     let structures = data.scenes.iter().flat_map(|scene| &scene.structures);
     let timings = structures.flat_map(|s| &s.body.timings);
@@ -138,7 +138,7 @@ fn busy(data: &RunData) -> Option<String> {
     })
 }
 
-/// What the system said of other work and of heat.
+/// Returns what the system reported of other work and of heat.
 fn loaded(data: &RunData) -> Vec<String> {
     let Some(run) = data.run else {
         return Vec::new();
@@ -164,7 +164,7 @@ fn loaded(data: &RunData) -> Vec<String> {
     said
 }
 
-/// That times are of different hours.
+/// Warns that times are from different runs.
 fn sittings(data: &RunData) -> Option<String> {
     let sittings = data.sittings();
     let (first, last) = (sittings.first()?, sittings.last()?);
@@ -180,7 +180,7 @@ fn sittings(data: &RunData) -> Option<String> {
     })
 }
 
-/// That an experiment of a thesis ran on other scenes than those that stand for the thesis's.
+/// Warns that an experiment of a thesis used other scenes than the substitutes for the thesis's.
 fn plain_thesis(run: &RunRecord) -> Option<String> {
     let thesis = Thesis::parse(&run.experiment_text, &run.experiment).ok()??;
     let is_plain = !run.experiment_text.contains("# --set axes.scene=");
@@ -193,10 +193,10 @@ fn plain_thesis(run: &RunRecord) -> Option<String> {
     })
 }
 
-/// Digits of a hash that tell two kernels apart.
+/// Digits of a hash that distinguish two kernels.
 const SHORT_HASH: usize = 12;
 
-/// Which files a folder put in the place of embedded kernels.
+/// Lists the embedded kernels that a folder replaced.
 fn kernels_banner(folder: &KernelFolder) -> String {
     let short = |hash: &str| hash.chars().take(SHORT_HASH).collect::<String>();
     let list = |replaces: bool| {

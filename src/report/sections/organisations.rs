@@ -1,4 +1,4 @@
-//! How the path tracer was organised: what each organisation takes, for what, and how many paths are alive after each bounce.
+//! Organisations of the path tracer: time and stages of each, and the paths alive after each bounce.
 
 use super::file_stem;
 use super::kernels::time_over;

@@ -1,4 +1,4 @@
-//! Ray casters of others beside the structures: times of the processors, ratios, and how their answers differ. No verdict is drawn from it.
+//! External ray casters beside the structures: times of the processors, ratios, and differences of their answers. They get no verdict.
 
 use super::specs::PEERS;
 use crate::data::{RunData, SceneGroup};
@@ -75,7 +75,7 @@ pub fn values(scene: &SceneGroup) -> Vec<Value<'static>> {
     values
 }
 
-/// What each is, and why one is missing.
+/// Describes a peer, or the reason for its absence.
 fn told(peer: &Recorded<PeerRecord>) -> String {
     let name = peer.key.label(axis::PEER);
     match (&peer.absent, &peer.failure) {

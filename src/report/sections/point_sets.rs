@@ -61,7 +61,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
     Some(section)
 }
 
-/// Square, disc, pixels and spectrum; `None` if the record does not hold as many points as it says.
+/// Returns square, disc, pixels and spectrum; `None` if the record does not hold as many points as it claims.
 fn panels(name: &str, recorded: &RecordedPoints) -> Option<[Panel; 4]> {
     let pixels = recorded.points()?;
     let points = pixels.first()?.clone();

@@ -13,7 +13,7 @@ use raystone_stats::comparison::LogFigure;
 
 /// Samplers at equal time, under the fastest structure.
 pub(crate) struct Race<'a> {
-    /// When the first of them ends: the time at which errors are compared.
+    /// The end of the first of them: the time at which errors are compared.
     pub seconds: f64,
     /// The structure under which all were timed.
     pub structure: String,
@@ -42,7 +42,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Whether all its noise is known.
+    /// Returns `true` if all its noise is known.
     fn is_ranked(&self) -> bool {
         self.sampler.is_ranked() && self.time.has_noise()
     }
@@ -64,7 +64,7 @@ impl<'a> Runner<'a> {
         let (neighbours, share) = place_on(&times, seconds)?;
         let [a, b] = neighbours.map(|i| self.curve[i].0);
         let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
-        // At a point of the curve, errors are taken to fall as one over the samples.
+        // At a point of the curve, errors are assumed to fall as one over the samples.
         let slope = if a < b {
             let fall = error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log;
             fall / (f64::from(b) / f64::from(a)).ln()
@@ -128,8 +128,8 @@ impl<'a> Race<'a> {
         (most > 0.0).then(|| (most / unit).ceil() * unit)
     }
 
-    /// What a second buys: error × time at the common spp, errors when the race ends, samples and seconds to an
-    /// error.
+    /// Returns the efficiency of each: error × time at the common spp, errors at the end of the race, samples and
+    /// seconds to an error.
     pub(crate) fn values(&self) -> Vec<Value<'static>> {
         let metric = Metric::RelMse.name();
         let (common, target) = (self.view.common_spp(), self.target());
@@ -174,7 +174,7 @@ impl<'a> Race<'a> {
         Some(runner.error_after(self.seconds)?.interval())
     }
 
-    /// Who has the least error when the race ends.
+    /// Returns the ruling on the least error at the end of the race.
     pub(crate) fn ruling(&self) -> Ruling {
         let contender = |runner: &Runner| {
             let log = runner.error_after(self.seconds)?;

@@ -1,4 +1,4 @@
-//! Which structure renders fastest, by the times of whole cells, and where the speeds of ray classes say otherwise.
+//! The fastest structure for rendering, by the times of whole cells, and contradictions by the speeds of ray classes.
 
 use super::kernels::is_repeat;
 use super::verdict::{class_speed, ray_classes};
@@ -16,11 +16,11 @@ struct Renderer {
     name: String,
     /// Milliseconds per sample per pixel: geometric mean over the samplers.
     time: LogFigure,
-    /// Whether each of its times was taken often enough.
+    /// True if each of its times was measured often enough.
     is_ranked: bool,
 }
 
-/// Structures that were timed with the most samplers, and how long each takes with these.
+/// Returns the structures that were timed with the most samplers, with their times.
 fn renderers(scene: &SceneGroup, view: &View) -> Vec<Renderer> {
     let times = view.valid_times();
     let times = times.filter(|time| !is_repeat(time, &view.times));
@@ -53,7 +53,7 @@ fn geometric_mean(logs: &[LogFigure]) -> LogFigure {
     LogFigure::product(&terms)
 }
 
-/// Which structure renders fastest.
+/// Returns the ruling on the fastest structure for rendering.
 pub(crate) fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
     if let Some(reason) = trust::doubt_of_rendering(scene, view) {
         return Ruling::Withheld(reason);

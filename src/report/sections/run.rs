@@ -1,4 +1,4 @@
-//! The run itself: economy of the plan, wall time, what failed, where it ran.
+//! The run itself: economy of the plan, wall time, failures, machine.
 
 use crate::data::{Measured, RunData, SceneGroup, View};
 use crate::document::*;
@@ -33,8 +33,8 @@ fn time(data: &RunData) -> Option<Section> {
     (!section.blocks.is_empty()).then_some(section)
 }
 
-/// What the harness takes for itself; `None` if the run did not finish. No check, since no figure depends
-/// on it: a slow disk or a tiny experiment is no fault of the results.
+/// Returns the overhead of the harness; `None` if the run did not finish. No check, since no figure depends on it: a
+/// slow disk or a tiny experiment is no fault of the results.
 pub(crate) fn overhead(data: &RunData) -> Option<String> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
     let share = finished.overhead_s / finished.wall_s;
@@ -69,16 +69,16 @@ fn wall_table(finished: &FinishedRecord) -> Table {
 pub const FAILED: &str = "FAILED";
 /// State of a cell that was not tried.
 const LEFT_OUT: &str = "left out";
-/// State of what went wrong beside the measuring.
+/// State of a problem outside the measurements.
 const WARNING: &str = "warning";
 
 /// A cell, its state, and why.
 pub(crate) struct Failure {
-    /// What it is of.
+    /// Its cell.
     pub cell: String,
     /// [`FAILED`], left out, or a warning.
     pub state: &'static str,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 

@@ -14,7 +14,7 @@ use crate::values::Value;
 use raystone_stats::bias::BiasVerdict;
 use raystone_stats::comparison::{Place, places};
 
-/// What a caption says of points that a logarithmic plot cannot show.
+/// Returns a caption's note on points that a logarithmic plot cannot show.
 fn not_drawn(count: usize) -> String {
     match count {
         0 => String::new(),
@@ -40,7 +40,7 @@ pub(crate) fn error_figures(
         ..ERROR_CURVES
     };
     let by_spp = spec.plot(data, values).curves;
-    // What stands behind a sampler's name, and what one sample per pixel is on the x axis.
+    // `unit` returns the suffix of a sampler's name, and one sample per pixel in units of the x axis.
     let plot = |x_title: &str, ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
         let curve = |mut curve: Curve| {
             let sampler = view.samplers.iter().find(|s| s.name == curve.label)?;
@@ -93,7 +93,7 @@ pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<I
         .iter()
         .map(|s| (s.name.clone(), data.sampler_look(&s.name)));
     let mut points = Vec::new();
-    // Which of them have noise that is known, and their figures.
+    // Curves of known noise, and their figures.
     let mut known = Vec::new();
     let mut figures = Vec::new();
     let mut hidden = 0;

@@ -131,7 +131,7 @@ pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric)
     table
 }
 
-/// What other metrics say at the highest spp.
+/// Returns other metrics at the highest spp.
 fn further_table(names: &Names, view: &View, values: &[Value]) -> Table {
     let spp = view.samplers.iter().find_map(MeasuredSampler::highest_spp);
     let spp = spp.map_or(String::new(), |spp| spp.to_string());
@@ -160,7 +160,7 @@ fn bias_table(names: &Names, view: &View, values: &[Value]) -> Table {
     BIAS.beside(names, values, &words, &[":verdict"], rows)
 }
 
-/// What a second buys: time per sample, error × time, error at equal time.
+/// Returns the table of efficiency: time per sample, error × time, error at equal time.
 pub(crate) fn efficiency_table(names: &Names, view: &View, values: &[Value]) -> Table {
     let Some(race) = Race::new(view) else {
         return Table::default();

@@ -6,7 +6,7 @@ use crate::spec::{BY_FIGURE, BY_RAYS, BY_SUBJECT, PlotSpec, TableSpec};
 use raystone_record::figure::*;
 use raystone_record::{Key, axis};
 
-/// A structure of full cells, beside its sampler, whose name has what else varies.
+/// A structure of full cells; the sampler's column has the other axes that vary.
 const CELL: Head = Axis("structure", axis::ACCEL);
 const WORKGROUP: Head = Varied(":work group", axis::WORKGROUP);
 

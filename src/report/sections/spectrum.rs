@@ -1,4 +1,4 @@
-//! What the errors of samplers look like: spectra, and what filters leave.
+//! Spectra of the errors of samplers, and errors left by filters.
 
 use super::specs::SPECTRA;
 use crate::data::{RunData, View};

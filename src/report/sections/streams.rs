@@ -1,5 +1,5 @@
-//! Figures of the words that samplers draw: discrepancies, errors of integrands, what several pixels draw,
-//! and what drawing costs.
+//! Figures of the words that samplers draw: discrepancies, errors of integrands, pixels against each other, and the
+//! cost of drawing.
 
 use super::file_stem;
 use super::specs::{
@@ -15,7 +15,7 @@ use raystone_record::{FigureAtCount, Recorded, StreamRecord, axis};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
-/// What the figures are of.
+/// Explanation of the figures.
 const TAPPED: &str = "Tapped are a sampler's 32-bit words for (pixel, sample, dimension, seed), read back from a \
                       kernel that imports the renderer's modules and does nothing but draw; each was compared with \
                       the scalar twin. Every seed was taken in a pixel of its own: the first of the image, the last, \
@@ -24,7 +24,7 @@ const TAPPED: &str = "Tapped are a sampler's 32-bit words for (pixel, sample, di
 /// Functions that are plotted; all are in the table: a smooth one, and one with an edge.
 const PLOTTED: [&str; 2] = ["exponential", "disk"];
 
-/// Name in records of what drawing from a sampler costs.
+/// Name of the measurement of the cost of drawing, in records.
 pub(super) const COST: &str = "sampler-cost";
 
 /// The section; `None` when no stream was measured.
@@ -57,7 +57,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
 /// The streams of one pair of dimensions.
 struct Pair<'a> {
     data: &'a RunData<'a>,
-    /// What the path uses the pair for, with its dimensions.
+    /// The use of the pair in the path, with its dimensions.
     what: String,
     /// Start of file names.
     stem: String,
@@ -192,7 +192,7 @@ fn worst_table(data: &RunData) -> Table {
     )
 }
 
-/// What drawing costs.
+/// Returns the table of the cost of drawing.
 fn cost_table(data: &RunData) -> Table {
     let costs = data.measured_by(COST);
     let values: Vec<Value> = costs

@@ -31,7 +31,7 @@ fn values_of<'a>(data: &RunData<'a>, measurement: &str) -> Vec<Value<'a>> {
         .collect()
 }
 
-/// What is known of whole families: not of their cases.
+/// Returns the values of whole families, not of their cases.
 fn of_families<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let mut values = values_of(data, FAMILIES);
     values.retain(|value| value.key.label(axis::PLACE).is_empty());
@@ -91,7 +91,7 @@ pub(crate) fn tables(data: &RunData) -> Vec<Table> {
     tables
 }
 
-/// Whether a measurement has tables here.
+/// Returns `true` if a measurement has tables here.
 pub(crate) fn is_shown(measurement: &str) -> bool {
     [FAMILIES, SHOTS].contains(&measurement)
 }
@@ -152,7 +152,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
     (!section.blocks.is_empty()).then_some(section)
 }
 
-/// Lost hits of each cell per million rays, and whether it differs from brute force.
+/// Returns the lost hits of each cell per million rays, and `true` if it differs from brute force.
 fn lost_hits<'v>(families: &'v [Value]) -> Vec<(&'v Key, f64, bool)> {
     let cells = families.chunk_by(|a, b| a.key == b.key);
     let lost = |cell: &'v [Value]| {
@@ -180,7 +180,7 @@ const SWEEPS: [[&str; 3]; 2] = [
     ["shift", "translation, units", "shift "],
 ];
 
-/// Where a place is on the way: `scale 1e-8`, `shift 1e2`, `far (223423)`.
+/// Returns the position of a place on the axis: `scale 1e-8`, `shift 1e2`, `far (223423)`.
 fn on_axis([name, _, begin]: [&str; 3], place: &str) -> Option<f64> {
     let far = place.strip_prefix("far (").filter(|_| name == "shift");
     let far = far.and_then(|far| far.strip_suffix(')'));
@@ -245,7 +245,7 @@ fn curve(values: &[&Value], sweep: [&str; 3], (look, test): (usize, &String)) ->
     })
 }
 
-/// What measurements say in words: commands that show a ray, failures, what was left out.
+/// Returns the notes of measurements: commands that show a ray, failures, cells left out.
 fn notes(data: &RunData) -> Table {
     let mut table = Table::new("Notes", &["of", ":what", ":text"]);
     for cell in &data.measured {

@@ -128,7 +128,7 @@ pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -
     SPEED.beside(names, values, &words, &[":gate"], rows)
 }
 
-/// What the build took.
+/// Returns the table of the cost of builds.
 fn build_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let built = || scene.structures.iter().filter(|s| s.is_built());
     let update = match built().any(|s| s.update_ms.is_some()) {

@@ -1,4 +1,4 @@
-//! What an experiment promises of itself, its `[[expect]]` without a thesis: each a check of the run.
+//! An experiment's own targets, its `[[expect]]` without a thesis: each a check of the run.
 
 use crate::data::RunData;
 use crate::document::Check;
@@ -28,7 +28,7 @@ pub(crate) fn checks(data: &RunData) -> Vec<Check> {
         context.quick && !expect.at.is_empty() && expect.at.iter().all(|at| at.full_only)
     };
     let mut values = values(data);
-    // A target holds or not by what was measured, also where nothing is known of its spread.
+    // A target is decided by the measured value, even if its spread is unknown.
     for value in &mut values {
         if value.figure.spread == Spread::Single {
             value.figure.to_mut().spread = Spread::Exact;
@@ -40,7 +40,7 @@ pub(crate) fn checks(data: &RunData) -> Vec<Check> {
         .collect()
 }
 
-/// Fails where one place contradicts it, and is open where none speaks; says the worst.
+/// Fails if one place contradicts it, and is open if none decides; shows the worst.
 fn check(data: &RunData, expect: &Expect, values: &[Value], context: &Context) -> Check {
     let rows = judge(expect, values, context);
     let has = |verdict| rows.iter().any(|row| row.verdict == verdict);
@@ -69,7 +69,7 @@ fn check(data: &RunData, expect: &Expect, values: &[Value], context: &Context) -
     }
 }
 
-/// Where something was found, with the ray that shows it.
+/// Returns the place of a finding, with the ray that shows it.
 fn place(data: &RunData, row: &Row, value: f64) -> String {
     if value == 0.0 || row.row.is_empty() {
         return String::new();

@@ -1,4 +1,4 @@
-//! What a build costs against what it gains: break-even in rays, and time to an image.
+//! The cost of a build against its gain: break-even in rays, and time to an image.
 
 use super::specs::{BREAK_EVENS, TIMES_TO_IMAGE};
 use crate::data::{Measured, STRUCTURE_AXES, SceneGroup, View};

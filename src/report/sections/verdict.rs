@@ -1,4 +1,4 @@
-//! What was asked, who wins, what failed, whether to believe it.
+//! The question of the run, the winners, the failures, and the state of the checks.
 
 use super::kernels::{self, is_repeat};
 use super::{belief, compactions, rendering, run, targets};
@@ -20,9 +20,9 @@ pub(crate) use super::race::Race;
 
 /// Scenes whose answers are open at first; those of further ones unfold.
 const OPEN_SCENES: usize = 3;
-/// Pairs of dimensions whose point sets are judged in the open.
+/// Pairs of dimensions whose point sets are ranked in the open.
 const OPEN_PAIRS: usize = 2;
-/// Failures that the first screens name; the others stand in their own section.
+/// Failures that the first screens name; the others are in their own section.
 const NAMED_FAILURES: usize = 5;
 
 /// Kinds of images that the question names.
@@ -66,7 +66,7 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     section
 }
 
-/// What the run was about, beside pictures of its scenes, and whether its checks passed.
+/// Returns the question of the run, beside pictures of its scenes, and the state of its checks.
 fn asked(dir: &Path, data: &RunData) -> Block {
     let picture = |scene: &SceneGroup| {
         let references = scene.views.iter().filter_map(|view| view.reference);
@@ -214,7 +214,7 @@ fn summary(data: &RunData) -> Check {
     }
 }
 
-/// What failed, the first few.
+/// Returns the first few failures.
 fn failed(data: &RunData) -> Option<Block> {
     let failures = run::failures(data);
     let failed: Vec<_> = failures.iter().filter(|f| f.state == run::FAILED).collect();
@@ -254,7 +254,7 @@ fn of_scene(scene: &SceneGroup) -> Vec<Block> {
     blocks
 }
 
-/// The answers as a table, and what had no competition in a line for each that was alone.
+/// Returns the answers as a table, and a line for each contender without competition.
 fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
     let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
     let alone = by_answer(alone.cloned().collect());
@@ -285,7 +285,7 @@ fn together(questions: &[String]) -> String {
     format!("{} questions", format::count(questions.len() as u64))
 }
 
-/// The rulings, with all questions that have the same answer in words together, where the first of them stood.
+/// Groups rulings by answer: the questions of each, at the place of the first of them.
 fn by_answer(rulings: Vec<(String, Ruling)>) -> Vec<(Vec<String>, Ruling)> {
     let together = grouped(rulings, |(_, ruling)| ruling.answer()).into_iter();
     let unzip = |(_, rulings): (String, Vec<(String, Ruling)>)| {
@@ -295,7 +295,7 @@ fn by_answer(rulings: Vec<(String, Ruling)>) -> Vec<(Vec<String>, Ruling)> {
     together.map(unzip).collect()
 }
 
-/// How winners are found, and how many comparisons that took.
+/// Explains the rule for winners, with the number of comparisons.
 fn rule(data: &RunData) -> String {
     let of_scenes = data.scenes.iter().flat_map(rulings);
     let all: Vec<_> = of_scenes.chain(point_sets(data)).collect();
@@ -311,7 +311,7 @@ fn rule(data: &RunData) -> String {
     )
 }
 
-/// Questions of one scene, each with what is ruled.
+/// Returns the questions of one scene, each with its ruling.
 pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     let mut rulings = Vec::new();
     for class in ray_classes(scene) {
@@ -353,7 +353,7 @@ fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
     let ruled = ruled
         .into_iter()
         .map(|(question, ruling)| row(question.into(), &ruling));
-    // Questions that one failed check takes the answer from are a row of their own.
+    // Questions whose answer is withheld by one failed check share a row.
     let withheld = by_answer(withheld).into_iter().map(|(questions, ruling)| {
         let (short, all) = (together(&questions), questions.join("; "));
         let detail = if short == all { String::new() } else { all };
@@ -383,7 +383,7 @@ fn row(question: TableCell, ruling: &Ruling) -> [TableCell; 4] {
     ]
 }
 
-/// Which sampler has the lowest D*, pair of dimensions by pair.
+/// Returns the sampler with the lowest D*, pair of dimensions by pair.
 fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
     let named: Vec<_> = data.streams.iter().filter(|s| s.named).collect();
     let pairs = named.iter().map(|s| s.pair());
@@ -418,7 +418,7 @@ fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigur
     LogFigure::of_interval(at.value, freedom).filter(|_| freedom > 0.0)
 }
 
-/// Who may not win, with the reason, and who is shown without being ranked.
+/// Lists contenders that may not win, with the reason, and those that are shown without a rank.
 fn apart(scene: &SceneGroup) -> Vec<Block> {
     let brief = |name: String, fault: String| {
         let fault = fault.split(';').next().unwrap_or_default();

@@ -12,7 +12,7 @@ fn clean_run() -> Vec<Line> {
     })
 }
 
-/// Titles of the checks that do not pass, with what they say.
+/// Returns the titles of the checks that do not pass, with their verdicts.
 fn failing(lines: &[Line]) -> Vec<(String, Verdict)> {
     let checks = sections::belief::checks(&RunData::new(lines));
     let failing = checks
@@ -124,7 +124,7 @@ fn an_image_that_failed_its_cell_fails_the_check_and_is_named() {
     assert_eq!(check.verdict, Verdict::Fail);
     let name = "; sobol × cranley-patterson on cornell-box, path";
     assert!(check.detail.contains(name), "{}", check.detail);
-    // The page of such records can be made, and says so beside the sampler.
+    // The page of such records can be made, and mentions it beside the sampler.
     let nowhere = Path::new("no such folder");
     let page = markdown::summary(&sections::document(nowhere, &RunData::new(&lines), &[]));
     assert!(page.contains("NaN or infinite pixels"));

@@ -1,4 +1,4 @@
-//! What exports make of records that were resumed, joined or made with every clock.
+//! Exports of records that were resumed, merged or made with every clock.
 
 use super::*;
 use crate::export::select::Selection;
@@ -129,7 +129,7 @@ fn keep(dir: &Path, name: &str, value: f32) {
 fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let (dir, out) = (folder.path(), folder.path().join("npy"));
-    // Of a run that was resumed: its references lie in one folder, what was rendered later in another.
+    // A resumed run: its references are in one folder, later renders in another.
     let lines = changed(|_, body| {
         if let Body::Error(record) = body {
             for name in [&mut record.image, &mut record.error_map]
@@ -157,7 +157,7 @@ fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
     }
     let image = "render-cornell-box-path-sobol-none";
     keep(dir, &format!("images-2/{image}.pfm"), 2.0);
-    // What no record names any more.
+    // Files that no record names any more.
     keep(dir, &format!("images/{image}.pfm"), 3.0);
     keep(dir, "images/foreign.pfm", 3.0);
     let files = write(&source, &out).unwrap();
@@ -173,7 +173,7 @@ fn linear_images_are_those_that_the_records_name_and_missing_ones_are_told() {
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 5);
     let found = read_linear(&out.join(format!("{image}.npy"))).unwrap();
     assert_eq!(found.pixels, [[2.0; 3]]);
-    // Where one mean was kept, the others are missing.
+    // If one mean was stored, the others are missing.
     let mean = raystone_core::text::slug(&["mean", "cornell-box", "path", "pixel-hash", "none"]);
     keep(dir, &format!("images-2/{mean}.pfm"), 4.0);
     let files = write(&source, &out).unwrap();

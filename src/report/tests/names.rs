@@ -1,4 +1,5 @@
-//! Runs that vary tests of rays against triangles and boxes, or offsets: what differs is told apart and named.
+//! Runs that vary tests of rays against triangles and boxes, or offsets: differing competitors are named and
+//! distinguished.
 
 use super::*;
 
@@ -12,7 +13,7 @@ fn both(axis: &str, labels: [&str; 2]) -> Vec<Line> {
     let mut lines = Vec::new();
     for line in small_run() {
         match line.body {
-            // References are rendered with the default offset whatever else there is.
+            // References are always rendered with the default offset.
             Body::Reference(_) if axis == axis::OFFSET => lines.push(with(line, labels[0])),
             Body::Structure(_) if axis == axis::OFFSET => lines.push(with(line, labels[0])),
             Body::Structure(_)
@@ -136,8 +137,8 @@ fn an_axis_with_one_value_is_named_nowhere() {
             }
         }
         assert_eq!(terminal_tables(&one), plain);
-        // A reference with the default offset makes no second value, and one of a known value, which no
-        // ray was traced for, is of every view.
+        // A reference with the default offset makes no second value, and one of a known value, for which no ray was
+        // traced, belongs to every view.
         for line in &mut one {
             if matches!(line.body, Body::Reference(_)) {
                 let label = if axis == axis::OFFSET { "default" } else { "" };

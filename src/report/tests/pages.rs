@@ -1,5 +1,5 @@
-//! Whole pages as text: what they say is what they said. `RAYSTONE_WRITE_PAGES=1` writes them anew; then the
-//! difference is to be read before it is committed.
+//! Whole pages as text, compared with the committed ones. `RAYSTONE_WRITE_PAGES=1` writes them anew; read the
+//! difference before you commit it.
 
 use super::*;
 use crate::document::{Block, Illustration, Table, TableCell, Tone};
@@ -14,7 +14,7 @@ fn page(lines: &[Line]) -> String {
     of_document(&document) + "\n# Terminal\n" + &terminal_tables(lines)
 }
 
-/// What the committed records say of tables of theses.
+/// Returns the text of tables of theses from the committed records.
 fn thesis(names: [&str; 2]) -> String {
     let reproduced = repro::chosen(&names.map(str::to_owned)).unwrap();
     let reproduced = reproduced.iter().map(|source| {
@@ -61,7 +61,7 @@ fn of_document(document: &Document) -> String {
     for section in &document.sections {
         text += &format!("\n# {} ({})\n", section.title, section.id);
         let blocks: String = section.blocks.iter().map(block).collect();
-        // Every figure of every cell, which stands in tables, too.
+        // Every figure of every cell, all of which are in tables, too.
         match section.id.as_str() {
             "cells" => text += &format!("{} lines, {}\n", blocks.lines().count(), hash(&blocks)),
             _ => text += &blocks,
@@ -126,7 +126,7 @@ fn of_table(table: &Table) -> String {
     format!("table: {}\n{}\n{rows}", table.caption, heads.join(" | "))
 }
 
-/// What is said, the texts, how many shapes there are, and what is told to who points at them.
+/// Returns the description, the texts, the number of shapes, and the tooltips of a plot.
 fn of_plot(figure: &Illustration) -> String {
     let drawing = &figure.drawing;
     let text = |shape: &Shape| match shape {
@@ -155,7 +155,7 @@ fn hash(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex()[..12].to_owned()
 }
 
-/// Lines of what [`full_run`] lacks: frames, peers, orders of passes, rasterised paths, organisations.
+/// Returns lines that [`full_run`] lacks: frames, peers, orders of passes, rasterised paths, organisations.
 fn further() -> Vec<Line> {
     let scene = (axis::SCENE, "cornell-box");
     let structure = [scene, (axis::ACCEL, "bvh")];
@@ -249,7 +249,7 @@ fn recorded(name: &str) -> Vec<Line> {
     read_records(&folder).unwrap().lines
 }
 
-/// Records of one scene, and of what belongs to none.
+/// Returns the records of one scene, and those without a scene.
 fn of_scene(name: &str, scene: &str) -> Vec<Line> {
     let mut lines = recorded(name);
     lines.retain(|line| ["", scene].contains(&line.key.label(axis::SCENE)));
