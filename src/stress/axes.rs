@@ -37,7 +37,7 @@ const BOX_FAMILIES: [&str; 6] = [
 ];
 /// Structures that find triangles by boxes.
 const BOX_STRUCTURES: [&str; 4] = ["bvh", "cwbvh", "roped-bvh", "bvh4"];
-/// How many of these if it has to be quick.
+/// Number of these in a quick suite.
 const BOX_STRUCTURES_IF_QUICK: usize = 2;
 /// Rays a case, times those of the cells.
 const BOX_RAYS: usize = 4;
@@ -53,13 +53,13 @@ const COST_ROUNDS: usize = 5;
 /// The test that costs are compared with.
 const PLAIN_TEST: &str = "moeller-trumbore";
 
-/// Whether the box tests are tried through the structure of a cell.
+/// Returns `true` if the box tests are tried through the structure of a cell.
 pub(crate) fn has_box_tests(scope: &Scope, cell: &Cell) -> bool {
     let most = (scope.settings).either([BOX_STRUCTURES.len(), BOX_STRUCTURES_IF_QUICK]);
     BOX_STRUCTURES[..most].contains(&&*cell[Axis::Accel].name)
 }
 
-/// What a box test loses.
+/// Losses of a box test.
 #[derive(Clone, Default)]
 struct Lost {
     rays: usize,
@@ -67,7 +67,7 @@ struct Lost {
     worst: Option<Worst>,
 }
 
-/// How many hits each box test loses, with the default triangle test.
+/// Counts the hits that each box test loses, with the default triangle test.
 ///
 /// # Errors
 /// The device is lost or hangs.
@@ -91,7 +91,8 @@ pub(crate) fn box_tests(suite: &Suite, cells: &[Cell]) -> Results {
         .collect())
 }
 
-/// What the box tests lose through one structure. Without a pad and a finite reciprocal, what WGSL leaves open decides.
+/// Returns the losses of the box tests through one structure. Without a pad and a finite reciprocal, they depend on
+/// what WGSL leaves open.
 fn losses(column: Vec<Lost>) -> Found {
     let mut found = Found::default();
     let tests = || BoxTest::ALL.iter().zip(&column);
@@ -112,7 +113,7 @@ fn losses(column: Vec<Lost>) -> Found {
     found
 }
 
-/// What each offset does to chains of mirror bounces in closed meshes, by the twins on the host.
+/// Measures chains of mirror bounces in closed meshes with each offset, by the twins on the host.
 ///
 /// # Errors
 /// The tree cannot be built, in words.
@@ -142,7 +143,7 @@ pub(crate) fn offsets(suite: &Suite, cells: &[Cell]) -> Results {
     Ok(vec![found; cells.len()])
 }
 
-/// What triangle tests cost, alone and in a traversal, by rounds in turns.
+/// Measures the times of triangle tests, alone and in a traversal, by rounds in turns.
 ///
 /// # Errors
 /// The device is lost or hangs.

@@ -1,4 +1,4 @@
-//! Where cases are traced: structures built over a case, and batches on the adapter.
+//! Structures built over a case, and batches of rays on the adapter.
 
 use super::case::Case;
 use raystone_accel::{
@@ -13,7 +13,7 @@ use raystone_render::Stage;
 /// Builds a structure and checks its invariants.
 ///
 /// # Errors
-/// What it refuses or violates, in words.
+/// The refusal or the violated invariant, in words.
 pub(crate) fn build_with(
     kind: &dyn AccelKind,
     params: &Params,
@@ -38,7 +38,7 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// What brute force on the host answers in each space.
+    /// Computes the answers of brute force on the host in each space.
     pub(crate) fn new(soup: &TriangleSoup, rays: &[Ray]) -> Self {
         let placed = soup.placed.as_ref();
         Self {
@@ -56,8 +56,8 @@ impl Expected {
     }
 }
 
-/// Time of one set of rays against another through the same structure: the least of a few rounds each,
-/// taken in turns.
+/// Returns the time of one set of rays over that of another through the same structure: the least of a few rounds
+/// each, in turns.
 ///
 /// # Errors
 /// As for [`Stage::closest`].
@@ -71,7 +71,7 @@ pub(crate) fn ratio(
     let batch = |rays| stage.tracer(traced, Query::Closest)?.batch(rays);
     let [a, b] = [rays, others].map(batch);
     let (a, b) = (a?, b?);
-    // Compiles, and finds how many rays a dispatch takes.
+    // Compiles, and finds the number of rays per dispatch.
     a.trace()?;
     b.trace()?;
     let mut least = [f64::INFINITY; 2];

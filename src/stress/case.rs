@@ -9,21 +9,20 @@ use raystone_core::random::Pcg32;
 use raystone_scene::{Assembly, MAX_COORDINATE, Material, SceneData};
 use std::fmt;
 
-/// What the right answers are.
+/// The source of the right answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
-    /// What the exact oracle says.
+    /// The exact oracle.
     Exact,
-    /// What the exact oracle says; the mesh is closed and the rays start inside, so that every miss is
-    /// a crack.
+    /// The exact oracle; the mesh is closed and the rays start inside, so that every miss is a crack.
     Closed,
-    /// Something is hit; what, only brute force knows.
+    /// Something is hit; only brute force knows which triangle.
     Hit,
     /// These are no rays: nothing may be hit.
     Miss,
 }
 
-/// How fine the meshes are on which most rays are tried: a closed sphere and a closed box.
+/// Resolution of the meshes of most rays: a closed sphere and a closed box.
 #[derive(Clone, Copy)]
 pub(crate) struct Meshes {
     /// Bands of the sphere.
@@ -46,15 +45,15 @@ impl Meshes {
 pub struct Case {
     /// Family that it belongs to.
     pub family: &'static str,
-    /// What it is within the family; unique there.
+    /// Its name, unique within the family.
     pub label: String,
-    /// Where the mesh stands.
+    /// Scale and translation of the mesh.
     pub place: Placement,
-    /// The triangles in world space, and what they are copies of.
+    /// The triangles in world space, and the objects that they are copies of.
     pub scene: SceneData,
     /// The rays.
     pub rays: Vec<Ray>,
-    /// What is right.
+    /// The right answers.
     pub truth: Truth,
 }
 
@@ -63,7 +62,7 @@ pub struct Case {
 pub(crate) struct Maker {
     family: &'static str,
     seed: u64,
-    /// Whether only a few rungs are wanted.
+    /// True for a quick suite, with only a few rungs.
     pub quick: bool,
     /// Rays a case.
     pub rays: usize,
@@ -71,7 +70,7 @@ pub(crate) struct Maker {
     pub cases: Vec<Case>,
 }
 
-/// A stream of random numbers that belongs to a case and to what is made of it.
+/// Returns a stream of random numbers of its own for a case and a purpose.
 fn stream(seed: u64, family: &str, label: &str, what: u64) -> Pcg32 {
     let bytes = family.bytes().chain([0]).chain(label.bytes());
     // FNV-1a: the same on every machine.
@@ -197,7 +196,7 @@ impl Maker {
     }
 }
 
-/// The scene as a loader would hand it over, without what only shading needs.
+/// Returns the scene as a loader would, without data that only shading needs.
 pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
     SceneData {
         colors: Vec::new(),
@@ -220,7 +219,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
     }
 }
 
-/// A case as `raystone trace --scene` takes it: `stress:FAMILY:LABEL:SEED`.
+/// A case in the notation of `raystone trace --scene`: `stress:FAMILY:LABEL:SEED`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
     /// Family.
@@ -232,7 +231,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// What follows `stress:`.
+    /// The start of an address.
     const PREFIX: &'static str = "stress:";
 
     /// Reads an address; `None` if the text is none.

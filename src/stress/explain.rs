@@ -1,4 +1,4 @@
-//! What a structure does with one ray, in words: for `raystone trace`.
+//! Explains in words how a structure traces one ray: for `raystone trace`.
 
 use super::bench;
 use super::shot_meshes;
@@ -9,11 +9,11 @@ use raystone_core::params::Params;
 use raystone_scene::SceneData;
 use std::fmt::Write as _;
 
-/// Crossed triangles that are told one by one.
+/// Crossed triangles that are listed one by one.
 const MOST_CROSSED: usize = 16;
 
-/// Every node that the structure's twin visits, every triangle that it tests, its answer, brute force's
-/// and the exact oracle's; and whether the first two are equal to the bit.
+/// Lists every node that the structure's twin visits, every triangle that it tests, its answer, brute force's and the
+/// exact oracle's; returns `true` beside the text if the first two are equal to the bit.
 ///
 /// # Errors
 /// The structure cannot be built, is not valid, or has no twin; in words.

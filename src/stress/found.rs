@@ -1,4 +1,4 @@
-//! What is found of a cell: readings of figures, and notes.
+//! Results of a cell: readings of figures, and notes.
 
 use super::tally::Worst;
 use raystone_bench::run::Prepared;
@@ -6,12 +6,12 @@ use raystone_bench::timing::Samples;
 use raystone_record::figure::{self, Figure};
 use raystone_record::{Key, Note, Reading};
 
-/// What was found of one cell.
+/// Results of one cell.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
-    /// Figures; absent where they were not asked for.
+    /// Figures; absent unless they were requested.
     pub readings: Vec<Reading>,
-    /// The rays to look at, failed cases, what was left out.
+    /// The rays to look at first, failed cases, parts left out.
     pub notes: Vec<Note>,
 }
 
@@ -38,7 +38,7 @@ impl Found {
         }
     }
 
-    /// Adds what failed, and how much that is.
+    /// Adds failures, and their number.
     pub fn failures(&mut self, at: &Key, failures: Vec<String>) {
         self.add(at, [(&figure::FAILED_CASES, failures.len() as f64)]);
         for failure in failures {

@@ -1,9 +1,9 @@
-//! The numerical stress suite: every triangle test and structure on scenes and rays that rounding makes
-//! hard, judged exactly. What is counted and why: `docs/stress.md`.
+//! The numerical stress suite: every triangle test and structure on scenes and rays that rounding makes hard, checked
+//! exactly. `docs/stress.md` explains the counts.
 //!
-//! Families make cases (`families`), which are traced on the adapter (`suite`) beside a million shots at closed
-//! meshes ([`shots`]); the exact oracle judges ([`tally`]). Each part of the suite is a measurement ([`register`]) of an
-//! ordinary experiment, [`EXPERIMENT`], whose targets are its `[[expect]]`.
+//! Families make cases (`families`), which are traced on the adapter (`suite`) beside a million shots at closed meshes
+//! ([`shots`]); the exact oracle checks the answers ([`tally`]). Each part of the suite is a measurement ([`register`])
+//! of an ordinary experiment, [`EXPERIMENT`], whose targets are its `[[expect]]`.
 #![warn(missing_docs)]
 
 mod axes;

@@ -1,4 +1,4 @@
-//! The parts of the suite as measurements: what each is called on the axis of integrators, which cells it has, what it takes.
+//! The parts of the suite as measurements: the name of each on the axis of integrators, its cells, its time.
 
 use super::families::FAMILIES;
 use super::suite::{BRUTE_FORCE, PLAIN, Suite};
@@ -56,7 +56,7 @@ impl Settings {
     }
 }
 
-/// What a plan knows of the suite.
+/// The settings of the suite that a plan needs.
 pub(crate) struct Scope {
     pub settings: Settings,
     /// The triangle test that is tried everywhere: the default one, or the first where that is not on the axis.
@@ -78,7 +78,7 @@ impl Scope {
         }
     }
 
-    /// Whether a cell has the test that is tried everywhere.
+    /// Returns `true` if a cell has the test that is tried everywhere.
     pub(crate) fn leads(&self, cell: &Cell) -> bool {
         cell[Axis::Triangle].name == self.lead
     }
@@ -91,11 +91,11 @@ pub(crate) type Results = Result<Vec<Found>, Absent>;
 struct Part {
     name: &'static str,
     plural: &'static str,
-    /// Names on the axis of integrators, behind [`STRESS`], and what each is.
+    /// Names on the axis of integrators, after [`STRESS`], with descriptions.
     entries: fn() -> Vec<[&'static str; 2]>,
     /// The axes that matter to it beside the integrator and the kernels.
     axes: &'static [Axis],
-    /// Whether it has such a cell.
+    /// True if it has such a cell.
     has: fn(&Scope, &Cell) -> bool,
     measure: fn(&Suite, &[Cell]) -> Results,
     /// Seconds of a cell, of the whole suite and of a quick one.
@@ -172,7 +172,7 @@ static PARTS: [Part; 6] = [
             ]]
         },
         axes: &[Axis::Triangle],
-        // Times of a few rays tell nothing.
+        // Times of a few rays are meaningless.
         has: |scope, _| !scope.settings.quick,
         measure: axes::costs,
         seconds: [4.0, 0.0],
@@ -199,7 +199,7 @@ static PARTS: [Part; 6] = [
     },
 ];
 
-/// Adds the suite to what can be measured.
+/// Adds the suite to the measurements.
 ///
 /// # Errors
 /// It is there already.
@@ -208,12 +208,12 @@ pub fn register(registries: &mut Registries) -> Result<(), String> {
     parts.try_for_each(|part| registries.measurements.add(part))
 }
 
-/// What an integrator is called without [`STRESS`].
+/// Returns the name of an integrator without [`STRESS`].
 pub(crate) fn part_of(cell: &Cell) -> &str {
     cell[Axis::Integrator].name.trim_start_matches(STRESS)
 }
 
-/// What cells have in common that are measured together.
+/// Returns the common axes of cells that are measured together.
 fn together(cell: &Cell) -> Cell {
     cell.on(&[Axis::Integrator, Axis::Kernels])
 }

@@ -1,4 +1,4 @@
-//! Where a mesh stands: the ladder of scales and translations that every swept family climbs.
+//! Positions of meshes: the ladder of scales and translations that every swept family climbs.
 
 use glam::{DVec3, Vec3};
 
@@ -15,7 +15,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where meshes are modelled: about two units around the origin.
+    /// The placement of models: about two units around the origin.
     pub const ORDINARY: Self = Self {
         scale: 1.0,
         shift: 0.0,
@@ -27,7 +27,7 @@ impl Placement {
         shift: 223_423.0,
     };
 
-    /// Every rung, or a few that tell most.
+    /// Returns every rung, or the few most informative ones.
     pub(crate) fn ladder(quick: bool) -> Vec<Self> {
         let scaled = |exponent: i32| Self {
             scale: 10f64.powi(exponent),
@@ -54,12 +54,12 @@ impl Placement {
         (modelled * self.scale + AWAY * self.shift).as_vec3()
     }
 
-    /// What a rounded coordinate may be off by, at a mesh of about two units.
+    /// Returns the error bound of a rounded coordinate, at a mesh of about two units.
     pub fn resolution(&self) -> f64 {
         (self.shift + 2.0 * self.scale) * f64::from(f32::EPSILON)
     }
 
-    /// Whether enough of a mesh is left that it has an inside: a hundred steps of rounding across.
+    /// Returns `true` if the mesh still has an inside: a hundred steps of rounding across.
     pub(crate) fn keeps_shape(&self) -> bool {
         2.0 * self.scale > 50.0 * self.resolution()
     }

@@ -158,8 +158,8 @@ fn close_holes(triangles: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     closed
 }
 
-/// Whether every edge belongs to an even number of triangles, whichever way they are turned. Rounding
-/// that joins vertices changes nothing of that.
+/// Returns `true` if every edge belongs to an even number of triangles of any orientation. Vertices joined by
+/// rounding do not affect this.
 #[cfg(test)]
 fn is_closed(mesh: &[Triangle]) -> bool {
     let mut uses: HashMap<[[u32; 3]; 2], u32> = HashMap::new();

@@ -11,14 +11,14 @@ use raystone_core::geometry::Triangle;
 use raystone_core::random::Pcg32;
 use raystone_scene::{self as scene, Bounds};
 
-/// What stands for a family in the address of one of these meshes.
+/// The family in the address of one of these meshes.
 pub(crate) const FAMILY: &str = "shots";
 /// The sphere and the plane; any other name is the path of a model.
 pub(crate) const SPHERE: &str = "sphere";
 /// See [`SPHERE`].
 pub(crate) const PLANE: &str = "plane";
 
-/// What is aimed at.
+/// Targets of shots.
 pub(crate) const AIMS: [&str; 3] = ["random", "vertices", "edges"];
 
 /// Bands of the sphere: 16,256 triangles.
@@ -34,11 +34,11 @@ const LEAST_ORIGINS: usize = 8;
 /// A mesh with points from which every ray that is shot hits it.
 pub(crate) struct ShotMesh {
     name: String,
-    /// Where it stands.
+    /// Its scale and translation.
     pub place: Placement,
     /// Its triangles.
     pub mesh: Mesh,
-    /// What is aimed at: a plane ends, and past its border lies nothing.
+    /// Its targets: a plane ends, and past its border lies nothing.
     aims: Mesh,
     origins: Vec<Vec3>,
 }
@@ -91,12 +91,12 @@ impl ShotMesh {
         Self::named(name, place, seed)
     }
 
-    /// What it is called in an address.
+    /// Returns its name in an address.
     pub(crate) fn label(&self) -> String {
         format!("{}, {}", self.name, self.place)
     }
 
-    /// What it is called in tables.
+    /// Returns its name in tables.
     pub(crate) fn short_name(&self) -> &str {
         match self.name.as_str() {
             name @ (SPHERE | PLANE) => name,
@@ -108,7 +108,7 @@ impl ShotMesh {
         }
     }
 
-    /// Rays at what is aimed at, [`AIMS`], from random numbers of their own.
+    /// Returns rays at a target, one of [`AIMS`], from random numbers of their own.
     pub(crate) fn shots(&self, aim: usize, seed: u64, stream: u64, count: usize) -> Vec<Ray> {
         const BLOCK: usize = 4096;
         let block = |block: usize| {

@@ -22,7 +22,7 @@ const CHUNK: usize = 1 << 17;
 /// Misses that are looked up in the oracle, a series.
 const LOOKED_UP: usize = 64;
 
-/// What shoots at the meshes, and what came of it.
+/// A structure and test that shoot at the meshes, and the results.
 type Shooter<'a> = (Kind<'a>, AnyTriangleTest, Found);
 
 /// Shoots at every mesh through the structures of the cells with their triangle tests.
@@ -78,7 +78,8 @@ impl Suite<'_> {
         })
     }
 
-    /// One series: as many shots as the settings want, in chunks. Shots that a kernel's error ended tell nothing of the mesh.
+    /// Traces one series: as many shots as the settings require, in chunks. Shots ended by a kernel's error say nothing of
+    /// the mesh.
     fn series(
         &self,
         target: &ShotMesh,

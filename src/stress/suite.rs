@@ -23,20 +23,20 @@ use raystone_verify::rays::RaySet;
 
 /// The structure that every other one is compared with.
 pub(crate) const BRUTE_FORCE: &str = "brute-force";
-/// The structure that stands for all where not all are tried.
+/// The structure that represents all where not all are tried.
 pub(crate) const PLAIN: &str = "bvh";
 /// Rays of a timed comparison.
 const TIMED_RAYS: [usize; 2] = [16_384, 8192];
 /// Cases that are timed if it has to be quick.
 const TIMED_IF_QUICK: usize = 3;
 
-/// What the suite runs on and with.
+/// The devices and settings of the suite.
 pub(crate) struct Suite<'a> {
     /// Devices of the adapter, one at least, which work at once where nothing is timed.
     pub gpus: Vec<Gpu>,
-    /// Whether it computes like the host.
+    /// True if it computes like the host.
     pub exact: bool,
-    /// What to do.
+    /// The settings.
     pub scope: Scope,
     /// Seed of everything random.
     pub seed: u64,
@@ -52,7 +52,7 @@ pub(crate) struct Kind<'a> {
 }
 
 impl Kind<'_> {
-    /// What it is called, with its parameters.
+    /// Returns its name, with its parameters.
     pub(crate) fn label(&self) -> &str {
         &self.variant.label
     }
@@ -61,16 +61,16 @@ impl Kind<'_> {
         self.variant.name == name
     }
 
-    /// The structure, valid.
+    /// Builds the structure and checks its invariants.
     ///
     /// # Errors
-    /// What it refuses or violates, in words.
+    /// The refusal or the violated invariant, in words.
     pub(crate) fn build(&self, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
         bench::build_with(self.accel, &self.variant.params, soup)
     }
 }
 
-/// Whether any case of a family goes through this structure with this triangle test.
+/// Returns `true` if any case of a family goes through this structure with this triangle test.
 pub(crate) fn has_cell(scope: &Scope, cell: &Cell) -> bool {
     scope.leads(cell) || stands_for_all(&cell[Axis::Accel].name) || !scope.settings.quick
 }
@@ -83,7 +83,7 @@ fn stands_for_all(accel: &str) -> bool {
 struct OpenCell<'a> {
     kind: Kind<'a>,
     test: AnyTriangleTest,
-    /// Whether its test is the one that is tried everywhere.
+    /// True if its test is the one that is tried everywhere.
     leads: bool,
     tally: Tally,
     slowdown: Option<f64>,
@@ -112,8 +112,8 @@ impl<'a> OpenCell<'a> {
         self.leads || stands_for_all(&self.kind.variant.name) || (coarse && !quick)
     }
 
-    /// Whether any hit is asked for: through the plain structure only if it has to be quick, since every kernel has to be
-    /// compiled.
+    /// Returns `true` if any-hit queries are traced: in a quick suite only through the plain structure, since every
+    /// kernel has to be compiled.
     fn asks_any(&self, quick: bool) -> bool {
         self.leads && (!quick || self.kind.is(PLAIN))
     }
@@ -187,8 +187,8 @@ impl Suite<'_> {
         })
     }
 
-    /// Whether this case is timed against ordinary rays: the first of a family, and all whose rays are not
-    /// numbers; of these a few if it has to be quick.
+    /// Returns `true` if this case is timed against ordinary rays: the first of a family, and all whose rays are not
+    /// numbers; only a few of the latter in a quick suite.
     fn is_timed(&self, case: &Case, timed: usize) -> bool {
         let strange = case.family == "non-finite";
         if self.scope.settings.quick {
@@ -209,7 +209,7 @@ impl Suite<'_> {
         let quick = self.scope.settings.quick;
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
         let expected = Expected::new(&soup, &case.rays);
-        // Structures mostly answer what brute force does: its answers are judged once.
+        // Structures mostly answer as brute force does: its answers are checked once.
         let known = expected.of(Space::World);
         let outcomes = reference.judge_all(known);
         self.on_devices(cells, |gpu, cell| {
@@ -244,8 +244,8 @@ impl Suite<'_> {
         })
     }
 
-    /// Times the case with the test that leads through every structure that can be built; not through brute
-    /// force, which does the same whatever the rays, if it has to be quick.
+    /// Times the case with the leading test through every structure that can be built; in a quick suite not through
+    /// brute force, whose work is the same for all rays.
     fn time(&self, case: &Case, cells: &mut [OpenCell]) -> Result<(), Absent> {
         let stage = Stage::new(self.gpu(), case.scene.clone(), Intersection::default())?;
         let count = self.scope.settings.either(TIMED_RAYS);
@@ -263,7 +263,7 @@ impl Suite<'_> {
         Ok(())
     }
 
-    /// The command that shows what a structure with a triangle test does with a ray of a family's case.
+    /// Returns the command that shows how a structure with a triangle test traces a ray of a family's case.
     pub(crate) fn replay(
         &self,
         [family, label]: [&str; 2],

@@ -1,4 +1,4 @@
-//! What came of each ray, and the sum over a cell.
+//! The outcome of each ray, and the sum over a cell.
 
 use super::Found;
 use super::case::{Case, Truth};
@@ -14,16 +14,16 @@ use std::collections::BTreeMap;
 /// coordinate and relative to the way of the ray.
 pub(crate) type Errors<T = f64> = [T; 4];
 
-/// What came of a ray.
+/// The outcome of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// What the answer is.
+    /// The verdict on the answer.
     pub verdict: ExactVerdict,
     /// Errors, where the answer is a hit of the triangle that it names.
     pub errors: Option<Errors>,
 }
 
-/// What is right for every ray of a case: found once, whatever traces the case.
+/// The right answers to every ray of a case: found once for all structures.
 pub(crate) struct CaseTruth<'a> {
     case: &'a Case,
     /// Exact truths; empty where there is no exact truth.
@@ -40,7 +40,7 @@ impl<'a> CaseTruth<'a> {
         Self { case, truths }
     }
 
-    /// Judges one answer.
+    /// Checks one answer.
     pub(crate) fn judge(&self, index: usize, hit: &Hit) -> Outcome {
         let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
         let plain = |verdict| Outcome {
@@ -66,7 +66,7 @@ impl<'a> CaseTruth<'a> {
         }
     }
 
-    /// Judges the answers to all rays, on all cores.
+    /// Checks the answers to all rays, on all cores.
     pub(crate) fn judge_all(&self, hits: &[Hit]) -> Vec<Outcome> {
         (hits.par_iter().enumerate())
             .map(|(i, hit)| self.judge(i, hit))
@@ -80,8 +80,8 @@ pub(crate) fn ulp(x: f64) -> f64 {
     2f64.powi(exponent as i32 - 23)
 }
 
-/// Errors of a hit whose exact distance is `t`. The hit point is what integrators compute from the
-/// barycentrics; its error is the greatest of its coordinates, relative to the way of the ray.
+/// Errors of a hit whose exact distance is `t`. Integrators compute the hit point from the barycentrics; its error is
+/// the greatest of its coordinates, relative to the way of the ray.
 fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
     let [v0, v1, v2] = triangle.vertices;
     let found = v0 - hit.u * (v0 - v1) + hit.v * (v2 - v0);
@@ -107,7 +107,7 @@ fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
     ]
 }
 
-/// What is counted of the rays of a cell.
+/// Counts of the rays of a cell.
 const COUNTED: [&Figure; 12] = [
     &figure::RAYS,
     &figure::FALSE_MISSES,
@@ -146,7 +146,7 @@ const ERRORS: Errors<[&Figure; 3]> = [
 /// The ray to look at first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Worst {
-    /// What is bad about it.
+    /// Its fault.
     pub what: String,
     /// The command that shows it.
     pub replay: String,
@@ -163,7 +163,7 @@ pub struct Tally {
     worst: Option<(f64, Worst)>,
 }
 
-/// How bad a verdict is, and what it is called.
+/// Returns the badness of a verdict, and its name.
 fn badness(outcome: &Outcome) -> (f64, &'static str) {
     match outcome.verdict {
         ExactVerdict::FalseMiss { explained: false } => (5e9, "false miss"),
@@ -240,7 +240,7 @@ impl Tally {
         }))
     }
 
-    /// Tells what is counted of one case.
+    /// Adds the counts of one case to the results.
     pub(crate) fn tell_rung(&self, found: &mut Found, case: &Case) {
         let at = Key::default().with(axis::SUBJECT, &case.label);
         let at = at.with(axis::PLACE, case.place);
@@ -255,8 +255,8 @@ impl Tally {
         }
     }
 
-    /// Tells all of it; any hits only if they were asked for. The worst ray of a structure that answers what brute force does is
-    /// that of brute force.
+    /// Adds everything to the results; any hits only if they were traced. The worst ray of a structure that answers as brute
+    /// force does is that of brute force.
     pub(crate) fn tell(self, found: &mut Found, at: &Key, asked_any: bool, is_brute_force: bool) {
         let counted = COUNTED
             .iter()

@@ -14,7 +14,7 @@ const MESHES: Meshes = Meshes {
 };
 /// Bounces of a chain.
 const BOUNCES: usize = 100;
-/// How far inside the analytic surface a chain turns, as a fraction: facets lie within.
+/// Size of the surface at which a chain turns, over that of the analytic one, which contains the facets.
 const INSIDE: f64 = 0.98;
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.

@@ -107,7 +107,7 @@ pub(super) fn interval_ends(maker: &mut Maker) {
     });
 }
 
-/// What stands in a direction where 0 is meant: zeros of both signs, sin π in f32 and in f64, and less.
+/// Values of a direction that mean 0: zeros of both signs, sin π in f32 and in f64, and less.
 const NOTHINGS: [f32; 8] = [
     0.0,
     -0.0,

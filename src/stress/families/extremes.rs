@@ -47,7 +47,7 @@ pub(super) fn denormal(maker: &mut Maker) {
     });
 }
 
-/// What is put into a ray.
+/// Values put into a ray.
 const STRANGE: [(&str, [f32; 3]); 2] = [
     // NaN with either sign and another payload.
     (

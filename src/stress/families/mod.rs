@@ -14,7 +14,7 @@ use super::case::{Case, Maker};
 pub(crate) struct Family {
     /// Name as a user types it.
     pub name: &'static str,
-    /// One line: what is hard.
+    /// One line: the difficulty.
     pub description: &'static str,
     make: fn(&mut Maker),
 }

@@ -27,7 +27,7 @@ fn squeezed(random: &mut Pcg32, thickness: f64, spread: f64) -> Option<Assembly>
         let linear = rotation(random) * squeeze * rotation(random);
         let columns = [0, 1, 2].map(|k| linear.col(k).as_vec3());
         let translation = (spread * random.in_cube()).as_vec3();
-        // What the limit on condition numbers refuses is left out.
+        // Transforms beyond the limit on condition numbers are left out.
         let _ = assembly.place(object, Transform::new(columns, translation));
     }
     (!assembly.instances().is_empty()).then_some(assembly)

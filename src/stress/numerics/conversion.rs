@@ -1,4 +1,4 @@
-//! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
+//! Words to floats in [0, 1). Checks `to_unit` of `kernels/sampling/sampler.wesl` through
 //! `kernels/stress/conversion.wesl`.
 
 use super::{Gauge, NumericsError, U, rig};
@@ -10,8 +10,8 @@ const PART: u32 = 1 << 22;
 /// Words whose naive conversion is looked at: the largest ones.
 const TOP: u32 = 512;
 
-/// Whether every draw keeps its upper 24 bits and none is 1, over all values of these bits, or over
-/// every 16th of them where it has to be quick.
+/// Checks that every draw has its upper 24 bits and none is 1, over all values of these bits, or over every 16th of
+/// them in a quick suite.
 pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let stride: u32 = if quick { 1 << 12 } else { 1 << 8 };
     let words = u32::MAX / stride + 1;

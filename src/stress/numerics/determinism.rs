@@ -1,4 +1,4 @@
-//! The same seed twice, and in other slices: the same bits. The hashes tell adapters apart.
+//! The same seed twice, and in other slices: the same bits. The hashes distinguish adapters.
 
 use super::rig::{self, Rig};
 use super::{Gauge, NumericsError};
@@ -28,7 +28,7 @@ fn image(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let render = |spps: &[u32], seed| -> Result<Image, NumericsError> {
         let renderer = rig.renderer(&path, &sampler, SIZE)?;
         let mut snapshots = renderer.render(spps, seed)?;
-        // `render` returns as many as it was asked for, and it was asked for one at least.
+        // `render` returns as many as requested, at least one.
         Ok(snapshots.swap_remove(spps.len() - 1).image)
     };
     let first = render(&[SPP], SEED)?;

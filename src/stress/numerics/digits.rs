@@ -8,7 +8,7 @@ use raystone_sampling::Coordinate;
 /// Dimensions of `halton`.
 const DIMENSIONS: u32 = 256;
 
-/// How far the adapter's words of `halton` lie from the exact points, for indices up to 2³² − 1.
+/// Measures the distance of the adapter's words of `halton` from the exact points, for indices up to 2³² − 1.
 pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let sampler = rig::sampler("halton", DIMENSIONS)?;
     let step = if quick { 16 } else { 1 };
@@ -71,8 +71,8 @@ fn indices(base: u32) -> impl Iterator<Item = u32> {
     around.chain(spread).chain([0, 1, u32::MAX - 1, u32::MAX])
 }
 
-/// How far `word` · 2⁻³² lies below the radical inverse of `n`, in units of 2⁻³²; from integers alone
-/// until the last division.
+/// Returns the distance by which `word` · 2⁻³² lies below the radical inverse of `n`, in units of 2⁻³²; from integers
+/// alone until the last division.
 fn shortfall(n: u32, base: u32, word: u32) -> f64 {
     let base = u128::from(base);
     // The radical inverse is `mirrored / power`.

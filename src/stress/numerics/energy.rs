@@ -1,4 +1,4 @@
-//! What long paths lose or gain where nothing is absorbed: a closed box of albedo 1, a ball of glass.
+//! Energy that long paths lose or gain without absorption: a closed box of albedo 1, a ball of glass.
 
 use super::rig::{self, Rig};
 use super::{Gauge, NumericsError};

@@ -1,4 +1,4 @@
-//! Directions of the hemisphere at the ends of the unit square and for awkward normals. Judges
+//! Directions of the hemisphere at the ends of the unit square and for awkward normals. Checks
 //! `kernels/shading/hemisphere.wesl` through `kernels/stress/mappings.wesl`.
 
 use super::{Gauge, NumericsError, U};
@@ -11,7 +11,7 @@ const RANDOM: [usize; 2] = [1 << 20, 1 << 16];
 const WGSL_SIN: f64 = 1.0 / 2048.0;
 const TWO_PI: f32 = 6.283_185_5;
 
-/// Lengths, sides and errors of what the kernel makes of each point.
+/// Measures lengths, sides and errors of the kernel's result for each point.
 pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let (points, normals) = inputs(RANDOM[usize::from(quick)]);
     let (directions, functions) = map(gpu, &points, &normals)?;

@@ -1,7 +1,7 @@
-//! Accumulation and sampling: what f32 sums, conversions, digits, mappings and long paths lose on an
-//! adapter, each figure beside the level from which it is an alarm.
+//! Accumulation and sampling: losses of f32 sums, conversions, digits, mappings and long paths on an adapter, each
+//! figure beside the level from which it is an alarm.
 //!
-//! What the figures mean, and where the levels come from: `docs/stress-numerics.md`.
+//! `docs/stress-numerics.md` explains the figures and levels.
 
 mod conversion;
 mod determinism;
@@ -22,7 +22,7 @@ use raystone_scene::SceneError;
 /// One thing measured on an adapter, with the level from which it is an alarm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gauge {
-    /// What was measured.
+    /// The name of the figure.
     pub name: String,
     /// The figure: the larger, the worse.
     pub value: f64,
@@ -30,9 +30,9 @@ pub struct Gauge {
     pub alarm: Option<f64>,
     /// Unit of `value` and `alarm`; empty for plain numbers.
     pub unit: String,
-    /// Whether `value` is a number and not beyond `alarm`.
+    /// True if `value` is a number and not beyond `alarm`.
     pub passed: bool,
-    /// What the reader should know: how often, where, what follows.
+    /// Explanation for the reader: frequency, place, consequences.
     pub note: String,
 }
 
@@ -65,7 +65,7 @@ impl Gauge {
     }
 }
 
-/// Why the figures cannot be taken.
+/// A reason why the figures cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum NumericsError {
     /// A kernel does not compile or run.
@@ -88,7 +88,7 @@ pub enum NumericsError {
     Stream(String),
 }
 
-/// Takes all figures on `gpu`; `quick` leaves out what takes long, at the cost of fewer numbers tried.
+/// Measures all figures on `gpu`; `quick` shortens the long ones, at the cost of fewer numbers tried.
 ///
 /// # Errors
 /// A kernel does not compile or run, or memory is short.
@@ -102,7 +102,8 @@ pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     Ok(figures)
 }
 
-/// All figures with their notes, and how many are beyond their level. What is no number is an alarm without a figure.
+/// Returns all figures with their notes, and the number beyond their level. One that is no number is an alarm without
+/// a figure.
 pub(crate) fn found(suite: &Suite) -> Result<Found, NumericsError> {
     let mut found = Found::default();
     let gauges = run(suite.gpu(), suite.scope.settings.quick)?;

@@ -10,7 +10,7 @@ use raystone_render::{
 use raystone_sampling::{Demand, Sampler, SamplerRegistry};
 use raystone_scene::SceneData;
 
-/// What is called `name`, with these parameters set.
+/// Returns the variant of this name, with these parameters set.
 fn variant(name: &str, set: &[(&str, ParamValue)]) -> Variant {
     let set = set
         .iter()

@@ -1,4 +1,4 @@
-//! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
+//! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Checks `kernels/stress/sums.wesl`.
 
 use super::{Gauge, NumericsError, U, rig};
 use raystone_gpu::{Composition, Gpu, UniformValues};
@@ -12,10 +12,9 @@ const LANES: u32 = 16;
 const SEED: u32 = 17;
 const SHORTENED: &str = "; no more terms, because this driver ends loops";
 
-/// The ways of the kernel in its order: name, alarm as a relative error for n terms, and what is to
-/// be known. The alarms are the a-priori bounds for terms of one sign (N. Higham, "Accuracy and
-/// Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2), doubled for what is of second
-/// order.
+/// The ways of the kernel in its order: name, alarm as a relative error for n terms, and a note. The alarms are the
+/// a-priori bounds for terms of one sign (N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002,
+/// section 4.2), doubled for terms of second order.
 type Way = (&'static str, fn(f64) -> f64, &'static str);
 
 const WAYS: [Way; 5] = [
@@ -64,7 +63,7 @@ pub(super) fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     Ok(figures)
 }
 
-/// Terms of a long sum, which takes about two turns of loops each, on a driver that ends loops.
+/// Returns the number of terms of a long sum, with about two turns of loops each, on a driver that ends loops.
 fn longest(loop_limit: Option<u32>) -> u32 {
     loop_limit.map_or(TERMS, |limit| TERMS.min(1 << (limit / 4).max(1).ilog2()))
 }
