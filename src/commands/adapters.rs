@@ -5,7 +5,7 @@ use raystone::gpu::AdapterSummary;
 use raystone::report::format::bytes;
 use serde_json::json;
 
-/// What kind of device it is.
+/// Returns the kind of device.
 fn kind(adapter: &AdapterSummary) -> &'static str {
     match adapter.info.device_type {
         wgpu::DeviceType::DiscreteGpu => "discrete GPU",
@@ -59,7 +59,7 @@ pub fn row(adapter: &AdapterSummary) -> Row {
     Row::with(adapter.index, adapter.info.name.clone(), vec![about], json)
 }
 
-/// Major version of the Mesa that a driver is part of, if its version text says so.
+/// Returns the major version of the Mesa that a driver is part of, if its version text has it.
 pub fn mesa_major(driver_info: &str) -> Option<u32> {
     let (_, version) = driver_info.split_once("Mesa ")?;
     version.split('.').next()?.parse().ok()

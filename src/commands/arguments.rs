@@ -83,18 +83,18 @@ pub struct ExperimentArguments {
     pub only: Vec<String>,
 }
 
-/// What commands without an experiment file begin with: one cell, so that one parser checks names, parameters, flags and
+/// The start of commands without an experiment file: one cell, so that one parser checks names, parameters, flags and
 /// `--set` everywhere.
 const CELL: &str =
     "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"pixel-hash\"]\n";
 
-/// These names on an axis as an override of an experiment, whatever characters are in them; nothing without any.
+/// Returns an override of an experiment that sets an axis to these names, with any characters; nothing without any.
 pub fn on_axis<T: ToString>(axis: Axis, names: impl IntoIterator<Item = T>) -> Option<String> {
     let names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
     (!names.is_empty()).then(|| format!("axes.{axis}={}", toml::Value::from(names)))
 }
 
-/// The experiment of a command without a file: what its flags say, and `--set`, which has the last word.
+/// Returns the experiment of a command without a file: its flags, and `--set`, which overrides them.
 ///
 /// # Errors
 /// Those of an experiment file.
@@ -129,7 +129,7 @@ pub fn one_cell(experiment: &Experiment) -> Result<Cell> {
     Ok(cell)
 }
 
-/// The text of a file, of standard input behind the name `-`, and what it is called in messages.
+/// Returns the text of a file, or of standard input for the name `-`, and its name in messages.
 ///
 /// # Errors
 /// A file that cannot be read, or is no text.
@@ -149,7 +149,7 @@ pub fn read_text(file: &Path) -> Result<(String, String)> {
     }
 }
 
-/// What to say of a name that there is not.
+/// Returns the message for an unknown name.
 pub fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let hint = nearest(name, known.iter().copied());
@@ -172,7 +172,8 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     parsed.ok_or_else(|| "must be width x height in pixels, for instance 512x384".to_owned())
 }
 
-/// The plan of an experiment whose models look like models: told before minutes are spent on other cells.
+/// Returns the plan of an experiment after a check that its models look like models: an error comes before minutes
+/// are spent on other cells.
 ///
 /// # Errors
 /// Cells that do not fit together, and the first model that is none.

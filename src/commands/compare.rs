@@ -21,7 +21,7 @@ use std::process::ExitCode;
 /// The noise leaves something open.
 const UNDECIDED: u8 = 4;
 
-/// What `--kernels` measures where no experiment is given.
+/// The experiment of `--kernels` where none is given.
 const SMALL: (&str, &str) = (
     include_str!("../../experiments/ci.toml"),
     "experiments/ci.toml",
@@ -137,7 +137,7 @@ impl Compare {
         })
     }
 
-    /// Reads or measures what is compared.
+    /// Reads or measures both sides.
     fn sides(&self, work: &Temporary) -> Result<[Side; 2]> {
         let labels = self
             .kernels
@@ -211,7 +211,7 @@ impl Compare {
         Ok(options)
     }
 
-    /// Measures again what looks worse.
+    /// Measures again the times that look worse.
     fn confirm(&self, sides: [&Side; 2], cells: &[Finding], work: &Temporary) -> Result<Confirmed> {
         if self.no_confirm {
             bail!("--no-confirm");

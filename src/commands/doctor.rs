@@ -53,7 +53,7 @@ impl Doctor {
         }
         let fields = as_json(&system, rows, examined.as_ref());
         self.output.show("doctor", fields, &text)?;
-        // Whatever it was: this is no adapter that a command could use.
+        // Whatever the failure: no command could use this adapter.
         Ok(failed.map_or(ExitCode::SUCCESS, |failure| {
             tell_error(&failure.into());
             ExitCode::from(NO_ADAPTER)
@@ -61,7 +61,7 @@ impl Doctor {
     }
 }
 
-/// What [`Doctor`] says, as JSON; `in_use` is null where no adapter works.
+/// Returns the output of [`Doctor`] as JSON; `in_use` is null if no adapter works.
 fn as_json(system: &System, found: Vec<Row>, examined: Option<&Examined>) -> Value {
     let remedy = found.is_empty().then(|| remedy(system).trim().to_owned());
     let in_use = examined.map(|examined| {
@@ -93,7 +93,7 @@ fn machine(system: &System) -> String {
     )
 }
 
-/// What to do where no adapter answers.
+/// Returns the steps to take if no adapter answers.
 fn remedy(system: &System) -> String {
     let mut text = "\nWhat to do\n".to_owned();
     if let Ok(backend) = std::env::var("WGPU_BACKEND") {
@@ -118,7 +118,7 @@ fn remedy(system: &System) -> String {
     text
 }
 
-/// Runs a kernel on the adapter that would be used, and says what it can do.
+/// Runs a kernel on the adapter that would be used, and describes its abilities.
 fn examine(
     gpu: &Gpu,
     choice: &AdapterChoice,
@@ -162,7 +162,7 @@ fn examine(
     })
 }
 
-/// What was found of the adapter in use.
+/// Findings on the adapter in use.
 struct Examined {
     adapter: String,
     head: String,
@@ -190,7 +190,7 @@ fn denormals(probe: ArithmeticProbe) -> &'static str {
     }
 }
 
-/// Whether the driver ends loops, and what follows from that.
+/// Describes whether the driver ends loops early, with the consequences.
 fn loops(gpu: &Gpu, system: &System) -> String {
     let Some(limit) = gpu.loop_limit else {
         return "run to their end".to_owned();
@@ -225,7 +225,7 @@ fn arithmetic(probe: ArithmeticProbe) -> String {
     }
 }
 
-/// What to expect of the speed of a software adapter, and whether a faster driver is at hand.
+/// Describes the speed of a software adapter, and the way to a faster driver if there is one.
 fn speed(gpu: &Gpu, system: &System) -> Option<(&'static str, String)> {
     let mut text = "software: times compare structures on this adapter only".to_owned();
     if let Some(major @ ..=22) = mesa_major(&gpu.info.driver_info) {

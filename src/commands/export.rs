@@ -51,7 +51,7 @@ impl ChoiceArguments {
         Ok(Selection::new(&self.figure, &self.only)?)
     }
 
-    /// Ends where something is chosen of what holds no figures.
+    /// Fails if figures are selected for a format without figures.
     fn refuse(&self, format: &str) -> Result<()> {
         if !self.figure.is_empty() || !self.only.is_empty() {
             bail!(
@@ -62,7 +62,7 @@ impl ChoiceArguments {
     }
 }
 
-/// What is written.
+/// The kind of export.
 #[derive(Clone, Copy)]
 enum Target {
     Run(&'static Format),

@@ -1,4 +1,4 @@
-//! How a command fails: one sentence on standard error and an exit code.
+//! Failure of a command: one sentence on standard error and an exit code.
 
 use super::output::tell_marked;
 use raystone::gpu::GpuError;
@@ -12,7 +12,7 @@ pub const BAD_INPUT: u8 = 2;
 /// No usable adapter.
 pub const NO_ADAPTER: u8 = 3;
 
-/// The exit code of a command that did all it was asked for, and found nothing wrong or something.
+/// Returns the exit code of a completed command; `well` if it found nothing wrong.
 pub fn ended(well: bool) -> ExitCode {
     if well {
         ExitCode::SUCCESS
@@ -26,7 +26,7 @@ pub fn tell_error(error: &anyhow::Error) {
     tell_marked("error:", 31, &sentence(error));
 }
 
-/// Tells an error; the exit code to end with.
+/// Writes an error; returns the exit code.
 pub fn end(error: anyhow::Error) -> ExitCode {
     tell_error(&error);
     let code = match error.downcast::<GpuError>() {
@@ -36,8 +36,8 @@ pub fn end(error: anyhow::Error) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// The chain of causes behind colons, without those that the sentence already holds: many messages
-/// quote their cause themselves.
+/// Joins the chain of causes by colons, without those that the sentence already holds: many messages quote their
+/// cause themselves.
 fn sentence(cause: &anyhow::Error) -> String {
     let mut text = String::new();
     for part in cause.chain().map(ToString::to_string) {

@@ -1,4 +1,4 @@
-//! `raystone help`: pages of the command line, and what other programs read of it.
+//! `raystone help`: pages of the command line, and files for other programs.
 
 use super::CommandLine;
 use super::arguments::unknown;

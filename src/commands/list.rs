@@ -34,7 +34,7 @@ pub struct List {
     output: OutputArguments,
 }
 
-/// What can be listed.
+/// A topic of the list.
 struct Topic {
     name: &'static str,
     also: &'static [&'static str],
@@ -84,7 +84,7 @@ const fn other(
     }
 }
 
-/// Adapters: drivers are loaded, and may print, only where they are asked for.
+/// Adapters: drivers are loaded, and may print, only if they are asked for.
 const ADAPTER: &str = "adapter";
 
 #[rustfmt::skip]
@@ -185,7 +185,7 @@ impl Row {
     }
 }
 
-/// A line for each row with its text behind it, and what stands below it.
+/// Formats a line for each row with its text after the name, and further lines below it.
 pub fn table(rows: &[Row]) -> String {
     let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0);
     let mut text = String::new();
@@ -236,7 +236,7 @@ fn shared_parameters<'a>(
         let with = entry.schema.iter().filter(|p| other.schema.contains(p));
         with.count()
     };
-    // The first of those that share most: `max_by_key` alone takes the last.
+    // The first of those that share most: `max_by_key` alone returns the last.
     let most = earlier.iter().rev().max_by_key(|other| shared(other));
     let Some(other) = most.filter(|other| shared(other) > FEW) else {
         return (None, entry.schema.iter().collect());

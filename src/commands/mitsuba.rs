@@ -10,7 +10,7 @@ use raystone::run::Registries;
 use raystone::scene::{LoadOptions, check_camera, load};
 use std::path::Path;
 
-/// The format that takes a scene.
+/// The format of scenes.
 pub const MITSUBA: (&str, &str) = (
     "mitsuba",
     "a scene for the renderer Mitsuba 3, with the camera and the path depth of `render`",
@@ -47,7 +47,7 @@ impl SceneArguments {
         let registries = Registries::default();
         let flags = on_axis(Axis::Scene, [scene.display()]).into_iter();
         let flags = flags.chain([
-            // As `render` takes where nothing is said: both programs make the same picture.
+            // The defaults of `render`: both programs make the same picture.
             format!("run.resolution={:?}", self.size.unwrap_or([512, 384])),
             "run.spp=[64]".to_owned(),
         ]);

@@ -1,4 +1,4 @@
-//! Commands: what they are called, and how they end.
+//! Commands: their names, and their ends.
 
 mod adapters;
 mod arguments;
@@ -51,7 +51,7 @@ Examples:
   raystone render --scene cornell-box --spp 256 -o box.png
   raystone points --sequence sobol --count 64 --measure star";
 
-/// Version, commit and whether the sources differed from it.
+/// Version, commit, and a mark if the sources differed from it.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let Program {
         version,
@@ -112,7 +112,7 @@ commands! {
     Help(help::Help),
 }
 
-/// What commands were called before, and the words that they are now.
+/// Old names of commands, with the present words.
 const OLD: [(&str, &[&str]); 9] = [
     ("plan", &["inspect"]),
     ("verify-run", &["inspect"]),
@@ -125,7 +125,7 @@ const OLD: [(&str, &[&str]); 9] = [
     ("man", &["help", "--man"]),
 ];
 
-/// The words of the command line, an old name replaced by what the command is called now.
+/// Returns the words of the command line, an old name replaced by the present one.
 fn words(mut words: Vec<OsString>) -> Vec<OsString> {
     let first = words.get(1);
     if let Some((old, now)) = first.and_then(|word| OLD.iter().find(|(old, _)| word == old)) {
@@ -138,7 +138,7 @@ fn words(mut words: Vec<OsString>) -> Vec<OsString> {
     words
 }
 
-/// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
+/// Reads the command line and executes it; clap itself ends the program with 2 on bad usage.
 pub fn main() -> ExitCode {
     let command = CommandLine::parse_from(words(std::env::args_os().collect())).command;
     command.execute().unwrap_or_else(failure::end)

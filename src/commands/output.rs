@@ -17,7 +17,7 @@ pub struct OutputArguments {
 }
 
 impl OutputArguments {
-    /// Prints what a command found as it was asked for: these fields, or this text.
+    /// Prints the results of a command in the requested form: these fields, or this text.
     pub fn show(self, command: &str, fields: Value, text: &str) -> Result<()> {
         if self.json {
             print_json(command, fields)
@@ -29,8 +29,8 @@ impl OutputArguments {
 
 /// Writes `text` to standard output.
 ///
-/// A reader that went away (`raystone list | head`) has what it wanted: that is no failure, and the
-/// exit code still tells how the command ended.
+/// A reader that closes the pipe (`raystone list | head`) is no failure, and the exit code still reports how the
+/// command ended.
 pub fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match output
@@ -43,7 +43,7 @@ pub fn print(text: &str) -> Result<()> {
     .context("cannot write to standard output")
 }
 
-/// Writes what a command found as one JSON object: version, command, and these fields.
+/// Writes the results of a command as one JSON object: version, command, and these fields.
 pub fn print_json(command: &str, fields: Value) -> Result<()> {
     let mut object = json!({ "schema": OUTPUT_SCHEMA, "command": command });
     if let (Value::Object(object), Value::Object(fields)) = (&mut object, fields) {
@@ -52,10 +52,10 @@ pub fn print_json(command: &str, fields: Value) -> Result<()> {
     print(&format!("{object:#}\n"))
 }
 
-/// Narrower screens are taken for this wide.
+/// Narrower screens are treated as this wide.
 const NARROWEST_SCREEN: usize = 20;
 
-/// What standard output is: as wide as COLUMNS says, else as the terminal is, else without end.
+/// Returns the width of standard output: COLUMNS, else that of the terminal, else unlimited; and its colours.
 pub fn screen() -> Screen {
     let terminal = console::Term::stdout();
     let is_terminal = terminal.is_term();
@@ -69,14 +69,13 @@ pub fn screen() -> Screen {
     }
 }
 
-/// Whether colours are wanted: see <https://no-color.org>.
+/// Returns `true` if colours are wanted: see <https://no-color.org>.
 fn shows_colours() -> bool {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
-/// Writes a line to standard error. A terminal that went away is no reason to end: what is measured
-/// counts.
+/// Writes a line to standard error. A closed terminal is no reason to end: the measurements count.
 pub fn tell(text: &str) {
     let lines: Vec<String> = text.split('\n').map(visible).collect();
     let _ = writeln!(std::io::stderr().lock(), "{}", lines.join("\n"));
@@ -87,7 +86,7 @@ pub fn warn(text: &str) {
     tell_marked("warning:", 33, text);
 }
 
-/// Writes a line behind a mark, in colour where standard error is a terminal that shows it.
+/// Writes a line after a mark, in colour where standard error is a terminal that shows it.
 pub fn tell_marked(mark: &str, colour: u8, text: &str) {
     if std::io::stderr().is_terminal() && shows_colours() {
         let mut error = std::io::stderr().lock();

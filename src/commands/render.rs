@@ -119,7 +119,7 @@ impl Render {
     }
 }
 
-/// Whether the picture can be written, asked before anything is rendered.
+/// Checks that the picture can be written, before anything is rendered.
 fn check_output(file: &Path) -> Result<()> {
     FileFormat::of(file)?;
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty());
@@ -129,7 +129,7 @@ fn check_output(file: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What was approximated, a line each, and how long it took.
+/// Lists approximations, a line each, and the time of the rendering.
 fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
     let mut text = String::new();
     for note in rendering.report.lines() {

@@ -81,7 +81,7 @@ impl Repro {
             cache: user_folder(),
             ..RunOptions::default()
         };
-        // Without an adapter what is recorded can be judged all the same; a run says that there is none.
+        // Without an adapter, recorded tables can be checked all the same; a run reports that there is none.
         settings.software = is_software(&options.adapter).unwrap_or(true);
         signals::watch(options.interrupt.clone())?;
         let (mut tables, mut failed) = (Vec::new(), Vec::new());
@@ -118,7 +118,7 @@ impl Repro {
     }
 }
 
-/// Whether no other table would fare better: there is no adapter.
+/// Returns `true` if every other table would fail the same way: there is no adapter.
 fn ends_all(error: &ReproError) -> bool {
     matches!(error, ReproError::Run(error @ RunError::Gpu(GpuError::NoAdapter | GpuError::UnknownAdapter { .. })) if error.exit_code() == 3)
 }

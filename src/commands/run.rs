@@ -152,7 +152,7 @@ impl Run {
     }
 }
 
-/// Runs a plan, writes its report, and tells what was found and what failed: of `command`.
+/// Runs a plan, writes its report, and prints results and failures: of `command`.
 pub fn carry_out(
     command: &str,
     experiment: &Experiment,
@@ -223,7 +223,7 @@ fn linear_format(text: &str) -> Result<&'static FileFormat, String> {
     })
 }
 
-/// Writes the report of a run, prints its tables, and tells what failed.
+/// Writes the report of a run, prints its tables, and reports failures.
 fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
     if summary.kept > 0 && !quiet {
         output::tell(&format!(
@@ -244,7 +244,7 @@ fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
     tell_failures(summary, lenient)
 }
 
-/// Tells what failed; the exit code to end with.
+/// Reports failures; returns the exit code.
 fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
     let lines = read_records(&summary.out)?.lines;
     let failed_checks = failed_checks(&lines);

@@ -1,4 +1,4 @@
-//! SIGINT and SIGTERM during a run: what was measured is kept and gets its report.
+//! SIGINT and SIGTERM during a run: the measurements so far are stored and get a report.
 
 use raystone::run::Interrupt;
 
@@ -72,7 +72,7 @@ fn end(signal: i32, interrupt: &Interrupt) {
     signal_hook::low_level::exit(128 + signal);
 }
 
-/// Exit code of a run that was asked to end by SIGINT.
+/// Exit code of a run that was ended by SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
 /// Leaves the end of the program to the thread of the signals.

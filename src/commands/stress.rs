@@ -56,9 +56,9 @@ pub struct Stress {
     output: OutputArguments,
 }
 
-/// Always takes part: the others are compared with it.
+/// Always included: the others are compared with it.
 const BRUTE_FORCE: &str = "brute-force";
-/// What messages call the experiment.
+/// The experiment's name in messages.
 const FILE: &str = "experiments/stress.toml";
 
 impl Stress {
@@ -67,7 +67,7 @@ impl Stress {
             return plant_faults(&self.out, self.device.adapter.as_ref());
         }
         if let Some(model) = &self.model {
-            // A model that was asked for has to be there; the default one may be missing.
+            // A requested model must exist; the default one may be missing.
             warn_of(&named(&model.to_string_lossy())?);
         }
         let registries = raystone::registries();

@@ -38,7 +38,7 @@ pub fn environment() -> String {
     text
 }
 
-/// What `/etc/os-release` says, as far as it matters here.
+/// The relevant content of `/etc/os-release`.
 #[derive(Debug, Default, PartialEq)]
 pub struct System {
     /// Name and version, for people.
@@ -78,7 +78,7 @@ impl System {
         }
     }
 
-    /// Whether `scripts/install-driver --backports` has a faster driver for this system.
+    /// Returns `true` if `scripts/install-driver --backports` has a faster driver for this system.
     pub fn has_backports(&self) -> bool {
         self.families.first().is_some_and(|id| id == "debian") && self.version == "12"
     }

@@ -59,7 +59,7 @@ impl Trace {
 
     /// Scene, structure and tests with their parameters, read as those of an experiment file.
     fn cell(&self, registries: &Registries) -> Result<Cell> {
-        // A case of the suite is no scene of an experiment; any other one stands in its place there.
+        // A case of the suite is no scene of an experiment; the cell then has the default one.
         let scene = Address::parse(&self.scene).is_none().then_some(&self.scene);
         let flags = [
             on_axis(Axis::Scene, scene),

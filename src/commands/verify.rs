@@ -25,7 +25,7 @@ const SCENES: [&str; 2] = ["cornell-box", "displaced-sphere"];
 const INTEGRATORS: [&str; 3] = ["primary", "ao", "path"];
 /// The structure that tests every triangle.
 const BRUTE_FORCE: &str = "brute-force";
-/// Scenes from this size on are left to the other structures, unless brute force is asked for.
+/// Scenes from this size on are left to the other structures, unless brute force is requested.
 const BRUTE_FORCE_TRIANGLES: usize = 5_000;
 
 /// Run the gate alone: does every structure answer every ray as the reference tracer does?
@@ -175,7 +175,7 @@ fn passed(verified: &Verified) -> bool {
         .is_ok_and(|verdict| verdict.passed)
 }
 
-/// How many structures passed, and how many could not be judged.
+/// Counts the structures that passed, and those that could not be checked.
 fn ending(all: usize, failed: usize, refused: usize) -> String {
     let left_out = match refused {
         0 => String::new(),
@@ -209,7 +209,7 @@ fn as_json(verified: &[Verified], skipped: &[Skipped]) -> Value {
     })
 }
 
-/// A row per ray class, and what else went wrong below the table.
+/// Formats a row per ray class, and other failures below the table.
 fn table(verified: &[Verified]) -> String {
     let columns = [
         "scene",
@@ -252,7 +252,7 @@ fn table(verified: &[Verified]) -> String {
     )
 }
 
-/// A row per integrator, and what went wrong below the table.
+/// Formats a row per integrator, and failures below the table.
 fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
     let columns = [
         "scene",
@@ -302,7 +302,7 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
     }
 }
 
-/// The rows of one structure; names and the reference tracer's own checks stand in the first.
+/// Returns the rows of one structure; names and the reference tracer's own checks are in the first.
 fn rows(head: [TableCell; 3], verdict: &GateVerdict) -> Vec<Vec<TableCell>> {
     let brute_force = &verdict.brute_force;
     let kept = brute_force.reused_unix_s.map_or("", |_| " (kept)");

@@ -29,7 +29,7 @@ pub fn execute(
     Ok(ended(failed == 0))
 }
 
-/// A row per view with its worst channel, and what is wrong below.
+/// Formats a row per view with its worst channel, and failures below.
 fn table(all: &[Seen]) -> String {
     let columns = [
         "image, view",

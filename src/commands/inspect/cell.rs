@@ -1,4 +1,5 @@
-//! One cell of the folder of a run: what it is, why it is up to date or not, and how to measure it alone.
+//! One cell of the folder of a run: its records, the reasons why it is up to date or not, and the command to measure
+//! it alone.
 
 use super::Inspect;
 use anyhow::{Result, bail};

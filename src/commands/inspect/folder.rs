@@ -1,4 +1,4 @@
-//! The folder of a run: whether it holds every cell of its plan.
+//! The folder of a run: cells of its plan that are missing or wrong.
 
 use super::Inspect;
 use crate::commands::failure::ended;

@@ -42,7 +42,7 @@ pub(super) fn inspect(command: &Inspect) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What each shard measures, and how long that may take.
+/// Describes the cells of each shard, with the expected time.
 fn describe(
     text: &mut String,
     (units, numbers): (&[Unit], &[usize]),
@@ -97,7 +97,7 @@ fn how_to_run(command: &Inspect, of: usize) -> String {
     )
 }
 
-/// Every cell of a plan with its kind and the seconds that it is expected to take, and what is left out.
+/// Returns every cell of a plan with its kind and expected seconds, and those left out.
 pub fn as_json(plan: &Cells, units: &[Unit], cost: &Cost) -> Value {
     let cell = |unit: &Unit| {
         let axes = Axis::ALL.into_iter();

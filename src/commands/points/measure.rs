@@ -1,4 +1,4 @@
-//! How evenly points fill the unit cube, as JSON.
+//! Measures of the uniformity of points in the unit cube, as JSON.
 
 use crate::commands::arguments::{read_text, unknown};
 use crate::commands::output::print_json;
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// What is measured where nothing is said.
+/// The default measures.
 const DEFAULT: &str = "star,l2star,centered,wrap,mixture";
 
 /// What of points is measured.
@@ -71,7 +71,7 @@ impl MeasureArguments {
     }
 }
 
-/// The points of a file, those dimensions of them that are asked for; of standard input where there is none.
+/// Reads the requested dimensions of the points of a file, or of standard input without one.
 pub(super) fn read(file: Option<&Path>, dims: &[u32]) -> Result<PointSet> {
     if file.is_none() && std::io::stdin().is_terminal() {
         bail!("give a --sequence to draw points from, or a file to measure");
@@ -91,7 +91,7 @@ pub(super) fn read(file: Option<&Path>, dims: &[u32]) -> Result<PointSet> {
     })
 }
 
-/// What was measured, or the reason why there is nothing; an absent value is absent, never 0.
+/// Returns the fields of a measurement, or the reason why there is none; an absent value is absent, never 0.
 fn fields(result: Result<Value, DiscrepancyError>, seconds: f64) -> serde_json::Value {
     let mut fields = match result {
         Ok(Value::Bracket(bracket)) => {

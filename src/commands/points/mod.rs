@@ -85,7 +85,7 @@ impl Points {
     }
 }
 
-/// The fraction of 2³² that a word stands for: exact in double precision.
+/// Returns a word as a fraction of 2³²: exact in double precision.
 fn fraction(word: u32) -> f64 {
     f64::from(word) * 2.0_f64.powi(-32)
 }

@@ -84,7 +84,7 @@ impl SamplerArguments {
         })
     }
 
-    /// What the flags say, as overrides of an experiment.
+    /// Returns the flags as overrides of an experiment.
     fn overrides(&self, sequence: &str, catalogue: &Catalogue) -> Result<Vec<String>> {
         let named = [
             (Axis::Sequence, sequence),
