@@ -1,5 +1,5 @@
-//! How rays intersect triangles and boxes: the choice of tests that every structure follows, on the
-//! device by composition and on the host through [`Reciprocal`].
+//! The tests of rays against triangles and boxes that every structure follows, on the device by composition and on
+//! the host through [`Reciprocal`].
 
 use super::ray::{Ray, raised};
 use super::triangle::{AnyTriangleTest, Watertight};

@@ -131,7 +131,7 @@ pub struct TriangleSoup {
     pub records: Vec<TriangleRecord>,
     /// The objects they are copies of, if the scene consists of instances.
     pub placed: Option<Placed>,
-    /// How rays intersect them: see [`TriangleSoup::intersecting`].
+    /// The tests of rays against them: see [`TriangleSoup::intersecting`].
     pub intersection: Intersection,
     /// Masks that cut holes into them; the words of records refer to these.
     pub masks: Option<Arc<Masks>>,
@@ -324,7 +324,7 @@ pub trait AccelKind: Sync {
 /// A built structure, or the reason for failure.
 pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
 
-/// How a built structure is traced.
+/// The way to trace a built structure.
 #[derive(Clone)]
 pub enum Access {
     /// Its kernel module exports `trace(ray, any)`, which other kernels call through `accel/query`.
@@ -348,12 +348,12 @@ pub trait BuiltAccel: Sync {
     fn on_device(&self) -> Vec<(&'static str, wgpu::Buffer)> {
         Vec::new()
     }
-    /// How it is traced.
+    /// Returns the way to trace it.
     fn access(&self) -> Access {
         Access::Inline
     }
-    /// When the batch kernel refills its invocations, for inline structures whose kernel exports
-    /// `Traversal`, `begin` and `advance`.
+    /// Returns the refill rule of the batch kernel, for inline structures whose kernel exports `Traversal`, `begin`
+    /// and `advance`.
     fn refill(&self) -> RefillParameters {
         RefillParameters::NONE
     }

@@ -285,7 +285,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
+            // The exit must lie clearly beyond the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }

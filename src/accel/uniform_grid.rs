@@ -5,9 +5,9 @@
 //! Woo, "A fast voxel traversal algorithm", 1987; K. Zuiderveld et al., "Acceleration of ray
 //! casting using 3D distance transforms", 1992 (skipping empty space).
 //!
-//! A hit beyond the current cell is stored and the traversal continues until the cell's exit lies
-//! behind the nearest hit. With `skip = chebyshev` an empty cell stores the distance to the nearest
-//! list, and the traversal skips the whole empty cube around it at once.
+//! A hit beyond the current cell is stored and the traversal continues until the cell's exit lies beyond the nearest
+//! hit. With `skip = chebyshev` an empty cell stores the distance to the nearest list, and the traversal skips the
+//! whole empty cube around it at once.
 
 use super::grid::lists::{Lists, check_lists, check_starts};
 use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, outside};
@@ -207,7 +207,7 @@ impl Traverse for Built {
             });
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
-            // The exit must lie clearly behind the hit: the next cell may hold an equally near one.
+            // The exit must lie clearly beyond the hit: the next cell may hold an equally near one.
             if walk.hit.t * inverse.pad < leave {
                 return walk.hit;
             }

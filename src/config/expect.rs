@@ -1,9 +1,9 @@
 //! Expected results: the numbers and claims of a thesis, next to the experiment that tests them.
 //!
-//! An experiment file of a thesis has more sections, which change nothing that is measured: `[thesis]` says what is
-//! reproduced, `[[substitute]]` which scene stands for which, `[[expect]]` what is claimed, `[quick]` what a short run
-//! changes, `[software]` what a whole run on a software adapter does. docs/repro.md describes them. Without `[thesis]`,
-//! `[[expect]]` says what the experiment itself promises: its targets, which are checks of every run.
+//! An experiment file of a thesis has more sections, which do not affect measurements: `[thesis]` describes the thesis,
+//! `[[substitute]]` the scenes used instead of its own, `[[expect]]` the claims, `[quick]` the changes of a short run,
+//! `[software]` those of a whole run on a software adapter. docs/repro.md describes them. Without `[thesis]`,
+//! `[[expect]]` holds the experiment's own targets, which are checks of every run.
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
@@ -18,7 +18,7 @@ const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "softwar
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thesis {
-    /// What is reproduced; empty where an experiment has targets of its own.
+    /// Title of the reproduced table; empty if an experiment has targets of its own.
     pub title: String,
     /// File stem of the digest, for instance `dufay-2017`.
     pub source: String,
@@ -55,12 +55,12 @@ pub struct Substitute {
     /// The built-in scene for short runs; `None` omits it from them.
     #[serde(default)]
     pub quick: Option<String>,
-    /// How the scenes differ.
+    /// The differences of the scenes.
     #[serde(default)]
     pub why: String,
 }
 
-/// How values are compared.
+/// The comparison of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Compare {
@@ -104,7 +104,7 @@ pub struct Expect {
     pub claims: Vec<String>,
     /// The figure, see `measure`'s table of figures.
     pub figure: String,
-    /// How values are compared.
+    /// The comparison.
     pub compare: Compare,
     /// The selection compared.
     #[serde(default)]

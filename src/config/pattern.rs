@@ -152,7 +152,7 @@ fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &
     })
 }
 
-/// True if `text` matches `glob`, in which `*` stands for any text, including none.
+/// True if `text` matches `glob`, in which `*` matches any text, including none.
 fn glob_matches(glob: &str, text: &str) -> bool {
     let Some((head, rest)) = glob.split_once('*') else {
         return glob == text;

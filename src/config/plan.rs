@@ -194,7 +194,7 @@ impl Plan {
         worlds
     }
 
-    /// What is measured without a scene, on the axes alone that matter to it: each cell once.
+    /// Returns the cells without a scene, on their relevant axes alone: each cell once.
     pub fn benches_on(&self, axes: &[Axis]) -> Vec<Cell> {
         let mut known = HashSet::new();
         let cells = self.benches.iter().map(|cell| cell.on(axes));

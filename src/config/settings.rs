@@ -131,7 +131,7 @@ pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, Confi
     read.collect()
 }
 
-/// Takes the checked settings of a section.
+/// Removes and returns the checked settings of a section.
 pub(super) fn take<S: Settings>(read: &mut Read) -> Option<S> {
     read.remove(S::SECTION)
         .map(|params| S::from_checked(&params))

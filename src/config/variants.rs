@@ -127,7 +127,7 @@ pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), C
 /// The values given for one parameter: one, or a list of distinct ones.
 fn listed(key: &str, item: &Item, range: &ParamRange) -> Result<Vec<ParamValue>, ConfigError> {
     let items = match &item.value {
-        // For a parameter that takes lists, a list is one value.
+        // For a parameter of lists, a list is one value.
         Value::List(items) if !matches!(range, ParamRange::List(..) | ParamRange::Ascending(_)) => {
             items
         }

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What went wrong or was approximated while a scene was loaded: counted, shown, kept in the record.
+/// Faults and approximations while a scene was loaded: counted, shown and recorded.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LoadReport {
     /// Triangles dropped because a vertex was NaN or infinite.
     pub dropped_non_finite: usize,
-    /// Triangles of zero area: kept, they can never be hit.
+    /// Triangles of zero area: they stay, but can never be hit.
     pub zero_area: usize,
     /// Everything else worth a line (missing texture, material approximated as diffuse, …).
     pub warnings: Vec<String>,

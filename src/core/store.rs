@@ -1,8 +1,7 @@
-//! What can be made again, kept on disk for later runs under a hash of all that it depends on, the program to the byte
-//! included.
+//! Cache on disk of reproducible data for later runs, under a hash of all that it depends on, including the program to the
+//! byte.
 //!
-//! A file that is damaged, or stands under another's name, counts for nothing. Of each kind the files not used for longest go
-//! first.
+//! A file that is damaged, or has another's name, is ignored. The least recently used files of each kind are removed first.
 
 use crate::atomic::write_atomic;
 use crate::text::cell_hash;
@@ -13,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::SystemTime;
 
-/// The files of a kind may take so many bytes together.
+/// Maximum bytes of all files of a kind together.
 const MOST_BYTES: u64 = 1 << 30;
 /// Bytes of the hash that ends a file.
 const HASH: usize = blake3::OUT_LEN;
@@ -27,8 +26,7 @@ pub fn caches() -> Option<PathBuf> {
     absolute("XDG_CACHE_HOME").or_else(|| Some(absolute("HOME")?.join(".cache")))
 }
 
-/// The user's folder for what can be made again: `$RAYSTONE_CACHE` (none if it is empty or `off`), else `raystone` among the
-/// [`caches`].
+/// The user's folder of the cache: `$RAYSTONE_CACHE` (none if it is empty or `off`), else `raystone` among the [`caches`].
 pub fn user_folder() -> Option<PathBuf> {
     match var_os("RAYSTONE_CACHE") {
         Some(folder) if folder.is_empty() || folder == "off" => None,
@@ -47,7 +45,7 @@ pub fn program() -> Option<&'static str> {
     PROGRAM.get_or_init(hash).as_deref()
 }
 
-/// Where something is, or will be, kept.
+/// An entry of the cache, existing or not.
 #[derive(Debug)]
 pub struct Kept {
     key: String,
@@ -55,8 +53,8 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// The place of what depends on these parts and the program, among others of its kind; absent where the program cannot be
-    /// read.
+    /// Returns the entry for data that depends on these parts and the program, among others of its kind; `None` if the
+    /// program cannot be read.
     pub fn new(folder: &Path, kind: &str, depends_on: &[(&str, &str)]) -> Option<Self> {
         let key = cell_hash(&[depends_on, &[("program", program()?)]].concat());
         let path = folder.join(kind).join(&key);
@@ -82,13 +80,13 @@ impl Kept {
             return None;
         }
         if let Ok(file) = File::options().append(true).open(&self.path) {
-            // Which were used last is only a guess at which will be wanted.
+            // Recent use only suggests further use.
             let _ = file.set_modified(SystemTime::now());
         }
         Some(bytes)
     }
 
-    /// Keeps bytes, and lets go of what was not used for longest.
+    /// Stores bytes, and removes the least recently used files.
     ///
     /// # Errors
     /// Those of the file system.
@@ -102,7 +100,7 @@ impl Kept {
     }
 }
 
-/// Removes the files not used for longest until the rest takes at most so many bytes.
+/// Removes the least recently used files until the rest has at most so many bytes.
 fn trim(folder: &Path, most: u64) -> io::Result<()> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder)? {

@@ -20,8 +20,8 @@ pub struct StructureStats {
     pub leaves: u64,
     /// Triangle references held by leaves or cells.
     pub references: u64,
-    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
-    /// index is counted there. Empty where not known.
+    /// `[k]` is the number of leaves or cells that hold k references; longer ones are counted at the last index.
+    /// Empty where not known.
     #[serde(default)]
     pub leaf_histogram: Vec<u64>,
     /// Deepest leaf (root = 0); absent for flat structures.
@@ -68,7 +68,7 @@ pub struct Counters {
     pub stack_high_water: u32,
 }
 
-/// In which space a structure meets triangles, and so which judge it has to equal to the bit.
+/// The space in which a structure intersects triangles, and so the reference tracer that it must equal to the bit.
 #[derive(
     Debug,
     Clone,

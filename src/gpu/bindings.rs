@@ -229,7 +229,7 @@ fn texels_of(gpu: &Gpu, name: &str, parts: &[&Array]) -> Result<wgpu::TextureVie
     Ok(made.clone())
 }
 
-/// The content of `buffers`, one behind the other, as a texture.
+/// Copies the content of `buffers`, one after the other, to a texture.
 fn copy_to_texture(
     gpu: &Gpu,
     name: &str,
@@ -270,8 +270,8 @@ fn copy_to_texture(
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// Where the texels from `first` on go that fill a rectangle, and its width and height: the rest of
-/// a row, whole rows, or a last row.
+/// Returns the position of a rectangle of texels from `first` on, and its width and height: the rest of a row, whole
+/// rows, or a last row.
 fn next_rectangle(first: u32, count: u32) -> ([u32; 2], [u32; 2]) {
     let at = [first % TEXELS_PER_ROW, first / TEXELS_PER_ROW];
     let size = if at[0] > 0 || count < TEXELS_PER_ROW {

@@ -6,7 +6,7 @@ use super::bindings::MAX_PARTS;
 use bytemuck::Pod;
 use std::time::Duration;
 
-/// Work that takes longer is given up: the driver hangs.
+/// Time limit of work: beyond it, the driver is assumed to hang.
 pub(super) const PATIENCE: Duration = Duration::from_secs(120);
 pub(super) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::INDIRECT)

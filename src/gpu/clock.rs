@@ -104,7 +104,7 @@ mod tests {
         let slept = watch.elapsed();
         assert!(slept.wall_ms >= 30.0);
         let watch = Stopwatch::start();
-        // Independent of how long a busy machine takes; other tests of this process only help.
+        // Independent of the load of the machine; other tests of this process only help.
         let is_idle = || watch.elapsed().cpu_ms.is_some_and(|ms| ms <= 20.0);
         while is_idle() && watch.start.elapsed().as_secs() < 600 {}
         let worked = watch.elapsed();

@@ -1,4 +1,4 @@
-//! Which way of reading arrays is faster on an adapter: storage buffers, or texels of textures.
+//! The faster load path of arrays on an adapter: storage buffers, or texels of textures.
 //!
 //! On Mesa's software driver a `vec4` of a storage buffer costs two to five times as much as a
 //! texel (docs/performance.md); hardware with caches for buffers may well lose by textures.
@@ -12,12 +12,12 @@ const ELEMENTS: u32 = 1 << 18;
 const COUNT: u32 = 1 << 14;
 /// Alternating rounds, of which the fastest counts.
 const ROUNDS: usize = 3;
-/// How much faster textures must be to be chosen: less may be chance, and they cost memory.
+/// Minimum speed-up of textures to be chosen: less may be chance, and they cost memory.
 const MARGIN: f64 = 1.1;
 
 impl Gpu {
-    /// True if kernels read nodes and triangles faster as texels than from storage buffers: on
-    /// software adapters, and on others if a short measurement, once per device, says so.
+    /// True if kernels read nodes and triangles faster as texels than from storage buffers: on software adapters, and
+    /// on others by a short measurement, once per device.
     ///
     /// # Errors
     /// The kernels do not run.

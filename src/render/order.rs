@@ -108,10 +108,9 @@ impl Order {
     }
 }
 
-/// The image of partial sums (radiance, and number of samples). A pixel without samples gets the
-/// mean of the first sampled corner of the squares of 2, 4, 8, 16 pixels around it (Dufay 2017,
-/// Alg. 2.1, whose comment says four iterations where his code takes five). `None` while a pixel
-/// finds none.
+/// The image of partial sums (radiance, and number of samples). A pixel without samples gets the mean of the first
+/// sampled corner of the squares of 2, 4, 8, 16 pixels around it (Dufay 2017, Alg. 2.1: four iterations by its
+/// comment, five in his code). `None` while a pixel finds none.
 ///
 /// # Panics
 /// The number of sums is not the number of pixels.

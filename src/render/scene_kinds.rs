@@ -17,7 +17,7 @@ pub trait SceneKind: PartialEq + Sized + 'static {
     fn table(others: &[(usize, &'static Self)]) -> (&'static str, &'static str, String);
 }
 
-/// The kinds, each with whether the scene uses it; the index is the number.
+/// The kinds, each with `true` if the scene uses it; the index is the number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneKinds<K: 'static>(Vec<(&'static K, bool)>);
 

@@ -122,7 +122,7 @@ impl Stage {
         })
     }
 
-    /// Whether each ray hits anything; also false for a ray that a kernel omitted, which a
+    /// Returns `true` for each ray that hits anything; also `false` for a ray that a kernel omitted, which a
     /// closest-hit query reveals.
     ///
     /// # Errors

@@ -11,13 +11,13 @@ use crate::metrics::{RELATIVE_EPSILON, Reference};
 use raystone_image::{Image, ImageError};
 use serde::{Deserialize, Serialize};
 
-/// What single pixels do to a mean relMSE, by the variance between the reference's parts.
+/// Influence of single pixels on a mean relMSE, by the variance between the reference's parts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Tail {
-    /// The greatest share that one pixel has in the error that is to be expected.
+    /// The greatest share of one pixel in the expected error.
     pub greatest_share: f64,
-    /// The greatest error that is to be expected of a pixel in which all replicates are darker than the reference, less what they
-    /// show of it, as part of the relMSE of the image.
+    /// The greatest expected error of a pixel in which all replicates are darker than the reference, less the error that they
+    /// show there, as a fraction of the relMSE of the image.
     pub missed: f64,
 }
 

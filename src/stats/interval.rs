@@ -1,4 +1,4 @@
-//! A figure with its interval, and the noise behind the interval.
+//! A figure with its interval, and the noise that determines the interval.
 
 use crate::hypothesis::{student_t_quantile, student_t_two_sided};
 use crate::statistics::{ROUNDING, variance};

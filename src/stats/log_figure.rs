@@ -147,10 +147,10 @@ impl LogFigure {
         }
     }
 
-    /// From the logarithm, and logarithms that leave out each part of each source of noise: its
-    /// own, such as replicates, and shared ones, such as reference halves, in equal order.
+    /// From the logarithm, and logarithms that leave out each part of each source of noise: its own, such as
+    /// replicates, and shared ones, such as reference halves, in equal order.
     ///
-    /// `None` if anything is not finite, except for figures that stay 0 whatever is left out.
+    /// `None` if anything is not finite, except for figures that are always 0.
     pub fn new(log: f64, own: &[Vec<f64>], shared: Vec<Vec<f64>>) -> Option<Self> {
         let all = || own.iter().chain(&shared).flatten().chain([&log]);
         if all().all(|x| *x == f64::NEG_INFINITY) {

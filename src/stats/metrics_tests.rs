@@ -220,7 +220,7 @@ fn metrics_have_the_values_of_independent_programs() {
             "{id}: {found} is not {value}"
         );
     }
-    // An outlier dominates the mean but not the trimmed mean; the tolerances can tell.
+    // An outlier dominates the mean but not the trimmed mean, beyond the tolerances.
     let mut calm = image.clone();
     calm.pixels[7 * 48 + 9] = reference.image().pixels[7 * 48 + 9];
     let calm = measure(&calm, &reference).unwrap();

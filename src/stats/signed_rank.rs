@@ -106,7 +106,7 @@ mod tests {
         let of = |n: usize| SignedRank::new(&vec![1.0; n]).unwrap();
         assert!((of(9).at_least(38) - 0.037).abs() < 5e-4);
         assert!((of(5).at_least(15) - 1.0 / 32.0).abs() < 1e-12);
-        // The normal approximation takes over without a step.
+        // The normal approximation continues without a step.
         let (exact, normal) = (of(60).at_least(1150), of(61).at_least(1150 + 30));
         assert!((exact / normal - 1.0).abs() < 0.1, "{exact} {normal}");
     }

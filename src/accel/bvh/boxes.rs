@@ -51,7 +51,7 @@ impl BoxNode {
     }
 }
 
-/// The axis along which two boxes are farthest apart, and whether the second is the lower one.
+/// Returns the axis along which two boxes are farthest apart, and `true` if the second is the lower one.
 fn split_axis(first: &Bounds, second: &Bounds) -> (u32, bool) {
     let (a, b) = (first.doubled_centre(), second.doubled_centre());
     let apart: [f32; 3] = std::array::from_fn(|axis| b[axis] - a[axis]);

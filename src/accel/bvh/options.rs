@@ -154,7 +154,7 @@ impl BvhParameters {
         }
     }
 
-    /// When the batch kernel refills its invocations: only for traversals with a resumable state.
+    /// Returns the refill rule of the batch kernel: only for traversals with a resumable state.
     pub(super) fn refill(&self) -> RefillParameters {
         match self.traversal {
             Traversal::Stack => self.refill.clone(),

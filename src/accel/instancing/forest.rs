@@ -31,7 +31,7 @@ pub(super) struct Forest {
     /// Object-space records, leaf by leaf, with object ids.
     pub triangles: Vec<TriangleRecord>,
     pub roots: Vec<Root>,
-    /// How rays intersect the triangles.
+    /// The tests of rays against triangles and boxes.
     pub intersection: Intersection,
     /// Sums over all objects.
     pub stats: StructureStats,

@@ -1,4 +1,4 @@
-//! World boxes of transformed boxes, grown so that no hit behind them is lost.
+//! World boxes of transformed boxes, grown so that they lose no hit.
 //!
 //! *Claim.* Let M be the map to object space with f32 entries, B a box there, W the image of B
 //! under the exact M⁻¹ grown by [`world_box`], and let a triangle with bounds in B accept the

@@ -51,7 +51,7 @@ struct State<'a> {
     tried: [u32; 3],
     /// Cached neighbour of each cell along each axis.
     neighbours: [Vec<AtomicU32>; 3],
-    /// The cell that each one wants to join in this pass, and whether another wants to join it.
+    /// The cell that each one would join in this pass, and `true` if another would join it.
     next: Vec<u32>,
     is_wanted: Vec<bool>,
 }
@@ -131,8 +131,8 @@ impl<'a> State<'a> {
         (same_section && self.pays(cell, next, axis)).then_some(other)
     }
 
-    /// The next cell at the same low corner otherwise. It has the number that the first phase's map
-    /// gives the voxel there, whatever it was merged with since.
+    /// The next cell at the same low corner otherwise. It has the number that the first phase's map gives the voxel
+    /// there, even if it was merged since.
     fn neighbour(&self, id: u32, axis: usize) -> u32 {
         let cell = &self.cells[id as usize];
         let mut voxel = cell.min.map(u32::from);

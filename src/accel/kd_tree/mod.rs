@@ -20,8 +20,8 @@ const KIND_MASK: u32 = 3;
 const LEAF: u32 = 3;
 /// The other bits: first of two children, or number of references.
 const LINK_SHIFT: u32 = 2;
-/// A cell that begins behind the hit by this factor ends the traversal: all others on the stack
-/// begin no more than `BOX_PAD` before it. More than its square.
+/// A cell that begins beyond the hit by this factor ends the traversal: all others on the stack begin no more than
+/// `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 
 parameters! {

@@ -20,8 +20,8 @@ const INNER_SHIFT: u32 = 8;
 const FILLED_MASK: u32 = 255;
 /// Marks the last reference of a leaf.
 const LAST: u32 = 0x8000_0000;
-/// A cell that begins behind the hit by this factor ends the traversal: all unvisited cells begin
-/// no more than `BOX_PAD` before it. More than its square.
+/// A cell that begins beyond the hit by this factor ends the traversal: all unvisited cells begin no more than
+/// `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 /// Maximum depth at which a float holds the integer cell positions exactly.
 const DEEPEST: u32 = 20;

@@ -212,7 +212,7 @@ impl Tracer {
         pipelines.values().map(|p| p.kernel.wgsl.clone()).collect()
     }
 
-    /// Milliseconds of the first use of each pass's kernel, once it ran; see [`Pipeline::cold_ms`].
+    /// Milliseconds of the first use of each pass's kernel, after it; see [`Pipeline::cold_ms`].
     pub fn cold_ms(&self) -> Vec<(String, Option<f64>)> {
         let pipelines = self.pipelines();
         let entries = pipelines.into_iter();

@@ -357,7 +357,7 @@ impl Spatial<'_> {
             counts[1 - side] -= 1.0;
         }
         let new = sides[0].len() + sides[1].len() - references.len();
-        // If one side has everything, the budget paid for what the other one lists.
+        // If one side has everything, the budget was spent on references of the other one.
         let progress = sides.iter().all(|side| !side.is_empty());
         (progress && new <= budget).then(|| sides.map(Side::of))
     }

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Entry {
     /// Name as typed.
     pub name: String,
-    /// One line: what it is and its source (paper).
+    /// One line: description and source (paper).
     pub description: String,
     /// Its parameters.
     pub schema: ParameterSchema,
@@ -55,8 +55,8 @@ pub struct Variant {
     pub name: String,
     /// Every parameter, defaults included.
     pub params: Params,
-    /// Short text that tells the variants of one experiment apart: the name, and in brackets the
-    /// parameters that differ from the default.
+    /// Short text that distinguishes the variants of one experiment: the name, and in brackets the parameters that
+    /// differ from the default.
     pub label: String,
 }
 

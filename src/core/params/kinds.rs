@@ -12,7 +12,7 @@ pub trait Named: 'static {
     fn built_in() -> Vec<&'static Self>;
     /// Name as typed.
     fn name(&self) -> &'static str;
-    /// One line: what it is and its source (paper).
+    /// Returns one line: description and source (paper).
     fn description(&self) -> &'static str;
     /// Its parameters.
     fn parameters(&self) -> ParameterSchema {

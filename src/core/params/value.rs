@@ -35,6 +35,6 @@ impl fmt::Display for ParamValue {
     }
 }
 
-/// Values of parameters by name, as files and records hold them; what is missing has its default.
+/// Values of parameters by name, as files and records hold them; missing ones have their defaults.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Params(pub BTreeMap<String, ParamValue>);

@@ -304,8 +304,8 @@ fn record(
                 .clear(queues.scratch("results", 16 * u64::from(total.max(1))));
         }
         queues.run(steps, "generate", queues.all())?;
-        // With regeneration no path waits while a slot is free, and none takes longer than its
-        // rays: all have ended by then.
+        // With regeneration no path waits while a slot is free, and none lives longer than its rays: all have ended
+        // by then.
         let is_refilled = wavefront.is_some_and(|w| w.regeneration);
         let bounces = if is_refilled {
             batches.max(1) * rays

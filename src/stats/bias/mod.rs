@@ -66,7 +66,7 @@ impl Default for BiasOptions {
     }
 }
 
-/// What the test says.
+/// The verdict of the test.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BiasVerdict {
@@ -192,7 +192,7 @@ pub fn check_bias(
     Ok(check)
 }
 
-/// Why this number of noisy replicates is inconclusive at this level; `None` if it suffices.
+/// Returns the reason why this number of noisy replicates is inconclusive at this level; `None` if it suffices.
 fn too_few(replicates: usize, alpha: f64) -> Option<String> {
     let needed = replicates_needed(alpha);
     ((replicates as u64) < u64::from(needed)).then(|| {

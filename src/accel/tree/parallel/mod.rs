@@ -27,7 +27,7 @@ pub const LEAF: u32 = 0xffff_ffff;
 /// Larger coordinates have infinite areas.
 const LARGEST_COORDINATE: f32 = 1e18;
 
-/// How the tree is built.
+/// The method of the build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// The radix tree over the codes.
