@@ -196,7 +196,10 @@ fn as_configured(
     cell: &Cell,
     traced: Traced,
 ) -> Result<Traced, String> {
-    let (workgroup, load) = (session.registries.workgroup(cell)?, session.registries.load(cell)?);
+    let (workgroup, load) = (
+        session.registries.workgroup(cell)?,
+        session.registries.load(cell)?,
+    );
     let traced = traced.in_workgroups(gpu, &workgroup);
     let traced = traced.and_then(|traced| traced.loading(gpu, &load));
     traced.map_err(|error| error.to_string())
