@@ -180,8 +180,7 @@ fn gate_with(
             super::trial::fault(session, world, gpu, cell).unwrap_or_else(|e| Some(e.to_string()));
         verdict.passed = verdict.elsewhere.is_none();
     }
-    let reference_fault = world.reference.of(traced.space).first_wrong.as_deref();
-    let fault = (!verdict.passed).then(|| fault_text(&verdict, reference_fault));
+    let fault = (!verdict.passed).then(|| fault_text(&verdict));
     candidate.record.body.gate = Some(verdict);
     Ok(match fault {
         Some(fault) => candidate.failed(fault),
