@@ -58,8 +58,8 @@ pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::BuildLog;
 pub use structure::{OverTree, Structure};
 pub use tracer::{
-    Answers, Ask, GroupShape, LiveRays, Load, LoadRegistry, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
-    Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
+    Answers, Ask, GroupShape, LiveRays, Load, LoadRegistry, Query, RayBatch, RefillParameters,
+    TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
 };
 pub use twin::CpuTwin;
 pub(crate) use two_level_grid::TwoLevelGrid;

@@ -141,6 +141,9 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
             rendering.non_finite_pixels
         );
     }
+    for remark in &rendering.uniform {
+        text += &format!("warning: {remark}\n");
+    }
     let work = match rendering.in_order {
         // Rays are not counted then.
         Some(in_order) => format!(

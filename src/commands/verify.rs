@@ -359,6 +359,7 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
     faults.extend(structural.map(|fault| format!("structure: {fault}")));
     faults.extend(kernel.map(|error| format!("kernel: {error}")));
     faults.extend(verdict.elsewhere.clone());
+    faults.extend(verdict.reference_fault());
     faults
 }
 

@@ -12,8 +12,11 @@ impl Plan {
     pub fn modelled(&self, experiment: &Experiment) -> Vec<Cell> {
         let is_first = |cell: &Cell, axis| cell.get(axis) == experiment.axes[axis].first();
         let cells = self.times.iter();
-        let cells =
-            cells.filter(|c| is_first(c, Axis::Organisation) && is_first(c, Axis::Workgroup) && is_first(c, Axis::Load));
+        let cells = cells.filter(|c| {
+            is_first(c, Axis::Organisation)
+                && is_first(c, Axis::Workgroup)
+                && is_first(c, Axis::Load)
+        });
         cells.cloned().collect()
     }
 }

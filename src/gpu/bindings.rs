@@ -297,7 +297,13 @@ mod tests {
     #[test]
     fn rectangles_of_texels_follow_one_another() {
         const ROW: u32 = TEXELS_PER_ROW;
-        for (first, count) in [(0, 1), (0, 3 * ROW), (5, ROW), (ROW - 1, 2 * ROW + 3), (7, 2)] {
+        for (first, count) in [
+            (0, 1),
+            (0, 3 * ROW),
+            (5, ROW),
+            (ROW - 1, 2 * ROW + 3),
+            (7, 2),
+        ] {
             let (mut done, mut places) = (0, Vec::new());
             while done < count {
                 let ([x, y], [width, height]) = next_rectangle(first + done, count - done);
@@ -306,7 +312,10 @@ mod tests {
                 }
                 done += width * height;
             }
-            assert!(places.into_iter().eq(first..first + count), "{first}, {count}");
+            assert!(
+                places.into_iter().eq(first..first + count),
+                "{first}, {count}"
+            );
         }
     }
 }

@@ -50,7 +50,10 @@ impl Slices {
 
     /// Milliseconds that a slice would take on an adapter of its own.
     fn work_ms(&self, elapsed: Elapsed) -> f64 {
-        let shared = elapsed.cpu_ms.zip(self.threads).map(|(ms, threads)| ms / threads);
+        let shared = elapsed
+            .cpu_ms
+            .zip(self.threads)
+            .map(|(ms, threads)| ms / threads);
         shared.map_or(elapsed.ms(), |ms| ms.min(elapsed.ms()))
     }
 

@@ -94,6 +94,9 @@ pub struct ReferenceCheck {
     /// Number of these that are hard rays, made to pass there.
     #[serde(default)]
     pub hard_ambiguous: usize,
+    /// The first ray that differs, with both answers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_wrong: Option<String>,
     /// Time of the check, if it was before this run: the same rays and answers, found in the cache.
     #[serde(default)]
     pub reused_unix_s: Option<u64>,
@@ -535,13 +538,13 @@ impl StructureRecord {
         match (&self.failure, &self.gate) {
             (Some(failure), _) => Some(failure.clone()),
             (None, None) => Some("not gated".into()),
-            (None, Some(gate)) => (!gate.passed).then(|| fault_text(gate, None)),
+            (None, Some(gate)) => (!gate.passed).then(|| fault_text(gate)),
         }
     }
 }
 
 /// Describes the faults that the gate found.
-pub fn fault_text(verdict: &GateVerdict, reference_fault: Option<&str>) -> String {
+pub fn fault_text(verdict: &GateVerdict) -> String {
     let mut parts = Vec::new();
     let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
     if wrong > 0 {
@@ -558,13 +561,22 @@ pub fn fault_text(verdict: &GateVerdict, reference_fault: Option<&str>) -> Strin
     parts.extend(verdict.kernel_errors.iter().cloned());
     parts.extend(verdict.structural.clone());
     parts.extend(verdict.elsewhere.clone());
-    if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
-        parts.push(format!(
-            "the reference tracer itself is wrong on {} rays against brute force and {} against f64; first: {}",
-            verdict.brute_force.wrong,
-            verdict.oracle.wrong,
-            reference_fault.unwrap_or_default()
-        ));
-    }
+    parts.extend(verdict.reference_fault());
     parts.join("; ")
+}
+
+impl GateVerdict {
+    /// What is wrong with the reference tracer itself, in words.
+    pub fn reference_fault(&self) -> Option<String> {
+        let [brute_force, oracle] = [&self.brute_force, &self.oracle];
+        let first = [brute_force, oracle].map(|check| check.first_wrong.as_deref());
+        let first = first.into_iter().flatten().next().unwrap_or_default();
+        (brute_force.wrong + oracle.wrong > 0).then(|| {
+            format!(
+                "the reference tracer itself is wrong on {} of {} rays against brute force and {} \
+                 of {} against f64, so that no structure can be compared with it; first: {first}",
+                brute_force.wrong, brute_force.rays, oracle.wrong, oracle.rays
+            )
+        })
+    }
 }

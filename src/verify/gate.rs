@@ -40,8 +40,6 @@ pub struct ReferenceTracer {
     pub brute_force: ReferenceCheck,
     /// The reference tracer against the f64 oracle.
     pub oracle: ReferenceCheck,
-    /// The first ray on which the reference tracer itself is wrong.
-    pub first_wrong: Option<String>,
     /// The reference for structures that trace instances; `None` if no ray is transformed.
     pub instances: Option<Box<ReferenceTracer>>,
 }
@@ -104,7 +102,6 @@ impl ReferenceTracer {
             sets,
             brute_force: ReferenceCheck::default(),
             oracle: ReferenceCheck::default(),
-            first_wrong: None,
             instances: None,
         }
     }
@@ -131,7 +128,6 @@ impl ReferenceTracer {
             sets: self.sets.iter().map(thin).collect(),
             brute_force: self.brute_force.clone(),
             oracle: self.oracle.clone(),
-            first_wrong: self.first_wrong.clone(),
             instances: self
                 .instances
                 .as_ref()
@@ -180,7 +176,7 @@ impl ReferenceTracer {
         for ((ray, judged), brute) in pairs.iter().zip(&truth) {
             if !judged.same_bits(brute) {
                 self.brute_force.wrong += 1;
-                self.first_wrong.get_or_insert_with(|| {
+                self.brute_force.first_wrong.get_or_insert_with(|| {
                     describe(ray, "reference", judged, "brute force", brute)
                 });
             }
@@ -220,12 +216,18 @@ impl ReferenceTracer {
                 }
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
-                    self.first_wrong.get_or_insert_with(|| {
+                    self.oracle.first_wrong.get_or_insert_with(|| {
                         format!("ray {ray} | reference {hit} | f64: {fault}")
                     });
                 }
             }
         }
+    }
+
+    /// The first ray on which the reference tracer itself is wrong.
+    pub fn first_wrong(&self) -> Option<&str> {
+        let checks = [&self.brute_force, &self.oracle];
+        (checks.into_iter()).find_map(|check| check.first_wrong.as_deref())
     }
 
     /// True if the reference tracer agrees with brute force and with the oracle.

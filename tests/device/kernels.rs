@@ -5,9 +5,9 @@ mod covering;
 mod families;
 mod translators;
 
+use crate::support::in_turn;
 use covering::{Choice, pairs, pairwise};
 use families::{Chosen, Family, batches, queued, renderers};
-use crate::support::in_turn;
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{Counters, Hit, Ray};
@@ -131,7 +131,12 @@ fn other_translators_take_every_kernel() {
     });
     let faults: Vec<String> = faults.collect();
     let first = &faults[..faults.len().min(3)];
-    assert!(faults.is_empty(), "{} of {}: {first:#?}", faults.len(), kernels.len());
+    assert!(
+        faults.is_empty(),
+        "{} of {}: {first:#?}",
+        faults.len(),
+        kernels.len()
+    );
     // What each of them must refuse.
     let broken = "@compute @workgroup_size(1) fn main() { let x: u32 = 1.0; }";
     assert!(tint.is_none_or(|tint| translators::tint_fault(tint, broken).is_some()));

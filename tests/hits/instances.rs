@@ -333,7 +333,7 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         .as_deref()
         .expect("a reference of instances");
     for reference in [&reference, over_instances] {
-        assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+        assert!(reference.is_sound(), "{:?}", reference.first_wrong());
         assert!(reference.brute_force.rays >= 2000 && reference.oracle.rays >= 64);
         let oracle = &reference.oracle;
         let [ambiguous, rays] = [

@@ -88,7 +88,7 @@ fn every_structure_passes_the_gate_on_real_models() {
             reference.is_sound(),
             "{}: {:?}",
             path.display(),
-            reference.first_wrong
+            reference.first_wrong()
         );
         let (mut asked, mut passed) = (0, 0);
         for kind in in_turn("structures on real models", structures()) {

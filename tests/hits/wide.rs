@@ -2,9 +2,7 @@
 
 use crate::support;
 use crate::support::tier::in_turn;
-use crate::support::{
-    Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace_by,
-};
+use crate::support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace_by};
 use raystone::accel::{AccelKind, AccelRegistry, Counters, Load, TriangleSoup, brute_force_hits};
 use raystone::config::Axis;
 

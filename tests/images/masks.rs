@@ -107,7 +107,7 @@ fn the_gate_passes_what_is_right() {
             "{oracle:?}"
         );
     }
-    let unsound = reference.first_wrong.as_deref();
+    let unsound = reference.first_wrong();
     assert_eq!(unsound, None);
 }
 
@@ -189,7 +189,7 @@ const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
 fn planted_faults_turn_the_gate_red() {
     let right = Stage::new(gpu(), few_plants());
     let reference = judge(&right);
-    assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+    assert!(reference.is_sound(), "{:?}", reference.first_wrong());
     for (what, module, from, to, name) in in_turn("faults of masks", FAULTS) {
         let gpu = open(kernels_with(module, &[(from, to)]));
         let stage = Stage::new(&gpu, few_plants());

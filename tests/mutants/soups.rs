@@ -53,7 +53,6 @@ pub fn lattice_reference(soup: &TriangleSoup, seed: u64) -> ReferenceTracer {
         }],
         brute_force: ReferenceCheck::default(),
         oracle: ReferenceCheck::default(),
-        first_wrong: None,
         instances: None,
     }
 }

@@ -159,7 +159,7 @@ fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
     if reference.is_sound() {
         return Ok(Case { stage, reference });
     }
-    let wrong = reference.first_wrong.unwrap_or_default();
+    let wrong = reference.first_wrong().unwrap_or_default();
     Err(CheckError::Other(format!(
         "the reference tracer is wrong: {wrong}"
     )))

@@ -5,18 +5,18 @@
 //! ([`TracePasses`]). To a [`Tracer`], an inline structure is a pipeline of one pass.
 
 mod batch;
+mod load;
 mod passes;
 mod refill;
 mod traced;
-mod load;
 mod workgroup;
 
 pub use batch::{Answers, RayBatch, count_work};
+pub use load::{Load, LoadRegistry};
 pub use passes::{LiveRays, TracePasses, TraceSteps};
 pub(crate) use refill::Refill;
 pub use refill::RefillParameters;
 pub use traced::{Traced, TriangleBuffers};
-pub use load::{Load, LoadRegistry};
 pub use workgroup::{GroupShape, Workgroup, WorkgroupRegistry};
 
 use raystone_core::text::cell_hash;

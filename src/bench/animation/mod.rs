@@ -144,7 +144,7 @@ impl Frame<'_> {
         if verdict.passed {
             Ok(reference.sets.iter().map(|set| set.rays.len()).sum())
         } else {
-            Err(fault_text(&verdict, reference.first_wrong.as_deref()))
+            Err(fault_text(&verdict))
         }
     }
 

@@ -42,6 +42,7 @@ mod structures;
 mod times;
 mod trial;
 mod twins;
+mod uniform;
 mod units;
 mod words;
 mod world;

@@ -4,6 +4,7 @@ use super::error::{Fault, RunError};
 use super::images::{Estimator, attributes};
 use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
+use super::uniform;
 use super::world::World;
 use raystone_config::{Axis, Cell, REFERENCE_PARTS};
 use raystone_core::params::{Entry, Variant};
@@ -341,6 +342,11 @@ fn finish_reference(
     let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
     let hash = reference_hash(session, world, &line, &sampler);
     if !session.ledger.is_done(&done) {
+        if line.body.exact.is_none() {
+            let triangles = || &world.soup;
+            let remark = uniform::remark(reference.image(), &world.scene, triangles, world.camera);
+            remark.map_or(Ok(()), |remark| session.warn(&done, remark))?;
+        }
         session
             .recorder
             .write(&line.hashed(&hash).with_body(Body::Reference))?;

@@ -5,7 +5,8 @@ use crate::compaction::benches;
 use crate::figure_registry::FigureRegistry;
 use crate::peers::PeerRegistry;
 use raystone_accel::{
-    AccelRegistry, BoxRegistry, Intersection, TriangleRegistry, Load, LoadRegistry, Workgroup, WorkgroupRegistry,
+    AccelRegistry, BoxRegistry, Intersection, Load, LoadRegistry, TriangleRegistry, Workgroup,
+    WorkgroupRegistry,
 };
 use raystone_config::{Axis, Catalogue, Cell};
 use raystone_core::params::Variant;

@@ -7,6 +7,7 @@ use super::kernels::Kernels;
 use super::options::RunOptions;
 use super::registries::Registries;
 use super::session::Session;
+use super::uniform;
 use super::world::{load_options, table_bytes};
 use indicatif::ProgressStyle;
 use raystone_accel::{AccelError, TriangleSoup};
@@ -46,6 +47,8 @@ pub struct Rendering {
     pub report: LoadReport,
     /// Number of NaN or infinite pixels: a renderer bug.
     pub non_finite_pixels: usize,
+    /// The likely reason, in words, if all pixels have the same value.
+    pub uniform: Option<String>,
     /// Times of rendering in an order of passes.
     pub in_order: Option<InOrder>,
 }
@@ -109,6 +112,7 @@ pub fn render(
         rays: 0,
         report: stage.scene.report.clone(),
         non_finite_pixels: 0,
+        uniform: None,
         in_order: None,
     };
     let mut show = |image: &Image, done: u32, file: &Path| {
@@ -145,6 +149,9 @@ pub fn render(
     };
     rendering.samples_s = compiled.elapsed().as_secs_f64();
     rendering.non_finite_pixels = image.non_finite_pixels();
+    // The stage's own triangles were given up for the memory of the rendering.
+    let soup = || TriangleSoup::new(&stage.scene).intersecting(stage.soup.intersection);
+    rendering.uniform = uniform::remark(&image, &stage.scene, soup, camera);
     rendering.total_s = start.elapsed().as_secs_f64();
     session.progress.bar.finish_and_clear();
     Ok(rendering)
@@ -170,7 +177,7 @@ fn staged(session: &Session, gpu: &Gpu, cell: &Cell) -> Result<(Stage, Traced, C
     let mut stage = Stage::new(gpu, scene_data, tests)?;
     session.say(format!("{scene}: building {accel}"));
     let traced = build(session, &stage, accel)?;
-    stage.soup = TriangleSoup::default();
+    stage.soup = TriangleSoup::default().intersecting(tests);
     Ok((stage, traced, camera))
 }
 

@@ -180,8 +180,7 @@ fn gate_with(
             super::trial::fault(session, world, gpu, cell).unwrap_or_else(|e| Some(e.to_string()));
         verdict.passed = verdict.elsewhere.is_none();
     }
-    let reference_fault = world.reference.of(traced.space).first_wrong.as_deref();
-    let fault = (!verdict.passed).then(|| fault_text(&verdict, reference_fault));
+    let fault = (!verdict.passed).then(|| fault_text(&verdict));
     candidate.record.body.gate = Some(verdict);
     Ok(match fault {
         Some(fault) => candidate.failed(fault),
@@ -196,7 +195,10 @@ fn as_configured(
     cell: &Cell,
     traced: Traced,
 ) -> Result<Traced, String> {
-    let (workgroup, load) = (session.registries.workgroup(cell)?, session.registries.load(cell)?);
+    let (workgroup, load) = (
+        session.registries.workgroup(cell)?,
+        session.registries.load(cell)?,
+    );
     let traced = traced.in_workgroups(gpu, &workgroup);
     let traced = traced.and_then(|traced| traced.loading(gpu, &load));
     traced.map_err(|error| error.to_string())

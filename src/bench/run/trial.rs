@@ -129,7 +129,6 @@ impl CheckedScene {
         let reference = thinned.as_ref().unwrap_or(&self.reference);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);
         let verdict = gate(gpu, triangles, &stage.soup, &traced, reference, probe, true)?;
-        let reference_fault = reference.of(traced.space).first_wrong.as_deref();
-        Ok((!verdict.passed).then(|| fault_text(&verdict, reference_fault)))
+        Ok((!verdict.passed).then(|| fault_text(&verdict)))
     }
 }

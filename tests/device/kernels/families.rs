@@ -358,7 +358,12 @@ pub fn renderers() -> Family {
     factors.extend(samplers);
     factors.extend([offsets(), workgroups(), Factor::entry(&entries)]);
     factors.extend(intersections());
-    factors.extend(flags(&["alpha_masks", "block_list", "scene_texels", "texels"]));
+    factors.extend(flags(&[
+        "alpha_masks",
+        "block_list",
+        "scene_texels",
+        "texels",
+    ]));
     let clash = |a: Level, b: Level| {
         let is_whole = b.factor == "integrator" && !staged.contains(&text_of(b.part));
         (a.part.entry == REGENERATION && is_whole)

@@ -21,11 +21,17 @@ pub fn tint() -> Option<&'static str> {
 
 /// What a browser's translator says against a kernel.
 pub fn tint_fault(tint: &str, wgsl: &str) -> Option<String> {
-    let mut file = tempfile::Builder::new().suffix(".wgsl").tempfile().expect("a file");
+    let mut file = tempfile::Builder::new()
+        .suffix(".wgsl")
+        .tempfile()
+        .expect("a file");
     file.write_all(wgsl.as_bytes()).expect("the text");
     let mut command = Command::new(tint);
     command.args(["--format", "none"]).arg(file.path());
-    let output = command.stdin(Stdio::null()).output().expect("it was there before");
+    let output = command
+        .stdin(Stdio::null())
+        .output()
+        .expect("it was there before");
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     (!output.status.success()).then_some(text)
 }
@@ -81,5 +87,7 @@ fn to_glsl(module: &naga::Module, info: &ModuleInfo) -> Result<(), String> {
     let bounds = naga::proc::BoundsCheckPolicies::default();
     let writer = glsl::Writer::new(&mut text, module, info, &options, &pipeline, bounds);
     let written = writer.and_then(|mut writer| writer.write());
-    written.map(|_| ()).map_err(|error| format!("GLSL: {error}"))
+    written
+        .map(|_| ())
+        .map_err(|error| format!("GLSL: {error}"))
 }

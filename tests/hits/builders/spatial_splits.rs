@@ -123,7 +123,7 @@ fn structures_over_clipped_triangles_pass_the_gate() {
     ] {
         let stage = Stage::builtin(gpu, scene, changes);
         let reference = stage.judge(Checks::Repeated, [2_048, 4_000_000, 256]);
-        assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+        assert!(reference.is_sound(), "{:?}", reference.first_wrong());
         let names = ["bvh", "roped-bvh", "bvh4", "cwbvh", "meta-bvh"];
         for name in support::in_turn("structures over clipped triangles", names) {
             let kind = support::structure(name);

@@ -12,7 +12,7 @@ const MOST_FOR_BRUTE_FORCE: usize = 6000;
 fn every_structure_passes(scene: &str, changes: &[(&str, ParamValue)]) {
     let stage = Stage::builtin(gpu(), scene, changes);
     let reference = judge(&stage, RAYS);
-    assert!(reference.is_sound(), "{:?}", reference.first_wrong);
+    assert!(reference.is_sound(), "{:?}", reference.first_wrong());
     assert!(reference.brute_force.rays >= 2000 && reference.oracle.rays >= 256);
     // In any turn, each structure is checked in one scene.
     let kinds = match scene {
