@@ -137,7 +137,7 @@ fn other_translators_take_every_kernel() {
         faults.len(),
         kernels.len()
     );
-    // What each of them must refuse.
+    // Faults that each of them must refuse.
     let broken = "@compute @workgroup_size(1) fn main() { let x: u32 = 1.0; }";
     assert!(tint.is_none_or(|tint| translators::tint_fault(tint, broken).is_some()));
 }

@@ -47,7 +47,7 @@ fn in_order(
     Ok((renderer.image(SPP)?, first, spent.passes))
 }
 
-/// The image of the renderer that takes whole samples.
+/// The image of the renderer with whole samples.
 fn whole() -> Image {
     let gpu = support::gpu();
     let stage = Stage::builtin(gpu, "cornell-box", &[]);

@@ -248,7 +248,7 @@ fn of_rays_that_the_device_counts_the_live_ones_alone_are_answered_by_structures
         assert!(only_live_rays_are_answered(&gpu, kind), "{}", kind.name());
     }
     for (from, to) in [
-        // All that fit, one too few, the number of others, behind the end of the range.
+        // All that fit, one too few, the number of others, beyond the end of the range.
         ("min(batch.count, live[batch.word])", "batch.count"),
         (
             "min(batch.count, live[batch.word])",

@@ -211,7 +211,7 @@ fn a_workgroup_beyond_the_adapter_is_refused_with_both_numbers() {
 
 #[test]
 fn no_dispatch_takes_long_however_slow_what_it_does() {
-    // Brute force over so many triangles takes as long per sample as a tree for hundreds.
+    // Brute force over so many triangles needs as long per sample as a tree for hundreds.
     let stage = Stage::builtin(
         gpu(),
         "displaced-sphere",

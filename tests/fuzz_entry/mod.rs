@@ -1,7 +1,7 @@
-//! The readers of foreign bytes, one function each: what the fuzz targets in `fuzz/` and
-//! `tests/mutated_files.rs` call, so that neither can rot alone.
+//! The readers of untrusted bytes, one function each: called by the fuzz targets in `fuzz/` and by
+//! `tests/mutated_files`, so that neither can rot alone.
 //!
-//! Each takes any bytes and returns what became of them.
+//! Each accepts any bytes and returns the outcome.
 #![allow(dead_code)] // Every fuzz target calls one of them.
 
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
@@ -17,16 +17,16 @@ use raystone::text::plain_text;
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// What a reader made of some bytes.
+/// The result of a reader.
 pub enum Outcome {
-    /// Accepted; to call it is to look at the result, which panics if that is unsound.
+    /// Accepted; a call examines the result, and panics if that is unsound.
     Accepted(Box<dyn FnOnce()>),
     /// Refused, with the message that a user gets; it calls the file [`FILE`] with an extension.
     Refused(String),
 }
 
 impl Outcome {
-    /// Looks at what was accepted.
+    /// Examines an accepted result.
     ///
     /// # Panics
     /// If it is unsound.
@@ -37,7 +37,7 @@ impl Outcome {
     }
 }
 
-/// What messages call the file, records apart, whose name is fixed.
+/// The file's name in messages, except for records, whose name is fixed.
 pub const FILE: &str = "foreign";
 
 type Error = Box<dyn std::error::Error>;
@@ -83,7 +83,7 @@ pub fn experiment(bytes: &[u8]) -> Outcome {
     })
 }
 
-/// An OBJ file, and behind [`OBJ_SEPARATOR`] the library beside it.
+/// An OBJ file, and the library beside it after [`OBJ_SEPARATOR`].
 pub fn obj(bytes: &[u8]) -> Outcome {
     let mut parts = bytes.splitn(2, |byte| *byte == OBJ_SEPARATOR);
     let text = parts.next().unwrap_or_default();

@@ -386,7 +386,7 @@ fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
         let of_all = together(&found.expect("tallies of groups"));
         of_all.into_values().next().unwrap_or_default()
     };
-    // Every ray once, whatever the groups; the last of three warps is not full.
+    // Every ray once for any groups; the last of three warps is not full.
     let all = tally(&rays[..80], 9, 1);
     assert_eq!((all.rays, all.lanes % 32), (80, 0));
     assert_eq!(tally(&rays[..80], 1, 3).active, all.active);

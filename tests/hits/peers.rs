@@ -198,7 +198,7 @@ fn a_distance_that_is_more_exact_than_the_judges_is_right() {
     }
 }
 
-/// For segments: a hit behind the end or before the beginning does not count.
+/// For segments: a hit beyond the end or before the beginning does not count.
 #[test]
 fn ends_of_rays_are_kept() {
     let scene = builtin("displaced-sphere", &[]);

@@ -215,7 +215,7 @@ fn an_unknown_word_is_found_on_every_line_that_assigns() {
             }
             let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
             lines[index] = line.replacen(" = ", " = unknown_word + ", 1);
-            // A line behind a feature that excludes one of these is not in the kernel.
+            // A line under a feature that excludes one of these is not in the kernel.
             let Err(told) = message(file, &lines.join("\n"), structure) else {
                 left_out += 1;
                 continue;

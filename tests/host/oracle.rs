@@ -356,7 +356,7 @@ fn random_answers_with_a_planted_fault_are_wrong() {
     assert!(planted > 100, "{planted}");
 }
 
-/// Exact arithmetic for every triangle takes hundreds of times as long as an f32 test.
+/// Exact arithmetic for every triangle needs hundreds of times as long as an f32 test.
 const MOST: f64 = 2.0;
 
 #[test]

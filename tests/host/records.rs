@@ -1,4 +1,4 @@
-//! Records of the previous version are read, whatever their content.
+//! Records of the previous version are read, with any content.
 
 use raystone::config::Cell;
 use raystone::measure::bias::BiasVerdict;

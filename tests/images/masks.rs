@@ -23,7 +23,7 @@ fn wrong(verdict: &GateVerdict) -> usize {
     verdict.classes.iter().map(|class| class.wrong).sum()
 }
 
-/// Rays down from above, so that masks decide what they hit.
+/// Rays down from above, whose hits depend on masks.
 fn rays_down(count: usize) -> Vec<Ray> {
     let mut rng = Pcg::new(3);
     let ray = |_| Ray {

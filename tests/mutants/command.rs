@@ -1,4 +1,4 @@
-//! `raystone stress --mutants` hands over to cargo, and says what to do where it cannot.
+//! `raystone stress --mutants` hands over to cargo, and advises where it cannot.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,5 +1,4 @@
-//! The checks of the project see what is wrong: faults that are planted on purpose must turn them red,
-//! and nothing else may.
+//! The project's checks detect faults: those planted on purpose must turn them red, and nothing else may.
 //!
 //! `raystone stress --mutants` runs the ignored test, which plants all of them.
 
@@ -51,7 +50,7 @@ fn run(names: &[&str]) -> (Report, Vec<String>) {
 fn every_fault_of_the_table_still_applies() {
     plan::check_table().unwrap_or_else(|e| panic!("{e}"));
     let all = mutants();
-    // One that is no kernel any more is told, too.
+    // One that is no longer a valid kernel is reported, too.
     let faulty = Mutant {
         plant: Plant::Kernel {
             file: "integrator/path",
@@ -98,7 +97,7 @@ fn row(mutant: &Mutant) -> String {
     )
 }
 
-/// What the page has too much or too little beside the table here: rows, and the number of faults.
+/// Lists the differences of the page from the table here: rows, and the number of faults.
 fn beside_the_table(page: &str) -> Vec<String> {
     let rows: BTreeSet<String> = mutants().iter().map(row).collect();
     let below = page
@@ -180,7 +179,7 @@ fn faults_are_seen_by_the_checks_that_should_see_them_and_the_sound_ones_are_gre
     }
 }
 
-/// Reads what the command hands over: where kernels, records and table go, and which adapter.
+/// Reads the arguments of the command: the folder of kernels, records and table, and the adapter.
 #[test]
 #[ignore = "some minutes: all faults; `raystone stress --mutants` runs this"]
 fn every_fault_of_the_table_is_seen_or_explained() {

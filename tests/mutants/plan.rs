@@ -1,13 +1,13 @@
-//! The gate tests itself: named faults are planted one at a time in kernels, in what builders hand
-//! out, and in the tables of samplers, and the project's own checks must turn red for each of them
-//! (mutation testing: R. DeMillo, R. Lipton, F. Sayward, "Hints on test data selection", 1978).
+//! The gate tests itself: named faults are planted one at a time in kernels, in the output of builders, and in the
+//! tables of samplers, and the project's own checks must turn red for each of them (mutation testing: R. DeMillo, R.
+//! Lipton, F. Sayward, "Hints on test data selection", 1978).
 //!
 //! A check that no fault can turn red proves nothing, and neither does one that is red without a
 //! fault: the same run therefore puts every sound subject through every check, and a mutant counts as
 //! killed only if its sound subject is green.
 //!
-//! Kernels are changed through an override folder, as a user would with `--kernels`: the folder of
-//! each mutant stays behind, so that a survivor can be looked at with every other command.
+//! Kernels are changed through an override folder, as a user would with `--kernels`: the folder of each mutant
+//! remains, so that a survivor can be examined with every other command.
 
 use crate::checks::{Bench, Check};
 use crate::plant::Plant;
@@ -30,21 +30,21 @@ pub const LEAST_KILLED: f64 = 0.95;
 pub struct Mutant {
     /// Name as a user types it.
     pub name: &'static str,
-    /// One line: what goes wrong.
+    /// One line: the fault.
     pub what: &'static str,
-    /// What it is planted in.
+    /// The place of the fault.
     pub plant: Plant,
-    /// What is put through the checks.
+    /// The subject of the checks.
     pub subject: Subject,
     /// The check that should turn red.
     pub expected: Check,
-    /// Why no check can see it, if none can.
+    /// The reason why no check can see it, if none can.
     pub equivalent: Option<&'static str>,
-    /// Whether a kernel may not come to its end with it: whoever waits for it in vain has seen it then.
+    /// True if it may keep a kernel from ending: a check that waits in vain has then seen it.
     pub hangs: bool,
 }
 
-/// Why a mutation run ends without a verdict.
+/// A reason why a mutation run ends without a verdict.
 #[derive(Debug, Error)]
 pub enum MutantError {
     /// The fault does not apply any more.
@@ -52,9 +52,9 @@ pub enum MutantError {
         "stale mutant `{name}`: {problem}; adapt its row in tests/mutants/table to what stands there now"
     )]
     Stale {
-        /// Which one.
+        /// Name of the mutant.
         name: String,
-        /// What was looked for and what was found.
+        /// The text expected and the text found.
         problem: String,
     },
     /// No mutant of this name.
@@ -63,22 +63,22 @@ pub enum MutantError {
     /// The mutated kernel cannot be run at all, or the device is gone: nothing is proven.
     #[error("mutant `{name}`: {source}")]
     Gpu {
-        /// Which one.
+        /// Name of the mutant.
         name: String,
-        /// What happened.
+        /// The error.
         source: GpuError,
     },
     /// Checks could not be carried out, with the reason.
     #[error("mutant `{name}`: {problem}")]
     Failed {
-        /// Which one.
+        /// Name of the mutant.
         name: String,
-        /// What happened.
+        /// The reason.
         problem: String,
     },
 }
 
-/// Why a check was not carried out.
+/// A reason why a check was not carried out.
 #[derive(Debug, Error)]
 pub enum CheckError {
     #[error(transparent)]
@@ -105,23 +105,23 @@ impl CheckError {
     }
 }
 
-/// What to run.
+/// Options of a mutation run.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Which adapter.
+    /// The adapter.
     pub adapter: AdapterChoice,
-    /// Where the changed kernels are written, one folder for each mutant.
+    /// Folder of the changed kernels, with one folder for each mutant.
     pub folder: PathBuf,
-    /// Names of mutants; none stands for all.
+    /// Names of mutants; all if empty.
     pub names: Vec<String>,
 }
 
-/// Plants the faults one after the other (in parallel, a device each) and tells which checks turn
-/// red. `progress` hears of each mutant as soon as it is decided.
+/// Plants the faults one after the other (in parallel, a device each) and returns the checks that turn red.
+/// `progress` is called for each mutant as soon as it is decided.
 ///
 /// # Errors
-/// An unknown name, a fault that no longer applies (whatever is selected: the whole table is
-/// checked), no adapter, or a check that cannot be carried out.
+/// An unknown name, a fault that no longer applies (the whole table is checked, whatever is selected), no adapter, or
+/// a check that cannot be carried out.
 pub fn run(options: &Options, progress: &(dyn Fn(&Outcome) + Sync)) -> Result<Report, MutantError> {
     check_table()?;
     run_selected(options, select(&options.names)?, progress)
@@ -247,7 +247,7 @@ fn subjects_of(mutants: &[Mutant]) -> Vec<Subject> {
     subjects
 }
 
-/// A device with these kernels, and whether it computes like the host.
+/// Opens a device with these kernels; returns it with `true` if it computes like the host.
 pub fn open(options: &Options, kernels: KernelLibrary) -> Result<(Gpu, bool), GpuError> {
     let gpu = raystone::gpu::open(&options.adapter, kernels)?;
     let exact = probe_arithmetic(&gpu)?.is_exact();
@@ -277,7 +277,7 @@ fn control(
     Ok(outcome)
 }
 
-/// What a check came to, if that decides.
+/// Returns the verdict of a check, if it is decisive.
 ///
 /// # Errors
 /// It could not be carried out.

@@ -1,4 +1,4 @@
-//! Where faults are planted: texts of kernels, what builders hand out, tables of samplers.
+//! Places of faults: texts of kernels, the output of builders, tables of samplers.
 
 use crate::CheckError;
 use raystone::accel::StructureStats;
@@ -7,7 +7,7 @@ use raystone::gpu::KernelLibrary;
 use raystone::sampling::{Sampler, SamplerTable};
 use std::path::Path;
 
-/// Where a fault is planted.
+/// The place of a fault.
 #[derive(Debug, Clone, Copy)]
 pub enum Plant {
     /// Nowhere: the control.
@@ -16,31 +16,31 @@ pub enum Plant {
     Kernel {
         /// Module, without `.wesl`.
         file: &'static str,
-        /// What stands there.
+        /// The original text.
         from: &'static str,
-        /// What takes its place.
+        /// Its replacement.
         to: &'static str,
-        /// How often it stands there.
+        /// Its number of occurrences.
         times: usize,
     },
-    /// What a builder hands to the GPU.
+    /// The output of a builder for the GPU.
     Built {
-        /// What is changed, for people.
+        /// Description of the changed part.
         part: &'static str,
-        /// Changes it, and tells how many places were changed.
+        /// Changes it, and returns the number of places changed.
         change: fn(&mut GpuBuffers) -> usize,
     },
     /// The table of a sampler, which kernel and twin both read.
     Table {
-        /// What is changed, for people.
+        /// Description of the changed part.
         part: &'static str,
-        /// Changes the words (header included), and tells how many were changed.
+        /// Changes the words (header included), and returns the number of words changed.
         change: fn(&mut [u32]) -> usize,
     },
 }
 
 impl Plant {
-    /// Where it is, in few words.
+    /// Describes the place in few words.
     pub fn place(&self) -> String {
         match self {
             Self::Nothing => "nowhere".to_owned(),
@@ -50,10 +50,10 @@ impl Plant {
         }
     }
 
-    /// Module and text of the changed kernel, if a kernel is changed.
+    /// Returns module and text of the changed kernel, if a kernel is changed.
     ///
     /// # Errors
-    /// The text to be replaced does not stand there as often as it should.
+    /// The text to be replaced does not occur as often as it should.
     pub fn changed_text(
         &self,
         library: &KernelLibrary,

@@ -1,4 +1,4 @@
-//! What a mutation run found.
+//! The findings of a mutation run.
 
 use crate::plan::LEAST_KILLED;
 use crate::world::World;
@@ -7,28 +7,28 @@ use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What became of a mutant.
+/// The fate of a mutant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// A check turned red.
     Killed {
-        /// Which check.
+        /// The check.
         by: Check,
-        /// What it said.
+        /// Its evidence.
         evidence: String,
     },
     /// The device did not finish, or was lost: that is no answer of the check.
     TimedOut {
-        /// Which check waited.
+        /// The check that waited.
         by: Check,
-        /// What the device said.
+        /// The device's error.
         evidence: String,
     },
     /// No check saw it.
     Survived,
     /// A check is red without any fault: its red means nothing.
     Distrusted {
-        /// Which check.
+        /// The check.
         by: Check,
     },
 }
@@ -38,7 +38,7 @@ pub enum Verdict {
 pub struct Outcome {
     /// The mutant.
     pub mutant: Mutant,
-    /// What became of it.
+    /// Its fate.
     pub verdict: Verdict,
     /// Milliseconds until then by the wall clock, with device and compilation.
     pub ms: f64,
@@ -97,11 +97,11 @@ pub struct MutantRecord {
     pub adapter: String,
     /// Name of the mutant.
     pub name: String,
-    /// What goes wrong.
+    /// The fault.
     pub what: String,
-    /// Where the fault is planted.
+    /// The place of the fault.
     pub place: String,
-    /// What was put through the checks.
+    /// The subject of the checks.
     pub subject: String,
     /// `killed`, `timed-out`, `survived`, or `distrusted`.
     pub verdict: String,
@@ -109,7 +109,7 @@ pub struct MutantRecord {
     pub expected: Check,
     /// The check that did.
     pub killed_by: Option<Check>,
-    /// What the check said; for a survivor why none can see it.
+    /// The evidence of the check; for a survivor the reason why none can see it.
     pub evidence: Option<String>,
     /// Milliseconds until then.
     pub ms: f64,
@@ -118,11 +118,11 @@ pub struct MutantRecord {
 /// A sound subject under every check.
 #[derive(Debug, Clone)]
 pub struct ControlOutcome {
-    /// What was put through the checks.
+    /// The subject of the checks.
     pub subject: Subject,
     /// Checks that were green.
     pub green: Vec<Check>,
-    /// Checks that were not, with what they said.
+    /// Checks that were not, with their evidence.
     pub red: Vec<(Check, String)>,
     /// Milliseconds by the wall clock.
     pub ms: f64,
@@ -162,7 +162,7 @@ impl Report {
         }
     }
 
-    /// Takes back every kill by a check that is red without a fault.
+    /// Withdraws every kill by a check that is red without a fault.
     pub fn distrust_red_controls(&mut self) {
         for outcome in &mut self.mutants {
             let Some(by) = outcome.killed_by() else {
@@ -176,7 +176,7 @@ impl Report {
         }
     }
 
-    /// How many mutants were killed.
+    /// Returns the number of mutants killed.
     pub fn killed(&self) -> usize {
         let killed = self.mutants.iter().filter(|m| m.killed_by().is_some());
         killed.count()
@@ -188,7 +188,7 @@ impl Report {
         self.mutants.iter().filter(survived)
     }
 
-    /// Whether every control is green, at least [`LEAST_KILLED`] of the mutants were killed, and every
+    /// Returns `true` if every control is green, at least [`LEAST_KILLED`] of the mutants were killed, and every
     /// survivor is explained.
     pub fn is_passed(&self) -> bool {
         let green = self.controls.iter().all(|c| c.red.is_empty());
@@ -199,7 +199,7 @@ impl Report {
         !self.mutants.is_empty() && green && enough && explained
     }
 
-    /// Name, place, what killed it, milliseconds; then survivors, red controls and the verdict.
+    /// Returns name, place, killing check and milliseconds; then survivors, red controls and the verdict.
     pub fn table(&self) -> String {
         let mut out = String::new();
         let width = |get: fn(&Outcome) -> String| {
@@ -257,7 +257,7 @@ impl Report {
         let _ = writeln!(out, "{}", self.verdict());
     }
 
-    /// How many were killed, and whether that is enough.
+    /// Returns the number of kills, and the verdict.
     pub fn verdict(&self) -> String {
         let (killed, all) = (self.killed(), self.mutants.len());
         let verdict = if self.is_passed() { "passed" } else { "failed" };

@@ -1,4 +1,4 @@
-//! What is put through the checks.
+//! The subjects of the checks.
 
 use crate::{Check, CheckError, Plant};
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
@@ -8,7 +8,7 @@ use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 /// Parameters that are not at their defaults, as a user would write them.
 pub type Changes = &'static [(&'static str, &'static str)];
 
-/// What is put through the checks.
+/// The subject of the checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
     /// An acceleration structure.
@@ -34,7 +34,7 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// What it is, in few words.
+    /// Describes it in few words.
     pub fn label(&self) -> String {
         let with = |name: &str, changes: Changes| {
             let texts = changes.iter().map(|(key, value)| format!(" {key}={value}"));

@@ -1,4 +1,4 @@
-//! What all mutants are put through, made once: scenes with rays and answers, and reference images.
+//! Inputs of all mutants, made once: scenes with rays and answers, and reference images.
 
 use crate::plan::open;
 use crate::soups::{lattice_reference, lattice_scene};
@@ -75,9 +75,9 @@ impl Stage {
 
 /// Everything that is made once.
 pub struct World {
-    /// Integer-grid soups, judged by brute force.
+    /// Integer-grid soups, checked against brute force.
     pub soups: Vec<Case>,
-    /// Built-in scenes, judged by the gate's judge.
+    /// Built-in scenes, checked against the gate's reference tracer.
     pub scenes: Vec<Case>,
     /// Images of the Cornell box by plain path tracing; empty if nothing asks for them.
     pub reference: Vec<Image>,
@@ -86,7 +86,7 @@ pub struct World {
 }
 
 impl World {
-    /// Makes what the checks of these mutants need.
+    /// Makes the inputs that the checks of these mutants need.
     pub fn new(options: &Options, mutants: &[Mutant]) -> Result<Self, CheckError> {
         let has = |wanted: fn(&Subject) -> bool| mutants.iter().any(|m| wanted(&m.subject));
         let (gpu, exact) = open(options, KernelLibrary::default())?;

@@ -1,4 +1,4 @@
-//! Large files whose every byte asks for as much memory as the format allows.
+//! Large files in which every byte needs as much memory as the format allows.
 
 /// Bytes of a file, about.
 const SIZE: usize = 200_000;

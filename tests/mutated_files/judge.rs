@@ -1,4 +1,4 @@
-//! Watches one reading after another: panics, time, memory, and what error messages say.
+//! Watches one read after another: panics, time, memory, and error messages.
 
 use super::fuzz_entry::{FILE, Outcome, Target};
 use raystone::measure::memory::peak_bytes;
@@ -27,7 +27,7 @@ pub struct ReferenceTracer {
     _alone: MutexGuard<'static, ()>,
 }
 
-/// What is being read, and the CPU time when it began.
+/// The name of the file being read, and the CPU time of its start.
 static CURRENT: Mutex<Option<(String, Duration)>> = Mutex::new(None);
 
 /// The last panic while a file was read.
@@ -53,10 +53,10 @@ impl ReferenceTracer {
         }
     }
 
-    /// Reads `bytes`, which messages call `case`, and looks at the result: whether it was accepted.
+    /// Reads `bytes`, called `case` in messages, and examines the result: `true` if it was accepted.
     ///
     /// # Errors
-    /// What is wrong with the reader.
+    /// The fault of the reader.
     pub fn read(&self, case: &str, bytes: &[u8], read: Target) -> Result<bool, String> {
         *lock(&CURRENT) = Some((case.to_owned(), cpu_time()));
         let result = self.check(bytes, read);
@@ -110,7 +110,7 @@ impl ReferenceTracer {
     }
 }
 
-/// Whether a message names the file and a place in it, or says that it speaks of the whole.
+/// Returns `true` if a message names the file and a place in it, or is about the whole file.
 pub fn says_where(message: &str) -> bool {
     const PLACES: [&str; 14] = [
         "line ",
@@ -159,7 +159,7 @@ fn watch_panics() {
     }));
 }
 
-/// Ends the process when a file takes too long: a thread that never returns cannot be stopped.
+/// Ends the process if a file takes too long: a thread that never returns cannot be stopped.
 fn watch_time() {
     loop {
         std::thread::sleep(Duration::from_millis(250));
@@ -172,12 +172,12 @@ fn watch_time() {
     }
 }
 
-/// CPU time of the process, so that a busy machine changes nothing; wall time where it is not told.
+/// CPU time of the process, which other processes hardly affect; wall time where the system does not report it.
 fn cpu_time() -> Duration {
     static START: Mutex<Option<Instant>> = Mutex::new(None);
     let ticks = || {
         let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-        // Behind the name in brackets; user and system time are the 12th and 13th, in 1/100 s.
+        // After the name in brackets; user and system time are the 12th and 13th, in 1/100 s.
         let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
         let time = |k: usize| fields.get(k)?.parse::<u64>().ok();
         Some(Duration::from_millis(10 * (time(11)? + time(12)?)))

@@ -172,7 +172,7 @@ fn dense_files_stay_within_the_bound_of_memory() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Keeps a mutant for whoever looks into the failure.
+/// Stores a mutant for an examination of the failure.
 fn kept(target: &str, seed: u64, mutant: &[u8]) -> String {
     let path = std::env::temp_dir().join(format!("mutant-{target}-{seed}"));
     match std::fs::write(&path, mutant) {
@@ -287,7 +287,7 @@ fn readers_that_misbehave_are_caught() {
         ),
         (
             |bytes| {
-                // Kept in the result.
+                // Held by the result.
                 let kept = vec![1_u8; 80 * bytes.len()];
                 Outcome::Accepted(Box::new(move || drop(kept)))
             },

@@ -1,4 +1,4 @@
-//! How files are broken.
+//! Ways to break files.
 #![allow(clippy::ptr_arg)] // All mutations have one type; most of them change the length.
 
 /// A small deterministic generator (PCG-RXS-M-XS with 64 bits of state; O'Neill 2014).
@@ -155,7 +155,7 @@ fn swap_lines(bytes: &mut Vec<u8>, _: &[u8], random: &mut Pcg) {
     *bytes = lines.concat();
 }
 
-/// The range of the digits nearest behind a random place.
+/// Returns the range of the first digits after a random place.
 fn number(bytes: &[u8], random: &mut Pcg) -> Option<std::ops::Range<usize>> {
     let from = random.below(bytes.len());
     let first = from + bytes[from..].iter().position(u8::is_ascii_digit)?;

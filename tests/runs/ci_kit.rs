@@ -1,5 +1,5 @@
-//! What continuous integration and clusters run: `scripts/ci-compare` with programs that only pretend, the files that GitHub reads, and
-//! a sweep on a Slurm of two nodes.
+//! Continuous integration and clusters: `scripts/ci-compare` with fake programs, the files that GitHub reads, and a sweep on a Slurm of
+//! two nodes.
 #![cfg(unix)]
 
 use crate::support::needs;
@@ -19,7 +19,7 @@ struct Kit {
 }
 
 impl Kit {
-    /// A program whose run and comparison end with these codes, and a `gh` that notes what it is asked for.
+    /// A program whose run and comparison end with these codes, and a `gh` that records its requests.
     fn new(run: i32, compare: i32, earlier_comment: &str) -> Self {
         let kit = Self {
             folder: tempfile::tempdir().expect("a folder"),
@@ -74,7 +74,7 @@ impl Kit {
 
 #[test]
 fn exit_codes_say_what_fails() {
-    // Run, comparison, and what the job ends with.
+    // Run, comparison, and the exit code of the job.
     for (run, compare, end) in [
         (0, 0, 0),
         (0, 1, 1),
@@ -99,7 +99,7 @@ fn exit_codes_say_what_fails() {
         assert_eq!(kit.read("asked"), "");
         let told = run < 2 && [0, 1, 4].contains(&compare);
         assert_eq!(kit.read("summary") == "verdict\n", told, "{run} {compare}");
-        // What could not be done is told, too, with the words of the program as they are.
+        // A failure is reported, too, with the words of the program as they are.
         let failed = format!("(exit code {end})\n\n    error: <b>no</b> @someone\n");
         assert_eq!(
             kit.read("summary").contains(&failed),

@@ -1,4 +1,4 @@
-//! The examples are as short as the documentation says, and run.
+//! The examples are as short as the documentation promises, and run.
 
 use std::path::{Path, PathBuf};
 

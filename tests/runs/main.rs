@@ -1,4 +1,4 @@
-//! The program as a whole: its commands, runs, what they leave behind and what reads it.
+//! The program as a whole: its commands, runs, their output and its readers.
 
 #[path = "../support/mod.rs"]
 mod support;

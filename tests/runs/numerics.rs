@@ -4,7 +4,7 @@ use crate::support::{gpu, in_turn, kernels_with, open};
 use raystone::stress::numerics::{Gauge, run};
 use std::sync::OnceLock;
 
-/// The figures of the embedded kernels, taken once.
+/// The figures of the embedded kernels, measured once.
 fn figures() -> &'static [Gauge] {
     static FIGURES: OnceLock<Vec<Gauge>> = OnceLock::new();
     FIGURES.get_or_init(|| {

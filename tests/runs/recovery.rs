@@ -1,5 +1,5 @@
-//! What goes wrong in a run is told and stays where it is: a lost device, a missing model, a folder
-//! that cannot be written. No other record is lost, none is written twice.
+//! A failure in a run is reported and affects nothing else: a lost device, a missing model, a folder that cannot be
+//! written. No other record is lost, none is written twice.
 
 mod folder;
 
@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Two scenes, two structures, two samplers; `SCENES` stands for the scenes.
+/// Two scenes, two structures, two samplers; `SCENES` is replaced by the scenes.
 const EXPERIMENT: &str = r#"
 [run]
 name = "recovery"
@@ -47,15 +47,15 @@ fn experiment(scenes: &[&str]) -> String {
     EXPERIMENT.replace("SCENES", &quoted.join(", "))
 }
 
-/// A run's records by what they are about. Panics if one is there twice or the last is not the end.
+/// A run's records by subject. Panics if one is there twice or the last is not the end.
 struct Outcome {
     summary: RunSummary,
     records: BTreeMap<String, Line>,
-    /// What failed.
+    /// The failed subjects.
     failed: BTreeSet<String>,
 }
 
-/// What a record is about, and whether it tells of a failure.
+/// Returns the subject of a record, and `true` if it reports a failure.
 fn subject(line: &Line) -> (String, bool) {
     let [scene, integrator] = [axis::SCENE, axis::INTEGRATOR].map(|axis| line.key.label(axis));
     let cell = Cell::from(&line.key);
@@ -65,7 +65,7 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Run(_) => ("run".to_owned(), false),
         Body::Scene(_) => (format!("scene {scene}"), false),
         Body::Structure(r) => (cell.to_string(), failed(&r.failure)),
-        // Judged with the first sampler that gets so far.
+        // Checked with the first sampler that gets so far.
         Body::Paths(_) => (format!("paths of {scene}, {integrator}"), false),
         Body::Reference(_) => (format!("reference {scene}, {integrator}"), false),
         Body::Error(r) => (format!("replicate {} of {cell}", r.replicate), false),

@@ -5,8 +5,8 @@ use raystone::config::StopRule;
 use raystone::measure::record::{Body, ErrorRecord, Line, axis};
 use raystone::run::Registries;
 
-/// Two samplers to 64 samples, and what a test changes. Under the open sky no pixel decides over the error, as one with a sliver of the
-/// lamp would in a picture of the Cornell box that is as small: the rule would never be met.
+/// Two samplers to 64 samples, and the changes of a test. Under the open sky no pixel dominates the error, as one with a sliver of the
+/// lamp would in an equally small picture of the Cornell box: the rule would never be met.
 fn experiment(changes: &[&str]) -> String {
     let common = [
         "axes.scene = [\"displaced-sphere\"]",
@@ -57,7 +57,7 @@ fn a_sampler_ends_where_its_error_is_below_the_target_and_says_so() {
     let ended = errors(&stopped, "pixel-hash");
     assert_eq!(ended.len(), 8);
     let last = ended[0].errors.last().expect("an error").spp;
-    // Half of the target is met at 16 samples, and what noise leaves open at 32.
+    // Half of the target is met at 16 samples, or at 32 because of noise.
     assert!(last == 16 || last == 32, "{last}");
     assert!(mean_at(&ended, last) < target);
     for (ended, full) in ended.iter().zip(&full) {
@@ -83,7 +83,7 @@ fn a_sampler_ends_where_its_error_is_below_the_target_and_says_so() {
         _ => None,
     });
     assert_eq!(spectrum, Some(last));
-    // Of one image nothing is known of its spread: it takes all samples.
+    // A single image has no known spread: it gets all samples.
     let single = errors(&stopped, "sobol");
     assert_eq!((single.len(), single[0].errors.len()), (1, 7));
 }

@@ -104,7 +104,7 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
         tables.contains("brute-force") && tables.contains("PASS  cracks from inside"),
         "{tables}"
     );
-    // What kernels every cell was made of is known.
+    // The kernels of every cell are recorded.
     let cells: Vec<_> = all_of::<CellRecord>(&records).collect();
     assert!(cells.iter().all(|cell| !cell.inputs.kernels.is_empty()));
 }
@@ -153,7 +153,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     assert!(count(edges, &figure::CRACKS) > 0.0 && count(edges, &figure::UNEQUAL) > 0.0);
 }
 
-/// The program with the words of a line, and one more argument; its exit status and all that it says.
+/// Runs the program with the words of a line, and one more argument; returns its exit status and all its output.
 fn program(line: &str, last: Option<&str>) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .args(line.split_whitespace().chain(last))

@@ -1,4 +1,5 @@
-//! Runs that are resumed, divided into shards and joined: nothing is measured twice, nothing is lost, nothing false is kept.
+//! Runs that are resumed, divided into shards and merged: nothing is measured twice, nothing is lost, nothing outdated is
+//! reused.
 
 use crate::support::{plan, records, small_with};
 use raystone::config::Shard;
@@ -56,7 +57,7 @@ fn measured_again(lines: &[Line]) -> BTreeSet<String> {
     cells(&lines[start..]).into_keys().collect()
 }
 
-/// What does not depend on clocks: hashes of images by cell and replicate, and discrepancies.
+/// Results that do not depend on clocks: hashes of images by cell and replicate, and discrepancies.
 fn evidence(lines: &[Line]) -> BTreeMap<String, String> {
     let found = lines.iter().filter_map(|line| match &line.body {
         Body::Error(r) => Some((
@@ -387,7 +388,7 @@ fn what_does_not_belong_together_is_not_joined() {
     );
 }
 
-/// Which structure is fastest is a matter of clocks: of two machines that measured one cell, each may have rendered through another.
+/// The fastest structure depends on clocks: of two machines that measured one cell, each may have rendered through another.
 #[test]
 fn images_through_different_structures_agree_if_they_are_equal() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -395,7 +396,7 @@ fn images_through_different_structures_agree_if_they_are_equal() {
     let text = experiment(&[]);
     resume(&text, &one);
     copy_folder(&one, &other);
-    // Lines that tell another kernel have another hash, and the cells other modules.
+    // Lines that name another kernel have another hash, and the cells other modules.
     let through_another = |module: &str| {
         rewrite(&other, |line| match &mut line.body {
             Body::Error(_) | Body::Bias(_) => line.hash = format!("0{}", &line.hash[1..]),
@@ -424,7 +425,7 @@ fn images_through_different_structures_agree_if_they_are_equal() {
         merged.notes.iter().any(|note| note.contains("agree with")),
         "{merged:?}"
     );
-    // What differs is found all the same.
+    // Differences are found all the same.
     rewrite(&other, |line| {
         if let Body::Error(record) = &mut line.body {
             record.image_hash.insert(0, '0');
@@ -480,7 +481,7 @@ fn the_first_failure_ends_the_run_where_that_was_asked_for_and_it_can_be_resumed
     assert_eq!(ended.exit_code(), 1, "{ended}");
     assert!(ended.to_string().contains("uniform-grid"), "{ended}");
     assert_eq!(cells(&records(&out)).len(), 1);
-    // What failed is tried again, and fails again; the rest is measured once.
+    // Failed cells are tried again, and fail again; the rest is measured once.
     let (summary, lines) = resume(&text, &out);
     assert!(summary.failed > 0 && summary.kept == 0);
     let failed = |cell: &&CellRecord| cell.outcome == Outcome::Failed;
@@ -567,7 +568,7 @@ fn an_image_that_is_not_finite_fails_the_check_of_the_run_and_of_joined_ones() {
     fs::create_dir_all(mine.join("integrator")).expect("a folder");
     let library = raystone::gpu::KernelLibrary::default();
     let good = library.text("integrator/primary").expect("a kernel");
-    // One column, beyond the pixels whose paths are judged before.
+    // One column, beyond the pixels whose paths are checked before.
     let nan = "* bitcast<f32>(select(0x3f800000u, 0x7fc00000u, pixel.x == 27u)) * abs(";
     let before = "* abs(";
     assert_eq!(good.matches(before).count(), 1);

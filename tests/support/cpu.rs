@@ -1,20 +1,20 @@
-//! Work by the processor time that it takes: what else runs on the machine hardly adds to it.
+//! Measures work by its processor time: other processes hardly affect it.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Clocks of processor time go on by ticks of some milliseconds: less than this is not told from nothing.
+/// Clocks of processor time advance by ticks of some milliseconds: less than this cannot be resolved.
 const LEAST: f64 = 0.1;
 
-/// Processor time of this thread in seconds, where the system tells it.
+/// Processor time of this thread in seconds, where the system reports it.
 fn of_thread() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
     Some(nanoseconds * 1e-9)
 }
 
-/// Seconds that `work` takes on this thread alone, repeated as often as it takes to measure it, at best of three; by the clock on the
-/// wall where the system does not tell processor time.
+/// Seconds of `work` on this thread alone, repeated until measurable, the best of three; by the wall clock where the system does not
+/// report processor time.
 pub fn seconds<T>(work: impl Fn() -> T) -> f64 {
     let several = |times: u32| {
         let (clock, before) = (Instant::now(), of_thread());

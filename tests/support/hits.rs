@@ -54,8 +54,8 @@ pub fn default_params(schema: &ParameterSchema) -> Params {
     Params(schema.iter().map(value).collect())
 }
 
-/// The defaults, and each parameter in turn at other values: the ends of an integer's range, an
-/// eighth and eight times a number, every choice but what needs a device.
+/// The defaults, and each parameter in turn at other values: the ends of an integer's range, an eighth and eight
+/// times a number, every choice except those that need a device.
 pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
     let mut out = vec![default_params(schema)];
     for parameter in schema {
@@ -68,11 +68,11 @@ pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
                 .to_vec(),
             (ParamRange::Flag, _) => [false, true].map(ParamValue::Flag).to_vec(),
             (ParamRange::Choice(names), _) => {
-                // What is built on a device has tests/device/device_builders.
+                // Builders on a device have tests/device/device_builders.
                 let names = names.iter().filter(|n| !n.starts_with("device-"));
                 names.map(|n| ParamValue::Name((*n).to_owned())).collect()
             }
-            // Texts name files; what reads them has tests of its own.
+            // Texts name files, whose readers have tests of their own.
             (ParamRange::Text, _) => Vec::new(),
             (range, default) => panic!("{}: default {default} of {range}", parameter.name),
         };
@@ -97,7 +97,7 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup, params: &Params) -> Box<
     built
 }
 
-/// What a batch brought back; `work` is empty unless the feature `counters` was on.
+/// The results of a batch; `work` is empty unless the feature `counters` was on.
 pub struct Batch {
     /// Closest hits; with the feature `any`, `t.to_bits()` is 1 or 0.
     pub hits: Vec<Hit>,

@@ -1,4 +1,4 @@
-//! What test programs share: one device for each, scenes and structures on it, rays and their answers,
+//! Shared parts of the test programs: one device for each, scenes and structures on it, rays and their answers,
 //! renderers, kernels with planted faults, samples with their standard error, runs.
 #![allow(dead_code, unused_imports)] // Every test program uses its own part of this.
 
@@ -36,19 +36,19 @@ pub fn gpu() -> &'static Gpu {
     GPU.get_or_init(|| alone(KernelLibrary::default()))
 }
 
-/// The shared device with other kernels; what composes to the same text is not compiled again.
+/// The shared device with other kernels; kernels that compose to the same text are not compiled again.
 pub fn open(kernels: KernelLibrary) -> Gpu {
     gpu().with_kernels(kernels)
 }
 
-/// A device of its own: for tests that change its limits, look at what opening it or compiling for it does, or plant what may
-/// lose it.
+/// A device of its own: for tests that change its limits, examine its opening or compilation, or plant faults that may lose
+/// it.
 pub fn alone(kernels: KernelLibrary) -> Gpu {
     raystone::gpu::open(&AdapterChoice::Best, kernels)
         .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
 }
 
-/// Whether the adapter computes like the host; says so if it does not.
+/// Returns `true` if the adapter computes like the host; reports if it does not.
 pub fn is_exact(gpu: &Gpu) -> bool {
     let probe = probe_arithmetic(gpu).expect("the probe runs");
     if !probe.is_exact() {
@@ -58,7 +58,7 @@ pub fn is_exact(gpu: &Gpu) -> bool {
     probe.is_exact()
 }
 
-/// A path tracer in the Cornell box with a plain BVH, with as little of all else as a run takes.
+/// A path tracer in the Cornell box with a plain BVH, with as little of all else as a run needs.
 pub const SMALL: &str = r#"
 [run]
 name = "small"
@@ -109,8 +109,8 @@ pub fn small_with(changes: &[&str]) -> String {
     toml::to_string(&table).expect("a table is text")
 }
 
-/// The embedded kernels with one text replaced in one of them. Panics unless `from` stands there
-/// exactly once, so that a fault is never planted beside the kernel.
+/// The embedded kernels with one text replaced in one of them. Panics unless `from` occurs there exactly once, so
+/// that no fault misses the kernel.
 pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {
     let library = KernelLibrary::default();
     let mut text = library.text(module).expect("a known module").to_owned();
@@ -125,13 +125,13 @@ pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {
     library.with_folder(folder.path()).expect("the kernels")
 }
 
-/// Whether an error, by its `Debug` text, or the words of a panic are what a planted fault does at work. A kernel that does not
-/// compile shows nothing: its error names the file.
+/// Returns `true` if an error, by its `Debug` text, or the words of a panic are the effect of a planted fault. A kernel that
+/// does not compile shows nothing: its error names the file.
 pub fn shows(said: &str) -> bool {
     !said.contains("Kernel(\"") && !said.contains(".wesl")
 }
 
-/// The same of what `catch_unwind` has caught.
+/// The same for a panic caught by `catch_unwind`.
 pub fn panic_shows(caught: &(dyn std::any::Any + Send)) -> bool {
     let text = caught.downcast_ref::<String>().map(String::as_str);
     shows(
@@ -231,7 +231,7 @@ impl Stage {
             .expect("a judge")
     }
 
-    /// The verdict on what is on the GPU.
+    /// Returns the verdict on the structure on the GPU.
     pub fn verdict(
         &self,
         gpu: &Gpu,
@@ -371,7 +371,7 @@ impl Estimate {
         }
     }
 
-    /// Whether the true mean may be `expected`.
+    /// Returns `true` if the true mean may be `expected`.
     pub fn agrees_with(&self, expected: f64) -> bool {
         let rounding = ROUNDING * expected.abs();
         (self.mean - expected).abs() <= STANDARD_ERRORS * self.error + rounding

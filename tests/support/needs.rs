@@ -1,9 +1,9 @@
-//! What tests need that not every machine has: a test that goes without says so, and fails where the need is
-//! in `RAYSTONE_REQUIRE`.
+//! Needs of tests that not every machine meets: a test without them reports it, and fails if the need is in
+//! `RAYSTONE_REQUIRE`.
 
 use std::fmt::Display;
 
-/// What may be missing, by the words that `RAYSTONE_REQUIRE` takes, separated by blanks.
+/// Possible needs, by the words that `RAYSTONE_REQUIRE` accepts, separated by blanks.
 const KNOWN: [&str; 14] = [
     // Adapter: one that computes as the host does; the very driver of the table of image hashes.
     "exact-adapter",
@@ -25,7 +25,7 @@ const KNOWN: [&str; 14] = [
     "python-modules",
 ];
 
-/// Says that a test, or a part of it, is left out for want of something.
+/// Reports that a test, or a part of it, is skipped for want of something.
 ///
 /// # Panics
 /// If it is required, or if a word is none of [`KNOWN`].
@@ -37,7 +37,7 @@ pub fn skip(need: &str, why: impl Display) {
     println!("skipped for want of {need}: {why}");
 }
 
-/// Why a test that has not what it needs may not be skipped.
+/// Checks that a test may be skipped without its need.
 ///
 /// # Errors
 /// The need is required, or a word is none of [`KNOWN`].

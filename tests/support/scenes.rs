@@ -11,7 +11,7 @@ use raystone::geometry::Triangle;
 /// `t_max` of a ray without an end.
 pub const FAR: f32 = 1.0e30;
 
-/// A scene with what it is hard for.
+/// A scene, named by its difficulty.
 pub struct Case {
     pub name: &'static str,
     pub soup: TriangleSoup,

@@ -1,20 +1,20 @@
-//! What a run of the tests takes of long lists: everything with `RAYSTONE_FULL=1`, which `scripts/test --full` sets, else a
-//! part, and with the next commit another part. `docs/testing.md` has a row for each list.
+//! The part of long lists that a run of the tests covers: everything with `RAYSTONE_FULL=1`, which `scripts/test --full`
+//! sets, else a part, and with the next commit another part. `docs/testing.md` has a row for each list.
 
 use std::fmt::Display;
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// One of so many parts is taken where a test asks for no other number.
+/// Number of parts where a test names no other.
 const PARTS: usize = 3;
 
-/// Whether this run takes everything; a table that is written anew is written as a whole.
+/// Returns `true` if this run covers everything; a table is always rewritten as a whole.
 pub fn is_full() -> bool {
     let is_set = |name| std::env::var(name).is_ok_and(|value| !["", "0"].contains(&&*value));
     is_set("RAYSTONE_FULL") || is_set("RAYSTONE_WRITE_HASHES")
 }
 
-/// Which part it is the turn of: `RAYSTONE_ROTATION`, which `scripts/test` sets and prints, else by the commit.
+/// Returns the turn: `RAYSTONE_ROTATION`, which `scripts/test` sets and prints, else by the commit.
 pub fn turn() -> usize {
     static TURN: OnceLock<usize> = OnceLock::new();
     *TURN.get_or_init(|| match std::env::var("RAYSTONE_ROTATION") {
@@ -34,8 +34,8 @@ fn commit() -> Option<usize> {
     usize::from_str_radix(text.get(..7)?, 16).ok()
 }
 
-/// The places of a list of `count` that are taken in this turn: one of `parts`, beginning elsewhere in every list; never none
-/// of a list that has any.
+/// Returns the places of a list of `count` that are covered in this turn: one of `parts`, with another start in every list;
+/// never none of a list that has any.
 pub fn places(list: &str, count: usize, parts: usize, turn: usize) -> Vec<usize> {
     let parts = parts.min(count).max(1);
     let begin = list.bytes().map(usize::from).sum::<usize>() + turn % parts;
@@ -63,7 +63,7 @@ pub fn one_of<T>(parts: usize, list: &str, all: impl IntoIterator<Item = T>) -> 
     taken.map(|(_, item)| item).collect()
 }
 
-/// So many of what is drawn at random: few, or as many as a full run takes.
+/// Returns the number of random samples: few, or as many as a full run has.
 pub fn so_many(list: &str, few: u64, full: u64) -> u64 {
     let count = if is_full() { full } else { few };
     told(list, count, full);

@@ -1,8 +1,8 @@
-//! What is measured stays what it is: hits, counted work, images and discrepancies of every structure,
-//! integrator and sampler, as hashes that were taken once and are compared with what comes out today.
+//! Results stay the same: hits, counted work, images and discrepancies of every structure, integrator and sampler are
+//! compared with hashes that were recorded once.
 //!
-//! A change on purpose writes the table anew, `RAYSTONE_WRITE_HASHES=1 scripts/test --test unchanged`, and
-//! says in the change log which figures do not compare any more.
+//! After an intended change, write the table anew with `RAYSTONE_WRITE_HASHES=1 scripts/test --test unchanged`, and
+//! list in the change log the figures that are no longer comparable.
 
 #[path = "../support/mod.rs"]
 mod support;
@@ -16,13 +16,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use support::*;
 
-/// `kind what hash`, one a line, in alphabetical order.
+/// `kind subject hash`, one a line, in alphabetical order.
 const HASHES: &str = include_str!("hashes.txt");
 /// Images depend on the driver's sine and cosine: they are compared where the adapter is this one, which
 /// the table names in a line of its own.
 const ADAPTER: &str = "adapter";
 
-/// What was computed, by kind and subject.
+/// The hashes computed, by kind and subject.
 type Found = BTreeMap<String, String>;
 
 fn short(hash: blake3::Hash) -> String {
@@ -50,7 +50,7 @@ fn compare(kinds: &[&str], found: &Found) {
     }
 }
 
-/// The hash in the table, for what is not computed in this turn.
+/// The hash in the table, for subjects not computed in this turn.
 fn known(subject: &str) -> String {
     let line = HASHES
         .lines()
@@ -58,7 +58,7 @@ fn known(subject: &str) -> String {
     line.unwrap_or("is not in the table").to_owned()
 }
 
-/// What is in one of the two and not in the other.
+/// Lists the lines of one of the two that are not in the other.
 fn differences(table: &str, kinds: &[&str], lines: &[String]) -> Result<(), String> {
     let ours = |line: &&str| kinds.iter().any(|k| line.split(' ').next() == Some(k));
     let known: Vec<&str> = table.lines().filter(ours).collect();

@@ -32,7 +32,7 @@ impl Structure for DeviceSlabs {
         let order = log.phase("sort", || sorted(soup));
         let boxes = match log.gpu().cloned() {
             Some(gpu) => record(&gpu, soup, slabs, &order),
-            // Without a device there is nothing to record, and playing it says so.
+            // Without a device there is nothing to record, and playing it is an error.
             None => log.play(&Recording::new()).map(|_| unreachable!()),
         };
         let (recording, boxes) = boxes?;

@@ -32,7 +32,7 @@ const FAULTS: [Fault; 24] = [
     // The last, partial block is dropped.
     ("stream", ["element < stream_length[0]", "element < stream_length[0] / 64u * 64u"], "workgroup", &[]),
     ("roger_blocks", ["block >= blocked.blocks", "block + 1u >= blocked.blocks"], "roger", &[("block", 16)]),
-    // Elements behind the end count as holes, and the search runs past them.
+    // Elements beyond the end count as holes, and the search runs past them.
     ("holes", ["element < stream_length[0] && flag_of", "element < padded.words / 2u && flag_of"], "horn", &[]),
     // A second level of sums is missing.
     ("add_totals", ["sums[word] += totals[block]", "sums[word] += 0u * totals[block]"], "roger", &[("block", 16)]),
@@ -66,7 +66,7 @@ fn planted_faults_are_seen() {
     assert!(unseen.is_empty(), "{}", unseen.join("\n"));
 }
 
-/// Promises a stable order, whatever the method does.
+/// Promises a stable order without a guarantee.
 struct Promised(Arc<dyn Compaction>);
 
 impl Compaction for Promised {

@@ -53,7 +53,7 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     let registries = Registries::default();
     let (_, plan) = plan(EXPERIMENT, &registries);
     assert!(plan.structures.is_empty() && plan.times.is_empty() && plan.streams.is_empty());
-    // The default block stands in two tables.
+    // The default block is in two tables.
     assert_eq!(plan.benches.len(), 5 + 3 + 5 + 1);
     let folder = tempfile::tempdir().expect("a folder");
     let (summary, lines) = run(EXPERIMENT, &registries, folder.path(), None);

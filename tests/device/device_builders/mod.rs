@@ -300,7 +300,7 @@ fn what_cannot_be_built_says_why() {
 
 #[test]
 fn faults_in_the_passes_are_seen() {
-    // Kernel, original text, replacement, and whether triangles share their codes.
+    // Kernel, original text, replacement, and `true` if triangles share their codes.
     let faults = [
         (
             "device/boxes",

@@ -19,7 +19,7 @@ pub fn tint() -> Option<&'static str> {
     }
 }
 
-/// What a browser's translator says against a kernel.
+/// Returns the error of a browser's translator for a kernel.
 pub fn tint_fault(tint: &str, wgsl: &str) -> Option<String> {
     let mut file = tempfile::Builder::new()
         .suffix(".wgsl")
@@ -36,7 +36,7 @@ pub fn tint_fault(tint: &str, wgsl: &str) -> Option<String> {
     (!output.status.success()).then_some(text)
 }
 
-/// What naga's other back ends say against a kernel.
+/// Returns the error of naga's other back ends for a kernel.
 pub fn naga_fault(wgsl: &str) -> Option<String> {
     let module = naga::front::wgsl::parse_str(wgsl).expect("a kernel");
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());

@@ -137,7 +137,7 @@ fn queues_of_kinds_of_any_length_make_the_same_image() {
     }
 }
 
-/// Text of all kernels, and the names of those that ran.
+/// Text of all kernels, and the names of those that were dispatched.
 fn kernels(stage: &Stage, by: &Variant) -> (String, Vec<String>) {
     let traced = stage.traced(gpu(), structure("bvh"));
     let integrator = organised(&path(3), by).expect("an integrator");

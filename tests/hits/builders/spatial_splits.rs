@@ -149,7 +149,7 @@ fn structures_over_clipped_triangles_pass_the_gate() {
 
 #[test]
 fn grazing_rays_are_given_hits_outside_the_triangle() {
-    // Why clipped triangles guarantee nothing for such rays: see `src/accel/tree/sbvh.rs`.
+    // The reason why clipped triangles guarantee nothing for such rays: see `src/accel/tree/sbvh.rs`.
     let mut rng = Pcg::new(9);
     let soup = sticks(&mut rng, 200, 8.0);
     let rays = grazing_rays(&mut rng, &soup, 20_000);

@@ -77,7 +77,7 @@ fn a_kernel_that_drops_the_far_child_is_wrong() {
     assert!(other.passed, "{other:?}");
 }
 
-/// `scene` with a second copy of every triangle behind the first ones.
+/// `scene` with a second copy of every triangle after the first ones.
 fn doubled(mut scene: SceneData) -> SceneData {
     scene.triangles.extend_from_within(..);
     scene.material_ids.extend_from_within(..);

@@ -162,8 +162,8 @@ fn signed_axis_rays(rng: &mut Pcg, soup: &TriangleSoup) -> Vec<Ray> {
     rays.take(640).collect()
 }
 
-/// A scene where a cell's first triangle is hit far behind the cell: long ones, slanted through
-/// many cells, in front of and behind small ones.
+/// A scene where a cell's first triangle is hit far beyond the cell: long ones, slanted through many cells, in front
+/// of and behind small ones.
 fn slanted(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let point =
         |rng: &mut Pcg, size: f32| size * Vec3::new(rng.signed(), rng.signed(), rng.signed());

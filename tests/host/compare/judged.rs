@@ -1,4 +1,4 @@
-//! Numbers behind the verdicts against scipy 1.17, and effects too small to count.
+//! Numbers of the verdicts against scipy 1.17, and effects too small to count.
 
 use super::records::Made;
 use super::{compared, said};

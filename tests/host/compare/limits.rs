@@ -1,5 +1,5 @@
-//! Where a comparison must claim less: no controls, measured once or against another reference, or
-//! below the threshold by value alone.
+//! Limits of a comparison: no controls, measured once or against another reference, or below the threshold by value
+//! alone.
 
 use super::records::{Made, QUIET, SHARED};
 use super::{compared, said};

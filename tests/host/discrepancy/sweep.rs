@@ -69,7 +69,7 @@ impl Strip {
     }
 }
 
-/// Maximum of two numbers that are never NaN: one instruction, where `f64::max` takes several.
+/// Maximum of two numbers that are never NaN: one instruction, instead of several for `f64::max`.
 #[inline]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }

@@ -524,7 +524,7 @@ fn committed_experiments_parse_and_plan() {
                 .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             let renders = !plan.times.is_empty() && !plan.streams.is_empty();
             assert!(renders || !plan.benches.is_empty());
-            // The saving is in what no image depends on.
+            // The saving is in axes that no image depends on.
             let unseen = [Axis::Accel, Axis::Organisation, Axis::Workgroup, Axis::Load];
             match unseen.map(|axis| experiment.axes[axis].len()) {
                 _ if !renders => {}

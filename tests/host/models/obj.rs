@@ -37,7 +37,7 @@ fn obj_materials_and_textures_arrive() {
     let [wall, lamp, mirror, glass, pane] = &scene.materials[..] else {
         panic!("{:?}", scene.materials);
     };
-    // Kd reflects twice what arrives.
+    // Kd reflects twice the incoming light.
     assert_eq!(wall.base_color, Vec3::new(0.25, 0.125, 1.0));
     assert_eq!(wall.kind, &DIFFUSE);
     assert_eq!(wall.base_color_texture, Some(TextureUse::plain(0)));

@@ -76,7 +76,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
                     source.name
                 );
             }
-            // A full run without models says what to download; a short one needs none.
+            // A full run without models lists the downloads; a short one needs none.
             for (substitute, ours) in &prepared.scenes {
                 if let (Err(reason), false) = (ours, quick) {
                     let told = reason.contains("--scenes") || reason.contains(&substitute.why);

@@ -1,5 +1,5 @@
-//! Thesis numbers match the digests' tables: each is looked up by what it measures (scene,
-//! structure, method, samples), to detect swapped rows or columns, scenes, units or ratios.
+//! Thesis numbers match the digests' tables: each is looked up by its subject (scene, structure, method, samples), to
+//! detect swapped rows or columns, scenes, units or ratios.
 
 use super::printed::Place;
 use super::{digest, theses};

@@ -285,7 +285,7 @@ fn records_of_another_experiment_of_a_killed_run_or_of_other_sizes_are_not_judge
     };
     assert!(judged(&quick, &own).is_none());
     assert!(judged(&whole, &lines(&quick, false)).is_none());
-    // Those of a software adapter's sizes apply wherever they are evaluated; the page says so.
+    // Records with the sizes of a software adapter count on any machine; the page lists the changes.
     let small = Settings {
         software: true,
         ..whole.clone()

@@ -555,7 +555,7 @@ fn an_interval_that_reaches_0_leaves_open_what_it_bears_on_and_no_more() {
         );
         rows[0].verdict
     };
-    // The middle of three points has no weight in the slope, whatever its interval.
+    // The middle of three points has no weight in the slope, for any interval.
     assert_eq!(
         at([0.99, 0.0, 0.99], "least = -0.6\nmost = -0.4\n"),
         ClaimVerdict::Supported

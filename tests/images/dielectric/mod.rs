@@ -21,7 +21,7 @@ struct Arrival {
 }
 
 impl Arrival {
-    /// Ratio of the index behind the surface to that before it.
+    /// Ratio of the index beyond the surface to that before it.
     fn eta(&self) -> f64 {
         let ior = f64::from(self.ior);
         if self.outside || self.thin {

@@ -267,7 +267,7 @@ fn every_other_row_of_a_written_map_is_one_of_the_scene_and_columns_run_the_same
 
 #[test]
 fn a_written_map_shines_from_where_mitsuba_looks_it_up() {
-    // A quarter of the way across is +x, and a quarter turn about +y takes that to −z.
+    // A quarter of the way across is +x, and a quarter turn about +y turns that to −z.
     let texel = |k: usize| Vec3::splat(f32::from(u8::from(k % 6 == 1)));
     let texels = (0..18).map(texel).collect();
     let map = EnvironmentMap::new("map", [6, 3], texels, &mut Vec::new()).unwrap();

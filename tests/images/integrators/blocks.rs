@@ -57,7 +57,7 @@ fn an_image_whose_pixels_took_other_samples_than_asked_for_is_an_error() {
         text.contains("1 pixels") && text.contains("(13, 4)"),
         "{text}"
     );
-    // In a block that the host has already taken over.
+    // In a block that the host has already read.
     let error = refused(
         "i < frame.samples - select(0u, 1u, frame.first_sample == 0u)",
         &[2 * BLOCK_SAMPLES],
@@ -141,7 +141,7 @@ fn an_image_too_large_for_one_buffer_is_summed_in_bands() {
         bits(&renderer.render(&[3], 5).expect("a render")[0].image)
     });
     let mut small = alone(KernelLibrary::default());
-    // 40 rows of 200 pixels; what the scene needs is smaller.
+    // 40 rows of 200 pixels; the scene needs less.
     small.limits.max_storage_buffer_binding_size = 128 << 10;
     with_renderer(&small, [200, 100], |renderer| {
         let banded = bits(&renderer.render(&[1, 3], 5).expect("a render")[1].image);

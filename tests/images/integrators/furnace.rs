@@ -78,7 +78,7 @@ fn the_furnace_box_has_the_radiance_of_its_bounces_with_every_sampler() {
             let sampler = sampler("pixel-hash", "none");
             check(gpu(), &stage, &sampler, albedo, depth);
         }
-        // One depth for the others: a software driver takes seconds per kernel.
+        // One depth for the others: a software driver needs seconds per kernel.
         let (random, fixed) = (samplers(RANDOM_SPP), samplers(FIXED_SPP));
         let random = random.iter().filter(|s| is_unbiased(s));
         let all = random.chain(fixed.iter().filter(|s| !is_unbiased(s)));

@@ -1,4 +1,4 @@
-//! Models from files: a mirror shows what is behind the camera, a texture is right side up.
+//! Models from files: a mirror shows the scene behind the camera, a texture is right side up.
 
 use crate::support::*;
 use glam::Vec3;

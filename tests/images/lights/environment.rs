@@ -17,7 +17,7 @@ fn radiance(light: &Light, polar: f64, azimuth: f64) -> f64 {
         panic!("no environment");
     };
     let (width, height) = (map.width as usize, map.height as usize);
-    // A turn by +a about y takes the azimuth φ, measured from −z towards +x, to φ − a.
+    // A turn by +a about y turns the azimuth φ, measured from −z towards +x, to φ − a.
     let around = (azimuth + f64::from(*turn)).rem_euclid(TAU) / TAU * width as f64 - 0.5;
     let down = (polar / PI * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
     let column = around.floor();
@@ -138,8 +138,8 @@ fn columns(white: &[usize], turn: f32) -> Light {
     }
 }
 
-/// Directions of columns: a quarter of the way across a map is +x, half +z, three quarters −x
-/// (Mitsuba 3, `envmap`); a quarter turn takes +x to −z (right-handed about +y).
+/// Directions of columns: a quarter of the way across a map is +x, half +z, three quarters −x (Mitsuba 3, `envmap`);
+/// a quarter turn turns +x to −z (right-handed about +y).
 const PLACES: [(&[usize], f32, Vec3); 5] = [
     (&[1], 0.0, Vec3::X),
     (&[2, 3], 0.0, Vec3::Z),

@@ -288,7 +288,7 @@ fn faults_at(scene: &SceneData, p: &Point, answer: &[f32; 20]) -> Vec<&'static s
             out.push(what);
         }
     };
-    // Where a margin is 0, rounding decides.
+    // At a margin of 0, rounding decides.
     if margin > 2e-3 {
         expect(vector(0).distance(normal) < 2e-3, "normal");
         // Directions that a glossy surface would reflect behind itself are mirrored at it.

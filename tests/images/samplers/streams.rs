@@ -15,8 +15,8 @@ fn name_of(variant: &Variant) -> &str {
     &variant.name
 }
 
-/// Every sequence without, and every decorrelation with one sequence, with every parameter; then
-/// every other valid pair. The registry tells which are random.
+/// Every sequence without, and every decorrelation with one sequence, with every parameter; then every other valid
+/// pair. The number of seeds follows from the registry.
 fn samplers() -> Vec<(Sampler, usize)> {
     let registry = SamplerRegistry::default();
     let all = |entries: &[Entry]| -> Vec<Variant> { entries.iter().flat_map(variants).collect() };

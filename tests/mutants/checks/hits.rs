@@ -13,7 +13,7 @@ use raystone::measure::record::GateVerdict;
 /// Rays whose work is counted, of each scene.
 const COUNTED_RAYS: usize = 2048;
 
-/// The gate on these cases, whose judges are as strict as the case is.
+/// Runs the gate on these cases, each against its own reference tracer.
 pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) -> Finding {
     let probe = ArithmeticProbe {
         unfused: bench.exact,

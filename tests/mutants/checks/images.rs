@@ -125,7 +125,7 @@ fn path(depth: i64) -> (&'static str, (&'static str, ParamValue)) {
     ("path", ("max_depth", ParamValue::Integer(depth)))
 }
 
-/// The box of walls that emit what they absorb, and the white sphere under a white sky.
+/// The box of walls that emit as much as they absorb, and the white sphere under a white sky.
 pub fn furnace(bench: &Bench) -> Finding {
     let albedo = 0.8;
     let stage = Stage::builtin("furnace-box", &[("albedo", ParamValue::Number(albedo))])?;

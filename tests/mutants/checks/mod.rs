@@ -63,8 +63,8 @@ impl Check {
         }
     }
 
-    /// Whether an adapter can pass it: where `a*b + c` is fused or division is inexact, work and images
-    /// do not equal the host's to the bit.
+    /// Returns `true` if an adapter can pass it: where `a*b + c` is fused or division is inexact, work and images do
+    /// not equal the host's to the bit.
     pub fn is_possible(self, exact: bool) -> bool {
         exact || !matches!(self, Self::Work | Self::Integrand)
     }
@@ -76,13 +76,13 @@ impl fmt::Display for Check {
     }
 }
 
-/// What a check found: evidence of a fault, or nothing.
+/// The finding of a check: evidence of a fault, or nothing.
 type Finding = Result<Option<String>, CheckError>;
 
-/// A device with the kernels of one mutant, and where else its fault is planted.
+/// A device with the kernels of one mutant, and the place of its fault outside the kernels.
 pub struct Bench<'a> {
     pub gpu: &'a Gpu,
-    /// Whether the adapter computes like the host.
+    /// True if the adapter computes like the host.
     pub exact: bool,
     pub world: &'a World,
     pub plant: &'a Plant,

@@ -5,8 +5,7 @@ use raystone::discrepancy::star_2d;
 use raystone::sampling::{Coordinate, Sampler, to_unit};
 use std::collections::HashSet;
 
-/// Dimensions whose pairs are all measured, and what none of them may exceed at 1024 points; random ones have
-/// about 0.04.
+/// Dimensions whose pairs are all measured, and the maximum of each at 1024 points; random ones have about 0.04.
 const PAIRED: usize = 20;
 const MOST_STAR: f64 = 0.12;
 /// Numbers that differ in these lowest bits alone are the same: points of bases below 256 lie farther apart.
@@ -28,7 +27,7 @@ fn columns(sampler: &Sampler, samples: u32) -> Vec<Vec<u32>> {
     (0..sampler.demand.dimensions).map(column).collect()
 }
 
-/// What is wrong with the first `samples` points: a number that a dimension draws twice, a dimension that is
+/// Describes a fault of the first `samples` points: a number that a dimension draws twice, a dimension that equals
 /// another one, or two that are locked together.
 pub fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
     let columns = columns(sampler, samples);

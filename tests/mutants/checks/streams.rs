@@ -50,7 +50,8 @@ const UNBIASED: [&str; 5] = [
     "linear-scramble",
     "owen-hash",
 ];
-/// What moves single points, so that they are less even than those of the sequence, though more than random ones.
+/// A decorrelation that moves single points, so that they are less even than those of the sequence, though more than
+/// random ones.
 const JITTERS: &str = "cranley-patterson-micro-jitter";
 /// The smooth function that images show.
 const INTEGRAND: &str = "integrand:exponential";

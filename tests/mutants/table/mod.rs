@@ -65,7 +65,7 @@ const fn equivalent(mutant: Mutant, why: &'static str) -> Mutant {
     }
 }
 
-/// A text that stands in the kernel once.
+/// A text that occurs in the kernel once.
 const fn text(file: &'static str, from: &'static str, to: &'static str) -> Plant {
     texts(file, from, to, 1)
 }

@@ -1,5 +1,5 @@
-//! Faults of builders: words that are changed in what they hand out. Each tells how many places it
-//! changed; 0 means that the layout is no longer what the fault supposes.
+//! Faults of builders: changed words in their output. Each returns the number of places that it changed; 0 means that
+//! the layout is no longer the one that the fault supposes.
 
 use raystone::accel::GpuBuffers;
 use raystone::gpu::UniformValues;
@@ -51,7 +51,7 @@ pub fn reverse_a_rope(buffers: &mut GpuBuffers) -> usize {
     leaves.next().map(|node| node[7] = 0).into_iter().count()
 }
 
-/// First children, which stand at even places, lead where second children do.
+/// First children, at even places, lead to the same node as second children.
 pub fn lengthen_ropes(buffers: &mut GpuBuffers) -> usize {
     let nodes = words(buffers, "nodes");
     let mut changed = 0;
@@ -102,7 +102,7 @@ pub fn forget_a_triangle(buffers: &mut GpuBuffers) -> usize {
     listed.map(|id| *id = other).count()
 }
 
-/// A box is a cell of four words, the last its list; all ones stand for none.
+/// A box is a cell of four words, the last its list; all ones mean none.
 pub fn empty_boxes(buffers: &mut GpuBuffers) -> usize {
     const EMPTY: u32 = u32::MAX;
     let cells = words(buffers, "cells").chunks_exact_mut(4);
@@ -165,8 +165,7 @@ pub fn repeat_direction_number(table: &mut [u32]) -> usize {
     copy(table, HEADER + 32 + 3, HEADER + 32 + 2)
 }
 
-/// Two words per dimension: the base, and where its permutation begins. In base 3 the digit 1 becomes what
-/// 2 becomes.
+/// Two words per dimension: the base, and the start of its permutation. In base 3 the digit 1 maps to the image of 2.
 pub fn repeat_digit(table: &mut [u32]) -> usize {
     let first = HEADER
         + table
@@ -191,7 +190,7 @@ pub fn repeat_late_direction_number(table: &mut [u32]) -> usize {
     copy(table, first + 15, first + 14)
 }
 
-/// Base 127 is that of dimension 30: its digit 100 becomes what 101 becomes.
+/// Base 127 is that of dimension 30: its digit 100 maps to the image of 101.
 pub fn repeat_late_digit(table: &mut [u32]) -> usize {
     let first = table
         .get(HEADER + 61)
@@ -199,12 +198,12 @@ pub fn repeat_late_digit(table: &mut [u32]) -> usize {
     copy(table, first + 100, first + 101)
 }
 
-/// Dimension 40 takes the base of dimension 39.
+/// Dimension 40 gets the base of dimension 39.
 pub fn repeat_late_base(table: &mut [u32]) -> usize {
     copy(table, HEADER + 80, HEADER + 78)
 }
 
-/// Dimension 19 takes the component of dimension 18.
+/// Dimension 19 gets the component of dimension 18.
 pub fn repeat_late_component(table: &mut [u32]) -> usize {
     copy(table, HEADER + 19, HEADER + 18)
 }

@@ -322,7 +322,7 @@ fn a_full_disk_is_told_and_ends_with_2() {
     let output = output
         .and_then(std::process::Child::wait_with_output)
         .expect("it starts");
-    // What went wrong, and why.
+    // The failure, and its cause.
     let message = error(&output, 2);
     assert!(message.contains("standard output: No space"), "{message}");
 }

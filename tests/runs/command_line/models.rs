@@ -1,4 +1,4 @@
-//! Models and scenes that cannot be loaded, and what a loader leaves out.
+//! Models and scenes that cannot be loaded, and the parts that a loader leaves out.
 
 use super::{ABSENT_BACKEND, error, output, program, run, stdout, text};
 use std::path::Path;
@@ -17,7 +17,7 @@ fn a_missing_model_ends_with_2_before_anything_is_run() {
     }
 }
 
-/// Models that cannot be loaded, by what is wrong with them.
+/// Models that cannot be loaded, named by their faults.
 fn bad_models(folder: &Path) -> Vec<String> {
     std::fs::create_dir(folder.join("folder.obj")).expect("a folder");
     let truncated = "ply\nformat ascii 1.0\nelement vertex 3\n";

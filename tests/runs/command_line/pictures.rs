@@ -1,4 +1,4 @@
-//! `raystone render`: pictures, their formats, and what is said of them.
+//! `raystone render`: pictures, their formats, and the messages about them.
 
 use super::{ABSENT_BACKEND, error, output, program, stdout, text};
 

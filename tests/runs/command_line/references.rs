@@ -61,7 +61,7 @@ fn errors(lines: &[Line]) -> Vec<Recorded<'_, ErrorRecord>> {
 #[test]
 fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // 1 says that the reference is too noisy to rank by, which it may be.
+    // Exit code 1 means that the reference is too noisy to rank by, which it may be.
     let (code, said, first) = run(folder.path(), "a", &["--images", "exr"]);
     assert!([0, 1].contains(&code), "{said}");
     let images: Vec<Image> = ["reference-", "image-", "mean-", "variance-"]
@@ -74,7 +74,7 @@ fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
             .iter()
             .all(|image| (image.width, image.height) == (24, 16))
     );
-    // What was recorded of the first replicate and of all is in the images.
+    // The recorded hash of the first replicate is that of its image, and the images of all have a spread.
     let measured = errors(&first);
     let hash = blake3::hash(bytemuck::cast_slice(&images[1].pixels)).to_hex();
     assert_eq!(measured[0].image_hash, hash.as_str());
@@ -98,7 +98,7 @@ fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
         assert!(error.errors.iter().map(|e| e.spp).eq([1, 3, 4]));
         assert!(last(&error).keys().all(|id| !id.contains("unbiased")));
     }
-    // One image says nothing about a bias.
+    // One image cannot show a bias.
     let bias: Vec<Recorded<BiasRecord>> = all_of(&second).collect();
     assert!(
         bias.iter()
@@ -162,13 +162,13 @@ fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
     assert!(error(&two, 2).contains("reference.file"));
 }
 
-/// The reference of a run that keeps references in `cache`: whether it was there, and the errors against it.
+/// Returns `true` if the reference of a run with this cache was there, and the errors against it.
 fn with_cache(folder: &Path, cache: &Path, name: &str, more: &[&str]) -> (bool, Vec<ErrorRecord>) {
     let file = folder.join("trial.toml");
     std::fs::write(&file, experiment()).expect("a writable folder");
     let out = folder.join(name);
     let arguments = ["run", text(&file), "-q", "--out", text(&out)];
-    // So few samples are too noisy a reference, which is told by the code 1.
+    // So few samples are too noisy a reference, as exit code 1 reports.
     output(program(&arguments).args(more).env("RAYSTONE_CACHE", cache));
     let lines = read_records(&out).expect("records").lines;
     let references: Vec<Recorded<ReferenceRecord>> = all_of(&lines).collect();
@@ -185,7 +185,7 @@ fn a_reference_is_rendered_once_for_all_runs_that_it_serves() {
     assert!(!cached);
     assert_eq!(run("again", &[]), (true, rendered.clone()));
     assert_eq!(run("without", &["--no-cache"]), (false, rendered.clone()));
-    // Edited kernels and other samplers are measured against the same; whatever it is made of makes another.
+    // Edited kernels and other samplers are measured against the same; other settings of the reference give another.
     let kernels = folder.path().join("kernels");
     std::fs::create_dir_all(kernels.join("accel")).expect("a writable folder");
     let edited = std::fs::read_to_string("kernels/accel/leaf.wesl").expect("a kernel");
@@ -208,7 +208,7 @@ fn a_reference_is_rendered_once_for_all_runs_that_it_serves() {
     }
     assert_eq!(run("damaged", &[]), (false, rendered.clone()));
     assert_eq!(run("mended", &[]), (true, rendered));
-    // A cache that cannot be written is told, and the run goes on.
+    // A cache that cannot be written is reported, and the run continues.
     std::fs::write(folder.path().join("file"), "").expect("a writable folder");
     let unusable = with_cache(folder.path(), &folder.path().join("file"), "unusable", &[]);
     assert!(!unusable.0);

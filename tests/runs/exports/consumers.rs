@@ -20,7 +20,7 @@ fn answer(program: &str, arguments: &[&str], input: &str) -> Option<(bool, Strin
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
     let mut child = command.spawn().ok()?;
-    // A program that does not read to the end says why by itself.
+    // A program that does not read to the end reports the reason itself.
     let _ = child
         .stdin
         .take()
@@ -33,7 +33,7 @@ fn answer(program: &str, arguments: &[&str], input: &str) -> Option<(bool, Strin
     ))
 }
 
-/// A shell that takes the completions and knows raystone then.
+/// A shell that loads the completions and then knows raystone.
 pub fn shell(shell: &str, arguments: &[&str], script: &str) {
     match answer(shell, arguments, script) {
         None => needs::skip("shells", format!("{shell} is not installed")),

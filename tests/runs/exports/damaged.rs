@@ -1,4 +1,4 @@
-//! Records that were damaged: whatever they say, nothing panics that reads them, and no figure comes of what cannot be.
+//! Damaged records: no reader panics, and no impossible value becomes a figure.
 
 use super::{folder_of, records, run_folder};
 use raystone::compare::judge::ChangeVerdict;
@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 
 /// Damaged files of one run of the test.
 const MUTANTS: u64 = 300;
-/// Every so many of them is made into pages, which take longest.
+/// One in so many of them is made into pages, which take longest.
 const PAGES: u64 = 10;
 
-/// What stands in the place of a value. Numbers of another unit, sign or size; words; nothing.
+/// Replacements of a value. Numbers of another unit, sign or size; words; nothing.
 fn damages(old: &Value) -> Vec<Value> {
     let mut all = vec![
         json!(0),
@@ -52,7 +52,7 @@ fn damages(old: &Value) -> Vec<Value> {
     all
 }
 
-/// Where all values of a record stand.
+/// Lists the places of all values of a record.
 fn places(value: &Value, at: &str, into: &mut Vec<String>) {
     match value {
         Value::Object(map) => {
@@ -75,7 +75,7 @@ fn pick<'a, T>(random: &mut Pcg32, of: &'a [T]) -> &'a T {
     &of[random.below(of.len())]
 }
 
-/// Takes a value away, or calls it something else.
+/// Removes a value, or renames it.
 fn rename(record: &mut Value, at: &str, to: Option<&str>) {
     let Some((parent, key)) = at.rsplit_once('/') else {
         return;
@@ -205,7 +205,7 @@ fn with(kind: &str, at: &str, value: Option<Value>) -> String {
     lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
-/// What a comparison with damaged records says: an error, or what it comes to.
+/// Compares with damaged records: an error, or the verdict.
 fn said(text: &str) -> Result<(ChangeVerdict, usize), String> {
     let folder = folder_of(text);
     let sound = Side::read(&run_folder()).expect("sound records");

@@ -1,4 +1,4 @@
-//! The shapes that tools ask for, and the part of JSON Schema that the schema of records uses.
+//! The shapes that tools require, and the part of JSON Schema that the schema of records uses.
 
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ pub fn bencher(file: &Value) -> Checked {
     }
 }
 
-/// `BenchmarkResult` of the action's `src/extract.ts`; its charts tell benchmarks apart by name.
+/// `BenchmarkResult` of the action's `src/extract.ts`; its charts distinguish benchmarks by name.
 pub fn github(file: &Value) -> Checked {
     let entries = file.as_array().ok_or("no array")?;
     let mut names = BTreeSet::new();
@@ -66,7 +66,7 @@ pub fn github(file: &Value) -> Checked {
     }
 }
 
-/// What `tools/gbench/report.py` reads, and repetitions that are numbered from 0.
+/// The format that `tools/gbench/report.py` reads, with repetitions numbered from 0.
 pub fn google_benchmark(file: &Value) -> Checked {
     if !file["context"].is_object() {
         return Err("no context".into());
@@ -127,7 +127,7 @@ pub fn hyperfine(file: &Value) -> Checked {
     }
 }
 
-/// Whether a value fits a schema: types, constants, enumerations, references, alternatives, properties, items and
+/// Checks that a value fits a schema: types, constants, enumerations, references, alternatives, properties, items and
 /// bounds.
 pub fn validate(root: &Value, schema: &Value, value: &Value) -> Checked {
     if let Some(reference) = schema["$ref"].as_str() {

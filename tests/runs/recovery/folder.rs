@@ -99,7 +99,7 @@ fn a_killed_rerun_leaves_the_earlier_results() {
     let out = folder.path();
     whole_run(out, &[]);
     let before = std::fs::read(out.join("records.jsonl")).expect("records");
-    // Before anything is measured, while records are written, and behind the structures.
+    // Before all measurements, while records are written, and after the structures.
     for (place, at, least) in [
         (Place::ReferenceTracer, None, 1),
         (Place::Reference, Some(2), 2),
@@ -165,7 +165,7 @@ fn signals_end_a_run_with_its_records_and_a_report() {
         held.wait();
         held.send(signal);
         if signal == "INT" {
-            // It ends behind the cell that is being measured, and no sooner.
+            // It ends after the cell that is being measured, and no sooner.
             held.hear("SIGINT: the run ends behind the cell");
             assert!(!folder.path().join("records.jsonl").exists());
             held.let_go();
@@ -202,7 +202,7 @@ fn an_interrupted_rerun_leaves_the_earlier_results() {
     assert!(!records(&folder.path().join("partial")).is_empty());
 }
 
-/// A model below folders with long names, as `tests/data/tiny.toml` takes it.
+/// A model below folders with long names, as `tests/data/tiny.toml` needs it.
 fn model(path: &Path) -> String {
     std::fs::create_dir_all(path.parent().expect("a folder")).expect("folders");
     std::fs::write(path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("a model");

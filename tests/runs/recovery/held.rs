@@ -1,4 +1,5 @@
-//! A run that waits where a test wants it to: what it reads of its cache is a pipe there, which nobody has written to yet.
+//! A run that waits at a place chosen by a test: the file that it reads from its cache is a pipe, to which nobody has
+//! written yet.
 
 use super::{program, records, stderr};
 use std::fs::File;
@@ -10,15 +11,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Nothing that is waited for takes so long, on a busy machine: a last guard against waiting for ever.
+/// Longer than any wait on a busy machine: a last guard against waiting for ever.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// Where a run is held.
+/// The place where a run is held.
 #[derive(Clone, Copy)]
 pub enum Place {
-    /// Before anything is measured: it asks whether its judge was checked before.
+    /// Before all measurements: it looks up whether its reference tracer was checked before.
     ReferenceTracer,
-    /// Behind its structures: it asks for its reference.
+    /// After its structures: it looks up its reference.
     Reference,
 }
 
@@ -37,7 +38,7 @@ impl Place {
     }
 }
 
-/// What a whole run keeps for the next one.
+/// Returns the cache left by a whole run.
 fn kept() -> &'static Path {
     static KEPT: OnceLock<TempDir> = OnceLock::new();
     let whole = || {
@@ -149,7 +150,7 @@ impl Held {
         }
     }
 
-    /// Waits until it has written so many records into `partial/`, and goes on.
+    /// Waits until it has written so many records into `partial/`, and returns.
     pub fn wait_for_records(&self, out: &Path, number: usize) {
         let path = out.join("partial/records.jsonl");
         let start = Instant::now();
@@ -164,7 +165,7 @@ impl Held {
         self.gate.open();
     }
 
-    /// Waits until it has said this.
+    /// Waits until it has printed this.
     pub fn hear(&mut self, words: &str) {
         while !self.heard.contains(words) {
             match self.next_line() {
@@ -194,7 +195,7 @@ impl Held {
         assert_eq!(status.code(), None, "it ended by itself: {}", self.heard);
     }
 
-    /// Waits for its end: its exit code, and all that it said.
+    /// Waits for its end: its exit code, and all its output.
     pub fn end(mut self) -> (Option<i32>, String) {
         loop {
             match self.next_line() {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What is fetched from npm, once.
+/// The package fetched from npm, once.
 const AXE: &str = "axe-core@4.10.3";
 
 /// A browser that was found.
@@ -14,16 +14,16 @@ pub struct Browser {
     axe: Option<String>,
 }
 
-/// What a visit found.
+/// The results of a visit.
 #[derive(Debug)]
 pub struct Seen {
     found: Value,
-    /// What the page logged.
+    /// The console log of the page.
     pub console: Vec<String>,
 }
 
 impl Browser {
-    /// The browser in `$CHROMIUM`, else on the path; says so if there is none.
+    /// The browser in `$CHROMIUM`, else on the path; reports if there is none.
     pub fn find() -> Option<Self> {
         let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
         let names = ["chromium", "chromium-browser", "google-chrome", "chrome"].map(PathBuf::from);
@@ -138,7 +138,7 @@ impl Seen {
         self.found.get(name)
     }
 
-    /// Whether a finding is true.
+    /// Returns `true` if a finding is true.
     pub fn is(&self, name: &str) -> bool {
         self.found[name] == true
     }
@@ -188,7 +188,7 @@ pub fn colour(value: &Value) -> [u8; 3] {
     })
 }
 
-/// The text of axe-core, from npm or from an earlier visit there; says so if it cannot be had.
+/// The text of axe-core, from npm or from an earlier visit there; reports if it cannot be fetched.
 fn axe() -> Option<String> {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join(AXE);
     let file = cache.join("package/axe.min.js");

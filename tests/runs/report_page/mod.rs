@@ -19,7 +19,7 @@ use std::time::Instant;
 
 /// Pixels of the synthetic images.
 const SIZE: [u32; 2] = [32, 24];
-/// The pixel that the browser is asked about.
+/// The pixel that the browser reads.
 const PIXEL: [u32; 2] = [7, 5];
 
 /// An image whose every pixel is its own: shifted by a number that its name gives.
@@ -56,13 +56,13 @@ fn small_page() -> (tempfile::TempDir, String) {
     (folder, page)
 }
 
-/// What each pixel of a picture is shown as.
+/// Returns the displayed colour of the pixel.
 fn colour(name: &str, exposure: f32) -> [u8; 3] {
     let pixel = image(name).pixels[(PIXEL[1] * SIZE[0] + PIXEL[0]) as usize];
     displayed(&pixel, exposure).map(|v| (v * 255.0).round() as u8)
 }
 
-/// Whether two colours are the same but for the rounding of 16-bit floats.
+/// Returns `true` if two colours are the same but for the rounding of 16-bit floats.
 fn close(a: [u8; 3], b: [u8; 3]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 1)
 }
@@ -126,7 +126,7 @@ fn a_page_works_in_a_browser_wide_and_narrow_light_and_dark() {
             "{seen:?}"
         );
         assert_eq!(seen.number("unfiltered"), 0.0);
-        // What a plot tells is what its table says.
+        // The tooltip of a plot matches its table.
         assert!(
             seen.string("tip").contains("primary rays") && !seen.is("tipHidden"),
             "{seen:?}"
@@ -135,7 +135,7 @@ fn a_page_works_in_a_browser_wide_and_narrow_light_and_dark() {
     }
 }
 
-/// The comparer shows what the images hold.
+/// The comparer shows the content of the images.
 fn check_comparer(seen: &Seen) {
     let reference = "images/reference-cornell-box-path.png";
     let first = "images/render-cornell-box-path-pixel-hash-none.png";
