@@ -16,7 +16,7 @@ fn kind(adapter: &AdapterSummary) -> &'static str {
     }
 }
 
-/// Driver and version; some drivers give only one of the two.
+/// Returns the driver and version; some drivers give only one of the two.
 fn driver(adapter: &AdapterSummary) -> String {
     let info = &adapter.info;
     let parts = [info.driver.as_str(), info.driver_info.as_str()];
@@ -27,14 +27,14 @@ fn driver(adapter: &AdapterSummary) -> String {
     }
 }
 
-/// The most bytes that a kernel can bind as one array.
+/// Returns the most bytes that a kernel can bind as one array.
 pub fn largest_binding(limits: &wgpu::Limits) -> u64 {
     limits
         .max_storage_buffer_binding_size
         .min(limits.max_buffer_size)
 }
 
-/// An adapter in lists: its number and name, and below them everything else.
+/// Describes an adapter for lists: its number and name, and below them everything else.
 pub fn row(adapter: &AdapterSummary) -> Row {
     let timestamps = if adapter.timestamps { "yes" } else { "no" };
     let (kind, driver, largest) = (

@@ -39,7 +39,7 @@ impl DeviceArguments {
         }
     }
 
-    /// The folder of kernels as an override of an experiment.
+    /// Returns the folder of kernels as an override of an experiment.
     pub fn kernels_override(&self) -> Option<String> {
         on_axis(Axis::Kernels, self.kernels.iter().map(|f| f.display()))
     }
@@ -110,7 +110,7 @@ pub fn of_flags(
     Ok(Experiment::parse(CELL, &name, &overrides, &catalogue)?)
 }
 
-/// The one cell of an experiment.
+/// Returns the one cell of an experiment.
 ///
 /// # Errors
 /// An axis with several values.
@@ -162,7 +162,7 @@ pub fn unknown<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Stri
     format!("there is no `{name}`{hint} (known: {known})")
 }
 
-/// `512x384` as width and height.
+/// Reads `512x384` as width and height.
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X', '×'])

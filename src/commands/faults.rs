@@ -45,7 +45,7 @@ pub fn plant_faults(out: &Path, adapter: Option<&AdapterChoice>) -> Result<ExitC
     Ok(ended(status.success()))
 }
 
-/// The folder of the checkout that the current folder is in.
+/// Returns the folder of the checkout that the current folder is in.
 fn checkout() -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;
     let is_checkout = |folder: &&Path| {
@@ -56,7 +56,7 @@ fn checkout() -> Option<PathBuf> {
     here.ancestors().find(is_checkout).map(Path::to_owned)
 }
 
-/// `out` as an absolute path, for the test runs elsewhere, without the table of an earlier run.
+/// Returns `out` as an absolute path, since the test runs elsewhere, without the table of an earlier run.
 fn prepared(out: &Path) -> Result<PathBuf> {
     let out = std::path::absolute(out)?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;

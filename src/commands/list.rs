@@ -124,7 +124,7 @@ static TOPICS: [Topic; 21] = [
     other(ADAPTER, "best first", |_, _| raystone::gpu::adapters().iter().map(adapters::row).collect()),
 ];
 
-/// The topic of this name, or of its plural.
+/// Returns the topic of this name, or of its plural.
 fn topic(name: &str) -> Result<&'static Topic, String> {
     let is_it = |known: &str| name.strip_suffix('s').unwrap_or(name) == known || name == known;
     let found = TOPICS
@@ -219,7 +219,7 @@ fn entries(entries: &[Entry]) -> Vec<Row> {
     entries.iter().enumerate().map(row).collect()
 }
 
-/// The default of a parameter; a dash where it has none that could be written.
+/// Returns the default of a parameter; a dash where it has none that could be written.
 fn default(parameter: &Parameter) -> String {
     let default = parameter.default_written();
     default.map_or("–".to_owned(), ToString::to_string)

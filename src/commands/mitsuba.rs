@@ -30,7 +30,7 @@ pub struct SceneArguments {
 }
 
 impl SceneArguments {
-    /// A flag that was given, if any was.
+    /// Returns a flag that was given, if any was.
     pub fn first_given(&self) -> Option<&'static str> {
         let flags = [
             ("--size", self.size.is_some()),

@@ -38,7 +38,7 @@ impl Report {
     }
 }
 
-/// Page, figures and checks of a run, as JSON.
+/// Returns the page, figures and checks of a run, as JSON.
 pub fn findings(dir: &Path, page: &Path) -> Result<Value> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);

@@ -207,13 +207,13 @@ fn references(
     Ok(ended(failures.is_empty()))
 }
 
-/// The image to compare with as an override of an experiment.
+/// Returns the image to compare with as an override of an experiment.
 fn reference_override(file: &Path) -> String {
     let file = toml::Value::from(file.display().to_string());
     format!("reference.file={file}")
 }
 
-/// The format of linear images with this ending.
+/// Returns the format of linear images with this ending.
 fn linear_format(text: &str) -> Result<&'static FileFormat, String> {
     let ending = text.trim_start_matches('.').to_ascii_lowercase();
     let found = FileFormat::linear().find(|format| format.ending == ending);
@@ -274,7 +274,7 @@ fn plural(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
-/// `results/NAME`, with a folder for a shard below it, where a name such as `../a b` cannot lead out of `results`.
+/// Returns `results/NAME`, with a folder for a shard below it; a name such as `../a b` cannot lead out of `results`.
 fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
     let plain = |c: char| match c {
         '-' | '_' | '.' => c,

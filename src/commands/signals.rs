@@ -2,8 +2,8 @@
 
 use raystone::run::Interrupt;
 
-/// The first SIGINT lets the run finish the cell that is being measured; the next one, and SIGTERM, end the program after the records so far
-/// have a report; and one more ends it at once. The exit code is 128 and the number of the signal.
+/// Handles signals: the first SIGINT lets the run finish the cell that is being measured; the next one, and SIGTERM, end the program after
+/// the records so far have a report; and one more ends it at once. The exit code is 128 and the number of the signal.
 ///
 /// # Errors
 /// The system refuses the handlers.
@@ -39,7 +39,7 @@ pub fn watch(interrupt: Interrupt) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Other systems end the program at once; the records so far stay in `partial/`.
+/// Does nothing: other systems end the program at once; the records so far stay in `partial/`.
 #[cfg(not(unix))]
 pub fn watch(_: Interrupt) -> std::io::Result<()> {
     Ok(())

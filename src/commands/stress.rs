@@ -92,7 +92,7 @@ impl Stress {
         )
     }
 
-    /// The options, laid over the experiment.
+    /// Returns the options, laid over the experiment.
     fn overrides(&self) -> Result<Vec<String>> {
         let mut overrides = Vec::from_iter(self.device.kernels_override());
         if self.quick {

@@ -21,7 +21,7 @@ const VARIABLES: [(&str, &str); 5] = [
     ("LP_NUM_THREADS", "threads of Mesa's software driver"),
 ];
 
-/// The variables with their values.
+/// Returns the variables with their values.
 pub fn environment() -> String {
     let width = VARIABLES
         .iter()
@@ -49,7 +49,7 @@ pub struct System {
 }
 
 impl System {
-    /// This system.
+    /// Returns this system.
     pub fn this() -> Self {
         match std::fs::read_to_string("/etc/os-release") {
             Ok(text) => Self::parse(&text),
@@ -83,7 +83,7 @@ impl System {
         self.families.first().is_some_and(|id| id == "debian") && self.version == "12"
     }
 
-    /// The line that installs a driver which runs on any processor.
+    /// Returns the line that installs a driver which runs on any processor.
     pub fn install_line(&self) -> &'static str {
         if cfg!(any(target_os = "macos", windows)) {
             return "(the driver comes with the system: update it)";
@@ -107,7 +107,7 @@ impl System {
     }
 }
 
-/// Processor model and hardware threads.
+/// Returns the processor model and hardware threads.
 pub fn processor() -> String {
     let model = cpu_model();
     match std::thread::available_parallelism() {

@@ -57,7 +57,7 @@ impl Trace {
         Ok(ended(equal))
     }
 
-    /// Scene, structure and tests with their parameters, read as those of an experiment file.
+    /// Reads scene, structure and tests with their parameters, as those of an experiment file.
     fn cell(&self, registries: &Registries) -> Result<Cell> {
         // A case of the suite is no scene of an experiment; the cell then has the default one.
         let scene = Address::parse(&self.scene).is_none().then_some(&self.scene);

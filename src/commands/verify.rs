@@ -118,7 +118,7 @@ impl Verify {
     }
 }
 
-/// Every structure on the scenes of the gate.
+/// Returns every structure on the scenes of the gate.
 fn all(registries: &Registries) -> impl Iterator<Item = String> {
     let catalogue = registries.catalogue();
     let structures = catalogue[Axis::Accel].iter().map(|entry| &entry.name);
@@ -184,7 +184,7 @@ fn ending(all: usize, failed: usize, refused: usize) -> String {
     format!("{} of {all} structures passed\n{left_out}", all - failed)
 }
 
-/// Every structure with its verdict or why there is none, and every integrator.
+/// Returns every structure with its verdict or why there is none, and every integrator.
 fn as_json(verified: &[Verified], skipped: &[Skipped]) -> Value {
     let structures = verified.iter().map(|one| {
         json!({
@@ -343,7 +343,7 @@ fn oracle(check: &ReferenceCheck) -> String {
     )
 }
 
-/// Everything that went wrong, in words.
+/// Returns everything that went wrong, in words.
 fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
     let verdict = match verdict {
         Ok(verdict) => verdict,

@@ -41,7 +41,7 @@ pub struct CoherenceAt {
     pub groups: Vec<Vec<[u64; 2]>>,
 }
 
-/// Rays and predicted cycles of a class in each group of warps.
+/// Returns the rays and predicted cycles of a class in each group of warps.
 pub fn by_group(groups: &[Tallies], class: u32) -> Vec<[u64; 2]> {
     let of_group = |group: &Tallies| {
         let tally = group.get(&class).copied().unwrap_or_default();
@@ -51,7 +51,7 @@ pub fn by_group(groups: &[Tallies], class: u32) -> Vec<[u64; 2]> {
 }
 
 impl CoherenceRecord {
-    /// Its figures by samples per pixel, organisation and class of rays.
+    /// Returns its figures by samples per pixel, organisation and class of rays.
     pub fn readings(&self) -> Vec<Reading> {
         let line_bytes = self.settings.line_bytes;
         self.at
@@ -77,7 +77,7 @@ impl CoherenceAt {
         all
     }
 
-    /// Its figures; those of each class and of all rays.
+    /// Returns its figures; those of each class and of all rays.
     fn readings(&self, line_bytes: u32) -> Vec<Reading> {
         let key = Key::default().with(axis::SPP, self.spp);
         let key = key.with(axis::SUBJECT, &self.organisation);
@@ -105,7 +105,7 @@ impl CoherenceAt {
         readings
     }
 
-    /// Rays and predicted cycles of all classes together in each group of warps, where those are known.
+    /// Returns the rays and predicted cycles of all classes together in each group of warps, where those are known.
     fn groups_of_all(&self) -> Option<Vec<[u64; 2]>> {
         let mut all = vec![[0; 2]; self.groups.first()?.len()];
         for groups in &self.groups {
@@ -117,13 +117,13 @@ impl CoherenceAt {
         Some(all)
     }
 
-    /// Predicted cycles of a path: see [`Tally::cost`].
+    /// Returns the predicted cycles of a path: see [`Tally::cost`].
     pub fn cost_of_path(&self) -> Option<f64> {
         ratio(self.all().cost(), self.paths)
     }
 }
 
-/// Predicted cycles over rays or paths, from counts of those and of cycles by group.
+/// Returns the predicted cycles over rays or paths, from counts of those and of cycles by group.
 fn cycles_over(groups: Option<&[[u64; 2]]>) -> Samples {
     let of_one = |[count, cycles]: &[u64; 2]| [*cycles as f64, *count as f64];
     let groups = groups.map(|groups| groups.iter().map(of_one).collect());
@@ -163,12 +163,12 @@ pub struct Tally {
 pub const COST: [u64; 4] = [25, 1, 5, 9];
 
 impl Tally {
-    /// Lines that were not in the L1.
+    /// Returns the number of lines that were not in the L1.
     pub fn l2_accesses(&self) -> u64 {
         self.lines - self.l1_hits
     }
 
-    /// Lines that came from memory.
+    /// Returns the number of lines that came from memory.
     pub fn misses(&self) -> u64 {
         self.l2_accesses() - self.l2_hits
     }
@@ -180,7 +180,7 @@ impl Tally {
         counts.iter().zip(COST).map(|(n, cycles)| n * cycles).sum()
     }
 
-    /// Share of the lanes that take part in an issue.
+    /// Returns the share of the lanes that take part in an issue.
     pub fn efficiency(&self) -> Option<f64> {
         ratio(self.active, self.lanes)
     }
@@ -205,7 +205,7 @@ impl Tally {
             .collect()
     }
 
-    /// Figures by id, those that there are.
+    /// Returns the known figures by id.
     pub fn figures(&self, line_bytes: u32) -> [(&'static Figure, Option<f64>); 9] {
         let line = u64::from(line_bytes);
         [
@@ -228,7 +228,7 @@ impl Tally {
     }
 }
 
-/// The quotient of two counts; `None` if there is none.
+/// Returns the quotient of two counts; `None` if there is none.
 fn ratio(part: u64, of: u64) -> Option<f64> {
     (of > 0).then(|| part as f64 / of as f64)
 }

@@ -157,14 +157,14 @@ pub struct SpectrumRecord {
 }
 
 impl ReferenceRecord {
-    /// Its own error.
+    /// Returns its own error.
     pub fn readings(&self) -> Vec<Reading> {
         Reading::known([(&figure::REFERENCE_MSE, self.mse)])
     }
 }
 
 impl BiasRecord {
-    /// Its figures; none where it was not testable.
+    /// Returns its figures; none where it was not testable.
     pub fn readings(&self) -> Vec<Reading> {
         let Some(p) = self.p else {
             return Vec::new();
@@ -196,7 +196,7 @@ impl SpectrumRecord {
         (at.rmse.value > 0.0).then_some(at.rmse.value)
     }
 
-    /// Its figures.
+    /// Returns its figures.
     pub fn readings(&self) -> Vec<Reading> {
         let key = Key::default().with(axis::SPP, self.spp);
         let before = self.unfiltered();

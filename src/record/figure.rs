@@ -85,7 +85,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A row of the table.
+    /// Returns a row of the table.
     pub const fn new(
         id: &'static str,
         title: &'static str,
@@ -104,7 +104,7 @@ impl Figure {
         }
     }
 
-    /// Title and unit, as the head of a column.
+    /// Returns title and unit, as the head of a column.
     pub fn heading(&self) -> String {
         match self.unit.is_empty() {
             true => self.title.to_string(),
@@ -303,7 +303,7 @@ figures! {
     ALARMS = "alarms/v1", "figures beyond their alarm level", "", Lower, Count, Exact;
 }
 
-/// The figure of this program with this id.
+/// Returns the figure of this program with this id.
 pub fn find(id: &str) -> Option<&'static Figure> {
     static BY_ID: LazyLock<HashMap<&str, &Figure>> = LazyLock::new(|| {
         FIGURES
@@ -314,7 +314,7 @@ pub fn find(id: &str) -> Option<&'static Figure> {
     BY_ID.get(id).copied()
 }
 
-/// The same of an id that is known to be there.
+/// Returns the figure of this id, which must exist.
 ///
 /// # Panics
 /// There is none: the table and the code that measures do not fit.

@@ -124,7 +124,7 @@ impl From<Written> for PlainOrWhole {
     }
 }
 
-/// A variant without parameters.
+/// Returns a variant without parameters.
 fn plain(label: &str) -> Variant {
     Variant {
         name: label.to_owned(),
@@ -155,13 +155,13 @@ impl From<&Key> for Cell {
 }
 
 impl Key {
-    /// The same key with a name on an axis; an empty name leaves it out.
+    /// Returns the same key with a name on an axis; an empty name leaves it out.
     #[must_use]
     pub fn with(self, axis: &str, label: impl fmt::Display) -> Self {
         self.with_variant(axis, &plain(&label.to_string()))
     }
 
-    /// The same key with a variant on an axis; one without a name (the embedded kernels) leaves it out.
+    /// Returns the same key with a variant on an axis; one without a name (the embedded kernels) leaves it out.
     #[must_use]
     pub fn with_variant(mut self, axis: &str, variant: &Variant) -> Self {
         if variant.name.is_empty() {
@@ -177,17 +177,17 @@ impl Key {
         self.0.get(axis).map(|written| &written.0)
     }
 
-    /// Label of [`Key::get`]; empty without one.
+    /// Returns the label of [`Key::get`]; empty without one.
     pub fn label(&self, axis: &str) -> &str {
         self.get(axis).map_or("", |variant| &variant.label)
     }
 
-    /// Registered name of [`Key::get`]; empty without one.
+    /// Returns the registered name of [`Key::get`]; empty without one.
     pub fn name(&self, axis: &str) -> &str {
         self.get(axis).map_or("", |variant| &variant.name)
     }
 
-    /// The axes that matter, each with its label: known ones in their order, others after them.
+    /// Returns the axes that matter, each with its label: known ones in their order, others after them.
     pub fn labels(&self) -> impl Iterator<Item = (&str, &str)> {
         let known = axis::ALL
             .into_iter()
@@ -197,7 +197,7 @@ impl Key {
         known.chain(others).map(|axis| (axis, self.label(axis)))
     }
 
-    /// The same key with these axes alone.
+    /// Returns the same key with these axes alone.
     #[must_use]
     pub fn only(&self, axes: &[&str]) -> Self {
         let kept = self
@@ -223,7 +223,8 @@ impl Key {
             .all(|axis| self.label(axis) == other.label(axis))
     }
 
-    /// The labels on some axes, in their order, empty where an axis does not matter: equal for keys that [agree].
+    /// Returns the labels on some axes, in their order, empty where an axis does not matter: equal for keys that
+    /// [agree].
     ///
     /// [agree]: Self::agrees
     pub fn labels_on(&self, axes: &[&str]) -> Vec<&str> {

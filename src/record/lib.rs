@@ -68,7 +68,7 @@ pub struct Line<B = Body> {
 }
 
 impl<B> Line<B> {
-    /// A line without a hash.
+    /// Returns a line without a hash.
     pub fn new(key: Key, ran: Ran, body: B) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -80,26 +80,26 @@ impl<B> Line<B> {
         }
     }
 
-    /// A line about the whole run.
+    /// Returns a line about the whole run.
     pub fn about_all(body: B) -> Self {
         Self::new(Key::default(), Ran::default(), body)
     }
 
-    /// The same line with the hash of its cell.
+    /// Returns the same line with the hash of its cell.
     #[must_use]
     pub fn hashed(mut self, hash: impl Into<String>) -> Self {
         self.hash = hash.into();
         self
     }
 
-    /// The same line with the figures that were measured.
+    /// Returns the same line with the figures that were measured.
     #[must_use]
     pub fn with_readings(mut self, readings: Vec<Reading>) -> Self {
         self.readings = readings;
         self
     }
 
-    /// The same line about another body.
+    /// Returns the same line about another body.
     pub fn with_body<C>(self, body: impl FnOnce(B) -> C) -> Line<C> {
         Line {
             schema: self.schema,
@@ -111,7 +111,7 @@ impl<B> Line<B> {
         }
     }
 
-    /// One part of the body beside the key.
+    /// Returns one part of the body beside the key.
     pub fn of<'a, T>(&'a self, body: &'a T) -> Recorded<'a, T> {
         Recorded {
             hash: &self.hash,
@@ -252,7 +252,7 @@ kinds! {
     Interrupted: InterruptedRecord,
 }
 
-/// All records of one kind, with their keys.
+/// Returns all records of one kind, with their keys.
 pub fn all_of<'a, T: Kind + 'a>(lines: &'a [Line]) -> impl Iterator<Item = Recorded<'a, T>> {
     lines
         .iter()

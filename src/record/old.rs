@@ -29,7 +29,7 @@ const IN_RAN: [&str; 4] = [axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST, axis::
 /// The separator of a name and its kernels.
 const KERNELS_MARK: &str = " @";
 
-/// The same line in the present schema.
+/// Returns the same line in the present schema.
 ///
 /// # Errors
 /// A body that lacks a field.
@@ -136,7 +136,7 @@ impl SamplerCost {
     }
 }
 
-/// A line of `raystone/1` with a key and a body.
+/// Returns a line of `raystone/1` with a key and a body.
 fn with_key(mut line: Value) -> Value {
     let mut take = |name: &str| line.as_object_mut().and_then(|line| line.remove(name));
     let hash = take("hash").unwrap_or_default();

@@ -44,7 +44,7 @@ impl PathsRecord {
         }
     }
 
-    /// Both together; the median is the greater one.
+    /// Combines both; the median is the greater one.
     pub fn and(self, other: Self) -> Self {
         Self {
             paths: self.paths + other.paths,

@@ -28,7 +28,7 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Those of a line.
+    /// Returns the images of a line.
     pub fn of(line: &Line) -> Self {
         let mut all = Self::default();
         match &line.body {
@@ -58,7 +58,7 @@ impl Pictures {
     }
 }
 
-/// The name of an image of this kind of a sampler, without its ending.
+/// Returns the name of an image of this kind of a sampler, without its ending.
 fn named(folder: &str, kind: &str, key: &Key) -> String {
     let labels = Cell::from(key).labels(&IMAGE_AXES);
     let labels = labels.iter().map(String::as_str);

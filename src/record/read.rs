@@ -110,7 +110,8 @@ pub fn read_records(dir: &Path) -> Result<Records, RecordError> {
     read_lines(&records_file(dir), SCHEMA)
 }
 
-/// The bytes of a file, unpacked where gzip packed it. Bytes, because a crash can cut a line inside a character.
+/// Returns the bytes of a file, unpacked if it was packed by gzip. Bytes, because a crash can cut a line inside a
+/// character.
 fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
     let bytes = std::fs::read(path)?;
     if !bytes.starts_with(&GZIP) {

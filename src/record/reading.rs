@@ -52,7 +52,7 @@ impl Samples {
 }
 
 impl Reading {
-    /// A value of which no more is known than its interval.
+    /// Creates a value with no more than its interval known.
     pub fn new(figure: &Figure, value: Interval) -> Self {
         Self {
             figure: figure.id.to_string(),
@@ -63,12 +63,12 @@ impl Reading {
         }
     }
 
-    /// A value that is exact or was measured once.
+    /// Creates a value that is exact or was measured once.
     pub fn exact(figure: &Figure, value: f64) -> Self {
         Self::new(figure, Interval::exact(value))
     }
 
-    /// Those figures that are known.
+    /// Returns the known ones of these figures.
     pub fn known<'f, T: Into<Interval>>(
         figures: impl IntoIterator<Item = (&'f Figure, Option<T>)>,
     ) -> Vec<Self> {
@@ -84,14 +84,14 @@ impl Reading {
         self
     }
 
-    /// The same reading of this work.
+    /// Returns the same reading of this work.
     #[must_use]
     pub fn of_work(mut self, work: impl Into<String>) -> Self {
         self.work = work.into();
         self
     }
 
-    /// The same reading with its samples.
+    /// Returns the same reading with its samples.
     #[must_use]
     pub fn with_samples(mut self, samples: Samples) -> Self {
         self.samples = samples;

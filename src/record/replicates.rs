@@ -37,7 +37,7 @@ impl Replicates<'_> {
         self.0.iter().all(|r| value(r, spp, id).is_some())
     }
 
-    /// Mean of a recorded metric over those that have it.
+    /// Returns the mean of a recorded metric over those that have it.
     pub fn mean(self, id: &str, spp: u32, without: Without) -> Option<f64> {
         let kept = self.0.iter().enumerate();
         let kept = kept.filter(|(i, _)| without != Without::Replicate(*i));
@@ -85,8 +85,8 @@ impl Replicates<'_> {
         Some(vec![of(0..half)?, of(half..2 * half)?])
     }
 
-    /// An estimated logarithm with its noise: that of the replicates is its own, that of the reference it shares
-    /// with all that are measured against it. Of a single replicate there is none.
+    /// Returns an estimated logarithm with its noise: that of the replicates is its own, that of the reference it
+    /// shares with all that are measured against it. Of a single replicate there is none.
     pub fn log_figure(
         self,
         id: &str,

@@ -94,7 +94,7 @@ fn of_cell(record: &TimeRecord, faults: &mut Vec<String>) {
     not_negative("stages", record.stages.values(), faults);
 }
 
-/// Times by one clock, round by round, and the same by others, which have as many rounds or none.
+/// Checks times by one clock, round by round, and the same by others, which have as many rounds or none.
 fn rounds(ms: &[f64], others: [&[f64]; 2], faults: &mut Vec<String>) {
     for times in others.into_iter().chain([ms]) {
         not_negative("a time", times, faults);

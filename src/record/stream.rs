@@ -45,7 +45,7 @@ impl StreamRecord {
         format!("{} (dimensions {a} and {b})", self.purpose)
     }
 
-    /// Its figures.
+    /// Returns its figures.
     pub fn readings(&self) -> Vec<Reading> {
         let key = Key::default().with(axis::DIMENSIONS, self.pair());
         let figures = &self.figures;
@@ -106,7 +106,7 @@ pub struct RecordedPoints {
 }
 
 impl RecordedPoints {
-    /// `words` of so many samples of so many pixels.
+    /// Records `words` of so many samples of so many pixels.
     pub fn new([samples, pixels]: [u32; 2], seed: u32, words: &[u32], spectrum: Vec<f64>) -> Self {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         Self {
@@ -118,7 +118,7 @@ impl RecordedPoints {
         }
     }
 
-    /// The points of each pixel as the renderer's floats; `None` if the text does not hold them.
+    /// Returns the points of each pixel as the renderer's floats; `None` if the text does not hold them.
     pub fn points(&self) -> Option<Vec<Vec<[f64; 2]>>> {
         let bytes = STANDARD.decode(&self.words).ok()?;
         let number = |b: &[u8]| f64::from(to_unit(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));

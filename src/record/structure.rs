@@ -46,7 +46,7 @@ pub enum RayClass {
 }
 
 impl RayClass {
-    /// Its name in keys, tables and plots.
+    /// Returns its name in keys, tables and plots.
     pub fn name(self) -> &'static str {
         match self {
             Self::Primary => "primary",
@@ -136,7 +136,7 @@ pub struct CountersPerRay {
 }
 
 impl CountersPerRay {
-    /// Of the work of these rays.
+    /// Returns the mean work of these rays.
     pub fn mean_of(work: &[Counters]) -> Self {
         let mean = |get: fn(&Counters) -> u32| {
             work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
@@ -178,7 +178,7 @@ pub struct ClassTiming {
 }
 
 impl ClassTiming {
-    /// Its figures.
+    /// Returns its figures.
     pub fn readings(&self) -> Vec<Reading> {
         let rate = |ms: &f64| self.rays as f64 / ms * 1e-3;
         let rates = |ms: &[f64]| ms.iter().map(rate).collect();
@@ -228,7 +228,7 @@ pub struct ClassCoherence {
 }
 
 impl ClassCoherence {
-    /// Its figures, class by class.
+    /// Returns its figures, class by class.
     pub fn readings(&self) -> Vec<Reading> {
         let classes = self.classes.iter().enumerate();
         let of_class = |(place, (class, tally)): (usize, &(RayClass, Tally))| {
@@ -380,7 +380,7 @@ const LEAF_CLASSES: [(&str, usize, usize); 8] = [
 ];
 
 impl OrderTime {
-    /// Its figures; `one_pass` is the time of the order with one pass.
+    /// Returns its figures; `one_pass` is the time of the order with one pass.
     fn readings(&self, one_pass: Option<Interval>) -> Vec<Reading> {
         let ratio = self.ms_per_spp.zip(one_pass);
         let ratio = ratio.map(|(ms, one)| Interval::exact(ms.value / one.value));
@@ -402,7 +402,7 @@ impl OrderTime {
 }
 
 impl PrimaryRecord {
-    /// Its figures.
+    /// Returns its figures.
     pub fn readings(&self) -> Vec<Reading> {
         let exact = |x: f64| Some(Interval::exact(x));
         let share = |pixels: u64| exact(pixels as f64 / self.pixels.max(1) as f64);
@@ -426,13 +426,14 @@ impl TimeRecord {
         self.failure.is_none() && self.image_equal && self.ms_per_spp.is_some()
     }
 
-    /// Rays that a render traces: `rays` also count those that were left out because they could change nothing.
+    /// Returns the number of rays that a render traces: `rays` also count those that were left out because they could change
+    /// nothing.
     pub fn traced_rays(&self) -> u64 {
         let classes = RAY_COUNT_CLASSES[..TRACED_CLASSES].iter();
         classes.filter_map(|class| self.rays.get(*class)).sum()
     }
 
-    /// The share of ray queries in the time of all stages, if stages were timed.
+    /// Returns the share of ray queries in the time of all stages, if stages were timed.
     pub fn query_share(&self) -> Option<f64> {
         let all: f64 = self.stages.values().sum();
         let queries = RAY_QUERIES
@@ -441,7 +442,7 @@ impl TimeRecord {
         (all > 0.0).then(|| queries.sum::<f64>() / all)
     }
 
-    /// Its figures, if it is [valid](Self::is_valid).
+    /// Returns its figures, if it is [valid](Self::is_valid).
     pub fn readings(&self) -> Vec<Reading> {
         if !self.is_valid() {
             return Vec::new();
@@ -488,7 +489,7 @@ impl StructureRecord {
         !self.build.is_empty() || self.gate.is_some()
     }
 
-    /// Its figures: those of the build if it was built, those of rays if it passed the gate.
+    /// Returns its figures: those of the build if it was built, those of rays if it passed the gate.
     pub fn readings(&self) -> Vec<Reading> {
         let mut readings = Vec::new();
         if self.is_built() {
@@ -566,7 +567,7 @@ pub fn fault_text(verdict: &GateVerdict) -> String {
 }
 
 impl GateVerdict {
-    /// What is wrong with the reference tracer itself, in words.
+    /// Describes the fault of the reference tracer itself; `None` if it is sound.
     pub fn reference_fault(&self) -> Option<String> {
         let [brute_force, oracle] = [&self.brute_force, &self.oracle];
         let first = [brute_force, oracle].map(|check| check.first_wrong.as_deref());

@@ -105,7 +105,8 @@ pub struct Measured<'a, T> {
 }
 
 impl<'a, T> Measured<'a, T> {
-    /// Its figures, from its readings; all of this kind on its scene take turns in the same rounds.
+    /// Returns its figures, from its readings; all of this kind on its scene are measured in turns in the same
+    /// rounds.
     pub(crate) fn values(
         &self,
         data: &RunData<'a>,
@@ -118,7 +119,7 @@ impl<'a, T> Measured<'a, T> {
         readings.into_iter().map(value).collect()
     }
 
-    /// Times of it, round by round; see [`sitting`].
+    /// Returns its times, round by round; see [`sitting`].
     pub(crate) fn rounds(&self, kind: &str, ms: &[f64]) -> Option<LogFigure> {
         LogFigure::of_rounds(&sitting(kind, &self.key, self.cell), ms)
     }
@@ -153,7 +154,7 @@ pub(crate) fn world(key: &Key) -> String {
 /// The cell that each line belongs to, by the line's hash.
 type Cells<'a> = HashMap<&'a str, &'a CellRecord>;
 
-/// The cells of these lines.
+/// Returns the cells of these lines.
 fn cells_of<'l>(lines: &'l [Line]) -> Cells<'l> {
     let cells = all_of::<CellRecord>(lines).map(|cell| cell.body);
     let hashes = |cell: &'l CellRecord| cell.lines.iter().map(move |hash| (&**hash, cell));
@@ -320,9 +321,9 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// Every sampler was tested at its share of the run's level. Those found biased need theirs no more: the
-    /// others share the level anew, until no more are found (Holm 1979; the chance that any sampler without bias
-    /// is called biased stays below the level).
+    /// Tests the samplers of a run together: each was tested at its share of the run's level; those found biased
+    /// release theirs, and the others share the level anew, until no more are found (Holm 1979; the chance that any
+    /// sampler without bias is called biased stays below the level).
     fn test_biases_together(&mut self) {
         let views = self.scenes.iter_mut().flat_map(|scene| &mut scene.views);
         let samplers = views.flat_map(|view| &mut view.samplers);
@@ -391,7 +392,7 @@ impl<'a> RunData<'a> {
         self.samplers = samplers;
     }
 
-    /// A row of the table of figures; of one that nobody describes only the id is known.
+    /// Returns the row of a figure in the table; of an undescribed one only the id is known.
     pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
         let from_outside = || self.run.iter().flat_map(|run| &run.figures);
         let unknown = || Figure {
@@ -403,17 +404,17 @@ impl<'a> RunData<'a> {
         known.map_or_else(|| Cow::Owned(unknown()), Cow::Borrowed)
     }
 
-    /// The cell that a line with this hash belongs to.
+    /// Returns the cell that a line with this hash belongs to.
     pub(crate) fn cell_of(&self, hash: &str) -> Option<&'a CellRecord> {
         self.by_line.get(hash).copied()
     }
 
-    /// Look of a structure in plots.
+    /// Returns the look of a structure in plots.
     pub(crate) fn structure_look(&self, name: &str) -> usize {
         STRUCTURES + place(&self.structures, name)
     }
 
-    /// Look of a sampler in plots.
+    /// Returns the look of a sampler in plots.
     pub(crate) fn sampler_look(&self, name: &str) -> usize {
         place(&self.samplers, name) % STRUCTURES
     }
@@ -460,7 +461,7 @@ impl<'a> RunData<'a> {
         find_or_push(samplers, |s| s.key.agrees(key, &SAMPLER_AXES), new)
     }
 
-    /// Cells of one of the measurements whose figures are readings alone.
+    /// Returns the cells of one of the measurements whose figures are readings alone.
     pub(crate) fn measured_by(&self, name: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
         let cells = self.measured.iter().filter(|cell| cell.measurement == name);
         cells.copied().collect()
@@ -487,7 +488,7 @@ impl<'a> RunData<'a> {
         timed.map(|cell| cell.run_began_unix_s).collect()
     }
 
-    /// Every view with its scene.
+    /// Returns every view with its scene.
     pub fn views(&self) -> impl Iterator<Item = (&SceneGroup<'a>, &View<'a>)> {
         self.scenes
             .iter()
@@ -496,30 +497,30 @@ impl<'a> RunData<'a> {
 }
 
 impl<'a> View<'a> {
-    /// Times that may be used.
+    /// Returns the times that may be used.
     pub(crate) fn valid_times(&self) -> impl Iterator<Item = &Measured<'a, TimeRecord>> {
         self.times.iter().filter(|time| time.is_valid())
     }
 
-    /// Names of the structures that were timed, in the order measured.
+    /// Returns the names of the structures that were timed, in the order measured.
     pub(crate) fn timed_structures(&self) -> Vec<String> {
         let names = self.times.iter().map(|time| time.structure.clone());
         without_repeats(names.collect())
     }
 
-    /// The time of a cell, unless it failed.
+    /// Returns the time of a cell, unless it failed.
     pub fn time(&self, structure: &str, sampler: &str) -> Option<&Measured<'_, TimeRecord>> {
         self.valid_times()
             .find(|time| time.structure == structure && time.sampler == sampler)
     }
 
-    /// Milliseconds per spp of [`View::time`].
+    /// Returns the milliseconds per spp of [`View::time`].
     pub fn ms_per_spp(&self, structure: &str, sampler: &str) -> Option<Interval> {
         self.time(structure, sampler)?.ms_per_spp
     }
 
-    /// The structure under which samplers are compared per second: of those timed with the most
-    /// samplers the one with the least geometric mean of the times.
+    /// Returns the structure under which samplers are compared per second: of those timed with the most samplers the
+    /// one with the least geometric mean of the times.
     pub(crate) fn fastest_structure(&self) -> Option<String> {
         let score = |name: &String| {
             let samplers = self.samplers.iter();
@@ -541,7 +542,7 @@ fn place(names: &[String], name: &str) -> usize {
     names.position(|known| known == name).unwrap_or(0)
 }
 
-/// The items, each once, in their order.
+/// Returns the items, each once, in their order.
 pub fn without_repeats<T: PartialEq>(items: Vec<T>) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for item in items {

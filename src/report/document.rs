@@ -75,7 +75,7 @@ pub(crate) struct Painted {
 }
 
 impl Painted {
-    /// The files of the figure in this place of its report.
+    /// Returns the files of the figure in this place of its report.
     fn of(drawing: &Drawing, place: usize) -> Result<Self, ReportError> {
         let png = (place < MOST_PNG).then(|| to_png(drawing, place < MOST_FOR_PRINT));
         Ok(Self {
@@ -107,7 +107,7 @@ pub struct Banner {
 }
 
 impl Banner {
-    /// A line of this tone.
+    /// Returns a line of this tone.
     pub fn new(tone: Tone, text: impl Into<String>) -> Self {
         let text = text.into();
         Self { tone, text }
@@ -126,7 +126,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// An empty section.
+    /// Returns an empty section.
     pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
         Self {
             id: id.into(),
@@ -177,7 +177,7 @@ impl Block {
         })
     }
 
-    /// The block, or those inside of it.
+    /// Returns the block, or those inside of it.
     pub fn leaves(&self) -> Vec<&Self> {
         match self {
             Self::Fold(fold) => fold.blocks.iter().flat_map(Self::leaves).collect(),
@@ -186,13 +186,13 @@ impl Block {
         }
     }
 
-    /// Plots, if any could be drawn.
+    /// Returns plots, if any could be drawn.
     pub fn figures(figures: impl IntoIterator<Item = Option<Illustration>>) -> Option<Self> {
         let figures: Vec<Illustration> = figures.into_iter().flatten().collect();
         (!figures.is_empty()).then_some(Self::Figures(figures))
     }
 
-    /// Pictures, if there are any.
+    /// Returns pictures, if there are any.
     pub(crate) fn gallery(
         caption: impl Into<String>,
         items: Vec<Picture>,
@@ -267,7 +267,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// The check as a line of a terminal.
+    /// Returns the check as a line of a terminal.
     pub fn line(&self) -> String {
         format!("{}  {}: {}\n", self.verdict.word(), self.title, self.detail)
     }
@@ -307,7 +307,7 @@ pub struct TableCell {
 }
 
 impl TableCell {
-    /// A figure with its interval or another smaller text.
+    /// Returns a figure with its interval or another smaller text.
     pub(crate) fn with_detail(text: impl Into<String>, detail: impl Into<String>) -> Self {
         Self {
             text: text.into(),
@@ -316,7 +316,7 @@ impl TableCell {
         }
     }
 
-    /// The same cell as a link.
+    /// Returns the same cell as a link.
     pub fn linked(mut self, address: impl Into<String>) -> Self {
         self.link = address.into();
         self
@@ -328,13 +328,13 @@ impl TableCell {
         Self::with_detail(n.to_string(), detail)
     }
 
-    /// The same cell with a tone.
+    /// Returns the same cell with a tone.
     pub(crate) fn toned(mut self, tone: Tone) -> Self {
         self.tone = tone;
         self
     }
 
-    /// Both texts in one line.
+    /// Returns both texts in one line.
     pub fn flat(&self) -> String {
         if self.detail.is_empty() {
             self.text.clone()
@@ -354,7 +354,7 @@ impl<T: Into<String>> From<T> for TableCell {
 }
 
 impl Table {
-    /// A table whose first column and those named with a leading `:` hold text.
+    /// Returns a table whose first column and those named with a leading `:` hold text.
     pub fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
         let mut table = Self {
             caption: caption.into(),
@@ -370,7 +370,7 @@ impl Table {
         table
     }
 
-    /// A table of these rows.
+    /// Returns a table of these rows.
     pub fn of<const N: usize>(
         caption: impl Into<String>,
         columns: &[&str; N],
@@ -389,7 +389,7 @@ impl Table {
         });
     }
 
-    /// The table as a block, or nothing if it has no rows.
+    /// Returns the table as a block, or nothing if it has no rows.
     pub fn into_block(self) -> Option<Block> {
         (!self.rows.is_empty()).then_some(Block::Table(self))
     }
@@ -418,7 +418,7 @@ pub struct Illustration {
 }
 
 impl Illustration {
-    /// A plot that is not painted yet; wide drawings take the full width.
+    /// Returns a plot that is not painted yet; wide drawings take the full width.
     pub fn new(name: impl Into<String>, caption: impl Into<String>, drawing: Drawing) -> Self {
         Self {
             name: name.into(),

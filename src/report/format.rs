@@ -21,7 +21,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// The same in plain characters.
+/// Formats the same in plain characters.
 fn plain(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -43,22 +43,22 @@ fn plain(value: f64, digits: usize) -> String {
     }
 }
 
-/// Three significant digits.
+/// Formats three significant digits.
 pub fn number(value: f64) -> String {
     significant(value, 3)
 }
 
-/// Three significant digits, or the dash.
+/// Formats three significant digits, or the dash.
 pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| ABSENT.into(), number)
 }
 
-/// `[low, high]`.
+/// Formats `[low, high]`.
 pub fn bounds(interval: &Interval) -> String {
     format!("[{}, {}]", number(interval.low), number(interval.high))
 }
 
-/// `value [low, high]`; the interval is left out where it has no width.
+/// Formats `value [low, high]`; the interval is left out where it has no width.
 pub fn interval(interval: &Interval) -> String {
     with_bounds(interval, number)
 }
@@ -80,7 +80,7 @@ pub(crate) fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
     }
 }
 
-/// A slope with its interval; the interval is left out where it has no width.
+/// Formats a slope with its interval; the interval is left out where it has no width.
 pub(crate) fn slope(interval: &Interval) -> String {
     with_bounds(interval, exponent)
 }
@@ -89,7 +89,7 @@ fn exponent(value: f64) -> String {
     format!("{value:.2}").replace('-', "−")
 }
 
-/// An integer with thin groups of three: `262,267`.
+/// Formats an integer with thin groups of three: `262,267`.
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
@@ -102,7 +102,7 @@ pub fn count(value: u64) -> String {
     text
 }
 
-/// Bytes with a binary unit.
+/// Formats bytes with a binary unit.
 pub fn bytes(value: u64) -> String {
     const UNITS: [&str; 4] = ["KiB", "MiB", "GiB", "TiB"];
     if value < 1024 {
@@ -117,7 +117,7 @@ pub fn bytes(value: u64) -> String {
     format!("{} {}", number(scaled), UNITS[unit])
 }
 
-/// A value as its row in the table of figures wants it.
+/// Formats a value by its row in the table of figures.
 pub fn figure(figure: &Figure, value: f64) -> String {
     match figure.shown {
         _ if !value.is_finite() => ABSENT.into(),
@@ -129,7 +129,7 @@ pub fn figure(figure: &Figure, value: f64) -> String {
     }
 }
 
-/// A share as whole percent, one decimal below ten.
+/// Formats a share as whole percent, one decimal below ten.
 pub(crate) fn percent(share: f64) -> String {
     let value = share * 100.0;
     if value.abs() < 10.0 {
@@ -139,7 +139,7 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
-/// `1 sampler`, `3 samplers`.
+/// Formats `1 sampler`, `3 samplers`.
 pub(crate) fn plural(n: usize, noun: &str) -> String {
     if n == 1 {
         format!("1 {noun}")
@@ -148,7 +148,7 @@ pub(crate) fn plural(n: usize, noun: &str) -> String {
     }
 }
 
-/// Date, adapter and processor in one line.
+/// Formats date, adapter and processor in one line.
 pub fn where_and_when(e: &Environment, unix_s: u64) -> String {
     format!(
         "{} on {} ({}, {} {}), {}",
@@ -161,7 +161,7 @@ pub fn where_and_when(e: &Environment, unix_s: u64) -> String {
     )
 }
 
-/// Seconds since 1970 as `YYYY-MM-DD hh:mm UTC` (days to civil date by Hinnant's algorithm).
+/// Formats seconds since 1970 as `YYYY-MM-DD hh:mm UTC` (days to civil date by Hinnant's algorithm).
 pub(crate) fn utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     let shifted = days + 719_468;

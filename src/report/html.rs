@@ -8,8 +8,8 @@ use minijinja::{Environment, context};
 /// Placeholder of the nonce until that is known.
 const PLACE: &str = "NONCE-OF-THIS-PAGE";
 
-/// The page: plots inlined as SVG, pictures as `data:` addresses, nothing fetched. Its policy lets no script run but its
-/// own, which a nonce marks: the hash of the page, which nothing in the page can know beforehand.
+/// Returns the page: plots inlined as SVG, pictures as `data:` addresses, nothing fetched. Its policy allows no script
+/// but its own, marked by a nonce: the hash of the page, which nothing in the page can know beforehand.
 ///
 /// # Errors
 /// [`ReportError::Template`].

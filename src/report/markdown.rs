@@ -3,7 +3,7 @@
 use super::document::*;
 use raystone_core::text::escape::markdown as escape;
 
-/// The summary: everything but the pictures, with plots linked under `plots/`.
+/// Returns the summary: everything but the pictures, with plots linked under `plots/`.
 pub fn summary(document: &Document) -> String {
     let (title, subtitle) = (escape(&document.title), escape(&document.subtitle));
     let mut out = format!("# {title}\n\n{subtitle}\n");
@@ -86,7 +86,7 @@ fn picture(item: &Picture) -> String {
     }
 }
 
-/// A table with its caption before it.
+/// Returns a table with its caption before it.
 pub fn table(table: &Table) -> String {
     let columns = || table.columns.iter();
     let heads: String = columns()

@@ -36,14 +36,14 @@ impl Names {
         }
     }
 
-    /// A structure among all of its scene.
+    /// Returns the name of a structure among all of its scene.
     pub fn structure(&self, key: &Key) -> String {
         let main = key.label(axis::ACCEL).to_owned();
         let further = [axis::TRIANGLE, axis::BOX_TEST, axis::WORKGROUP, axis::LOAD];
         self.with_further(main + &kernels(key), key, &further)
     }
 
-    /// A sampler among those of one view, or one whose words were read back.
+    /// Returns the name of a sampler among those of one view, or of one whose words were read back.
     pub fn sampler(&self, key: &Key) -> String {
         let [sequence, decorrelation] =
             [axis::SEQUENCE, axis::DECORRELATION].map(|axis| key.label(axis));
@@ -72,7 +72,7 @@ impl Names {
     }
 }
 
-/// ` @` and the kernels in the place of the embedded ones; empty for these.
+/// Returns ` @` and the kernels that replace the embedded ones; empty for these.
 fn kernels(key: &Key) -> String {
     match key.label(axis::KERNELS) {
         "" => String::new(),

@@ -33,7 +33,7 @@ impl Picture {
     }
 }
 
-/// The place of a file that a record names; `None` where the name leads out of the folder.
+/// Returns the place of a file that a record names; `None` where the name leads out of the folder.
 pub(crate) fn inside(dir: &Path, path: &str) -> Option<PathBuf> {
     let mut parts = Path::new(path).components();
     let stays = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));

@@ -35,7 +35,8 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// A row for each combination of labels in the values, in their order. An axis without any label has no column.
+    /// Creates a row for each combination of labels in the values, in their order. An axis without any label has no
+    /// column.
     pub fn of_labels(by: &'a [&'a str], heads: &'a [&'a str], values: &[Value]) -> Self {
         let is_used = |axis: &str| values.iter().any(|v| !v.key.label(axis).is_empty());
         let used: Vec<bool> = by.iter().map(|axis| is_used(axis)).collect();
@@ -53,8 +54,8 @@ impl<'a> Rows<'a> {
         Self { by, heads, rows }
     }
 
-    /// The table of some figures, in the order of their columns. A figure or part without a value
-    /// has no column, a row may have dashes alone; there is no table without any column.
+    /// Returns the table of some figures, in the order of their columns. A figure or part without a value has no
+    /// column, a row may have dashes alone; there is no table without any column.
     pub fn table(
         self,
         values: &[Value],

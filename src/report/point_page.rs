@@ -34,7 +34,7 @@ pub struct PointPage {
     pub copies: Vec<Vec<Pair>>,
 }
 
-/// The page; star discrepancies and spectra are computed here, on all cores.
+/// Returns the page; star discrepancies and spectra are computed here, on all cores.
 ///
 /// # Errors
 /// Coordinates outside `[0, 1]`, or fewer than two dimensions.
@@ -63,24 +63,24 @@ pub fn document(page: &PointPage) -> Result<Document, DiscrepancyError> {
 }
 
 impl PointPage {
-    /// The coordinates at two positions of `dims`.
+    /// Returns the coordinates at two positions of `dims`.
     fn pairs(&self, i: usize, j: usize) -> Result<Vec<Pair>, DiscrepancyError> {
         let projected = self.points.project(&[i, j])?;
         Ok(projected.points().map(|p| [p[0], p[1]]).collect())
     }
 
-    /// `dimensions 0 and 1` of two positions.
+    /// Returns `dimensions 0 and 1` of two positions.
     fn names(&self, i: usize, j: usize) -> String {
         format!("dimensions {} and {}", self.dims[i], self.dims[j])
     }
 
-    /// m, if there are 2^m points and not too many for elementary intervals.
+    /// Returns m, if there are 2^m points and not too many for elementary intervals.
     fn net(&self) -> Option<u32> {
         let n = self.points.len();
         (n.is_power_of_two() && n <= MOST_INTERVALS).then(|| n.trailing_zeros())
     }
 
-    /// The first two dimensions: square, discs and dome, then every shape of elementary intervals.
+    /// Plots the first two dimensions: square, discs and dome, then every shape of elementary intervals.
     fn sets(&self) -> Result<Vec<Illustration>, DiscrepancyError> {
         let points = self.pairs(0, 1)?;
         let cloud = |domain| Cloud::new(domain, points.clone());
@@ -115,7 +115,7 @@ impl PointPage {
         Ok(figures)
     }
 
-    /// All pairs of the first dimensions, and the star discrepancy of all pairs.
+    /// Plots all pairs of the first dimensions, and the star discrepancy of all pairs.
     fn projections(&self) -> Result<Vec<Illustration>, DiscrepancyError> {
         let shown = self.dims.len().min(MOST_PROJECTED);
         let mut panels = Vec::new();
@@ -148,14 +148,14 @@ impl PointPage {
         Ok(projections.into_iter().chain(discrepancies).collect())
     }
 
-    /// D* of every pair of positions in `dims`.
+    /// Returns D* of every pair of positions in `dims`.
     fn stars(&self) -> Result<Vec<(usize, usize, f64)>, DiscrepancyError> {
         let star = |(i, j)| Ok((i, j, star_2d(&self.pairs(i, j)?)?));
         let pairs: Vec<_> = pairs_below(self.dims.len()).collect();
         pairs.into_par_iter().map(star).collect()
     }
 
-    /// All pixels upon each other (Dufay 2017, Figs. 5.7 and 5.13).
+    /// Plots all pixels on top of each other (Dufay 2017, Figs. 5.7 and 5.13).
     fn copies(&self) -> Illustration {
         let all: Vec<Pair> = self.copies.concat();
         let own = self.copies.first().cloned().unwrap_or_default();
@@ -181,7 +181,7 @@ impl PointPage {
         panels::figure("pixels", caption, &panels, 2)
     }
 
-    /// Periodogram and its radial mean, or why there are none.
+    /// Returns the periodogram and its radial mean, or why there are none.
     fn spectra(&self) -> Result<Block, DiscrepancyError> {
         let highest = highest_frequency(self.points.len());
         let pair = self.points.project(&[0, 1])?;
@@ -214,12 +214,12 @@ impl PointPage {
     }
 }
 
-/// Every pair `i < j` below `n`.
+/// Returns every pair `i < j` below `n`.
 fn pairs_below(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (i + 1..n).map(move |j| (i, j)))
 }
 
-/// All shapes of elementary intervals of volume 1/N of 2^m points.
+/// Plots all shapes of elementary intervals of volume 1/N of 2^m points.
 fn intervals(points: &[Pair], m: u32) -> Illustration {
     let panel = |a: u32| {
         let shape = [a, m - a];

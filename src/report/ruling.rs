@@ -89,7 +89,7 @@ pub(crate) fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
 }
 
 impl Ruling {
-    /// The answer: a name, or why there is none.
+    /// Returns the answer: a name, or why there is none.
     pub(crate) fn answer(&self) -> String {
         match self {
             Self::Nobody => "nothing measured".into(),
@@ -113,7 +113,7 @@ impl Ruling {
         !matches!(self, Self::Nobody | Self::Alone(_))
     }
 
-    /// The best figure.
+    /// Returns the best figure.
     pub(crate) fn figure(&self) -> String {
         match self {
             Self::Nobody | Self::Withheld(_) => format::ABSENT.into(),
@@ -124,7 +124,7 @@ impl Ruling {
         }
     }
 
-    /// The next one with its figure and, of positive figures, the ratio of the two.
+    /// Returns the next one with its figure and, of positive figures, the ratio of the two.
     pub(crate) fn runner_up(&self) -> String {
         let (best, next, ratio) = match self {
             Self::Winner(best, next, ratio, _) => (best, next, ratio),

@@ -60,7 +60,7 @@ impl Metric {
         }
     }
 
-    /// Its row in the table of figures.
+    /// Returns its row in the table of figures.
     pub fn figure(self) -> &'static Figure {
         match self {
             Self::RelMse => &figure::RELMSE_UNBIASED,
@@ -68,7 +68,7 @@ impl Metric {
         }
     }
 
-    /// The row of its slope.
+    /// Returns the row of its slope.
     pub(crate) fn slope_figure(self) -> &'static Figure {
         match self {
             Self::RelMse => &figure::RELMSE_SLOPE,
@@ -175,14 +175,14 @@ impl<'a> MeasuredSampler<'a> {
         Some(format!("biased{design}: {tiles}{of_image}{weighted}"))
     }
 
-    /// The fault, unless the sampler is meant to have it.
+    /// Returns the fault, unless the sampler is meant to have it.
     pub fn failure(&self) -> Option<String> {
         let by_design = self.bias.as_ref().is_some_and(|bias| bias.by_design);
         let finite = self.replicates.iter().all(|r| r.non_finite_pixels == 0);
         self.fault().filter(|_| !(by_design && finite))
     }
 
-    /// The full id of a metric as recorded.
+    /// Returns the full id of a metric as recorded.
     pub(crate) fn metric_id(&self, metric: Metric) -> Option<&'a str> {
         let errors = self.replicates.iter().flat_map(|r| &r.errors);
         let ids = errors.flat_map(|error| error.metrics.keys());
@@ -191,7 +191,8 @@ impl<'a> MeasuredSampler<'a> {
         id(unbiased).or_else(|| id(plain)).map(String::as_str)
     }
 
-    /// Mean error by growing spp, over the replicates that have it; computed once they are all there.
+    /// Returns mean errors by growing spp, over the replicates that have them; computed once all replicates are
+    /// there.
     pub(crate) fn mean_errors(&self, metric: Metric) -> Vec<MeanError> {
         let place = &self.means[usize::from(metric == Metric::Rmse)];
         place.get_or_init(|| self.computed_means(metric)).clone()
@@ -224,12 +225,12 @@ impl<'a> MeasuredSampler<'a> {
         spps.into_iter().filter_map(mean_at).collect()
     }
 
-    /// The highest spp.
+    /// Returns the highest spp.
     pub(crate) fn highest_spp(&self) -> Option<u32> {
         Some(self.replicates.first()?.errors.last()?.spp)
     }
 
-    /// The figures of [`FURTHER_METRICS`] at this spp: means over replicates.
+    /// Returns the figures of [`FURTHER_METRICS`] at this spp: means over replicates.
     pub(crate) fn further(
         &self,
         spp: u32,
@@ -243,7 +244,7 @@ impl<'a> MeasuredSampler<'a> {
         FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))))
     }
 
-    /// Mean error at this spp.
+    /// Returns the mean error at this spp.
     pub fn mean_error_at(&self, metric: Metric, spp: u32) -> Option<MeanError> {
         let mut means = self.mean_errors(metric).into_iter();
         means.find(|mean| mean.spp == spp)
@@ -267,8 +268,8 @@ impl<'a> MeasuredSampler<'a> {
         })
     }
 
-    /// Samples per pixel at which the error falls to `target`, between the two neighbours where its mean does: by
-    /// interpolation on logarithms. `None` where it is above or below at all numbers of samples.
+    /// Returns the samples per pixel at which the error falls to `target`, between the two neighbours where its mean
+    /// does: by interpolation on logarithms. `None` where it is above or below at all numbers of samples.
     pub(crate) fn spp_to(&self, metric: Metric, target: f64) -> Option<LogFigure> {
         let id = self.metric_id(metric)?;
         let means = self.mean_errors(metric);
@@ -291,7 +292,7 @@ impl<'a> MeasuredSampler<'a> {
         })
     }
 
-    /// Slope of log error against log spp, over the spp that every replicate has and the reference
+    /// Returns the slope of log error against log spp, over the spp that every replicate has and the reference
     /// resolves.
     pub fn slope(&self, metric: Metric) -> Option<Interval> {
         let id = self.metric_id(metric)?;
@@ -388,7 +389,7 @@ impl View<'_> {
         })
     }
 
-    /// The highest spp at which every measured sampler has an error.
+    /// Returns the highest spp at which every measured sampler has an error.
     pub(crate) fn common_spp(&self) -> Option<u32> {
         let means = self.samplers.iter().map(|s| s.mean_errors(Metric::RelMse));
         let measured = means.filter(|means| !means.is_empty());
@@ -400,13 +401,13 @@ impl View<'_> {
     }
 }
 
-/// The next number above with two significant digits, which leaves some room.
+/// Returns the next number above with two significant digits, which leaves some room.
 fn rounded_up(value: f64) -> u64 {
     let unit = 10f64.powf((value.max(1.0).log10().floor() - 1.0).max(0.0));
     ((value / unit).floor() + 1.0) as u64 * unit as u64
 }
 
-/// The time per sample per pixel, milliseconds, with its noise: none where it was not measured often enough.
+/// Returns the time per sample per pixel, milliseconds, with its noise: none where it was not measured often enough.
 pub(crate) fn log_time(time: &Measured<TimeRecord>) -> Option<LogFigure> {
     let often = time.ms.len() >= LEAST_FOR_MEDIAN;
     let known = time.rounds(FULL_CELLS, &time.ms).filter(|_| often);

@@ -12,7 +12,7 @@ const TRUTH: f64 = 0.5;
 /// Standard deviation of a pixel at one sample; it falls as the root of the samples.
 const NOISE: f64 = 0.1;
 
-/// About normal, mean 0, variance 1.
+/// Returns a nearly normal number, mean 0, variance 1.
 fn normal(generator: &mut Pcg32) -> f64 {
     (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0
 }

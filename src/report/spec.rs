@@ -58,7 +58,7 @@ impl Head {
         }
     }
 
-    /// The category of a curve, or of the place that it has.
+    /// Returns the category of a curve, or of the place that it has.
     fn look(self, data: &RunData, name: &str, place: usize) -> usize {
         match self {
             Structure | Axis(_, axis::ACCEL) => data.structure_look(name),
@@ -89,7 +89,7 @@ pub(crate) const BY_RAYS: fn(&Key) -> String = |key| key.label(axis::RAYS).to_ow
 pub(crate) const BY_SUBJECT: fn(&Key) -> String = |key| key.label(axis::SUBJECT).to_owned();
 
 impl TableSpec<'_> {
-    /// A row for each competitor that has one of the figures.
+    /// Returns a row for each competitor that has one of the figures.
     pub(crate) fn table(&self, names: &Names, values: &[Value], words: &[&str]) -> Table {
         let is_shown = |v: &&Value| self.figures.iter().any(|f| f.id == v.figure.id);
         let keys = values.iter().filter(is_shown).map(|v| &v.key);
@@ -106,7 +106,7 @@ impl TableSpec<'_> {
         self.beside(names, values, words, &[], rows)
     }
 
-    /// These rows, each with cells under further heads before the figures.
+    /// Returns a table of these rows, each with cells under further heads before the figures.
     pub(crate) fn beside(
         &self,
         names: &Names,
@@ -141,7 +141,7 @@ impl TableSpec<'_> {
     }
 }
 
-/// The text with a word in the place of each `{}`.
+/// Replaces each `{}` of a text by a word.
 pub(crate) fn filled(text: &str, words: &[&str]) -> String {
     let mut parts = text.split("{}");
     let first = parts.next().unwrap_or_default().to_owned();
@@ -173,7 +173,7 @@ pub(crate) struct PlotSpec<'a> {
 }
 
 impl PlotSpec<'_> {
-    /// The plot in a document, if there is anything to draw.
+    /// Returns the plot in a document, if there is anything to draw.
     pub(crate) fn figure(
         &self,
         data: &RunData,
@@ -185,7 +185,7 @@ impl PlotSpec<'_> {
         plot.figure(format!("{stem}{}", self.name), filled(self.caption, words))
     }
 
-    /// A curve for each competitor and figure, in the order of the values.
+    /// Returns a curve for each competitor and figure, in the order of the values.
     pub(crate) fn plot(&self, data: &RunData, values: &[Value]) -> CurvePlot {
         let mut curves: Vec<Curve> = Vec::new();
         for value in values {

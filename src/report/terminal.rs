@@ -21,7 +21,7 @@ pub struct Screen {
     pub colour: bool,
 }
 
-/// Verdicts, speeds, errors and checks as aligned plain text of any width.
+/// Formats verdicts, speeds, errors and checks as aligned plain text of any width.
 pub fn terminal_tables(records: &[Line]) -> String {
     Screen::default().tables(records)
 }
@@ -36,7 +36,7 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
 }
 
 impl Screen {
-    /// Verdicts, speeds, errors and checks.
+    /// Formats verdicts, speeds, errors and checks.
     pub fn tables(self, records: &[Line]) -> String {
         let data = RunData::new(records);
         let tables = tables(&data);
@@ -74,7 +74,7 @@ impl Screen {
         }
     }
 
-    /// A text in the colour of its tone, where the screen shows any.
+    /// Colours a text by its tone, where the screen shows any.
     fn toned(self, text: &str, tone: Tone) -> String {
         let colour = match tone {
             Tone::Good => 32,
@@ -88,7 +88,7 @@ impl Screen {
         }
     }
 
-    /// A text with line breaks where words end, and one at its end.
+    /// Breaks a text into lines at the ends of words, with a break at its end.
     pub fn lines(self, text: &str) -> String {
         let text = visible(text);
         match self.width {
@@ -116,7 +116,7 @@ impl Screen {
     }
 }
 
-/// Every table that the end of a run shows.
+/// Returns every table that the end of a run shows.
 fn tables(data: &RunData) -> Vec<Table> {
     let against_original = kernels::against_original(data).into_iter();
     let mut tables: Vec<Table> = against_original.map(|(table, _)| table).collect();
@@ -195,8 +195,8 @@ impl Grid {
         columns.map(|c| gap(c) + self.widest(c, true)).collect()
     }
 
-    /// Widths, with gaps, of columns whose heads are broken, and then of texts that are, the widest first, until
-    /// the table fits or no text gets narrower.
+    /// Returns widths, with gaps, of columns whose heads are broken, and then of texts that are, the widest first,
+    /// until the table fits or no text gets narrower.
     fn fitted(&self, width: usize) -> Vec<usize> {
         let natural = self.natural();
         let gap = |column| if column == 0 { 0 } else { GAP };
@@ -249,7 +249,7 @@ impl Grid {
         tone.copied().unwrap_or_default()
     }
 
-    /// These columns: heads, a rule, rows.
+    /// Formats these columns: heads, a rule, rows.
     fn block(&self, columns: &[usize], widths: &[usize], screen: Screen) -> String {
         let inner = |column: usize| match column {
             0 => widths[0],
@@ -293,7 +293,7 @@ fn width_of(text: &str) -> usize {
     console::measure_text_width(text)
 }
 
-/// Lines of at most this width: broken at blanks, and inside of words that are longer.
+/// Breaks a text into lines of at most this width: at blanks, and inside of words that are longer.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line) = (Vec::new(), String::new());

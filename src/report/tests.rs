@@ -37,7 +37,7 @@ fn report(name: &str, lines: &[Line]) -> (String, String) {
     (read(&paths.html), read(&paths.summary))
 }
 
-/// The page without embedded pictures and its script, whose text may spell anything.
+/// Returns the page without embedded pictures and its script, whose text may spell anything.
 fn without_pictures(html: &str) -> String {
     let html = html.split("<script").next().unwrap_or(html);
     let parts = html.split("base64,").enumerate();
@@ -52,7 +52,7 @@ fn path_view<'d, 'a>(data: &'d data::RunData<'a>) -> &'d data::View<'a> {
     &data.scenes[0].views[0]
 }
 
-/// The full run with some records changed.
+/// Returns the full run with some records changed.
 fn changed(mut change: impl FnMut(&Key, &mut Body)) -> Vec<Line> {
     let mut lines = full_run();
     lines
@@ -61,7 +61,7 @@ fn changed(mut change: impl FnMut(&Key, &mut Body)) -> Vec<Line> {
     lines
 }
 
-/// All figures of a record of errors.
+/// Returns all figures of a record of errors.
 fn figures(record: &mut ErrorRecord) -> impl Iterator<Item = &mut f64> {
     record
         .errors
@@ -331,7 +331,8 @@ fn a_bias_by_design_never_wins_and_is_no_failure() {
     assert!(html.contains("biased by design: 57 of 432 tiles rejected, image z = "));
 }
 
-/// Of the first sampler of a view that is not biased, p = 0.3 % against a share of 1 % of `level`: how many are biased?
+/// Counts the biased samplers where the first one of a view has p = 0.3 % against a share of 1 % of `level`, and
+/// `found` others are biased.
 fn biased_samplers(level: Option<f64>, found: usize) -> usize {
     let mut seen = 0;
     let lines = changed(|_, body| {

@@ -81,7 +81,7 @@ impl From<f64> for Estimate {
 }
 
 impl Value<'static> {
-    /// A figure of this crate.
+    /// Creates a figure of this crate.
     pub fn new(key: &Key, figure: &'static Figure, estimate: impl Into<Estimate>) -> Self {
         Self {
             key: key.clone(),
@@ -91,7 +91,7 @@ impl Value<'static> {
         }
     }
 
-    /// Those figures of a key that are known.
+    /// Returns the known ones of these figures of a key.
     pub fn known<T: Into<Estimate>>(
         key: &Key,
         figures: impl IntoIterator<Item = (&'static Figure, Option<T>)>,
@@ -121,7 +121,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The same, measured in the rounds that all of this kind had on its scene.
+    /// Returns the same value, measured in the rounds that all of this kind had on its scene.
     pub(crate) fn measured(mut self, kind: &str, ran: &'a Ran, cell: Option<&CellRecord>) -> Self {
         self.source.kernel = &ran.kernel_hash;
         self.source.sitting = match &self.source.samples {
@@ -135,7 +135,7 @@ impl<'a> Value<'a> {
         self
     }
 
-    /// Its logarithm with the noise of its parts, round by round or group by group, where these are known.
+    /// Returns its logarithm with the noise of its parts, round by round or group by group, where these are known.
     pub fn by_parts(&self) -> Option<LogFigure> {
         match &self.source.samples {
             Samples::Once => None,
@@ -165,7 +165,7 @@ impl<'a> Value<'a> {
         matches!(self.estimate, Estimate::HeavyTailed(_))
     }
 
-    /// The value as a table shows it.
+    /// Returns the value as a table shows it.
     pub fn cell(&self) -> TableCell {
         let text = |value| format::figure(&self.figure, value);
         match self.estimate {
@@ -184,12 +184,12 @@ impl<'a> Value<'a> {
     }
 }
 
-/// The number on an axis; 0 without one.
+/// Returns the number on an axis; 0 without one.
 pub fn number(key: &Key, axis: &str) -> usize {
     key.label(axis).parse().unwrap_or(0)
 }
 
-/// Everything that a run found.
+/// Returns all values of a run.
 pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let mut values = Vec::new();
     for scene in &data.scenes {
@@ -211,7 +211,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     values
 }
 
-/// The readings of a cell that did not fail.
+/// Returns the readings of a cell that did not fail.
 pub(crate) fn of_readings<'a>(
     data: &RunData<'a>,
     cell: Recorded<'a, MeasuredRecord>,
@@ -226,7 +226,7 @@ pub(crate) fn of_readings<'a>(
     cell.readings.iter().map(value).collect()
 }
 
-/// Figures of all structures of a scene; those without a fault also have speeds.
+/// Returns the figures of all structures of a scene; those without a fault also have speeds.
 pub(crate) fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
     let triangles = scene.record.map_or(0, |record| record.triangles);
     let mut values = Vec::new();
@@ -256,7 +256,7 @@ fn of_triangles(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'
     Value::known(key, figures)
 }
 
-/// Errors, times and bias checks of one view.
+/// Returns errors, times and bias checks of one view.
 pub(crate) fn of_view<'a>(
     data: &RunData<'a>,
     scene: &SceneGroup<'a>,
@@ -311,7 +311,7 @@ fn of_sampler<'a>(data: &RunData<'a>, sampler: &MeasuredSampler<'a>) -> Vec<Valu
     values
 }
 
-/// Errors of references, of which views have some in common.
+/// Returns the errors of references, of which views have some in common.
 fn of_references<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
     let mut known = BTreeSet::new();
     let references = scene.views.iter().filter_map(|view| view.reference);
@@ -325,7 +325,7 @@ fn of_references<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a
     references.flat_map(of_one).collect()
 }
 
-/// Figures of a stream's points.
+/// Returns the figures of a stream's points.
 pub(crate) fn of_stream<'a>(
     data: &RunData<'a>,
     stream: Recorded<'a, StreamRecord>,
@@ -336,7 +336,7 @@ pub(crate) fn of_stream<'a>(
         .collect()
 }
 
-/// The values as comma-separated text: one line for each key and figure, a column for each axis.
+/// Returns the values as comma-separated text: one line for each key and figure, a column for each axis.
 pub fn csv(values: &[Value]) -> String {
     let mut axes: Vec<&str> = Vec::new();
     for (axis, _) in values.iter().flat_map(|value| value.key.labels()) {
@@ -379,7 +379,7 @@ pub fn csv(values: &[Value]) -> String {
     text
 }
 
-/// A name that a spreadsheet would take for a formula has an apostrophe before it.
+/// Returns a name, with an apostrophe before it if a spreadsheet would read it as a formula.
 fn no_formula(name: &str) -> String {
     match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         true => format!("'{}", visible(name)),

@@ -214,7 +214,7 @@ impl Suite<'_> {
         Ok(())
     }
 
-    /// Least time of each triangle test through a structure over a sphere.
+    /// Returns the least time of each triangle test through a structure over a sphere.
     fn times(
         &self,
         tests: &[AnyTriangleTest],
@@ -267,14 +267,14 @@ struct Timed {
     rays: usize,
 }
 
-/// The smallest pad that loses no hit, nor does any greater one; each pad is beside the hits that it loses.
+/// Returns the smallest pad that loses no hit, nor does any greater one; each pad is beside the hits that it loses.
 fn smallest_sound_pad(padded: impl Iterator<Item = [usize; 2]> + Clone) -> Option<usize> {
     let lossy = padded.clone().filter(|t| t[1] > 0).map(|t| t[0]).max();
     padded.map(|t| t[0]).filter(|pad| Some(*pad) > lossy).min()
 }
 
-/// A sphere, a box, the box with faces in the planes of the axes, where coordinates are 0, and that one
-/// with two faces nearly, but not quite, in such planes.
+/// Returns a sphere, a box, the box with faces in the planes of the axes, where coordinates are 0, and that one with
+/// two faces nearly, but not quite, in such planes.
 fn closed_meshes(place: &Placement) -> [(&'static str, Mesh); 4] {
     let at = |tilt: f32| -> Mesh {
         let mut mesh = cube(5, place);
@@ -342,7 +342,7 @@ fn bounce(
     ])
 }
 
-/// The mirrored ray, begun as integrators begin it, and how many bounds of the point's error it was moved;
+/// Returns the mirrored ray, begun as integrators begin it, and how many bounds of the point's error it was moved;
 /// `None` where the triangle has no normal.
 fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> Option<(Ray, f64)> {
     let record = soup.records.get(hit.triangle as usize)?;

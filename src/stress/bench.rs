@@ -26,7 +26,7 @@ pub(crate) fn build_with(
     Ok(built)
 }
 
-/// The error word in words; `None` if there is no error.
+/// Returns the error word in words; `None` if there is no error.
 pub(crate) fn error_text(errors: u32) -> Option<String> {
     (errors != 0).then(|| kernel_errors(errors).join("; "))
 }
@@ -47,7 +47,7 @@ impl Expected {
         }
     }
 
-    /// Those for a structure that meets triangles in this space.
+    /// Returns the answers for a structure that intersects triangles in this space.
     pub(crate) fn of(&self, space: Space) -> &[Hit] {
         match (space, &self.instances) {
             (Space::Instances, Some(hits)) => hits,
@@ -83,12 +83,12 @@ pub(crate) fn ratio(
     Ok(least[0] / least[1].max(1e-6))
 }
 
-/// The rays over and over until there are `count`.
+/// Repeats the rays until there are `count`.
 pub(crate) fn repeated(rays: &[Ray], count: usize) -> Vec<Ray> {
     rays.iter().copied().cycle().take(count).collect()
 }
 
-/// Ordinary rays for the mesh of a case: chords between points of its box.
+/// Returns ordinary rays for the mesh of a case: chords between points of its box.
 pub(crate) fn ordinary_rays(case: &Case, seed: u64, count: usize) -> Vec<Ray> {
     let bounds = case.scene.bounds();
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max - bounds.min).as_dvec3());

@@ -32,7 +32,7 @@ pub(crate) struct Meshes {
 }
 
 impl Meshes {
-    /// Both with their names, at a place.
+    /// Returns both with their names, at a place.
     pub(crate) fn at(self, place: &Placement) -> [(&'static str, Mesh); 2] {
         [
             ("sphere", sphere(self.bands, place)),
@@ -80,7 +80,7 @@ fn stream(seed: u64, family: &str, label: &str, what: u64) -> Pcg32 {
     Pcg32::with_stream(seed ^ hash, what)
 }
 
-/// A ray through a point; its direction is the rounded difference.
+/// Returns a ray through a point; its direction is the rounded difference.
 pub fn towards(origin: Vec3, target: Vec3) -> Ray {
     Ray::new(origin, target - origin)
 }
@@ -96,7 +96,7 @@ impl Maker {
         }
     }
 
-    /// The rungs of the ladder.
+    /// Returns the rungs of the ladder.
     pub(crate) fn places(&self) -> Vec<Placement> {
         Placement::ladder(self.quick)
     }

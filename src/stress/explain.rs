@@ -64,7 +64,7 @@ fn reference_name(built: &dyn BuiltAccel) -> &'static str {
     }
 }
 
-/// One line a node, with the triangles tested there.
+/// Formats one line a node, with the triangles tested there.
 fn steps(events: &[Event]) -> String {
     let mut text = String::new();
     for event in events {
@@ -105,7 +105,7 @@ fn oracle_text(scene: &SceneData, ray: &Ray) -> String {
     text
 }
 
-/// The case of an address, as a scene.
+/// Returns the case of an address, as a scene.
 ///
 /// # Errors
 /// No family or no case of that name; in words.

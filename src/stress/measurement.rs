@@ -35,17 +35,17 @@ impl Section for Settings {
 }
 
 impl Settings {
-    /// Those of an experiment.
+    /// Returns the settings of an experiment.
     pub fn of(experiment: &Experiment) -> Self {
         experiment.settings().unwrap_or_default()
     }
 
-    /// One of two things: of the whole suite, and of a quick one.
+    /// Returns one of two values: that of the whole suite, or that of a quick one.
     pub(crate) fn either<T: Copy>(&self, of: [T; 2]) -> T {
         of[usize::from(self.quick)]
     }
 
-    /// Rays of a case.
+    /// Returns the number of rays of a case.
     pub(crate) fn rays_of_a_case(&self) -> usize {
         self.rays.unwrap_or(self.either(RAYS)) as usize
     }

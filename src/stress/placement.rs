@@ -49,7 +49,7 @@ impl Placement {
         scales.chain(shifts).chain([Self::FAR]).collect()
     }
 
-    /// A modelled point in the scene, rounded once.
+    /// Returns a modelled point in the scene, rounded once.
     pub fn point(&self, modelled: DVec3) -> Vec3 {
         (modelled * self.scale + AWAY * self.shift).as_vec3()
     }

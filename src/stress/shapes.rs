@@ -12,7 +12,7 @@ pub(crate) type Mesh = Vec<Triangle>;
 /// Radius of the sphere and half the side of the box, units; Embree's test has the same.
 pub(crate) const RADIUS: f64 = 2.0;
 
-/// A closed grid of longitude and latitude, `bands` × 2 `bands`; the polar bands are fans.
+/// Returns a closed grid of longitude and latitude, `bands` × 2 `bands`; the polar bands are fans.
 pub(crate) fn sphere(bands: usize, place: &Placement) -> Mesh {
     let sectors = 2 * bands;
     let at = |band: usize, sector: usize| {
@@ -38,14 +38,14 @@ pub(crate) fn sphere(bands: usize, place: &Placement) -> Mesh {
     mesh
 }
 
-/// A level square of `cells` × `cells` quadrilaterals, `side` units wide, through the origin.
+/// Returns a level square of `cells` × `cells` quadrilaterals, `side` units wide, through the origin.
 pub(crate) fn plane(cells: usize, side: f64, place: &Placement) -> Mesh {
     grid(cells, place, |u, v| {
         DVec3::new(side * (u - 0.5), 0.0, side * (v - 0.5))
     })
 }
 
-/// A closed box, each face `cells` × `cells` quadrilaterals.
+/// Returns a closed box, each face `cells` × `cells` quadrilaterals.
 pub(crate) fn cube(cells: usize, place: &Placement) -> Mesh {
     let face = |axis: usize, end: f64| {
         move |u: f64, v: f64| {
@@ -76,7 +76,7 @@ fn grid(cells: usize, place: &Placement, at: impl Fn(f64, f64) -> DVec3) -> Mesh
     mesh
 }
 
-/// A point of a triangle's plane, inside it, rounded.
+/// Returns a point of a triangle's plane, inside it, rounded.
 pub(crate) fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     let root = random.uniform().sqrt();
     let v = random.uniform();
@@ -84,7 +84,7 @@ pub(crate) fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)).as_vec3()
 }
 
-/// A point of an edge, as near as f32 comes.
+/// Returns a point of an edge, as near as f32 comes.
 pub(crate) fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     let k = random.below(3);
     let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
@@ -96,17 +96,17 @@ pub(crate) fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     (a + (b - a) * share).as_vec3()
 }
 
-/// A corner of a triangle.
+/// Returns a corner of a triangle.
 pub(crate) fn vertex(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
     random.one_of(&triangle.vertices)
 }
 
-/// A point of a random triangle, rounded.
+/// Returns a point of a random triangle, rounded.
 pub(crate) fn on_mesh(mesh: &[Triangle], random: &mut Pcg32) -> Vec3 {
     on(&random.one_of(mesh), random)
 }
 
-/// A model moved and scaled so that it has the sphere's size, its holes closed by fans.
+/// Returns a model moved and scaled to the sphere's size, its holes closed by fans.
 pub(crate) fn model(triangles: &[Triangle], place: &Placement) -> Mesh {
     let points = || triangles.iter().flat_map(|t| t.vertices);
     let low = points().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
@@ -119,12 +119,12 @@ pub(crate) fn model(triangles: &[Triangle], place: &Placement) -> Mesh {
     closed.into_iter().map(placed).collect()
 }
 
-/// A point as a key.
+/// Returns a point as a key.
 fn bits(v: DVec3) -> [u64; 3] {
     v.to_array().map(|x| (x + 0.0).to_bits())
 }
 
-/// The triangles, and a fan over every loop of edges that only one triangle has.
+/// Returns the triangles, and a fan over every loop of edges that only one triangle has.
 fn close_holes(triangles: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     let directed = || {
         triangles

@@ -44,7 +44,7 @@ pub(crate) struct ShotMesh {
 }
 
 impl ShotMesh {
-    /// The mesh of this name, at this place, with origins by this seed.
+    /// Returns the mesh of this name, at this place, with origins by this seed.
     ///
     /// # Errors
     /// A model that cannot be read, or that has hardly an inside; in words.
@@ -76,7 +76,7 @@ impl ShotMesh {
         })
     }
 
-    /// The mesh of a label.
+    /// Returns the mesh of a label.
     ///
     /// # Errors
     /// As for [`ShotMesh::named`], or the label is none.
@@ -137,7 +137,7 @@ impl ShotMesh {
     }
 }
 
-/// A model with its holes closed, and points inside it.
+/// Returns a model with its holes closed, and points inside it.
 fn model(path: &str, place: Placement, seed: u64) -> Result<(Mesh, Vec<Vec3>), String> {
     let scene = scene::named(path).map_err(|e| e.to_string())?;
     let mesh = shapes::model(&scene.triangles, &place);
@@ -158,7 +158,7 @@ fn model(path: &str, place: Placement, seed: u64) -> Result<(Mesh, Vec<Vec3>), S
     Ok((mesh, origins))
 }
 
-/// The triangles that do not touch the border of a level plane.
+/// Returns the triangles that do not touch the border of a level plane.
 fn within_border(plane: &[Triangle]) -> Mesh {
     let bounds = Bounds::of(plane);
     let is_inner = |v: &Vec3| {

@@ -106,7 +106,8 @@ impl<'a> OpenCell<'a> {
         })
     }
 
-    /// Other tests than the one that leads climb few rungs through structures other than the plain one.
+    /// Returns `true` if the case is traced: other tests than the leading one climb few rungs through structures
+    /// other than the plain one.
     fn takes(&self, case: &Case, quick: bool) -> bool {
         let coarse = Placement::ladder(true).contains(&case.place);
         self.leads || stands_for_all(&self.kind.variant.name) || (coarse && !quick)
@@ -132,7 +133,7 @@ impl<'a> OpenCell<'a> {
 }
 
 impl Suite<'_> {
-    /// The default box test with a triangle test.
+    /// Returns the default box test with a triangle test.
     pub(crate) fn with(triangle: AnyTriangleTest) -> Intersection {
         Intersection {
             triangle,
@@ -140,12 +141,12 @@ impl Suite<'_> {
         }
     }
 
-    /// The device that times are measured on.
+    /// Returns the device that times are measured on.
     pub(super) fn gpu(&self) -> &Gpu {
         &self.gpus[0]
     }
 
-    /// The structure of a cell.
+    /// Returns the structure of a cell.
     ///
     /// # Errors
     /// It is not registered.
@@ -157,7 +158,7 @@ impl Suite<'_> {
         Ok(Kind { accel, variant })
     }
 
-    /// The triangle test of a cell.
+    /// Returns the triangle test of a cell.
     ///
     /// # Errors
     /// It is not registered.
@@ -198,7 +199,7 @@ impl Suite<'_> {
         }
     }
 
-    /// One case through all structures with one triangle test.
+    /// Traces one case through all structures with one triangle test.
     fn case(
         &self,
         case: &Case,
@@ -279,7 +280,7 @@ impl Suite<'_> {
     }
 }
 
-/// One family through the structures of the cells with their triangle tests.
+/// Traces one family through the structures of the cells with their triangle tests.
 ///
 /// # Errors
 /// The device is lost or hangs.

@@ -74,14 +74,14 @@ impl<'a> CaseTruth<'a> {
     }
 }
 
-/// Distance between neighbouring f32 numbers at `x`.
+/// Returns the distance between neighbouring f32 numbers at `x`.
 pub(crate) fn ulp(x: f64) -> f64 {
     let exponent = (x.abs().max(f64::from(f32::MIN_POSITIVE))).log2().floor();
     2f64.powi(exponent as i32 - 23)
 }
 
-/// Errors of a hit whose exact distance is `t`. Integrators compute the hit point from the barycentrics; its error is
-/// the greatest of its coordinates, relative to the way of the ray.
+/// Returns the errors of a hit whose exact distance is `t`. Integrators compute the hit point from the barycentrics;
+/// its error is the greatest of its coordinates, relative to the way of the ray.
 fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
     let [v0, v1, v2] = triangle.vertices;
     let found = v0 - hit.u * (v0 - v1) + hit.v * (v2 - v0);
@@ -182,7 +182,7 @@ impl Tally {
         *self.counts.entry(&*figure.id).or_default() += more;
     }
 
-    /// A count so far.
+    /// Returns a count so far.
     fn counted(&self, figure: &Figure) -> usize {
         self.counts.get(&*figure.id).copied().unwrap_or(0)
     }
@@ -230,7 +230,7 @@ impl Tally {
         }
     }
 
-    /// Median, 99th percentile and greatest of each error; `None` without a right hit.
+    /// Returns the median, 99th percentile and greatest of each error; `None` without a right hit.
     fn quantiles(&self) -> Option<Errors<[f64; 3]>> {
         let last = self.errors.len().checked_sub(1)?;
         Some([0, 1, 2, 3].map(|which| {

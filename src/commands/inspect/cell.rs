@@ -29,7 +29,7 @@ pub(super) fn inspect(command: &Inspect, name: &str) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The cell of this name, or whose name alone holds it.
+/// Returns the cell of this name, or whose name alone holds it.
 fn find<'i>(inventory: &'i Inventory, dir: &Path, name: &str) -> Result<&'i State> {
     let states = &inventory.states;
     if let Some(state) = states.iter().find(|state| state.unit.name == name) {
@@ -125,7 +125,7 @@ fn outcome(record: &CellRecord) -> String {
     }
 }
 
-/// The command that measures a cell alone: a filter on each axis that matters to it.
+/// Returns the command that measures a cell alone: a filter on each axis that matters to it.
 fn command(inventory: &Inventory, cell: &Cell) -> String {
     let run = &inventory.run;
     let mut command = format!("raystone run {}", shell_word(&run.experiment));

@@ -113,7 +113,7 @@ pub fn as_json(plan: &Cells, units: &[Unit], cost: &Cost) -> Value {
     })
 }
 
-/// A time with the precision of an estimate.
+/// Returns a time with the precision of an estimate.
 fn duration(seconds: f64) -> String {
     match seconds {
         ..100.0 => format!("{:.0} s", seconds.ceil()),

@@ -90,7 +90,7 @@ fn fraction(word: u32) -> f64 {
     f64::from(word) * 2.0_f64.powi(-32)
 }
 
-/// One point a line.
+/// Formats one point a line.
 fn lines(numbers: &[f64], dims: usize) -> String {
     let mut text = String::new();
     for point in numbers.chunks_exact(dims) {

@@ -61,7 +61,7 @@ impl Points {
         Ok(())
     }
 
-    /// The first two dimensions of the same samples in each pixel, no more of them than are drawn.
+    /// Returns the first two dimensions of the same samples in each pixel, no more of them than are drawn.
     fn copies(&self, stream: &Stream) -> Result<Vec<Vec<[f64; 2]>>> {
         let each = (MOST_DRAWN / self.copies as usize).max(1);
         let samples = thinned(self.sampler.count() as usize, each).into_iter();

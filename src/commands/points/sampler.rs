@@ -47,12 +47,12 @@ pub struct SamplerArguments {
 }
 
 impl SamplerArguments {
-    /// The number of points, which there is with every sequence.
+    /// Returns the number of points, which every sequence has.
     pub(super) fn count(&self) -> u32 {
         self.count.unwrap_or_default()
     }
 
-    /// The sampler for these dimensions.
+    /// Returns the sampler for these dimensions.
     pub(super) fn stream(&self, sequence: &str, dims: &[u32]) -> Result<Stream> {
         let registries = Registries::default();
         let overrides = self.overrides(sequence, &registries.catalogue())?;
@@ -131,7 +131,7 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// The words of these samples of a pixel, dimension by dimension.
+    /// Returns the words of these samples of a pixel, dimension by dimension.
     pub(super) fn words(
         &self,
         pixel: u32,
@@ -160,7 +160,7 @@ impl Stream {
         }
     }
 
-    /// The points of the pixel, number by number, in parts that are computed at a time.
+    /// Returns the points of the pixel, number by number, in parts that are computed at a time.
     pub(super) fn parts(&self, count: u32, dims: &[u32]) -> impl Iterator<Item = Result<Vec<f64>>> {
         let each = (BATCH / dims.len()).max(1);
         let part =

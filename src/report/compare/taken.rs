@@ -341,7 +341,7 @@ fn scene_hash(data: &RunData, key: &Key) -> String {
     record.map_or(String::new(), |r| format!("scene {}; ", r.scene_hash))
 }
 
-/// Errors of all samplers, seed by seed.
+/// Returns the errors of all samplers, seed by seed.
 fn of_samplers(data: &RunData) -> Seeds {
     let views = data.views();
     views
@@ -433,7 +433,8 @@ fn pseudo_values(values: &[f64], estimate: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     }
 }
 
-/// Pseudo-values of the slope of the mean error over samples per pixel; empty where some replicates lack some.
+/// Returns the pseudo-values of the slope of the mean error over samples per pixel; empty where some replicates lack
+/// some.
 fn slopes(metric: Metric, spps: &[u32], curves: &[Vec<f64>]) -> Vec<f64> {
     let n = curves.first().map_or(0, Vec::len);
     if curves.iter().any(|values| values.len() != n) {

@@ -31,7 +31,7 @@ fn case(title: impl Into<String>, verdict: Verdict, detail: impl Into<String>) -
     }
 }
 
-/// A case for each structure and class of rays of a scene, and one for each structure as a whole.
+/// Returns a case for each structure and class of rays of a scene, and one for each structure as a whole.
 fn gates(scene: &SceneGroup) -> Suite {
     let of_structure = |s: &Measured<StructureRecord>| {
         let why = s.fault().unwrap_or_default();

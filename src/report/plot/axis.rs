@@ -118,12 +118,12 @@ impl Axis {
         Some(Self::logarithmic([min, max], ticks, title))
     }
 
-    /// Largest value shown.
+    /// Returns the largest value shown.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// Smallest value shown.
+    /// Returns the smallest value shown.
     pub fn min(&self) -> f64 {
         self.min
     }
@@ -194,7 +194,7 @@ impl Axis {
         drawing.upward_text((14.0, (top + bottom) / 2.0), &self.title, INK);
     }
 
-    /// Width of the widest tick label in pixels.
+    /// Returns the width of the widest tick label in pixels.
     fn label_width(&self) -> f64 {
         let widths = self.ticks.iter().map(|tick| text_width(&tick.label));
         widths.fold(0.0, f64::max)
@@ -202,7 +202,7 @@ impl Axis {
 }
 
 impl Tick {
-    /// Width of the gridline in pixels.
+    /// Returns the width of the gridline in pixels.
     fn width(&self) -> f64 {
         if self.label.is_empty() { 0.5 } else { 1.0 }
     }

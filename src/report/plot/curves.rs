@@ -99,7 +99,7 @@ const WIDTH: f64 = 580.0;
 const PLOT_HEIGHT: f64 = 400.0;
 
 impl CurvePlot {
-    /// The curves that have a point.
+    /// Returns the curves that have a point.
     pub fn new(
         x_title: impl Into<String>,
         x_ticks: Ticks,
@@ -116,7 +116,7 @@ impl CurvePlot {
         }
     }
 
-    /// The same with lines for comparison.
+    /// Returns the same plot with lines for comparison.
     pub fn with_guides(mut self, guides: impl IntoIterator<Item = Guide>) -> Self {
         self.guides.extend(guides);
         self

@@ -72,7 +72,7 @@ impl Panel {
 /// Width of a drawing that fills the page, pixels.
 const WIDTH: f64 = 900.0;
 
-/// Square panels, `columns` in a row that fills the page.
+/// Returns square panels, `columns` in a row that fills the page.
 pub(crate) fn figure(
     name: impl Into<String>,
     caption: impl Into<String>,
@@ -82,7 +82,7 @@ pub(crate) fn figure(
     Illustration::new(name, caption, draw(panels, columns, square(WIDTH, columns)))
 }
 
-/// Size of square panels of which `columns` fill a drawing of `width` pixels.
+/// Returns the size of square panels of which `columns` fill a drawing of `width` pixels.
 fn square(width: f64, columns: usize) -> (f64, f64) {
     let columns = columns.max(1) as f64;
     let side = ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor();

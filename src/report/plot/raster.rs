@@ -25,7 +25,7 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.rgb.len() / self.columns.max(1)
     }

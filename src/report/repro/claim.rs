@@ -229,7 +229,7 @@ impl<'e> Place<'e> {
         Ok(bounds)
     }
 
-    /// The thesis's value in the unit of ours.
+    /// Returns the thesis's value in the unit of ours.
     fn thesis_in(&self, unit: &str) -> Result<Option<f64>, String> {
         let Some(thesis) = self.at.thesis else {
             return Ok(None);
@@ -242,7 +242,7 @@ impl<'e> Place<'e> {
         Ok(Some(thesis * factor(from, unit).ok_or_else(problem)?))
     }
 
-    /// A row with its verdict, for a number in this unit.
+    /// Returns a row with its verdict, for a number in this unit.
     fn judged(&self, ours: Interval, unit: &str, key: &Key) -> Row {
         let speaks = self.expect.device == Speaks::Any || !self.context.software;
         let judged = match self.bounds(unit) {
@@ -264,7 +264,7 @@ impl<'e> Place<'e> {
         row
     }
 
-    /// A row whose reading is no number.
+    /// Returns a row whose reading is no number.
     fn unread(&self, value: &Value) -> Option<Row> {
         let row = match value.estimate {
             Estimate::Known(_) => return None,
@@ -331,7 +331,7 @@ impl<'e> Place<'e> {
         by_parts.or_else(|| LogFigure::of_interval(known(value)?, f64::INFINITY))
     }
 
-    /// A ratio with its interval. Nothing is known of one of figures that are not positive.
+    /// Returns a ratio with its interval. Nothing is known of a ratio of figures that are not positive.
     fn ratio(&self, a: &Value, b: &Value) -> Interval {
         over(self.figure(a), self.figure(b))
     }
@@ -404,7 +404,7 @@ impl<'e> Place<'e> {
         ]))
     }
 
-    /// The number of a part of an order.
+    /// Returns the number of a part of an order.
     fn number(&self, gain: &Gain) -> f64 {
         let value = known(gain.value).map_or(f64::NAN, |i| i.value);
         gain.over
@@ -499,7 +499,7 @@ fn known(value: &Value) -> Option<Interval> {
     }
 }
 
-/// The ratio of two figures; any, where one of them is not positive.
+/// Returns the ratio of two figures; any, where one of them is not positive.
 fn over(a: Option<LogFigure>, b: Option<LogFigure>) -> Interval {
     let unknown = Interval {
         value: f64::NAN,

@@ -64,7 +64,7 @@ pub struct Reproduced {
 }
 
 impl Reproduced {
-    /// The verdict on an expectation as a whole.
+    /// Returns the verdict on an expectation as a whole.
     pub fn verdict(&self, index: usize) -> ClaimVerdict {
         let found = ClaimVerdict::of_all(self.claims[index].iter().map(|row| row.verdict));
         // A row that is only shown is no claim, whether there is something to show or not.
@@ -127,7 +127,7 @@ pub fn prepare(
     })
 }
 
-/// The scene in the place of the thesis's.
+/// Returns the scene in the place of the thesis's.
 fn scene_of(substitute: &Substitute, settings: &Settings) -> Result<String, String> {
     let original = &substitute.original;
     if settings.quick {
@@ -146,7 +146,7 @@ fn scene_of(substitute: &Substitute, settings: &Settings) -> Result<String, Stri
     }
 }
 
-/// A table's verdicts from its records alone; `None` if it has none that are whole.
+/// Returns a table's verdicts from its records alone; `None` if it has none that are whole.
 ///
 /// # Errors
 /// A fault of its file, or records that cannot be read.

@@ -51,7 +51,7 @@ fn introduction(settings: &Animation) -> String {
     )
 }
 
-/// The class of rays that curves show: those that leave surfaces, where there are any.
+/// Returns the class of rays that curves show: those that leave surfaces, where there are any.
 fn shown(frame: &FrameRecord) -> &'static str {
     let classes = || frame.classes.iter().map(|rays| rays.class);
     let bounce = classes().find(|class| *class == RayClass::Bounce);
@@ -80,7 +80,7 @@ fn nodes_ratio(rays: &FrameRays) -> Option<f64> {
     Some(refitted?.nodes / rebuilt?.nodes)
 }
 
-/// The quotient of the times of rays, round by round.
+/// Returns the quotient of the times of rays, round by round.
 fn time_ratio(rays: &FrameRays, software: bool) -> Option<Interval> {
     let [refitted, rebuilt] = [0, 1].map(|place| rays.cost[place].ms(software));
     let ratios = refitted.iter().zip(rebuilt).map(|(a, b)| a / b);
@@ -108,12 +108,12 @@ fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<E
     Some(Estimate::from(million_rays * more / saved.value))
 }
 
-/// The key of a frame.
+/// Returns the key of a frame.
 fn key_of(cell: &Animated, frame: &FrameRecord) -> Key {
     (cell.key.clone()).with(axis::SUBJECT, format!("frame {}", frame.frame))
 }
 
-/// Every figure of the animations of a scene.
+/// Returns every figure of the animations of a scene.
 pub fn values(data: &RunData, scene: &SceneGroup) -> Vec<Value<'static>> {
     let software = is_software(data);
     let mut values = Vec::new();

@@ -8,7 +8,7 @@ use crate::samplers::REFERENCE_SHARE;
 use raystone_record::{GateVerdict, PathsRecord, ReferenceCheck, TimeRecord, Verdict, axis};
 use raystone_stats::bias::BiasVerdict;
 
-/// The section.
+/// Returns the section.
 pub fn section(data: &RunData) -> Section {
     let mut section = Section::new("belief", "Why to believe it");
     let (passed, others): (Vec<Check>, Vec<Check>) = checks(data)

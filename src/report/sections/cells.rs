@@ -32,7 +32,7 @@ fn of_cell(key: &Key) -> Key {
     key.only(&axes)
 }
 
-/// Anchor of the cell that a key belongs to.
+/// Returns the anchor of the cell that a key belongs to.
 fn anchor(key: &Key) -> String {
     let hash = blake3::hash(key.to_string().as_bytes()).to_hex();
     format!("cell-{}", &hash[..12])
@@ -95,7 +95,7 @@ impl<'a> Cells<'a> {
         self.found.len() <= MOST_INSIDE
     }
 
-    /// The section of the page: the cells, or where they are.
+    /// Returns the section of the page: the cells, or where they are.
     pub fn section(&self, data: &RunData) -> Option<Section> {
         if self.found.is_empty() {
             return None;
@@ -112,7 +112,7 @@ impl<'a> Cells<'a> {
         Some(section)
     }
 
-    /// The page of the cells, where there are too many for the other.
+    /// Returns the page of the cells, where there are too many for the other.
     pub fn document(&self, data: &RunData) -> Option<Document> {
         let mut section = Section::new("cells", "Every cell, and how to repeat it");
         section.blocks = self.blocks(data);
@@ -205,7 +205,7 @@ fn command(file: &str, text: &str, key: &Key) -> String {
     command + &format!(" --only {}", quoted(&only.join(",")))
 }
 
-/// A pattern of `--only` that a label fits.
+/// Returns a pattern of `--only` that matches a label.
 fn pattern(label: &str) -> String {
     let mut depth = 0usize;
     let plain = |(i, c): (usize, char)| {
@@ -235,7 +235,7 @@ fn visible(text: &str) -> String {
     text.chars().filter(|c| is_visible(*c)).collect()
 }
 
-/// One word of a POSIX shell.
+/// Quotes one word for a POSIX shell.
 fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
     match !text.is_empty() && text.chars().all(is_plain) {

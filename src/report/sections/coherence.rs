@@ -9,7 +9,7 @@ use crate::values::Value;
 use raystone_record::{ALL_RAYS, CoherenceRecord, Key, SINGLE_KERNEL, axis};
 use raystone_stats::statistics::kendall_tau;
 
-/// Tables and plots of a view; nothing where nothing was modelled.
+/// Returns the tables and plots of a view; nothing where nothing was modelled.
 pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<Block> {
     let Some(first) = view.coherence.first() else {
         return Vec::new();
@@ -72,7 +72,7 @@ fn machine(record: &CoherenceRecord) -> String {
     )
 }
 
-/// Predicted cycles of a path against measured time, over all cells that were timed.
+/// Returns the plot of predicted cycles of a path against measured time, over all cells that were timed.
 fn against_times(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
     let point = |cell: &Measured<CoherenceRecord>| {
         let predicted = cell.timed(SINGLE_KERNEL)?.cost_of_path()?;

@@ -34,7 +34,7 @@ const JUDGED: &str = "Each method first compacted its stream once and was judged
                       stayed wiped out, and after it two sums over what stayed were compared with the host's. What \
                       differs has no figure. Times are those of all passes of a method together.";
 
-/// The section; `None` when no compaction was measured.
+/// Returns the section; `None` when no compaction was measured.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     if data.measured_by(NAME).is_empty() {
         return None;
@@ -49,7 +49,7 @@ pub(crate) fn section(data: &RunData) -> Option<Section> {
     Some(section)
 }
 
-/// The label of a cell without some parameters.
+/// Returns the label of a cell without some parameters.
 fn label_without(key: &Key, left_out: &[&str]) -> String {
     let label = key.label(axis::INTEGRATOR);
     let (name, parameters) = label.split_once('(').unwrap_or((label, ""));
@@ -75,7 +75,7 @@ fn time<'a>(cell: &Measured<'a>) -> Option<&'a raystone_record::Reading> {
     readings.find(|reading| reading.figure == COMPACTION_NS.id)
 }
 
-/// A parameter of the stream or the method.
+/// Returns a parameter of the stream or the method.
 fn parameter(key: &Key, name: &str) -> Option<f64> {
     match key.get(axis::INTEGRATOR)?.params.0.get(name)? {
         ParamValue::Integer(x) => Some(*x as f64),
@@ -95,7 +95,7 @@ fn others(key: &Key, parameter: &str) -> (String, String) {
     (text, key.label(axis::KERNELS).to_owned())
 }
 
-/// Cells that differ in one parameter alone, by growing values of it.
+/// Returns the cells that differ in one parameter alone, by growing values of it.
 fn over<'a>(data: &RunData<'a>, name: &str) -> Vec<Vec<(f64, Measured<'a>)>> {
     let cells = data.measured_by(NAME).into_iter();
     let timed = cells.filter(|cell| time(cell).is_some());
@@ -108,7 +108,7 @@ fn over<'a>(data: &RunData<'a>, name: &str) -> Vec<Vec<(f64, Measured<'a>)>> {
     groups
 }
 
-/// A plot for each parameter that was varied.
+/// Returns a plot for each parameter that was varied.
 fn plots(data: &RunData) -> Vec<Option<Illustration>> {
     let variants = data.measured_by(NAME).into_iter();
     let variants = variants.filter_map(|c| c.key.get(axis::INTEGRATOR));
@@ -158,7 +158,7 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
     plot.figure(format!("compaction-{parameter}"), caption)
 }
 
-/// The same look for all variants of a method.
+/// Returns the look shared by all variants of a method.
 fn look(data: &RunData, key: &Key) -> usize {
     let cells = data.measured_by(NAME).into_iter();
     let methods = grouped(cells, |cell| cell.key.name(axis::INTEGRATOR).to_owned());
@@ -167,7 +167,7 @@ fn look(data: &RunData, key: &Key) -> usize {
     at.unwrap_or(0)
 }
 
-/// Every figure of compactions.
+/// Returns every figure of compactions.
 pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let cells = data.measured_by(NAME);
     let read = cells.iter().flat_map(|cell| of_readings(data, *cell));
@@ -176,7 +176,7 @@ pub(crate) fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     values
 }
 
-/// Figures that follow from several cells.
+/// Returns the figures that follow from several cells.
 pub(crate) fn derived(data: &RunData) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for cell in data.measured_by(NAME) {
@@ -194,7 +194,7 @@ pub(crate) fn derived(data: &RunData) -> Vec<Value<'static>> {
     values
 }
 
-/// Time over that of the baseline on the same stream, round by round.
+/// Returns the time over that of the baseline on the same stream, round by round.
 fn over_baseline(data: &RunData, cell: &Measured) -> Option<Interval> {
     let stream = |key: &Key| STREAM.map(|name| parameter(key, name));
     let is_baseline = |other: &Measured| {
@@ -243,7 +243,7 @@ pub(crate) fn growth_table(data: &RunData, values: &[Value]) -> Table {
     )
 }
 
-/// Every cell.
+/// Returns the table of every cell.
 pub(crate) fn table(data: &RunData, values: &[Value]) -> Table {
     let row = |cell: &Measured| {
         let judged = match &cell.failure {

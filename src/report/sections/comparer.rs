@@ -12,7 +12,7 @@ use std::path::Path;
 /// Characters of radiance that all comparers of a page may hold together: the page stays below 10 MB.
 const MOST_CHARACTERS: usize = 3_000_000;
 
-/// The reference and the first replicate of each sampler; `None` where there is nothing to compare.
+/// Returns the reference and the first replicate of each sampler; `None` where there is nothing to compare.
 pub(super) fn block(dir: &Path, data: &RunData, stem: &str, view: &View) -> Option<Block> {
     let pictured = view.samplers.iter().filter_map(|sampler| {
         let first = sampler
@@ -80,7 +80,7 @@ fn note(absent: usize, large: usize) -> String {
     note.trim_end().into()
 }
 
-/// The linear image beside a picture of the run: the same name with another ending.
+/// Returns the linear image beside a picture of the run: the same name with another ending.
 fn linear(dir: &Path, picture: &str) -> Option<Image> {
     read_linear(&linear_file(dir, picture.strip_suffix(".png")?)?).ok()
 }

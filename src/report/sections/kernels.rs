@@ -17,7 +17,7 @@ use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 /// The parameter that compiles features into a kernel that its scene does not need.
 const CARRY: &str = "carry";
 
-/// The answer that a run with several sets of kernels was made for: each against the first, by the comparison of
+/// Answers the question of a run with several sets of kernels: each against the first, by the comparison of
 /// docs/compare.md, structure by structure. Those whose composed kernels are equal to the letter are the unchanged control.
 pub(crate) fn against_original(data: &RunData) -> Vec<(Table, Vec<String>)> {
     if ideas(data).is_empty() {
@@ -61,7 +61,7 @@ pub(crate) fn ideas(data: &RunData) -> Vec<String> {
     labels
 }
 
-/// A row for each structure, those that the kernels change first.
+/// Returns a row for each structure, those that the kernels change first.
 fn structures(data: &RunData, found: &Comparison) -> Vec<[TableCell; 3]> {
     const WHERE: [&str; 6] = [
         axis::SCENE,
@@ -174,7 +174,7 @@ pub(crate) fn is_repeat<T>(one: &Measured<T>, all: &[Measured<T>]) -> bool {
     })
 }
 
-/// The tables on the kernels of a scene.
+/// Returns the tables on the kernels of a scene.
 pub fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     let gains = scene.views.iter().flat_map(|view| gains(scene, view));
     let gains = GAINS.table(&data.names, &gains.collect::<Vec<_>>(), &[scene.name]);
@@ -240,7 +240,7 @@ pub(crate) fn time_over(
     Some(own?.compared_with(&base?).ratio)
 }
 
-/// The label of an integrator without the parameter; `None` for one that does not have it.
+/// Returns the label of an integrator without the parameter; `None` for one that does not have it.
 fn without_carry(label: &str) -> Option<String> {
     let (name, rest) = label.split_once('(')?;
     let parameters = rest.strip_suffix(')')?.split(',');

@@ -8,7 +8,7 @@ use crate::values::{Value, of_readings};
 use raystone_record::axis;
 use raystone_record::figure::Figure;
 
-/// One table for each measurement.
+/// Returns one table for each measurement.
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
     let names = data.measured.iter().map(|cell| cell.measurement.clone());
     let names = without_repeats(names.collect()).into_iter();
@@ -38,7 +38,7 @@ fn table(data: &RunData, name: &str) -> Table {
     )
 }
 
-/// The section; `None` where there is no such measurement.
+/// Returns the section; `None` where there is no such measurement.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     let mut section = Section::new("measured", "Further measurements");
     let tables = tables(data).into_iter().filter_map(Table::into_block);

@@ -40,7 +40,7 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
     with_cells(dir, data, &Cells::new(data, &values), warnings)
 }
 
-/// The same with cells that are known already.
+/// Returns the same with cells that are known already.
 pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
     let mut sections = vec![verdict::section(dir, data), belief::section(data)];
     for (index, scene) in data.scenes.iter().enumerate() {
@@ -268,7 +268,7 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
         .collect()
 }
 
-/// A name as part of a file name: lower-case letters, digits and single dashes.
+/// Returns a name as part of a file name: lower-case letters, digits and single dashes.
 pub(crate) fn file_stem(name: &str) -> String {
     let mut stem = String::new();
     for c in name.chars() {

@@ -19,7 +19,7 @@ fn is_single(time: &Measured<TimeRecord>) -> bool {
     matches!(time.key.label(axis::ORGANISATION), "" | SINGLE)
 }
 
-/// Time of each organisation of a view over that of the single kernel with everything else the same.
+/// Returns the time of each organisation of a view over that of the single kernel with everything else the same.
 pub(crate) fn against_single(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let others = view.valid_times().filter(|time| !is_single(time));
     let value = |time: &Measured<TimeRecord>| {
@@ -32,7 +32,7 @@ pub(crate) fn against_single(scene: &SceneGroup, view: &View) -> Vec<Value<'stat
     others.filter_map(value).collect()
 }
 
-/// The stages by their share of the time, the longest first.
+/// Returns the stages by their share of the time, the longest first.
 fn stages(time: &TimeRecord) -> String {
     let all: f64 = time.stages.values().sum();
     let mut parts: Vec<(&String, f64)> = (time.stages.iter())
@@ -46,7 +46,7 @@ fn stages(time: &TimeRecord) -> String {
     told.join(", ")
 }
 
-/// Table and plot; nothing where there is one kernel alone.
+/// Returns table and plot; nothing where there is one kernel alone.
 pub(crate) fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     let times: Vec<&Measured<TimeRecord>> =
         scene.views.iter().flat_map(View::valid_times).collect();

@@ -37,14 +37,14 @@ fn of_peer(peer: &Recorded<PeerRecord>, timing: &PeerTiming) -> Vec<Value<'stati
     Value::known(&key, figures)
 }
 
-/// Time of the processors for the same rays, over that of the peer.
+/// Returns the time of the processors for the same rays, over that of the peer.
 fn over(ours: &ClassTiming, theirs: &PeerTiming) -> Option<Interval> {
     let [own, base] = [&ours.cpu_ms, &theirs.cpu_ms].map(|ms| LogFigure::of_times(ms));
     let (own, base) = own.zip(base)?;
     Some(own.compared_with(&base).ratio)
 }
 
-/// All figures of a scene's peers, and of its structures against them.
+/// Returns all figures of a scene's peers, and of its structures against them.
 pub fn values(scene: &SceneGroup) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for peer in &scene.peers {
@@ -89,7 +89,7 @@ fn told(peer: &Recorded<PeerRecord>) -> String {
     }
 }
 
-/// Tables of a scene; nothing without peers.
+/// Returns the tables of a scene; nothing without peers.
 pub fn blocks(data: &RunData, scene: &SceneGroup) -> Vec<Block> {
     if scene.peers.is_empty() {
         return Vec::new();

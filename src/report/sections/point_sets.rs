@@ -8,7 +8,7 @@ use crate::plot::points::{Cloud, Domain, Pair, interval_counts};
 use crate::plot::spectrum::RadialCurve;
 use raystone_record::{Recorded, RecordedPoints, StreamRecord, axis};
 
-/// The section; `None` when no record holds points. Of a sampler without points nothing is drawn: today's
+/// Returns the section; `None` if no record holds points. Nothing is drawn for a sampler without points: today's
 /// samplers need not be those of the run.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     let recorded = |name: &String| {

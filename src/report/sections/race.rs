@@ -47,7 +47,7 @@ impl<'a> Runner<'a> {
         self.sampler.is_ranked() && self.time.has_noise()
     }
 
-    /// A figure with the noise of the time, which it goes with as with this power of it; without it beside an image whose own
+    /// Returns a figure with the noise of the time, which enters as this power of it; without it beside an image whose own
     /// noise is not known.
     fn with_time(&self, figure: LogFigure, power: f64) -> LogFigure {
         // An exact 0 stays one.
@@ -58,7 +58,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// The error after so many seconds. A time per sample that is off by a part moves it along the curve.
+    /// Returns the error after so many seconds. An error of the time per sample moves it along the curve.
     fn error_after(&self, seconds: f64) -> Option<LogFigure> {
         let times: Vec<f64> = self.curve.iter().map(|at| at.1).collect();
         let (neighbours, share) = place_on(&times, seconds)?;
@@ -74,14 +74,14 @@ impl<'a> Runner<'a> {
         Some(self.with_time(error([a, b], share)?, -slope))
     }
 
-    /// Error × seconds, one over the efficiency.
+    /// Returns error × seconds, one over the efficiency.
     fn error_seconds(&self, spp: u32) -> Option<LogFigure> {
         let error = self.sampler.log_error(Metric::RelMse, [spp; 2], 0.0)?;
         let seconds = f64::from(spp) * self.time.log.exp() / 1000.0;
         Some(self.with_time(error.scaled(seconds), 1.0))
     }
 
-    /// Seconds until the error falls to `target`.
+    /// Returns the seconds until the error falls to `target`.
     fn seconds_to(&self, target: f64) -> Option<LogFigure> {
         let spp = self.sampler.spp_to(Metric::RelMse, target)?;
         Some(self.with_time(spp.scaled(self.time.log.exp() / 1000.0), 1.0))
@@ -89,7 +89,7 @@ impl<'a> Runner<'a> {
 }
 
 impl<'a> Race<'a> {
-    /// `None` without a sampler that has both errors and a time.
+    /// Creates the race; `None` without a sampler that has both errors and a time.
     pub(crate) fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a MeasuredSampler<'a>| {
@@ -111,7 +111,7 @@ impl<'a> Race<'a> {
         })
     }
 
-    /// The error that samples and seconds are counted to: that of the rule that ends cells, else the least
+    /// Returns the error that samples and seconds are counted to: that of the rule that ends cells, else the least
     /// that all of the race reach, rounded up to two digits.
     fn target(&self) -> Option<f64> {
         let stopped = self.view.samplers.iter().flat_map(|s| &s.replicates);
@@ -166,7 +166,7 @@ impl<'a> Race<'a> {
         values
     }
 
-    /// Error of a sampler when the race ends.
+    /// Returns the error of a sampler when the race ends.
     #[cfg(test)]
     pub(crate) fn error_of(&self, sampler: &str) -> Option<raystone_record::Interval> {
         let is_it = |runner: &&Runner| runner.sampler.name == sampler;

@@ -67,8 +67,8 @@ pub(crate) fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
     judge(all, Better::Lower)
 }
 
-/// A line for each class of rays of which some structure is faster than the one that renders fastest, though it
-/// renders slower: both by a test of the difference, corrected for all pairs of the comparison.
+/// Returns a line for each class of rays of which some structure is faster than the one that renders fastest, though
+/// it renders slower: both by a test of the difference, corrected for all pairs of the comparison.
 pub(crate) fn disagreements(scene: &SceneGroup) -> Vec<String> {
     let views = scene.views.iter();
     views

@@ -9,7 +9,7 @@ use raystone_record::{FinishedRecord, Key, StructureRecord, TimeRecord};
 /// Largest share of the wall time that the harness may take for itself.
 const OVERHEAD_TARGET: f64 = 0.1;
 
-/// The closing sections.
+/// Returns the closing sections.
 pub fn sections(data: &RunData) -> Vec<Section> {
     let sections = [failures_section(data), time(data), environment(data)];
     sections.into_iter().flatten().collect()
@@ -93,7 +93,7 @@ impl Failure {
     }
 }
 
-/// Everything that failed, was left out, or is warned of.
+/// Returns all failures, omissions and warnings.
 pub(crate) fn failures(data: &RunData) -> Vec<Failure> {
     let mut all: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
     let of_views = data.views().map(|(scene, view)| failed_cells(scene, view));

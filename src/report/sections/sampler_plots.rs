@@ -22,7 +22,7 @@ fn not_drawn(count: usize) -> String {
     }
 }
 
-/// Error against samples and against seconds.
+/// Returns plots of error against samples and against seconds.
 pub(crate) fn error_figures(
     data: &RunData,
     stem: &str,
@@ -81,7 +81,7 @@ pub(crate) fn error_figures(
     [of_samples, of_seconds]
 }
 
-/// Run time against error at the common spp.
+/// Returns the plot of run time against error at the common spp.
 pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
     let spp = view.common_spp()?;
     let names = view.timed_structures().into_iter();
@@ -150,7 +150,7 @@ pub(crate) fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<I
     ))
 }
 
-/// The p-values of every sampler that was checked.
+/// Returns histograms of the p-values of every sampler that was checked.
 pub(crate) fn histograms(stem: &str, view: &View) -> Option<Illustration> {
     let panel = |sampler: &MeasuredSampler| {
         let bias = sampler.bias.as_ref()?;

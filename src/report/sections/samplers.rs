@@ -22,7 +22,7 @@ use raystone_record::{Key, axis};
 use raystone_stats::bias::BiasVerdict;
 use std::path::Path;
 
-/// Everything on the samplers of a view; `stem` starts the names of its plots.
+/// Returns everything on the samplers of a view; `stem` starts the names of its plots.
 pub fn blocks(
     dir: &Path,
     data: &RunData,
@@ -74,7 +74,7 @@ pub fn blocks(
     blocks
 }
 
-/// A row for each sampler with images, with a further cell.
+/// Returns a row for each sampler with images, with a further cell.
 fn measured(
     view: &View,
     cell: impl Fn(&MeasuredSampler) -> TableCell,
@@ -83,7 +83,7 @@ fn measured(
     measured.map(|s| (s.key.clone(), vec![cell(s)])).collect()
 }
 
-/// Mean error per spp, slope and bias verdict.
+/// Returns the table of mean error per spp, slope and bias verdict.
 pub fn error_table(names: &Names, view: &View, values: &[Value], metric: Metric) -> Table {
     let id = view.samplers.iter().find_map(|s| s.metric_id(metric));
     let shown = [metric.figure(), metric.slope_figure()];
@@ -138,7 +138,7 @@ fn further_table(names: &Names, view: &View, values: &[Value]) -> Table {
     FURTHER_ERRORS.table(names, values, &[&view.name, &spp])
 }
 
-/// Verdict on the bias of every sampler.
+/// Returns the table of bias verdicts.
 fn bias_table(names: &Names, view: &View, values: &[Value]) -> Table {
     let levels = view.samplers.iter().filter_map(|s| s.bias.as_ref());
     let level = levels.map(|bias| bias.alpha).reduce(f64::min);
@@ -170,7 +170,7 @@ pub(crate) fn efficiency_table(names: &Names, view: &View, values: &[Value]) -> 
     EFFICIENCY.table(names, &values, &[&view.name, &race.structure])
 }
 
-/// Milliseconds per spp of every cell.
+/// Returns the table of milliseconds per spp of every cell.
 fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> Table {
     let structures = view.timed_structures();
     let row = |(i, name): (usize, &String)| {
@@ -205,7 +205,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> T
     table
 }
 
-/// The reference and a render of each sampler, then where each render is wrong.
+/// Returns the reference and a render of each sampler, then where each render is wrong.
 fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
     let mut renders = Vec::new();
     let mut errors = Vec::new();

@@ -8,7 +8,7 @@ use crate::samplers::MeasuredSampler;
 use crate::values::Value;
 use raystone_record::{FilteredError, Interval, PowerAt, SpectrumRecord};
 
-/// Plots and table of a view; nothing without spectra.
+/// Returns the plots and table of a view; nothing without spectra.
 pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<Block> {
     let by_frequency = |y_title: &str, at: &dyn Fn(&PowerAt) -> Option<Interval>| {
         let point = |of: &PowerAt| Some(CurvePoint::new(of.frequency, &at(of)?));

@@ -27,7 +27,7 @@ const PLOTTED: [&str; 2] = ["exponential", "disk"];
 /// Name of the measurement of the cost of drawing, in records.
 pub(super) const COST: &str = "sampler-cost";
 
-/// The section; `None` when no stream was measured.
+/// Returns the section; `None` when no stream was measured.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     if data.streams.is_empty() && data.measured_by(COST).is_empty() {
         return None;
@@ -139,7 +139,7 @@ impl Pair<'_> {
         POINT_SETS.table(&self.data.names, &values, &words)
     }
 
-    /// One figure by N: mean over seeds.
+    /// Returns the table of one figure by N: mean over seeds.
     fn count_table(&self, values: &[Value], figure: &Figure) -> Table {
         let n = |value: &Value| number(&value.key, axis::POINTS);
         let of_figure = values.iter().filter(|value| value.figure.id == figure.id);
@@ -167,7 +167,7 @@ impl Pair<'_> {
     }
 }
 
-/// The pair of dimensions with the greatest D* of each sampler.
+/// Returns the table of each sampler's pair of dimensions with the greatest D*.
 fn worst_table(data: &RunData) -> Table {
     let worst = || {
         data.streams

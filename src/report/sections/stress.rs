@@ -17,12 +17,12 @@ const BRUTE_FORCE: &str = "brute-force";
 /// Families whose errors are drawn over the rungs.
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 
-/// A family, or another part of the suite.
+/// Returns the name of a family, or of another part of the suite.
 fn part(key: &Key) -> &str {
     key.label(axis::INTEGRATOR).trim_start_matches(STRESS)
 }
 
-/// The values of a measurement.
+/// Returns the values of a measurement.
 fn values_of<'a>(data: &RunData<'a>, measurement: &str) -> Vec<Value<'a>> {
     let cells = data.measured_by(measurement);
     cells
@@ -96,7 +96,7 @@ pub(crate) fn is_shown(measurement: &str) -> bool {
     [FAMILIES, SHOTS].contains(&measurement)
 }
 
-/// The section; `None` where the suite was not run.
+/// Returns the section; `None` where the suite was not run.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     let families = of_families(data);
     let mut section = Section::new("stress", "Hard scenes and rays");
@@ -190,7 +190,7 @@ fn on_axis([name, _, begin]: [&str; 3], place: &str) -> Option<f64> {
     }
 }
 
-/// Error of the distance over the rungs, one plot per family and sweep, one curve per triangle test.
+/// Plots the error of the distance over the rungs, one plot per family and sweep, one curve per triangle test.
 fn curves(data: &RunData, tests: &[String]) -> Vec<Option<Illustration>> {
     let mut values = values_of(data, FAMILIES);
     values.retain(|value| value.figure.id == figure::T_ULP_P99.id);
@@ -218,7 +218,7 @@ fn curves(data: &RunData, tests: &[String]) -> Vec<Option<Illustration>> {
     sweeps.map(plot).collect()
 }
 
-/// Of the cases of a family those on the mesh of the first.
+/// Returns the curve of a family's cases on the mesh of the first.
 fn curve(values: &[&Value], sweep: [&str; 3], (look, test): (usize, &String)) -> Option<Curve> {
     let mut cases = values.iter().map(|value| value.key.label(axis::SUBJECT));
     let first = cases.find(|case| !case.is_empty())?.split(", ").next()?;

@@ -17,7 +17,7 @@ use raystone_record::figure::Figure;
 use raystone_record::{RayClass, StructureRecord};
 use std::path::Path;
 
-/// Everything on the structures of the scene with this index.
+/// Returns everything on the structures of the scene with this index.
 pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Vec<Block> {
     if scene.structures.is_empty() {
         return Vec::new();
@@ -107,7 +107,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
     }
 }
 
-/// Mrays/s, one row per structure and one column per ray class.
+/// Returns the table of Mrays/s, one row per structure and one column per ray class.
 pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let gate = |s: &StructureRecord| {
         let (verdict, tone) = match s.fault() {
@@ -150,7 +150,7 @@ fn build_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     )
 }
 
-/// Figures that this program does not measure itself.
+/// Returns the table of figures that this program does not measure itself.
 pub(crate) fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let from_outside = data.run.iter().flat_map(|run| &run.figures);
     let figures: Vec<&Figure> = from_outside.collect();
@@ -161,7 +161,7 @@ pub(crate) fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]
     table.table(&data.names, values, &[scene.name])
 }
 
-/// Coherence of the recorded rays, by the model.
+/// Returns the table of the recorded rays' coherence, by the model.
 fn coherence_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let Some(modelled) = scene.structures.iter().find_map(|s| s.coherence.as_ref()) else {
         return Table::default();

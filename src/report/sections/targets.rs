@@ -10,7 +10,7 @@ use raystone_config::expect::{Expect, Thesis};
 use raystone_record::Verdict;
 use raystone_record::figure::Spread;
 
-/// The targets of a run; none where its experiment has none.
+/// Returns the targets of a run; none where its experiment has none.
 pub(crate) fn checks(data: &RunData) -> Vec<Check> {
     let thesis = data.run.and_then(|run| {
         let thesis = Thesis::parse(&run.experiment_text, &run.experiment).ok()??;

@@ -11,8 +11,8 @@ use raystone_record::figure;
 use raystone_record::*;
 use raystone_stats::statistics::LEAST_FOR_MEDIAN;
 
-/// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
-/// Speeds in Mrays/s.
+/// Returns the thousands of rays after which a structure has caught up with one that is built `extra_build_ms`
+/// faster. Speeds in Mrays/s.
 fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Estimate {
     if slow_build.high < fast_build.low {
         return Estimate::Word("never");
@@ -24,13 +24,13 @@ fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) 
     (extra_build_ms.max(0.0) / seconds_per_million).into()
 }
 
-/// Speed in a class, if it was measured often enough to have a 95 % interval.
+/// Returns the speed in a class, if it was measured often enough to have a 95 % interval.
 fn rate<'a>(structure: &Measured<'a, StructureRecord>, class: RayClass) -> Option<&'a Interval> {
     let timing = (structure.body.timings.iter()).find(|t| t.class == class)?;
     (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
-/// The structures with speeds: the one that is built fastest, and the others.
+/// Returns the structures with speeds: the one that is built fastest, and the others.
 fn by_build<'a>(
     scene: &'a SceneGroup,
 ) -> Option<(
@@ -47,7 +47,7 @@ fn by_build<'a>(
     Some((passed.remove(least), passed))
 }
 
-/// Rays after which each structure has caught up with the one that is built fastest, per class.
+/// Returns the rays after which each structure has caught up with the one that is built fastest, per class.
 pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
     let Some((first, others)) = by_build(scene) else {
         return Vec::new();
@@ -65,7 +65,7 @@ pub(crate) fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
     others.iter().flat_map(of).collect()
 }
 
-/// The table of [`break_even`].
+/// Returns the table of [`break_even`].
 pub(crate) fn break_even_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let Some((first, others)) = by_build(scene) else {
         return Table::default();
@@ -75,13 +75,13 @@ pub(crate) fn break_even_table(names: &Names, scene: &SceneGroup, values: &[Valu
     BREAK_EVENS.beside(names, values, &words, &[], rows)
 }
 
-/// The sampler that most structures were timed with.
+/// Returns the sampler that most structures were timed with.
 fn most_timed<'a>(view: &'a View) -> Option<&'a MeasuredSampler<'a>> {
     let timed = |s: &&MeasuredSampler| view.valid_times().filter(|t| t.sampler == s.name).count();
     view.samplers.iter().rev().max_by_key(timed)
 }
 
-/// Build and rendering together with that sampler, for one image of few samples and one of many.
+/// Returns times of build and rendering together with that sampler, for one image of few samples and one of many.
 pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let errors = view.samplers.iter().flat_map(|s| &s.replicates);
     let spps = errors.flat_map(|r| &r.errors).map(|e| e.spp);
@@ -105,7 +105,7 @@ pub(crate) fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'stat
     timed.filter_map(of).flatten().collect()
 }
 
-/// The table of [`times_to_image`].
+/// Returns the table of [`times_to_image`].
 pub(crate) fn time_to_image_table(
     names: &Names,
     scene: &SceneGroup,

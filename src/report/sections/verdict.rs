@@ -28,7 +28,7 @@ const NAMED_FAILURES: usize = 5;
 /// Kinds of images that the question names.
 const NAMED_VIEWS: usize = 4;
 
-/// The first screens.
+/// Returns the section of the first screens.
 pub fn section(dir: &Path, data: &RunData) -> Section {
     let mut section = Section::new("verdict", "Verdict");
     let blocks = &mut section.blocks;
@@ -136,7 +136,7 @@ fn question(data: &RunData) -> String {
     text + "." + &amounts(data)
 }
 
-/// Names, of many the first ones and how many more there are.
+/// Joins names; of many the first ones and the number of the others.
 fn some_of(names: &[String]) -> String {
     let more = names.len().saturating_sub(NAMED_VIEWS);
     let shown = names[..names.len() - more].join(", ");
@@ -146,7 +146,7 @@ fn some_of(names: &[String]) -> String {
     }
 }
 
-/// Size of the images, samples and replicates, where there are images.
+/// Returns the size of the images, samples and replicates, if there are images.
 fn amounts(data: &RunData) -> String {
     let samplers = || data.views().flat_map(|(_, view)| &view.samplers);
     let Some(first) = samplers().flat_map(|s| &s.replicates).next() else {
@@ -171,7 +171,7 @@ fn amounts(data: &RunData) -> String {
     format!(" Images of {width} × {height} pixels{spp}, {replicates}.")
 }
 
-/// All checks in one.
+/// Sums up all checks in one.
 fn summary(data: &RunData) -> Check {
     let checks = belief::checks(data);
     let titles = |verdict: Verdict| -> Vec<&str> {
@@ -232,7 +232,7 @@ fn failed(data: &RunData) -> Option<Block> {
     table.into_block()
 }
 
-/// Everything on one scene.
+/// Returns everything on one scene.
 fn of_scene(scene: &SceneGroup) -> Vec<Block> {
     let rulings = rulings(scene);
     let mut blocks = answers(&format!("Verdict on {}", scene.name), &rulings);
@@ -341,7 +341,7 @@ pub(crate) fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     rulings
 }
 
-/// The verdicts on one scene.
+/// Returns the verdicts on one scene.
 pub fn table(scene: &SceneGroup) -> Table {
     table_of(&format!("Verdict on {}", scene.name), &rulings(scene))
 }
@@ -409,7 +409,7 @@ fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
     pairs.filter_map(rule_on).collect()
 }
 
-/// D* with its noise over seeds; that of a deterministic set is exact.
+/// Returns D* with its noise over seeds; that of a deterministic set is exact.
 fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigure> {
     if !stream.randomised {
         return LogFigure::of_interval(Interval::exact(at.value.value), f64::INFINITY);
@@ -455,7 +455,7 @@ fn apart(scene: &SceneGroup) -> Vec<Block> {
     said.map(Block::Paragraph).collect()
 }
 
-/// Ray classes that some structure was timed on.
+/// Returns the ray classes that some structure was timed on.
 pub(crate) fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     let timings = scene.structures.iter().flat_map(|s| &s.timings);
     let mut classes: Vec<RayClass> = timings.map(|timing| timing.class).collect();
@@ -464,7 +464,7 @@ pub(crate) fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     classes
 }
 
-/// Speed in a class, Mrays/s, of a structure that passed the gate and was timed often enough.
+/// Returns the speed in a class, Mrays/s, of a structure that passed the gate and was timed often enough.
 pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
     let timing = s.timings.iter().find(|timing| timing.class == class)?;
     let often = timing.ms.len() >= LEAST_FOR_MEDIAN && s.fault().is_none();

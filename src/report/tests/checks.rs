@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A run without any fault.
+/// Returns a run without any fault.
 fn clean_run() -> Vec<Line> {
     changed(|_, body| match body {
         Body::Structure(s) => s.gate = Some(gate(0)),

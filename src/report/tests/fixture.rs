@@ -16,7 +16,7 @@ impl Noise {
     }
 }
 
-/// A line with this key; axes with empty labels are left out.
+/// Returns a line with this key; axes with empty labels are left out.
 pub(super) fn line(key: &[(&str, &str)], body: Value) -> Line {
     let add = |key: Key, (axis, label): &(&str, &str)| key.with(axis, label);
     let key = key.iter().fold(Key::default(), add);
@@ -24,7 +24,7 @@ pub(super) fn line(key: &[(&str, &str)], body: Value) -> Line {
     Line::new(key, Ran::default(), body)
 }
 
-/// A line of a sampler in a view.
+/// Returns a line of a sampler in a view.
 pub(super) fn sampled([scene, integrator]: [&str; 2], sampler: &Sampler, body: Value) -> Line {
     let view = [(axis::SCENE, scene), (axis::INTEGRATOR, integrator)];
     let sampler = [
@@ -99,7 +99,7 @@ pub(super) fn gate(wrong: usize) -> GateVerdict {
     serde_json::from_value(gate).expect("a verdict")
 }
 
-/// Seven times around this one, its median.
+/// Returns seven times around this one, their median.
 pub(super) fn jittered(ms: f64) -> [f64; 7] {
     [1.0, 1.03, 0.97, 1.0, 1.02, 0.98, 1.0].map(|factor| factor * ms)
 }
@@ -217,7 +217,7 @@ fn reference([scene, integrator]: [&str; 2]) -> Line {
     )
 }
 
-/// Verdict on an integrator.
+/// Returns the verdict on an integrator.
 fn paths([scene, integrator]: [&str; 2]) -> Line {
     let record = json!({
         "kind": "paths", "paths": 494, "ill_conditioned": 3, "flips": 1, "wrong": 0, "median": 4.2e-6, "worst": 8.1e-5,
@@ -228,7 +228,7 @@ fn paths([scene, integrator]: [&str; 2]) -> Line {
     )
 }
 
-/// Spectra that rise, so that low frequencies are weak.
+/// Returns spectra that rise, so that low frequencies are weak.
 fn spectrum(view: [&str; 2], sampler: &Sampler) -> Line {
     let power = |k: i32| {
         let quantiles = [0.18, 0.2, 0.3, 0.5].map(|q| q * f64::from(k));
@@ -300,8 +300,8 @@ fn finished() -> Line {
     line(&[], record)
 }
 
-/// Two scenes, four structures (one fails its gate, one is skipped on the second scene), five
-/// samplers, two integrators, eight replicates.
+/// Returns two scenes, four structures (one fails its gate, one is skipped on the second scene), five samplers, two
+/// integrators, eight replicates.
 pub(super) fn full_run() -> Vec<Line> {
     let mut lines = vec![run()];
     for (name, triangles) in [("cornell-box", 36), ("displaced-sphere", 99_856)] {
@@ -344,7 +344,7 @@ pub(super) fn full_run() -> Vec<Line> {
     lines
 }
 
-/// The first scene of [`full_run`] with one integrator: as much in kind, a quarter in plots.
+/// Returns the first scene of [`full_run`] with one integrator: as much in kind, a quarter in plots.
 pub(super) fn small_run() -> Vec<Line> {
     let kept = |line: &Line| {
         ["", "cornell-box"].contains(&line.key.label(axis::SCENE))

@@ -3,7 +3,7 @@
 
 use super::*;
 
-/// A run whose cells took both labels of an axis. With the second one structures are half as fast, renders
+/// Returns a run whose cells used both labels of an axis. With the second one structures are half as fast, renders
 /// twice as slow and errors three times as large.
 fn both(axis: &str, labels: [&str; 2]) -> Vec<Line> {
     let with = |mut line: Line, label: &str| {

@@ -8,7 +8,7 @@ use crate::repro::claim::{Context, judge};
 use crate::repro::table::Reproduced;
 use serde_json::json;
 
-/// The page and the terminal's tables.
+/// Returns the page and the terminal's tables.
 fn page(lines: &[Line]) -> String {
     let document = sections::document(Path::new("no such folder"), &RunData::new(lines), &[]);
     of_document(&document) + "\n# Terminal\n" + &terminal_tables(lines)

@@ -5,7 +5,7 @@ use sections::rendering::{disagreements, fastest as renders_fastest};
 
 const VIEW: [&str; 2] = ["room", "path"];
 
-/// Structures with speeds of rays and times of rendering, relative.
+/// Returns structures with speeds of rays and times of rendering, relative.
 fn lines(structures: &[(&str, f64, f64)]) -> Vec<Line> {
     let of_rays = structures
         .iter()

@@ -17,7 +17,7 @@ const BOUNCES: usize = 100;
 /// Size of the surface at which a chain turns, over that of the analytic one, which contains the facets.
 const INSIDE: f64 = 0.98;
 
-/// A mesh that rounding has crushed is as closed as before, but has no inside.
+/// Returns the source of the right answers: a mesh crushed by rounding is as closed as before, but has no inside.
 pub(super) fn truth(place: &Placement) -> Truth {
     match place.keeps_shape() {
         true => Truth::Closed,
@@ -25,12 +25,12 @@ pub(super) fn truth(place: &Placement) -> Truth {
     }
 }
 
-/// A point well inside the sphere and the box.
+/// Returns a point well inside the sphere and the box.
 pub(super) fn inside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(0.45 * RADIUS * random.in_cube())
 }
 
-/// A point around the meshes.
+/// Returns a point around the meshes.
 fn outside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(3.0 * RADIUS * random.direction())
 }

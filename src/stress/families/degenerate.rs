@@ -11,7 +11,7 @@ use raystone_core::params::{ParamValue, Params, Variant};
 use raystone_core::random::Pcg32;
 use raystone_scene::{LoadOptions, load};
 
-/// Rays at insides, edges and vertices of random triangles, from about the mesh.
+/// Returns rays at insides, edges and vertices of random triangles, from about the mesh.
 fn shots(place: Placement) -> impl Fn(&[Triangle], &mut Pcg32) -> Ray {
     move |mesh, random| {
         let triangle = random.one_of(mesh);
@@ -24,7 +24,7 @@ fn shots(place: Placement) -> impl Fn(&[Triangle], &mut Pcg32) -> Ray {
     }
 }
 
-/// A triangle `1 : 10^-digits` in a random pose.
+/// Returns a triangle `1 : 10^-digits` in a random pose.
 fn needle(random: &mut Pcg32, digits: f64) -> [DVec3; 3] {
     let start = RADIUS * random.in_cube();
     let along = random.direction();
@@ -155,7 +155,7 @@ pub(super) fn huge_and_tiny(maker: &mut Maker) {
     }
 }
 
-/// The built-in scene, coarse.
+/// Returns the built-in scene, coarse.
 fn stadium(scale: f32) -> Option<Mesh> {
     let name = "teapot-in-a-stadium";
     let subdivision = ("subdivision".to_owned(), ParamValue::Integer(2));

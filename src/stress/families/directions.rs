@@ -57,7 +57,7 @@ pub(super) fn in_plane(maker: &mut Maker) {
     });
 }
 
-/// A point of a plane that cuts the scene's box into equal cells.
+/// Returns a point of a plane that cuts the scene's box into equal cells.
 fn on_cell_border(bounds: &Bounds, random: &mut Pcg32) -> Vec3 {
     let cells = 1 + random.below(8);
     let size = (bounds.max - bounds.min).as_dvec3();
@@ -119,8 +119,8 @@ const NOTHINGS: [f32; 8] = [
     1e-44,
 ];
 
-/// A ray of any length from 10⁻¹⁰ to 10¹⁰, most often with a component or two that are next to nothing,
-/// and from the coordinates of a vertex along those.
+/// Returns a ray of any length from 10⁻¹⁰ to 10¹⁰, most often with a component or two that are next to nothing, and
+/// from the coordinates of a vertex along those.
 fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     let mut from = from;
     let mut direction = random.direction().as_vec3();
@@ -138,7 +138,7 @@ fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     Ray::new(from, length * direction)
 }
 
-/// A ray of any length from around the middle of a mesh.
+/// Returns a ray of any length from around the middle of a mesh.
 pub(super) fn from_the_middle(place: &Placement, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
 }

@@ -95,7 +95,7 @@ pub(super) fn non_finite(maker: &mut Maker) {
     });
 }
 
-/// Pcg32 bits that are a number no greater than `limit`.
+/// Returns random bits that are a number no greater than `limit`.
 fn number(random: &mut Pcg32, limit: f32) -> f32 {
     loop {
         let x = f32::from_bits(random.next_u32());

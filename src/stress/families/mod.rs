@@ -73,12 +73,12 @@ families! {
 }
 
 impl Family {
-    /// The family of this name.
+    /// Returns the family of this name.
     pub(crate) fn named(name: &str) -> Option<&'static Self> {
         FAMILIES.iter().find(|family| family.name == name)
     }
 
-    /// Its cases with about `rays` rays each.
+    /// Returns its cases with about `rays` rays each.
     pub(crate) fn cases(&self, seed: u64, quick: bool, rays: usize) -> Vec<Case> {
         let mut maker = Maker::new(self.name, seed, quick, rays);
         (self.make)(&mut maker);

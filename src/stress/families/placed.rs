@@ -17,7 +17,7 @@ fn rotation(random: &mut Pcg32) -> DMat3 {
     DMat3::from_quat(DQuat::from_axis_angle(random.direction(), turn))
 }
 
-/// Spheres, squeezed along a random direction to `thickness`, about the origin.
+/// Returns spheres, squeezed along a random direction to `thickness`, about the origin.
 fn squeezed(random: &mut Pcg32, thickness: f64, spread: f64) -> Option<Assembly> {
     let mut assembly = Assembly::default();
     let object = assembly.add_object(sphere(8, &Placement::ORDINARY)).ok()?;
@@ -33,7 +33,7 @@ fn squeezed(random: &mut Pcg32, thickness: f64, spread: f64) -> Option<Assembly>
     (!assembly.instances().is_empty()).then_some(assembly)
 }
 
-/// One sphere, scaled about the origin, and directions of every length.
+/// Makes one sphere, scaled about the origin, and directions of every length.
 fn scaled(maker: &mut Maker) {
     for scale in [1e-6, 1e6] {
         let place = Placement { scale, shift: 0.0 };

@@ -43,7 +43,7 @@ pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsErro
     ])
 }
 
-/// The draw and the naive conversion of `count` words from `first` on.
+/// Returns the draw and the naive conversion of `count` words from `first` on.
 fn convert(gpu: &Gpu, first: u32, stride: u32, count: u32) -> Result<Vec<[f32; 2]>, NumericsError> {
     let sampler = rig::sampler("pixel-hash", 1)?;
     let kernel = with_sampler(Composition::new("stress/conversion"), &sampler);

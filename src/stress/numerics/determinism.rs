@@ -79,7 +79,7 @@ fn stream(gpu: &Gpu) -> Result<Gauge, NumericsError> {
         .in_unit("words"))
 }
 
-/// The beginning of the BLAKE3 hash: the same on two adapters where all bits are.
+/// Returns the beginning of the BLAKE3 hash: the same on two adapters where all bits are.
 fn hash(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex()[..16].to_owned()
 }

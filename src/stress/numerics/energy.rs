@@ -52,7 +52,7 @@ impl Integrator for Walk {
 
 static WALK: Walk = Walk;
 
-/// The furnace box with walls of albedo 1 that emit `emission`.
+/// Returns the furnace box with walls of albedo 1 that emit `emission`.
 fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
     let mut scene = scene::named("furnace-box")?;
     for material in &mut scene.materials {
@@ -62,7 +62,7 @@ fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
     Ok(scene)
 }
 
-/// Energy left by walks of up to 64 bounces, and by the path tracer with light and roulette.
+/// Measures the energy left by walks of up to 64 bounces, and by the path tracer with light and roulette.
 pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let spp = SPP[usize::from(quick)];
     let mut figures = walk(gpu, spp)?;
@@ -74,7 +74,7 @@ pub(super) fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsErro
     Ok(figures)
 }
 
-/// The radiance in a ball of glass under a white sky: the square of its index, wherever one looks.
+/// Measures the radiance in a ball of glass under a white sky: the square of its index, wherever one looks.
 fn glass(gpu: &Gpu, spp: u32) -> Result<Gauge, NumericsError> {
     let mut scene = scene::named("white-furnace")?;
     scene.materials = vec![Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR)];
@@ -125,13 +125,13 @@ fn image(rig: &Rig, integrator: &ConfiguredIntegrator, spp: u32) -> Result<Image
     Ok(renderer.image()?)
 }
 
-/// The red channel of the path tracer's image.
+/// Returns the red channel of the path tracer's image.
 fn radiance(rig: &Rig, depth: i64, spp: u32) -> Result<Vec<f64>, NumericsError> {
     let image = image(rig, &rig::path(Some(depth))?, spp)?;
     Ok(image.pixels.iter().map(|p| f64::from(p[0])).collect())
 }
 
-/// The radiance of the path tracer after `depth` bounces: one emission for each surface met.
+/// Measures the radiance of the path tracer after `depth` bounces: one emission for each surface met.
 fn path(rig: &Rig, depth: i64, spp: u32) -> Result<Gauge, NumericsError> {
     let pixels = radiance(rig, depth, spp)?;
     let expected = depth as f64 + 1.0;

@@ -91,7 +91,7 @@ impl Worst {
 
 type Vectors = Vec<[f32; 4]>;
 
-/// All pairs of end points with awkward normals, then random ones.
+/// Returns all pairs of end points with awkward normals, then random ones.
 fn inputs(random: usize) -> (Vectors, Vectors) {
     let u = U as f32;
     let ends = [
@@ -131,7 +131,7 @@ fn inputs(random: usize) -> (Vectors, Vectors) {
     (points, normals)
 }
 
-/// The axes with both zeros, and normals that nearly are the axes where the basis turns over.
+/// Returns the axes with both zeros, and normals that nearly are the axes where the basis turns over.
 fn awkward_normals() -> Vectors {
     let mut normals = Vec::new();
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {

@@ -37,7 +37,7 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// A figure for comparison, a plain number.
+    /// Returns a figure for comparison, a plain number.
     fn new(name: impl Into<String>, value: f64, note: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -49,7 +49,7 @@ impl Gauge {
         }
     }
 
-    /// The same figure, which must not exceed this.
+    /// Returns the same figure, which must not exceed this.
     fn at_most(self, alarm: f64) -> Self {
         Self {
             alarm: Some(alarm),
@@ -58,7 +58,7 @@ impl Gauge {
         }
     }
 
-    /// The same figure in a unit.
+    /// Returns the same figure in a unit.
     fn in_unit(self, unit: &str) -> Self {
         let unit = unit.to_owned();
         Self { unit, ..self }

@@ -22,7 +22,7 @@ fn variant(name: &str, set: &[(&str, ParamValue)]) -> Variant {
     }
 }
 
-/// A sequence without decorrelation, for so many dimensions.
+/// Returns a sequence without decorrelation, for so many dimensions.
 pub(super) fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, NumericsError> {
     let digits = [("digits", ParamValue::Name("plain".to_owned()))];
     let set: &[_] = if sequence == "halton" { &digits } else { &[] };
@@ -35,7 +35,7 @@ pub(super) fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, Numeri
     Ok(SamplerRegistry::default().sampler(&variant(sequence, set), &none, &demand)?)
 }
 
-/// The path tracer with `depth` bounces at most.
+/// Returns the path tracer with `depth` bounces at most.
 pub(super) fn path(depth: Option<i64>) -> Result<ConfiguredIntegrator, NumericsError> {
     let depth = depth.map(|depth| ("max_depth", ParamValue::Integer(depth)));
     let path = variant("path", depth.as_slice());
@@ -55,7 +55,7 @@ impl Rig {
         Ok(Self { stage, traced })
     }
 
-    /// A compiled image of `size` × `size` pixels.
+    /// Returns a compiled image of `size` × `size` pixels.
     pub(super) fn renderer<'a>(
         &'a self,
         integrator: &ConfiguredIntegrator,

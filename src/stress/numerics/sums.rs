@@ -41,7 +41,7 @@ const WAYS: [Way; 5] = [
     ),
 ];
 
-/// The largest relative error of each way, over a constant and over noise.
+/// Measures the largest relative error of each way, over a constant and over noise.
 pub(super) fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let sampler = rig::sampler("pixel-hash", 1)?;
     let terms = longest(gpu.loop_limit);
@@ -87,7 +87,7 @@ fn errors(gpu: &Gpu, sampler: &Sampler, terms: u32) -> Result<[f64; 5], Numerics
     Ok(worst)
 }
 
-/// The sum of the noise of a lane: multiples of 2⁻²⁴ have exact sums in 64 bits.
+/// Returns the sum of the noise of a lane: multiples of 2⁻²⁴ have exact sums in 64 bits.
 fn exact_noise(sampler: &Sampler, terms: u32, lane: u32) -> f64 {
     let word = |sample| {
         let at = Coordinate {
@@ -101,7 +101,7 @@ fn exact_noise(sampler: &Sampler, terms: u32, lane: u32) -> f64 {
     (0..terms).map(word).sum::<u64>() as f64 * U
 }
 
-/// The sums of all lanes in the order of [`WAYS`].
+/// Returns the sums of all lanes in the order of [`WAYS`].
 fn totals(
     gpu: &Gpu,
     sampler: &Sampler,

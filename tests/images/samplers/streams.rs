@@ -16,7 +16,7 @@ fn name_of(variant: &Variant) -> &str {
 }
 
 /// Every sequence without, and every decorrelation with one sequence, with every parameter; then every other valid
-/// pair. The number of seeds follows from the registry.
+/// pair. Each with its number of coordinates.
 fn samplers() -> Vec<(Sampler, usize)> {
     let registry = SamplerRegistry::default();
     let all = |entries: &[Entry]| -> Vec<Variant> { entries.iter().flat_map(variants).collect() };
