@@ -141,7 +141,7 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
             rendering.non_finite_pixels
         );
     }
-    for remark in &rendering.uniform {
+    if let Some(remark) = &rendering.uniform {
         text += &format!("warning: {remark}\n");
     }
     let work = match rendering.in_order {
