@@ -271,7 +271,7 @@ impl Compare {
     }
 }
 
-/// A folder that goes with its owner; made when it is needed.
+/// A folder that is removed with its owner; made on demand.
 #[derive(Default)]
 struct Temporary(std::cell::OnceCell<PathBuf>);
 

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 /// A gate or a cell failed; everything else was done.
 pub const FAILED: u8 = 1;
-/// Bad usage or input: every error but those of a run and of the device, which say themselves.
+/// Bad usage or input: every error but those of a run and of the device, which have codes of their own.
 pub const BAD_INPUT: u8 = 2;
 /// No usable adapter.
 pub const NO_ADAPTER: u8 = 3;

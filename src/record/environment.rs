@@ -21,7 +21,7 @@ pub struct Environment {
     pub software: bool,
     /// True if GPU timestamps are available; without them the wall clock is used, and marked.
     pub timestamps: bool,
-    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
+    /// Maximum loop iterations of an invocation in total, on a driver that ends loops beyond that.
     #[serde(default)]
     pub loop_limit: Option<u32>,
     /// True if denormal numbers are preserved; absent if unknown.

@@ -26,8 +26,8 @@ pub struct ReferenceRecord {
     pub sampler: String,
     /// Seconds it took.
     pub seconds: f64,
-    /// Estimated mean squared error of the reference itself, from its two halves; absent where it is one
-    /// image of which no more is known.
+    /// Estimated mean squared error of the reference itself, from its two halves; absent for a single image of
+    /// unknown parts.
     pub mse: Option<f64>,
     /// The same of the relative error, which samplers are ranked by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -101,7 +101,7 @@ pub struct BiasRecord {
     pub alpha_of_run: Option<f64>,
     /// Smallest p-value of a tile.
     pub min_p: f64,
-    /// p-value of all the tests of this sampler together, to be held against `alpha`.
+    /// p-value of all the tests of this sampler together, to be compared with `alpha`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_of_all: Option<f64>,
     /// Histogram of the p-values in ten equal bins, without tiles whose difference rounding explains: flat when

@@ -205,7 +205,7 @@ pub enum Body {
     Kernels(KernelSetRecord),
     /// A cell is done, failed or left out: the last line of all that were written of it.
     Cell(CellRecord),
-    /// Last line: where the wall time went, how many cells failed.
+    /// Last line: the parts of the wall time, the number of failed cells.
     Finished(FinishedRecord),
     /// Last line of a run that was ended early.
     Interrupted(InterruptedRecord),
@@ -299,7 +299,7 @@ pub enum Verdict {
     Pass,
     /// It does not hold.
     Fail,
-    /// There was nothing to look at.
+    /// There was nothing to check.
     Open,
 }
 

@@ -18,7 +18,7 @@ pub struct PeerTiming {
     pub cpu_ms: Vec<f64>,
     /// Million rays per second by the wall clock, median with interval.
     pub mrays_s: Interval,
-    /// Rays whose triangle (any hits: whether there is one) is not the reference tracer's.
+    /// Rays whose triangle (for any hits: whose answer) differs from the reference tracer's.
     pub unlike: usize,
     /// Number of these that were checked by the oracle; none of them was beyond rounding.
     pub judged: usize,

@@ -242,7 +242,7 @@ impl<'a> RunData<'a> {
     fn add(&mut self, line: &'a Line) {
         match &line.body {
             Body::Run(record) => {
-                // The ends of runs before are none of this one, which went on with them.
+                // The ends of earlier runs are not those of this one, which resumed them.
                 (self.run, self.finished, self.interrupted) = (Some(record), None, None);
             }
             Body::Finished(record) => self.finished = Some(record),

@@ -14,7 +14,7 @@ use raystone_discrepancy::{Budget, DiscrepancyError, PointSet, periodogram, star
 pub(crate) const MOST_PROJECTED: usize = 8;
 /// Points for which elementary intervals are drawn at most: more lines would hide the points.
 const MOST_INTERVALS: usize = 1024;
-/// Points of the first pixel that are drawn upon those of the others at most.
+/// Maximum number of points of the first pixel that are drawn over those of the others.
 const MOST_HIGHLIGHTED: usize = 1024;
 /// Time for the spectra, seconds.
 const SPECTRUM_SECONDS: f64 = 60.0;

@@ -251,7 +251,7 @@ impl<'a> MeasuredSampler<'a> {
     }
 
     /// Returns the error interpolated between those at two numbers of samples, at this fraction of the way on
-    /// logarithms. `None` unless both are positive, whatever is left out.
+    /// logarithms. `None` unless both are positive, also with any part left out.
     pub(crate) fn log_error(
         &self,
         metric: Metric,

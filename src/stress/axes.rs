@@ -296,8 +296,8 @@ fn closed_meshes(place: &Placement) -> [(&'static str, Mesh); 4] {
     ]
 }
 
-/// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
-/// closed mesh cannot be left: chains that do either begin anew.
+/// Traces chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a closed
+/// mesh cannot be left: chains that do either start again.
 fn bounce(
     mesh: &Mesh,
     offset: RayOffset,

@@ -173,7 +173,7 @@ fn load_scene(path: &Path) -> Result<Box<dyn FnOnce()>, Error> {
     Ok(Box::new(move || check_scene(&scene)))
 }
 
-/// Everything that structures and kernels take for granted of a scene.
+/// Checks the assumptions of structures and kernels about a scene.
 fn check_scene(scene: &SceneData) {
     let triangles = scene.triangles.len();
     assert!(triangles > 0, "no triangle");

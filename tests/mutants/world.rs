@@ -79,7 +79,7 @@ pub struct World {
     pub soups: Vec<Case>,
     /// Built-in scenes, checked against the gate's reference tracer.
     pub scenes: Vec<Case>,
-    /// Images of the Cornell box by plain path tracing; empty if nothing asks for them.
+    /// Images of the Cornell box by plain path tracing; empty if no check needs them.
     pub reference: Vec<Image>,
     /// The adapter's name.
     pub adapter: String,

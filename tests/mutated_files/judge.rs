@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// CPU time after which a file counts as one that is never read to its end.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// Bytes that reading may take at most, the result included: `per_byte` × the file + `fixed`.
+/// Maximum bytes of memory of a read, the result included: `per_byte` × the file + `fixed`.
 #[derive(Clone, Copy)]
 pub struct MemoryBound {
     pub per_byte: usize,
@@ -99,7 +99,7 @@ impl ReferenceTracer {
         self.caught.get()
     }
 
-    /// The same as [`ReferenceTracer::largest_multiple`], and begins anew.
+    /// The same as [`ReferenceTracer::largest_multiple`], and resets it.
     pub fn take_multiple(&self) -> f64 {
         self.largest.take()
     }

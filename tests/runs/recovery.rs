@@ -252,7 +252,7 @@ fn vertices_that_are_not_numbers_are_dropped_and_counted() {
     assert_eq!((scene.triangles, scene.report.dropped_non_finite), (1, 2));
 }
 
-/// Runs into a folder that cannot take it.
+/// Runs into a folder that cannot be used.
 fn refused(out: &Path, adapter: AdapterChoice) -> RunError {
     let registries = Registries::default();
     let (experiment, plan) = plan(&experiment(&["furnace-box"]), &registries);

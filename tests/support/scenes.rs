@@ -82,7 +82,7 @@ fn random_triangle(rng: &mut Pcg, centre: Vec3, size: f32) -> [Vec3; 3] {
     [0; 3].map(|_| centre + size * Vec3::new(rng.signed(), rng.signed(), rng.signed()))
 }
 
-/// Scenes at the edge of what builders expect.
+/// Scenes at the limits of builders.
 pub fn degenerate_cases() -> Vec<Case> {
     let mut rng = Pcg::new(17);
     let one = [

@@ -10,9 +10,9 @@ use raystone::report::write_page;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Points of which pictures are made at most.
+/// Maximum number of points in pictures.
 const MOST_POINTS: u32 = 1 << 20;
-/// Dimensions of which pictures are made at most.
+/// Maximum number of dimensions in pictures.
 const MOST_DIMENSIONS: usize = 16;
 
 impl Points {

@@ -230,7 +230,7 @@ fn shortened(text: &str) -> String {
 }
 
 /// Returns a comment: a line with the verdict, a short table, everything else folded. Beyond the limit of a comment, rows
-/// at the end are cut, those that are the same first, and then notes; the text counts what was cut.
+/// at the end are cut, those that are the same first, and then notes; the text counts the cut ones.
 pub fn markdown(comparison: &Comparison) -> String {
     let sign = match comparison.verdict() {
         ChangeVerdict::Worse => "❌",

@@ -121,7 +121,7 @@ const OF_ONE_SEED: [&Figure; 11] = [
     &figure::COVERAGE,
 ];
 
-/// Fewer degrees of freedom say too little of the spread of means over seeds to compare those of other seeds.
+/// With fewer degrees of freedom, the spread of means over seeds is too uncertain to compare those of other seeds.
 const FEWEST_FREE: f64 = 7.0;
 
 fn is_among(figures: &[&Figure], id: &str) -> bool {

@@ -308,7 +308,7 @@ impl<'e> Place<'e> {
         self.expect.explain.iter().filter_map(figure).collect()
     }
 
-    /// Pairs of the two selections of a ratio, each pair alike on all other axes.
+    /// Returns pairs of the two selections of a ratio, each pair equal on all other axes.
     fn pairs<'v, 'a>(
         &self,
         values: &'v [Value<'a>],

@@ -1,4 +1,4 @@
-//! Taking structures over from frame to frame of a moving scene, against building them anew.
+//! Updates of structures from frame to frame of a moving scene, against full builds.
 
 use super::specs::{FRAME_PLOTS, FRAME_RAYS, TREES};
 use crate::data::{Measured, RunData, SceneGroup};

@@ -28,7 +28,7 @@ pub fn section(data: &RunData) -> Section {
     section
 }
 
-/// Detail of a check that had nothing to look at.
+/// Detail of a check without anything to test.
 const NOTHING: &str = "nothing to test.";
 /// Reasons why cells were left out that a check names.
 const MOST_REASONS: usize = 3;
@@ -37,7 +37,7 @@ const MOST_REASONS: usize = 3;
 pub fn checks(data: &RunData) -> Vec<Check> {
     let mut checks = targets::checks(data);
     if data.scenes.is_empty() && !data.measured.is_empty() {
-        // Nothing was traced or rendered that the others look at.
+        // Nothing was traced or rendered for the others to check.
         checks.push(complete(data));
         return checks;
     }

@@ -6,7 +6,7 @@ use crate::format::{self, count, percent};
 use crate::samplers::MeasuredSampler;
 use raystone_record::{FinishedRecord, Key, StructureRecord, TimeRecord};
 
-/// Largest share of the wall time that the harness may take for itself.
+/// Largest fraction of the wall time for the harness itself.
 const OVERHEAD_TARGET: f64 = 0.1;
 
 /// Returns the closing sections.

@@ -61,7 +61,7 @@ pub fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
     None
 }
 
-/// The first dimension in which 2^m points, the most that there are, do not take one place each of 2^m.
+/// Returns the first dimension in which 2^m points, the maximum, do not lie in one interval each of 2^m.
 pub fn fault_of_axes(sampler: &Sampler) -> Option<String> {
     let m = sampler.demand.samples?.checked_ilog2()?;
     let columns = columns(sampler, 1 << m);

@@ -1,5 +1,5 @@
-//! Exports of a real run: each format is held against its own shape, and read by its own consumer where that is
-//! installed; a hostile name is shown and never run; records that are cut or of another version are named.
+//! Exports of a real run: each format is checked against its own shape, and read by its own consumer where that is
+//! installed; a hostile name is shown and never executed; records that are cut or of another version are named.
 
 mod consumers;
 mod damaged;

@@ -53,7 +53,7 @@ fn kept() -> &'static Path {
     KEPT.get_or_init(whole).path()
 }
 
-/// Files of a cache in the place of which there are pipes.
+/// Files of a cache that are replaced by pipes.
 struct Gate {
     cache: TempDir,
     files: Vec<(PathBuf, Vec<u8>)>,
@@ -160,7 +160,7 @@ impl Held {
         }
     }
 
-    /// Lets it go on.
+    /// Lets it continue.
     pub fn let_go(&mut self) {
         self.gate.open();
     }

@@ -1,4 +1,4 @@
-//! Chromium without a window: a page in a frame of some width, with a script that looks at it.
+//! Chromium without a window: a page in a frame of some width, with a script that examines it.
 
 use crate::support::needs;
 use serde_json::Value;
@@ -72,7 +72,7 @@ impl Browser {
         (text(&said.stdout), text(&said.stderr))
     }
 
-    /// Looks at a page in a frame of this width: sorts the table whose caption begins with `table` by `column`, and
+    /// Examines a page in a frame of this width: sorts the table whose caption begins with `table` by `column`, and
     /// compares images at `pixel`.
     pub fn visit(
         &self,
