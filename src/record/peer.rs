@@ -30,7 +30,7 @@ pub struct PeerTiming {
 /// An external ray caster on a scene.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PeerRecord {
-    /// Version and back end.
+    /// Version, and the hardware it runs on.
     pub about: String,
     /// Wall time of the build, milliseconds.
     pub build_ms: f64,
