@@ -52,8 +52,8 @@ pub struct Compare {
     /// Measure nothing again
     #[arg(long, conflicts_with = "base_program")]
     no_confirm: bool,
-    /// Whether times decide or are only told
-    #[arg(long, value_enum, default_value_t = Times::ReferenceTracer)]
+    /// Whether times decide or are only shown
+    #[arg(long, value_enum, default_value_t = Times::Decide)]
     times: Times,
     /// Other images from the same seeds are meant: their errors decide
     #[arg(long)]
@@ -86,8 +86,9 @@ pub struct Compare {
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Times {
     /// They decide.
-    ReferenceTracer,
-    /// They are told.
+    #[value(alias = "judge")]
+    Decide,
+    /// They are shown.
     Show,
 }
 
@@ -108,7 +109,7 @@ impl Compare {
         let options = self.options();
         let none = Confirmed::new();
         let mut found = compare_sides(&base, &candidate, &options, &none);
-        if found.suspects().next().is_some() && options.judge_times {
+        if found.suspects().next().is_some() && options.times_decide {
             let cells: Vec<Finding> = found.suspects().cloned().collect();
             match self.confirm([&base, &candidate], &cells, &work) {
                 Ok(confirmed) => {
@@ -254,7 +255,7 @@ impl Compare {
                 images: self.new_images,
                 ..Effects::default()
             },
-            judge_times: self.times == Times::ReferenceTracer,
+            times_decide: self.times == Times::Decide,
         }
     }
 

@@ -11,13 +11,13 @@ mod needs;
 mod dense;
 #[path = "../fuzz_entry/mod.rs"]
 mod fuzz_entry;
-mod judge;
 mod mutation;
+mod watch;
 
 use fuzz_entry::{OBJ_SEPARATOR, Outcome, TARGETS, Target};
-use judge::{MemoryBound, ReferenceTracer};
 use mutation::{Pcg, mutate};
 use std::path::{Path, PathBuf};
+use watch::{MemoryBound, Watch};
 
 #[global_allocator]
 static ALLOCATOR: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;
@@ -82,11 +82,11 @@ fn run(target: &str, read: Target) {
     if seeds.is_empty() {
         return;
     }
-    let judge = ReferenceTracer::new(bound(target));
+    let watch = Watch::new(bound(target));
     let mut faults = Vec::new();
     let mut accepted = 0;
     for (name, bytes) in &seeds {
-        match judge.read(&format!("{target} {name}"), bytes, read) {
+        match watch.read(&format!("{target} {name}"), bytes, read) {
             Ok(true) => {}
             Ok(false) => panic!(
                 "the seed {name} of {target} is refused: {:?}",
@@ -101,7 +101,7 @@ fn run(target: &str, read: Target) {
         let mut random = Pcg::new(seed);
         let other = &seeds[random.below(seeds.len())].1;
         let mutant = mutate(bytes, other, &mut random);
-        match judge.read(&format!("{target} {name}, seed {seed}"), &mutant, read) {
+        match watch.read(&format!("{target} {name}, seed {seed}"), &mutant, read) {
             Ok(sound) => accepted += usize::from(sound),
             Err(fault) => faults.push(format!("{fault}{}", kept(target, seed, &mutant))),
         }
@@ -110,8 +110,8 @@ fn run(target: &str, read: Target) {
         "{target}: {FILES} files, {accepted} accepted, {} refused, {} of them after a panic that the \
          reader caught; at most {:.1} bytes a byte beyond {} KiB",
         FILES - accepted - faults.len(),
-        judge.caught_panics(),
-        judge.largest_multiple(),
+        watch.caught_panics(),
+        watch.largest_multiple(),
         bound(target).fixed >> 10,
     );
     let shown: Vec<_> = faults.iter().take(60).map(String::as_str).collect();
@@ -134,15 +134,15 @@ fn files_cut_off_at_any_byte_are_refused_with_a_place_or_sound() {
     let mut faults = Vec::new();
     let mut files = 0;
     for (target, read) in TARGETS {
-        let judge = ReferenceTracer::new(bound(target));
+        let watch = Watch::new(bound(target));
         for (name, bytes) in seeds(target).iter().filter(|(_, b)| b.len() <= 4000) {
             for end in 1..bytes.len() {
-                let judged = judge.read(
+                let outcome = watch.read(
                     &format!("{target} {name}, cut at {end}"),
                     &bytes[..end],
                     read,
                 );
-                faults.extend(judged.err());
+                faults.extend(outcome.err());
                 files += 1;
             }
         }
@@ -157,16 +157,16 @@ fn files_cut_off_at_any_byte_are_refused_with_a_place_or_sound() {
 fn dense_files_stay_within_the_bound_of_memory() {
     let mut faults = Vec::new();
     for (target, read) in TARGETS {
-        let judge = ReferenceTracer::new(bound(target));
+        let watch = Watch::new(bound(target));
         let files = dense::files(target);
         assert!(!files.is_empty(), "{target} has no dense file");
         for (name, bytes) in files {
-            let judged = judge.read(&format!("{target} {name}"), &bytes, read);
+            let outcome = watch.read(&format!("{target} {name}"), &bytes, read);
             println!(
-                "{target} {name}: {judged:?}, {:.0} bytes a byte",
-                judge.take_multiple()
+                "{target} {name}: {outcome:?}, {:.0} bytes a byte",
+                watch.take_multiple()
             );
-            faults.extend(judged.err());
+            faults.extend(outcome.err());
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
@@ -267,11 +267,11 @@ fn readers_that_misbehave_are_caught() {
     fn refused(message: &str) -> Outcome {
         Outcome::Refused(message.to_owned())
     }
-    let judge = ReferenceTracer::new(MemoryBound {
+    let watch = Watch::new(MemoryBound {
         per_byte: 64,
         fixed: 1 << 10,
     });
-    let fault = |read: Target| judge.read("planted", &[b'x'; 1000], read).err();
+    let fault = |read: Target| watch.read("planted", &[b'x'; 1000], read).err();
     assert_eq!(fault(|_| accepted()), None);
     assert_eq!(fault(|_| refused("foreign.obj (line 3): broken")), None);
     let planted: [(Target, &str); 6] = [

@@ -228,7 +228,7 @@ impl Stage {
             shadow_orders: false,
         };
         ReferenceTracer::new(&self.scene, &self.soup, self.camera, &settings, 1, checks)
-            .expect("a judge")
+            .expect("a reference tracer")
     }
 
     /// Returns the verdict on the structure on the GPU.

@@ -30,7 +30,7 @@ pub struct Options {
     /// Thresholds of differences that count.
     pub effects: Effects,
     /// `true` if times decide; otherwise they are only shown.
-    pub judge_times: bool,
+    pub times_decide: bool,
 }
 
 impl Default for Options {
@@ -38,7 +38,7 @@ impl Default for Options {
         Self {
             alpha: LEVEL,
             effects: Effects::default(),
-            judge_times: true,
+            times_decide: true,
         }
     }
 }

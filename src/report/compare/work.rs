@@ -317,7 +317,7 @@ impl<'a> Work<'a> {
             }
             tests += if is_control { 0 } else { p.len() };
         }
-        if !self.options.judge_times {
+        if !self.options.times_decide {
             for open in self.findings.iter_mut().filter(|open| open.finding.is_time) {
                 open.finding.verdict = ChangeVerdict::Told;
             }

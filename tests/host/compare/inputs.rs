@@ -161,7 +161,7 @@ fn times_of_another_machine_are_refused_and_all_else_is_compared() {
         };
     }
     let options = Options {
-        judge_times: false,
+        times_decide: false,
         ..Options::default()
     };
     assert_eq!(

@@ -110,7 +110,7 @@ fn two_seeds_of_a_real_run_are_never_worse_and_a_worsening_of_one_is_found() {
     let first = run(&at("a"), 1);
     let second = run(&at("b"), 2);
     let options = Options {
-        judge_times: false,
+        times_decide: false,
         ..Options::default()
     };
     let of = |a: &Side, b: &Side| compare_sides(a, b, &options, &Confirmed::new());

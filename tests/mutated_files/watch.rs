@@ -20,7 +20,7 @@ pub struct MemoryBound {
 
 /// Reads files one at a time, all tests of the program together: allocations are counted for the
 /// whole process.
-pub struct ReferenceTracer {
+pub struct Watch {
     bound: MemoryBound,
     largest: Cell<f64>,
     caught: Cell<usize>,
@@ -37,7 +37,7 @@ fn lock<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl ReferenceTracer {
+impl Watch {
     pub fn new(bound: MemoryBound) -> Self {
         static ALONE: Mutex<()> = Mutex::new(());
         static ONCE: Once = Once::new();
@@ -99,7 +99,7 @@ impl ReferenceTracer {
         self.caught.get()
     }
 
-    /// The same as [`ReferenceTracer::largest_multiple`], and resets it.
+    /// The same as [`Watch::largest_multiple`], and resets it.
     pub fn take_multiple(&self) -> f64 {
         self.largest.take()
     }
