@@ -287,7 +287,11 @@ impl SceneBuilder {
         }
         if self.triangles.is_empty() {
             let reason = match self.report.dropped_non_finite {
-                0 => "it lists no faces".to_owned(),
+                0 if self.report.warnings.is_empty() => "it lists no faces".to_owned(),
+                0 => format!(
+                    "it lists no faces of three or more corners; {}",
+                    self.report.warnings.join("; ")
+                ),
                 n => format!("all {n} have a NaN or infinite vertex"),
             };
             let name = owned();

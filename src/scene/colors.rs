@@ -24,12 +24,24 @@ pub fn decode_color([first, second]: [u32; 2]) -> DVec3 {
 }
 
 /// Converts an sRGB component to linear (IEC 61966-2-1).
-pub(super) fn linear(encoded: f32) -> f32 {
+fn linear(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
         encoded / 12.92
     } else {
         ((encoded + 0.055) / 1.055).powf(2.4)
     }
+}
+
+/// True if all components are within 0 to 1.
+pub(super) fn is_color(color: Vec3) -> bool {
+    let is_part = |x: &f32| (0.0..=1.0).contains(x);
+    color.to_array().iter().all(is_part)
+}
+
+/// Converts an sRGB colour to linear; components beyond 0 to 1 are taken as 0 or 1.
+pub(super) fn shown(color: Vec3) -> Vec3 {
+    let clamped = color.clamp(Vec3::ZERO, Vec3::ONE);
+    Vec3::from(clamped.to_array().map(linear))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Reports parts of a glTF document that are ignored, each once.
 
 use super::gltf_instancing::OF_NODES;
-use super::obj_statements::unread_warning;
+use super::tally::unread_warning;
 use gltf::Semantic;
 use std::collections::BTreeSet;
 

@@ -2,6 +2,7 @@
 
 mod flux;
 mod parse;
+mod unfold;
 
 pub use parse::IesError;
 

@@ -2,18 +2,17 @@
 
 use super::builder::DEFAULT_ALBEDO;
 use super::material::{Description, Format, emitted};
+use super::mtl_statements::{self, Definition, Map};
 use super::mtl_texture::{Statement, statement};
-use super::obj_statements::{unread_warning, without_comment};
+use super::obj_statements::without_comment;
+use super::tally::{Tally, Unread};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{
-    AlphaChannel, AlphaMask, DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource, TextureUse,
-};
+use super::{AlphaChannel, AlphaMask, DIELECTRIC, LoadOptions, MIRROR, Material, TextureUse};
 use glam::Vec3;
+use raystone_core::files::files;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fmt::Display;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// Collects the materials of all `mtllib` statements while the OBJ file is read.
@@ -34,6 +33,8 @@ pub(super) struct Contents {
     unused: BTreeMap<&'static str, Vec<String>>,
     /// Index in `textures` by path.
     texture_ids: HashMap<PathBuf, u32>,
+    /// Texture files found elsewhere than the current library says.
+    moved: Tally,
 }
 
 impl Library {
@@ -50,9 +51,9 @@ impl Library {
     /// Loads the libraries of a statement: a single file whose name may contain blanks, if it
     /// exists, or several. Returns the indices of their materials by name. Broken libraries are
     /// warnings.
-    pub(crate) fn load(&self, names: &str) -> Vec<(String, u32)> {
+    pub(crate) fn load(&self, names: &str) -> HashMap<String, u32> {
         let cut = without_comment(names).trim();
-        let is_there = |name: &&str| self.folder.join(plain(name)).is_file();
+        let is_there = |name: &&str| found(&self.folder, &plain(name)).is_some();
         match [names, cut].iter().find(|name| is_there(name)) {
             Some(name) => self.load_one(name),
             None => cut
@@ -62,42 +63,33 @@ impl Library {
         }
     }
 
-    fn load_one(&self, name: &str) -> Vec<(String, u32)> {
-        let file = plain(name);
-        let path = self.folder.join(&file);
-        if !self.loaded.borrow_mut().insert(path.clone()) {
-            return Vec::new();
-        }
+    fn load_one(&self, name: &str) -> HashMap<String, u32> {
+        let named = self.folder.join(plain(name));
+        let place = place(&self.folder, &plain(name), &self.options);
         let mut contents = self.contents.borrow_mut();
-        let unread = |error: &dyn Display| {
-            let path = path.display();
-            format!("material library {path}: {error}; its materials are drawn grey")
-        };
-        let bytes = relative(Path::new(&file), &self.options)
-            .and_then(|()| raystone_core::files::read(&path));
+        let path = place.as_ref().unwrap_or(&named).clone();
+        if !self.loaded.borrow_mut().insert(path.clone()) {
+            return HashMap::new();
+        }
+        let bytes = place.and_then(|path| raystone_core::files::read(&path));
         let bytes = match bytes {
             Ok(bytes) => bytes,
             Err(error) => {
-                contents.warnings.push(unread(&error));
-                return Vec::new();
+                contents.warnings.push(format!(
+                    "material library {}: {error}; its materials are drawn grey",
+                    named.display()
+                ));
+                return HashMap::new();
             }
         };
-        let text = readable_lines(&normalised(bytes), &path, &mut contents.warnings);
-        let (materials, numbers) = match tobj::load_mtl_buf(&mut Cursor::new(text)) {
-            Ok(read) => read,
-            Err(error) => {
-                contents.warnings.push(unread(&error));
-                return Vec::new();
-            }
-        };
-        let before = contents.materials.len();
-        for material in &materials {
-            contents.add(material, &path, &self.options);
+        if path != named {
+            contents.warnings.push(format!(
+                "material library {}: {} is read in its place",
+                named.display(),
+                path.display()
+            ));
         }
-        let numbers = numbers.into_iter();
-        numbers
-            .map(|(name, k)| (name, (before + k) as u32))
-            .collect()
+        contents.add_all(&normalised(bytes), &path, &self.options)
     }
 
     /// All materials in library order, their textures, and a warning for deviations from the file.
@@ -121,213 +113,200 @@ impl Library {
 }
 
 impl Contents {
-    fn add(&mut self, material: &tobj::Material, file: &Path, options: &LoadOptions) {
+    /// Adds the materials of a library; returns their indices by name.
+    fn add_all(&mut self, text: &str, path: &Path, options: &LoadOptions) -> HashMap<String, u32> {
+        let mut numbers = HashMap::new();
+        let mut unread = Unread::default();
+        let mut again = Tally::default();
+        let mut without_comments = Vec::new();
+        mtl_statements::read(text, &mut unread, |definition, unread| {
+            let number = self.materials.len() as u32;
+            let name = &definition.name;
+            without_comments.push((without_comment(name).trim().to_owned(), number));
+            again.see_if(
+                numbers.insert(name.clone(), number).is_some(),
+                definition.line,
+            );
+            self.add(definition, path, options, unread);
+        });
+        for (name, number) in without_comments {
+            numbers.entry(name).or_insert(number);
+        }
+        let notes = [
+            unread.note(),
+            again.note(
+                ["material is defined again", "materials are defined again"],
+                "line",
+                "the last definition counts",
+            ),
+            std::mem::take(&mut self.moved).note(
+                [
+                    "texture is not where it should be",
+                    "textures are not where they should be",
+                ],
+                "line",
+                "the file of this name, in any case, beside the library is read",
+            ),
+        ];
+        let named = notes.iter().flatten();
+        self.warnings
+            .extend(named.map(|note| format!("{}: {note}", path.display())));
+        numbers
+    }
+
+    fn add(
+        &mut self,
+        definition: Definition,
+        file: &Path,
+        options: &LoadOptions,
+        unread: &mut Unread,
+    ) {
+        let Definition {
+            name,
+            diffuse,
+            emission,
+            source,
+            maps: [map_kd, map_ke, map_d, norm],
+            ..
+        } = definition;
         let folder = file.parent().unwrap_or(Path::new(""));
         // The standard shows textures unscaled by default.
-        let unstated = if material.diffuse_texture.is_some() {
-            1.0
-        } else {
-            DEFAULT_ALBEDO
-        };
-        let diffuse = Vec3::from(material.diffuse.unwrap_or([unstated; 3]));
-        let source = source(material);
+        let unstated = map_kd.as_ref().map_or(DEFAULT_ALBEDO, |_| 1.0);
         let description = Description {
             format: Format::Mtl,
-            base_color: diffuse,
+            base_color: Vec3::from(diffuse.unwrap_or([unstated; 3])),
             is_varied: false,
             is_followed: false,
             source: &source,
         };
-        let name = material.name.clone();
         let found =
             Material::described(name, &description, options.kinds, file, &mut self.warnings);
-        let mask = self.mask(material, folder, options);
-        let mut texture = |statement: Option<&str>, is_used: bool| {
-            let statement = statement.filter(|_| is_used && options.textures)?;
-            Some(self.texture(folder, statement, options).place)
+        // A mask with cutoff one half, in place of MTL's blending.
+        let mask = map_d.map(|map| {
+            let found = self.texture(folder, &map, options, unread);
+            let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
+            let mask = AlphaMask::of(found.place, channel, AlphaMask::CUTOFF);
+            let factor = source.opacity.unwrap_or(1.0);
+            AlphaMask { factor, ..mask }
+        });
+        let mut texture = |map: Option<Map>, is_used: bool| {
+            let map = map.filter(|_| is_used && options.textures)?;
+            Some(self.texture(folder, &map, options, unread).place)
         };
-        let other = |key: &str| material.unknown_param.get(key).map(String::as_str);
         let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
-        let emission = emitted(material.emissive.unwrap_or_default());
+        let emission = emitted(emission.unwrap_or_default());
         let is_lamp = emission != Vec3::ZERO;
         let textured = Material {
-            base_color_texture: texture(material.diffuse_texture.as_deref(), is_rough),
-            normal_texture: texture(other("norm"), found.kind != &DIELECTRIC),
-            emission_texture: texture(other("map_Ke"), is_lamp),
+            base_color_texture: texture(map_kd, is_rough),
+            normal_texture: texture(norm, found.kind != &DIELECTRIC),
+            emission_texture: texture(map_ke, is_lamp),
             emission,
             mask,
             ..found
         };
-        let unused = [
-            ("map_Ks", material.specular_texture.is_some()),
-            ("map_Ns", material.shininess_texture.is_some()),
-            ("a bump map", material.normal_texture.is_some()),
-        ];
-        for (what, _) in unused.iter().filter(|(_, is_there)| *is_there) {
-            self.unused
-                .entry(what)
-                .or_default()
-                .push(textured.name.clone());
+        for what in definition.unused {
+            let names = self.unused.entry(what).or_default();
+            names.push(textured.name.clone());
         }
         self.materials.push(textured);
     }
 
     /// The texture named by a statement; each file is added once.
-    fn texture(&mut self, folder: &Path, text: &str, options: &LoadOptions) -> Statement {
+    fn texture(
+        &mut self,
+        folder: &Path,
+        map: &Map,
+        options: &LoadOptions,
+        unread: &mut Unread,
+    ) -> Statement {
         let Statement {
             file,
-            place,
+            place: used,
             channel,
-        } = statement(text);
+            skipped,
+        } = statement(&map.text);
+        for option in skipped {
+            unread.see(&format!("`{option}` of a texture"), map.line);
+        }
+        // A comment may follow, but names contain `#`, too.
+        let [whole, cut] = [&file, without_comment(&file)].map(plain);
+        let is_cut = whole != cut && found(folder, &whole).is_none();
+        let file = match is_cut && found(folder, &cut).is_some() {
+            true => cut,
+            false => whole,
+        };
         let next = self.textures.len() as u32;
-        let path = folder.join(&file);
+        let named = folder.join(&file);
+        let (path, encoded) = match place(folder, &file, options) {
+            Ok(path) => (path.clone(), Encoded::File(path)),
+            Err(error) => (named.clone(), Encoded::Missing(error.to_string())),
+        };
+        if path != named {
+            self.moved.see(map.line);
+        }
         let texture = *self.texture_ids.entry(path).or_insert_with_key(|path| {
             self.textures.push(ImageSource {
                 name: path.display().to_string(),
-                encoded: match relative(Path::new(&file), options) {
-                    Ok(()) => Encoded::File(path.clone()),
-                    Err(error) => Encoded::Missing(error.to_string()),
-                },
+                encoded,
             });
             next
         });
         Statement {
-            place: TextureUse { texture, ..place },
+            place: TextureUse { texture, ..used },
             file,
             channel,
+            skipped: Vec::new(),
         }
-    }
-
-    /// The opacity texture as a mask with cutoff one half, in place of MTL's blending.
-    fn mask(
-        &mut self,
-        material: &tobj::Material,
-        folder: &Path,
-        options: &LoadOptions,
-    ) -> Option<AlphaMask> {
-        let text = material.dissolve_texture.as_deref()?;
-        let found = self.texture(folder, text, options);
-        let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
-        let mask = AlphaMask::of(found.place, channel, AlphaMask::CUTOFF);
-        let factor = material.dissolve.unwrap_or(1.0);
-        Some(AlphaMask { factor, ..mask })
     }
 }
 
+/// A path as written on any system, without quotation marks.
 fn plain(name: &str) -> String {
-    name.replace('\\', "/")
+    name.trim().trim_matches('"').replace('\\', "/")
 }
 
-/// Refuses absolute paths, which belong to the machine that wrote the file. Relative ones may leave
-/// the folder: many models keep textures in `../textures`.
-fn relative(file: &Path, options: &LoadOptions) -> std::io::Result<()> {
-    if file.has_root() && !options.allow_outside {
-        Err(std::io::Error::other(
-            "an absolute path, which is read with --allow-outside only",
-        ))
-    } else {
-        Ok(())
-    }
-}
-
-fn source(material: &tobj::Material) -> MaterialSource {
-    let numbers = |key: &str| -> Vec<f32> {
-        let value = material.unknown_param.get(key).map_or("", String::as_str);
-        let words = value.split_whitespace();
-        words.map_while(|word| word.parse().ok()).collect()
+/// The path of a file that a model in `folder` names.
+///
+/// # Errors
+/// The path is absolute and may not be read: it belongs to the machine that wrote the file. Relative
+/// ones may leave the folder: many models keep textures in `../textures`.
+fn place(folder: &Path, file: &str, options: &LoadOptions) -> std::io::Result<PathBuf> {
+    let is_drive = file.as_bytes().get(1) == Some(&b':');
+    let is_absolute = Path::new(file).has_root();
+    let is_allowed = !is_absolute || options.allow_outside;
+    let there = is_allowed.then(|| found(folder, file)).flatten();
+    let beside = || {
+        let name = file
+            .rsplit('/')
+            .next()
+            .filter(|_| is_absolute || is_drive)?;
+        found(folder, name)
     };
-    let extra = |key: &str| numbers(key).first().copied();
-    // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007); glTF's
-    // roughness is the square root of alpha.
-    let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
-    MaterialSource {
-        roughness: extra("Pr").or(material.shininess.map(phong)),
-        metallic: extra("Pm"),
-        specular: material.specular,
-        shininess: material.shininess,
-        ior: material.optical_density,
-        transmission: None,
-        filter: match numbers("Tf")[..] {
-            [] => None,
-            [r, g, b, ..] => Some([r, g, b]),
-            [grey, ..] => Some([grey; 3]),
-        },
-        thickness: None,
-        opacity: material.dissolve.or(extra("Tr").map(|t| 1.0 - t)),
-        alpha_mode: None,
-        illum: material.illumination_model,
+    match there.or_else(beside) {
+        Some(path) => Ok(path),
+        None if is_allowed => Ok(folder.join(file)),
+        None => Err(std::io::Error::other(
+            "an absolute path, which is read with --allow-outside only",
+        )),
     }
 }
 
-/// Statements that are read, irrelevant (empty, ambient), or reported with their materials.
-const READ: [&str; 25] = [
-    "", "newmtl", "Ka", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "Tf", "illum", "Pr", "Pm",
-    "map_Kd", "map_Ks", "map_Ke", "map_Ns", "map_ns", "map_NS", "map_d", "map_Bump", "map_bump",
-    "bump", "norm",
-];
-
-/// Limit on the kinds of unread statements recorded: a file in another format has any number.
-const MOST_UNREAD: usize = 64;
-
-/// The text without lines that make `tobj` reject the library or panic; single-number colours
-/// become three.
-fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut unread: BTreeMap<String, usize> = BTreeMap::new();
-    for (number, line) in (1..).zip(text.lines()) {
-        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
-        let keyword = words.next().unwrap_or("");
-        let argument = words.clone().next();
-        let count = words.clone().count();
-        let numbers = words.take_while(|w| w.parse::<f32>().is_ok()).count();
-        let broken = match keyword {
-            "Ka" | "Kd" | "Ks" | "Ke" => {
-                if let (1, 1, Some(grey)) = (count, numbers, argument) {
-                    out.push_str(&format!("{keyword} {grey} {grey} {grey}\n"));
-                    continue;
-                }
-                numbers < 3
-            }
-            "Ns" | "Ni" | "d" => numbers < 1,
-            "illum" => argument.is_none_or(|word| word.parse::<u8>().is_err()),
-            "newmtl" | "bump" => argument.is_none(),
-            _ => keyword.starts_with("map_") && argument.is_none(),
-        };
-        if !READ.contains(&keyword) && unread.len() < MOST_UNREAD {
-            unread.entry(keyword.to_owned()).or_insert(number);
-        }
-        if broken {
-            warnings.push(format!(
-                "{}, line {number}: `{}` ignored: the value cannot be read",
-                path.display(),
-                line.trim()
-            ));
-        } else {
-            out.push_str(line);
-            out.push('\n');
-        }
+/// The file of this name, or else the only one whose name differs in case alone: models come from
+/// systems that ignore it.
+fn found(folder: &Path, file: &str) -> Option<PathBuf> {
+    let path = folder.join(file);
+    let is_file = |path: &PathBuf| files().open(path).is_ok();
+    if is_file(&path) {
+        return Some(path);
     }
-    let unread = unread
-        .iter()
-        .map(|(what, line)| format!("`{what}` (line {line})"));
-    let unread = unread_warning(unread);
-    warnings.extend(unread.map(|text| format!("{}: {text}", path.display())));
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn broken_statements_are_dropped_with_their_line_and_the_rest_is_kept() {
-        let text = "newmtl a\nKd 0.5\nKs 1 x 1\nNs\nillum 999\nKe 1 2 3\n";
-        let mut warnings = Vec::new();
-        let kept = readable_lines(text, Path::new("m.mtl"), &mut warnings);
-        assert_eq!(kept, "newmtl a\nKd 0.5 0.5 0.5\nKe 1 2 3\n");
-        assert_eq!(warnings.len(), 3);
-        assert!(warnings[0].contains("line 3"), "{warnings:?}");
-        let (materials, _) = tobj::load_mtl_buf(&mut Cursor::new(kept)).unwrap();
-        assert_eq!(materials[0].emissive, Some([1.0, 2.0, 3.0]));
-    }
+    let name = path.file_name()?;
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let listed = files().list(parent.unwrap_or(Path::new("."))).ok()?;
+    let is_same = |other: &&PathBuf| {
+        let other = other.file_name();
+        other.is_some_and(|other| other.eq_ignore_ascii_case(name))
+    };
+    let mut same = listed.iter().filter(is_same);
+    let only = same.next().filter(|_| same.next().is_none())?;
+    Some(path.with_file_name(only.file_name()?)).filter(is_file)
 }

@@ -1,5 +1,6 @@
 //! Texture statements of material libraries: options, then the file.
 
+use super::obj_statements::number;
 use super::{AlphaChannel, TextureUse, Wrap};
 use glam::{Mat2, Vec2};
 
@@ -11,17 +12,22 @@ pub(super) struct Statement {
     pub place: TextureUse,
     /// The channel used as a scalar (`-imfchan`), if given.
     pub channel: Option<AlphaChannel>,
+    /// Options that are not read.
+    pub skipped: Vec<String>,
 }
 
-/// Reads the options `-s`, `-o`, `-clamp`, `-bm` and `-imfchan` and skips the others.
+/// Reads the options `-s`, `-o`, `-clamp`, `-bm` and `-imfchan`, and names others that would change
+/// the texture.
 pub(super) fn statement(text: &str) -> Statement {
     let mut place = TextureUse::plain(0);
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
     let mut channel = None;
+    let mut skipped = Vec::new();
     let mut rest = text.trim();
     while rest.starts_with('-') {
         let (option, after) = first_word(rest);
         rest = after;
+        let (value, _) = first_word(rest);
         // -o, -s, -t take one to three numbers, -mm two, the others one word.
         let (least, most) = match option {
             "-o" | "-s" | "-t" => (1, 3),
@@ -31,17 +37,17 @@ pub(super) fn statement(text: &str) -> Statement {
         let mut numbers = Vec::new();
         for taken in 0..most {
             let (word, after) = first_word(rest);
-            let number = word.parse::<f32>();
+            let number = number(word);
             if option == "-imfchan" {
                 channel = channel_of(word);
             }
-            if taken >= least && number.is_err() {
+            if taken >= least && number.is_none() {
                 break;
             }
             if taken == 0 && option == "-clamp" && word == "on" {
                 place.wrap = [Wrap::Clamp; 2];
             }
-            numbers.extend(number.ok().filter(|x| x.is_finite()));
+            numbers.extend(number.filter(|x: &f32| x.is_finite()));
             rest = after;
         }
         let pair = |default: Vec2| {
@@ -52,7 +58,11 @@ pub(super) fn statement(text: &str) -> Statement {
             "-s" => scale = pair(scale),
             "-o" => offset = pair(offset),
             "-bm" => place.scale = numbers.first().copied().unwrap_or(1.0),
-            _ => {}
+            "-clamp" | "-imfchan" => {}
+            "-mm" if numbers == [0.0, 1.0] => {}
+            "-blendu" | "-blendv" if value == "on" => {}
+            "-cc" if value == "off" => {}
+            _ => skipped.push(option.to_owned()),
         }
     }
     // v' = s v + o pointing up is v' = s v + 1 - s - o pointing down.
@@ -62,6 +72,7 @@ pub(super) fn statement(text: &str) -> Statement {
         file: rest.replace('\\', "/"),
         place,
         channel,
+        skipped,
     }
 }
 
@@ -107,6 +118,10 @@ mod tests {
         // The surface's upper left corner, v = 0 pointing down, is v = 1 pointing up.
         let corner = place.linear * Vec2::ZERO + place.offset;
         assert_eq!(corner, Vec2::new(0.5, 1.0 - (4.0 + 0.25)));
+        let odd = statement("-blendu on -blendv off -mm 0.1 1 -boost 2 a.png");
+        assert_eq!(odd.file, "a.png");
+        assert_eq!(odd.skipped, ["-blendv", "-mm", "-boost"]);
+        assert_eq!(statement("c:\\my files\\a.png").file, "c:/my files/a.png");
         assert_eq!(
             statement("-s 2 a.png").place.linear,
             Mat2::from_diagonal(Vec2::new(2.0, 1.0))

@@ -1,10 +1,11 @@
 //! Wavefront OBJ; materials are in [`super::mtl`], statements in [`super::obj_statements`].
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::colors::linear;
+use super::colors::{is_color, shown};
 use super::error::{self, guarded};
 use super::obj_statements::{Corner, Face, Statements};
 use super::polygon::triangulate;
+use super::tally::Tally;
 use super::text::normalised;
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
@@ -25,7 +26,7 @@ pub(super) fn load(
     guarded(path, || {
         let text = normalised(bytes);
         let library = mtl::Library::new(path, options);
-        let broken = |(line, problem): (u32, String)| {
+        let broken = |(line, problem): (usize, String)| {
             SceneError::malformed(path, format!("line {line}"), problem)
         };
         let mut read = Statements::read(&text, &library).map_err(broken)?;
@@ -68,12 +69,12 @@ struct Model {
     without: Vec<Material>,
     grey: Option<u32>,
     white: Option<u32>,
-    /// Number of triangles without a material, and the object of the first.
-    drawn_grey: (usize, Option<String>),
-    /// Number of self-intersecting polygons, and the line of the first.
-    crossing: (usize, u32),
-    /// Number of colours outside 0 to 1 or not numeric.
-    odd_colors: usize,
+    /// Faces without a material, and the object and the undefined material of the first.
+    drawn_grey: (Tally, Option<[String; 2]>),
+    /// Self-intersecting polygons.
+    crossing: Tally,
+    /// Faces with a colour that is not within 0 to 1.
+    odd_colors: Tally,
 }
 
 impl Model {
@@ -85,20 +86,21 @@ impl Model {
             without: Vec::new(),
             grey: None,
             white: None,
-            drawn_grey: (0, None),
-            crossing: (0, 0),
-            odd_colors: 0,
+            drawn_grey: (Tally::default(), None),
+            crossing: Tally::default(),
+            odd_colors: Tally::default(),
         }
     }
 
-    fn push_faces(&mut self) -> Result<(), (u32, String)> {
+    fn push_faces(&mut self) -> Result<(), (usize, String)> {
         let faces = std::mem::take(&mut self.read.faces);
         let mut first = 0;
         for face in &faces {
             let end = first + face.corners as usize;
+            let line = face.line as usize;
             self.read
-                .check(first..end)
-                .map_err(|problem| (face.line, problem))?;
+                .check(first..end, line)
+                .map_err(|problem| (line, problem))?;
             self.push_face(face, first..end);
             first = end;
         }
@@ -106,6 +108,7 @@ impl Model {
     }
 
     fn push_face(&mut self, face: &Face, corners: std::ops::Range<usize>) {
+        let line = face.line as usize;
         let corners = &self.read.corners[corners];
         let positions = &self.read.positions;
         let places: Vec<Vec3> = corners.iter().map(|c| positions[c.vertex()]).collect();
@@ -113,21 +116,22 @@ impl Model {
         if !self.read.colors.is_empty() {
             let colors_of = |c: &Corner| self.read.colors.get(c.vertex()).copied().flatten();
             let given: Vec<Option<Vec3>> = corners.iter().map(colors_of).collect();
-            let is_odd = |c: &Vec3| !(c.min_element() >= 0.0 && c.max_element() <= 1.0);
-            self.odd_colors += usize::from(given.iter().flatten().any(is_odd));
+            let is_odd = given.iter().flatten().any(|color| !is_color(*color));
+            self.odd_colors.see_if(is_odd, line);
             if given.iter().any(Option::is_some) {
-                let light = |c: &Option<Vec3>| {
-                    let shown = c.unwrap_or(Vec3::ONE).clamp(Vec3::ZERO, Vec3::ONE);
-                    Vec3::from(shown.to_array().map(linear))
-                };
+                let light = |color: &Option<Vec3>| shown(color.unwrap_or(Vec3::ONE));
                 colors = given.iter().map(light).collect();
             }
         }
-        let material = match self.read.materials[face.material as usize] {
-            Some(id) => id,
-            None => {
+        let material = match &self.read.materials[face.material as usize] {
+            Ok(id) => *id,
+            Err(name) => {
                 let next = self.known + self.without.len() as u32;
                 let (id, albedo) = if colors.is_empty() {
+                    let (tally, first) = &mut self.drawn_grey;
+                    tally.see(line);
+                    let object = &self.read.objects[face.object as usize];
+                    first.get_or_insert_with(|| [object.clone(), name.clone()]);
                     (&mut self.grey, DEFAULT_ALBEDO)
                 } else {
                     (&mut self.white, 1.0)
@@ -139,11 +143,6 @@ impl Model {
                 })
             }
         };
-        if Some(material) == self.grey {
-            self.drawn_grey.0 += corners.len() - 2;
-            let object = || self.read.objects[face.object as usize].clone();
-            self.drawn_grey.1.get_or_insert_with(object);
-        }
         let uv = |c: &Corner| {
             let uv = c.uv().map(|i| self.read.uvs[i]);
             uv.map_or(Vec2::ZERO, |uv| Vec2::new(uv.x, 1.0 - uv.y))
@@ -159,33 +158,59 @@ impl Model {
             let vertices = triangle.map(|k| places[k]);
             builder.push_colored(vertices, of.map(uv), normals, colors, material);
         });
-        if crosses {
-            let (count, line) = self.crossing;
-            self.crossing = (count + 1, if count == 0 { face.line } else { line });
-        }
+        self.crossing.see_if(crosses, line);
     }
 
     /// Warns about everything drawn differently from the file.
     fn tell(&mut self) {
+        let [uvs, normals] = self.read.lost;
+        let notes = [
+            uvs.note(
+                [
+                    "corner names a texture coordinate that does not exist",
+                    "corners name a texture coordinate that does not exist",
+                ],
+                "line",
+                "as if none were named",
+            ),
+            normals.note(
+                [
+                    "corner names a normal that does not exist",
+                    "corners name a normal that does not exist",
+                ],
+                "line",
+                "as if none were named",
+            ),
+            self.crossing.note(
+                ["polygon crosses itself", "polygons cross themselves"],
+                "line",
+                "drawn as a fan around the first corner",
+            ),
+            self.odd_colors.note(
+                [
+                    "face has vertex colours beyond 0 to 1",
+                    "faces have vertex colours beyond 0 to 1",
+                ],
+                "line",
+                "each component is taken as 0 or 1",
+            ),
+        ];
         let warnings = &mut self.builder.report.warnings;
-        let (count, line) = self.crossing;
-        if count > 0 {
-            warnings.push(format!(
-                "{count} polygons cross themselves, the first in line {line}: drawn as fans around their first corner"
-            ));
-        }
-        if self.odd_colors > 0 {
-            warnings.push(format!(
-                "{} faces have colours of vertices beyond 0 to 1, which are taken as 0 or 1",
-                self.odd_colors
-            ));
-        }
-        if let (triangles, Some(object)) = &self.drawn_grey
-            && self.known > 0
+        warnings.extend(notes.into_iter().flatten());
+        if let (faces, Some([object, material])) = &self.drawn_grey
+            && (self.known > 0 || !material.is_empty())
         {
-            warnings.push(format!(
-                "{triangles} triangles (first object: `{object}`) use no material that a .mtl \
-                 file defines; drawn grey"
+            let first = match material.as_str() {
+                "" => format!("drawn grey; the first belongs to object `{object}`"),
+                name => format!("drawn grey; the first is of material `{name}`, object `{object}`"),
+            };
+            warnings.extend(faces.note(
+                [
+                    "face has no material that a .mtl file defines",
+                    "faces have no material that a .mtl file defines",
+                ],
+                "line",
+                &first,
             ));
         }
     }

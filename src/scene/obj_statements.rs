@@ -1,13 +1,17 @@
 //! Parser for the statements of OBJ files.
 
 use super::mtl::Library;
+use super::tally::{Tally, Unread};
 use glam::{Vec2, Vec3};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::ops::Range;
-use std::str::SplitWhitespace;
+use std::str::{FromStr, SplitWhitespace};
 
 /// Marks a missing index of a corner.
 const NONE: u32 = u32::MAX;
+
+/// Marks an index of a texture coordinate or normal that cannot exist.
+const LOST: u32 = NONE - 1;
 
 /// A corner of a face: zero-based indices of vertex, texture coordinates and normal.
 #[derive(Clone, Copy)]
@@ -48,24 +52,25 @@ pub(super) struct Statements {
     pub normals: Vec<Vec3>,
     pub corners: Vec<Corner>,
     pub faces: Vec<Face>,
-    /// The material before any `usemtl`, then of each `usemtl`; `None` if undefined.
-    pub materials: Vec<Option<u32>>,
+    /// The material before any `usemtl`, then of each `usemtl`, or its name if it is not defined.
+    pub materials: Vec<Result<u32, String>>,
     /// Names of objects and groups.
     pub objects: Vec<String>,
     pub warnings: Vec<String>,
+    /// Corners whose texture coordinates do not exist, and corners whose normal does not.
+    pub lost: [Tally; 2],
 }
 
 #[derive(Default)]
 struct Reader {
     numbers: HashMap<String, u32>,
-    /// Names of `usemtl` that no library has defined so far.
-    pending: Vec<(usize, String)>,
-    /// Number of faces with fewer than three corners, and the line of the first.
-    short: (usize, u32),
+    /// Faces with fewer than three corners.
+    short: Tally,
+    /// Vertices, texture coordinates and normals that are not finite.
+    infinite: [Tally; 3],
     /// True while a smoothing group is on.
     is_smooth: bool,
-    /// Unread statements, with the line of the first of each.
-    unread: BTreeMap<String, u32>,
+    unread: Unread,
 }
 
 impl Statements {
@@ -73,7 +78,7 @@ impl Statements {
     ///
     /// # Errors
     /// The line of the first malformed statement, and the problem.
-    pub(crate) fn read(text: &str, library: &Library) -> Result<Self, (u32, String)> {
+    pub(crate) fn read(text: &str, library: &Library) -> Result<Self, (usize, String)> {
         let mut found = Self {
             positions: Vec::new(),
             colors: Vec::new(),
@@ -81,9 +86,10 @@ impl Statements {
             normals: Vec::new(),
             corners: Vec::new(),
             faces: Vec::new(),
-            materials: vec![None],
+            materials: vec![Err(String::new())],
             objects: vec!["unnamed_object".to_owned()],
             warnings: Vec::new(),
+            lost: [Tally::default(); 2],
         };
         let mut reader = Reader::default();
         for (line, content) in (1..).zip(text.lines()) {
@@ -106,7 +112,7 @@ impl Statements {
         &mut self,
         reader: &mut Reader,
         library: &Library,
-        line: u32,
+        line: usize,
         keyword: &str,
         rest: &str,
         words: SplitWhitespace<'_>,
@@ -114,14 +120,21 @@ impl Statements {
         match keyword {
             "v" => self.vertex(reader, line, words)?,
             "vt" => {
-                let uv: [f32; 2] = numbers(keyword, words, 1)?;
-                self.uvs.push(Vec2::from(uv));
+                let ([u, v], count) = numbers(words);
+                let u = if count == 0 { f32::NAN } else { u };
+                let uv = Vec2::new(u, v);
+                reader.infinite[1].see_if(!uv.is_finite(), line);
+                self.uvs.push(uv);
             }
             "vn" => {
-                let normal: [f32; 3] = numbers(keyword, words, 3)?;
-                self.normals.push(Vec3::from(normal));
+                let (normal, count) = numbers(words);
+                let normal = Vec3::from(normal);
+                let normal = if count < 3 { Vec3::NAN } else { normal };
+                reader.infinite[2].see_if(!normal.is_finite(), line);
+                self.normals.push(normal);
             }
-            "f" => self.face(reader, line, words)?,
+            // `fo` is an older name.
+            "f" | "fo" => self.face(reader, line, words)?,
             "o" | "g" => {
                 let name = if rest.is_empty() {
                     "unnamed_object"
@@ -132,22 +145,14 @@ impl Statements {
             }
             "usemtl" => {
                 let known = reader.material(rest);
-                if known.is_none() {
-                    reader.pending.push((self.materials.len(), rest.to_owned()));
-                }
-                self.materials.push(known);
+                self.materials.push(known.ok_or_else(|| rest.to_owned()));
             }
             "mtllib" => reader.numbers.extend(library.load(rest)),
             "s" => {
                 let group = words.clone().next().unwrap_or("off");
                 reader.is_smooth = !matches!(group, "off" | "0");
             }
-            // Points and lines have no surface.
-            "l" | "p" => {}
-            _ if reader.unread.len() < MOST_UNREAD => {
-                reader.unread.entry(keyword.to_owned()).or_insert(line);
-            }
-            _ => {}
+            _ => reader.unread.see(keyword, line),
         }
         Ok(())
     }
@@ -156,30 +161,34 @@ impl Statements {
     fn vertex(
         &mut self,
         reader: &mut Reader,
-        line: u32,
+        line: usize,
         words: SplitWhitespace<'_>,
     ) -> Result<(), String> {
-        let count = words.clone().count();
-        if ![3, 4, 6, 7].contains(&count) {
-            return Err(format!("`v` with {count} numbers"));
+        let all = words.clone().count();
+        let ([x, y, z, w, g, b, alpha, _], count) = numbers(words.clone());
+        if count < 3 {
+            let odd = words.clone().nth(count);
+            return Err(odd.map_or_else(
+                || format!("`v` with {count} numbers"),
+                |word| format!("`{word}` is not a number"),
+            ));
         }
-        let [x, y, z, w, g, b, alpha] = numbers("v", words, 3)?;
-        let position = Vec3::new(x, y, z);
-        if count == 4 {
-            if w == 0.0 {
-                return Err("a vertex of weight 0".to_owned());
+        let mut position = Vec3::new(x, y, z);
+        match count {
+            4 => position /= w,
+            6 | 7 => {
+                self.colors.resize(self.positions.len(), None);
+                self.colors.push(Some(Vec3::new(w, g, b)));
             }
-            self.positions.push(position / w);
-            return Ok(());
+            _ => {}
         }
-        if count > 4 {
-            self.colors.resize(self.positions.len(), None);
-            self.colors.push(Some(Vec3::new(w, g, b)));
+        if all > count || ![3, 4, 6, 7].contains(&count) {
+            reader.unread.see("further words of `v`", line);
         }
         if count == 7 && alpha != 1.0 {
-            let what = "the alpha of a vertex".to_owned();
-            reader.unread.entry(what).or_insert(line);
+            reader.unread.see("the alpha of a vertex", line);
         }
+        reader.infinite[0].see_if(!position.is_finite(), line);
         self.positions.push(position);
         Ok(())
     }
@@ -187,7 +196,7 @@ impl Statements {
     fn face(
         &mut self,
         reader: &mut Reader,
-        line: u32,
+        line: usize,
         words: SplitWhitespace<'_>,
     ) -> Result<(), String> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
@@ -196,41 +205,41 @@ impl Statements {
             self.corners.push(corner(word, counts)?);
         }
         let corners = self.corners.len() - first;
-        if corners == 0 {
-            return Err("`f` with no corners".to_owned());
-        }
         if corners < 3 {
             self.corners.truncate(first);
-            let (count, before) = reader.short;
-            reader.short = (count + 1, if count == 0 { line } else { before });
+            reader.short.see(line);
             return Ok(());
         }
         if reader.is_smooth && self.corners[first..].iter().any(|c| c.normal().is_none()) {
-            let what = "smoothing groups (`s`) of faces without normals".to_owned();
-            reader.unread.entry(what).or_insert(line);
+            let what = "smoothing groups (`s`) of faces without normals";
+            reader.unread.see(what, line);
         }
         self.faces.push(Face {
             corners: corners as u32,
-            line,
+            line: line as u32,
             material: self.materials.len() as u32 - 1,
             object: self.objects.len() as u32 - 1,
         });
         Ok(())
     }
 
-    /// Checks that everything these corners refer to exists.
+    /// Checks that the vertices of these corners exist; a texture coordinate or normal that does
+    /// not is as one that is not given.
     ///
     /// # Errors
-    /// The missing item.
-    pub(crate) fn check(&self, corners: Range<usize>) -> Result<(), String> {
+    /// The missing vertex.
+    pub(crate) fn check(&mut self, corners: Range<usize>, line: usize) -> Result<(), String> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        for Corner(indices) in &self.corners[corners] {
-            for ((index, count), what) in indices.iter().zip(counts).zip(WHAT) {
-                if *index != NONE && *index as usize >= count {
-                    let number = u64::from(*index) + 1;
-                    return Err(format!(
-                        "the face refers to {what} {number}, but there are {count}"
-                    ));
+        for Corner(indices) in &mut self.corners[corners] {
+            for (k, index) in indices.iter_mut().enumerate() {
+                let (number, count) = (u64::from(*index) + 1, counts[k]);
+                match *index == NONE || number <= count as u64 {
+                    true => {}
+                    false if k == 0 => return Err(beyond(number as i64, count, "")),
+                    false => {
+                        *index = NONE;
+                        self.lost[k - 1].see(line);
+                    }
                 }
             }
         }
@@ -238,30 +247,47 @@ impl Statements {
     }
 
     fn finish(&mut self, reader: Reader, text: &str) {
-        for (place, name) in &reader.pending {
-            self.materials[*place] = reader.material(name);
+        for material in &mut self.materials {
+            let known = material
+                .as_ref()
+                .err()
+                .and_then(|name| reader.material(name));
+            if let Some(id) = known {
+                *material = Ok(id);
+            }
         }
-        let (count, line) = reader.short;
-        self.warnings.extend(match count {
-            0 => None,
-            1 => Some(format!(
-                "line {line}: a face with fewer than three corners, left out"
-            )),
-            _ => Some(format!(
-                "{count} faces with fewer than three corners, left out; the first in line {line}"
-            )),
-        });
-        let unread = reader.unread.iter();
-        self.warnings
-            .extend(unread_warning(unread.map(|(what, line)| {
-                let what = if what.contains(' ') {
-                    what.clone()
-                } else {
-                    format!("`{what}`")
-                };
-                format!("{what} (line {line})")
-            })));
-        self.warnings.extend(cut_off(text));
+        let [positions, uvs, normals] = reader.infinite;
+        let notes = [
+            reader.short.note(
+                [
+                    "face has fewer than three corners",
+                    "faces have fewer than three corners",
+                ],
+                "line",
+                "left out",
+            ),
+            positions.note(
+                ["vertex is not finite", "vertices are not finite"],
+                "line",
+                "triangles with such a corner are dropped",
+            ),
+            uvs.note(
+                [
+                    "texture coordinate is not finite",
+                    "texture coordinates are not finite",
+                ],
+                "line",
+                "taken as 0",
+            ),
+            normals.note(
+                ["normal is not finite", "normals are not finite"],
+                "line",
+                "the triangle's is used",
+            ),
+            reader.unread.note(),
+            cut_off(text),
+        ];
+        self.warnings.extend(notes.into_iter().flatten());
     }
 }
 
@@ -273,51 +299,34 @@ impl Reader {
     }
 }
 
-/// Limit on the kinds of unread statements recorded: a file in another format has any number.
-const MOST_UNREAD: usize = 64;
-
-const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
-
-/// One warning for everything in a file that is not read; `None` if there is nothing.
-pub(super) fn unread_warning(what: impl Iterator<Item = String>) -> Option<String> {
-    const SHOWN: usize = 12;
-    let what: Vec<String> = what.collect();
-    let shown = what[..what.len().min(SHOWN)].join(", ");
-    let more = if what.len() > SHOWN { ", …" } else { "" };
-    (!what.is_empty())
-        .then(|| format!("not read, and drawn as if it were not there: {shown}{more}"))
-}
-
+/// The part of a line before `#`, which does not begin a comment in the number `1.#IND`.
 pub(super) fn without_comment(line: &str) -> &str {
-    line.split('#').next().unwrap_or_default()
+    let mut signs = line.match_indices('#').map(|(at, _)| line.split_at(at));
+    let is_number = |(before, after): &(&str, &str)| {
+        before.ends_with('.') && after[1..].starts_with(|c: char| c.is_ascii_uppercase())
+    };
+    let comment = signs.find(|parts| !is_number(parts));
+    comment.map_or(line, |(before, _)| before)
 }
 
-/// Parses at least `least` numbers; missing ones are 0, and those beyond `N` ignored.
-fn numbers<const N: usize>(
-    keyword: &str,
-    words: SplitWhitespace<'_>,
-    least: usize,
-) -> Result<[f32; N], String> {
+/// Parses the numbers before the first other word, at most `N`, and counts them; missing ones are 0.
+fn numbers<const N: usize>(words: SplitWhitespace<'_>) -> ([f32; N], usize) {
     let mut found = [0.0; N];
     let mut count = 0;
-    for (place, word) in found.iter_mut().zip(words) {
-        *place = number(word).ok_or_else(|| format!("`{word}` is not a number"))?;
+    for (place, number) in found.iter_mut().zip(words.map_while(number)) {
+        *place = number;
         count += 1;
     }
-    if count >= least {
-        Ok(found)
-    } else {
-        Err(format!("`{keyword}` with {count} numbers"))
-    }
+    (found, count)
 }
 
 /// Parses numbers of C, C++ and Fortran: NaN as `-1.#IND` or `nan(ind)`, exponents as `1.0D+00`.
-pub(super) fn number(word: &str) -> Option<f32> {
+pub(super) fn number<T: FromStr + From<f32>>(word: &str) -> Option<T> {
     word.parse().ok().or_else(|| {
         let word = word.to_ascii_lowercase();
         let begins_as_none = ["nan", "+nan", "-nan"].iter().any(|w| word.starts_with(w));
-        if begins_as_none || word.contains(".#ind") || word.contains(".#qnan") {
-            Some(f32::NAN)
+        if begins_as_none || word.contains(".#") {
+            Some(f32::NAN.into())
         } else {
             word.replace('d', "e").parse().ok()
         }
@@ -337,20 +346,24 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
         let value: i64 = part.parse().map_err(|_| none())?;
         let index = match value {
             1.. => value - 1,
-            _ => value + counts[k] as i64,
+            _ => value.saturating_add(counts[k] as i64),
         };
         let found = u32::try_from(index)
             .ok()
-            .filter(|i| *i != NONE && value != 0);
-        *place = found.ok_or_else(|| {
-            let (what, count) = (WHAT[k], counts[k]);
-            format!("the face refers to {what} {value}, but there are {count} before it")
-        })?;
+            .filter(|i| *i < LOST && value != 0);
+        *place = match found {
+            None if k == 0 => return Err(beyond(value, counts[k], " before it")),
+            found => found.unwrap_or(LOST),
+        };
     }
-    match parts.next() {
-        None => Ok(Corner(corner)),
-        Some(_) => Err(none()),
+    match parts.all(str::is_empty) {
+        true => Ok(Corner(corner)),
+        false => Err(none()),
     }
+}
+
+fn beyond(vertex: i64, count: usize, place: &str) -> String {
+    format!("the face refers to vertex {vertex}, but there are {count}{place}")
 }
 
 /// Detects a file that ends within a statement by its missing final line break. A number without

@@ -1,156 +1,355 @@
-//! Stanford PLY with `ply-rs-bw`, ASCII and binary: faces go straight into the scene's arrays.
+//! Stanford PLY, ASCII and binary: faces go straight into the scene's arrays.
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::colors::linear;
-use super::error::{guarded, open};
-use super::obj_statements::unread_warning;
+use super::colors::{is_color, shown};
+use super::error::open;
+use super::ply_body::Body;
+use super::ply_header::{Element, Encoding, Header, Kind, Property};
 use super::polygon::triangulate;
+use super::tally::{Tally, unread_warning};
 use super::{Material, SceneData, SceneError};
 use glam::{Vec2, Vec3};
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyDef,
-    PropertyType, ScalarType,
-};
-use raystone_core::text::plain_text_or_latin1;
-use std::io::{BufRead, BufReader, Cursor};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Loads a PLY model. Polygons become triangles. There are no materials: surfaces are grey or have
-/// vertex colours, which are sRGB whatever their type, as in MeshLab, Blender and three.js.
+/// Loads a PLY model: polygons and triangle strips become triangles. There are no materials:
+/// surfaces are grey or have vertex colours, which are sRGB whatever their type, as in MeshLab,
+/// Blender and three.js. Vertex normals are shading normals.
 ///
 /// # Errors
 /// [`SceneError`] naming the unreadable element.
 pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     let (file, bytes) = open(path)?;
-    guarded(path, || {
-        let source = BufReader::with_capacity(1 << 16, file);
-        let (builder, is_colored) = read(path, bytes, source)?;
-        let albedo = if is_colored { 1.0 } else { DEFAULT_ALBEDO };
-        let look = Look {
-            materials: vec![Material::diffuse("default", Vec3::splat(albedo))],
-            ..Look::default()
-        };
-        builder.finish(name, look)
-    })
-}
-
-/// Reads the triangles; the flag is true if vertices have colours.
-fn read(
-    path: &Path,
-    bytes: u64,
-    mut source: impl BufRead,
-) -> Result<(SceneBuilder, bool), SceneError> {
-    let text = header_text(&mut source).map_err(|p| SceneError::malformed(path, "header", p))?;
-    let header = Parser::<Skipped>::new()
-        .read_header(&mut Reader::new(Cursor::new(text)))
-        .map_err(|error| header_error(path, &error))?;
-    let mut body = Body {
-        path,
-        encoding: header.encoding,
-        source,
-        line: Vec::new(),
+    let mut source = BufReader::with_capacity(1 << 16, file);
+    let broken = |(place, problem): Problem| SceneError::malformed(path, place, problem);
+    let header = Header::read(&mut source)
+        .map_err(|(line, problem)| broken((format!("header, line {line}"), problem)))?;
+    let mut body = Body::new(source, header.encoding, header.lines);
+    let mut model = Model::default();
+    model.read(&header, &mut body, bytes).map_err(broken)?;
+    model.tell(&header);
+    let is_colored = !model.colors.is_empty();
+    let albedo = if is_colored { 1.0 } else { DEFAULT_ALBEDO };
+    let look = Look {
+        materials: vec![Material::diffuse("default", Vec3::splat(albedo))],
+        ..Look::default()
     };
-    let mut vertices: Vec<Vertex> = Vec::new();
-    let mut is_colored = false;
-    let mut builder = SceneBuilder::default();
-    let mut odd = Odd::default();
-    for definition in header.elements.values() {
-        check_element(path, definition, header.encoding, bytes)?;
-    }
-    for (name, definition) in &header.elements {
-        match name.as_str() {
-            "vertex" => {
-                is_colored = has_colors(definition);
-                vertices.reserve_exact(definition.count);
-                body.each(definition, |_, vertex| {
-                    vertices.push(vertex);
-                    Ok(())
-                })?;
-            }
-            "face" => {
-                builder = SceneBuilder::new(false, definition.count);
-                body.each(definition, |index, face: Face| {
-                    let corners = face.corners(&vertices).map_err(|problem| {
-                        SceneError::malformed(path, format!("face {index}"), problem)
-                    })?;
-                    odd.flat += usize::from(corners.len() < 3);
-                    builder.reserve(corners.len().saturating_sub(2));
-                    odd.see(index, push_face(&mut builder, &corners, is_colored));
-                    Ok(())
-                })?;
-            }
-            _ => body.each(definition, |_, Skipped| Ok(()))?,
-        }
-    }
-    let is_odd = |v: &Vertex| !(v.color.min_element() >= 0.0 && v.color.max_element() <= 1.0);
-    odd.colors = vertices.iter().filter(|v| is_colored && is_odd(v)).count();
-    let warnings = &mut builder.report.warnings;
-    odd.tell(warnings);
-    let unread = header.elements.values().flat_map(|e| unread(e, is_colored));
-    warnings.extend(unread_warning(unread));
-    Ok((builder, is_colored))
+    model.builder.finish(name, look)
 }
 
-/// Counts of odd faces and vertices, for warnings.
+/// A place in the file, and what is wrong there.
+type Problem = (String, String);
+
+#[derive(Default)]
+struct Model {
+    builder: SceneBuilder,
+    positions: Vec<Vec3>,
+    /// Linear. Empty if vertices have none.
+    colors: Vec<Vec3>,
+    /// Empty if vertices have none.
+    normals: Vec<Vec3>,
+    /// Faces before the vertices: index, number of corners, corners.
+    early: Vec<u32>,
+    odd: Odd,
+    /// What is not read, for a warning.
+    unread: Vec<String>,
+    /// Positions of the current face's corners.
+    places: Vec<Vec3>,
+}
+
+/// Odd vertices and faces, for warnings.
 #[derive(Default)]
 struct Odd {
+    positions: Tally,
+    normals: Tally,
+    colors: Tally,
     /// Faces with fewer than three corners.
-    flat: usize,
-    /// Self-intersecting polygons, and the first of them.
-    crossing: (usize, usize),
-    /// Vertices with a colour outside 0 to 1.
-    colors: usize,
+    flat: Tally,
+    /// Self-intersecting polygons.
+    crossing: Tally,
 }
 
-impl Odd {
-    fn see(&mut self, face: usize, crosses: bool) {
-        if crosses {
-            let (count, first) = self.crossing;
-            self.crossing = (count + 1, if count == 0 { face } else { first });
+impl Model {
+    /// Reads all elements up to the last with vertices or faces: what is behind them cannot spoil
+    /// the model.
+    fn read<S: BufRead>(
+        &mut self,
+        header: &Header,
+        body: &mut Body<S>,
+        bytes: u64,
+    ) -> Result<(), Problem> {
+        let elements = &header.elements;
+        let first = |name: &str| elements.iter().position(|e| e.name == name && e.count > 0);
+        let vertices = first("vertex");
+        let read = [vertices, first("face"), first(STRIPS)];
+        let last = read.into_iter().flatten().max();
+        for (k, element) in elements.iter().enumerate() {
+            let is_read = read.contains(&Some(k));
+            if is_read {
+                check_size(element, header.encoding, bytes)?;
+            }
+            if Some(k) == vertices {
+                self.read_vertices(element, body)?;
+            } else if is_read {
+                self.read_faces(element, body, vertices > Some(k))?;
+            } else if element.count > 0 {
+                self.unread.push(format!("the element `{}`", element.name));
+                if Some(k) < last {
+                    each(element, body, |_, body| {
+                        element.properties.iter().try_for_each(|p| body.skip(p))
+                    })?;
+                }
+            }
+        }
+        self.push_early_faces()?;
+        if last.is_some_and(|last| last + 1 == elements.len()) && body.goes_on() {
+            let line = body
+                .line()
+                .map_or(String::new(), |n| format!(" (line {n})"));
+            let what = format!("the rest behind the last element{line}");
+            self.unread.push(what);
+        }
+        Ok(())
+    }
+
+    fn read_vertices<S: BufRead>(
+        &mut self,
+        element: &Element,
+        body: &mut Body<S>,
+    ) -> Result<(), Problem> {
+        let place = || format!("element `{}`", element.name);
+        let needed = || (place(), "the properties x, y and z are needed".to_owned());
+        let position = find(element, ["x", "y", "z"], |_| true).ok_or_else(needed)?;
+        let normal = find(element, ["nx", "ny", "nz"], |_| true);
+        let color = COLORS
+            .iter()
+            .find_map(|names| find(element, *names, |kind| white(kind).is_some()));
+        let mut slots = vec![None; element.properties.len()];
+        let sets = [Some(position), normal, color];
+        for (k, property) in sets.iter().flatten().flatten().enumerate() {
+            slots[*property] = Some(k);
+        }
+        self.name_unread(element, |k| slots[k].is_some());
+        let white = |k: usize| white(element.properties[k].kind).unwrap_or(1.0);
+        let white = color.map(|parts| Vec3::from(parts.map(white)));
+        let count = element.count as usize;
+        self.positions.reserve_exact(count);
+        self.normals.reserve_exact(normal.map_or(0, |_| count));
+        self.colors.reserve_exact(color.map_or(0, |_| count));
+        let mut values = [0.0; 9];
+        each(element, body, |index, body| {
+            for (property, slot) in element.properties.iter().zip(&slots) {
+                match slot {
+                    Some(k) => values[*k] = body.value(property.kind)? as f32,
+                    None => body.skip(property)?,
+                }
+            }
+            let mut sets = values.as_chunks::<3>().0.iter().map(|v| Vec3::from(*v));
+            let mut next = || sets.next().unwrap_or_default();
+            self.push_vertex(
+                index,
+                next(),
+                normal.map(|_| next()),
+                white.map(|w| next() / w),
+            );
+            Ok(())
+        })
+    }
+
+    fn push_vertex(
+        &mut self,
+        index: usize,
+        position: Vec3,
+        normal: Option<Vec3>,
+        color: Option<Vec3>,
+    ) {
+        self.odd.positions.see_if(!position.is_finite(), index);
+        self.positions.push(position);
+        if let Some(normal) = normal {
+            self.odd.normals.see_if(!normal.is_finite(), index);
+            self.normals.push(normal);
+        }
+        if let Some(color) = color {
+            self.odd.colors.see_if(!is_color(color), index);
+            self.colors.push(shown(color));
         }
     }
 
-    fn tell(&self, warnings: &mut Vec<String>) {
-        if self.flat > 0 {
-            warnings.push(format!(
-                "{} faces with fewer than three corners left out",
-                self.flat
-            ));
-        }
-        let (count, first) = self.crossing;
-        if count > 0 {
-            warnings.push(format!(
-                "{count} polygons cross themselves, the first is face {first}: drawn as fans around their first corner"
-            ));
-        }
-        if self.colors > 0 {
-            warnings.push(format!(
-                "{} vertices have a colour beyond 0 to 1, which is taken as 0 or 1",
-                self.colors
-            ));
-        }
+    fn read_faces<S: BufRead>(
+        &mut self,
+        element: &Element,
+        body: &mut Body<S>,
+        is_early: bool,
+    ) -> Result<(), Problem> {
+        let list = corner_list(element).ok_or_else(|| {
+            let place = format!("element `{}`", element.name);
+            (place, "the property vertex_indices is needed".to_owned())
+        })?;
+        self.name_unread(element, |k| k == list);
+        self.builder.reserve(element.count as usize);
+        let mut corners = Vec::new();
+        each(element, body, |index, body| {
+            corners.clear();
+            for (k, property) in element.properties.iter().enumerate() {
+                match property.length {
+                    Some(length) if k == list => body.list(length, property.kind, |x| {
+                        corners.push(corner(x)?);
+                        Ok(())
+                    })?,
+                    _ => body.skip(property)?,
+                }
+            }
+            let mut face = |corners: &[u32]| match is_early {
+                true => {
+                    self.early.extend([index as u32, corners.len() as u32]);
+                    self.early.extend(corners);
+                    Ok(())
+                }
+                false => self.push_face(index, corners),
+            };
+            match element.name == STRIPS {
+                true => strip(&corners).try_for_each(|triangle| face(&triangle)),
+                false => face(&corners),
+            }
+        })
     }
-}
 
-/// Adds a polygon's triangles. Returns true if it intersects itself.
-fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) -> bool {
-    let places: Vec<Vec3> = corners.iter().map(|c| c.position).collect();
-    let light = |k: usize| {
-        let shown = corners[k].color.clamp(Vec3::ZERO, Vec3::ONE);
-        Vec3::from(shown.to_array().map(linear))
-    };
-    triangulate(&places, |triangle| {
-        let colors = is_colored.then(|| triangle.map(light));
-        builder.push_colored(
-            triangle.map(|k| places[k]),
-            [Vec2::ZERO; 3],
-            None,
+    fn push_early_faces(&mut self) -> Result<(), Problem> {
+        let early = std::mem::take(&mut self.early);
+        let mut rest = &early[..];
+        while let [index, count, after @ ..] = rest {
+            let (corners, after) = after.split_at(*count as usize);
+            let broken = |problem| (format!("face {index}"), problem);
+            self.push_face(*index as usize, corners).map_err(broken)?;
+            rest = after;
+        }
+        Ok(())
+    }
+
+    fn push_face(&mut self, index: usize, corners: &[u32]) -> Result<(), String> {
+        let Self {
+            builder,
+            positions,
+            normals,
             colors,
-            0,
-        );
-    })
+            places,
+            ..
+        } = self;
+        places.clear();
+        places.reserve_exact(corners.len());
+        for corner in corners {
+            let position = positions.get(*corner as usize).ok_or_else(|| {
+                let (vertex, count) = (i64::from(*corner), positions.len());
+                let vertex = if *corner == NONE { -1 } else { vertex };
+                format!("it refers to vertex {vertex}, but there are {count}")
+            })?;
+            places.push(*position);
+        }
+        if corners.len() < 3 {
+            self.odd.flat.see(index);
+            return Ok(());
+        }
+        builder.reserve(corners.len() - 2);
+        let crosses = triangulate(places, |triangle| {
+            let of = triangle.map(|k| corners[k] as usize);
+            let normals = (!normals.is_empty()).then(|| of.map(|v| normals[v]));
+            let colors = (!colors.is_empty()).then(|| of.map(|v| colors[v]));
+            let vertices = triangle.map(|k| places[k]);
+            builder.push_colored(vertices, [Vec2::ZERO; 3], normals, colors, 0);
+        });
+        self.odd.crossing.see_if(crosses, index);
+        Ok(())
+    }
+
+    /// Notes the properties that are not read.
+    fn name_unread(&mut self, element: &Element, is_read: impl Fn(usize) -> bool) {
+        let others = element.properties.iter().enumerate();
+        let others = others.filter(|(k, _)| !is_read(*k));
+        let named = others.map(|(_, p)| format!("`{}` of `{}`", p.name, element.name));
+        self.unread.extend(named);
+    }
+
+    /// Warns about everything drawn differently from the file.
+    fn tell(&mut self, header: &Header) {
+        let odd = &self.odd;
+        let notes = [
+            odd.flat.note(
+                [
+                    "face has fewer than three corners",
+                    "faces have fewer than three corners",
+                ],
+                "face",
+                "left out",
+            ),
+            odd.positions.note(
+                ["vertex is not finite", "vertices are not finite"],
+                "vertex",
+                "triangles with such a corner are dropped",
+            ),
+            odd.normals.note(
+                ["normal is not finite", "normals are not finite"],
+                "vertex",
+                "the triangle's is used",
+            ),
+            odd.crossing.note(
+                ["polygon crosses itself", "polygons cross themselves"],
+                "face",
+                "drawn as a fan around the first corner",
+            ),
+            odd.colors.note(
+                [
+                    "vertex has a colour beyond 0 to 1",
+                    "vertices have a colour beyond 0 to 1",
+                ],
+                "vertex",
+                "each component is taken as 0 or 1",
+            ),
+            unread_warning(self.unread.drain(..)),
+            header.unread.note(),
+        ];
+        self.builder
+            .report
+            .warnings
+            .extend(notes.into_iter().flatten());
+    }
 }
+
+/// Reads all elements of a kind; problems get their place.
+fn each<S: BufRead>(
+    element: &Element,
+    body: &mut Body<S>,
+    mut one: impl FnMut(usize, &mut Body<S>) -> Result<(), String>,
+) -> Result<(), Problem> {
+    let Element { name, count, .. } = element;
+    let all = if element.properties.is_empty() {
+        0
+    } else {
+        *count
+    };
+    for index in 0..all {
+        one(index as usize, body).map_err(|problem| {
+            let line = body.line().map_or(String::new(), |n| format!(", line {n}"));
+            (format!("{name} {index} of {count}{line}"), problem)
+        })?;
+    }
+    Ok(())
+}
+
+/// Refuses elements that cannot fit into a file of `bytes` bytes, before memory is reserved.
+fn check_size(element: &Element, encoding: Encoding, bytes: u64) -> Result<(), Problem> {
+    // The last line of a text may lack its end.
+    if element.least_bytes(encoding) <= bytes + 1 {
+        return Ok(());
+    }
+    let Element { name, count, .. } = element;
+    Err((
+        format!("element `{name}`"),
+        format!("{count} elements are announced, more than the file can hold"),
+    ))
+}
+
+/// The element of triangle strips, in files of the Stanford repository.
+const STRIPS: &str = "tristrips";
 
 const COLORS: [[&str; 3]; 3] = [
     ["red", "green", "blue"],
@@ -158,313 +357,58 @@ const COLORS: [[&str; 3]; 3] = [
     ["diffuse_red", "diffuse_green", "diffuse_blue"],
 ];
 
-/// True if vertices have a colour that can be read.
-fn has_colors(vertex: &ElementDef) -> bool {
-    let is_read = |name: &&str| {
-        let property = vertex.properties.get(*name);
-        let kind = property.map(|p| &p.data_type);
-        kind.is_some_and(|kind| {
-            use ScalarType::{Double, Float, UChar, UShort};
-            matches!(kind, PropertyType::Scalar(UChar | UShort | Float | Double))
-        })
-    };
-    COLORS.iter().any(|names| names.iter().all(&is_read))
-}
-
-/// The properties of an element that are not read.
-fn unread(element: &ElementDef, is_colored: bool) -> Vec<String> {
-    let name = element.name.as_str();
-    if element.count == 0 {
-        return Vec::new();
-    }
-    let is_read = |property: &&String| match name {
-        "vertex" => {
-            let is_color = COLORS.as_flattened().contains(&property.as_str());
-            ["x", "y", "z"].contains(&property.as_str()) || (is_colored && is_color)
-        }
-        _ => FACE_LISTS.contains(&property.as_str()),
-    };
-    match name {
-        "vertex" | "face" => {
-            let others = element.properties.keys().filter(|p| !is_read(p));
-            others.map(|p| format!("`{p}` of `{name}`")).collect()
-        }
-        _ => vec![format!("the element `{name}`")],
+/// The largest colour component of a type; `None` if its range is unknown.
+fn white(kind: Kind) -> Option<f32> {
+    match kind {
+        Kind::UChar => Some(255.0),
+        Kind::UShort => Some(65_535.0),
+        Kind::Float | Kind::Double => Some(1.0),
+        _ => None,
     }
 }
 
-/// Reads the header with any kind of line ends; the rest stays in the source.
-fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
-    let mut text = Vec::new();
-    let mut line = Vec::new();
-    let mut pairs = true;
-    loop {
-        let end = read_line(source, &mut line, pairs).map_err(|e| e.to_string())?;
-        if text.is_empty() {
-            if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
-                return Err("it is UTF-16 text; save it as UTF-8".to_owned());
-            }
-            // After a header with \r line ends, \n is the first byte of the data.
-            pairs = end != LineEnd::Return;
-        }
-        let plain = plain_text_or_latin1(std::mem::take(&mut line));
-        text.extend(plain.as_bytes());
-        if end == LineEnd::None {
-            return Ok(text);
-        }
-        text.push(b'\n');
-        if plain.trim() == "end_header" {
-            return Ok(text);
-        }
+/// Indices of the first properties of these names that are no lists; `None` unless all are there.
+fn find(element: &Element, names: [&str; 3], is_fit: impl Fn(Kind) -> bool) -> Option<[usize; 3]> {
+    let is = |p: &Property, name| p.name == name && p.length.is_none() && is_fit(p.kind);
+    let at = |name| element.properties.iter().position(|p| is(p, name));
+    match names.map(at) {
+        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+        _ => None,
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum LineEnd {
-    None,
-    /// `\r`.
-    Return,
-    /// `\n` or `\r\n`.
-    Other,
+/// Index of the list of corners, which has two names, or is the only list of whole numbers.
+fn corner_list(element: &Element) -> Option<usize> {
+    let is_whole = |p: &Property| !matches!(p.kind, Kind::Float | Kind::Double);
+    let lists = element.properties.iter().enumerate();
+    let lists = lists.filter(|(_, p)| p.length.is_some());
+    let named = ["vertex_indices", "vertex_index"];
+    let mut of_name = lists.clone().filter(|(_, p)| named.contains(&&*p.name));
+    let mut whole = lists.filter(|(_, p)| is_whole(p));
+    let only = whole.next().filter(|_| whole.next().is_none());
+    of_name.next().or(only).map(|(k, _)| k)
 }
 
-/// Appends a line without its end: `\n`, `\r`, or with `pairs` also both.
-fn read_line(
-    source: &mut impl BufRead,
-    line: &mut Vec<u8>,
-    pairs: bool,
-) -> std::io::Result<LineEnd> {
-    loop {
-        let bytes = source.fill_buf()?;
-        if bytes.is_empty() {
-            return Ok(LineEnd::None);
-        }
-        let Some(end) = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
-            let all = bytes.len();
-            line.extend_from_slice(bytes);
-            source.consume(all);
-            continue;
-        };
-        line.extend_from_slice(&bytes[..end]);
-        let is_return = bytes[end] == b'\r';
-        source.consume(end + 1);
-        let is_pair = is_return && pairs && source.fill_buf()?.first() == Some(&b'\n');
-        if is_pair {
-            source.consume(1);
-        }
-        return Ok(if is_return && !is_pair {
-            LineEnd::Return
-        } else {
-            LineEnd::Other
-        });
+/// The −1 that ends a strip.
+const NONE: u32 = u32::MAX;
+
+/// The number of a vertex, or [`NONE`].
+fn corner(value: f64) -> Result<u32, String> {
+    match value {
+        -1.0 => Ok(NONE),
+        0.0..=4_294_967_295.0 if value.fract() == 0.0 => Ok(value as u32),
+        _ => Err(format!("`{value}` is not the number of a vertex")),
     }
 }
 
-fn header_error(path: &Path, error: &ParseError) -> SceneError {
-    let place = error.line().map_or("header".to_owned(), |line| {
-        format!("header, line {}", line.max(1))
+/// The triangles of strips, all turning the same way. Triangles with equal corners, which join
+/// strips, are left out.
+fn strip(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let strips = corners.split(|corner| *corner == NONE);
+    let triangles = strips.flat_map(|strip| strip.array_windows().enumerate());
+    let turned = triangles.map(|(k, &[a, b, c]): (usize, &[u32; 3])| match k % 2 {
+        0 => [a, b, c],
+        _ => [b, a, c],
     });
-    SceneError::malformed(path, place, error.to_string().trim().to_owned())
-}
-
-/// Minimum bytes of an element: a digit and a separator per property in text, empty lists.
-fn least_bytes(definition: &ElementDef, encoding: Encoding) -> u64 {
-    let least = |property: &PropertyDef| match (encoding, &property.data_type) {
-        (Encoding::Ascii, _) => 2,
-        (_, PropertyType::Scalar(kind) | PropertyType::List(kind, _)) => match kind {
-            ScalarType::Char | ScalarType::UChar => 1,
-            ScalarType::Short | ScalarType::UShort => 2,
-            ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-            ScalarType::Double => 8,
-        },
-    };
-    definition.properties.values().map(least).sum()
-}
-
-/// Refuses elements that cannot fit into a file of `bytes` bytes, before memory is reserved, and
-/// elements that lack required properties.
-fn check_element(
-    path: &Path,
-    definition: &ElementDef,
-    encoding: Encoding,
-    bytes: u64,
-) -> Result<(), SceneError> {
-    let ElementDef {
-        name,
-        count,
-        properties,
-    } = definition;
-    // The last line of a text may lack its end.
-    let least = least_bytes(definition, encoding).saturating_mul(*count as u64);
-    let problem = if least > bytes + 1 || (properties.is_empty() && *count > 0) {
-        format!("{count} elements are announced, more than the file can hold")
-    } else if name == "vertex" && !["x", "y", "z"].iter().all(|k| properties.contains_key(*k)) {
-        "the properties x, y and z are needed".to_owned()
-    } else if name == "face" && !FACE_LISTS.iter().any(|k| properties.contains_key(*k)) {
-        "the property vertex_indices is needed".to_owned()
-    } else {
-        return Ok(());
-    };
-    Err(SceneError::malformed(
-        path,
-        format!("element `{name}`"),
-        problem,
-    ))
-}
-
-struct Body<'a, S> {
-    path: &'a Path,
-    encoding: Encoding,
-    source: S,
-    line: Vec<u8>,
-}
-
-impl<S: BufRead> Body<'_, S> {
-    /// Reads all elements of one kind and passes each on with its index.
-    fn each<E: PropertyAccess>(
-        &mut self,
-        definition: &ElementDef,
-        mut consume: impl FnMut(usize, E) -> Result<(), SceneError>,
-    ) -> Result<(), SceneError> {
-        let parser = Parser::<E>::new();
-        for index in 0..definition.count {
-            let element = self.element(&parser, definition).map_err(|problem| {
-                let place = format!("{} {index} of {}", definition.name, definition.count);
-                SceneError::malformed(self.path, place, problem)
-            })?;
-            consume(index, element)?;
-        }
-        Ok(())
-    }
-
-    fn element<E: PropertyAccess>(
-        &mut self,
-        parser: &Parser<E>,
-        definition: &ElementDef,
-    ) -> Result<E, String> {
-        let source = &mut self.source;
-        let element = match self.encoding {
-            Encoding::Ascii => {
-                self.line.clear();
-                match read_line(source, &mut self.line, true) {
-                    Ok(LineEnd::None) if self.line.is_empty() => {
-                        return Err("the file ends here".to_owned());
-                    }
-                    Ok(_) => {
-                        let line = String::from_utf8_lossy(&self.line);
-                        parser.read_ascii_element(&line, definition)
-                    }
-                    Err(error) => return Err(error.to_string()),
-                }
-            }
-            Encoding::BinaryLittleEndian => parser.read_little_endian_element(source, definition),
-            Encoding::BinaryBigEndian => parser.read_big_endian_element(source, definition),
-        };
-        element.map_err(|error| match error.kind() {
-            std::io::ErrorKind::UnexpectedEof => "the file ends here".to_owned(),
-            _ => error.to_string(),
-        })
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Vertex {
-    position: Vec3,
-    /// sRGB, 0 to 1.
-    color: Vec3,
-}
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self {
-            position: Vec3::NAN,
-            color: Vec3::ONE,
-        }
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let component = match name {
-            "x" => &mut self.position.x,
-            "y" => &mut self.position.y,
-            "z" => &mut self.position.z,
-            _ => {
-                let mut of_color = COLORS
-                    .iter()
-                    .filter_map(|n| n.iter().position(|n| *n == name));
-                let Some((k, shade)) = of_color.next().zip(shade(&value)) else {
-                    return PropertyAccessResult::Ignored;
-                };
-                self.color[k] = shade;
-                return PropertyAccessResult::Set;
-            }
-        };
-        match value.to_f32_lossy() {
-            Some(value) => *component = value,
-            None => return PropertyAccessResult::UnsupportedType,
-        }
-        PropertyAccessResult::Set
-    }
-}
-
-/// A colour component, 0 to 1.
-fn shade(value: &Property) -> Option<f32> {
-    Some(match value {
-        Property::UChar(x) => f32::from(*x) / f32::from(u8::MAX),
-        Property::UShort(x) => f32::from(*x) / f32::from(u16::MAX),
-        Property::Float(x) => *x,
-        Property::Double(x) => *x as f32,
-        _ => return None,
-    })
-}
-
-/// Both names of the corner list are in use.
-const FACE_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
-
-/// The corner list, in the file's type.
-struct Face(Option<Property>);
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self(None)
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        if !FACE_LISTS.contains(&name) {
-            return PropertyAccessResult::Ignored;
-        }
-        self.0 = Some(value);
-        PropertyAccessResult::Set
-    }
-}
-
-impl Face {
-    fn corners<'a>(&self, vertices: &'a [Vertex]) -> Result<Vec<&'a Vertex>, String> {
-        let position = |index: i64| {
-            let vertex = usize::try_from(index).ok().and_then(|i| vertices.get(i));
-            vertex.ok_or_else(|| {
-                format!(
-                    "the face refers to vertex {index}, but {} are defined before it",
-                    vertices.len()
-                )
-            })
-        };
-        match &self.0 {
-            Some(Property::ListInt(list)) => list.iter().map(|i| position((*i).into())).collect(),
-            Some(list) => {
-                let list = list.to_u32_list();
-                let list = list.ok_or("the corners are not a list of vertex indices")?;
-                list.into_iter().map(|i| position(i.into())).collect()
-            }
-            None => Err("no list of vertex indices".to_owned()),
-        }
-    }
-}
-
-/// An ignored element.
-struct Skipped;
-
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
-    }
+    turned.filter(|[a, b, c]| a != b && b != c && a != c)
 }

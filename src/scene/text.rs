@@ -2,15 +2,15 @@
 
 use raystone_core::text::plain_text_or_latin1;
 
-/// The plain text of a file. A line that ends in `\`, unless it is a comment, continues on the
-/// next; empty lines replace the joined ones, to preserve line numbers.
+/// The plain text of a file. A line that ends in `\`, unless in a comment, continues on the next; empty lines replace the joined ones, to preserve line numbers.
 pub(super) fn normalised(bytes: Vec<u8>) -> String {
     let mut bytes = plain_text_or_latin1(bytes).into_bytes();
     // Writing never overtakes reading, as the output is at most as long as the input.
     let (mut from, mut to, mut line, mut joined) = (0, 0, 0, 0);
+    let mut is_comment = false;
     while from < bytes.len() {
         match bytes[from] {
-            b'\\' if bytes.get(from + 1) == Some(&b'\n') && !is_comment(&bytes[line..to]) => {
+            b'\\' if bytes.get(from + 1) == Some(&b'\n') && !is_comment => {
                 bytes[to] = b' ';
                 to += 1;
                 joined += 1;
@@ -19,10 +19,13 @@ pub(super) fn normalised(bytes: Vec<u8>) -> String {
             b'\n' => {
                 let end = to + 1 + joined;
                 bytes[to..end].fill(b'\n');
-                (to, line, joined) = (end, end, 0);
+                (to, line, joined, is_comment) = (end, end, 0, false);
                 from += 1;
             }
             byte => {
+                // Names may contain `#`, but do not begin with it.
+                let before = bytes[line..to].last();
+                is_comment |= byte == b'#' && before.is_none_or(u8::is_ascii_whitespace);
                 bytes[to] = byte;
                 to += 1;
                 from += 1;
@@ -32,10 +35,6 @@ pub(super) fn normalised(bytes: Vec<u8>) -> String {
     bytes.truncate(to);
     // Only whole characters were copied, and only blanks and line ends added.
     String::from_utf8(bytes).unwrap_or_default()
-}
-
-fn is_comment(line: &[u8]) -> bool {
-    line.trim_ascii_start().starts_with(b"#")
 }
 
 #[cfg(test)]
@@ -51,6 +50,8 @@ mod tests {
             (b"f 1 \\\r2\rf 3\r", "f 1  2\n\nf 3\n"),
             (b"map_Kd a\\b.png\n", "map_Kd a\\b.png\n"),
             (b" # c:\\models\\\nv 1\n", " # c:\\models\\\nv 1\n"),
+            (b"v 1 2 3 # c:\\a\\\nv 1\n", "v 1 2 3 # c:\\a\\\nv 1\n"),
+            (b"usemtl a#1 \\\n\nf 1\n", "usemtl a#1  \n\nf 1\n"),
             (b"f 1 2 \\", "f 1 2 \\"),
             (b"f 1 2 \\\n", "f 1 2  "),
             (b"\\\n\\\n\\\n", "   "),

@@ -12,7 +12,7 @@ use raystone::params::{Params, Variant};
 use raystone::report::data::RunData;
 use raystone::report::{sections, terminal_tables};
 use raystone::run::Registries;
-use raystone::scene::{self, Bounds, LoadOptions, MAX_COORDINATE, SceneData};
+use raystone::scene::{self, Bounds, IesProfile, LoadOptions, MAX_COORDINATE, SceneData};
 use raystone::text::plain_text;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -46,11 +46,12 @@ type Error = Box<dyn std::error::Error>;
 pub type Target = fn(&[u8]) -> Outcome;
 
 /// All readers, by the names of the fuzz targets and of the folders of their corpora.
-pub const TARGETS: [(&str, Target); 6] = [
+pub const TARGETS: [(&str, Target); 7] = [
     ("experiment", experiment),
     ("obj", obj),
     ("gltf", gltf),
     ("ply", ply),
+    ("ies", ies),
     ("points", points),
     ("records", records),
 ];
@@ -104,6 +105,21 @@ pub fn gltf(bytes: &[u8]) -> Outcome {
 pub fn ply(bytes: &[u8]) -> Outcome {
     in_folder(&[("foreign.ply", bytes)], |folder| {
         load_scene(&folder.join("foreign.ply"))
+    })
+}
+
+/// A photometric file of a luminaire.
+pub fn ies(bytes: &[u8]) -> Outcome {
+    in_folder(&[("foreign.ies", bytes)], |folder| {
+        let profile = IesProfile::read(&folder.join("foreign.ies"))?;
+        Ok(Box::new(move || {
+            let (vertical, horizontal) = (&profile.vertical, &profile.horizontal);
+            assert_eq!(profile.candela.len(), vertical.len() * horizontal.len());
+            let ascends = |angles: &[f32]| angles.windows(2).all(|pair| pair[0] < pair[1]);
+            assert!(ascends(vertical) && ascends(horizontal), "{profile:?}");
+            let is_intensity = |x: &f32| *x >= 0.0 && x.is_finite();
+            assert!(profile.candela.iter().all(is_intensity), "{profile:?}");
+        }))
     })
 }
 

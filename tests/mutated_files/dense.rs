@@ -29,6 +29,7 @@ pub fn files(target: &str) -> Vec<(&'static str, Vec<u8>)> {
         "obj" => objs(),
         "gltf" => gltfs(),
         "ply" => plys(),
+        "ies" => luminaires(),
         "points" => vec![
             ("zeros", filled("", "0\n", "")),
             ("one point", filled("", "0 ", "")),
@@ -217,6 +218,33 @@ fn plys() -> Vec<(&'static str, Vec<u8>)> {
             "comments",
             filled("ply\nformat ascii 1.0\n", "comment\n", "end_header\n"),
         ),
+    ]
+}
+
+fn luminaires() -> Vec<(&'static str, Vec<u8>)> {
+    let angles = |count: usize, last: usize| {
+        let parts = (0..count).map(|k| format!("{} ", (k * last) as f64 / (count - 1) as f64));
+        parts.collect::<String>()
+    };
+    let before = "TILT=NONE\n1 1 1";
+    let table = |vertical: usize, horizontal: usize, last: usize| {
+        let numbers = format!("{before} {vertical} {horizontal} 1 2 0 0 0 1 1 1\n");
+        let angles = angles(vertical, 90) + &angles(horizontal, last);
+        let candela = "1 ".repeat(vertical * horizontal);
+        [numbers, angles, candela].concat().into_bytes()
+    };
+    vec![
+        ("labels", filled("", "\n", "TILT=NONE\n")),
+        ("lines", filled("TILT=NONE\n", "\n", "")),
+        ("words", filled("TILT=NONE\n", "1 ", "\n")),
+        ("a quadrant", table(10_000, 5, 90)),
+        ("horizontal angles", table(2, 9999, 90)),
+        ("a circle", table(181, 361, 360)),
+        ("announced candela", {
+            let numbers = format!("{before} 10000 10000 1 2 0 0 0 1 1 1\n");
+            let angles = angles(10_000, 90) + &angles(10_000, 90);
+            (numbers + &angles).into_bytes()
+        }),
     ]
 }
 

@@ -3,7 +3,7 @@
 //! bounds.
 //!
 //! The files are seeds of the fuzz targets (`fuzz/corpus`), changed by [`mutation`] from fixed
-//! seeds. There is no reader of IES files yet, so there is none here.
+//! seeds.
 
 #[path = "../support/needs.rs"]
 mod needs;
@@ -31,11 +31,12 @@ const SEED: u64 = 20_261_121;
 /// Memory that reading may take, by target: bytes per byte of input. One byte can be a vertex of a
 /// fan (a triangle of 40 bytes, in arrays that double), in nine bytes of MTL a material with four uses of textures, or, in
 /// three bytes of JSON, a whole node.
-const BYTES_PER_BYTE: [(&str, usize); 6] = [
+const BYTES_PER_BYTE: [(&str, usize); 7] = [
     ("experiment", 128),
     ("obj", 128),
     ("gltf", 1280),
     ("ply", 64),
+    ("ies", 64),
     ("points", 64),
     ("records", 64),
 ];
@@ -211,6 +212,11 @@ fn mutated_gltf_and_glb_files_are_refused_with_a_place_or_sound() {
 #[test]
 fn mutated_ply_files_are_refused_with_a_place_or_sound() {
     run("ply", target("ply"));
+}
+
+#[test]
+fn mutated_luminaires_are_refused_with_a_place_or_sound() {
+    run("ies", target("ies"));
 }
 
 #[test]

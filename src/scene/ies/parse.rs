@@ -1,6 +1,7 @@
 //! Parser for LM-63.
 
 use super::{IesProfile, Photometry};
+use crate::obj_statements::number;
 use thiserror::Error;
 
 /// Errors of reading a photometric file.
@@ -33,7 +34,7 @@ pub enum IesError {
 /// Limit on the number of angles and intensities.
 const MOST_ANGLES: usize = 10_000;
 /// Tolerance for equal angles, degrees.
-const SAME: f32 = 1e-3;
+pub(super) const SAME: f32 = 1e-3;
 
 /// The numbers after `TILT=`, with their lines.
 struct Numbers<'a> {
@@ -41,14 +42,20 @@ struct Numbers<'a> {
     words: Vec<(usize, &'a str)>,
     next: usize,
     last_line: usize,
+    /// True if commas stand between digits.
+    has_commas: bool,
 }
 
 impl<'a> Numbers<'a> {
     fn error(&self, line: usize, problem: impl Into<String>) -> IesError {
+        let mut problem = problem.into();
+        if self.has_commas {
+            problem += " (commas separate numbers here; write decimals with a point)";
+        }
         IesError::Malformed {
             file: self.file.to_owned(),
             line,
-            problem: problem.into(),
+            problem,
         }
     }
 
@@ -71,8 +78,8 @@ impl<'a> Numbers<'a> {
             ));
         };
         self.next += 1;
-        match word.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
+        match number::<f64>(word) {
+            Some(x) if (x as f32).is_finite() => Ok(x),
             _ => Err(self.error(*line, format!("{what} should be a number, not `{word}`"))),
         }
     }
@@ -139,19 +146,29 @@ impl IesProfile {
             words: words.collect(),
             next: 0,
             last_line: lines.len(),
+            has_commas: lines[tilt + 1..].iter().any(|line| has_comma(line)),
         };
-        match value.to_ascii_uppercase().as_str() {
-            "NONE" => {}
-            "INCLUDE" => skip_tilt(&mut numbers)?,
-            _ => {
-                let problem = format!(
-                    "TILT={value} names another file, which is not read; write TILT=NONE or include it"
-                );
-                return Err(malformed(tilt + 1, problem));
-            }
+        let value = value.to_ascii_uppercase();
+        if value == "INCLUDE" {
+            skip_tilt(&mut numbers)?;
         }
-        profile(file, year(&lines[..tilt]), &mut numbers)
+        let mut found = profile(file, year(&lines[..tilt]), &mut numbers)?;
+        if value != "NONE" {
+            found.warnings.push(format!(
+                "{file}, line {}: factors for tilted lamps are not read; the luminaire shines as measured",
+                tilt + 1
+            ));
+        }
+        Ok(found)
     }
+}
+
+/// True if a comma stands between two digits.
+fn has_comma(line: &str) -> bool {
+    let is_digit = |c: Option<&u8>| c.is_some_and(u8::is_ascii_digit);
+    line.as_bytes()
+        .array_windows()
+        .any(|[a, comma, b]| *comma == b',' && is_digit(Some(a)) && is_digit(Some(b)))
 }
 
 /// The value of `TILT=`, which ends the labels; those of 1986 are free text.
@@ -190,7 +207,7 @@ const NO_LAMP_FACTOR: u32 = 1995;
 /// First year in which it states how the file was made.
 const GENERATION_TYPE: u32 = 2019;
 
-/// Skips the factors for tilted lamps: luminaires are rendered as measured.
+/// Skips the factors for tilted lamps.
 fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
     numbers.number("the lamp-to-luminaire geometry")?;
     let pairs = numbers.count("the number of tilt angles")?;
@@ -235,13 +252,18 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
     check_vertical(photometry, &vertical).map_err(|problem| numbers.here(problem))?;
     let horizontal = numbers.angles(horizontal_count, "horizontal angle")?;
     let last_angle = numbers.line();
-    let mut candela = Vec::with_capacity(horizontal_count * vertical_count);
+    // The counts promise more than a file may hold.
+    let mut candela = Vec::new();
     for _ in 0..horizontal_count {
         for value in numbers.list(vertical_count, "candela value")? {
             if value < 0.0 {
                 return Err(numbers.here(format!("the candela value {value} is below 0")));
             }
-            candela.push((f64::from(value) * factor) as f32);
+            let intensity = (f64::from(value) * factor) as f32;
+            if !intensity.is_finite() {
+                return Err(numbers.here(format!("{value} times {factor} candela is no number")));
+            }
+            candela.push(intensity);
         }
     }
     let mut warnings = Vec::new();
@@ -270,7 +292,7 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
     Ok(out)
 }
 
-fn is(a: f32, b: f32) -> bool {
+pub(super) fn is(a: f32, b: f32) -> bool {
     (a - b).abs() < SAME
 }
 
@@ -288,119 +310,6 @@ fn check_vertical(photometry: Photometry, angles: &[f32]) -> Result<(), String> 
         Err(format!(
             "vertical angles from {first} to {last} are none of the standard"
         ))
-    }
-}
-
-impl IesProfile {
-    /// Completes the horizontal angles by symmetry.
-    fn unfold(&mut self) -> Result<(), String> {
-        let [first, last] = [
-            self.horizontal[0],
-            self.horizontal[self.horizontal.len() - 1],
-        ];
-        let unknown =
-            || format!("horizontal angles from {first} to {last} are none of the standard");
-        if self.photometry != Photometry::C {
-            return match is(last, 90.0) {
-                true if is(first, -90.0) => Ok(()),
-                true if is(first, 0.0) => {
-                    self.mirror(0.0);
-                    Ok(())
-                }
-                _ => Err(unknown()),
-            };
-        }
-        match (first, last) {
-            _ if self.horizontal.len() == 1 => Ok(()),
-            _ if is(first, 0.0) && is(last, 90.0) => {
-                self.mirror(90.0);
-                self.mirror(180.0);
-                Ok(())
-            }
-            _ if is(first, 0.0) && is(last, 180.0) => {
-                self.mirror(180.0);
-                Ok(())
-            }
-            _ if is(first, 90.0) && is(last, 270.0) => {
-                self.mirror(270.0);
-                self.turn_to_zero();
-                Ok(())
-            }
-            _ if is(first, 0.0) && is(last, 360.0) => Ok(()),
-            _ if is(first, 0.0) && last > 180.0 && last < 360.0 => {
-                let gap = 360.0 - last;
-                let step = last - self.horizontal[self.horizontal.len() - 2];
-                if gap > 1.5 * step {
-                    return Err(unknown());
-                }
-                self.warnings.push(format!(
-                    "{}: the horizontal angle 360 is missing, and taken to be that of 0",
-                    self.name
-                ));
-                self.horizontal.push(360.0);
-                self.candela.extend_from_within(..self.vertical.len());
-                Ok(())
-            }
-            _ => Err(unknown()),
-        }
-    }
-
-    /// Adds the other angles, mirrored at the first or last one, `about`.
-    fn mirror(&mut self, about: f32) {
-        let rows = self.vertical.len();
-        let columns: Vec<(f32, Vec<f32>)> = self
-            .horizontal
-            .iter()
-            .zip(self.candela.chunks(rows))
-            .map(|(h, column)| (*h, column.to_vec()))
-            .collect();
-        let others = columns.iter().filter(|(h, _)| !is(*h, about));
-        let mut all: Vec<_> = others
-            .map(|(h, column)| (2.0 * about - h, column.clone()))
-            .collect();
-        all.extend(columns.iter().cloned());
-        self.set_columns(all);
-    }
-
-    /// Maps angles between 90 and 450 to 0 to 360.
-    fn turn_to_zero(&mut self) {
-        let rows = self.vertical.len();
-        let columns = self.horizontal.iter().zip(self.candela.chunks(rows));
-        let mut all: Vec<(f32, Vec<f32>)> = columns
-            .map(|(h, column)| {
-                (
-                    if *h > 360.0 + SAME { h - 360.0 } else { *h },
-                    column.to_vec(),
-                )
-            })
-            .collect();
-        // 90 also occurs as 450, and 0 only as 360.
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        all.dedup_by(|a, b| is(a.0, b.0));
-        if let Some(full) = all.last().filter(|(h, _)| is(*h, 360.0)).cloned() {
-            all.insert(0, (0.0, full.1));
-        }
-        self.set_columns(all);
-        if !is(self.horizontal[0], 0.0) {
-            // No angle was measured at 360: interpolate its neighbours.
-            let (low, high) = (self.horizontal.len() - 1, 0);
-            let [a, b] = [360.0 - self.horizontal[low], self.horizontal[high]];
-            let column = |k: usize| self.candela[k * rows..][..rows].to_vec();
-            let between: Vec<f32> = column(low)
-                .into_iter()
-                .zip(column(high))
-                .map(|(x, y)| (x * b + y * a) / (a + b))
-                .collect();
-            let mut all: Vec<(f32, Vec<f32>)> = vec![(0.0, between.clone()), (360.0, between)];
-            all.extend((0..self.horizontal.len()).map(|k| (self.horizontal[k], column(k))));
-            self.set_columns(all);
-        }
-    }
-
-    fn set_columns(&mut self, mut columns: Vec<(f32, Vec<f32>)>) {
-        columns.sort_by(|a, b| a.0.total_cmp(&b.0));
-        self.horizontal = columns.iter().map(|(h, _)| *h).collect();
-        self.candela = columns.into_iter().flat_map(|(_, column)| column).collect();
     }
 }
 
@@ -448,6 +357,14 @@ mod tests {
     fn tilt_factors_are_skipped_and_factors_multiplied() {
         let text = file("INCLUDE\n1\n2\n0 90\n1 0.9", 2, "0 90", "2 1 0 2 1 0");
         let found = IesProfile::parse("x.ies", &text).expect("a profile");
+        let elsewhere = file("lamp.tlt", 2, "0 90", "2 1 0 2 1 0");
+        let elsewhere = IesProfile::parse("x.ies", &elsewhere).expect("a profile");
+        assert_eq!(found.candela, elsewhere.candela);
+        assert_eq!(found.warnings, elsewhere.warnings);
+        assert!(
+            found.warnings[0].starts_with("x.ies, line 3: "),
+            "{found:?}"
+        );
         assert_eq!(found.horizontal, [-90.0, 0.0, 90.0]);
         assert_eq!((found.candela[0], found.input_watts), (2.0, 40.0));
     }
@@ -505,7 +422,7 @@ mod tests {
         let good = file("NONE", 1, "0 90", "5 1 1 5 2 2");
         for (from, to, line, what) in [
             ("TILT=NONE", "no tilt", 8, "TILT"),
-            ("TILT=NONE", "TILT=lamp.tlt", 3, "lamp.tlt"),
+            ("0.5 1 40", "1,0 1,0 40", 6, "with a point"),
             ("1000", "many", 4, "`many`"),
             (" 1 2 0 0 0", " 4 2 0 0 0", 4, "photometric type"),
             ("0 45 90", "0 45 45", 6, "ascend"),

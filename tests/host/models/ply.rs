@@ -74,7 +74,8 @@ fn broken_files_say_where() {
             "header",
         ),
         (
-            b"ply\nformat ascii 1.0\nelement vertex 9000000000\nend_header\n".to_vec(),
+            b"ply\nformat ascii 1.0\nelement vertex 9000000000\nproperty float x\nend_header\n"
+                .to_vec(),
             "more than the file can hold",
         ),
     ];

@@ -285,10 +285,10 @@ fn everything_that_is_not_read_is_named_once() {
     let scene = load_files("a.obj", &files).unwrap();
     let told = self::told(&scene);
     for once in [
-        "`vp` (line 6)",
+        "`vp` (2 times, first: line 6)",
         "smoothing groups",
         "`curv`",
-        "`sharpness` (line 4)",
+        "`sharpness` (2 times, first: line 4)",
         "`map_Ka`",
         "`refl`",
     ] {
@@ -365,12 +365,15 @@ fn concave_polygons_are_what_they_are_and_crossing_ones_are_named() {
     );
     let told_of = told(&crossing.unwrap());
     assert!(
-        told_of.contains("1 polygons cross themselves, the first is face 1"),
+        told_of.contains("1 polygon crosses itself (face 1)"),
         "{told_of}"
     );
     let bow = load_obj(&format!("{SQUARE}f 1 2 3 4\nf 1 3 2 4\n")).unwrap();
     let told_of = told(&bow);
-    assert!(told_of.contains("the first in line 6"), "{told_of}");
+    assert!(
+        told_of.contains("1 polygon crosses itself (line 6)"),
+        "{told_of}"
+    );
 }
 
 #[test]

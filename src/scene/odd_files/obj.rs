@@ -1,0 +1,297 @@
+//! OBJ and MTL.
+
+use super::{Fails, Outcome, Reads, check, load_files};
+
+const RED_AND_BLUE: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.1 0.8\n";
+
+/// Behind four vertices, with `m.mtl` beside it.
+const OBJ: &[(&str, Outcome)] = &[
+    ("mtllib m.mtl\nusemtl\tred\nf 1 2 3 4\n", Reads("rr", &[])),
+    (
+        "mtllib\tm.mtl\nusemtl red\nf\t1\t2  3 4\n",
+        Reads("rr", &[]),
+    ),
+    (
+        "  mtllib m.mtl\ng part\n  usemtl red\n\t f 1 2 3 4\n",
+        Reads("rr", &[]),
+    ),
+    (
+        "usemtl red\nf 1 2 3\nmtllib m.mtl\nusemtl blue\nf 1 3 4\n",
+        Reads("rb", &[]),
+    ),
+    (
+        "mtllib m.mtl # colours\nusemtl red # a wall\nf 1 2 3 4 # the only face\n",
+        Reads("rr", &[]),
+    ),
+    (
+        "mtllib a.mtl m.mtl\nusemtl red\nf 1 2 3\n",
+        Reads("r", &["a.mtl: "]),
+    ),
+    ("mtllib \"m.mtl\"\nusemtl red\nf 1 2 3\n", Reads("r", &[])),
+    (
+        "mtllib C:\\work\\m.mtl\nusemtl red\nf 1 2 3\n",
+        Reads("r", &["is read in its place"]),
+    ),
+    (
+        "mtllib /home/me/m.mtl\nusemtl red\nf 1 2 3\n",
+        Reads("r", &["is read in its place"]),
+    ),
+    (
+        "mtllib M.MTL\nusemtl red\nf 1 2 3\n",
+        Reads("r", &["is read in its place"]),
+    ),
+    (
+        "usemtl red\nf 1 2 3\n",
+        Reads(
+            ".",
+            &[
+                "1 face has no material that a .mtl file defines (line 6): drawn grey; the first is of material `red`",
+            ],
+        ),
+    ),
+    (
+        "mtllib m.mtl\nusemtl\nf 1 2 3\nf 1 3 4\n",
+        Reads(
+            "..",
+            &["2 faces have no material that a .mtl file defines (first: line 7)"],
+        ),
+    ),
+    (
+        "mtllib m.mtl\nusemtl Red\nf 1 2 3\n",
+        Reads(".", &["`Red`"]),
+    ),
+    ("v 0 0 1 # origin\nf 1 2 5 # x\n", Reads(".", &[])),
+    ("v 0 0 1 1 0 0\nf 5 1 2\n", Reads("r", &[])),
+    ("vt 0\nvt 0.5\nf 1/1 2/2 3/2\n", Reads(".", &[])),
+    (
+        "vt\nvt x 1\nvt nan 0\nf 1/1 2/2 3/3\n",
+        Reads(
+            ".",
+            &["3 texture coordinates are not finite (first: line 5)"],
+        ),
+    ),
+    (
+        "vn 0 0 1\nvn -nan(ind) -nan(ind) -nan(ind)\nf 1//1 2//1 3//2\n",
+        Reads(".", &["1 normal is not finite (line 6)"]),
+    ),
+    (
+        "vn 1.#QNAN 1.#QNAN 1.#QNAN\nvn 1.#INF 0 0\nf 1//1 2//2 3//1\n",
+        Reads(".", &["2 normals are not finite (first: line 5)"]),
+    ),
+    (
+        "vn 0 1\nf 1//1 2//1 3//1\n",
+        Reads(".", &["1 normal is not finite (line 5)"]),
+    ),
+    (
+        "v 1.0D+00 0 .5\nv +1. 1d0 -.5E0\nf 1 5 6\n",
+        Reads(".", &[]),
+    ),
+    (
+        "v -1.#IND 0 0\nf 1 2 5\nf 1 2 3\n",
+        Reads(
+            ".",
+            &["1 triangle dropped", "1 vertex is not finite (line 5)"],
+        ),
+    ),
+    (
+        "v 1 1 1 0\nf 1 2 5\nf 1 2 3\n",
+        Reads(
+            ".",
+            &["1 triangle dropped", "1 vertex is not finite (line 5)"],
+        ),
+    ),
+    (
+        "v 1 1 1 1 0\nv 1 1 1 x\nv 1 1 1 1 0 0 1 8 9\nf 5 6 7\nf 1 2 3\n",
+        Reads("..", &["further words of `v` (3 times, first: line 5)"]),
+    ),
+    (
+        "f 1/ 2// 3/1/1\n",
+        Reads(
+            ".",
+            &[
+                "1 corner names a texture coordinate that does not exist (line 5)",
+                "1 corner names a normal",
+            ],
+        ),
+    ),
+    (
+        "f 1/0/0 2/-1/-1 3\n",
+        Reads(
+            ".",
+            &[
+                "2 corners name a texture coordinate",
+                "2 corners name a normal that does not exist (first: line 5)",
+            ],
+        ),
+    ),
+    ("f 1/1 2/1 3/1\nvt 0 0\n", Reads(".", &[])),
+    ("f -4 -3 -2\nfo 1 3 4\n", Reads("..", &[])),
+    (
+        "f\nf 1 2\nf 1 2 3\n",
+        Reads(
+            ".",
+            &["2 faces have fewer than three corners (first: line 5)"],
+        ),
+    ),
+    (
+        "f 1 2\n",
+        Fails(&[
+            "no triangles",
+            "1 face has fewer than three corners (line 5)",
+        ]),
+    ),
+    (
+        "l 1 2\np 1\nl 2 3\ncall x.obj\nf 1 2 3\n",
+        Reads(
+            ".",
+            &["`call` (line 8), `l` (2 times, first: line 5), `p` (line 6)"],
+        ),
+    ),
+    (
+        "surf 0 1 0 1 1 2 3\nend\n",
+        Fails(&["no triangles", "`surf` (line 5)"]),
+    ),
+    ("f 1 2 \\\n3\\\n 4\n", Reads("..", &[])),
+    (
+        "# c:\\models\\\nf 1 2 3 # c:\\a\\\nf 1 3 4\n",
+        Reads("..", &[]),
+    ),
+    ("f 1 2 9\n", Fails(&["line 5", "vertex 9, but there are 4"])),
+    (
+        "v 0,5 0 0\nf 1 2 5\n",
+        Fails(&["line 5", "`0,5` is not a number"]),
+    ),
+];
+
+#[test]
+fn obj_files_as_found_are_read() {
+    for (text, expected) in OBJ {
+        let model = format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n{text}");
+        let latin1 = [model.as_bytes(), b"# \xfc\n"].concat();
+        let variants = [
+            model.as_bytes().to_vec(),
+            latin1,
+            [b"\xef\xbb\xbf", model.as_bytes()].concat(),
+            model.replace('\n', "\r\n").into_bytes(),
+            model.replace('\n', "\r").into_bytes(),
+        ];
+        for bytes in variants {
+            let files: [(&str, &[u8]); 2] = [("a.obj", &bytes), ("m.mtl", RED_AND_BLUE.as_bytes())];
+            check(text, load_files(&files), expected);
+        }
+    }
+}
+
+/// A library, and the material `a` that it defines.
+const MTL: &[(&str, Outcome)] = &[
+    ("newmtl a\nKd 1 0 0", Reads("r", &[])),
+    ("\u{feff}  newmtl\ta  \n\tkd\t1 0 0 # red", Reads("r", &[])),
+    (
+        "newmtl a\nKd 1.0D+00 0. .0\nd -halo 1\nTf 1 1 1\nillum 2.0",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nKs\nNs none\nillum -1",
+        Reads(
+            "r",
+            &[
+                "the value of `Ks` (line 3), the value of `Ns` (line 4), the value of `illum` (line 5)",
+            ],
+        ),
+    ),
+    (
+        "newmtl a\nKd 0 1 0\nnewmtl a\nKd 1 0 0",
+        Reads("r", &["1 material is defined again (line 3)"]),
+    ),
+    (
+        "Kd 0 1 0\nnewmtl a\nKd 1 0 0",
+        Reads("r", &["statements before the first `newmtl` (line 1)"]),
+    ),
+    ("newmtl a\nKd 1 0 0\nnewmtl\nKd 0 1 0", Reads("r", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nd 1\nTr 1",
+        Reads("r", &["`Tr` that is not 1 − `d` (line 4)"]),
+    ),
+    ("newmtl a\nKd 1 0 0\nd 1\nTr 0", Reads("r", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd -mm 0.1 0.9 -blendu off T.PNG",
+        Reads(
+            "r",
+            &[
+                "`-blendu` of a texture (line 3), `-mm` of a texture (line 3)",
+                "1 texture is not where it should be (line 3)",
+            ],
+        ),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd -bm 1 -s 1 1 1 -mm 0 1 sub\\t 1.png",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd \"sub/t 1.png\" # bricks",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd D:\\work\\t.png\nmap_d /work/t.png",
+        Reads(
+            "r",
+            &["2 textures are not where they should be (first: line 3)"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd",
+        Reads("r", &["the value of `map_Kd` (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nMAP_KD none.png",
+        Reads("r", &["none.png"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Pr t.png\nPc 1\nmap_Pr t.png",
+        Reads("r", &["`Pc` (line 4), `map_Pr` (2 times, first: line 3)"]),
+    ),
+    ("newmtl a\nKd nan -1 0", Reads(".", &[])),
+    (
+        "newmtl a # wall\nKd 1 0 0\nnewmtl a #2\nKd 0 1 0",
+        Reads("r", &[]),
+    ),
+];
+
+#[test]
+fn mtl_files_as_found_are_read() {
+    let mut png = std::io::Cursor::new(Vec::new());
+    let image = image::RgbImage::from_pixel(1, 1, image::Rgb([255; 3]));
+    image
+        .write_to(&mut png, image::ImageFormat::Png)
+        .expect("an image");
+    let png = png.into_inner();
+    let model = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    for (library, expected) in MTL {
+        let files: [(&str, &[u8]); 4] = [
+            ("a.obj", model),
+            ("m.mtl", library.as_bytes()),
+            ("t.png", &png),
+            ("sub/t 1.png", &png),
+        ];
+        let result = load_files(&files);
+        if let Ok(scene) = &result {
+            let count = usize::from(library.contains("map_Kd ") && library.contains('.'));
+            assert_eq!(scene.textures.len(), count, "{library}");
+        }
+        check(library, result, expected);
+    }
+}
+
+#[test]
+fn several_libraries_stand_in_a_line_and_a_name_with_a_blank_goes_first() {
+    let model = b"mtllib a.mtl b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n";
+    let one: [&[u8]; 2] = [b"newmtl red\nKd 1 0 0\n", b"newmtl blue\nKd 0 0 1\n"];
+    let mut files: Vec<(&str, &[u8])> =
+        vec![("a.obj", model), ("a.mtl", one[0]), ("b.mtl", one[1])];
+    check("two", load_files(&files), &Reads("rb", &[]));
+    files.push((
+        "a.mtl b.mtl",
+        b"newmtl red\nKd 0 1 0\nnewmtl blue\nKd 0 1 0\n",
+    ));
+    check("one", load_files(&files), &Reads("gg", &[]));
+}
