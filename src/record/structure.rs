@@ -112,6 +112,9 @@ pub struct GateVerdict {
     pub oracle: ReferenceCheck,
     /// Error words raised by kernels (step fuse, stack overflow), in words.
     pub kernel_errors: Vec<String>,
+    /// The first ray whose counted work is not that of the structure's twin on the host.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work: Option<String>,
     /// Structural faults found by `validate`.
     pub structural: Option<String>,
     /// What is wrong on the gate's second scene.
@@ -551,6 +554,7 @@ pub fn fault_text(verdict: &GateVerdict, reference_fault: Option<&str>) -> Strin
         ));
     }
     parts.extend(verdict.kernel_errors.iter().cloned());
+    parts.extend(verdict.work.clone());
     parts.extend(verdict.structural.clone());
     parts.extend(verdict.elsewhere.clone());
     if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
