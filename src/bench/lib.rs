@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 pub mod animation;
+mod clock_check;
 pub mod coherence;
 pub mod compaction;
 pub mod environment;

@@ -23,6 +23,8 @@ use std::process::ExitCode;
 const SCENES: [&str; 2] = ["cornell-box", "displaced-sphere"];
 /// Integrators of the gate without an experiment file.
 const INTEGRATORS: [&str; 3] = ["primary", "ao", "path"];
+/// Organisations of the path tracer in the gate without an experiment file.
+const ORGANISATIONS: [&str; 4] = ["single-kernel", "regeneration", "multi-kernel", "wavefront"];
 /// The structure that tests every triangle.
 const BRUTE_FORCE: &str = "brute-force";
 /// Scenes from this size on are left to the other structures, unless brute force is requested.
@@ -31,8 +33,8 @@ const BRUTE_FORCE_TRIANGLES: usize = 5_000;
 /// Run the gate alone: does every structure answer every ray as the reference tracer does?
 ///
 /// Without a file: every structure (brute force only where a scene has fewer than 5,000 triangles),
-/// on `cornell-box` and `displaced-sphere`, and the integrators on small trial scenes of every material, light and
-/// estimator.
+/// on `cornell-box` and `displaced-sphere`, and the integrators, in every organisation, there and on small trial scenes
+/// of every material, light and estimator.
 #[derive(Args)]
 pub struct Verify {
     /// Experiment file whose scenes and structures to check
@@ -73,6 +75,7 @@ impl Verify {
         };
         let mut plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.file.is_none() {
+            spare_organisations(&mut plan, set, &registries);
             spare_brute_force(&mut plan, self.experiment.values.allow_outside)?;
         }
         for skipped in &plan.skipped {
@@ -126,8 +129,18 @@ fn all(registries: &Registries) -> impl Iterator<Item = String> {
         on_axis(Axis::Scene, SCENES),
         on_axis(Axis::Accel, structures),
         on_axis(Axis::Integrator, INTEGRATORS),
+        on_axis(Axis::Organisation, ORGANISATIONS),
     ];
     axes.into_iter().flatten()
+}
+
+/// Leaves integrators of one kernel, which cannot be organised otherwise, to it, unless other
+/// organisations are asked for.
+fn spare_organisations(plan: &mut Plan, set: &[String], registries: &Registries) {
+    if !set.iter().any(|text| text.starts_with("axes.organisation")) {
+        let can_be = |cell: &Cell| registries.integrator(cell).is_ok();
+        plan.times.retain(can_be);
+    }
 }
 
 /// Leaves out brute force on scenes with many triangles, where other structures are checked.
@@ -358,6 +371,7 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
     let kernel = verdict.kernel_errors.iter();
     faults.extend(structural.map(|fault| format!("structure: {fault}")));
     faults.extend(kernel.map(|error| format!("kernel: {error}")));
+    faults.extend(verdict.work.clone());
     faults.extend(verdict.elsewhere.clone());
     faults.extend(verdict.reference_fault());
     faults
@@ -385,6 +399,24 @@ mod tests {
         assert!(spared.skipped[0].cell.contains(BRUTE_FORCE));
         assert_eq!(plan_of("brute-force").structures.len(), 1);
         assert_eq!(plan("cornell-box", "brute-force,bvh").structures.len(), 2);
+    }
+
+    #[test]
+    fn only_the_path_tracer_is_organised_otherwise_unless_asked_for() {
+        let registries = Registries::default();
+        let mut plan = plan("cornell-box", "bvh");
+        let others = |plan: &Plan| {
+            let unusual = plan.times.iter();
+            let unusual = unusual.filter(|cell| cell.is_unusual(Axis::Organisation));
+            let name = |cell: &Cell| cell[Axis::Integrator].name.clone();
+            unusual.map(name).collect::<Vec<_>>()
+        };
+        assert_eq!(others(&plan).len(), 9);
+        let asked = ["axes.organisation=wavefront".to_owned()];
+        spare_organisations(&mut plan, &asked, &registries);
+        assert_eq!(others(&plan).len(), 9);
+        spare_organisations(&mut plan, &[], &registries);
+        assert_eq!(others(&plan), ["path", "path", "path"]);
     }
 
     #[test]

@@ -3,6 +3,11 @@
 use super::GpuError;
 use raystone_core::clock::Instant;
 
+/// Times of passes on the device, which may overlap, over the wall time around all, at most.
+const OVERLAP: f64 = 1.5;
+/// Milliseconds by which timestamps may be too coarse.
+const TICK_MS: f64 = 0.5;
+
 /// A duration.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Elapsed {
@@ -34,6 +39,19 @@ impl Elapsed {
     /// A clock ran backwards.
     pub fn measured(self) -> Result<Self, GpuError> {
         if self.backwards {
+            Err(GpuError::Clock)
+        } else {
+            Ok(self)
+        }
+    }
+
+    /// Returns the duration if it lies within another one that began before and ended after it.
+    ///
+    /// # Errors
+    /// It is longer, by more than passes that overlap on the device explain.
+    pub fn within(self, around: &Self) -> Result<Self, GpuError> {
+        let most = OVERLAP * around.wall_ms + TICK_MS;
+        if self.wall_ms > around.wall_ms || self.gpu_ms.is_some_and(|ms| ms > most) {
             Err(GpuError::Clock)
         } else {
             Ok(self)
@@ -113,6 +131,23 @@ mod tests {
         sum += worked;
         assert_eq!(sum, worked);
         assert_eq!(sum.measured().ok(), Some(worked));
+        let timed = Elapsed {
+            gpu_ms: Some(worked.wall_ms),
+            ..worked
+        };
+        assert!(timed.within(&worked).is_ok());
+        for wrong in [
+            Elapsed {
+                gpu_ms: Some(2.0 * worked.wall_ms + 1.0),
+                ..worked
+            },
+            Elapsed {
+                wall_ms: 1.01 * worked.wall_ms,
+                ..worked
+            },
+        ] {
+            assert!(matches!(wrong.within(&worked), Err(GpuError::Clock)));
+        }
         // A part without a time leaves the sum without one.
         sum += Elapsed {
             backwards: true,

@@ -17,6 +17,8 @@ pub struct FileFormat {
     pub description: &'static str,
     encode: fn(&Image, &[Attribute]) -> Result<Vec<u8>, image::ImageError>,
     pub(super) decode: Option<Decode>,
+    /// True if it keeps every bit.
+    is_exact: bool,
 }
 
 #[cfg(feature = "exr")]
@@ -31,30 +33,35 @@ pub(crate) const FILE_FORMATS: [FileFormat; 5] = [
         description: "tone-mapped sRGB with 8 bits",
         encode: |image, _| encode_png(&tone_map(image, automatic_exposure(image))),
         decode: None,
+        is_exact: false,
     },
     FileFormat {
         ending: "exr",
         description: "OpenEXR, linear radiance as 32-bit floats, with attributes",
         encode: |image, attributes| Ok(encode_exr(image, attributes)),
         decode: READ_EXR,
+        is_exact: true,
     },
     FileFormat {
         ending: "hdr",
         description: "Radiance RGBE, linear radiance to 1 %",
         encode: |image, _| encode_hdr(image),
         decode: Some(read_hdr),
+        is_exact: false,
     },
     FileFormat {
         ending: "pfm",
         description: "portable float map, linear radiance as 32-bit floats",
         encode: |image, _| Ok(encode_pfm(image)),
         decode: Some(read_pfm),
+        is_exact: true,
     },
     FileFormat {
         ending: "npy",
         description: "NumPy array [height, width, 3] of 32-bit floats, linear radiance",
         encode: |image, _| Ok(encode_npy(image)),
         decode: Some(read_npy),
+        is_exact: true,
     },
 ];
 
@@ -78,18 +85,49 @@ impl FileFormat {
     }
 
     /// Writes an image atomically. Radiance is stored unchanged, including NaN, except by RGBE,
-    /// which replaces NaN and negative numbers by 0. Only EXR stores the attributes.
+    /// which replaces NaN and negative numbers by 0. Only EXR stores the attributes. What keeps every
+    /// bit is read back, by another decoder than the encoder, and compared.
     ///
     /// # Errors
-    /// [`ImageError::Encode`], [`ImageError::Write`].
+    /// [`ImageError::Encode`], [`ImageError::Write`], [`ImageError::Altered`].
     pub fn write(
         &self,
         path: &Path,
         image: &Image,
         attributes: &[Attribute],
     ) -> Result<(), ImageError> {
-        save(path, (self.encode)(image, attributes))
+        save(path, (self.encode)(image, attributes))?;
+        // A pipe or a device cannot be read back.
+        let is_kept = self.is_exact && path.is_file();
+        let Some(decode) = self.decode.filter(|_| is_kept) else {
+            return Ok(());
+        };
+        let read = std::fs::read(path).map_err(|e| e.to_string());
+        let read = read.and_then(|bytes| decode(&bytes));
+        let fault = match read {
+            Ok(read) => differing_pixel(&read, image),
+            Err(reason) => Some(reason),
+        };
+        fault.map_or(Ok(()), |fault| {
+            let path = path.to_owned();
+            Err(ImageError::Altered { path, fault })
+        })
     }
+}
+
+/// The first pixel that differs in a bit; all numbers that are none are alike.
+fn differing_pixel(read: &Image, written: &Image) -> Option<String> {
+    let size = |image: &Image| [image.width, image.height];
+    if size(read) != size(written) {
+        let ([w, h], [width, height]) = (size(read), size(written));
+        return Some(format!("{w} × {h} pixels, not {width} × {height}"));
+    }
+    let bits = |pixel: &[f32; 3]| pixel.map(|v| if v.is_nan() { f32::NAN } else { v }.to_bits());
+    let mut pairs = read.pixels.iter().zip(&written.pixels);
+    let place = pairs.position(|(read, written)| bits(read) != bits(written))?;
+    let [x, y] = [place as u32 % read.width, place as u32 / read.width];
+    let (read, written) = (read.pixels[place], written.pixels[place]);
+    Some(format!("pixel ({x}, {y}) is {read:?}, not {written:?}"))
 }
 
 /// Writes an encoded picture atomically.
@@ -163,6 +201,7 @@ fn push_floats(bytes: &mut Vec<u8>, pixels: &[[f32; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::read_linear;
 
     /// Odd sizes without symmetry, to detect flips and swaps of axes or channels.
     fn sample() -> Image {
@@ -225,6 +264,37 @@ mod tests {
                     assert_eq!(bits, pixel[channel].to_bits(), "{x}, {y}, {channel}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_file_that_holds_another_image_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = sample();
+        for format in FILE_FORMATS.iter().filter(|format| format.is_exact) {
+            let path = folder.path().join(format!("picture.{}", format.ending));
+            format.write(&path, &image, &[]).unwrap();
+            for change in [
+                |image: &mut Image| image.pixels.iter_mut().for_each(|p| p.swap(0, 2)),
+                |image| image.pixels.reverse(),
+                |image| image.pixels[14][1] = image.pixels[14][1].next_up(),
+            ] {
+                let mut other = image.clone();
+                change(&mut other);
+                let fault = differing_pixel(&read_linear(&path).unwrap(), &other);
+                assert!(fault.unwrap().starts_with("pixel ("), "{}", format.ending);
+            }
+            let swapped = FileFormat {
+                encode: |image, attributes| {
+                    let mut other = image.clone();
+                    other.pixels[14].swap(0, 1);
+                    let path = Path::new("x.npy");
+                    (FileFormat::of(path).unwrap().encode)(&other, attributes)
+                },
+                ..FILE_FORMATS[4]
+            };
+            let written = swapped.write(&path, &image, &[]);
+            assert!(matches!(written, Err(ImageError::Altered { .. })));
         }
     }
 

@@ -100,6 +100,14 @@ pub enum ImageError {
         /// The problem.
         reason: String,
     },
+    /// A file that was just written holds another image.
+    #[error("{} does not hold the image that was written to it: {fault}; a disk or this program is at fault, keep no file of it", path.display())]
+    Altered {
+        /// The file.
+        path: PathBuf,
+        /// The first difference.
+        fault: String,
+    },
     /// The encoder refused the image.
     #[error("cannot encode {}: {source}", path.display())]
     Encode {

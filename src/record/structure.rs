@@ -115,6 +115,9 @@ pub struct GateVerdict {
     pub oracle: ReferenceCheck,
     /// Error words raised by kernels (step fuse, stack overflow), in words.
     pub kernel_errors: Vec<String>,
+    /// The first ray whose counted work is not that of the structure's twin on the host.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work: Option<String>,
     /// Structural faults found by `validate`.
     pub structural: Option<String>,
     /// The fault on the gate's second scene.
@@ -560,6 +563,7 @@ pub fn fault_text(verdict: &GateVerdict) -> String {
         ));
     }
     parts.extend(verdict.kernel_errors.iter().cloned());
+    parts.extend(verdict.work.clone());
     parts.extend(verdict.structural.clone());
     parts.extend(verdict.elsewhere.clone());
     parts.extend(verdict.reference_fault());

@@ -284,16 +284,26 @@ pub fn gate(
     if let Err(refused @ GpuError::LoopsCut { .. }) = gpu.check_error_word(errors) {
         return Err(refused);
     }
+    Ok(verdict(classes, errors, reference))
+}
+
+/// The verdict on answers of all classes and the error word of their kernels.
+pub(super) fn verdict(
+    classes: Vec<ClassVerdict>,
+    errors: u32,
+    reference: &ReferenceTracer,
+) -> GateVerdict {
     let right = classes.iter().all(|c| c.wrong == 0);
-    Ok(GateVerdict {
+    GateVerdict {
         passed: right && errors == 0 && reference.is_sound(),
         classes,
         brute_force: reference.brute_force.clone(),
         oracle: reference.oracle.clone(),
         kernel_errors: kernel_errors(errors),
+        work: None,
         structural: None,
         elsewhere: None,
-    })
+    }
 }
 
 /// Checks all answers left by a timed batch, and the error word of all its dispatches. Returns a

@@ -25,12 +25,16 @@
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
 //! left within a texel, so the last two have separate bounds for textures.
 
+pub use crate::pixels::{Choice, Frame, Pixels};
+
 use crate::path_oracle::{MOST_ROUNDINGS, Parting, Path, PathId, PathOracle, Rounding, View};
 use glam::DVec3;
 use rayon::prelude::*;
 use raystone_gpu::GpuError;
+use raystone_image::Image;
 use raystone_record::PathsRecord;
-use raystone_render::Renderer;
+use raystone_render::{BLOCK_SAMPLES, Renderer};
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Relative difference of a channel that counts as agreement.
@@ -80,77 +84,96 @@ enum Class {
     Wrong,
 }
 
-/// The paths to check.
-#[derive(Debug, Clone)]
-pub struct Pixels {
-    /// Width and height of the image, pixels.
-    pub size: [u32; 2],
-    /// One pixel in `every` is checked, a different set for each sample.
-    pub every: u32,
-    /// Sample indices.
-    pub samples: Vec<u32>,
-    /// Seed of the replicate.
-    pub seed: u32,
-}
-
-/// Renders single samples, each in its own dispatch.
+/// Renders single samples, each in dispatches of its own.
 ///
 /// # Errors
 /// A kernel raised its error word, or the device is lost or hangs.
 pub fn answers(renderer: &Renderer, pixels: &Pixels) -> Result<Vec<Answer>, GpuError> {
-    let [width, every] = [pixels.size[0], pixels.every.max(1)];
     let mut out = Vec::new();
     for (turn, &sample) in (0u32..).zip(&pixels.samples) {
-        renderer.reset()?;
-        renderer.add_samples(sample, 1, pixels.seed)?;
-        let image = renderer.image()?;
-        let numbered = (0u32..).zip(&image.pixels);
-        let chosen = numbered.filter(|(i, _)| (i + turn) % every == 0);
-        out.extend(chosen.map(|(i, pixel)| Answer {
-            id: PathId {
-                pixel: [i % width, i / width],
-                sample,
-                seed: pixels.seed,
-            },
-            radiance: DVec3::from_array(pixel.map(f64::from)),
-        }));
+        let image = samples_of(renderer, pixels, sample..sample + 1)?;
+        out.extend(answers_of(&image, pixels, (turn, sample)));
     }
     Ok(out)
 }
 
-/// Checks that several samples summed in one dispatch equal the same samples rendered singly.
-/// Returns a description of the fault, or `None`.
+/// The chosen pixels of the image of one sample, which is in this place of the list.
+pub(crate) fn answers_of(
+    image: &Image,
+    pixels: &Pixels,
+    (turn, sample): (u32, u32),
+) -> impl Iterator<Item = Answer> {
+    let (width, seed) = (pixels.size[0], pixels.seed);
+    pixels.chosen(turn).into_iter().map(move |number| Answer {
+        id: PathId {
+            pixel: [number % width, number / width],
+            sample,
+            seed,
+        },
+        radiance: DVec3::from_array(image.pixels[number as usize].map(f64::from)),
+    })
+}
+
+pub(crate) fn samples_of(
+    renderer: &Renderer,
+    pixels: &Pixels,
+    samples: Range<u32>,
+) -> Result<Image, GpuError> {
+    renderer.reset()?;
+    renderer.add_samples(samples.start, samples.end - samples.start, pixels.seed)?;
+    renderer.image()
+}
+
+/// Checks, in every pixel, that several samples rendered together equal the same samples rendered
+/// singly: the first ones, and the last below `limit` on both sides of a border of blocks, which
+/// the host adds. Returns a description of the fault, or `None`.
 ///
 /// # Errors
 /// A kernel raised its error word, or the device is lost or hangs.
-pub fn sums(renderer: &Renderer, pixels: &Pixels) -> Result<Option<String>, GpuError> {
-    let last = pixels.samples.iter().copied().max().unwrap_or_default();
-    let count = SUMMED.min(last + 1);
-    let render = |first, count| {
-        renderer.reset()?;
-        renderer.add_samples(first, count, pixels.seed)?;
-        renderer.image()
-    };
-    let singles: Vec<_> = (0..count)
-        .map(|sample| render(sample, 1))
-        .collect::<Result<_, _>>()?;
-    let together = render(0, count)?;
-    for (place, mean) in (0u32..).zip(&together.pixels) {
-        for (channel, mean) in mean.iter().map(|x| f64::from(*x)).enumerate() {
-            let own =
-                |image: &raystone_image::Image| f64::from(image.pixels[place as usize][channel]);
-            let expected = singles.iter().map(own).sum::<f64>() / f64::from(count);
-            if (mean - expected).abs() > SUM_TOLERANCE * expected.abs() {
-                let [x, y] = [place % pixels.size[0], place / pixels.size[0]];
-                return Ok(Some(format!(
-                    "pixel ({x}, {y}), seed {}: the mean of samples 0 to {} is {mean:.7e} in one dispatch, {expected:.7e} by single samples",
-                    pixels.seed,
-                    count - 1
-                )));
-            }
+pub fn sums(renderer: &Renderer, pixels: &Pixels, limit: u32) -> Result<Option<String>, GpuError> {
+    let first = 0..SUMMED.min(limit.max(1));
+    let border = BLOCK_SAMPLES - SUMMED / 2..BLOCK_SAMPLES + SUMMED / 2;
+    let across = Some(border).filter(|samples| samples.end <= limit);
+    for samples in [first].into_iter().chain(across) {
+        // The first dispatches of a renderer are the smallest: they cut the image into slices.
+        let together = samples_of(renderer, pixels, samples.clone())?;
+        let singles: Vec<Image> = samples
+            .clone()
+            .map(|sample| samples_of(renderer, pixels, sample..sample + 1))
+            .collect::<Result<_, _>>()?;
+        let found = differing_sum(&together, &singles).map(|fault| {
+            let last = samples.end - 1;
+            format!(
+                "seed {}, samples {} to {last}: {fault}",
+                pixels.seed, samples.start
+            )
+        });
+        if found.is_some() {
+            return Ok(found);
         }
     }
     Ok(None)
+}
+
+/// The first pixel whose mean is not that of the single samples.
+pub(crate) fn differing_sum(together: &Image, singles: &[Image]) -> Option<String> {
+    let count = singles.len() as f64;
+    for (place, mean) in together.pixels.iter().enumerate() {
+        for (channel, mean) in mean.iter().map(|x| f64::from(*x)).enumerate() {
+            let own = |image: &Image| f64::from(image.pixels[place][channel]);
+            let expected = singles.iter().map(own).sum::<f64>() / count;
+            // NaN differs.
+            let agrees = (mean - expected).abs() <= SUM_TOLERANCE * expected.abs();
+            if !agrees {
+                let width = together.width as usize;
+                let [x, y] = [place % width, place / width];
+                return Some(format!(
+                    "the mean of pixel ({x}, {y}) is {mean:.7e} in one dispatch, {expected:.7e} by single samples"
+                ));
+            }
+        }
+    }
+    None
 }
 
 /// Classifies the answers of a kernel.
@@ -158,9 +181,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     let truth: Vec<Path> = (answers.par_iter())
         .map(|answer| oracle.trace(view, answer.id, Rounding::none()))
         .collect();
-    let mean = |c: DVec3| c.element_sum() / 3.0;
-    let sum: f64 = truth.iter().map(|path| mean(path.radiance)).sum();
-    let floor = FLOOR * sum / truth.len().max(1) as f64;
+    let floor = floor_of(&truth);
     let differences: Vec<f64> = (answers.iter().zip(&truth))
         .map(|(answer, path)| difference(answer.radiance, path.radiance, floor))
         .collect();
@@ -203,6 +224,19 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
         None => out_of_bounds(&record, oracle.texturing()),
     };
     record
+}
+
+/// The radiance below which differences of these paths are ignored.
+pub(crate) fn floor_of(truth: &[Path]) -> f64 {
+    let mean = |c: DVec3| c.element_sum() / 3.0;
+    let sum: f64 = truth.iter().map(|path| mean(path.radiance)).sum();
+    FLOOR * sum / truth.len().max(1) as f64
+}
+
+/// True if a kernel's path does not agree with the oracle's, whatever the reason.
+pub(crate) fn differs(answer: &Answer, truth: &Path, floor: f64) -> bool {
+    let off = difference(answer.radiance, truth.radiance, floor);
+    off.is_nan() || off > TOLERANCE
 }
 
 /// The largest difference of a channel, relative to the oracle's value or to the floor.

@@ -10,7 +10,7 @@ use raystone::gpu::{Gpu, KernelLibrary};
 use raystone::integrator::{
     IntegratorRegistry, OrganisationRegistry, RayOffset, RenderJob, Renderer,
 };
-use raystone::measure::image_gate::{Pixels, answers, judge};
+use raystone::measure::image_gate::{Choice, Pixels, answers, judge};
 use raystone::measure::kinds::KindChecks;
 use raystone::measure::known_images::{SIZE, known_images_of, look, most_samples};
 use raystone::measure::mitsuba::{
@@ -104,7 +104,7 @@ pub fn verdict(
     let renderer = with(gpu, &stage, &sampler, (IMAGE, &what), &single);
     let pixels = Pixels {
         size: IMAGE,
-        every: 1,
+        choice: Choice::Every(1),
         samples: vec![0, 3],
         seed: 70_003,
     };

@@ -31,6 +31,8 @@ pub enum Subject {
     Integrators,
     /// Single paths of the integrators, with the same.
     Paths,
+    /// Images by an organisation of the path tracer, with the same.
+    Organised(&'static str),
 }
 
 impl Subject {
@@ -49,6 +51,7 @@ impl Subject {
             } => format!("{} × {decorrelation}", with(sequence, changes)),
             Self::Integrators => "integrators".to_owned(),
             Self::Paths => "single paths".to_owned(),
+            Self::Organised(name) => format!("images, {name}"),
         }
     }
 
@@ -69,6 +72,7 @@ impl Subject {
                 Check::Bias,
             ],
             Self::Paths => &[Check::Paths],
+            Self::Organised(_) => &[Check::Frames, Check::Counts],
         }
     }
 }

@@ -5,13 +5,17 @@ use super::session::{Session, content_hash};
 use super::world::World;
 use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
-use raystone_core::params::{Params, Variant};
-use raystone_gpu::Gpu;
+use raystone_core::params::{ParamValue, Params, Variant};
+use raystone_gpu::{Gpu, GpuError};
 use raystone_record::{Body, Key, Line, PathsRecord, Ran};
-use raystone_render::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stage, Traced};
+use raystone_render::{
+    BLOCK_SAMPLES, ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stage, Traced,
+};
 use raystone_sampling::Sampler;
-use raystone_verify::image_gate::{Answer, Pixels, answers, judge, sums};
+use raystone_verify::image_gate::{Choice, Frame, Pixels, answers, judge, sums};
 use raystone_verify::path_oracle::{Estimator, PathOracle, View};
+use raystone_verify::ray_counts;
+use raystone_verify::self_test::unseen_pixel;
 use raystone_verify::trial_scenes::{TrialScene, trial_scenes_of, trials_of};
 
 /// Size of the checked frame: not square, and not a multiple of a workgroup.
@@ -27,30 +31,36 @@ const AXES: [Axis; 4] = [
     Axis::Kernels,
 ];
 
-/// Number of paths checked.
-#[derive(Debug, Clone, Copy)]
-struct Extent {
-    /// Number of sample indices, spread over the experiment's.
-    samples: u32,
-    /// One pixel in `every` is checked.
-    every: u32,
-}
-
 /// At the start of a run: 494 paths.
-const RUN: Extent = Extent {
+const RUN: Frame = Frame {
+    size: SIZE,
+    choice: Choice::Every(4),
     samples: 4,
-    every: 4,
+    summed: BLOCK_SAMPLES + 2,
 };
 /// On a trial scene by `verify`: 1976 paths, since a material may cover a twentieth of the image.
-const TRIAL: Extent = Extent {
-    samples: 4,
-    every: 1,
+const TRIAL: Frame = Frame {
+    choice: Choice::Every(1),
+    ..RUN
 };
 /// By `verify`: 3952 paths.
-const VERIFY: Extent = Extent {
+const VERIFY: Frame = Frame {
     samples: 8,
-    every: 1,
+    ..TRIAL
 };
+
+/// The frame, an image of the run's own size, and one with many pixels.
+fn frames(session: &Session, frame: Frame) -> Vec<Frame> {
+    let own = Frame {
+        size: session.experiment.run.resolution,
+        choice: Choice::Borders,
+        samples: 2,
+        summed: 2,
+    };
+    let pixels = |frame: &Frame| frame.size[0] * frame.size[1];
+    let large = Some(Frame::LARGE).filter(|large| pixels(&own) <= pixels(large));
+    [frame, own].into_iter().chain(large).collect()
+}
 
 /// Checks a cell's integrator, unless already done.
 ///
@@ -85,7 +95,11 @@ pub(super) fn verify(
     for cell in session.plan.samplers.iter().chain(reorganised) {
         let is_its = cell.is_on(&world.cell) && cell[Axis::Kernels] == structure[Axis::Kernels];
         if is_its && !session.checked.integrators.contains_key(&key(world, cell)) {
-            let record = judge_and_record(session, world, traced, cell, VERIFY)?;
+            let mut record = judge_and_record(session, world, traced, cell, VERIFY)?;
+            if record.fault.is_none() {
+                let counts = miscounted(session, world, traced, cell);
+                record.fault = counts.unwrap_or_else(Some);
+            }
             judged.push((cell.clone(), record));
         }
     }
@@ -101,10 +115,10 @@ fn judge_and_record(
     world: &World,
     traced: &Traced,
     cell: &Cell,
-    extent: Extent,
+    frame: Frame,
 ) -> Result<PathsRecord, RunError> {
     session.say(format!("{cell}: paths"));
-    let (record, ran) = match made(session, world, traced, cell, extent) {
+    let (record, ran) = match made(session, world, traced, cell, frame) {
         Ok(judged) => judged,
         Err(reason) => (PathsRecord::not_judged(reason), Ran::default()),
     };
@@ -141,15 +155,13 @@ struct Subject<'a> {
     offset: RayOffset,
 }
 
-/// The verdict and its kernels, or why there is none. Trial scenes supplement what the scene may
-/// not show; in `verify` all of them may, once per integrator and kernels.
-fn made(
-    session: &mut Session,
-    world: &World,
-    traced: &Traced,
-    cell: &Cell,
-    extent: Extent,
-) -> Result<(PathsRecord, Ran), String> {
+/// What is checked of a cell on its scene, or why nothing can be.
+fn subject<'a>(
+    session: &Session,
+    world: &'a World,
+    traced: &'a Traced,
+    cell: &'a Cell,
+) -> Result<(Subject<'a>, ConfiguredIntegrator), String> {
     let registries = session.registries;
     let integrator = registries.integrator(cell)?;
     Estimator::of(&integrator)?;
@@ -169,11 +181,30 @@ fn made(
         cell,
         offset,
     };
-    let (mut record, ran) = judged(session, &subject, &integrator, extent)?;
-    let of = [Axis::Offset, Axis::Organisation, Axis::Kernels];
+    Ok((subject, integrator))
+}
+
+/// The verdict and its kernels, or why there is none. Trial scenes supplement what the scene may
+/// not show; in `verify` all of them may, once per integrator and kernels.
+fn made(
+    session: &mut Session,
+    world: &World,
+    traced: &Traced,
+    cell: &Cell,
+    frame: Frame,
+) -> Result<(PathsRecord, Ran), String> {
+    let (subject, integrator) = subject(session, world, traced, cell)?;
+    let frames = frames(session, frame);
+    let (mut record, ran) = judged(session, &subject, &integrator, &frames)?;
+    if let Some(short) = with_short_queues(session, cell)? {
+        record = record.and(judged(session, &subject, &short, &Frame::FULL)?.0);
+    }
+    let of = [Axis::Offset, Axis::Kernels];
     let all = format!("trial scenes, {}, {}", cell.on(&of), integrator.kind.name());
     let kinds = &session.registries.kinds;
-    let trials = match session.checked.on_all_trials {
+    // What trial scenes show of shading is the same in every organisation.
+    let on_all = session.checked.on_all_trials && !cell.is_unusual(Axis::Organisation);
+    let trials = match on_all {
         true if session.checked.integrators.insert(all, None).is_none() => trial_scenes_of(kinds),
         true => Ok(Vec::new()),
         false => trials_of(kinds, &world.scene, &integrator),
@@ -184,6 +215,58 @@ fn made(
         }
     }
     Ok((record, ran))
+}
+
+/// The integrator of a cell whose organisation has queues, with so few slots that they are full and
+/// paths wait.
+fn with_short_queues(
+    session: &Session,
+    cell: &Cell,
+) -> Result<Option<ConfiguredIntegrator>, String> {
+    let mut organisation = cell[Axis::Organisation].clone();
+    let Some(capacity) = organisation.params.0.get_mut("capacity") else {
+        return Ok(None);
+    };
+    *capacity = ParamValue::Integer(Frame::SLOTS.into());
+    let short = cell.clone().with(Axis::Organisation, &organisation);
+    session.registries.integrator(&short).map(Some)
+}
+
+/// Compares counted rays with those of the path oracle, once per integrator, organisation and
+/// kernels. Returns what is wrong; `None` also where the oracle has no formula for something.
+///
+/// # Errors
+/// A kernel does not compile or raised its error word, or the device is lost.
+pub(super) fn miscounted(
+    session: &mut Session,
+    world: &World,
+    traced: &Traced,
+    cell: &Cell,
+) -> Result<Option<String>, String> {
+    let key = format!("counts, {}", key(world, cell));
+    if let Some(known) = session.checked.integrators.get(&key) {
+        return Ok(known.clone());
+    }
+    let Ok((subject, integrator)) = subject(session, world, traced, cell) else {
+        return Ok(None);
+    };
+    let kinds = &session.registries.kinds;
+    let Ok(oracle) = PathOracle::knowing(&subject.stage.scene, kinds) else {
+        return Ok(None);
+    };
+    let frame = Frame {
+        samples: 1,
+        ..TRIAL
+    };
+    let (sampler, pixels) = drawn(session, &subject, &integrator, &frame)?;
+    let view = subject.view(&integrator, &sampler, &pixels)?;
+    let found = session.clock.time("judge", || {
+        let renderer = subject.renderer(&integrator, &sampler, &pixels, true)?;
+        ray_counts::fault(&renderer, &oracle, &view, &pixels)
+    });
+    let found = found.map_err(|e| e.to_string())?;
+    session.checked.integrators.insert(key, found.clone());
+    Ok(found)
 }
 
 /// Checks this integrator's trials on a trial scene, or itself if the scene lists none.
@@ -226,13 +309,12 @@ fn of_trial(
         camera: trial.scene.view(1.0),
         ..*subject
     };
+    let frame = match session.checked.on_all_trials {
+        true => TRIAL,
+        false => RUN,
+    };
     for integrator in integrators {
-        let extent = if session.checked.on_all_trials {
-            TRIAL
-        } else {
-            RUN
-        };
-        let (mut record, _) = judged(session, &on_trial, integrator, extent)?;
+        let (mut record, _) = judged(session, &on_trial, integrator, &[frame])?;
         let told = |fault: String| format!("on the trial scene `{}`: {fault}", trial.scene.name);
         record.fault = record.fault.map(told);
         all = all.and(record);
@@ -243,72 +325,116 @@ fn of_trial(
     Ok(all)
 }
 
+/// Checks an integrator in frames, up to the first with a fault.
 fn judged(
     session: &mut Session,
     subject: &Subject,
     integrator: &ConfiguredIntegrator,
-    extent: Extent,
+    frames: &[Frame],
 ) -> Result<(PathsRecord, Ran), String> {
-    let cell = subject.cell;
     let kinds = &session.registries.kinds;
     let oracle = || PathOracle::knowing(&subject.stage.scene, kinds);
     let oracle = session.clock.time("judge", oracle)?;
-    let spp = session.experiment.run.spp.max();
-    let demand = integrator.demand(spp, SIZE[0]);
-    let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
-    let samplers = &session.registries.samplers;
-    let sampler = samplers.sampler(sequence, decorrelation, &demand);
-    let sampler = sampler.map_err(|e| e.to_string())?;
-    let view = View {
-        estimator: Estimator::of(integrator)?,
-        camera: subject.camera,
-        size: SIZE,
-        sampler: &sampler,
-    };
-    let seed = session.experiment.seeds().replicates.first().copied();
-    let pixels = Pixels {
-        size: SIZE,
-        every: extent.every,
-        samples: spread(spp, extent.samples),
-        seed: seed.unwrap_or_default(),
-    };
-    let (answers, sums, ran) =
-        (session.clock).time("gate", || render(subject, (integrator, &sampler), &pixels))?;
-    let mut record = session
-        .clock
-        .time("judge", || judge(&oracle, &view, &answers));
-    record.fault = record.fault.or(sums);
-    Ok((record, ran))
+    let (mut all, mut ran) = (PathsRecord::default(), Ran::default());
+    for frame in frames {
+        let (sampler, pixels) = drawn(session, subject, integrator, frame)?;
+        let view = subject.view(integrator, &sampler, &pixels)?;
+        let limit = sampler.demand.samples.unwrap_or(u32::MAX);
+        let rendered = session.clock.time("gate", || {
+            let renderer = subject.renderer(integrator, &sampler, &pixels, false)?;
+            ran = Ran::kernel(renderer.kernel_hash());
+            let sums = match frame.summed {
+                0 => None,
+                summed => sums(&renderer, &pixels, summed.min(limit))?,
+            };
+            Ok((answers(&renderer, &pixels)?, sums))
+        });
+        let (answers, sums) = match rendered {
+            Ok(rendered) => rendered,
+            // The renderer hands out no such image.
+            Err(e @ (GpuError::Samples { .. } | GpuError::Kernels(_))) => {
+                let refused = PathsRecord {
+                    paths: 1,
+                    wrong: 1,
+                    fault: Some(e.to_string()),
+                    ..PathsRecord::default()
+                };
+                return Ok((all.and(refused), ran));
+            }
+            Err(e) => return Err(e.to_string()),
+        };
+        let mut record = session
+            .clock
+            .time("judge", || judge(&oracle, &view, &answers));
+        record.fault = record.fault.or(sums);
+        if !session.checked.image_gate_is_proven {
+            session.checked.image_gate_is_proven = true;
+            let unseen = || unseen_pixel(&oracle, &view, &answers);
+            let unseen = session.clock.time("judge", unseen).map(|fault| {
+                format!("the check of images is blind: of pixels made wrong on purpose it does not see {fault}")
+            });
+            record.fault = record.fault.or(unseen);
+        }
+        all = all.and(record);
+        if all.fault.is_some() {
+            break;
+        }
+    }
+    Ok((all, ran))
 }
 
-/// `count` indices below `spp`, including the first and the last.
-fn spread(spp: u32, count: u32) -> Vec<u32> {
-    let last = u64::from(spp.max(1) - 1);
-    let steps = u64::from(count.max(2) - 1);
-    let mut indices: Vec<u32> = (0..=steps).map(|i| (i * last / steps) as u32).collect();
-    indices.dedup();
-    indices
-}
-
-/// The kernels' answers, and errors in their sums.
-fn render(
+/// The paths of a frame, and what they draw: the sampler of the experiment's samples, and of as many
+/// as are summed if it has them.
+fn drawn(
+    session: &Session,
     subject: &Subject,
-    (integrator, sampler): (&ConfiguredIntegrator, &Sampler),
-    pixels: &Pixels,
-) -> Result<(Vec<Answer>, Option<String>, Ran), String> {
-    let job = RenderJob {
-        size: pixels.size,
-        camera: subject.camera,
-        sampler,
-        integrator,
-        offset: subject.offset,
-        runtime_checks: true,
+    integrator: &ConfiguredIntegrator,
+    frame: &Frame,
+) -> Result<(Sampler, Pixels), String> {
+    let spp = session.experiment.run.spp.max();
+    let cell = subject.cell;
+    let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
+    let sampler = |samples: u32| {
+        let demand = integrator.demand(samples, frame.size[0]);
+        let samplers = &session.registries.samplers;
+        samplers.sampler(sequence, decorrelation, &demand)
     };
-    let buffers = &subject.stage.buffers;
-    let renderer = Renderer::new(subject.gpu, buffers, subject.traced, &job, false);
-    let renderer = renderer.map_err(|e| e.to_string())?;
-    let ran = Ran::kernel(renderer.kernel_hash());
-    let answers = answers(&renderer, pixels).map_err(|e| e.to_string())?;
-    let sums = sums(&renderer, pixels).map_err(|e| e.to_string())?;
-    Ok((answers, sums, ran))
+    let made = sampler(spp.max(frame.summed)).or_else(|_| sampler(spp));
+    let seed = session.experiment.seeds().replicates.first().copied();
+    let pixels = frame.pixels(spp, seed.unwrap_or_default());
+    Ok((made.map_err(|e| e.to_string())?, pixels))
+}
+
+impl Subject<'_> {
+    fn view<'s>(
+        &self,
+        integrator: &ConfiguredIntegrator,
+        sampler: &'s Sampler,
+        pixels: &Pixels,
+    ) -> Result<View<'s>, String> {
+        Ok(View {
+            estimator: Estimator::of(integrator)?,
+            camera: self.camera,
+            size: pixels.size,
+            sampler,
+        })
+    }
+
+    fn renderer(
+        &self,
+        integrator: &ConfiguredIntegrator,
+        sampler: &Sampler,
+        pixels: &Pixels,
+        ray_counts: bool,
+    ) -> Result<Renderer<'_>, GpuError> {
+        let job = RenderJob {
+            size: pixels.size,
+            camera: self.camera,
+            sampler,
+            integrator,
+            offset: self.offset,
+            runtime_checks: true,
+        };
+        Renderer::new(self.gpu, &self.stage.buffers, self.traced, &job, ray_counts)
+    }
 }

@@ -15,7 +15,7 @@ use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, probe_arithmetic};
-use raystone_image::{FileFormat, Image};
+use raystone_image::{FileFormat, Image, ImageError};
 use raystone_render::{
     InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
 };
@@ -122,7 +122,11 @@ pub fn render(
         let sampler = estimator.sampler.label();
         let about = attributes(&options.program, cell, &sampler, done, experiment.run.seed);
         let format = FileFormat::of(file).map_err(input)?;
-        format.write(file, image, &about).map_err(input)
+        let written = format.write(file, image, &about);
+        written.map_err(|error| match error {
+            ImageError::Altered { .. } => RunError::Wrong(error.to_string()),
+            _ => input(error),
+        })
     };
     let compiled;
     let image = if let Some(order) = pictures.order {

@@ -103,6 +103,12 @@ pub(super) struct Checked {
     pub integrators: BTreeMap<String, Option<String>>,
     /// True to check on all trial scenes, not only on those of the plan's scenes.
     pub on_all_trials: bool,
+    /// True once the gate has seen faults in its own data.
+    pub gate_is_proven: bool,
+    /// True once the check of images has.
+    pub image_gate_is_proven: bool,
+    /// True once times followed work and clocks.
+    pub clock_is_proven: bool,
     /// Samplers whose words were compared with the twin's.
     pub words: HashSet<String>,
 }
@@ -489,10 +495,14 @@ impl<'a> Session<'a> {
         let labels = labels.iter().map(String::as_str);
         let parts: Vec<&str> = std::iter::once(kind).chain(labels).collect();
         let written = self.recorder.image(&parts, ending, write);
-        written.or_else(|error| {
-            self.warn(&parts.join(", "), error.to_string())?;
-            Ok(None)
-        })
+        match written {
+            Err(error @ ImageError::Altered { .. }) => Err(RunError::Wrong(error.to_string())),
+            Err(error) => {
+                self.warn(&parts.join(", "), error.to_string())?;
+                Ok(None)
+            }
+            Ok(path) => Ok(path),
+        }
     }
 }
 

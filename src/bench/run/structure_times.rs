@@ -6,15 +6,18 @@ use super::peers;
 use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
+use crate::clock_check;
 use crate::timing::{
-    Measured, Samples, Watch, empty_ms, interleave, millions_per_second, without_overhead,
+    Measured, Samples, Watch, empty_ms, interleave, millions_per_second, rate_fault,
+    without_overhead,
 };
 use raystone_accel::tracer::count_work;
-use raystone_accel::{Ask, Query, RayBatch, Space, Tracer};
+use raystone_accel::{Ask, Query, Ray, RayBatch, Space, Tracer};
 use raystone_config::Axis;
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use raystone_image::{Picture, viridis};
 use raystone_record::{ClassTiming, CountersPerRay};
+use raystone_stats::statistics::median;
 use raystone_verify::gate::timed_fault;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
 use raystone_verify::shadow_rays::unlike_shadow;
@@ -76,7 +79,7 @@ pub(super) fn time_all(
         let gpu = world.device.of(&one.cell[Axis::Kernels])?;
         let sets = &world.reference.of(one.traced.space).sets;
         for set in sets.iter().filter(|set| set.is_timed()) {
-            match prepare(gpu, world, one, set) {
+            match prepare(gpu, world, one, set, &set.rays) {
                 Ok(batch) => timed.push(Timed {
                     structure,
                     set,
@@ -114,6 +117,11 @@ pub(super) fn time_all(
         .clock
         .time("gate", || peers::judged(world, cast, theirs));
     peers::write(session, world, rivals, refused, theirs)?;
+    let known = timed
+        .iter()
+        .zip(&samples)
+        .filter_map(|(item, samples)| Some((item, median(&samples.as_ref().ok()?.ms)?)));
+    prove_clock(session, world, &gated, &known.collect::<Vec<_>>())?;
     for (item, samples) in timed.iter().zip(samples) {
         let one = &mut gated[item.structure];
         match class_timing(session, world, one, item, samples) {
@@ -138,14 +146,61 @@ pub(super) fn time_all(
     Ok(kept)
 }
 
-/// The rays of a class, ready to be traced through a structure.
-fn prepare(gpu: &Gpu, world: &World, one: &Gated, set: &RaySet) -> Result<RayBatch, GpuError> {
+/// Rays of a class, ready to be traced through a structure.
+fn prepare(
+    gpu: &Gpu,
+    world: &World,
+    one: &Gated,
+    set: &RaySet,
+    rays: &[Ray],
+) -> Result<RayBatch, GpuError> {
     let ask = Ask {
         coherent: set.is_coherent(),
         runtime_checks: one.runtime_checks,
         ..set.query().into()
     };
-    Tracer::new(gpu, &world.buffers.triangles, &one.traced, ask)?.batch(&set.rays)
+    Tracer::new(gpu, &world.buffers.triangles, &one.traced, ask)?.batch(rays)
+}
+
+/// Milliseconds that the clock check wants to measure, and the most rays that it traces for it.
+const CLOCK_MS: f64 = 10.0;
+const CLOCK_RAYS: usize = 1 << 20;
+
+/// Ends the run if the times of the slowest batch follow neither its rays nor the clock around it,
+/// once per run.
+fn prove_clock(
+    session: &mut Session,
+    world: &World,
+    gated: &[Gated],
+    timed: &[(&Timed, f64)],
+) -> Result<(), RunError> {
+    let slowest = timed.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((item, ms)) = slowest.filter(|_| !session.checked.clock_is_proven) else {
+        return Ok(());
+    };
+    session.checked.clock_is_proven = true;
+    let (set, one) = (item.set, &gated[item.structure]);
+    let most = (CLOCK_RAYS / set.rays.len()).max(1);
+    let repeats = ((CLOCK_MS / ms).ceil() as usize).clamp(1, most);
+    let batch = |times: usize| {
+        let rays = set
+            .rays
+            .iter()
+            .cycle()
+            .take(times * repeats * set.rays.len());
+        let rays: Vec<Ray> = rays.copied().collect();
+        prepare(item.batch.gpu(), world, one, set, &rays)
+    };
+    let found = session
+        .clock
+        .time("gpu", || clock_check::fault(&batch(1)?, &batch(2)?));
+    match found {
+        Ok(Some(fault)) => Err(RunError::Wrong(format!(
+            "the clocks of this run are wrong: {fault}; no time would mean anything"
+        ))),
+        // A device that is lost, or has no room for so many rays, fails where it is used.
+        Ok(None) | Err(_) => Ok(()),
+    }
 }
 
 /// The figures of a class, if its answers are right; none where the time is below what can be measured.
@@ -178,7 +233,11 @@ fn class_timing(
         })
         .map_err(text)?;
     let ms = without_overhead(&samples.ms, empty);
-    let rate = millions_per_second(&ms, set.rays.len() as f64);
+    let rays = set.rays.len() as f64;
+    let rate = millions_per_second(&ms, rays);
+    if let Some(fault) = rate.and_then(|rate| rate_fault(&rate, rays, &ms)) {
+        return Err(fault.into());
+    }
     Ok(rate.map(|mrays_s| ClassTiming {
         class: set.class,
         rays: set.rays.len(),

@@ -9,13 +9,16 @@ use super::twins::of_recorded_rays;
 use super::units::Unit;
 use super::world::World;
 use crate::memory::peak_bytes;
-use raystone_accel::tracer::kernel_hash;
-use raystone_accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
+use raystone_accel::tracer::{count_work, kernel_hash};
+use raystone_accel::{AccelError, BuildLog, BuiltAccel, CpuTwin, Space, StructureStats, Traced};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
+use raystone_verify::self_test::unseen_hit;
+use raystone_verify::twin_work::TwinWork;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Build, gate and speed of structures.
@@ -77,6 +80,8 @@ pub(super) struct Candidate {
     pub traced: Option<Traced>,
     /// What `validate` says.
     structural: Option<String>,
+    /// Work of some recorded rays as its twin counts it; empty without a twin.
+    work: Arc<Vec<TwinWork>>,
     pub record: Line<StructureRecord>,
 }
 
@@ -105,6 +110,7 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
         cell: cell.clone(),
         traced: None,
         structural: None,
+        work: Arc::default(),
         record: empty_record(cell, session.experiment.run.runtime_checks),
     };
     let kind = match session.registries.accel.named("structure", &accel.name) {
@@ -133,6 +139,8 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
     record.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let valid = (session.clock).time("gate", || built.validate(&world.soup));
     candidate.structural = valid.err().map(|e| e.to_string());
+    let work = || twin_work(world, &*built);
+    candidate.work = Arc::new(session.clock.time("gate", work));
     match Traced::upload(world.gpu, &*built) {
         Ok(traced) => candidate.traced = Some(traced),
         Err(error) => return candidate.failed(error),
@@ -159,8 +167,13 @@ fn gate_with(
     };
     candidate.traced = Some(traced.clone());
     let checks = session.experiment.run.runtime_checks;
+    prove_gate(session, world)?;
     let gated = session.clock.time("gate", || {
-        let verdict = gate_twice(checks, world, gpu, &traced)?;
+        let mut verdict = gate_twice(checks, world, gpu, &traced)?;
+        if verdict.passed {
+            verdict.work = work_fault(world, gpu, &traced, &candidate.work)?;
+            verdict.passed = verdict.work.is_none();
+        }
         let hash = kernel_hash(gpu, &world.buffers.triangles, &traced)?;
         Ok::<_, GpuError>((verdict, hash))
     });
@@ -202,6 +215,56 @@ fn as_configured(
     let traced = traced.in_workgroups(gpu, &workgroup);
     let traced = traced.and_then(|traced| traced.loading(gpu, &load));
     traced.map_err(|error| error.to_string())
+}
+
+/// Ends the run if the gate does not see what is planted into its own data, once per run.
+fn prove_gate(session: &mut Session, world: &World) -> Result<(), RunError> {
+    if std::mem::replace(&mut session.checked.gate_is_proven, true) {
+        return Ok(());
+    }
+    let (scene, soup) = (&world.scene, &world.soup);
+    let plant = || unseen_hit(scene, soup, &world.reference, world.probe.is_exact());
+    match session.clock.time("gate", plant) {
+        None => Ok(()),
+        Some(fault) => Err(RunError::Wrong(format!(
+            "the gate is blind: of faults planted into its own data it does not see {fault}; nothing that it passes is proven"
+        ))),
+    }
+}
+
+/// The work of recorded rays through the twin of a structure, on an adapter with the host's
+/// arithmetic.
+fn twin_work(world: &World, built: &dyn BuiltAccel) -> Vec<TwinWork> {
+    let twin = (built.cpu_twin(&world.soup)).filter(|_| world.probe.is_exact());
+    let sets = &world.reference.of(built.space()).sets;
+    let of_twin = |twin: Box<dyn CpuTwin + '_>| {
+        let timed = sets.iter().filter(|set| set.is_timed());
+        timed.map(|set| TwinWork::of(set, &*twin)).collect()
+    };
+    twin.map(of_twin).unwrap_or_default()
+}
+
+/// What is wrong with the work that kernels count. Kernels of a folder that traverse otherwise may
+/// count otherwise.
+fn work_fault(
+    world: &World,
+    gpu: &Gpu,
+    traced: &Traced,
+    expected: &[TwinWork],
+) -> Result<Option<String>, GpuError> {
+    let overridden = gpu.kernels.overridden();
+    if overridden.iter().any(|name| name.starts_with("accel/")) {
+        return Ok(None);
+    }
+    for twin in expected {
+        let triangles = &world.buffers.triangles;
+        let counted = count_work(gpu, triangles, traced, twin.query, &twin.rays)?;
+        let fault = counted.and_then(|counted| twin.fault(&counted));
+        if fault.is_some() {
+            return Ok(fault);
+        }
+    }
+    Ok(None)
 }
 
 /// Updates of which the median is taken.

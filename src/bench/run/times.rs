@@ -10,7 +10,7 @@ use super::reference_file::image_hash;
 use super::session::{End, Session, failure_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
-use crate::timing::{Measured, Samples, Watch, interleave};
+use crate::timing::{Measured, Samples, Watch, interleave, rate_fault};
 use raystone_accel::Space;
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
@@ -293,8 +293,15 @@ fn finish(
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
     let rate = |ms: &f64| total as f64 / ms * 1e-3;
     let rates: Vec<f64> = samples.ms.iter().map(rate).collect();
+    let mrays_s = median_interval(&rates);
+    let rate_is_wrong = mrays_s.and_then(|rate| rate_fault(&rate, total as f64, &samples.ms));
     let equal = hash == first;
-    let mut faults: Vec<String> = item.watch.fault().into_iter().collect();
+    let mut faults: Vec<String> = item
+        .watch
+        .fault()
+        .into_iter()
+        .chain(rate_is_wrong)
+        .collect();
     if !equal && world.probe.is_exact() {
         let text = "its last timed image differs from one that the first structure on this scene (in the same space) rendered into fresh buffers";
         faults.push(text.to_owned());
@@ -305,7 +312,7 @@ fn finish(
     record.failure = failure;
     if record.failure.is_none() {
         record.ms_per_spp = median_interval(&per_spp);
-        record.mrays_s = median_interval(&rates);
+        record.mrays_s = mrays_s;
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
         if world.gpu.is_software() {
@@ -384,7 +391,11 @@ fn count_rays(
         };
         Ok((counted, image_hash(&renderer.image()?)))
     });
-    counted.map_err(|e: GpuError| e.to_string())
+    let counted = counted.map_err(|e: GpuError| e.to_string())?;
+    match paths::miscounted(session, world, &structure.traced, &item.cell)? {
+        Some(fault) => Err(format!("its counted rays are wrong: {fault}")),
+        None => Ok(counted),
+    }
 }
 
 fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRecord> {

@@ -1,12 +1,13 @@
 //! Correctness check of integrators: kernels match the image oracle per path, faults do not.
 
 mod real;
+mod runs;
 
 use crate::support::*;
 use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
-use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::image_gate::{Pixels, answers, judge, out_of_bounds, sums};
+use raystone::integrator::{BLOCK_SAMPLES, IntegratorRegistry, RenderJob, Renderer};
+use raystone::measure::image_gate::{Choice, Pixels, answers, judge, out_of_bounds, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
 use raystone::measure::trial_scenes::{layers, trial_scenes};
@@ -76,7 +77,7 @@ fn judged_on(
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false)?;
     let pixels = Pixels {
         size: SIZE,
-        every: 1,
+        choice: Choice::Every(1),
         samples: samples.to_vec(),
         seed: 70_003,
     };
@@ -90,7 +91,9 @@ fn judged_on(
     };
     let start = std::time::Instant::now();
     let mut record = judge(&oracle, &view, &answers);
-    record.fault = record.fault.or(sums(&renderer, &pixels)?);
+    record.fault = record
+        .fault
+        .or(sums(&renderer, &pixels, 2 * BLOCK_SAMPLES)?);
     println!(
         "{} {}: {:?} {record:?}",
         stage.scene.name,

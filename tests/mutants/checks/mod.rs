@@ -1,5 +1,6 @@
 //! The checks that a fault has to get past.
 
+mod frames;
 mod hits;
 mod images;
 mod paths;
@@ -42,6 +43,10 @@ pub enum Check {
     Bias,
     /// Single paths are those of the oracle for images.
     Paths,
+    /// So are pixels of a large image, and paths in queues that are full; sums are those of single samples.
+    Frames,
+    /// Rays are counted as the oracle for images counts them.
+    Counts,
 }
 
 impl Check {
@@ -60,6 +65,8 @@ impl Check {
             Self::ThinWalls => "thin-walls",
             Self::Bias => "bias",
             Self::Paths => "paths",
+            Self::Frames => "frames",
+            Self::Counts => "counts",
         }
     }
 
@@ -132,6 +139,11 @@ impl<'a> Bench<'a> {
                 _ => Ok(None),
             },
             Subject::Paths => paths::paths(self),
+            Subject::Organised(organisation) => match check {
+                Check::Frames => frames::frames(self, organisation),
+                Check::Counts => frames::counts(self, organisation),
+                _ => Ok(None),
+            },
         }
     }
 }

@@ -4,8 +4,10 @@ use super::{Bench, Finding};
 use crate::subject::{build, sampler};
 use crate::{CheckError, Plant};
 use raystone::accel::{Traced, TriangleSoup};
-use raystone::integrator::{IntegratorRegistry, RayOffset, RenderJob, Renderer, SceneBuffers};
-use raystone::measure::image_gate::{Pixels, answers, judge, sums};
+use raystone::integrator::{
+    BLOCK_SAMPLES, IntegratorRegistry, RayOffset, RenderJob, Renderer, SceneBuffers,
+};
+use raystone::measure::image_gate::{Choice, Pixels, answers, judge, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::trial_scenes::{Trial, TrialScene, trial_scenes};
 use raystone::params::{Params, Variant};
@@ -83,7 +85,7 @@ fn of_integrator(
     let renderer = Renderer::new(bench.gpu, buffers, traced, &job, false)?;
     let pixels = Pixels {
         size: SIZE,
-        every: 1,
+        choice: Choice::Every(1),
         samples: SAMPLES.to_vec(),
         seed: SEED,
     };
@@ -94,5 +96,5 @@ fn of_integrator(
         sampler: &sampler,
     };
     let found = judge(oracle, &view, &answers(&renderer, &pixels)?).fault;
-    Ok(found.or(sums(&renderer, &pixels)?))
+    Ok(found.or(sums(&renderer, &pixels, 2 * BLOCK_SAMPLES)?))
 }

@@ -2,7 +2,9 @@
 
 mod binary;
 mod cells;
+mod counts;
 mod ends;
+mod frames;
 mod hard;
 mod image;
 mod instanced;
@@ -31,6 +33,8 @@ pub fn mutants() -> Vec<Mutant> {
         image::MUTANTS,
         paths::MUTANTS,
         path_lights::MUTANTS,
+        frames::MUTANTS,
+        counts::MUTANTS,
     ]
     .concat()
 }

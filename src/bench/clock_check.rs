@@ -1,0 +1,111 @@
+//! The clocks of a run against each other and against the work: twice the rays must take about twice
+//! the time, and a measurement must account for most of the time that passed around it, and for no
+//! more.
+
+use raystone_accel::RayBatch;
+use raystone_gpu::{Elapsed, GpuError, Stopwatch};
+
+/// Bounds of the time of twice the rays over that of the rays.
+const TWICE: [f64; 2] = [1.5, 2.8];
+/// Most that a measurement may claim of the time around it: timestamps have another period.
+const MOST_CLAIMED: f64 = 1.05;
+/// Least of it that it must claim, after [`SPARE_MS`] for wiping answers and waking up.
+const LEAST_CLAIMED: f64 = 0.65;
+const SPARE_MS: f64 = 2.0;
+/// Milliseconds below which a time says nothing about a clock.
+const LEAST_MS: f64 = 5.0;
+/// Rounds of which the shortest count, and how often they may fail: other work on the machine
+/// lengthens times, again and again only by accident.
+const ROUNDS: usize = 5;
+const TRIES: usize = 5;
+
+/// The shortest times of a measurement: as told, and around it.
+#[derive(Debug, Clone, Copy)]
+struct Shortest {
+    ms: f64,
+    around_ms: f64,
+}
+
+/// Compares a batch with one of twice the rays. Returns what is wrong; `None` if nothing is, or if
+/// the times are too short to say.
+///
+/// # Errors
+/// The device is lost or hangs, or a clock ran backwards.
+pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<String>, GpuError> {
+    let mut last = None;
+    for _ in 0..TRIES {
+        let mut shortest = [Shortest::NONE; 2];
+        for _ in 0..ROUNDS {
+            for (shortest, batch) in shortest.iter_mut().zip([single, double]) {
+                let around = Stopwatch::start();
+                let elapsed = batch.trace()?.measured()?;
+                shortest.note(elapsed, around.elapsed());
+            }
+        }
+        last = judge(shortest);
+        if last.is_none() {
+            break;
+        }
+    }
+    Ok(last)
+}
+
+impl Shortest {
+    const NONE: Self = Self {
+        ms: f64::INFINITY,
+        around_ms: f64::INFINITY,
+    };
+
+    fn note(&mut self, elapsed: Elapsed, around: Elapsed) {
+        self.ms = self.ms.min(elapsed.ms());
+        self.around_ms = self.around_ms.min(around.wall_ms);
+    }
+}
+
+/// Judges the shortest times of the rays, and of twice as many.
+fn judge([single, double]: [Shortest; 2]) -> Option<String> {
+    let [least, most] = TWICE;
+    if single.around_ms < LEAST_MS {
+        return None;
+    }
+    let ratio = double.ms / single.ms;
+    // NaN is no ratio.
+    if !(least..=most).contains(&ratio) {
+        return Some(format!(
+            "twice the rays take {ratio:.2} times as long, {:.3} ms and {:.3} ms",
+            double.ms, single.ms
+        ));
+    }
+    let claimed = double.ms / double.around_ms;
+    if claimed > MOST_CLAIMED || double.ms + SPARE_MS < LEAST_CLAIMED * double.around_ms {
+        return Some(format!(
+            "{:.3} ms are measured while {:.3} ms pass on the clock around it",
+            double.ms, double.around_ms
+        ));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_that_do_not_follow_the_work_or_the_clock_are_told() {
+        let of = |ms: f64, around_ms: f64| Shortest { ms, around_ms };
+        let said = |single, double| judge([single, double]).unwrap_or_default();
+        assert_eq!(said(of(10.0, 11.0), of(20.0, 21.5)), "");
+        assert_eq!(said(of(10.0, 14.0), of(27.0, 33.0)), "");
+        // Too short to say.
+        assert_eq!(said(of(0.2, 1.0), of(0.2, 1.0)), "");
+        for (single, double, part) in [
+            (of(10.0, 10.5), of(11.0, 20.5), "1.10 times"),
+            (of(10.0, 10.5), of(40.0, 41.0), "4.00 times"),
+            (of(0.0, 10.5), of(0.0, 20.5), "twice the rays"),
+            (of(20.0, 10.5), of(40.0, 20.5), "40.000 ms are measured"),
+            (of(5.0, 10.5), of(10.0, 20.5), "10.000 ms are measured"),
+        ] {
+            assert!(said(single, double).contains(part), "{part}");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Counted work of kernels against that of the twins: nodes and tests per ray have no other check.
+
+use crate::rays::RaySet;
+use rayon::prelude::*;
+use raystone_accel::{Counters, CpuTwin, Query, Ray};
+use raystone_record::RayClass;
+
+/// Rays of each class whose work is compared, besides the last.
+const RAYS: usize = 512;
+
+/// The work of some rays of a class as the twin of a structure counts it.
+#[derive(Debug, Clone)]
+pub struct TwinWork {
+    /// The ray class.
+    pub class: RayClass,
+    /// The query of the class.
+    pub query: Query,
+    /// The rays: spread over the class, the last among them.
+    pub rays: Vec<Ray>,
+    counted: Vec<Counters>,
+}
+
+impl TwinWork {
+    /// Counts on the host.
+    pub fn of(set: &RaySet, twin: &dyn CpuTwin) -> Self {
+        let step = set.rays.len().div_ceil(RAYS).max(1);
+        let spread = set.rays.iter().step_by(step);
+        let rays: Vec<Ray> = spread.chain(set.rays.last()).copied().collect();
+        let query = set.query();
+        let count = |ray: &Ray| {
+            let mut counters = Counters::default();
+            match query {
+                Query::Closest => drop(twin.closest_hit(ray, &mut counters)),
+                Query::Any => drop(twin.any_hit(ray, &mut counters)),
+            }
+            counters
+        };
+        Self {
+            class: set.class,
+            query,
+            counted: rays.par_iter().map(count).collect(),
+            rays,
+        }
+    }
+
+    /// The first ray whose work kernels count otherwise; `None` if there is none.
+    pub fn fault(&self, kernel: &[Counters]) -> Option<String> {
+        let class = self.class.name();
+        if kernel.len() != self.rays.len() {
+            let (found, all) = (kernel.len(), self.rays.len());
+            return Some(format!("work is counted of {found} of {all} {class} rays"));
+        }
+        let pairs = || kernel.iter().zip(&self.counted);
+        let first = pairs().position(|(kernel, twin)| kernel != twin)?;
+        let wrong = pairs().filter(|(kernel, twin)| kernel != twin).count();
+        Some(format!(
+            "the counted work of {wrong} of {} {class} rays is not that of the structure's twin; first: ray {} | kernel {} | twin {}",
+            self.rays.len(),
+            self.rays[first],
+            show(&kernel[first]),
+            show(&self.counted[first])
+        ))
+    }
+}
+
+fn show(work: &Counters) -> String {
+    let Counters {
+        nodes,
+        box_tests,
+        triangle_tests,
+        stack_high_water,
+    } = work;
+    format!(
+        "{nodes} nodes, {box_tests} box tests, {triangle_tests} triangle tests, {stack_high_water} on the stack"
+    )
+}
