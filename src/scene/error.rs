@@ -48,6 +48,18 @@ pub enum SceneError {
         /// The problem.
         problem: String,
     },
+    /// The content is valid, but not in a form that can be read.
+    #[error("{}{}: {problem}, which is not read; {advice}", path.display(), at(place))]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// Part of the file.
+        place: String,
+        /// The form.
+        problem: String,
+        /// The suggested fix.
+        advice: &'static str,
+    },
     /// The file is well formed but has no triangle to trace.
     #[error("{name}: the scene has no triangles ({reason}); give a model with at least one face")]
     NoTriangles {

@@ -1,25 +1,25 @@
-//! Loads glTF 2.0 and GLB with the `gltf` crate, flattening nodes into world space. If nodes share
-//! a mesh, the scene also records which triangles are copies of which object.
+//! Loads glTF 2.0 and GLB, flattening nodes into world space. If nodes share a mesh, the scene also
+//! records which triangles are copies of which object.
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
-use super::gltf_accessor::{check_accessors, has_colors, has_normals};
-use super::gltf_container;
+use super::gltf_data::Data;
+use super::gltf_document::{self, Item};
 use super::gltf_files::Files;
-use super::gltf_instancing;
-use super::gltf_lights;
-use super::gltf_material;
-use super::gltf_unread::{Unread, of_document};
+use super::gltf_notes::Notes;
+use super::gltf_roots::roots;
 use super::texture::decode_all;
 use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, Transform};
-use glam::{DMat3, Mat4, Vec2, Vec3};
-use gltf::mesh::Mode;
+use super::{gltf_container, gltf_instancing, gltf_lights, gltf_material};
+use glam::{Mat4, Quat, Vec3, Vec4};
 use raystone_core::geometry::{Camera, Triangle};
-use std::borrow::Cow;
 use std::path::Path;
 
 /// Triangle limit for a node's instances: all are stored, and a small file can list many.
 const MOST_TRIANGLES: usize = 100_000_000;
+
+/// Limit on the nodes walked, as nodes below several others are walked for each of them.
+const MOST_NODES: usize = 1_000_000;
 
 /// Loads the default scene of a glTF or GLB model, with its first camera.
 ///
@@ -32,55 +32,38 @@ pub(super) fn load(
 ) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
-        let (json, blob) = gltf_container::split(&bytes).map_err(|(byte, problem)| {
+        let (json, chunk) = gltf_container::split(&bytes).map_err(|(byte, problem)| {
             SceneError::malformed(path, format!("byte {byte}"), problem)
         })?;
-        let document = parse(json).map_err(|problem| SceneError::malformed(path, "", problem))?;
-        let blob = blob.map(<[u8]>::to_vec);
+        let parsed = gltf_document::parse(json);
+        let (document, fault) = parsed.map_err(|p| SceneError::malformed(path, "", p))?;
+        let document = Item::new(&document);
+        check_version(path, document)?;
+        let chunk = chunk.map(<[u8]>::to_vec);
+        let file_bytes = bytes.len();
         drop(bytes);
         let files = Files::new(path, options);
-        let buffers = read_buffers(path, &files, &document, blob)?;
-        build(path, name, options, &files, &document, &buffers)
+        let data = Data::new(&files, document, file_bytes, chunk);
+        let mut notes = Notes::default();
+        if let Some(fault) = fault {
+            notes.tell("the text is not JSON, and was read as if it were", || fault);
+        }
+        build(path, name, options, &files, document, &data, notes)
     })
 }
 
-/// Parses and validates the document. The crate's validation looks up attribute accessors before
-/// checking their indices, so they are checked here first.
-fn parse(json: &[u8]) -> Result<gltf::Document, String> {
-    let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
-    let mut root = unchecked.document.into_json();
-    let mut required = root.extensions_required.iter();
-    if let Some(problem) = required.find_map(|name| compressed(name)) {
-        return Err(problem);
+/// glTF 1.0 is another format with the same ending.
+fn check_version(path: &Path, document: Item<'_>) -> Result<(), SceneError> {
+    let version = document.get("asset").text("version").unwrap_or("2.0");
+    match version.split('.').next() {
+        Some("0" | "1") => Err(SceneError::Unsupported {
+            path: path.to_owned(),
+            place: "asset".to_owned(),
+            problem: format!("glTF of version {version}"),
+            advice: "export it as glTF 2.0",
+        }),
+        _ => Ok(()),
     }
-    // The crate refuses required extensions that it does not know.
-    let of_nodes = gltf_instancing::OF_NODES;
-    root.extensions_required
-        .retain(|name| !of_nodes.contains(&name.as_str()));
-    for (m, mesh) in root.meshes.iter().enumerate() {
-        for (p, primitive) in mesh.primitives.iter().enumerate() {
-            let mut accessors = primitive.attributes.values().map(|index| index.value());
-            if let Some(missing) = accessors.find(|index| *index >= root.accessors.len()) {
-                let place = format!("meshes[{m}].primitives[{p}].attributes");
-                return Err(format!("{place}: there is no accessor {missing}"));
-            }
-        }
-    }
-    gltf::Document::from_json(root).map_err(|e| e.to_string())
-}
-
-/// Advice for unsupported geometry compression.
-fn compressed(extension: &str) -> Option<String> {
-    let command = match extension {
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" | "MESHOPT_compression" => {
-            "gltfpack -i IN -o OUT"
-        }
-        "KHR_draco_mesh_compression" => "gltf-transform copy IN OUT",
-        _ => return None,
-    };
-    Some(format!(
-        "the geometry is compressed with {extension}; decode it first, for instance with `{command}`"
-    ))
 }
 
 fn build(
@@ -88,40 +71,38 @@ fn build(
     name: &str,
     options: &LoadOptions,
     files: &Files,
-    document: &gltf::Document,
-    buffers: &[Vec<u8>],
+    document: Item<'_>,
+    data: &Data<'_>,
+    mut notes: Notes,
 ) -> Result<SceneData, SceneError> {
-    let mut palette = gltf_material::read(files, document, buffers, options);
+    let mut palette = gltf_material::read(files, document, data, options);
+    notes.see_document(document, &palette.named);
     let mut geometry = Geometry {
         path,
-        buffers,
+        document,
+        data,
         sets: &palette.sets,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
         lights: Vec::new(),
         copies: Copies::new(document),
         white: None,
-        lines_or_points: 0,
-        deformed: 0,
-        unread_normals: 0,
-        unread: of_document(document),
+        notes,
     };
-    geometry.read_scene(document)?;
-    geometry.report_left_out();
+    geometry.read_scene()?;
     let Geometry {
         mut builder,
         camera,
         lights,
         white,
-        unread,
+        notes,
         ..
     } = geometry;
     if white.is_some() {
         let plain = Material::diffuse("default, coloured", Vec3::ONE);
         palette.materials.push(plain);
     }
-    let unread = unread.warnings(&palette.named);
-    builder.report.warnings.extend(unread);
+    builder.report.warnings.extend(notes.warnings());
     builder.report.warnings.append(&mut palette.warnings);
     let textures = decode_all(
         &palette.images,
@@ -139,53 +120,21 @@ fn build(
     builder.finish(name, look)
 }
 
-/// Bytes of every buffer: the binary chunk, a data URI or a separate file.
-fn read_buffers(
-    path: &Path,
-    files: &Files,
-    document: &gltf::Document,
-    mut blob: Option<Vec<u8>>,
-) -> Result<Vec<Vec<u8>>, SceneError> {
-    document
-        .buffers()
-        .map(|buffer| {
-            let place = format!("buffer {}", buffer.index());
-            let error = |problem: String| SceneError::malformed(path, &place, problem);
-            let data = match buffer.source() {
-                gltf::buffer::Source::Bin => blob
-                    .take()
-                    .ok_or_else(|| error("the binary chunk is missing".to_owned()))?,
-                gltf::buffer::Source::Uri(uri) => files.read(uri).map_err(error)?,
-            };
-            if data.len() < buffer.length() {
-                return Err(error(format!(
-                    "{} bytes are announced, {} are there",
-                    buffer.length(),
-                    data.len()
-                )));
-            }
-            Ok(data)
-        })
-        .collect()
-}
-
 /// Walks a scene's nodes, collecting triangles and the first camera.
-struct Geometry<'a> {
+pub(super) struct Geometry<'a> {
     path: &'a Path,
-    buffers: &'a [Vec<u8>],
+    pub document: Item<'a>,
+    pub data: &'a Data<'a>,
     /// Texture coordinate set of each material.
-    sets: &'a [Option<u32>],
-    builder: SceneBuilder,
+    pub sets: &'a [Option<u32>],
+    pub builder: SceneBuilder,
     camera: Option<Camera>,
     lights: Vec<Light>,
     /// `None` if no nodes share a mesh, or once a node could not become an instance.
     copies: Option<Copies>,
     /// Material of primitives that have colours but name no material, once there is one.
-    white: Option<usize>,
-    lines_or_points: usize,
-    deformed: usize,
-    unread_normals: usize,
-    unread: Unread,
+    pub white: Option<usize>,
+    pub notes: Notes,
 }
 
 struct Copies {
@@ -196,13 +145,12 @@ struct Copies {
 }
 
 impl Copies {
-    fn new(document: &gltf::Document) -> Option<Self> {
-        let mut uses = vec![0; document.meshes().len()];
-        for node in document.nodes() {
-            if let Some(mesh) = node.mesh() {
+    fn new(document: Item<'_>) -> Option<Self> {
+        let mut uses = vec![0; document.list("meshes").len()];
+        for node in document.list("nodes") {
+            if let Some(uses) = node.index("mesh").and_then(|mesh| uses.get_mut(mesh)) {
                 // Even a single listed instance counts as one.
-                let listed = gltf_instancing::has_instances(&node);
-                uses[mesh.index()] += 1 + usize::from(listed);
+                *uses += 1 + usize::from(gltf_instancing::has_instances(node));
             }
         }
         let shared = uses.iter().any(|n| *n > 1);
@@ -211,73 +159,123 @@ impl Copies {
     }
 }
 
+/// Says where something is, for a message.
+pub(super) type Place<'a> = &'a dyn Fn() -> String;
+
+/// A step of the walk: into a node under a transform, shown or not, or out of it.
+enum Step {
+    Into(usize, Mat4, bool),
+    Out(usize),
+}
+
 impl<'a> Geometry<'a> {
-    fn read_scene(&mut self, document: &'a gltf::Document) -> Result<(), SceneError> {
-        let scene = document
-            .default_scene()
-            .or_else(|| document.scenes().next());
-        let roots = scene.ok_or_else(|| SceneError::malformed(self.path, "", "it has no scene"))?;
-        // Explicit stack and visited marks: a cycle in a malformed file is an error.
-        let mut visited = vec![false; document.nodes().len()];
-        let roots = roots.nodes().map(|node| (node, Mat4::IDENTITY, true));
-        let mut stack: Vec<_> = roots.collect();
-        stack.reverse();
-        while let Some((node, parent, shown)) = stack.pop() {
-            if std::mem::replace(&mut visited[node.index()], true) {
-                return Err(self.error(&node, "it is reached twice, but nodes must form a tree"));
+    fn read_scene(&mut self) -> Result<(), SceneError> {
+        let nodes: Vec<Item<'a>> = self.document.list("nodes").collect();
+        let roots = roots(self.document, &nodes, &mut self.notes);
+        let into = |node: &usize| Step::Into(*node, Mat4::IDENTITY, true);
+        let mut stack: Vec<Step> = roots.iter().rev().map(into).collect();
+        // An explicit stack, so that no depth overflows.
+        let mut seen = vec![false; nodes.len()];
+        let mut is_open = vec![false; nodes.len()];
+        let mut walked = 0;
+        while let Some(step) = stack.pop() {
+            let (index, parent, shown) = match step {
+                Step::Into(index, parent, shown) => (index, parent, shown),
+                Step::Out(index) => {
+                    is_open[index] = false;
+                    continue;
+                }
+            };
+            let Some(&node) = nodes.get(index) else {
+                let what = "nodes that are named but not there are left out";
+                self.notes.tell(what, || format!("node {index}"));
+                continue;
+            };
+            let place = || node.place("node", index);
+            if is_open[index] {
+                let what = "nodes are children of themselves, which is left out";
+                self.notes.tell(what, place);
+                continue;
             }
-            let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
-            let shown = shown && gltf_instancing::is_visible(&node);
-            self.read_camera_of(&node, world);
+            if std::mem::replace(&mut seen[index], true) {
+                let what = "nodes are children of several nodes, and drawn below each";
+                self.notes.tell(what, place);
+            }
+            walked += 1;
+            if walked > MOST_NODES {
+                let problem =
+                    format!("with the nodes below several others, more than {MOST_NODES}");
+                return Err(self.error(&place(), problem));
+            }
+            let world = parent * transform(node);
+            let shown = shown && gltf_instancing::is_visible(node);
+            self.read_camera_of(node, world);
             if shown {
-                self.read_node(&node, world, document)?;
+                self.read_node(node, &place, world)?;
             }
+            is_open[index] = true;
+            stack.push(Step::Out(index));
             let first_child = stack.len();
-            stack.extend(node.children().map(|child| (child, world, shown)));
+            let children = node.list("children").filter_map(Item::as_index);
+            stack.extend(children.map(|child| Step::Into(child, world, shown)));
             stack[first_child..].reverse();
         }
         Ok(())
     }
 
-    fn error(&self, node: &gltf::Node<'_>, problem: impl Into<String>) -> SceneError {
-        let label = node.name().unwrap_or("unnamed");
-        let place = format!("node {} `{label}`", node.index());
+    fn error(&self, place: &str, problem: impl Into<String>) -> SceneError {
         SceneError::malformed(self.path, place, problem)
     }
 
     /// Reads the node's camera; hidden nodes count too.
-    fn read_camera_of(&mut self, node: &gltf::Node<'a>, world: Mat4) {
-        if let (None, Some(camera)) = (self.camera, node.camera()) {
-            self.camera = self.read_camera(&camera, world);
+    fn read_camera_of(&mut self, node: Item<'a>, world: Mat4) {
+        if let (None, Some(index)) = (self.camera, node.index("camera")) {
+            let camera = self.document.at("cameras", index);
+            self.camera = self.read_camera(camera, index, world);
         }
     }
 
     fn read_node(
         &mut self,
-        node: &gltf::Node<'a>,
+        node: Item<'a>,
+        place: Place<'_>,
         world: Mat4,
-        document: &'a gltf::Document,
     ) -> Result<(), SceneError> {
-        if let Some(light) = node.light() {
-            self.lights.push(gltf_lights::read(&light, world));
+        if let Some(index) = gltf_lights::of_node(node) {
+            match gltf_lights::read(self.document, index, world) {
+                Some(light) => self.lights.push(light),
+                None => {
+                    let what = "lights that are missing or of an unknown type are left out";
+                    self.notes.tell(what, place);
+                }
+            }
         }
-        let Some(mesh) = node.mesh() else {
+        let Some(index) = node.index("mesh") else {
             return Ok(());
         };
-        self.deformed += usize::from(node.skin().is_some());
-        let places = gltf_instancing::places(node, document, self.buffers);
-        let (places, others) = places.map_err(|problem| self.error(node, problem))?;
-        self.unread.attributes.extend(others);
-        for place in &places {
+        let Some(mesh) = self.document.at("meshes", index) else {
+            let what = "nodes show a mesh that is not there";
+            self.notes.tell(what, place);
+            return Ok(());
+        };
+        if node.get("skin").is_given() {
+            self.notes.tell(AT_REST, || mesh.place("mesh", index));
+        }
+        let places = gltf_instancing::places(node, self.data);
+        let (places, others) = places.map_err(|problem| self.error(&place(), problem))?;
+        for name in others {
+            self.notes.unread(name, place);
+        }
+        for instance in &places {
             let before = self.builder.len();
-            self.read_mesh(node, &mesh, world * *place)?;
+            self.read_mesh(place, mesh, index, world * *instance)?;
             let each = self.builder.len() - before;
             if each.saturating_mul(places.len()) > MOST_TRIANGLES {
                 let problem = format!(
                     "its {} instances of {each} triangles are more than {MOST_TRIANGLES} triangles",
                     places.len()
                 );
-                return Err(self.error(node, problem));
+                return Err(self.error(&place(), problem));
             }
         }
         Ok(())
@@ -286,38 +284,49 @@ impl<'a> Geometry<'a> {
     /// Adds a mesh's triangles under this transform, and the node as an instance of it.
     fn read_mesh(
         &mut self,
-        node: &gltf::Node<'a>,
-        mesh: &gltf::Mesh<'a>,
+        node: Place<'_>,
+        mesh: Item<'a>,
+        index: usize,
         world: Mat4,
     ) -> Result<(), SceneError> {
         let before = self.builder.len();
         let mut own = Vec::new();
-        for primitive in mesh.primitives() {
-            let read = self.read_primitive(&primitive, world, &mut own);
-            read.map_err(|problem| {
-                let label = mesh.name().unwrap_or("unnamed");
-                let place = format!(
-                    "mesh {} `{label}`, primitive {}",
-                    mesh.index(),
-                    primitive.index()
-                );
-                SceneError::malformed(self.path, place, problem)
-            })?;
+        let mut list = self.copies.is_some().then_some(&mut own);
+        for (k, primitive) in mesh.list("primitives").enumerate() {
+            let place = || format!("{}, primitive {k}", mesh.place("mesh", index));
+            if self.is_draco_only(primitive) {
+                return Err(SceneError::Unsupported {
+                    path: self.path.to_owned(),
+                    place: place(),
+                    problem: format!("the geometry is compressed with {DRACO}"),
+                    advice: "decode it first: `npx @gltf-transform/cli copy IN OUT`",
+                });
+            }
+            self.read_primitive(primitive, &place, world, list.as_deref_mut())
+                .map_err(|problem| self.error(&place(), problem))?;
         }
         if Transform::from_matrix(world).is_mirrored() {
             self.builder.mirror_from(before);
         }
         if self.builder.len() > before {
-            self.place(node, mesh.index(), own, world, before);
+            self.place(node, index, own, world, before);
         }
         Ok(())
+    }
+
+    /// True if the primitive has no data besides the compressed one.
+    fn is_draco_only(&self, primitive: Item<'_>) -> bool {
+        let positions = primitive.get("attributes").index("POSITION");
+        let accessor = positions.and_then(|index| self.document.at("accessors", index));
+        let is_plain = accessor.is_none_or(|accessor| accessor.get("bufferView").is_given());
+        primitive.extension(DRACO).is_given() && !is_plain
     }
 
     /// Makes the node an instance of its mesh with triangles `own`, whose world-space copies begin
     /// at `before`. If that fails, the scene has no instances.
     fn place(
         &mut self,
-        node: &gltf::Node<'a>,
+        node: Place<'_>,
         mesh: usize,
         own: Vec<Triangle>,
         world: Mat4,
@@ -344,20 +353,26 @@ impl<'a> Geometry<'a> {
             Ok(_) => "it has triangles that are not finite".to_owned(),
             Err(error) => reason(&error),
         };
-        let label = node.name().unwrap_or("unnamed");
         self.copies = None;
         self.builder.assembly = Default::default();
         self.builder.report.warnings.push(format!(
-            "node {} `{label}` cannot be an instance ({problem}): the scene is traced as a \
-             flat list of triangles",
-            node.index()
+            "{} cannot be an instance ({problem}): the scene is traced as a flat list of \
+             triangles",
+            node()
         ));
     }
 
-    fn read_camera(&mut self, camera: &gltf::Camera<'_>, world: Mat4) -> Option<Camera> {
-        let gltf::camera::Projection::Perspective(lens) = camera.projection() else {
-            let warning = "an orthographic camera was ignored".to_owned();
-            self.builder.report.warnings.push(warning);
+    fn read_camera(
+        &mut self,
+        camera: Option<Item<'_>>,
+        index: usize,
+        world: Mat4,
+    ) -> Option<Camera> {
+        let place = || camera.map_or(format!("camera {index}"), |c| c.place("camera", index));
+        let lens = camera.map(|camera| camera.get("perspective"));
+        let Some(fov) = lens.and_then(|lens| lens.number("yfov")) else {
+            let what = "cameras without a perspective are ignored";
+            self.notes.tell(what, place);
             return None;
         };
         // glTF cameras look along -z with y up.
@@ -368,170 +383,44 @@ impl<'a> Geometry<'a> {
             // Far enough that rounding the target does not turn the view.
             target: eye + forward * eye.length().max(1.0),
             up: world.transform_vector3(Vec3::Y).normalize_or_zero(),
-            vertical_fov_degrees: lens.yfov().to_degrees(),
+            vertical_fov_degrees: fov.to_degrees(),
         };
         if let Err(problem) = crate::check_camera(&found) {
-            let warning = format!("a camera of the file was ignored: {problem}");
-            self.builder.report.warnings.push(warning);
+            let what = format!("a camera of the file was ignored: {problem}");
+            self.notes.tell(what, place);
             return None;
         }
         Some(found)
     }
-
-    /// Adds a primitive's triangles, also in mesh space to `own` if nodes share the mesh.
-    fn read_primitive(
-        &mut self,
-        primitive: &gltf::Primitive<'a>,
-        world: Mat4,
-        own: &mut Vec<Triangle>,
-    ) -> Result<(), String> {
-        let mode = primitive.mode();
-        if !matches!(
-            mode,
-            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-        ) {
-            self.lines_or_points += 1;
-            return Ok(());
-        }
-        self.deformed += usize::from(primitive.morph_targets().len() > 0);
-        let buffers = self.buffers;
-        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-        // The file's materials, then one for primitives that name none.
-        let last = self.sets.len() - 1;
-        let colors = self.read_colors(primitive);
-        let material = match primitive.material().index() {
-            Some(index) => index,
-            // The standard default is white; grey is for surfaces without any colour.
-            None if !colors.is_empty() => *self.white.get_or_insert(last + 1),
-            None => last,
-        };
-        let set = self.sets.get(material).copied().flatten();
-        self.unread.see(primitive, set);
-        check_accessors(primitive, buffers, set)?;
-        let local: Vec<Vec3> = reader
-            .read_positions()
-            .ok_or("its positions are missing or outside their buffer")?
-            .map(Vec3::from)
-            .collect();
-        let positions: Vec<Vec3> = local.iter().map(|p| world.transform_point3(*p)).collect();
-        let indices: Cow<'_, [u32]> = match (primitive.indices(), reader.read_indices()) {
-            (None, _) => (0..positions.len() as u32).collect(),
-            (Some(_), Some(indices)) => indices.into_u32().collect(),
-            (Some(_), None) => return Err("its indices are outside their buffer".to_owned()),
-        };
-        if let Some(index) = indices.iter().find(|i| **i as usize >= positions.len()) {
-            return Err(format!(
-                "a face refers to vertex {index}, but there are {}",
-                positions.len()
-            ));
-        }
-        let read = |set: u32| {
-            let uvs = reader.read_tex_coords(set)?.into_f32();
-            Some(uvs.map(Vec2::from).collect())
-        };
-        let uvs: Vec<Vec2> = set.and_then(read).unwrap_or_default();
-        let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
-        let normals = self.read_normals(primitive, world);
-        let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
-        let is_shared = self.copies.is_some();
-        for_each_face(mode, &indices, |corners| {
-            let vertices = corners.map(|i| positions[i as usize]);
-            let normals = (!normals.is_empty()).then(|| corners.map(normal));
-            let (uvs, material) = (corners.map(uv), material as u32);
-            let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);
-            let colors = (!colors.is_empty()).then(|| corners.map(color));
-            self.builder
-                .push_colored(vertices, uvs, normals, colors, material);
-            if is_shared {
-                let vertices = corners.map(|i| local[i as usize]);
-                own.push(Triangle { vertices });
-            }
-        });
-        Ok(())
-    }
-
-    /// Linear vertex colours, which multiply the base colour; empty if none can be read.
-    fn read_colors(&mut self, primitive: &gltf::Primitive<'a>) -> Vec<Vec3> {
-        match has_colors(primitive, self.buffers) {
-            None => return Vec::new(),
-            Some(false) => {
-                let name = "`COLOR_0`, whose values are no colours in their buffer";
-                self.unread.attributes.insert(name.to_owned());
-                return Vec::new();
-            }
-            Some(true) => {}
-        }
-        let buffers = self.buffers;
-        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-        let colors = reader.read_colors(0).map(|colors| colors.into_rgba_f32());
-        let colors: Vec<[f32; 4]> = colors.into_iter().flatten().collect();
-        if colors.iter().any(|[.., alpha]| *alpha < 1.0) {
-            let name = "alpha of `COLOR_0`".to_owned();
-            self.unread.attributes.insert(name);
-        }
-        if (colors.iter().flatten()).any(|x| !(0.0..=1.0).contains(x)) {
-            let name = "`COLOR_0` beyond 0 to 1".to_owned();
-            self.unread.attributes.insert(name);
-        }
-        let rgb = |[r, g, b, _]: &[f32; 4]| Vec3::new(*r, *g, *b);
-        colors.iter().map(rgb).collect()
-    }
-
-    /// World-space normals; empty if none can be read.
-    fn read_normals(&mut self, primitive: &gltf::Primitive<'a>, world: Mat4) -> Vec<Vec3> {
-        match has_normals(primitive, self.buffers) {
-            None => return Vec::new(),
-            Some(false) => {
-                self.unread_normals += 1;
-                return Vec::new();
-            }
-            Some(true) => {}
-        }
-        let buffers = self.buffers;
-        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-        // In f64, so that a small scale does not make it singular.
-        let to_world = DMat3::from_mat4(world.as_dmat4()).inverse().transpose();
-        let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
-        let normals = reader.read_normals().into_iter().flatten();
-        normals.map(|n| moved(n).as_vec3()).collect()
-    }
-
-    fn report_left_out(&mut self) {
-        for (count, what) in [
-            (
-                self.unread_normals,
-                "primitives have normals that are not three 32-bit floats in their buffer: drawn flat",
-            ),
-            (
-                self.lines_or_points,
-                "primitives of lines or points left out",
-            ),
-            (
-                self.deformed,
-                "meshes have a skin or morph targets: shown in their rest shape",
-            ),
-        ] {
-            if count > 0 {
-                self.builder.report.warnings.push(format!("{count} {what}"));
-            }
-        }
-    }
 }
 
-/// Vertex indices of every triangle of a list, strip or fan.
-fn for_each_face(mode: Mode, indices: &[u32], mut face: impl FnMut([u32; 3])) {
-    match mode {
-        Mode::Triangles => indices.as_chunks::<3>().0.iter().for_each(|c| face(*c)),
-        Mode::TriangleStrip => indices
-            .windows(3)
-            .enumerate()
-            .for_each(|(k, w)| face([w[0], w[1 + k % 2], w[2 - k % 2]])),
-        _ => indices
-            .get(1..)
-            .unwrap_or_default()
-            .windows(2)
-            .for_each(|w| face([indices[0], w[0], w[1]])),
+/// The note on meshes with a skin or morph targets.
+pub(super) const AT_REST: &str =
+    "meshes with a skin or morph targets are shown in their rest shape";
+
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// A node's own transform. What is no number is NaN, and drops the triangles below.
+fn transform(node: Item<'_>) -> Mat4 {
+    let given = |value: Option<f32>| value.unwrap_or(f32::NAN);
+    if let Some(matrix) = node.numbers::<16>("matrix") {
+        return Mat4::from_cols_array(&matrix.map(given));
     }
+    let scale = node
+        .numbers("scale")
+        .map_or(Vec3::ONE, |s| s.map(given).into());
+    let translation = node.numbers("translation");
+    let translation = translation.map_or(Vec3::ZERO, |t| t.map(given).into());
+    let rotation = node.numbers("rotation");
+    let rotation = rotation.map_or(Vec4::W, |q| q.map(given).into());
+    // Rounded more than a quaternion of f32 is, or not a rotation at all.
+    let is_unit = (rotation.length_squared() - 1.0).abs() < 1e-5;
+    let rotation = match rotation.try_normalize() {
+        Some(unit) if !is_unit => unit,
+        None if rotation == Vec4::ZERO => Vec4::W,
+        _ => rotation,
+    };
+    Mat4::from_scale_rotation_translation(scale, Quat::from_vec4(rotation), translation)
 }
 
 /// Why a node cannot be an instance, without the index that only built-in scenes use.

@@ -1,7 +1,8 @@
 //! Files that a glTF model names by URI.
 
 use super::LoadOptions;
-use base64::Engine;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{Engine, alphabet};
 use std::path::{Component, Path, PathBuf};
 
 /// Finds and reads a model's files, by default only inside its folder.
@@ -29,26 +30,33 @@ impl Files {
     /// # Errors
     /// The problem, with the name of the file.
     pub(crate) fn read(&self, uri: &str) -> Result<Vec<u8>, String> {
-        if let Some(data) = uri.strip_prefix("data:") {
-            let (_, encoded) = data
-                .split_once(";base64,")
-                .ok_or("the data URI is not base64")?;
-            return base64::engine::general_purpose::STANDARD
-                .decode(encoded)
-                .map_err(|error| format!("the data URI cannot be decoded: {error}"));
+        if is_data(uri) {
+            return read_data(uri).map_err(|p| format!("the data URI cannot be decoded: {p}"));
         }
         let file = self.find(uri)?;
         raystone_core::files::read(&file).map_err(|error| format!("{}: {error}", file.display()))
     }
 
-    /// Resolves a relative URI, decoding `%20` and the like.
+    /// Resolves a relative URI: as the standard has it, with `%20` and the like decoded, or as
+    /// exporters write it, with backslashes, a blank or percent sign as it is, or a query behind.
     ///
     /// # Errors
     /// The file lies outside the model's folder, by name or by link, and that is not allowed.
     pub(crate) fn find(&self, uri: &str) -> Result<PathBuf, String> {
-        let file = self
-            .folder
-            .join(decoded(uri.strip_prefix("file://").unwrap_or(uri)));
+        if uri.starts_with("http:") || uri.starts_with("https:") {
+            return Err(format!(
+                "`{uri}` is on the network; save it beside the model and write its name instead"
+            ));
+        }
+        let uri = uri.strip_prefix("file://").unwrap_or(uri);
+        let slashes = |text: &str| text.replace('\\', "/");
+        let plain = decoded(uri);
+        let bare = uri.split(['?', '#']).next().unwrap_or_default();
+        let written = [&plain, uri, &slashes(&plain), &slashes(uri), &decoded(bare)];
+        let files = written.map(|name| self.folder.join(name));
+        let exists = |file: &&PathBuf| raystone_core::files::files().real(file).is_ok();
+        // None exists: the name that is most likely meant, for the message.
+        let file = files.iter().find(exists).unwrap_or(&files[2]).clone();
         if self.allow_outside {
             return Ok(file);
         }
@@ -70,7 +78,41 @@ impl Files {
     }
 }
 
+pub(super) fn is_data(uri: &str) -> bool {
+    let scheme = uri.get(..5).unwrap_or_default();
+    scheme.eq_ignore_ascii_case("data:")
+}
+
+/// The bytes of a data URI of any media type, in base64 or percent-encoded (RFC 2397). The base64
+/// may itself be percent-encoded, broken into lines, without padding, or in the letters of URLs.
+fn read_data(uri: &str) -> Result<Vec<u8>, String> {
+    let (head, data) = uri.split_once(',').ok_or("it has no comma")?;
+    let data = decoded_bytes(data);
+    if !head.to_ascii_lowercase().ends_with(";base64") {
+        return Ok(data);
+    }
+    let letter = |byte: &u8| match byte {
+        b'-' => Some(b'+'),
+        b'_' => Some(b'/'),
+        b'=' => None,
+        byte => (!byte.is_ascii_whitespace()).then_some(*byte),
+    };
+    let letters: Vec<u8> = data.iter().filter_map(letter).collect();
+    let engine = GeneralPurpose::new(&alphabet::STANDARD, UNPADDED);
+    engine.decode(letters).map_err(|error| error.to_string())
+}
+
+/// The last letter may have bits beyond the last byte.
+const UNPADDED: GeneralPurposeConfig = GeneralPurposeConfig::new()
+    .with_decode_padding_mode(DecodePaddingMode::RequireNone)
+    .with_decode_allow_trailing_bits(true);
+
 fn decoded(uri: &str) -> String {
+    String::from_utf8_lossy(&decoded_bytes(uri)).into_owned()
+}
+
+/// Decodes `%20` and the like.
+fn decoded_bytes(uri: &str) -> Vec<u8> {
     let mut decoded = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let Some((&byte, after)) = rest.split_first() {
@@ -79,5 +121,5 @@ fn decoded(uri: &str) -> String {
         decoded.push(value.unwrap_or(byte));
         rest = &after[if value.is_some() { 2 } else { 0 }..];
     }
-    String::from_utf8_lossy(&decoded).into_owned()
+    decoded
 }

@@ -1,6 +1,8 @@
 //! Materials and images of glTF documents.
 
 use super::builder::DEFAULT_ALBEDO;
+use super::gltf_data::Data;
+use super::gltf_document::Item;
 use super::gltf_files::Files;
 use super::gltf_texture::{Images, Placed};
 use super::material::{Description, Format, emitted};
@@ -10,7 +12,6 @@ use super::{
     PRINCIPLED, approximation_warning,
 };
 use glam::{Vec3, Vec4, Vec4Swizzles};
-use gltf::material::AlphaMode;
 
 /// Roughness above which glass looks frosted.
 const FROSTED: f32 = 0.1;
@@ -44,19 +45,19 @@ pub(super) struct Palette<'a> {
 /// Reads all materials; images are collected here and decoded later.
 pub(super) fn read<'a>(
     files: &'a Files,
-    document: &gltf::Document,
-    buffers: &'a [Vec<u8>],
+    document: Item<'a>,
+    data: &'a Data<'a>,
     options: &LoadOptions,
 ) -> Palette<'a> {
     let with_textures = options.textures;
-    let mut images = Images::new(files, document, buffers);
+    let mut images = Images::new(files, document, data);
     let (mut materials, mut sets, mut told) = (Vec::new(), Vec::new(), Vec::new());
     let mut elsewhere = Vec::new();
-    for material in document.materials() {
-        let mut found = convert(&material, files, options, &mut told);
+    for (index, material) in document.list("materials").enumerate() {
+        let mut found = convert(material, index, files, options, &mut told);
         let mut set = None;
-        found.mask = mask(&material, &mut images, &mut set);
-        if with_textures && textured(&material, &mut found, &mut images, &mut set) {
+        found.mask = mask(material, &mut images, &mut set);
+        if with_textures && textured(material, &mut found, &mut images, &mut set) {
             elsewhere.push(found.name.clone());
         }
         materials.push(found);
@@ -82,10 +83,10 @@ pub(super) fn read<'a>(
 
 /// Assigns `found` the usable textures of its material. Returns true if one was left out because it
 /// uses another coordinate set than those before it.
-fn textured(
-    material: &gltf::Material<'_>,
+fn textured<'a>(
+    material: Item<'a>,
     found: &mut Material,
-    images: &mut Images<'_>,
+    images: &mut Images<'a>,
     set: &mut Option<u32>,
 ) -> bool {
     let mut left_out = false;
@@ -95,36 +96,39 @@ fn textured(
         is_ours.then_some(placed.place)
     };
     let color = base_color(material).1.filter(|_| found.kind != &MIRROR);
-    found.base_color_texture = color.and_then(|info| take(images.place(&info)));
+    found.base_color_texture = color.and_then(|info| take(images.place(info)));
     if found.kind == &PRINCIPLED {
-        let varied = material.pbr_metallic_roughness();
-        let varied = varied.metallic_roughness_texture();
-        found.metallic_roughness_texture = varied.and_then(|info| take(images.place(&info)));
+        let varied = material.get(METALLIC).get("metallicRoughnessTexture");
+        let varied = varied.given().and_then(|info| take(images.place(info)));
+        found.metallic_roughness_texture = varied;
     }
-    if found.kind != &DIELECTRIC {
-        let bent = material.normal_texture();
-        found.normal_texture = bent.and_then(|info| take(images.place_normals(&info)));
+    if found.kind != &DIELECTRIC
+        && let Some(bent) = material.get("normalTexture").given()
+    {
+        let mut placed = images.place(bent);
+        placed.place.scale = bent.number("scale").unwrap_or(1.0);
+        found.normal_texture = take(placed);
     }
     if found.emission != Vec3::ZERO {
-        let shining = material.emissive_texture();
-        found.emission_texture = shining.and_then(|info| take(images.place(&info)));
+        let shining = material.get("emissiveTexture").given();
+        found.emission_texture = shining.and_then(|info| take(images.place(info)));
     }
     left_out
 }
 
 /// The mask of `alphaMode` `MASK`, from the alpha of the base colour and its texture, whose
 /// coordinate set comes first.
-fn mask(
-    material: &gltf::Material<'_>,
-    images: &mut Images<'_>,
+fn mask<'a>(
+    material: Item<'a>,
+    images: &mut Images<'a>,
     set: &mut Option<u32>,
 ) -> Option<AlphaMask> {
-    if material.alpha_mode() != AlphaMode::Mask {
+    if alpha_mode(material) != "MASK" {
         return None;
     }
     let (factor, texture) = base_color(material);
     let texture = texture.map(|info| {
-        let placed = images.place(&info);
+        let placed = images.place(info);
         *set = Some(placed.set);
         placed.place
     });
@@ -132,90 +136,112 @@ fn mask(
         texture,
         channel: AlphaChannel::Alpha,
         factor: factor.w,
-        cutoff: material.alpha_cutoff().unwrap_or(AlphaMask::CUTOFF),
+        cutoff: material.number("alphaCutoff").unwrap_or(AlphaMask::CUTOFF),
     })
 }
 
+const METALLIC: &str = "pbrMetallicRoughness";
+const GLOSSY: &str = "KHR_materials_pbrSpecularGlossiness";
+const TRANSMISSION: &str = "KHR_materials_transmission";
+const VOLUME: &str = "KHR_materials_volume";
+
+/// Unknown modes are opaque, as the default is.
+fn alpha_mode(material: Item<'_>) -> String {
+    let mode = material.text("alphaMode").unwrap_or("OPAQUE");
+    mode.to_ascii_uppercase()
+}
+
 /// Linear base colour and texture; from `KHR_materials_pbrSpecularGlossiness` if present.
-fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture::Info<'a>>) {
-    match material.pbr_specular_glossiness() {
-        Some(model) => (model.diffuse_factor().into(), model.diffuse_texture()),
-        None => {
-            let model = material.pbr_metallic_roughness();
-            (model.base_color_factor().into(), model.base_color_texture())
-        }
-    }
+fn base_color(material: Item<'_>) -> (Vec4, Option<Item<'_>>) {
+    let (model, factor, texture) = match material.extension(GLOSSY).given() {
+        Some(model) => (model, "diffuseFactor", "diffuseTexture"),
+        None => (
+            material.get(METALLIC),
+            "baseColorFactor",
+            "baseColorTexture",
+        ),
+    };
+    let factor = model.vector(factor, [1.0; 4]).into();
+    (factor, model.get(texture).given())
 }
 
 fn convert(
-    material: &gltf::Material<'_>,
+    material: Item<'_>,
+    index: usize,
     files: &Files,
     options: &LoadOptions,
     warnings: &mut Vec<String>,
 ) -> Material {
     let (color, _) = base_color(material);
-    let model = material.pbr_metallic_roughness();
-    let gloss = material.pbr_specular_glossiness();
-    let emission =
-        emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
+    let model = material.get(METALLIC);
+    let gloss = material.extension(GLOSSY).given();
+    let transmission = material.extension(TRANSMISSION).given();
+    let strength = material.extension("KHR_materials_emissive_strength");
+    let strength = strength.number("emissiveStrength").unwrap_or(1.0);
+    let emission = emitted(material.vector("emissiveFactor", [0.0; 3])) * strength;
     // A texture may darken any part of the surface: better no light than light everywhere.
-    let emission = match material.emissive_texture() {
+    let emission = match material.get("emissiveTexture").given() {
         Some(_) if !options.textures => Vec3::ZERO,
         _ => emission,
     };
-    let index = material.index().unwrap_or(0);
+    let factor = |part: Item<'_>, key: &str, default: f32| part.number(key).unwrap_or(default);
+    let volume = material.extension(VOLUME).given();
     let source = MaterialSource {
-        roughness: Some(match &gloss {
-            Some(gloss) => 1.0 - gloss.glossiness_factor(),
-            None => model.roughness_factor(),
+        roughness: Some(match gloss {
+            Some(gloss) => 1.0 - factor(gloss, "glossinessFactor", 1.0),
+            None => factor(model, "roughnessFactor", 1.0),
         }),
-        metallic: gloss.is_none().then(|| model.metallic_factor()),
-        specular: gloss.map(|gloss| gloss.specular_factor()),
+        metallic: gloss
+            .is_none()
+            .then(|| factor(model, "metallicFactor", 1.0)),
+        specular: gloss.map(|gloss| gloss.vector("specularFactor", [1.0; 3])),
         shininess: None,
-        ior: material.ior(),
-        transmission: material.transmission().map(|t| t.transmission_factor()),
+        ior: ior(material),
+        transmission: transmission.map(|t| factor(t, "transmissionFactor", 0.0)),
         filter: None,
-        thickness: material.volume().map(|v| v.thickness_factor()),
+        thickness: volume.map(|v| factor(v, "thicknessFactor", 0.0)),
         opacity: Some(color.w),
-        // The standard's names are the crate's in capitals.
-        alpha_mode: Some(format!("{:?}", material.alpha_mode()).to_uppercase()),
+        alpha_mode: Some(alpha_mode(material)),
         illum: None,
     };
+    let has = |part: Item<'_>, key: &str| part.get(key).is_given();
     let description = Description {
         format: Format::Gltf,
         base_color: color.xyz(),
-        is_varied: model.metallic_roughness_texture().is_some()
-            || material
-                .transmission()
-                .is_some_and(|t| t.transmission_texture().is_some()),
+        is_varied: has(model, "metallicRoughnessTexture")
+            || transmission.is_some_and(|t| has(t, "transmissionTexture")),
         is_followed: options.textures,
         source: &source,
     };
-    let name = material.name();
+    let name = material.text("name").filter(|name| !name.is_empty());
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
     Material {
         emission: emitted(emission),
-        emits_both_sides: material.double_sided(),
+        emits_both_sides: material.flag("doubleSided") == Some(true),
         ..Material::described(name, &description, options.kinds, &files.model, warnings)
     }
 }
 
+fn ior(material: Item<'_>) -> Option<f32> {
+    let ior = material.extension("KHR_materials_ior").given()?;
+    Some(ior.number("ior").unwrap_or(1.5))
+}
+
 /// Surface extensions used by some material and named by [`warnings`].
-fn named(document: &gltf::Document) -> Vec<&'static str> {
+fn named(document: Item<'_>) -> Vec<&'static str> {
     let has = |name: &&str| {
-        document
-            .materials()
-            .any(|m| m.extension_value(name).is_some())
+        let mut materials = document.list("materials");
+        materials.any(|m| m.extension(name).is_given())
     };
     EXTENSIONS.into_iter().filter(has).collect()
 }
 
 /// One warning per kind of appearance drawn differently from the file.
-fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
+fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
     // Pairs each converted material with its original; the final default one has none.
-    let of = |wanted: &dyn Fn(&Material, &gltf::Material<'_>) -> bool| -> Vec<&str> {
-        let pairs = materials.iter().zip(document.materials());
-        let chosen = pairs.filter(|(converted, original)| wanted(converted, original));
+    let of = |wanted: &dyn Fn(&Material, Item<'_>) -> bool| -> Vec<&str> {
+        let pairs = materials.iter().zip(document.list("materials"));
+        let chosen = pairs.filter(|(converted, original)| wanted(converted, *original));
         chosen
             .map(|(converted, _)| converted.name.as_str())
             .collect()
@@ -224,25 +250,24 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         of(&|m, _| m.kind != &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0));
     let frosted =
         of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
-    let blended = of(&|_, original| original.alpha_mode() == AlphaMode::Blend);
+    let blended = of(&|_, original| alpha_mode(original) == "BLEND");
     // A texture may scale the metalness, so the factor alone decides nothing.
     let metal = of(&|m, original| {
-        let model = original.pbr_metallic_roughness();
-        m.kind == &DIFFUSE
-            && m.source.metallic.is_some_and(|metal| metal > 0.5)
-            && model.metallic_roughness_texture().is_none()
+        let varied = original.get(METALLIC).get("metallicRoughnessTexture");
+        let is_metal = m.source.metallic.is_some_and(|metal| metal > 0.5);
+        m.kind == &DIFFUSE && is_metal && !varied.is_given()
     });
     let glossy = of(&|_, original| {
-        let model = original.pbr_specular_glossiness();
-        model.is_some_and(|model| model.specular_glossiness_texture().is_some())
+        let model = original.extension(GLOSSY);
+        model.get("specularGlossinessTexture").is_given()
     });
     let tinted = of(&|_, original| {
-        let volume = original.volume();
-        volume.is_some_and(|volume| volume.attenuation_distance().is_finite())
+        let volume = original.extension(VOLUME);
+        volume.number("attenuationDistance").is_some()
     });
-    let occluded = of(&|_, original| original.occlusion_texture().is_some());
+    let occluded = of(&|_, original| original.get("occlusionTexture").is_given());
     let extended = EXTENSIONS.iter().filter_map(|name| {
-        let names = of(&|_, original| original.extension_value(name).is_some());
+        let names = of(&|_, original| original.extension(name).is_given());
         approximation_warning(&format!("extended by {name}"), "if it were not", names)
     });
     [

@@ -1,19 +1,29 @@
 //! Textures of glTF documents: images and texture transforms.
 
-use super::gltf_files::Files;
+use super::gltf_data::Data;
+use super::gltf_document::Item;
+use super::gltf_files::{Files, is_data};
 use super::texture::{Encoded, ImageSource};
 use super::{TextureUse, Wrap};
 use glam::{Mat2, Vec2};
-use gltf::texture::WrappingMode;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// Images used by some material, without duplicates, and those left out.
 pub(super) struct Images<'a> {
     files: &'a Files,
-    buffers: &'a [Vec<u8>],
-    /// Index in `used` of each of the document's images.
-    ids: Vec<Option<u32>>,
+    document: Item<'a>,
+    data: &'a Data<'a>,
+    /// Index in `used` of each image.
+    ids: BTreeMap<Source, u32>,
     pub used: Vec<ImageSource<'a>>,
+}
+
+/// The image of a texture, or a texture without any.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Source {
+    Image(usize),
+    None(usize),
 }
 
 pub(super) struct Placed {
@@ -21,122 +31,112 @@ pub(super) struct Placed {
     pub place: TextureUse,
 }
 
-/// `KHR_texture_transform` as given in the file.
-struct Given {
-    offset: Vec2,
-    rotation: f32,
-    scale: Vec2,
-    set: Option<u32>,
-}
+const TRANSFORM: &str = "KHR_texture_transform";
 
 impl<'a> Images<'a> {
-    pub(crate) fn new(files: &'a Files, document: &gltf::Document, buffers: &'a [Vec<u8>]) -> Self {
+    pub(crate) fn new(files: &'a Files, document: Item<'a>, data: &'a Data<'a>) -> Self {
         Self {
             files,
-            buffers,
-            ids: vec![None; document.images().len()],
+            document,
+            data,
+            ids: BTreeMap::new(),
             used: Vec::new(),
         }
     }
 
-    pub(crate) fn place(&mut self, info: &gltf::texture::Info<'_>) -> Placed {
-        let given = info.texture_transform().map(|t| Given {
-            offset: t.offset().into(),
-            rotation: t.rotation(),
-            scale: t.scale().into(),
-            set: t.tex_coord(),
-        });
-        self.placed(&info.texture(), info.tex_coord(), given)
-    }
-
-    pub(crate) fn place_normals(&mut self, info: &gltf::material::NormalTexture<'_>) -> Placed {
-        let given = info
-            .extension_value("KHR_texture_transform")
-            .map(given_by_json);
-        let mut found = self.placed(&info.texture(), info.tex_coord(), given);
-        found.place.scale = info.scale();
-        found
-    }
-
-    fn placed(&mut self, texture: &gltf::Texture<'_>, set: u32, given: Option<Given>) -> Placed {
-        let sampler = texture.sampler();
-        let wrap = |mode| match mode {
-            WrappingMode::Repeat => Wrap::Repeat,
-            WrappingMode::MirroredRepeat => Wrap::Mirrored,
-            WrappingMode::ClampToEdge => Wrap::Clamp,
+    /// The texture that a material names by `info`, which may have a transform.
+    pub(crate) fn place(&mut self, info: Item<'a>) -> Placed {
+        let index = info.index("index").unwrap_or(usize::MAX);
+        let texture = self.document.at("textures", index);
+        let sampler = texture.and_then(|texture| texture.index("sampler"));
+        let sampler = sampler.and_then(|sampler| self.document.at("samplers", sampler));
+        let wrap = |key| match sampler.and_then(|sampler| sampler.index(key)) {
+            Some(33071) => Wrap::Clamp,
+            Some(33648) => Wrap::Mirrored,
+            _ => Wrap::Repeat,
         };
         let mut place = TextureUse {
-            wrap: [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
-            ..TextureUse::plain(self.id(&texture.source()))
+            wrap: [wrap("wrapS"), wrap("wrapT")],
+            ..TextureUse::plain(self.id(index, texture))
         };
-        let mut used = set;
-        if let Some(given) = given {
-            let (sin, cos) = given.rotation.sin_cos();
+        let set = |part: Item<'_>| part.index("texCoord").map(|set| set as u32);
+        let mut used = set(info).unwrap_or(0);
+        if let Some(given) = info.extension(TRANSFORM).given() {
+            let (sin, cos) = given.number("rotation").unwrap_or(0.0).sin_cos();
             let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
-            place.linear = rotation * Mat2::from_diagonal(given.scale);
-            place.offset = given.offset;
-            used = given.set.unwrap_or(set);
+            let scale = Vec2::from(given.vector("scale", [1.0; 2]));
+            place.linear = rotation * Mat2::from_diagonal(scale);
+            place.offset = given.vector("offset", [0.0; 2]).into();
+            used = set(given).unwrap_or(used);
         }
         Placed { set: used, place }
     }
 
-    fn id(&mut self, image: &gltf::Image<'_>) -> u32 {
-        let (files, buffers, used) = (self.files, self.buffers, &mut self.used);
-        *self.ids[image.index()].get_or_insert_with(|| {
-            used.push(image_source(files, image, buffers));
+    fn id(&mut self, index: usize, texture: Option<Item<'a>>) -> u32 {
+        let source = texture.and_then(source);
+        let key = source.map_or(Source::None(index), Source::Image);
+        let (files, data, used) = (self.files, self.data, &mut self.used);
+        let image = source.map(|source| (source, self.document.at("images", source)));
+        *self.ids.entry(key).or_insert_with(|| {
+            used.push(match image {
+                Some((index, Some(image))) => image_source(files, data, index, image),
+                Some((image, None)) => missing(index, format!("there is no image {image}")),
+                None => missing(index, without_image(texture)),
+            });
             used.len() as u32 - 1
         })
     }
 }
 
-/// Missing and non-numeric values count as not given.
-fn given_by_json(value: &serde_json::Value) -> Given {
-    let number = |value: Option<&serde_json::Value>| {
-        let number = value.and_then(serde_json::Value::as_f64);
-        number.map(|x| x as f32).filter(|x| x.is_finite())
+/// The image of a texture: its own, which all can read, or that of an extension.
+fn source(texture: Item<'_>) -> Option<usize> {
+    let webp = texture.extension("EXT_texture_webp");
+    texture.index("source").or_else(|| webp.index("source"))
+}
+
+fn without_image(texture: Option<Item<'_>>) -> String {
+    let Some(texture) = texture else {
+        return "there is no such texture".to_owned();
     };
-    let pair = |key: &str, default: f32| {
-        let values = value.get(key);
-        let part = |k: usize| number(values.and_then(|v| v.get(k))).unwrap_or(default);
-        Vec2::new(part(0), part(1))
-    };
-    let set = value.get("texCoord").and_then(serde_json::Value::as_u64);
-    Given {
-        offset: pair("offset", 0.0),
-        rotation: number(value.get("rotation")).unwrap_or(0.0),
-        scale: pair("scale", 1.0),
-        set: set.and_then(|set| u32::try_from(set).ok()),
+    match texture.get("extensions").members().next() {
+        Some((name, _)) => format!("its only image is that of `{name}`, which is not read"),
+        None => "it names no image".to_owned(),
+    }
+}
+
+fn missing<'a>(texture: usize, why: String) -> ImageSource<'a> {
+    ImageSource {
+        name: texture.to_string(),
+        encoded: Encoded::Missing(why),
     }
 }
 
 fn image_source<'a>(
     files: &Files,
-    image: &gltf::Image<'_>,
-    buffers: &'a [Vec<u8>],
+    data: &'a Data<'a>,
+    index: usize,
+    image: Item<'a>,
 ) -> ImageSource<'a> {
-    let index = image.index();
-    let (uri_name, encoded) = match image.source() {
-        gltf::image::Source::View { view, .. } => {
-            let range = view.offset()..view.offset().saturating_add(view.length());
-            let buffer = buffers.get(view.buffer().index());
-            let bytes = buffer.and_then(|data| data.get(range));
-            let missing = || Encoded::Missing("its bytes lie outside the buffer".to_owned());
-            let encoded = bytes.map_or_else(missing, |b| Encoded::Memory(Cow::Borrowed(b)));
-            (None, encoded)
-        }
-        gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
-            let owned = |bytes| Encoded::Memory(Cow::Owned(bytes));
+    let owned = |bytes| Encoded::Memory(Cow::Owned(bytes));
+    let borrowed = |bytes| Encoded::Memory(Cow::Borrowed(bytes));
+    let (uri, encoded) = match (image.index("bufferView"), image.text("uri")) {
+        (Some(view), _) => (
+            None,
+            data.view(view).map_or_else(Encoded::Missing, borrowed),
+        ),
+        (None, Some(uri)) if is_data(uri) => {
             (None, files.read(uri).map_or_else(Encoded::Missing, owned))
         }
-        gltf::image::Source::Uri { uri, .. } => (
-            Some(uri),
-            files.find(uri).map_or_else(Encoded::Missing, Encoded::File),
-        ),
+        (None, Some(uri)) => {
+            let found = files.find(uri).map_or_else(Encoded::Missing, Encoded::File);
+            (Some(uri), found)
+        }
+        (None, None) => (None, Encoded::Missing("it names no file".to_owned())),
     };
+    let name = image.text("name").filter(|name| !name.is_empty());
     ImageSource {
-        name: image
-            .name()
-            .or(uri_name)
+        name: name
+            .or(uri)
             .map_or_else(|| format!("image {index}"), str::to_owned),
         encoded,
     }

@@ -15,14 +15,22 @@ mod environment;
 mod error;
 mod framing;
 mod gltf;
-mod gltf_accessor;
+#[cfg(test)]
+mod gltf_cases;
 mod gltf_container;
+mod gltf_data;
+mod gltf_document;
 mod gltf_files;
 mod gltf_instancing;
 mod gltf_lights;
 mod gltf_material;
+mod gltf_meshopt;
+#[cfg(test)]
+mod gltf_meshopt_tests;
+mod gltf_notes;
+mod gltf_primitive;
+mod gltf_roots;
 mod gltf_texture;
-mod gltf_unread;
 mod hung_lamps;
 mod ies;
 mod instances;

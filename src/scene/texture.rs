@@ -10,9 +10,9 @@ use std::path::PathBuf;
 
 /// Source of the encoded image.
 pub(super) enum Encoded<'a> {
-    /// A PNG or JPEG file.
+    /// A PNG, JPEG or WebP file.
     File(PathBuf),
-    /// A PNG or JPEG in memory.
+    /// A PNG, JPEG or WebP in memory.
     Memory(Cow<'a, [u8]>),
     /// Not found, with the reason.
     Missing(String),

@@ -128,10 +128,9 @@ pub fn says_where(message: &str) -> bool {
         "byte ",
         "accessor",
     ];
-    const WHOLE: [&str; 6] = [
+    const WHOLE: [&str; 5] = [
         "the file is empty",
         "has no triangles",
-        "it has no scene",
         "holds no record",
         "empty point set",
         "nothing is left to run",

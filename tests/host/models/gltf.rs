@@ -91,8 +91,6 @@ fn broken_gltf_files_say_which_part() {
     let bin = square_bin(&image);
     let json = square_json(image.len());
     for (from, to, expected) in [
-        ("\"nodes\":[0,1,3]", "\"nodes\":[0,1,1]", "node 1"),
-        ("\"children\":[2]", "\"children\":[1]", "node 1"),
         (
             "\"count\":4,\"type\":\"VEC3\"",
             "\"count\":3,\"type\":\"VEC3\"",
@@ -105,12 +103,6 @@ fn broken_gltf_files_say_which_part() {
             "mesh 0",
         ),
         ("{\"mesh\":0}", "{}", ""),
-        (
-            "\"asset\"",
-            "\"extensionsRequired\":[\"X_none\"],\"asset\"",
-            "extensionsRequired",
-        ),
-        ("\"material\":0", "\"material\":9", "material"),
     ] {
         assert!(json.contains(from), "{from}");
         let result = load_files("a.glb", &[("a.glb", &glb(&json.replace(from, to), &bin))]);

@@ -195,7 +195,11 @@ fn listed_instances_stand_where_they_are_put() {
     for (from, to, expected) in [
         ("\"TRANSLATION\":2", "\"TRANSLATION\":99", "no accessor 99"),
         ("\"TRANSLATION\":2", "\"TRANSLATION\":0", "of 4 and of 2"),
-        ("\"TRANSLATION\":2", "\"TRANSLATION\":3", "three 32-bit"),
+        (
+            "\"TRANSLATION\":2",
+            "\"TRANSLATION\":3",
+            "4 components, not 3",
+        ),
         (
             "\"attributes\":{\"TR",
             "\"attributs\":{\"TR",

@@ -1,0 +1,246 @@
+//! Materials and textures.
+
+use super::*;
+
+fn textured(name: &'static str) -> Case {
+    let uvs = CORNERS.iter().flat_map(|[x, y, _]| [*x, *y]);
+    case(name)
+        .accessor(floats(uvs), 5126, "VEC2", 4)
+        .set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(2))
+        .material(
+            json!({"name": "wood", "pbrMetallicRoughness": {"metallicFactor": 0,
+            "baseColorFactor": [0.2, 0.4, 0.6, 1], "baseColorTexture": {"index": 0}}}),
+        )
+        .set("/textures", json!([{"source": 0}]))
+        .set("/images", json!([{"uri": "wood.png"}]))
+        .file("wood.png", image(image::ImageFormat::Png))
+}
+
+fn image(format: image::ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let pixels = image::RgbImage::from_raw(2, 1, vec![255, 0, 0, 0, 0, 255]).expect("a size");
+    pixels.write_to(&mut bytes, format).expect("an image");
+    bytes.into_inner()
+}
+
+impl Loaded {
+    #[track_caller]
+    fn images(self, count: usize) -> Self {
+        assert_eq!(self.scene().textures.len(), count, "{}", self.name);
+        self
+    }
+}
+
+#[test]
+fn textures_are_drawn_or_their_constant_is() {
+    let plain = [0.2, 0.4, 0.6];
+    textured("a texture").load().whole(2).images(1);
+    textured("a source of its own")
+        .set(
+            "/textures/0/extensions",
+            json!({"KHR_texture_basisu": {"source": 9}}),
+        )
+        .set("/extensionsUsed", json!(["KHR_texture_basisu"]))
+        .load()
+        .but(2, &["the extension `KHR_texture_basisu` (texture 0)"])
+        .images(1);
+    textured("a source of an extension alone")
+        .set(
+            "/textures",
+            json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]),
+        )
+        .set("/extensionsRequired", json!(["KHR_texture_basisu"]))
+        .load()
+        .but(
+            2,
+            &[
+                "its only image is that of `KHR_texture_basisu`",
+                "drawn with the constant",
+            ],
+        )
+        .images(0)
+        .color(plain);
+    textured("an image for browsers alone")
+        .set(
+            "/textures",
+            json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]),
+        )
+        .set("/extensionsRequired", json!(["EXT_texture_webp"]))
+        .file("wood.png", image(image::ImageFormat::WebP))
+        .load()
+        .whole(2)
+        .images(1);
+    textured("an image for browsers, and one for all")
+        .set(
+            "/textures/0/extensions",
+            json!({"EXT_texture_webp": {"source": 9}}),
+        )
+        .load()
+        .whole(2)
+        .images(1);
+    for (path, value, word) in [
+        ("/textures", json!([{}]), "it names no image"),
+        ("/textures", Value::Null, "there is no such texture"),
+        ("/textures/0/source", json!(7), "there is no image 7"),
+        ("/images/0/uri", json!("none.png"), "texture none.png"),
+        ("/images/0/uri", Value::Null, "it names no file"),
+        ("/images/0", json!({"bufferView": 70}), "no buffer view 70"),
+        (
+            "/images/0/uri",
+            json!("data:image/png;base64,*"),
+            "cannot be decoded",
+        ),
+        (
+            "/images/0/uri",
+            json!("../wood.png"),
+            "outside the model's folder",
+        ),
+    ] {
+        let case = textured(path).set(path, value);
+        case.load()
+            .but(2, &["drawn with the constant", word])
+            .images(0)
+            .color(plain);
+    }
+    let encoded = STANDARD.encode(image(image::ImageFormat::Png));
+    for uri in [
+        format!("data:image/png;base64,{encoded}"),
+        format!("data:image/jpeg;base64,{encoded}"),
+        format!(
+            "data:application/octet-stream;base64,{}",
+            encoded.trim_end_matches('=')
+        ),
+        "wood.png".to_owned(),
+        ".\\wood.png".to_owned(),
+    ] {
+        textured("a URI")
+            .set("/images/0/uri", json!(uri))
+            .load()
+            .whole(2)
+            .images(1);
+    }
+    textured("a sampler that is not there")
+        .set("/textures/0/sampler", json!(4))
+        .load()
+        .whole(2);
+}
+
+#[test]
+fn coordinates_of_textures_are_read_in_every_type() {
+    let corners = || {
+        CORNERS
+            .as_flattened()
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .flat_map(|[x, y, _]| [*x, *y])
+    };
+    let words = |most: f32| shorts(corners().map(|x| (x * most) as u16));
+    let bytes = |most: f32| corners().map(|x| (x * most) as u8).collect::<Vec<_>>();
+    let quantised = json!(["KHR_mesh_quantization"]);
+    for (name, component, data, is_normalised, used, far) in [
+        ("u16", 5123, words(65_535.0), true, json!([]), 1.0),
+        ("u8", 5121, bytes(255.0), true, json!([]), 1.0),
+        (
+            "u16 of the standard itself",
+            5123,
+            words(65_535.0),
+            false,
+            json!([]),
+            1.0,
+        ),
+        ("i16", 5122, words(32_767.0), true, quantised.clone(), 1.0),
+        (
+            "u16 as they are",
+            5123,
+            words(3.0),
+            false,
+            quantised.clone(),
+            3.0,
+        ),
+        ("i8 as they are", 5120, bytes(3.0), false, quantised, 3.0),
+    ] {
+        let scene = textured(name)
+            .accessor(data, component, "VEC2", 4)
+            .set("/accessors/3/normalized", json!(is_normalised))
+            .set("/extensionsUsed", used)
+            .set("/meshes/0/primitives/0/attributes/TEXCOORD_0", json!(3))
+            .load()
+            .whole(2);
+        assert_eq!(scene.scene().uvs[0][2], glam::Vec2::splat(far), "{name}");
+    }
+    textured("coordinates outside")
+        .set("/accessors/2/count", json!(99))
+        .load()
+        .but(2, &["`TEXCOORD_0`, whose values are outside"]);
+    let moved =
+        json!({"KHR_texture_transform": {"offset": [0.5, null], "scale": [2, 2], "texCoord": 3}});
+    textured("a transform of another set")
+        .set(
+            "/materials/0/pbrMetallicRoughness/baseColorTexture/extensions",
+            moved,
+        )
+        .set("/meshes/0/primitives/0/attributes/TEXCOORD_3", json!(2))
+        .load()
+        .whole(2)
+        .images(1);
+}
+
+#[test]
+fn surfaces_that_are_drawn_otherwise_are_named() {
+    for name in [
+        "KHR_materials_anisotropy",
+        "KHR_materials_clearcoat",
+        "KHR_materials_diffuse_transmission",
+        "KHR_materials_dispersion",
+        "KHR_materials_iridescence",
+        "KHR_materials_sheen",
+        "KHR_materials_specular",
+        "KHR_materials_unlit",
+    ] {
+        case(name)
+            .material(json!({"name": "shell", "extensions": {name: {}}}))
+            .set("/extensionsRequired", json!([name]))
+            .load()
+            .but(2, &["1 material is extended by", name, "shell"]);
+    }
+    case("thin glass")
+        .material(json!({"name": "pane", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {}}}))
+        .load()
+        .whole(2);
+    case("half glass")
+        .material(json!({"name": "pane", "extensions":
+            {"KHR_materials_transmission": {"transmissionFactor": 0.4}}}))
+        .load()
+        .but(2, &["1 material is transmissive", "pane"]);
+    case("blended")
+        .material(json!({"name": "veil", "alphaMode": "BLEND"}))
+        .load()
+        .but(2, &["blended by alpha", "veil"]);
+    case("specular and gloss")
+        .material(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness":
+            {"diffuseFactor": [0.1, 0.2, 0.3, 1], "specularFactor": [0, 0, 0]}}}))
+        .load()
+        .whole(2)
+        .color([0.1, 0.2, 0.3].map(|x| x / 0.96));
+    case("a short colour")
+        .material(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3], "metallicFactor": 0}}))
+        .load()
+        .whole(2)
+        .color([0.1, 0.2, 0.3]);
+    case("no such material")
+        .set("/meshes/0/primitives/0/material", json!(7))
+        .load()
+        .but(
+            2,
+            &[
+                "a material that is not there",
+                "mesh 0 `square`, primitive 0",
+            ],
+        );
+    case("a strange mode")
+        .material(json!({"alphaMode": "GLOW"}))
+        .load()
+        .whole(2);
+}

@@ -1,0 +1,293 @@
+//! Scenes, nodes and what hangs on them.
+
+use super::*;
+
+#[test]
+fn a_scene_begins_somewhere() {
+    let two = |name| {
+        case(name).set(
+            "/nodes/-",
+            json!({"mesh": 0, "translation": [3, 0, 0], "name": "b"}),
+        )
+    };
+    let no_scenes = |case: Case| case.set("/scenes", Value::Null).set("/scene", Value::Null);
+    no_scenes(two("no scenes")).load().whole(4);
+    no_scenes(two("no scenes, but children"))
+        .set("/nodes/1/children", json!([0]))
+        .load()
+        .whole(4)
+        .corner([4.0, 1.0, 0.0]);
+    two("no default scene")
+        .set("/scene", Value::Null)
+        .load()
+        .whole(2);
+    two("an empty list of scenes")
+        .set("/scenes", json!([]))
+        .load()
+        .but(4, &["scene 0"]);
+    two("a scene that is not there")
+        .set("/scene", json!(7))
+        .load()
+        .but(2, &["the scene to show is not there", "scene 7"]);
+    two("another scene")
+        .set("/scenes/-", json!({"name": "night", "nodes": [1]}))
+        .load()
+        .but(
+            2,
+            &["scenes that are not the one to show are left out (scene 1 `night`)"],
+        );
+    two("the second scene")
+        .set("/scenes/-", json!({"nodes": [0, 1]}))
+        .set("/scene", json!(1))
+        .set("/scenes/0/nodes", json!([]))
+        .load()
+        .whole(4);
+    case("no nodes")
+        .set("/nodes", Value::Null)
+        .load()
+        .fails(&["no triangles"]);
+    case("an empty scene")
+        .set("/scenes/0/nodes", json!([]))
+        .load()
+        .fails(&["no triangles"]);
+    two("a root that is not there")
+        .set("/scenes/0/nodes", json!([0, 9]))
+        .load()
+        .but(2, &["named but not there", "node 9"]);
+}
+
+#[test]
+fn nodes_are_drawn_wherever_they_stand() {
+    let of = |name, nodes: Value| case(name).set("/nodes", nodes);
+    let moved = |by: u32| json!({"translation": [by, 0, 0], "children": [2]});
+    of(
+        "two parents",
+        json!([{"children": [1, 3]}, moved(3), {"mesh": 0, "name": "leg"}, moved(6)]),
+    )
+    .load()
+    .but(4, &["children of several nodes", "node 2 `leg`"])
+    .corner([4.0, 1.0, 0.0]);
+    of(
+        "a child listed as a root",
+        json!([{"children": [1]}, {"mesh": 0}]),
+    )
+    .set("/scenes/0/nodes", json!([0, 1]))
+    .load()
+    .but(2, &["listed as roots", "node 1"]);
+    of("a root listed twice", json!([{"mesh": 0}]))
+        .set("/scenes/0/nodes", json!([0, 0]))
+        .load()
+        .but(2, &["drawn once", "node 0"]);
+    of(
+        "its own child",
+        json!([{"mesh": 0, "children": [0], "name": "snake"}]),
+    )
+    .load()
+    .but(2, &["children of themselves", "node 0 `snake`"]);
+    of(
+        "a circle",
+        json!([{"mesh": 0, "children": [1]}, {"children": [0]}]),
+    )
+    .load()
+    .but(2, &["children of themselves"]);
+    of(
+        "a circle without scenes",
+        json!([{"mesh": 0, "children": [1]}, {"children": [0]}]),
+    )
+    .set("/scenes", Value::Null)
+    .load()
+    .but(2, &["children of themselves"]);
+    of(
+        "a child that is not there",
+        json!([{"mesh": 0, "children": [7, "x", null]}]),
+    )
+    .load()
+    .but(2, &["named but not there", "node 7"]);
+    of(
+        "a mesh that is not there",
+        json!([{"mesh": 0, "children": [1]}, {"mesh": 5, "name": "gone"}]),
+    )
+    .load()
+    .but(2, &["a mesh that is not there", "node 1 `gone`"]);
+    // Each level shows the next twice: a small file with more places than can be walked.
+    let levels = (1..40)
+        .map(|k| json!({"children": [k, k]}))
+        .chain([json!({"mesh": 0})]);
+    let twice = of("doubled", levels.collect()).load();
+    twice.fails(&["node ", "more than"]);
+}
+
+#[test]
+fn transforms_may_be_rounded_flat_or_broken() {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let with = |name, key: &str, value: Value| case(name).set(&format!("/nodes/0/{key}"), value);
+    with("a turn", "rotation", json!([0, 0, half, half]))
+        .load()
+        .whole(2)
+        .corner([-1.0, 1.0, 0.0]);
+    with("a long quaternion", "rotation", json!([0, 0, 3, 3]))
+        .load()
+        .whole(2)
+        .corner([-1.0, 1.0, 0.0]);
+    with("no rotation", "rotation", json!([0, 0, 0, 0]))
+        .load()
+        .whole(2)
+        .corner([1.0, 1.0, 0.0]);
+    with("a mirror", "scale", json!([-1, 1, 1]))
+        .load()
+        .whole(2)
+        .corner([-1.0, 1.0, 0.0]);
+    with("a flat scale", "scale", json!([2, 2, 0]))
+        .load()
+        .whole(2)
+        .corner([2.0, 2.0, 0.0]);
+    let identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1];
+    with("a matrix", "matrix", json!(identity))
+        .load()
+        .whole(2)
+        .corner([6.0, 1.0, 0.0]);
+    let mut broken: Vec<Value> = identity.iter().map(|x| json!(x)).collect();
+    broken[12] = Value::Null;
+    with("a matrix of NaN", "matrix", json!(broken))
+        .load()
+        .fails(&["no triangles", "all 2 have a NaN"]);
+    let beside = case("a broken node beside others")
+        .set("/nodes/-", json!({"mesh": 0, "matrix": broken}))
+        .set("/scenes/0/nodes", json!([0, 1]))
+        .load();
+    assert_eq!(beside.scene().triangles.len(), 2);
+    assert_eq!(beside.scene().report.dropped_non_finite, 2);
+}
+
+#[test]
+fn what_hangs_on_nodes_is_drawn_or_named() {
+    let on = |name, key: &str, value: Value| case(name).set(&format!("/nodes/0/{key}"), value);
+    let beside = json!([{"mesh": 0}, {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}}]);
+    case("a hidden node")
+        .set("/nodes", beside)
+        .set("/scenes/0/nodes", json!([0, 1]))
+        .set("/extensionsRequired", json!(["KHR_node_visibility"]))
+        .load()
+        .whole(2);
+    on("a camera", "camera", json!(0))
+        .set(
+            "/cameras",
+            json!([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]),
+        )
+        .load()
+        .whole(2);
+    for camera in [
+        json!({"name": "plan", "type": "orthographic", "orthographic": {"xmag": 1}}),
+        json!({"name": "plan"}),
+        json!({"name": "plan", "type": "perspective", "perspective": null}),
+    ] {
+        on("another camera", "camera", json!(0))
+            .set("/cameras", json!([camera]))
+            .load()
+            .but(2, &["without a perspective", "camera 0 `plan`"]);
+    }
+    on("no camera", "camera", json!(3))
+        .load()
+        .but(2, &["camera 3"]);
+    on("a camera that sees nothing", "camera", json!(0))
+        .set("/cameras", json!([{"perspective": {"yfov": 9}}]))
+        .load()
+        .but(2, &["a camera of the file was ignored", "camera 0"]);
+    let light = |index: u32| json!({"KHR_lights_punctual": {"light": index}});
+    let lights = json!({"KHR_lights_punctual": {"lights": [{"type": "spot"}, {"type": "area"}]}});
+    let lit = on("a light", "extensions", light(0))
+        .set("/extensions", lights.clone())
+        .load()
+        .whole(2);
+    assert_eq!(lit.scene().lights.len(), 1);
+    for index in [1, 2] {
+        on("no light", "extensions", light(index))
+            .set("/extensions", lights.clone())
+            .load()
+            .but(
+                2,
+                &["lights that are missing or of an unknown type", "node 0"],
+            );
+    }
+    on("a skin", "skin", json!(0))
+        .set("/skins", json!([{"joints": "broken"}]))
+        .load()
+        .but(
+            2,
+            &["a skin or morph targets", "rest shape", "mesh 0 `square`"],
+        );
+    case("morph targets")
+        .set("/meshes/0/primitives/0/targets", json!([{"POSITION": 99}]))
+        .load()
+        .but(2, &["rest shape"]);
+    let animation = json!([{"channels": [{"target": {"path": "pointer"}}]}, {"name": "walk"}]);
+    case("animations")
+        .set("/animations", animation)
+        .load()
+        .but(2, &["animations (2, the first: animation 0)"]);
+}
+
+#[test]
+fn extensions_that_are_not_read_refuse_nothing_and_are_named() {
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        case("required")
+            .set(
+                &format!("/{key}"),
+                json!(["X_own", "KHR_texture_transform", "KHR_texture_basisu"]),
+            )
+            .load()
+            .but(
+                2,
+                &[
+                    "the extension `X_own`",
+                    "the extension `KHR_texture_basisu`",
+                ],
+            );
+    }
+    case("where it is")
+        .set("/extensionsUsed", json!(["MSFT_lod"]))
+        .set("/nodes/0/extensions", json!({"MSFT_lod": {"ids": [1]}}))
+        .set(
+            "/nodes/-",
+            json!({"name": "far", "extensions": {"MSFT_lod": null}}),
+        )
+        .load()
+        .but(2, &["the extension `MSFT_lod` (2, the first: node 0)"]);
+    case("not declared")
+        .set(
+            "/accessors/0/extensions",
+            json!({"X_deep": {"extensions": {"X_deeper": {}}}}),
+        )
+        .load()
+        .but(2, &["`X_deep` (accessor 0)", "`X_deeper` (accessor 0)"]);
+    for (key, value) in [
+        ("samplers", json!([{"magFilter": "soft", "wrapS": 1}])),
+        (
+            "images",
+            json!([{}, {"uri": "none.png"}, {"bufferView": 77}]),
+        ),
+        ("textures", json!([{"source": 99}])),
+        ("skins", json!([{}])),
+        ("cameras", json!([{"type": 3}])),
+        ("extras", json!({"extensions": 5})),
+        (
+            "materials",
+            json!([{"alphaMode": 7, "pbrMetallicRoughness": {"baseColorTexture": null}}]),
+        ),
+    ] {
+        case("broken, but not used")
+            .set(&format!("/{key}"), value)
+            .load()
+            .whole(2);
+    }
+    case("an accessor that nothing uses")
+        .set("/accessors/-", json!({"componentType": 5, "type": "MAT9"}))
+        .load()
+        .whole(2);
+    case("values of other types")
+        .set("/nodes/0/name", json!(5))
+        .set("/nodes/0/children", json!(null))
+        .set("/meshes/0/name", json!(null))
+        .load()
+        .whole(2);
+}

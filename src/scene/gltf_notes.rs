@@ -1,0 +1,124 @@
+//! Reports parts of a glTF document that are not drawn as the file says, each once.
+
+use super::gltf_document::Item;
+use super::gltf_instancing::OF_NODES;
+use super::gltf_meshopt::COMPRESSIONS;
+use super::tally::unread_warning;
+use std::collections::BTreeMap;
+
+/// Extensions that are read, or that change nothing once the data is.
+const READ: [&str; 10] = [
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Lists of the document whose elements may have extensions, and the word for one.
+const LISTS: [(&str, &str); 13] = [
+    ("accessors", "accessor"),
+    ("animations", "animation"),
+    ("buffers", "buffer"),
+    ("bufferViews", "buffer view"),
+    ("cameras", "camera"),
+    ("images", "image"),
+    ("materials", "material"),
+    ("meshes", "mesh"),
+    ("nodes", "node"),
+    ("samplers", "sampler"),
+    ("scenes", "scene"),
+    ("skins", "skin"),
+    ("textures", "texture"),
+];
+
+/// How often something was met, and the first place of it.
+struct Met {
+    count: usize,
+    first: String,
+}
+
+#[derive(Default)]
+pub(super) struct Notes {
+    /// Sentences, one warning each.
+    told: BTreeMap<String, Met>,
+    /// Names of what is drawn as if it were not there, in one warning.
+    unread: BTreeMap<String, Met>,
+}
+
+impl Notes {
+    pub(crate) fn tell(&mut self, what: impl Into<String>, place: impl FnOnce() -> String) {
+        add(&mut self.told, what.into(), place);
+    }
+
+    pub(crate) fn unread(&mut self, what: impl Into<String>, place: impl FnOnce() -> String) {
+        add(&mut self.unread, what.into(), place);
+    }
+
+    /// Records everything in the document that no reader sees: extensions, except those `named`
+    /// elsewhere, and animations.
+    pub(crate) fn see_document(&mut self, document: Item<'_>, named: &[&str]) {
+        let is_read = |name: &str| {
+            let mut known = READ.iter().chain(&OF_NODES).chain(&COMPRESSIONS);
+            known.any(|read| *read == name) || named.contains(&name)
+        };
+        for (key, kind) in LISTS {
+            for (index, item) in document.list(key).enumerate() {
+                each_extension(item, &mut |name| {
+                    if !is_read(name) {
+                        let what = format!("the extension `{name}`");
+                        self.unread(what, || item.place(kind, index));
+                    }
+                });
+            }
+        }
+        // Those that no element has are the document's own, or only declared.
+        for key in ["extensionsUsed", "extensionsRequired"] {
+            for name in document.list(key).filter_map(Item::as_text) {
+                let what = format!("the extension `{name}`");
+                if !is_read(name) && !self.unread.contains_key(&what) {
+                    self.unread(what, String::new);
+                }
+            }
+        }
+        for (index, animation) in document.list("animations").enumerate() {
+            self.unread("animations", || animation.place("animation", index));
+        }
+    }
+
+    pub(crate) fn warnings(self) -> impl Iterator<Item = String> {
+        let unread = unread_warning(self.unread.into_iter().map(written));
+        self.told.into_iter().map(written).chain(unread)
+    }
+}
+
+fn add(met: &mut BTreeMap<String, Met>, what: String, place: impl FnOnce() -> String) {
+    let first = || Met {
+        count: 0,
+        first: place(),
+    };
+    met.entry(what).or_insert_with(first).count += 1;
+}
+
+fn written((what, met): (String, Met)) -> String {
+    match (met.count, met.first.as_str()) {
+        (_, "") => what,
+        (1, place) => format!("{what} ({place})"),
+        (count, place) => format!("{what} ({count}, the first: {place})"),
+    }
+}
+
+/// Calls `found` with every extension of a part and of the parts within it.
+fn each_extension(part: Item<'_>, found: &mut impl FnMut(&str)) {
+    for (name, _) in part.get("extensions").members() {
+        found(name);
+    }
+    for inner in part.parts() {
+        each_extension(inner, found);
+    }
+}

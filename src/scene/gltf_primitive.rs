@@ -1,0 +1,208 @@
+//! Primitives of glTF meshes: their triangles, with what their corners have.
+
+use super::gltf::{AT_REST, Geometry, Place};
+use super::gltf_document::Item;
+use glam::{DMat3, Mat4, Vec2, Vec3};
+use raystone_core::geometry::Triangle;
+
+const TRIANGLES: usize = 4;
+const STRIP: usize = 5;
+const FAN: usize = 6;
+
+impl<'a> Geometry<'a> {
+    /// Adds a primitive's triangles, also in mesh space to `own` if it is given.
+    pub(super) fn read_primitive(
+        &mut self,
+        primitive: Item<'a>,
+        place: Place<'_>,
+        world: Mat4,
+        mut own: Option<&mut Vec<Triangle>>,
+    ) -> Result<(), String> {
+        let mode = primitive.index("mode").unwrap_or(TRIANGLES);
+        if !(TRIANGLES..=FAN).contains(&mode) {
+            let what = "primitives of lines or points left out";
+            self.notes.tell(what, place);
+            return Ok(());
+        }
+        let attributes = primitive.get("attributes");
+        let Some(positions) = attributes.index("POSITION") else {
+            let what = "primitives without positions left out";
+            self.notes.tell(what, place);
+            return Ok(());
+        };
+        if primitive.list("targets").len() > 0 {
+            self.notes.tell(AT_REST, place);
+        }
+        let local = self.data.accessor(positions);
+        let local = local.and_then(|values| values.vectors::<3>());
+        let local = local.map_err(|problem| format!("its positions {problem}"))?;
+        let positions: Vec<Vec3> = (local.iter())
+            .map(|p| world.transform_point3(Vec3::from(*p)))
+            .collect();
+        let indices = self.read_indices(primitive, positions.len())?;
+        let colors = self.read_colors(attributes, positions.len(), place);
+        let material = self.material(primitive, !colors.is_empty(), place);
+        let set = self.sets.get(material).copied().flatten();
+        self.see_attributes(attributes, set, place);
+        let uvs = self.read_uvs(attributes, set, place);
+        let normals = self.read_normals(attributes, world, place);
+        let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+        let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
+        let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);
+        for run in indices.iter() {
+            for_each_face(mode, run, |corners| {
+                let vertices = corners.map(|i| positions[i as usize]);
+                let normals = (!normals.is_empty()).then(|| corners.map(normal));
+                let colors = (!colors.is_empty()).then(|| corners.map(color));
+                let (uvs, material) = (corners.map(uv), material as u32);
+                self.builder
+                    .push_colored(vertices, uvs, normals, colors, material);
+                if let Some(own) = &mut own {
+                    let vertices = corners.map(|i| local[i as usize].into());
+                    own.push(Triangle { vertices });
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// The vertices of the faces in order, in one run or, between restarts, in several.
+    fn read_indices(&self, primitive: Item<'a>, vertices: usize) -> Result<Vec<Vec<u32>>, String> {
+        let Some(accessor) = primitive.get("indices").given() else {
+            return Ok(vec![(0..vertices as u32).collect()]);
+        };
+        let accessor = accessor.as_index().ok_or("its indices name no accessor")?;
+        let indices = self.data.accessor(accessor);
+        let indices = indices.and_then(|values| values.indices());
+        let (indices, restart) = indices.map_err(|problem| format!("its indices {problem}"))?;
+        let exists = |index: u32| (index as usize) < vertices;
+        // The standard forbids the restart of strips; exporters use it all the same.
+        let is_restart = |index: &u32| !exists(*index) && [restart, u32::MAX].contains(index);
+        if let Some(index) = (indices.iter()).find(|i| !exists(**i) && !is_restart(i)) {
+            return Err(format!(
+                "a face refers to vertex {index}, but there are {vertices}"
+            ));
+        }
+        if !indices.iter().any(|index| is_restart(index)) {
+            return Ok(vec![indices]);
+        }
+        Ok(indices.split(is_restart).map(<[u32]>::to_vec).collect())
+    }
+
+    /// The file's materials, then one for primitives that name none.
+    fn material(&mut self, primitive: Item<'a>, is_colored: bool, place: Place<'_>) -> usize {
+        let last = self.sets.len() - 1;
+        if let Some(index) = primitive.index("material") {
+            if index < last {
+                return index;
+            }
+            let what = "primitives name a material that is not there: drawn without";
+            self.notes.tell(what, place);
+        }
+        // The standard default is white; grey is for surfaces without any colour.
+        match is_colored {
+            true => *self.white.get_or_insert(last + 1),
+            false => last,
+        }
+    }
+
+    /// Records attributes that are not read. Skins and morph targets are handled elsewhere, and
+    /// unused texture coordinates lose nothing.
+    fn see_attributes(&mut self, attributes: Item<'a>, set: Option<u32>, place: Place<'_>) {
+        let used = set.map(|set| format!("TEXCOORD_{set}"));
+        for (name, _) in attributes.members() {
+            let is_read = ["POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0"].contains(&name);
+            if !is_read && used.as_deref() != Some(name) {
+                self.notes.unread(format!("`{name}`"), place);
+            }
+        }
+    }
+
+    /// Values of an attribute, which is drawn without if they cannot be read.
+    fn read<T>(
+        &mut self,
+        attributes: Item<'a>,
+        name: &str,
+        place: Place<'_>,
+        read: impl FnOnce(super::gltf_data::Values) -> Result<Vec<T>, String>,
+    ) -> Vec<T> {
+        let Some(accessor) = attributes.get(name).given() else {
+            return Vec::new();
+        };
+        let accessor = accessor.as_index().unwrap_or(usize::MAX);
+        match self.data.accessor(accessor).and_then(read) {
+            Ok(values) => values,
+            Err(problem) => {
+                let what = format!("`{name}`, whose values {problem}");
+                self.notes.unread(what, place);
+                Vec::new()
+            }
+        }
+    }
+
+    fn read_uvs(&mut self, attributes: Item<'a>, set: Option<u32>, place: Place<'_>) -> Vec<Vec2> {
+        let Some(set) = set else {
+            return Vec::new();
+        };
+        let as_is = self.data.is_quantised();
+        let uvs = self.read(
+            attributes,
+            &format!("TEXCOORD_{set}"),
+            place,
+            |values| match as_is {
+                true => values.vectors::<2>(),
+                false => values.unit_vectors::<2>(),
+            },
+        );
+        uvs.into_iter().map(Vec2::from).collect()
+    }
+
+    /// Linear vertex colours, which multiply the base colour; empty if none can be read.
+    fn read_colors(
+        &mut self,
+        attributes: Item<'a>,
+        vertices: usize,
+        place: Place<'_>,
+    ) -> Vec<Vec3> {
+        let colors = self.read(attributes, "COLOR_0", place, |values| {
+            if values.width() == 3 {
+                let colors = values.unit_vectors()?.into_iter();
+                return Ok(colors.map(|[r, g, b]| [r, g, b, 1.0]).collect());
+            }
+            values.unit_vectors::<4>()
+        });
+        if colors.iter().any(|[.., alpha]| *alpha < 1.0) {
+            self.notes.unread("alpha of `COLOR_0`", place);
+        }
+        if (colors.iter().flatten()).any(|x| !(0.0..=1.0).contains(x)) {
+            self.notes.unread("`COLOR_0` beyond 0 to 1", place);
+        }
+        let rgb = |[r, g, b, _]: &[f32; 4]| Vec3::new(*r, *g, *b);
+        colors.iter().take(vertices).map(rgb).collect()
+    }
+
+    /// World-space normals; empty if none can be read.
+    fn read_normals(&mut self, attributes: Item<'a>, world: Mat4, place: Place<'_>) -> Vec<Vec3> {
+        // In f64, so that a small scale does not make it singular.
+        let to_world = DMat3::from_mat4(world.as_dmat4()).inverse().transpose();
+        let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
+        let normals = self.read(attributes, "NORMAL", place, |values| values.vectors::<3>());
+        normals.into_iter().map(|n| moved(n).as_vec3()).collect()
+    }
+}
+
+/// Vertex indices of every triangle of a list, strip or fan.
+fn for_each_face(mode: usize, indices: &[u32], mut face: impl FnMut([u32; 3])) {
+    match mode {
+        TRIANGLES => indices.as_chunks::<3>().0.iter().for_each(|c| face(*c)),
+        STRIP => indices
+            .windows(3)
+            .enumerate()
+            .for_each(|(k, w)| face([w[0], w[1 + k % 2], w[2 - k % 2]])),
+        _ => indices
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .for_each(|w| face([indices[0], w[0], w[1]])),
+    }
+}
