@@ -135,18 +135,15 @@ pub fn sums(renderer: &Renderer, pixels: &Pixels, limit: u32) -> Result<Option<S
     let border = BLOCK_SAMPLES - SUMMED / 2..BLOCK_SAMPLES + SUMMED / 2;
     let across = Some(border).filter(|samples| samples.end <= limit);
     for samples in [first].into_iter().chain(across) {
-        // The first dispatches of a renderer are the smallest: they cut the image into slices.
-        let together = samples_of(renderer, pixels, samples.clone())?;
-        let singles: Vec<Image> = samples
-            .clone()
-            .map(|sample| samples_of(renderer, pixels, sample..sample + 1))
-            .collect::<Result<_, _>>()?;
-        let found = differing_sum(&together, &singles).map(|fault| {
-            let last = samples.end - 1;
-            format!(
-                "seed {}, samples {} to {last}: {fault}",
-                pixels.seed, samples.start
-            )
+        // The first dispatches of a renderer are the smallest, and cut the image into slices.
+        let all = || samples_of(renderer, pixels, samples.clone());
+        let in_slices = all()?;
+        let single = |sample| samples_of(renderer, pixels, sample..sample + 1);
+        let singles: Vec<Image> = samples.clone().map(single).collect::<Result<_, _>>()?;
+        let differs = |together: &Image| differing_sum(together, &singles);
+        let found = differs(&in_slices).or(differs(&all()?)).map(|fault| {
+            let (first, last) = (samples.start, samples.end - 1);
+            format!("seed {}, samples {first} to {last}: {fault}", pixels.seed)
         });
         if found.is_some() {
             return Ok(found);

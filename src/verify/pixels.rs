@@ -1,5 +1,6 @@
 //! The paths that the check of images looks at.
 
+use raystone_core::geometry::Camera;
 use raystone_core::random::Pcg32;
 use std::collections::BTreeSet;
 
@@ -44,15 +45,18 @@ pub struct Frame {
     pub samples: u32,
     /// Sums of the samples below this one are compared with single samples; 0 for none.
     pub summed: u32,
+    /// Part of the scene's field of view: at the borders of a small part there is something to see.
+    pub view: f32,
 }
 
 impl Frame {
-    /// More pixels than sixteen bits can number: about 250 paths.
+    /// More pixels than sixteen bits can number: about 500 paths.
     pub const LARGE: Self = Self {
         size: [267, 251],
         choice: Choice::Borders,
-        samples: 1,
+        samples: 2,
         summed: 0,
+        view: 0.5,
     };
     /// As many paths as [`Self::SLOTS`], and one more.
     pub const FULL: [Self; 2] = [Self::full([32, 32]), Self::full([41, 25])];
@@ -65,6 +69,15 @@ impl Frame {
             choice: Choice::Every(8),
             samples: 1,
             summed: 4,
+            view: 0.5,
+        }
+    }
+
+    /// The camera that sees its part of the view of this one.
+    pub fn camera(&self, camera: Camera) -> Camera {
+        Camera {
+            vertical_fov_degrees: self.view * camera.vertical_fov_degrees,
+            ..camera
         }
     }
 

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use raystone_accel::{Counters, CpuTwin, Query, Ray};
 use raystone_record::RayClass;
 
-/// Rays of each class whose work is compared, besides the last.
-const RAYS: usize = 512;
+/// Rays of each class whose work is compared, besides the last: so many that one dispatch of
+/// them, behind two small ones, makes invocations answer several.
+const RAYS: usize = 4096;
 
 /// The work of some rays of a class as the twin of a structure counts it.
 #[derive(Debug, Clone)]

@@ -37,6 +37,7 @@ const RUN: Frame = Frame {
     choice: Choice::Every(4),
     samples: 4,
     summed: BLOCK_SAMPLES + 2,
+    view: 1.0,
 };
 /// On a trial scene by `verify`: 1976 paths, since a material may cover a twentieth of the image.
 const TRIAL: Frame = Frame {
@@ -56,6 +57,7 @@ fn frames(session: &Session, frame: Frame) -> Vec<Frame> {
         choice: Choice::Borders,
         samples: 2,
         summed: 2,
+        view: 1.0,
     };
     let pixels = |frame: &Frame| frame.size[0] * frame.size[1];
     let large = Some(Frame::LARGE).filter(|large| pixels(&own) <= pixels(large));
@@ -337,6 +339,10 @@ fn judged(
     let oracle = session.clock.time("judge", oracle)?;
     let (mut all, mut ran) = (PathsRecord::default(), Ran::default());
     for frame in frames {
+        let subject = &Subject {
+            camera: frame.camera(subject.camera),
+            ..*subject
+        };
         let (sampler, pixels) = drawn(session, subject, integrator, frame)?;
         let view = subject.view(integrator, &sampler, &pixels)?;
         let limit = sampler.demand.samples.unwrap_or(u32::MAX);

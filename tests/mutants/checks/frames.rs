@@ -25,6 +25,7 @@ const SMALL: Frame = Frame {
     choice: Choice::Every(1),
     samples: 1,
     summed: 2 * BLOCK_SAMPLES,
+    view: 0.5,
 };
 
 /// A scene, its structure and its oracle on the host and on a device.
@@ -58,15 +59,16 @@ impl<'a> Setup<'a> {
         check: impl Fn(&Renderer, &View, &Pixels) -> Result<Option<String>, GpuError>,
     ) -> Finding {
         let sampler = independent(integrator, frame)?;
+        let camera = frame.camera(self.stage.camera);
         let view = View {
             estimator: Estimator::of(integrator).map_err(CheckError::Stale)?,
-            camera: self.stage.camera,
+            camera,
             size: frame.size,
             sampler: &sampler,
         };
         let job = RenderJob {
             size: frame.size,
-            camera: self.stage.camera,
+            camera,
             sampler: &sampler,
             integrator,
             offset: RayOffset::default(),

@@ -164,17 +164,6 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Work,
     ),
     row(
-        "work-carried-to-the-next-ray",
-        "refilled invocations add the work of the ray before",
-        text(
-            "integrator/trace_rays",
-            "@if(counters) counters = Counters();",
-            "",
-        ),
-        WIDE,
-        Check::Work,
-    ),
-    row(
         "tests-of-boxes-and-triangles-exchanged",
         "box tests stand for triangle tests",
         text(
