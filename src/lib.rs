@@ -45,14 +45,14 @@ pub mod compare {
 /// What is measured and how it is judged: checks, figures, statistics, records.
 pub mod measure {
     pub use raystone_bench::{
-        animation, compaction, environment, figure_registry, memory, sampler_cost, spectrum,
-        stopping, stream, timing, words,
+        animation, compaction, environment, figure_registry, known_words, memory, sampler_cost,
+        spectrum, stopping, stream, timing, words,
     };
     pub use raystone_record as record;
     pub use raystone_record::{figure, replicates};
     pub use raystone_stats::{
-        adaptive, bias, comparison, flip, growth, heavy_tails, hypothesis, interval, metrics,
-        signed_rank, statistics,
+        adaptive, bias, comparison, flip, growth, heavy_tails, hypothesis, interval, known_figures,
+        metrics, signed_rank, statistics,
     };
     pub use raystone_verify::*;
 }

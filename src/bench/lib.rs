@@ -7,6 +7,7 @@ pub mod coherence;
 pub mod compaction;
 pub mod environment;
 pub mod figure_registry;
+pub mod known_words;
 pub mod memory;
 pub mod peers;
 pub mod run;

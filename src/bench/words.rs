@@ -4,6 +4,7 @@
 //! The words come from the kernel `sampling/dump_stream`, which reads coordinates (pixel, sample,
 //! dimension, seed) from a buffer and uses the renderer's modules, constants and table.
 
+use crate::known_words;
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Composition, Gpu, UniformValues, groups_for};
 use raystone_render::with_sampler;
@@ -31,7 +32,7 @@ pub struct Used {
 
 /// Numbers below `end` at which something may change: the first ones, those around powers of two
 /// and halfway between, and the last ones.
-fn borders(end: u32) -> Vec<u32> {
+pub(crate) fn borders(end: u32) -> Vec<u32> {
     let last = end.saturating_sub(1);
     let powers = (1..32).map(|k| 1_u32 << k);
     let around = powers.flat_map(|p| [p - 1, p, p + 1, p + p / 2]);
@@ -135,14 +136,16 @@ pub(crate) fn kernel_hash(gpu: &Gpu, sampler: &Sampler) -> Result<String, String
     Ok(pipeline.map_err(|e| e.to_string())?.kernel.hash())
 }
 
-/// Compares the kernel's words with the twin's over a run's range; returns their number.
+/// Compares the kernel's words with the twin's over a run's range, and both with what is known of them
+/// ([`known_words`]); returns the number of the former.
 ///
 /// # Errors
-/// A word differs, or the kernel does not run.
+/// A word differs, numbers are alike that must not be, or the kernel does not run.
 pub fn check_words(gpu: &Gpu, sampler: &Sampler, used: &Used) -> Result<usize, String> {
     let coordinates = used.coordinates();
     let words = dump_stream(gpu, sampler, &coordinates)?;
     compare(sampler, &coordinates, &words)?;
+    known_words::check(gpu, sampler, used)?;
     Ok(words.len())
 }
 

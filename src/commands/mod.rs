@@ -141,7 +141,24 @@ fn words(mut words: Vec<OsString>) -> Vec<OsString> {
 /// Reads the command line and executes it; clap itself ends the program with 2 on bad usage.
 pub fn main() -> ExitCode {
     let command = CommandLine::parse_from(words(std::env::args_os().collect())).command;
-    command.execute().unwrap_or_else(failure::end)
+    let checked = match command {
+        Command::List(_) | Command::Doctor(_) | Command::Help(_) => Ok(()),
+        _ => known_figures(),
+    };
+    checked
+        .and_then(|()| command.execute())
+        .unwrap_or_else(failure::end)
+}
+
+/// Computes known figures anew, before any is shown.
+fn known_figures() -> Result<()> {
+    let checks = [
+        raystone::measure::known_figures::check,
+        raystone::discrepancy::known_figures::check,
+    ];
+    checks
+        .into_iter()
+        .try_for_each(|check| check().map_err(anyhow::Error::msg))
 }
 
 #[cfg(test)]

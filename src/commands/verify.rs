@@ -12,7 +12,7 @@ use raystone::measure::record::{
 };
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::count;
-use raystone::run::{Registries, Verified};
+use raystone::run::{Registries, Verified, VerifiedSampler};
 use raystone::scene::{LoadOptions, load};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -89,6 +89,11 @@ impl Verify {
         let trials = self.file.is_none() && self.scene.is_empty();
         let verified =
             raystone::run::verify(&experiment, &plan, &registries, &options, rays, trials)?;
+        let samplers = match trials {
+            true => raystone::run::verify_samplers(&plan, &registries, &options)?,
+            false => Vec::new(),
+        };
+        let failed_samplers = samplers.iter().filter(|s| s.fault.is_some()).count();
         let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
         let refused = verified.iter().filter(|v| v.refused).count();
         let failed = verified.iter().filter(|v| !passed(v)).count() - refused;
@@ -99,10 +104,11 @@ impl Verify {
             let (right, all) = (paths.len() - failed_paths, paths.len());
             text += &format!("{right} of {all} integrators did not fail\n");
         }
-        let fields = as_json(&verified, &plan.skipped);
+        text += &of_samplers(&samplers);
+        let fields = as_json(&verified, &samplers, &plan.skipped);
         self.output.show("verify", fields, &text)?;
         let bad_input = verified.iter().any(|v| v.bad_input);
-        Ok(match failed + failed_paths {
+        Ok(match failed + failed_paths + failed_samplers {
             0 => ExitCode::SUCCESS,
             _ if bad_input => ExitCode::from(BAD_INPUT),
             _ => ExitCode::from(FAILED),
@@ -197,8 +203,26 @@ fn ending(all: usize, failed: usize, refused: usize) -> String {
     format!("{} of {all} structures passed\n{left_out}", all - failed)
 }
 
-/// Returns every structure with its verdict or why there is none, and every integrator.
-fn as_json(verified: &[Verified], skipped: &[Skipped]) -> Value {
+/// Counts the samplers that draw what they should, with the faults of the others; empty if none was checked.
+fn of_samplers(samplers: &[VerifiedSampler]) -> String {
+    let faults: Vec<_> = samplers
+        .iter()
+        .filter_map(|s| Some((&s.name, s.fault.as_ref()?)))
+        .collect();
+    let mut text = String::new();
+    for (name, fault) in &faults {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{name}: {fault}");
+    }
+    if !samplers.is_empty() {
+        let (right, all) = (samplers.len() - faults.len(), samplers.len());
+        text += &format!("{right} of {all} samplers draw what they should\n");
+    }
+    text
+}
+
+/// Returns every structure with its verdict or why there is none, every integrator and every sampler.
+fn as_json(verified: &[Verified], samplers: &[VerifiedSampler], skipped: &[Skipped]) -> Value {
     let structures = verified.iter().map(|one| {
         json!({
             "cell": one.cell.to_string(),
@@ -212,12 +236,16 @@ fn as_json(verified: &[Verified], skipped: &[Skipped]) -> Value {
     let paths = verified.iter().flat_map(|one| &one.paths).map(|(cell, paths)| {
         json!({ "cell": cell.to_string(), "verdict": paths.verdict(), "paths": paths })
     });
+    let samplers = samplers
+        .iter()
+        .map(|s| json!({ "sampler": s.name, "passed": s.fault.is_none(), "fault": s.fault }));
     let skipped = skipped
         .iter()
         .map(|s| json!({ "cell": s.cell, "reason": s.reason }));
     json!({
         "structures": structures.collect::<Vec<Value>>(),
         "integrators": paths.collect::<Vec<Value>>(),
+        "samplers": samplers.collect::<Vec<Value>>(),
         "left_out": skipped.collect::<Vec<Value>>(),
     })
 }

@@ -24,6 +24,7 @@ mod distance;
 mod empty_box;
 mod error;
 mod extreme;
+pub mod known_figures;
 mod leaf;
 mod measure;
 mod nets;

@@ -104,6 +104,32 @@ pub struct Sampler {
 }
 
 impl Sampler {
+    /// The same sampler with tables for another demand.
+    ///
+    /// # Errors
+    /// The table of the decorrelation cannot be made.
+    pub fn with_demand(&self, demand: &Demand) -> Result<Self, String> {
+        let partner = Partner {
+            name: &self.sequence_variant.name,
+            facts: self.sequence.facts(),
+        };
+        let words = self.decorrelation.table(&partner, demand)?;
+        let width = demand.width.unwrap_or(0);
+        Ok(Self {
+            table: SamplerTable::new(&self.sequence.table(demand), width, &words),
+            demand: *demand,
+            ..self.clone()
+        })
+    }
+
+    /// The most dimensions that both parts have; `None` is unlimited.
+    pub fn most_dimensions(&self) -> Option<u32> {
+        let [own, _] = self.decorrelation.limits();
+        own.into_iter()
+            .chain(self.sequence.facts().dimensions)
+            .min()
+    }
+
     /// True if seeds give different points; a deterministic sampler has one replicate.
     pub fn is_random(&self) -> bool {
         self.sequence.facts().random || self.decorrelation.is_random()

@@ -146,10 +146,6 @@ impl SamplerRegistry {
     ) -> Result<Sampler, SamplerError> {
         let ((first, second), [sequence, decorrelation]) = self.pair(sequence, decorrelation)?;
         let facts = first.facts();
-        let partner = Partner {
-            name: &sequence.name,
-            facts,
-        };
         let pair = || pair(&sequence, &decorrelation);
         let [dimensions, samples] = second.limits();
         for limit in facts.dimensions.into_iter().chain(dimensions) {
@@ -180,20 +176,18 @@ impl SamplerRegistry {
         if let Some(what) = unknown.into_iter().flatten().next() {
             return Err(SamplerError::NotKnown { pair: pair(), what });
         }
-        let words = second.table(&partner, demand);
-        let words = words.map_err(|reason| SamplerError::Table {
-            pair: pair(),
-            reason,
-        })?;
-        Ok(Sampler {
-            table: SamplerTable::new(&first.table(demand), demand.width.unwrap_or(0), &words),
+        let pair = pair();
+        let without_table = Sampler {
+            table: SamplerTable::new(&[], 0, &[]),
             seeding,
             sequence: first,
             sequence_variant: sequence,
             decorrelation: second,
             decorrelation_variant: decorrelation,
             demand: *demand,
-        })
+        };
+        let made = without_table.with_demand(demand);
+        made.map_err(|reason| SamplerError::Table { pair, reason })
     }
 
     /// Names, descriptions and parameters of the sequences.

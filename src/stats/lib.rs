@@ -9,6 +9,7 @@ pub mod growth;
 pub mod heavy_tails;
 pub mod hypothesis;
 pub mod interval;
+pub mod known_figures;
 mod log_figure;
 pub mod metrics;
 mod shown;

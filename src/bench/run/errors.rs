@@ -8,7 +8,7 @@ use super::measurement::{Measurement, Through};
 use super::paths;
 use super::reference::{ReferenceImage, reference, reference_structure};
 use super::reference_file::image_hash;
-use super::replicates::{Pass, all_samples, until_met};
+use super::replicates::{Pass, all_samples, check_distinct, until_met};
 use super::session::{Session, content_hash};
 use super::structures::{Gated, image_settings};
 use super::world::World;
@@ -266,6 +266,9 @@ fn sampler_error(
     };
     let spp = replicates.spp;
     let finals = replicates.images;
+    if cell.randomised {
+        check_distinct(&finals, reference_image)?;
+    }
     write_spread(session, cell, spp, &finals)?;
     let bias = bias_record(session, cell, &finals, reference_image)?;
     session.recorder.write(&line(Body::Bias(bias)))?;

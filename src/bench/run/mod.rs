@@ -73,6 +73,7 @@ use raystone_scene as scene;
 use session::Session;
 use std::collections::HashMap;
 use std::path::PathBuf;
+pub use words::{VerifiedSampler, verify_samplers};
 use world::{Loaded, NoWorld, World, load_options};
 
 /// Verdict on one structure, for `raystone verify`.
@@ -429,7 +430,10 @@ fn verify_cell(
         Ok(world) => {
             let candidate = structures::build_and_gate(session, world, cell)?;
             if let Some(traced) = candidate.traced.as_ref().filter(|t| t.is_inline()) {
-                verified.paths = paths::verify(session, world, traced, cell)?;
+                verified.paths = words::verify(session, world, cell)?;
+                verified
+                    .paths
+                    .extend(paths::verify(session, world, traced, cell)?);
             }
             let record = candidate.record.body;
             verified.refused = record.refused;

@@ -18,6 +18,11 @@ use std::collections::BTreeMap;
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
 
+/// Relative difference of a value that is noise and not rounding, and the values that must show noise before
+/// images of two seeds cannot be equal by chance.
+const NOISE: f32 = 1e-3;
+const NOISY_VALUES: usize = 64;
+
 /// One render of a replicate, and the numbers of samples at which its image is kept.
 pub(super) struct Pass<'a> {
     pub renderer: Renderer<'a>,
@@ -158,6 +163,38 @@ fn further_samples(
         }
     }
     Ok(Snapshot { spp, image })
+}
+
+/// Fails a cell of which two replicates are one image, or whose reference has two equal parts: other seeds must
+/// give other images, wherever pixels are noisy.
+pub(super) fn check_distinct(images: &[Image], reference: &ReferenceImage) -> Result<(), String> {
+    let parts = reference.reference.parts();
+    let is_noisy = |(a, b): &(&f32, &f32)| (*a - *b).abs() > NOISE * a.abs().max(b.abs());
+    let noisy = images
+        .first()
+        .zip(parts.first())
+        .map_or(0, |(image, part)| {
+            let pairs = image
+                .pixels
+                .iter()
+                .flatten()
+                .zip(part.pixels.iter().flatten());
+            pairs.filter(is_noisy).count()
+        });
+    if noisy < NOISY_VALUES {
+        return Ok(());
+    }
+    for (what, images) in [("replicates", images), ("parts of the reference", parts)] {
+        let mut known = BTreeMap::new();
+        for (i, image) in images.iter().enumerate() {
+            if let Some(other) = known.insert(image_hash(image), i) {
+                return Err(format!(
+                    "{what} {other} and {i} are the same image, though their seeds differ"
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Fails a cell with an image that is not finite everywhere. The replicate is recorded with it, without figures: the checks of a run are

@@ -8,9 +8,19 @@ use super::{PathOracle, Vertex, Walk};
 use glam::DVec3;
 use raystone_core::params::{ParamValue, Params};
 use raystone_render::{ConfiguredIntegrator, CountedRays};
-use raystone_sampling::dimensions::{
-    DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
-};
+
+// The dimensions of a path, written down here once more: were they those of the crate of samplers, a fault in
+// both its table and the kernels' would look right.
+const PIXEL: u32 = 0;
+const DIRECTION: u32 = 0;
+const LIGHT_POINT: u32 = 2;
+const LIGHT_CHOICE: u32 = 4;
+const ROULETTE: u32 = 5;
+
+/// Dimension of a purpose at a bounce: two of the pixel, then six of each bounce.
+fn at_bounce(bounce: u32, purpose: u32) -> u32 {
+    2 + 6 * bounce + purpose
+}
 
 /// The value estimated by a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
