@@ -29,12 +29,15 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     model.read(&header, &mut body, bytes).map_err(broken)?;
     model.tell(&header);
     let is_colored = !model.colors.is_empty();
+    let builder = std::mem::take(&mut model.builder);
+    // Their memory serves what follows.
+    drop(model);
     let albedo = if is_colored { 1.0 } else { DEFAULT_ALBEDO };
     let look = Look {
         materials: vec![Material::diffuse("default", Vec3::splat(albedo))],
         ..Look::default()
     };
-    model.builder.finish(name, look)
+    builder.finish(name, look)
 }
 
 /// A place in the file, and what is wrong there.
@@ -329,7 +332,11 @@ fn each<S: BufRead>(
     for index in 0..all {
         one(index as usize, body).map_err(|problem| {
             let line = body.line().map_or(String::new(), |n| format!(", line {n}"));
-            (format!("{name} {index} of {count}{line}"), problem)
+            let place = match name.as_str() {
+                "vertex" | "face" => format!("{name} {index} of {count}{line}"),
+                _ => format!("element `{name}`, {index} of {count}{line}"),
+            };
+            (place, problem)
         })?;
     }
     Ok(())

@@ -145,6 +145,10 @@ const PLY: &[(&str, Outcome)] = &[
         "element vertex many\nE ",
         Fails(&["header, line 3", "`many`"]),
     ),
+    (
+        "element camera 9\nproperty int id\nV4F1E 1 2",
+        Fails(&["element `camera`, 2 of 9, line 12"]),
+    ),
     ("V4F1", Fails(&["header", "end_header"])),
 ];
 
