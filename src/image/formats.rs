@@ -276,8 +276,8 @@ mod tests {
             format.write(&path, &image, &[]).unwrap();
             for change in [
                 |image: &mut Image| image.pixels.iter_mut().for_each(|p| p.swap(0, 2)),
-                |image| image.pixels.reverse(),
-                |image| image.pixels[14][1] = image.pixels[14][1].next_up(),
+                |image: &mut Image| image.pixels.reverse(),
+                |image: &mut Image| image.pixels[14][1] = image.pixels[14][1].next_up(),
             ] {
                 let mut other = image.clone();
                 change(&mut other);

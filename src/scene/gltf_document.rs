@@ -23,8 +23,9 @@ impl<'a> Item<'a> {
         self.get("extensions").get(name)
     }
 
+    /// Some exporters write -1 for an index that is none.
     pub(crate) fn is_given(self) -> bool {
-        !self.0.is_null()
+        !self.0.is_null() && self.0.as_i64() != Some(-1)
     }
 
     /// The part, if it is given.
@@ -90,19 +91,20 @@ impl<'a> Item<'a> {
         self.0.as_str()
     }
 
+    /// A text that is not empty.
     pub(crate) fn text(self, key: &str) -> Option<&'a str> {
-        self.get(key).as_text()
+        self.get(key).as_text().filter(|text| !text.is_empty())
     }
 
     pub(crate) fn flag(self, key: &str) -> Option<bool> {
         self.get(key).0.as_bool()
     }
 
-    /// `node 3 (arm)`, for messages.
+    /// Kind, index and name, for messages.
     pub(crate) fn place(self, kind: &str, index: usize) -> String {
         match self.text("name") {
-            Some(name) if !name.is_empty() => format!("{kind} {index} `{name}`"),
-            _ => format!("{kind} {index}"),
+            Some(name) => format!("{kind} {index} `{name}`"),
+            None => format!("{kind} {index}"),
         }
     }
 }
@@ -114,8 +116,9 @@ impl<'a> Item<'a> {
 pub(super) fn parse(bytes: &[u8]) -> Result<(Value, Option<String>), String> {
     let text = plain_text_or_latin1(bytes.to_vec());
     let padding = |c: char| c == '\0' || c == '\u{feff}' || c.is_whitespace();
+    // Line ends in front are kept, for the numbers of lines.
     let text = text.trim_end_matches(padding);
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = text.trim_start_matches(['\0', '\u{feff}']);
     let fault = match serde_json::from_str(text) {
         Ok(value) => return Ok((value, None)),
         Err(error) => error.to_string(),

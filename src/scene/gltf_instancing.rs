@@ -55,9 +55,8 @@ pub(super) fn places(node: Item<'_>, data: &Data<'_>) -> Result<(Vec<Mat4>, Vec<
         scales.as_ref().map(Vec::len),
     ];
     let mut counts = counts.into_iter().flatten();
-    let count = counts
-        .next()
-        .ok_or_else(|| format!("{INSTANCING} has neither TRANSLATION nor ROTATION nor SCALE"))?;
+    // Instances that nothing tells apart are one.
+    let count = counts.next().unwrap_or(1);
     if let Some(other) = counts.find(|other| *other != count) {
         return Err(format!(
             "{INSTANCING} has attributes of {count} and of {other} instances"

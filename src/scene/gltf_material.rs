@@ -98,19 +98,19 @@ fn textured<'a>(
     let color = base_color(material).1.filter(|_| found.kind != &MIRROR);
     found.base_color_texture = color.and_then(|info| take(images.place(info)));
     if found.kind == &PRINCIPLED {
-        let varied = material.get(METALLIC).get("metallicRoughnessTexture");
-        let varied = varied.given().and_then(|info| take(images.place(info)));
+        let varied = texture(material.get(METALLIC), "metallicRoughnessTexture");
+        let varied = varied.and_then(|info| take(images.place(info)));
         found.metallic_roughness_texture = varied;
     }
     if found.kind != &DIELECTRIC
-        && let Some(bent) = material.get("normalTexture").given()
+        && let Some(bent) = texture(material, "normalTexture")
     {
         let mut placed = images.place(bent);
         placed.place.scale = bent.number("scale").unwrap_or(1.0);
         found.normal_texture = take(placed);
     }
     if found.emission != Vec3::ZERO {
-        let shining = material.get("emissiveTexture").given();
+        let shining = texture(material, "emissiveTexture");
         found.emission_texture = shining.and_then(|info| take(images.place(info)));
     }
     left_out
@@ -153,7 +153,7 @@ fn alpha_mode(material: Item<'_>) -> String {
 
 /// Linear base colour and texture; from `KHR_materials_pbrSpecularGlossiness` if present.
 fn base_color(material: Item<'_>) -> (Vec4, Option<Item<'_>>) {
-    let (model, factor, texture) = match material.extension(GLOSSY).given() {
+    let (model, factor, key) = match material.extension(GLOSSY).given() {
         Some(model) => (model, "diffuseFactor", "diffuseTexture"),
         None => (
             material.get(METALLIC),
@@ -162,7 +162,13 @@ fn base_color(material: Item<'_>) -> (Vec4, Option<Item<'_>>) {
         ),
     };
     let factor = model.vector(factor, [1.0; 4]).into();
-    (factor, model.get(texture).given())
+    (factor, texture(model, key))
+}
+
+/// What a material says of a texture, if it names one.
+fn texture<'a>(part: Item<'a>, key: &str) -> Option<Item<'a>> {
+    let info = part.get(key);
+    info.get("index").is_given().then_some(info)
 }
 
 fn convert(
@@ -180,7 +186,7 @@ fn convert(
     let strength = strength.number("emissiveStrength").unwrap_or(1.0);
     let emission = emitted(material.vector("emissiveFactor", [0.0; 3])) * strength;
     // A texture may darken any part of the surface: better no light than light everywhere.
-    let emission = match material.get("emissiveTexture").given() {
+    let emission = match texture(material, "emissiveTexture") {
         Some(_) if !options.textures => Vec3::ZERO,
         _ => emission,
     };
@@ -204,7 +210,7 @@ fn convert(
         alpha_mode: Some(alpha_mode(material)),
         illum: None,
     };
-    let has = |part: Item<'_>, key: &str| part.get(key).is_given();
+    let has = |part: Item<'_>, key: &str| texture(part, key).is_some();
     let description = Description {
         format: Format::Gltf,
         base_color: color.xyz(),
@@ -213,7 +219,7 @@ fn convert(
         is_followed: options.textures,
         source: &source,
     };
-    let name = material.text("name").filter(|name| !name.is_empty());
+    let name = material.text("name");
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
     Material {
         emission: emitted(emission),
@@ -253,19 +259,19 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
     let blended = of(&|_, original| alpha_mode(original) == "BLEND");
     // A texture may scale the metalness, so the factor alone decides nothing.
     let metal = of(&|m, original| {
-        let varied = original.get(METALLIC).get("metallicRoughnessTexture");
+        let varied = texture(original.get(METALLIC), "metallicRoughnessTexture");
         let is_metal = m.source.metallic.is_some_and(|metal| metal > 0.5);
-        m.kind == &DIFFUSE && is_metal && !varied.is_given()
+        m.kind == &DIFFUSE && is_metal && varied.is_none()
     });
     let glossy = of(&|_, original| {
         let model = original.extension(GLOSSY);
-        model.get("specularGlossinessTexture").is_given()
+        texture(model, "specularGlossinessTexture").is_some()
     });
     let tinted = of(&|_, original| {
         let volume = original.extension(VOLUME);
         volume.number("attenuationDistance").is_some()
     });
-    let occluded = of(&|_, original| original.get("occlusionTexture").is_given());
+    let occluded = of(&|_, original| texture(original, "occlusionTexture").is_some());
     let extended = EXTENSIONS.iter().filter_map(|name| {
         let names = of(&|_, original| original.extension(name).is_given());
         approximation_warning(&format!("extended by {name}"), "if it were not", names)

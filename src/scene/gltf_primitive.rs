@@ -144,16 +144,17 @@ impl<'a> Geometry<'a> {
         let Some(set) = set else {
             return Vec::new();
         };
+        let name = format!("TEXCOORD_{set}");
+        if !attributes.get(&name).is_given() {
+            let what =
+                "primitives lack the texture coordinates of their material: drawn as one texel";
+            self.notes.tell(what, place);
+        }
         let as_is = self.data.is_quantised();
-        let uvs = self.read(
-            attributes,
-            &format!("TEXCOORD_{set}"),
-            place,
-            |values| match as_is {
-                true => values.vectors::<2>(),
-                false => values.unit_vectors::<2>(),
-            },
-        );
+        let uvs = self.read(attributes, &name, place, |values| match as_is {
+            true => values.vectors::<2>(),
+            false => values.unit_vectors::<2>(),
+        });
         uvs.into_iter().map(Vec2::from).collect()
     }
 

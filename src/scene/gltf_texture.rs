@@ -133,9 +133,9 @@ fn image_source<'a>(
         }
         (None, None) => (None, Encoded::Missing("it names no file".to_owned())),
     };
-    let name = image.text("name").filter(|name| !name.is_empty());
     ImageSource {
-        name: name
+        name: image
+            .text("name")
             .or(uri)
             .map_or_else(|| format!("image {index}"), str::to_owned),
         encoded,

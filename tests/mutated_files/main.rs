@@ -34,7 +34,7 @@ const SEED: u64 = 20_261_121;
 const BYTES_PER_BYTE: [(&str, usize); 7] = [
     ("experiment", 128),
     ("obj", 128),
-    ("gltf", 1280),
+    ("gltf", 640),
     ("ply", 64),
     ("ies", 64),
     ("points", 64),

@@ -112,7 +112,7 @@ impl Watch {
 
 /// Returns `true` if a message names the file and a place in it, or is about the whole file.
 pub fn says_where(message: &str) -> bool {
-    const PLACES: [&str; 14] = [
+    const PLACES: [&str; 15] = [
         "line ",
         "face ",
         "vertex ",
@@ -127,6 +127,7 @@ pub fn says_where(message: &str) -> bool {
         "s[",
         "byte ",
         "accessor",
+        "asset",
     ];
     const WHOLE: [&str; 5] = [
         "the file is empty",

@@ -128,6 +128,10 @@ fn elements_may_be_apart_together_or_anywhere() {
         .set("/accessors/0/min", json!([5, "x"]))
         .load()
         .whole(2);
+}
+
+#[test]
+fn a_value_that_is_used_and_wrong_is_named() {
     for (path, value, words) in [
         (
             "/accessors/0/count",
@@ -244,6 +248,18 @@ fn faces_are_listed_in_any_way() {
     listed("a vertex too many", 5121, vec![0, 1, 4], 3, 4)
         .load()
         .fails(&["vertex 4", "there are 4"]);
+}
+
+#[test]
+fn what_is_no_face_is_left_out() {
+    case("-1 for none")
+        .set("/meshes/0/primitives/0/indices", json!(-1))
+        .set("/meshes/0/primitives/0/material", json!(-1))
+        .set("/meshes/0/primitives/0/attributes/NORMAL", json!(-1))
+        .set("/nodes/0/skin", json!(-1))
+        .set("/nodes/0/camera", json!(-1))
+        .load()
+        .whole(1);
     case("no indices")
         .set("/meshes/0/primitives/0/indices", Value::Null)
         .load()

@@ -101,6 +101,7 @@ fn texts_may_be_marked_padded_and_nearly_json() {
         format!("\u{feff}{text}").into_bytes(),
         format!("{text}\0\0\0").into_bytes(),
         format!("\r\n {text}  \n\0").into_bytes(),
+        format!("\0\u{feff}{text}\u{1a}").into_bytes(),
         utf_16,
         text.replace("square", "squ\u{e4}re")
             .chars()
@@ -157,6 +158,9 @@ fn containers_may_be_padded_and_counted_wrongly() {
     load(&glb[..at]).fails(&["buffer 0", "no binary chunk"]);
     load(&glb[..at - 9]).fails(&["byte 12", "a chunk of"]);
     load(&with_word(4, 1)).fails(&["byte 4", "version 1"]);
+    let mut named = case("a container that also names no file");
+    named.document["buffers"][0]["uri"] = json!("");
+    named.load_as("model.glb", &named.glb(b' ')).whole(2);
     let alone = model.text();
     model.load_as("model.glb", alone.as_bytes()).whole(2);
 }

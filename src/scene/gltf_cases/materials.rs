@@ -31,9 +31,11 @@ impl Loaded {
     }
 }
 
+/// The constant of [`textured`].
+const PLAIN: [f32; 3] = [0.2, 0.4, 0.6];
+
 #[test]
 fn textures_are_drawn_or_their_constant_is() {
-    let plain = [0.2, 0.4, 0.6];
     textured("a texture").load().whole(2).images(1);
     textured("a source of its own")
         .set(
@@ -59,7 +61,7 @@ fn textures_are_drawn_or_their_constant_is() {
             ],
         )
         .images(0)
-        .color(plain);
+        .color(PLAIN);
     textured("an image for browsers alone")
         .set(
             "/textures",
@@ -78,6 +80,10 @@ fn textures_are_drawn_or_their_constant_is() {
         .load()
         .whole(2)
         .images(1);
+}
+
+#[test]
+fn images_that_cannot_be_had_leave_the_constant() {
     for (path, value, word) in [
         ("/textures", json!([{}]), "it names no image"),
         ("/textures", Value::Null, "there is no such texture"),
@@ -100,8 +106,31 @@ fn textures_are_drawn_or_their_constant_is() {
         case.load()
             .but(2, &["drawn with the constant", word])
             .images(0)
-            .color(plain);
+            .color(PLAIN);
     }
+    textured("-1 for no texture")
+        .set(
+            "/materials/0/pbrMetallicRoughness/baseColorTexture/index",
+            json!(-1),
+        )
+        .load()
+        .whole(2)
+        .images(0)
+        .color(PLAIN);
+    textured("no coordinates")
+        .set("/meshes/0/primitives/0/attributes/TEXCOORD_0", Value::Null)
+        .load()
+        .but(
+            2,
+            &[
+                "lack the texture coordinates",
+                "mesh 0 `square`, primitive 0",
+            ],
+        );
+}
+
+#[test]
+fn images_are_found_however_they_are_named() {
     let encoded = STANDARD.encode(image(image::ImageFormat::Png));
     for uri in [
         format!("data:image/png;base64,{encoded}"),

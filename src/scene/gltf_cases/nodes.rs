@@ -228,6 +228,37 @@ fn what_hangs_on_nodes_is_drawn_or_named() {
 }
 
 #[test]
+fn instances_are_drawn_in_every_type() {
+    let name = "EXT_mesh_gpu_instancing";
+    let with = |title, attributes: Value| {
+        let extension = json!({name: {"attributes": attributes}});
+        case(title)
+            .accessor(vec![0, 0, 0, 0, 5, 0, 0, 0], 5120, "VEC3", 2)
+            .set("/bufferViews/2/byteStride", json!(4))
+            .accessor(floats([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 5126, "VEC3", 2)
+            .set("/nodes/0/extensions", extension)
+            .set("/extensionsRequired", json!([name]))
+    };
+    let scene = with("two", json!({"TRANSLATION": 2, "SCALE": 3}))
+        .load()
+        .whole(4);
+    assert_eq!(
+        scene.scene().triangles[2].vertices[2],
+        Vec3::new(7.0, 2.0, 0.0)
+    );
+    with("nothing to tell them apart", json!({"_ID": 3}))
+        .load()
+        .but(2, &["`_ID` of instances", "node 0"]);
+    with("of several numbers", json!({"TRANSLATION": 2, "SCALE": 0}))
+        .load()
+        .fails(&["node 0", "of 2 and of 4 instances"]);
+    with("listed below zeros", json!({"TRANSLATION": 2}))
+        .set("/accessors/2/bufferView", Value::Null)
+        .load()
+        .whole(4);
+}
+
+#[test]
 fn extensions_that_are_not_read_refuse_nothing_and_are_named() {
     for key in ["extensionsUsed", "extensionsRequired"] {
         case("required")
