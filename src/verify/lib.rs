@@ -18,6 +18,7 @@ pub mod peer_check;
 pub mod rays;
 pub mod shadow_rays;
 mod trial_lights;
+mod trial_reach;
 pub mod trial_scenes;
 mod trial_slivers;
 mod trial_surfaces;
