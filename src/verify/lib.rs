@@ -21,6 +21,7 @@ pub mod rays;
 pub mod self_test;
 pub mod shadow_rays;
 mod trial_lights;
+mod trial_reach;
 pub mod trial_scenes;
 mod trial_slivers;
 mod trial_surfaces;

@@ -84,7 +84,7 @@ fn mixed(seed: u32) -> f32 {
 }
 
 /// A map of dark and bright texels, one of them a small sun, turned and scaled.
-fn map() -> Light {
+pub(super) fn map() -> Light {
     const SIZE: [u32; 2] = [13, 7];
     let texel = |at: u32| {
         let colour = vec3(mixed(3 * at), mixed(3 * at + 1), mixed(3 * at + 2));
@@ -179,7 +179,7 @@ fn luminaire(photometry: Photometry, axial: bool, position: Vec3, turn: Quat) ->
     }
 }
 
-fn luminaire_lights() -> [Light; 4] {
+pub(super) fn luminaire_lights() -> [Light; 4] {
     let turn = |x: f32, y: f32, z: f32, w: f32| Quat::from_xyzw(x, y, z, w);
     [
         luminaire(

@@ -93,6 +93,7 @@ pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError
     scenes.push(crate::trial_lights::many()?);
     scenes.extend(crate::trial_surfaces::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
+    scenes.extend(crate::trial_reach::scenes(kinds)?);
     Ok(scenes)
 }
 
@@ -132,7 +133,7 @@ pub(super) fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
 
 /// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and
 /// bright, one in the plane of a wall, one on edge, one hidden behind a block, one that faces away.
-fn lamps() -> Result<SceneData, SceneError> {
+pub(super) fn lamps() -> Result<SceneData, SceneError> {
     let camera = camera(
         vec3(2.3, 2.2, 3.7),
         vec3(-0.4, 0.7, -0.3),

@@ -180,6 +180,7 @@ fn faults_are_seen_by_the_checks_that_should_see_them_and_the_sound_ones_are_gre
 }
 
 /// Reads the arguments of the command: the folder of kernels, records and table, and the adapter.
+/// `RAYSTONE_MUTANTS_NAMES` names faults in place of all.
 #[test]
 #[ignore = "some minutes: all faults; `raystone stress --mutants` runs this"]
 fn every_fault_of_the_table_is_seen_or_explained() {
@@ -195,7 +196,9 @@ fn every_fault_of_the_table_is_seen_or_explained() {
             Some(out) => out.join("mutants"),
             None => temporary.path().to_owned(),
         },
-        names: Vec::new(),
+        names: std::env::var("RAYSTONE_MUTANTS_NAMES")
+            .map(|names| names.split_whitespace().map(str::to_owned).collect())
+            .unwrap_or_default(),
     };
     let shows = std::io::stderr().is_terminal();
     let progress = |outcome: &Outcome| {

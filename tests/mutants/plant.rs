@@ -4,8 +4,14 @@ use crate::CheckError;
 use raystone::accel::StructureStats;
 use raystone::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use raystone::gpu::KernelLibrary;
-use raystone::sampling::{Sampler, SamplerTable};
+use raystone::sampling::{
+    Coordinate, Decorrelation, Demand, Facts, Partner, Sampler, SamplerTable, Seeding, Sequence,
+};
 use std::path::Path;
+use std::sync::Arc;
+
+/// Coordinates at which a faulty sampler draws in place of those asked for.
+pub type Elsewhere = fn(Coordinate) -> Coordinate;
 
 /// The place of a fault.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +36,15 @@ pub enum Plant {
         /// Changes it, and returns the number of places changed.
         change: fn(&mut GpuBuffers) -> usize,
     },
+    /// A kernel of samplers, and the twin in the same way.
+    Both {
+        /// What stands in `sampling/sampler`, once.
+        from: &'static str,
+        /// What takes its place.
+        to: &'static str,
+        /// Where the twin's sequence and decorrelation draw.
+        twin: [Option<Elsewhere>; 2],
+    },
     /// The table of a sampler, which kernel and twin both read.
     Table {
         /// Description of the changed part.
@@ -39,6 +54,87 @@ pub enum Plant {
     },
 }
 
+/// The kernel through which all draws go.
+const SAMPLER: &str = "sampling/sampler";
+
+/// A sequence or decorrelation that draws elsewhere.
+struct Moved<T: ?Sized> {
+    inner: Arc<T>,
+    draws: Elsewhere,
+}
+
+impl Sequence for Moved<dyn Sequence> {
+    fn seeding(&self) -> Seeding {
+        self.inner.seeding()
+    }
+
+    fn facts(&self) -> Facts {
+        self.inner.facts()
+    }
+
+    fn table(&self, demand: &Demand) -> Vec<u32> {
+        self.inner.table(demand)
+    }
+
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        self.inner.constants()
+    }
+
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
+        self.inner.sequence(table, (self.draws)(at))
+    }
+}
+
+impl Decorrelation for Moved<dyn Decorrelation> {
+    fn kernel(&self) -> Option<&'static str> {
+        self.inner.kernel()
+    }
+
+    fn seeding(&self) -> Seeding {
+        self.inner.seeding()
+    }
+
+    fn is_random(&self) -> bool {
+        self.inner.is_random()
+    }
+
+    fn is_unbiased(&self) -> bool {
+        self.inner.is_unbiased()
+    }
+
+    fn by_count(&self) -> bool {
+        self.inner.by_count()
+    }
+
+    fn by_width(&self) -> bool {
+        self.inner.by_width()
+    }
+
+    fn limits(&self) -> [Option<u32>; 2] {
+        self.inner.limits()
+    }
+
+    fn refusal(&self, partner: &Partner) -> Option<String> {
+        self.inner.refusal(partner)
+    }
+
+    fn table(&self, partner: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
+        self.inner.table(partner, demand)
+    }
+
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        self.inner.constants()
+    }
+
+    fn index(&self, table: &SamplerTable, at: Coordinate) -> u32 {
+        self.inner.index(table, (self.draws)(at))
+    }
+
+    fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32 {
+        self.inner.decorrelate(x, table, (self.draws)(at))
+    }
+}
+
 impl Plant {
     /// Describes the place in few words.
     pub fn place(&self) -> String {
@@ -46,6 +142,7 @@ impl Plant {
             Self::Nothing => "nowhere".to_owned(),
             Self::Kernel { file, .. } => format!("kernels/{file}.wesl"),
             Self::Built { part, .. } => format!("builder: {part}"),
+            Self::Both { .. } => format!("{SAMPLER} and twin"),
             Self::Table { part, .. } => format!("table: {part}"),
         }
     }
@@ -58,14 +155,15 @@ impl Plant {
         &self,
         library: &KernelLibrary,
     ) -> Result<Option<(&'static str, String)>, CheckError> {
-        let Self::Kernel {
-            file,
-            from,
-            to,
-            times,
-        } = self
-        else {
-            return Ok(None);
+        let (file, from, to, times) = match self {
+            Self::Kernel {
+                file,
+                from,
+                to,
+                times,
+            } => (*file, *from, *to, *times),
+            Self::Both { from, to, .. } => (SAMPLER, *from, *to, 1),
+            _ => return Ok(None),
         };
         let stale = |found: String| {
             CheckError::Stale(format!(
@@ -75,7 +173,7 @@ impl Plant {
         let text = library.text(file);
         let text = text.ok_or_else(|| stale("but there is no such kernel".to_owned()))?;
         match text.matches(from).count() {
-            found if found == *times => Ok(Some((file, text.replace(from, to)))),
+            found if found == times => Ok(Some((file, text.replace(from, to)))),
             found => Err(stale(format!("but stands {found} times"))),
         }
     }
@@ -108,11 +206,11 @@ impl Plant {
         Ok(library.clone().with_folder(folder)?)
     }
 
-    /// `sampler` with the fault in its table.
+    /// `sampler` with the fault in its table, or in its twin.
     ///
     /// # Errors
     /// There is nothing left to change.
-    pub fn in_table(&self, mut sampler: Sampler) -> Result<Sampler, CheckError> {
+    pub fn in_sampler(&self, mut sampler: Sampler) -> Result<Sampler, CheckError> {
         if let Self::Table { part, change } = self {
             let mut words = sampler.table.words().to_vec();
             if change(&mut words) == 0 {
@@ -121,6 +219,16 @@ impl Plant {
             let (sequence, decorrelation) = words.split_at(words[0] as usize);
             let (width, sequence) = sequence[1..].split_last().unwrap_or((&0, &[]));
             sampler.table = SamplerTable::new(sequence, *width, decorrelation);
+        }
+        if let Self::Both { twin, .. } = *self {
+            if let Some(draws) = twin[0] {
+                let inner = sampler.sequence;
+                sampler.sequence = Arc::new(Moved { inner, draws });
+            }
+            if let Some(draws) = twin[1] {
+                let inner = sampler.decorrelation;
+                sampler.decorrelation = Arc::new(Moved { inner, draws });
+            }
         }
         Ok(sampler)
     }

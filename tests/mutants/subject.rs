@@ -61,6 +61,7 @@ impl Subject {
             Self::Structure { .. } => &[Check::Lattice, Check::Gate, Check::Work],
             Self::Sampler { .. } => &[
                 Check::Stream,
+                Check::Known,
                 Check::Integrand,
                 Check::Discrepancy,
                 Check::Integral,
@@ -125,8 +126,8 @@ pub const LONG_DEMAND: Demand = Demand {
     width: Some(192),
 };
 
-/// The sampler of these names for `demand` or as much of it as there is, with the fault in its table if it
-/// belongs there.
+/// The sampler of these names for `demand` or as much of it as there is, with the fault if it belongs
+/// there.
 pub fn sampler(
     (sequence, changes): (&str, Changes),
     decorrelation: &str,
@@ -144,5 +145,5 @@ pub fn sampler(
         ..*demand
     };
     let made = registry.sampler(&sequence, &decorrelation, &demand);
-    plant.in_table(made.map_err(|e| CheckError::Other(e.to_string()))?)
+    plant.in_sampler(made.map_err(|e| CheckError::Other(e.to_string()))?)
 }

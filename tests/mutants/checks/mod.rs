@@ -27,6 +27,9 @@ pub enum Check {
     Work,
     /// The words of a sampler's kernel equal those of its twin.
     Stream,
+    /// Words of kernel and twin are those computed anew or checked before, and no two seeds, pixels or dimensions
+    /// are alike.
+    Known,
     /// The image of an integrand equals that of the twins to the bit.
     Integrand,
     /// Star discrepancy, net quality and projections of the stream are those of good points.
@@ -57,6 +60,7 @@ impl Check {
             Self::Gate => "gate",
             Self::Work => "work",
             Self::Stream => "stream",
+            Self::Known => "known",
             Self::Integrand => "integrand",
             Self::Discrepancy => "discrepancy",
             Self::Integral => "integral",
@@ -125,6 +129,7 @@ impl<'a> Bench<'a> {
                 let sampler = (sequence, changes, decorrelation);
                 match check {
                     Check::Stream => streams::same_words(self, sampler),
+                    Check::Known => streams::known_words(self, sampler),
                     Check::Integrand => streams::same_image(self, sampler),
                     Check::Discrepancy => streams::discrepancy(self, sampler),
                     Check::Integral => streams::integral(self, sampler),

@@ -28,11 +28,13 @@ fn columns(sampler: &Sampler, samples: u32) -> Vec<Vec<u32>> {
 }
 
 /// Describes a fault of the first `samples` points: a number that a dimension draws twice, a dimension that equals
-/// another one, or two that are locked together.
-pub fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
+/// another one, or two that are locked together. Numbers that are jittered one by one come as near to each other
+/// as random ones (two of 1024 agree in 20 bits in two dimensions of five): only whole words count as the same.
+pub fn fault(sampler: &Sampler, samples: u32, are_jittered: bool) -> Option<String> {
     let columns = columns(sampler, samples);
+    let unseen = if are_jittered { 0 } else { UNSEEN };
     for (i, xs) in columns.iter().enumerate() {
-        if xs.iter().map(|x| x >> UNSEEN).collect::<HashSet<_>>().len() < xs.len() {
+        if xs.iter().map(|x| x >> unseen).collect::<HashSet<_>>().len() < xs.len() {
             return Some(format!(
                 "dimension {i} draws a number twice in {samples} samples"
             ));

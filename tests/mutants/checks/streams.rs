@@ -11,6 +11,7 @@ use raystone::integrator::integrand::functions;
 use raystone::integrator::{
     ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
 };
+use raystone::measure::known_words;
 use raystone::measure::statistics::{mean, variance};
 use raystone::measure::words::{Used, compare, dump_stream};
 use raystone::params::Variant;
@@ -91,6 +92,19 @@ pub fn same_words(bench: &Bench, names: Names) -> Finding {
     }));
     let words = dump(bench, &sampler, &coordinates)?;
     Ok(compare(&sampler, &coordinates, &words).err())
+}
+
+/// What is known of the words, as before a run.
+pub fn known_words(bench: &Bench, names: Names) -> Finding {
+    let sampler = make(bench, names, &DEMAND)?;
+    let width = sampler.demand.width.unwrap_or(1);
+    let used = Used {
+        samples: sampler.demand.samples.unwrap_or(1),
+        dimensions: sampler.demand.dimensions,
+        size: [width, width],
+        seeds: (1..=4).collect(),
+    };
+    Ok(known_words::check(bench.gpu, &sampler, &used).err())
 }
 
 fn dump(bench: &Bench, sampler: &Sampler, at: &[Coordinate]) -> Result<Vec<u32>, CheckError> {
@@ -196,7 +210,7 @@ pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
             return Ok(Some(format!("a ({}, {}, 2)-net, not t = 0", net.t, net.m)));
         }
     }
-    if let Some(fault) = projections::fault(&sampler, POINTS) {
+    if let Some(fault) = projections::fault(&sampler, POINTS, jitters) {
         return Ok(Some(fault));
     }
     let long = make(bench, names, &LONG_DEMAND)?;

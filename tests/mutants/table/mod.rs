@@ -11,7 +11,9 @@ mod instanced;
 mod late_samples;
 mod path_lights;
 mod paths;
+mod reach;
 mod samplers;
+mod shared;
 mod wide;
 mod words;
 
@@ -30,6 +32,8 @@ pub fn mutants() -> Vec<Mutant> {
         hard::MUTANTS,
         samplers::MUTANTS,
         late_samples::MUTANTS,
+        shared::MUTANTS,
+        reach::MUTANTS,
         image::MUTANTS,
         paths::MUTANTS,
         path_lights::MUTANTS,

@@ -226,3 +226,55 @@ fn copy(table: &mut [u32], to: usize, from: usize) -> usize {
         _ => 0,
     }
 }
+
+/// Dimension 30 of Sobol has 32 words from here on.
+pub fn flip_a_direction_bit(table: &mut [u32]) -> usize {
+    let word = table.get_mut(HEADER + 30 * 32 + 7);
+    word.map(|word| *word ^= 1 << 20).into_iter().count()
+}
+
+pub fn exchange_rows(table: &mut [u32]) -> usize {
+    let first = HEADER + 40 * 32;
+    let rows = table.get_mut(first..first + 64);
+    rows.map(|rows| rows.rotate_left(32)).into_iter().count()
+}
+
+/// Dimension 41 has the base 181; 229 belongs to the 50th.
+pub fn take_a_larger_prime(table: &mut [u32]) -> usize {
+    let base = table.get_mut(HEADER + 82).filter(|base| **base == 181);
+    base.map(|base| *base = 229).into_iter().count()
+}
+
+/// Base 101 is that of dimension 25.
+pub fn exchange_digits(table: &mut [u32]) -> usize {
+    let first = table
+        .get(HEADER + 51)
+        .map_or(usize::MAX / 2, |&w| HEADER + w as usize);
+    if table.len() <= first + 57 {
+        return 0;
+    }
+    table.swap(first + 30, first + 57);
+    1
+}
+
+pub fn lengthen_step(table: &mut [u32]) -> usize {
+    let step = table.get_mut(HEADER + 1);
+    step.map(|step| *step += 430).into_iter().count()
+}
+
+/// The number of samples, then the quotient of 2³² over it.
+pub fn divide_by_one_more(table: &mut [u32]) -> usize {
+    let Some(&count) = table.get(HEADER) else {
+        return 0;
+    };
+    table[HEADER + 1] = ((1_u64 << 32) / u64::from(count + 1)) as u32;
+    1
+}
+
+pub fn halve_the_stack(buffers: &mut GpuBuffers) -> usize {
+    let stack = buffers
+        .constants
+        .iter_mut()
+        .filter(|c| c.0 == "STACK_ENTRIES" && c.1 > 1);
+    stack.map(|c| c.1 /= 2).count()
+}

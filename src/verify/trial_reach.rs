@@ -1,0 +1,188 @@
+//! Trial scenes for what small, plain scenes do not reach: masks that wrap in two ways and alphas equal to their
+//! cutoff, rooms a hundred thousand times as large and as small, every light on every material at once, and
+//! surfaces within a luminous ball.
+
+use crate::kinds::KindChecks;
+use crate::mesh::Mesh;
+use crate::trial_scenes::{TrialScene, camera, depth, lamps, word};
+use glam::{Vec3, vec2, vec3};
+use raystone_core::params::ParamValue;
+use raystone_scene::{
+    AlphaChannel, AlphaMask, Light, Material, SceneData, SceneError, Texture, TextureUse, Wrap,
+};
+
+/// Factors of the large and the small room: powers of two, so that all coordinates stay exact.
+const LARGE: f32 = 131_072.0;
+const SMALL: f32 = 1.0 / 131_072.0;
+
+pub(super) fn scenes(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
+    let path = |changes: &[_]| ("path", changes.to_vec());
+    let occlusion = || ("ao", vec![("radius", ParamValue::Number(0.3))]);
+    let primary = || ("primary", vec![]);
+    let mut scenes = vec![
+        TrialScene {
+            scene: fences()?,
+            trials: vec![path(&[depth(3)]), primary()],
+        },
+        TrialScene {
+            scene: every_pair(kinds)?,
+            trials: vec![path(&[depth(2), word("lights", "all")])],
+        },
+        TrialScene {
+            scene: within_a_lamp()?,
+            trials: vec![path(&[depth(3)])],
+        },
+    ];
+    for (name, factor) in [("large-room", LARGE), ("small-room", SMALL)] {
+        scenes.push(TrialScene {
+            scene: scaled(lamps()?, name, factor),
+            trials: vec![path(&[depth(8)]), occlusion(), primary()],
+        });
+    }
+    Ok(scenes)
+}
+
+/// The same scene at another scale.
+fn scaled(mut scene: SceneData, name: &str, factor: f32) -> SceneData {
+    scene.name = name.to_owned();
+    for vertex in scene.triangles.iter_mut().flat_map(|t| &mut t.vertices) {
+        *vertex *= factor;
+    }
+    if let Some(camera) = &mut scene.camera {
+        camera.eye *= factor;
+        camera.target *= factor;
+    }
+    scene
+}
+
+/// An image of alphas of which whole rows and columns at the border are opaque.
+fn alphas(name: &str, [width, height]: [u32; 2]) -> Texture {
+    let alpha = |at: u32| match (at % width, at / width) {
+        (column, row) if column + 1 == width || row == 0 => 255,
+        _ => [0, 90, 200, 255][(at * 7 % 5 % 4) as usize],
+    };
+    Texture {
+        name: name.to_owned(),
+        width,
+        height,
+        texels: (0..width * height).map(|at| [0, 0, 0, alpha(at)]).collect(),
+    }
+}
+
+/// Fences before a wall, each cut out by another image that wraps differently in both directions; one of them is
+/// solid only where alpha is the cutoff itself.
+fn fences() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.4, 1.7, 3.1), vec3(0.0, 0.6, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("fences", camera, vec3(0.4, 0.5, 0.6))?;
+    let fence = |name, color, (texture, wrap, cutoff)| Material {
+        mask: Some(AlphaMask::of(
+            TextureUse {
+                wrap,
+                ..TextureUse::plain(texture)
+            },
+            AlphaChannel::Alpha,
+            cutoff,
+        )),
+        ..Material::diffuse(name, color)
+    };
+    let [first, second, third, ground, lamp] = [
+        fence(
+            "first",
+            vec3(0.8, 0.3, 0.2),
+            (0, [Wrap::Clamp, Wrap::Repeat], 1.0),
+        ),
+        fence(
+            "second",
+            vec3(0.2, 0.4, 0.8),
+            (1, [Wrap::Mirrored, Wrap::Clamp], 0.5),
+        ),
+        fence(
+            "third",
+            vec3(0.3, 0.7, 0.3),
+            (1, [Wrap::Repeat, Wrap::Mirrored], 0.7),
+        ),
+        Material::diffuse("ground", vec3(0.7, 0.7, 0.6)),
+        Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(9.0, 8.0, 7.0)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        ground,
+    );
+    mesh.plain(
+        [vec3(-2.0, 0.0, -1.6), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        ground,
+    );
+    mesh.plain([vec3(-0.6, 2.6, -0.5), 1.2 * Vec3::X, 0.9 * Vec3::Z], lamp);
+    let uv = [vec2(-1.7, -2.2), vec2(2.9, 3.4)];
+    for (x, z, material) in [(-1.6, 0.3, first), (-0.4, -0.4, second), (0.2, 0.9, third)] {
+        mesh.quad(
+            [vec3(x, 0.0, z), 1.5 * Vec3::X, 1.3 * Vec3::Y],
+            uv,
+            material,
+        );
+    }
+    Ok(mesh.done(vec![alphas("fine", [3, 5]), alphas("coarse", [4, 2])]))
+}
+
+/// Balls of every kind of material among lights of every kind, all of which are sampled at every vertex.
+fn every_pair(kinds: &KindChecks) -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.3, 2.2, 4.6), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("every-pair", camera, vec3(0.1, 0.15, 0.2))?;
+    let kinds_of_balls = kinds.materials.iter().flat_map(|kind| (kind.balls)());
+    let mut materials: Vec<Material> = kinds_of_balls.map(|(_, material)| material).collect();
+    materials.push(Material::mirror("mirror", vec3(0.9, 0.8, 0.7)));
+    for (place, material) in materials.into_iter().enumerate() {
+        let material = mesh.material(material);
+        let (column, row) = ((place % 4) as f32, (place / 4) as f32);
+        let centre = vec3(1.1 * column - 1.7, 0.45, 1.1 * row - 0.8);
+        mesh.ball(centre, 0.42, material);
+    }
+    let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));
+    let lamp = Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(3.0, 2.0, 4.0));
+    let lamp = mesh.material(lamp);
+    mesh.plain([vec3(-3.0, 0.0, -3.0), 6.0 * Vec3::Z, 6.0 * Vec3::X], floor);
+    mesh.plain([vec3(-2.2, 0.2, -1.4), Vec3::Y, 1.4 * Vec3::Z], lamp);
+    let corners = [
+        vec3(2.1, 0.3, -0.9),
+        vec3(2.3, 1.4, -0.2),
+        vec3(2.2, 0.4, 0.9),
+    ];
+    mesh.triangle(corners, [glam::Vec2::ZERO; 3], lamp);
+    let mut scene = mesh.done(Vec::new());
+    scene.lights = kinds
+        .lights
+        .iter()
+        .flat_map(|kind| (kind.points)())
+        .collect();
+    scene.lights.extend(crate::trial_lights::luminaire_lights());
+    scene.lights.push(crate::trial_lights::map());
+    Ok(scene)
+}
+
+/// A block and a ball in a corner, all of it within a ball that shines inwards, and beside a small one.
+fn within_a_lamp() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.2, 1.5, 2.4), vec3(-0.1, 0.5, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("within-a-lamp", camera, Vec3::ZERO)?;
+    let [floor, block, shiny] = [
+        Material::diffuse("floor", vec3(0.7, 0.5, 0.6)),
+        Material::diffuse("block", vec3(0.4, 0.7, 0.5)),
+        Material::phong("shiny", vec3(0.2, 0.3, 0.4), Vec3::splat(0.5), 30.0),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-1.5, 0.0, -1.5), 3.0 * Vec3::Z, 3.0 * Vec3::X], floor);
+    mesh.plain([vec3(-1.5, 0.0, -1.0), 3.0 * Vec3::X, 1.5 * Vec3::Y], floor);
+    mesh.block(vec3(-0.7, 0.0, -0.5), vec3(0.5, 0.9, 0.4), block);
+    mesh.ball(vec3(0.5, 0.4, 0.3), 0.38, shiny);
+    let mut scene = mesh.done(Vec::new());
+    let ball = |center, radius, radiance| Light::Sphere {
+        center,
+        radius,
+        radiance,
+    };
+    scene.lights = vec![
+        ball(vec3(0.4, 0.3, -0.2), 4.5, vec3(0.5, 0.7, 0.9)),
+        ball(vec3(-0.9, 1.1, 0.7), 0.15, vec3(9.0, 6.0, 3.0)),
+    ];
+    Ok(scene)
+}
