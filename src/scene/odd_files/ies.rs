@@ -2,49 +2,49 @@
 
 use crate::IesProfile;
 
-/// The intensity straight down and at 45 degrees towards x, or a part of the error.
-type Outcome = Result<[f64; 2], &'static str>;
+/// The intensity straight down and at 45 degrees towards x and y, or a part of the error.
+type Outcome = Result<[f64; 3], &'static str>;
 
 /// A luminaire, what becomes of it, and a part of the note.
 const IES: &[(&str, Outcome, &str)] = &[
     (
         "own measurement 12\nTILTED DOWNLIGHT, WHITE\nTILT=NONE\n1 1000 1 3 1 1 2 0 0 0\n1 1 40\n0 45 90\n0\n100 50 0\n",
-        Ok([100.0, 50.0]),
+        Ok([100.0, 50.0, 50.0]),
         "",
     ),
     (
         "IESNA91\ntilt = none\n1 1000 1 3 1 1 2 0 0 0 1 1 40 0 45 90 0 100 50 0\n\u{1a}",
-        Ok([100.0, 50.0]),
+        Ok([100.0, 50.0, 50.0]),
         "",
     ),
     (
         "IESNA91\nTILT=NONE\n1,1000,1,3,1,1,2,0,0,0\n1,1,40\n0,45,90\n0\n1.0E+02,0.5d2,0\n",
-        Ok([100.0, 50.0]),
+        Ok([100.0, 50.0, 50.0]),
         "",
     ),
     (
         "IESNA91\nTILT=a.tlt\n1 1000 1 3 1 1 2 0 0 0\n1 1 40\n0 45 90\n0\n100 50 0\n",
-        Ok([100.0, 50.0]),
+        Ok([100.0, 50.0, 50.0]),
         "line 2: factors for tilted lamps",
     ),
     (
         "IESNA91\nTILT=NONE\n1 -1 1 2 3 1 2 0 0 0\n1 1 0\n0 90\n180 270 360\n90 10 90 20 90 30\n",
-        Ok([90.0, 60.0]),
+        Ok([90.0, 60.0, 55.0]),
         "",
     ),
     (
-        "IESNA91\nTILT=NONE\n1 -1 1 2 5 1 2 0 0 0\n1 1 0\n0 90\n-180 -90 0 90 180\n90 10 90 20 90 30 90 20 90 10\n",
-        Ok([90.0, 60.0]),
+        "IESNA91\nTILT=NONE\n1 -1 1 2 5 1 2 0 0 0\n1 1 0\n0 90\n-180 -90 0 90 180\n90 10 90 20 90 30 90 40 90 10\n",
+        Ok([90.0, 60.0, 65.0]),
         "",
     ),
     (
         "IESNA91\nTILT=NONE\n1 -1 1 2 3 1 2 0 0 0\n1 1 0\n0 90\n-90 0 90\n90 10 90 30 90 20\n",
-        Ok([90.0, 60.0]),
+        Ok([90.0, 60.0, 55.0]),
         "",
     ),
     (
         "IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n90 30\n7\n",
-        Ok([90.0, 60.0]),
+        Ok([90.0, 60.0, 60.0]),
         "line 8",
     ),
     (
@@ -78,8 +78,10 @@ fn ies_files_as_found_are_read() {
             std::fs::write(&file, text.replace('\n', end)).expect("a file");
             match (IesProfile::read(&file), expected) {
                 (Ok(found), Ok(intensities)) => {
-                    for (x, intensity) in [0.0, 1.0].into_iter().zip(intensities) {
-                        let towards = glam::DVec3::new(x, 0.0, 1.0).normalize();
+                    for (x_y, intensity) in
+                        [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].iter().zip(intensities)
+                    {
+                        let towards = glam::DVec3::new(x_y[0], x_y[1], 1.0).normalize();
                         let error = found.intensity(towards) - intensity;
                         assert!(error.abs() < 1e-3, "{text}: {found:?}");
                     }
