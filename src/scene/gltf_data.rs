@@ -158,13 +158,9 @@ impl<'a> Data<'a> {
             let bytes = match buffer.text("uri") {
                 Some(uri) => files.read(uri),
                 None => {
-                    let is_fallback = |name: &&str| {
-                        let fallback = buffer.extension(name).flag("fallback");
-                        fallback == Some(true)
-                    };
-                    let own = !gltf_meshopt::COMPRESSIONS
-                        .iter()
-                        .any(|name| is_fallback(&name));
+                    let packed = gltf_meshopt::compression(buffer);
+                    let is_fallback = packed.and_then(|packed| packed.flag("fallback"));
+                    let own = is_fallback != Some(true);
                     let chunk = own.then(|| chunk.take()).flatten();
                     chunk.ok_or_else(|| "it names no file, and no binary chunk is there".to_owned())
                 }

@@ -10,7 +10,7 @@ pub(super) const COMPRESSIONS: [&str; 3] = [
     "MESHOPT_compression",
 ];
 
-/// The extension of a buffer view, if it is compressed.
+/// The extension of a buffer view that is compressed, or of the buffer that it would have without.
 pub(super) fn compression(view: Item<'_>) -> Option<Item<'_>> {
     let found = COMPRESSIONS.iter().map(|name| view.extension(name));
     found.into_iter().find_map(Item::given)
@@ -103,7 +103,7 @@ const BITS: [[usize; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
 /// Elements of `stride` bytes, as differences per byte in blocks.
 fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
-    if stride % 4 != 0 || !(4..=256).contains(&stride) {
+    if !stride.is_multiple_of(4) || !(4..=256).contains(&stride) {
         return None;
     }
     let (version, channels, padded) = match data.first()? {
@@ -115,7 +115,7 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let mut bytes = Bytes(data.get(1..data.len().checked_sub(tail.max(padded))?)?);
     let (last, channels) = data[data.len() - tail..].split_at(stride);
     let mut last = last.to_vec();
-    let block = (0x2000 / stride & !15).min(256);
+    let block = ((0x2000 / stride) & !15).min(256);
     let mut decoded = Vec::new();
     let mut left = count;
     while left > 0 {
@@ -320,7 +320,7 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
         };
         list.extend(triangle);
     }
-    (count % 3 == 0).then_some(list)
+    count.is_multiple_of(3).then_some(list)
 }
 
 /// Indices as differences from one of two earlier ones.

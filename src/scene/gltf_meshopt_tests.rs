@@ -51,7 +51,7 @@ fn attributes_of_both_versions_are_what_was_encoded() {
     let pairs = (0..20).flat_map(|i| [1.0 + i as f32 / 16.0, -3.0 * i as f32]);
     let floats: Vec<u8> = pairs.flat_map(f32::to_le_bytes).collect();
     assert_eq!(decoded("ATTRIBUTES", "NONE", 20, 8, &bytes(FLOATS)), floats);
-    let short = |i: u32| if i % 4 == 3 { 0 } else { i * 777 + (i * i >> 1) } as u16;
+    let short = |i: u32| if i % 4 == 3 { 0 } else { i * 777 + ((i * i) >> 1) } as u16;
     let shorts: Vec<u8> = (0..80).flat_map(|i| short(i).to_le_bytes()).collect();
     assert_eq!(decoded("ATTRIBUTES", "NONE", 20, 8, &bytes(SHORTS)), shorts);
 }
@@ -93,14 +93,14 @@ fn filters_give_what_the_original_decoder_does() {
         (
             "OCTAHEDRAL",
             4,
-            "oe8AIGvBIWYAuk2nj0UA/v3+/f4AAAAAAAAAAAAAAAAAAAAAAAAAVlx/AAA=",
-            "PEapAF3XtH8ZjNMAs2IZf5zxTQDpumh/",
+            "oe8AAq7+CaEAZmb+nScA/v3+/f4AAAAAAAAAAAAAAAAAAAAAAAAAVlx/AAA=",
+            "PEapABXEkn+aueUAR2YbfzzrbgC6xll/",
         ),
         (
             "OCTAHEDRAL",
             8,
-            "of/aAAfNIx1kAAIHCwEIAJ/ZW/BnABMDFAcDARmQAAAA/v3+/f4AAAAAAAAAAAAAAAAAAGkF0gX/BwAAAAA=",
-            "iTvCRoCnAAAeXXDVL7P/f0AZzYor0wAAVrJ2YqAZ/3/Wm8bwOE4AALLo5rmHaP9/",
+            "of/aABS4ApU3AAAVEAAJABiCAwGPABkIEAkDARmQAAAA/v3+/f4AAAAAAAAAAAAAAAAAAGkF0gX/BwAAAAA=",
+            "iTvCRoCnAADJFK7ClpH/f5iYj7kF5QAAokZNZ+Ea/3/CPIbql24AACS5lMR+WP9/",
         ),
         (
             "QUATERNION",

@@ -83,7 +83,7 @@ impl<'a> Geometry<'a> {
                 "a face refers to vertex {index}, but there are {vertices}"
             ));
         }
-        if !indices.iter().any(|index| is_restart(index)) {
+        if !indices.iter().any(is_restart) {
             return Ok(vec![indices]);
         }
         Ok(indices.split(is_restart).map(<[u32]>::to_vec).collect())
