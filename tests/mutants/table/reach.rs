@@ -81,11 +81,11 @@ pub const MUTANTS: &[Mutant] = &[
     ),
     path(
         "shadow-rays-end-at-1000",
-        "nothing blocks light from farther than 1000 units",
+        "nothing blocks the light of lamps from farther than 1000 units",
         text(
-            "shading/light/sample",
-            "(surface.position - origin), 1.0)",
-            "(surface.position - origin), min(1.0, 1000.0 / length(towards)))",
+            "shading/light/flat",
+            "Ray(origin, 0.0, end - origin, 1.0),",
+            "Ray(origin, 0.0, end - origin, min(1.0, 1000.0 / length(end - origin))),",
         ),
     ),
     path(
@@ -107,15 +107,6 @@ pub const MUTANTS: &[Mutant] = &[
         ),
     ),
     path(
-        "offset-of-at-most-a-thousandth",
-        "rays start a thousandth of a unit off their surface at most",
-        text(
-            "integrator/position_error",
-            "return POSITION_ERROR * (reach + (2.0 * extent + moved));",
-            "return min(vec3<f32>(0.001), POSITION_ERROR * (reach + (2.0 * extent + moved)));",
-        ),
-    ),
-    path(
         "dark-within-a-sphere",
         "a sphere does not light what is within",
         text(
@@ -130,7 +121,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "shading/light/sphere",
             "max(cos_light, 1e-6)",
-            "max(cos_light, 0.7)",
+            "max(cos_light, 0.99)",
         ),
     ),
     path(
