@@ -274,11 +274,12 @@ mod tests {
         for format in FILE_FORMATS.iter().filter(|format| format.is_exact) {
             let path = folder.path().join(format!("picture.{}", format.ending));
             format.write(&path, &image, &[]).unwrap();
-            for change in [
-                |image: &mut Image| image.pixels.iter_mut().for_each(|p| p.swap(0, 2)),
-                |image: &mut Image| image.pixels.reverse(),
-                |image: &mut Image| image.pixels[14][1] = image.pixels[14][1].next_up(),
-            ] {
+            let changes: [fn(&mut Image); 3] = [
+                |image| image.pixels.iter_mut().for_each(|p| p.swap(0, 2)),
+                |image| image.pixels.reverse(),
+                |image| image.pixels[14][1] = image.pixels[14][1].next_up(),
+            ];
+            for change in changes {
                 let mut other = image.clone();
                 change(&mut other);
                 let fault = differing_pixel(&read_linear(&path).unwrap(), &other);
