@@ -117,6 +117,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("common/errors", "writes the error word on the device"),
     ("common/limits", "a uniform, filled by name"),
+    (
+        "common/load_probe",
+        "takes time on the device, which src/gpu/load_probe.rs measures",
+    ),
     ("common/sort/digits", "what the passes of the sort share"),
     (
         "common/sort/count",
@@ -341,10 +345,6 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ("accel/bvh/stack", "follow", "the body of the twin's loop"),
     ("accel/bvh/stack", "begin", "of lanes that are refilled"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
-    ("accel/cwbvh", "node_word", "parts of an array"),
-    ("accel/cwbvh", "triangle_word", "parts of an array"),
-    ("accel/bvh4", "node_word", "parts of an array"),
-    ("accel/bvh4", "triangle_word", "parts of an array"),
     (
         "accel/bvh/short_stack",
         "level_bit",

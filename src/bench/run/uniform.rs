@@ -187,8 +187,10 @@ mod tests {
             material.emission = Vec3::ZERO;
         }
         says(black(&scene, camera), "the scene has no light");
-        let sphere = named("sphere").unwrap();
-        let within = Camera::upright(Vec3::ZERO, Vec3::X, 40.0);
+        let sphere = named("displaced-sphere").unwrap();
+        let bounds = sphere.bounds();
+        let middle = 0.5 * (bounds.min + bounds.max);
+        let within = Camera::upright(middle, middle + Vec3::X, 40.0);
         says(black(&sphere, within), "inside or behind a surface");
     }
 
