@@ -78,7 +78,6 @@ impl Level<'_> {
 /// Kernels that cover every possible pair of choices.
 pub struct Family {
     factors: Vec<Factor>,
-    rows: Vec<Vec<usize>>,
     pub kernels: Vec<Composition>,
 }
 
@@ -111,29 +110,20 @@ impl Family {
                 assert!(turns >= parts.len(), "{name}: {turns} turns of {parts:?}");
             }
         }
-        Self {
-            factors,
-            rows,
-            kernels,
-        }
+        Self { factors, kernels }
     }
 
     /// The kernels that have both choices, and the others.
     pub fn divided(&self, a: Chosen, b: Chosen) -> [Vec<&Composition>; 2] {
-        let has = |row: &[usize], chosen: Chosen| {
-            let place = self.factors.iter().position(|f| f.name == chosen.factor);
-            let place = place.unwrap_or_else(|| panic!("no factor {}", chosen.factor));
-            let part = &self.factors[place].levels[row[place]][0];
-            match chosen.choice {
-                "on" => part.features.contains(chosen.factor),
-                "off" => !part.features.contains(chosen.factor),
-                module => part.active.get(chosen.factor).is_some_and(|m| m == module),
-            }
+        let has = |kernel: &Composition, chosen: Chosen| match chosen.choice {
+            "on" => kernel.features.contains(chosen.factor),
+            "off" => !kernel.features.contains(chosen.factor),
+            module => (kernel.active.get(chosen.factor)).is_some_and(|m| m == module),
         };
-        let rows = self.rows.iter().zip(&self.kernels);
+        let kernels = self.kernels.iter();
         let (with, without): (Vec<_>, Vec<_>) =
-            rows.partition(|(row, _)| has(row, a) && has(row, b));
-        [with, without].map(|half| half.into_iter().map(|(_, kernel)| kernel).collect())
+            kernels.partition(|kernel| has(kernel, a) && has(kernel, b));
+        [with, without]
     }
 
     /// The modules available for this role.

@@ -27,7 +27,9 @@ pub fn tint_fault(tint: &str, wgsl: &str) -> Option<String> {
         .expect("a file");
     file.write_all(wgsl.as_bytes()).expect("the text");
     let mut command = Command::new(tint);
-    command.args(["--format", "none"]).arg(file.path());
+    command
+        .args(["--format", "wgsl", "-o", "/dev/null"])
+        .arg(file.path());
     let output = command
         .stdin(Stdio::null())
         .output()
