@@ -46,7 +46,7 @@ fn faure_digit(base: u32, digit: u32) -> u32 {
     if base <= 2 {
         return digit;
     }
-    if base % 2 == 0 {
+    if base.is_multiple_of(2) {
         let odd = digit / half;
         return 2 * faure_digit(half, digit - odd * half) + odd;
     }
