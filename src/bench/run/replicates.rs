@@ -184,7 +184,9 @@ pub(super) fn check_distinct(images: &[Image], reference: &ReferenceImage) -> Re
     if noisy < NOISY_VALUES {
         return Ok(());
     }
-    for (what, images) in [("replicates", images), ("parts of the reference", parts)] {
+    // Those of a known reference, or of one from a file, are copies.
+    let rendered = if reference.part_spp > 0 { parts } else { &[] };
+    for (what, images) in [("replicates", images), ("parts of the reference", rendered)] {
         let mut known = BTreeMap::new();
         for (i, image) in images.iter().enumerate() {
             if let Some(other) = known.insert(image_hash(image), i) {
