@@ -1,6 +1,6 @@
 //! What a sampler draws, against sources that neither its kernel nor its twin shares: sequences computed
-//! anew ([`sequences`]), digests of words that were checked once, and the independence of pixels, seeds
-//! and dimensions ([`spread`]).
+//! anew (`sequences`), digests of words that were checked once, and the independence of pixels, seeds
+//! and dimensions (`spread`).
 //!
 //! A comparison of a kernel with its twin sees no fault that stands in both, such as two dimensions with
 //! one scramble, or seeds of which the last bit is ignored.
