@@ -194,6 +194,7 @@ fn prove_clock(
     let found = session
         .clock
         .time("gpu", || clock_check::fault(&batch(1)?, &batch(2)?));
+    session.recorder.note_kernels(&one.cell.to_string());
     match found {
         Ok(Some(fault)) => Err(RunError::Wrong(format!(
             "the clocks of this run are wrong: {fault}; no time would mean anything"
