@@ -232,7 +232,7 @@ const MTL: &[(&str, Outcome)] = &[
         Reads("r", &[]),
     ),
     (
-        "newmtl a\nKd 1 0 0\nmap_Kd D:\\work\\t.png\nmap_d /work/t.png",
+        "newmtl a\nKd 1 0 0\nmap_Kd D:\\maps\\t.png\nmap_d /maps/t.png",
         Reads(
             "r",
             &["2 textures are not where they should be (first: line 3)"],
