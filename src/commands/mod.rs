@@ -25,6 +25,7 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+mod view;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -103,6 +104,7 @@ commands! {
     Export(export::Export),
     Repro(repro::Repro),
     Render(render::Render),
+    View(view::View),
     Verify(verify::Verify),
     Trace(trace::Trace),
     Stress(stress::Stress),
