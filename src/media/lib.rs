@@ -16,6 +16,7 @@ pub mod procedures;
 pub mod rays;
 pub mod segments;
 pub mod structure;
+pub mod tracking;
 pub mod volume;
 pub mod walk;
 

@@ -247,6 +247,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "integrator/visible",
         "reads what was drawn; tests/images/primary_visibility.rs compares it with rays",
     ),
+    (
+        "media/tracking",
+        "judged by closed forms and quadratures in src/media/tests/tracking.rs",
+    ),
     ("sampling/dump_stream", "the loop over coordinates"),
     (
         "sampling/sampler_cost",

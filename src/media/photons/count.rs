@@ -40,6 +40,26 @@ pub fn cell_deviation(points: &[[f64; 2]], cells: u32, turn: f64, scale: f64) ->
     square.sqrt() / mean
 }
 
+/// Root of the mean square of a cell's relative error: its number of points against a density relative to the uniform one,
+/// constant in each of `cells`² cells.
+pub fn density_deviation(
+    points: &[[f64; 2]],
+    cells: u32,
+    density: impl Fn([f64; 2]) -> f64,
+) -> f64 {
+    let side = cells as usize;
+    let mut counts = vec![0_u32; side * side];
+    for [x, y] in points {
+        counts[cell_of(*x, cells) as usize + side * cell_of(*y, cells) as usize] += 1;
+    }
+    let even = points.len() as f64 / counts.len() as f64;
+    let square = |(cell, count): (usize, &u32)| {
+        let middle = [cell % side, cell / side].map(|c| (c as f64 + 0.5) / side as f64);
+        (f64::from(*count) / (even * density(middle)) - 1.0).powi(2)
+    };
+    (counts.iter().enumerate().map(square).sum::<f64>() / counts.len() as f64).sqrt()
+}
+
 /// The share of photons in windows of `window` consecutive ones that land in a cell in which one of their window did
 /// before: those that have to write again.
 pub fn collisions(points: &[[f64; 2]], cells: u32, window: usize) -> f64 {

@@ -9,7 +9,7 @@ mod order;
 mod points;
 mod warp;
 
-pub use count::{cell_deviation, collisions, segments_of_32};
+pub use count::{cell_deviation, collisions, density_deviation, segments_of_32};
 pub use order::{Order, ordered};
 pub use points::{Points, point_set};
 pub use warp::{ImportanceMap, Warp};

@@ -111,21 +111,12 @@ fn warps_follow_their_map_and_keep_different_parts_of_the_order_of_points() {
     let points = set(Points::Hammersley);
     let mut deviations = Vec::new();
     for warp in [Warp::Inversion, Warp::Alias, Warp::Hierarchical] {
-        let mut counts = vec![0.0; side * side];
-        for point in &points {
-            let [x, y] = map.warped(warp, *point);
-            assert!(
-                (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y),
-                "{warp:?} {x} {y}"
-            );
-            counts[(x * 16.0) as usize + side * (y * 16.0) as usize] += 1.0;
-        }
-        let expected = |cell: usize| {
-            let [x, y] = [cell % side, cell / side].map(|c| (c as f64 + 0.5) / 16.0);
-            map.density([x, y]) * points.len() as f64 / (side * side) as f64
-        };
-        let square = |cell: usize| (counts[cell] / expected(cell) - 1.0).powi(2);
-        let deviation = ((0..counts.len()).map(square).sum::<f64>() / counts.len() as f64).sqrt();
+        let warped: Vec<[f64; 2]> = points.iter().map(|p| map.warped(warp, *p)).collect();
+        assert!(
+            warped.as_flattened().iter().all(|c| (0.0..1.0).contains(c)),
+            "{warp:?}"
+        );
+        let deviation = density_deviation(&warped, side as u32, |at| map.density(at));
         println!("{warp:?}: {deviation:.5}");
         assert!(deviation < 0.02, "{warp:?}: {deviation}");
         deviations.push(deviation);

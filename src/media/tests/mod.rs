@@ -1,7 +1,9 @@
 //! Tests of structures and walks: answers of every structure against the field, in f64, and against the device.
 
+mod faults;
 mod march;
 mod segments;
+mod tracking;
 
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::{Volume, procedures, structure};

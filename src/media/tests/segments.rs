@@ -5,7 +5,7 @@ use crate::segments::{Walker, exact_depth, first_difference, walk_ray, wrong_seg
 use crate::{procedures, structure};
 use glam::DVec3;
 use rayon::prelude::*;
-use raystone_gpu::{AdapterChoice, KernelLibrary, probe_arithmetic};
+use raystone_gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 
 /// Rays of all media together.
 const RAYS: usize = 1_000_000;
@@ -13,7 +13,7 @@ const RAYS: usize = 1_000_000;
 #[test]
 fn every_structure_answers_what_its_voxels_say() {
     media().par_iter().for_each(|(name, _, medium)| {
-        medium.validate().unwrap_or_else(|e| panic!("{name}: {e}"));
+        medium.validate(1).unwrap_or_else(|e| panic!("{name}: {e}"));
     });
 }
 
@@ -28,7 +28,7 @@ fn a_wrong_answer_of_any_array_is_seen() {
         let seen = |pair: usize| {
             let mut faulty = medium.clone();
             faulty.pairs[pair][1] ^= 1;
-            faulty.validate().is_err()
+            faulty.validate(1).is_err()
         };
         let pairs = medium.pairs.len();
         assert!(
@@ -87,14 +87,20 @@ fn the_optical_depth_of_a_constant_medium_is_its_closed_form() {
     }
 }
 
+/// An adapter that computes like the host; none says so.
+pub(super) fn adapter() -> Option<Gpu> {
+    let gpu = raystone_gpu::open(&AdapterChoice::Best, KernelLibrary::default());
+    let gpu = gpu.unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"));
+    let exact = probe_arithmetic(&gpu).unwrap().is_exact();
+    if !exact {
+        eprintln!("skipped for want of an adapter that computes like the host");
+    }
+    exact.then_some(gpu)
+}
+
 #[test]
 fn kernels_walk_as_their_twins_do() {
-    let gpu = raystone_gpu::open(&AdapterChoice::Best, KernelLibrary::default())
-        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"));
-    if !probe_arithmetic(&gpu).unwrap().is_exact() {
-        eprintln!("skipped for want of an adapter that computes like the host");
-        return;
-    }
+    let Some(gpu) = adapter() else { return };
     for kind in structure::registry().iter() {
         for (k, volume) in volumes().iter().enumerate() {
             let structure = kind.make(&Default::default()).unwrap();
