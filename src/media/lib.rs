@@ -8,6 +8,7 @@
 mod error;
 pub mod files;
 pub mod march;
+mod measure;
 pub mod medium;
 pub mod optics;
 pub mod phase;
@@ -21,6 +22,7 @@ pub mod volume;
 pub mod walk;
 
 pub use error::MediaError;
+pub use measure::register;
 pub use medium::{Homogeneity, Key, Medium};
 pub use phase::Phase;
 pub use structure::VolumeStructure;

@@ -2,6 +2,7 @@
 
 mod faults;
 mod march;
+mod measure;
 mod segments;
 mod tracking;
 
