@@ -52,6 +52,7 @@ pub(super) fn parse(
         discrepancy: take(&mut read).unwrap_or_default(),
         coherence,
         animation: take(&mut read),
+        window: take(&mut read).unwrap_or_default(),
         further: read,
     };
     reader.check_reference_seed(&experiment)?;
