@@ -77,7 +77,10 @@ mod events {
             move || {
                 let mut state = lock(&state);
                 state.0 -= 1;
-                if let (0, Some(waker)) = (state.0, state.1.take()) {
+                // Earlier callbacks leave the waker to the last.
+                if state.0 == 0
+                    && let Some(waker) = state.1.take()
+                {
                     waker.wake();
                 }
             }
