@@ -348,6 +348,8 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ("accel/leaf", "leaf_words", "parts of an array"),
     ("accel/bvh/stack", "follow", "the body of the twin's loop"),
     ("accel/bvh/stack", "begin", "of lanes that are refilled"),
+    ("media/march", "main", "the loop over paths"),
+    ("media/segments", "main", "the loop over rays"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
     (
         "accel/bvh/short_stack",
@@ -415,7 +417,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("media/medium", "pack_halves", "build"),
     ("media/structure/cube_bvh", "append", "build"),
     ("media/segments", "step_fuse", "a uniform of the kernel"),
-    ("media/segments", "first_difference", "compares with the kernel"),
+    (
+        "media/segments",
+        "first_difference",
+        "compares with the kernel",
+    ),
     ("media/segments", "wrong_segment", "judges in f64"),
     ("media/segments", "exact_depth", "judges in f64"),
     ("media/march", "parallel_rays", "where paths begin"),
