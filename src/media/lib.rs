@@ -1,6 +1,6 @@
 //! Light in participating and refractive media.
 //!
-//! A [`Volume`] has grids of scattering, absorption and refractive index. A [structure](structure) over it answers, for
+//! A [`Volume`] has grids of scattering, absorption and refractive index. A [structure] over it answers, for
 //! a voxel, the region around it in which bounds of index and extinction hold; rays walk from region to region
 //! ([`walk`]). `docs/media.md` explains the contract and what is measured.
 #![warn(missing_docs)]
