@@ -64,6 +64,8 @@ parameters! {
         resolution: [u32; 2] = [192, 144], in EDGES;
         /// Samples per pixel at which the error is taken, in a list, `[1, 3, 10]`, or 2^lo, …, 2^hi.
         spp: SppCounts = SppCounts(FEW.to_vec()), in 1..=MOST_SPP;
+        /// Whether images are rendered and samplers measured; if not, structures alone are built, gated and timed.
+        images: bool = true;
         /// Keep the bounds checks and loop bounds that the driver layer adds to kernels.
         runtime_checks: bool = true;
     }
