@@ -6,7 +6,8 @@ use crate::image::ImageView;
 use crate::pixel::PixelPanel;
 use crate::worker::{Ask, Message, Worker};
 use eframe::egui;
-use egui::{Align, Color32, Key, Layout, Modifiers, RichText, ScrollArea, Ui};
+use egui::util::History;
+use egui::{Color32, Key, Modifiers, RichText, ScrollArea, ThemePreference, Ui};
 use raystone_bench::run::Registries;
 use raystone_config::{Map, Pace};
 use raystone_core::params::Choice as _;
@@ -15,8 +16,10 @@ use std::path::{Path, PathBuf};
 
 /// Greatest texture of every adapter, pixels.
 const MOST_PIXELS: u32 = 2048;
+/// Widths of a window from which the panels, left and right, are open, points.
+const WIDTHS: [f32; 2] = [700.0, 1000.0];
 /// What the keys do.
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 17] = [
     ("drag, arrow keys", "orbit around the target"),
     ("Shift + drag, right drag", "move along the image"),
     ("Ctrl + drag", "look around"),
@@ -33,6 +36,7 @@ const KEYS: [(&str, &str); 16] = [
     ("Ctrl + S", "save the image"),
     ("Ctrl + E", "copy what is on screen as an experiment"),
     ("F1", "these keys"),
+    ("F2, F3", "the panels, left and right"),
 ];
 
 /// The window's state: what it asked the worker for, and what the user types.
@@ -42,36 +46,37 @@ pub struct App {
     /// What the user wants on screen.
     pub screen: Screen,
     /// What the worker was asked for last.
-    asked: Option<Screen>,
+    asked: Screen,
     image: ImageView,
     pixel: PixelPanel,
     /// The path that is typed.
     path: String,
     file: String,
     message: Option<Message>,
+    /// Whether the panels, left and right, are open; `None` until the user says so.
+    are_open: [Option<bool>; 2],
     is_help_open: bool,
+    /// When a window with a display was drawn, for a second; empty without a display.
+    drawn: History<()>,
 }
 
 impl App {
     pub fn new(worker: Worker, screen: Screen) -> Self {
+        worker.ask(Ask::Show(Box::new(screen.clone())));
         Self {
             worker,
             registries: Registries::default(),
+            asked: screen.clone(),
             screen,
-            asked: None,
             image: ImageView::default(),
             pixel: PixelPanel::default(),
             path: String::new(),
             file: "view.png".to_owned(),
             message: None,
+            are_open: [None; 2],
             is_help_open: false,
+            drawn: History::new(0..1000, 1.0),
         }
-    }
-
-    /// The error on screen.
-    pub fn error(&self) -> Option<String> {
-        let message = self.message.as_ref().filter(|message| message.is_error);
-        message.map(|message| message.text.clone())
     }
 
     /// Draws the window, and sends what the user changed.
@@ -79,7 +84,7 @@ impl App {
         if std::mem::take(&mut self.worker.found().refused) {
             // A refused screen: that before it is still there.
             if let Some(screen) = self.worker.found().screen.clone() {
-                self.asked = Some(screen.clone());
+                self.asked = screen.clone();
                 self.screen = screen;
             }
         }
@@ -89,34 +94,47 @@ impl App {
         self.take_keys(ui);
         egui::Panel::top("top").show(ui, |ui| self.draw_top(ui));
         egui::Panel::bottom("bottom").show(ui, |ui| self.draw_bottom(ui));
-        egui::Panel::left("left")
-            .default_size(290.0)
-            .show(ui, |ui| {
+        let [has_choices, has_figures] = [0, 1].map(|panel| self.is_open(ui, panel));
+        if has_choices {
+            let panel = egui::Panel::left("left").default_size(290.0);
+            panel.show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| self.draw_choices(ui));
             });
-        egui::Panel::right("right")
-            .default_size(300.0)
-            .show(ui, |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    let (frame, adapter) = {
-                        let found = self.worker.found();
-                        (found.frame.clone(), found.adapter.clone())
-                    };
-                    figures::draw(ui, &frame, &adapter, &self.screen);
-                    self.pixel.draw(ui, &self.worker, &self.screen);
-                });
+        }
+        if has_figures {
+            let panel = egui::Panel::right("right").default_size(300.0);
+            panel.show(ui, |ui| {
+                ScrollArea::vertical().show(ui, |ui| self.draw_figures(ui));
             });
+        }
         egui::CentralPanel::default().show(ui, |ui| {
-            if let Some(pixel) = self.image.draw(ui, &self.worker, &mut self.screen) {
+            let inspected = self.pixel.pixel();
+            let clicked = (self.image).draw(ui, &self.worker, &mut self.screen, inspected);
+            if let Some(pixel) = clicked {
                 self.pixel.inspect(&self.worker, pixel);
             }
         });
         self.draw_help(ui);
-        if self.asked.as_ref() != Some(&self.screen) {
+        if self.asked != self.screen {
             self.worker.ask(Ask::Show(Box::new(self.screen.clone())));
-            self.asked = Some(self.screen.clone());
+            self.asked = self.screen.clone();
             self.message = self.message.take().filter(|message| !message.is_error);
         }
+    }
+
+    /// Whether a panel is open: as the user said, else if it leaves most of the window to the image.
+    fn is_open(&self, ui: &Ui, panel: usize) -> bool {
+        let width = ui.ctx().content_rect().width();
+        self.are_open[panel].unwrap_or(width >= WIDTHS[panel])
+    }
+
+    fn draw_figures(&mut self, ui: &mut Ui) {
+        let (frame, adapter) = {
+            let found = self.worker.found();
+            (found.frame.clone(), found.adapter.clone())
+        };
+        figures::draw(ui, &frame, &adapter, &self.screen);
+        self.pixel.draw(ui, &self.worker, &self.screen);
     }
 
     fn draw_top(&mut self, ui: &mut Ui) {
@@ -137,14 +155,23 @@ impl App {
             if ui.button("Copy as experiment").on_hover_text("Ctrl + E").clicked() {
                 self.copy(ui);
             }
-            if ui.button("Save").on_hover_text("Ctrl + S; the ending chooses the format: .png is what is on screen, .exr, .hdr, .pfm and .npy the linear radiance of A").clicked() {
+            let save = ui.button("Save").on_hover_text(
+                "Ctrl + S; the ending chooses the format: .png is what is on screen, .exr, .hdr, .pfm and .npy the linear radiance of A, .toml the experiment",
+            );
+            if save.clicked() {
                 self.save();
             }
-            ui.add(egui::TextEdit::singleline(&mut self.file).desired_width(110.0));
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.toggle_value(&mut self.is_help_open, "Keys");
-                egui::widgets::global_theme_preference_switch(ui);
-            });
+            ui.add(egui::TextEdit::singleline(&mut self.file).desired_width(110.0))
+                .labelled_by(save.id);
+            ui.separator();
+            for (panel, (name, key)) in [("Choices", "F2"), ("Figures", "F3")].into_iter().enumerate() {
+                let mut is_open = self.is_open(ui, panel);
+                if ui.toggle_value(&mut is_open, name).on_hover_text(key).changed() {
+                    self.are_open[panel] = Some(is_open);
+                }
+            }
+            ui.toggle_value(&mut self.is_help_open, "Keys").on_hover_text("F1");
+            draw_themes(ui);
         });
     }
 
@@ -164,9 +191,13 @@ impl App {
             }
             let texts: Vec<String> = done.iter().map(ToString::to_string).collect();
             ui.label(texts.join(" · "));
+            if !self.drawn.is_empty() {
+                ui.separator();
+                ui.label(format!("drawn {} times a second", self.drawn.len()));
+            }
             if !notes.is_empty() {
                 ui.separator();
-                ui.label(format!("{} notes on the scene", notes.len()))
+                ui.label(format!("notes on the scene: {}", notes.len()))
                     .on_hover_text(notes.join("\n"));
             }
         });
@@ -199,14 +230,12 @@ impl App {
         ui.separator();
         ui.strong("Image");
         egui::Grid::new("image").num_columns(2).show(ui, |ui| {
-            ui.label("width, height");
+            let label = ui.label("width, height");
             ui.horizontal(|ui| {
                 for edge in &mut self.screen.size {
-                    ui.add(
-                        egui::DragValue::new(edge)
-                            .range(16..=MOST_PIXELS)
-                            .update_while_editing(false),
-                    );
+                    let value = egui::DragValue::new(edge).range(16..=MOST_PIXELS);
+                    ui.add(value.update_while_editing(false))
+                        .labelled_by(label.id);
                 }
                 if ui
                     .button("fit")
@@ -217,15 +246,15 @@ impl App {
                 }
             });
             ui.end_row();
-            ui.label("samples per pixel");
-            ui.add(
-                egui::DragValue::new(&mut self.screen.spp)
-                    .range(1..=1 << 16)
-                    .update_while_editing(false),
-            );
+            let label = ui.label("samples per pixel");
+            let value = egui::DragValue::new(&mut self.screen.spp).range(1..=1 << 16);
+            ui.add(value.update_while_editing(false))
+                .labelled_by(label.id);
             ui.end_row();
-            ui.label("seed");
-            ui.add(egui::DragValue::new(&mut self.screen.seed).update_while_editing(false));
+            let label = ui.label("seed");
+            let value = egui::DragValue::new(&mut self.screen.seed);
+            ui.add(value.update_while_editing(false))
+                .labelled_by(label.id);
             ui.end_row();
         });
         ui.separator();
@@ -263,6 +292,8 @@ impl App {
         egui::Window::new("Keys")
             .open(&mut self.is_help_open)
             .resizable(false)
+            .vscroll(true)
+            .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
             .show(ui.ctx(), |ui| {
                 egui::Grid::new("keys")
                     .num_columns(2)
@@ -304,7 +335,12 @@ impl App {
         if pressed(Modifiers::NONE, Key::F1) {
             self.is_help_open = !self.is_help_open;
         }
-        if ui.ctx().egui_wants_keyboard_input() {
+        for (key, panel) in [(Key::F2, 0), (Key::F3, 1)] {
+            if pressed(Modifiers::NONE, key) {
+                self.are_open[panel] = Some(!self.is_open(ui, panel));
+            }
+        }
+        if ui.ctx().text_edit_focused() {
             return;
         }
         let window = &mut self.screen.window;
@@ -351,10 +387,7 @@ impl App {
 
     /// Shows a model, or what an experiment says.
     pub fn open(&mut self, path: &Path) {
-        let is_experiment = path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
-        if !is_experiment {
+        if !is_experiment(path) {
             self.screen
                 .open(&path.display().to_string(), &self.worker.catalogue);
             return;
@@ -384,13 +417,50 @@ impl App {
     }
 
     fn save(&mut self) {
-        self.worker.ask(Ask::Save(PathBuf::from(&self.file), 0));
+        let file = PathBuf::from(&self.file);
+        if !is_experiment(&file) {
+            return self.worker.ask(Ask::Save(file, 0));
+        }
+        let text = self.screen.to_toml(&self.worker.catalogue);
+        let (text, is_error) = match std::fs::write(&file, text) {
+            Ok(()) => (format!("wrote {}", file.display()), false),
+            Err(error) => (format!("cannot write {}: {error}", file.display()), true),
+        };
+        self.message = Some(Message { text, is_error });
     }
 }
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+        self.drawn.add(ui.input(|i| i.time), ());
         self.draw(ui);
+    }
+}
+
+fn is_experiment(file: &Path) -> bool {
+    file.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+fn draw_themes(ui: &mut Ui) {
+    let themes = [
+        (ThemePreference::System, "as the system"),
+        (ThemePreference::Light, "light"),
+        (ThemePreference::Dark, "dark"),
+    ];
+    let before = ui.ctx().options(|options| options.theme_preference);
+    let now = themes.iter().find(|(theme, _)| *theme == before);
+    let mut chosen = before;
+    egui::ComboBox::from_label("colours")
+        .width(90.0)
+        .selected_text(now.map_or("", |(_, name)| name))
+        .show_ui(ui, |ui| {
+            for (theme, name) in themes {
+                ui.selectable_value(&mut chosen, theme, name);
+            }
+        });
+    if chosen != before {
+        ui.ctx().set_theme(chosen);
     }
 }
 

@@ -22,10 +22,11 @@ const OF_EACH: [Axis; 8] = [
 
 pub fn draw(ui: &mut Ui, screen: &mut Screen, catalogue: &Catalogue) {
     draw_axes(ui, screen, catalogue, 0, &OF_BOTH);
-    for side in 0..screen.cells.len() {
-        if screen.cells.len() > 1 {
+    let sides = screen.cells.len();
+    for (side, name) in SIDE_NAMES.into_iter().enumerate().take(sides) {
+        if sides > 1 {
             ui.separator();
-            ui.strong(SIDE_NAMES[side]);
+            ui.strong(name);
         }
         draw_axes(ui, screen, catalogue, side, &OF_EACH);
     }
@@ -52,7 +53,7 @@ fn draw_axis(
 ) -> Option<Variant> {
     let mut chosen = None;
     ui.horizontal(|ui| {
-        ComboBox::from_id_salt((axis.name(), side))
+        let list = ComboBox::from_id_salt((axis.name(), side))
             .width(150.0)
             .selected_text(&now.label)
             .show_ui(ui, |ui| {
@@ -66,7 +67,8 @@ fn draw_axis(
                     }
                 }
             });
-        ui.label(axis.name());
+        let label = ui.label(axis.name());
+        list.response.labelled_by(label.id);
     });
     // Models have the parameters that all scenes share.
     let entry = entries.iter().find(|entry| entry.name == now.name);
@@ -112,61 +114,46 @@ fn draw_parameter(
 ) -> Option<ParamValue> {
     let mut given = None;
     ui.horizontal(|ui| {
-        match (&parameter.range, value) {
+        let widget = match (&parameter.range, value) {
             (ParamRange::Number { min, max }, ParamValue::Number(x)) => {
-                let mut x = *x;
-                let speed = (x.abs() * 0.02).max(1e-3);
-                if ui
-                    .add(
-                        DragValue::new(&mut x)
-                            .range(*min..=*max)
-                            .speed(speed)
-                            .update_while_editing(false),
-                    )
-                    .changed()
-                {
-                    given = Some(ParamValue::Number(x));
-                }
+                let (mut x, speed) = (*x, (x.abs() * 0.02).max(1e-3));
+                let number = DragValue::new(&mut x).range(*min..=*max).speed(speed);
+                let widget = ui.add(number.update_while_editing(false));
+                given = widget.changed().then_some(ParamValue::Number(x));
+                widget
             }
             (ParamRange::Integer { min, max }, ParamValue::Integer(x)) => {
                 let mut x = *x;
-                if ui
-                    .add(
-                        DragValue::new(&mut x)
-                            .range(*min..=*max)
-                            .speed(0.1)
-                            .update_while_editing(false),
-                    )
-                    .changed()
-                {
-                    given = Some(ParamValue::Integer(x));
-                }
+                let number = DragValue::new(&mut x).range(*min..=*max).speed(0.1);
+                let widget = ui.add(number.update_while_editing(false));
+                given = widget.changed().then_some(ParamValue::Integer(x));
+                widget
             }
             (ParamRange::Flag, ParamValue::Flag(x)) => {
                 let mut x = *x;
-                if ui.checkbox(&mut x, "").changed() {
-                    given = Some(ParamValue::Flag(x));
-                }
+                let widget = ui.checkbox(&mut x, "");
+                given = widget.changed().then_some(ParamValue::Flag(x));
+                widget
             }
             (ParamRange::Choice(names), ParamValue::Name(now)) => {
-                ComboBox::from_id_salt((axis.name(), side, parameter.name))
+                let list = ComboBox::from_id_salt((axis.name(), side, parameter.name))
                     .width(110.0)
-                    .selected_text(now)
-                    .show_ui(ui, |ui| {
-                        for name in names.iter() {
-                            if ui.selectable_label(name == now, *name).clicked() && name != now {
-                                given = Some(ParamValue::Name((*name).to_owned()));
-                            }
+                    .selected_text(now);
+                let list = list.show_ui(ui, |ui| {
+                    for name in names.iter() {
+                        if ui.selectable_label(name == now, *name).clicked() && name != now {
+                            given = Some(ParamValue::Name((*name).to_owned()));
                         }
-                    });
+                    }
+                });
+                list.response
             }
-            _ => {
-                // Lists, texts and steps: as typed in an experiment.
-                ui.label(value.to_string());
-            }
-        }
-        ui.label(parameter.name)
-            .on_hover_text(parameter.description);
+            // Lists, texts and steps are changed in an experiment.
+            _ => ui.label(value.to_string()),
+        };
+        let label = ui.label(parameter.name);
+        widget.labelled_by(label.id);
+        label.on_hover_text(parameter.description);
     });
     given.filter(|value| parameter.range.allows(value))
 }

@@ -75,8 +75,8 @@ fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u
         }
         if structure.bytes > 0 {
             row(
-                "MiB of the structure",
-                format!("{:.2}", structure.bytes as f64 / f64::from(1 << 20)),
+                "KiB of the structure",
+                grouped(structure.bytes.div_ceil(1024)),
             );
         }
     });

@@ -36,7 +36,13 @@ impl ImageView {
     }
 
     /// Draws the images, moves camera and line, and returns the pixel that was clicked.
-    pub fn draw(&mut self, ui: &mut Ui, worker: &Worker, screen: &mut Screen) -> Option<[u32; 2]> {
+    pub fn draw(
+        &mut self,
+        ui: &mut Ui,
+        worker: &Worker,
+        screen: &mut Screen,
+        inspected: Option<[u32; 2]>,
+    ) -> Option<[u32; 2]> {
         let place = ui.available_rect_before_wrap();
         self.room = [
             place.width() * ui.pixels_per_point(),
@@ -53,6 +59,7 @@ impl ImageView {
         let rect = fitted(place, size);
         self.draw_images(ui, rect, &found.frame, screen.window.swipe);
         draw_path(ui, rect, &found, size);
+        draw_pixel(ui, rect, inspected, size);
         drop(found);
         self.move_line(ui, &response, rect, screen);
         let camera = screen.camera.or(camera)?;
@@ -77,6 +84,8 @@ impl ImageView {
         self.number = found.number;
         let sides = &found.frame.sides;
         self.textures.resize(sides.len(), None);
+        let most = ctx.input(|i| i.max_texture_side);
+        let pixels = |picture: &Picture| pixels(picture, most);
         for (texture, side) in self.textures.iter_mut().zip(sides) {
             match (&mut *texture, &side.picture) {
                 (_, None) => *texture = None,
@@ -158,7 +167,11 @@ impl ImageView {
     fn moves(&self, ui: &Ui, response: &egui::Response, rect: Rect) -> Vec<Motion> {
         let mut moves = Vec::new();
         let by = response.drag_delta() / rect.height();
-        if response.dragged() && !self.is_grasped && by != Vec2::ZERO {
+        let touch = ui.ctx().multi_touch();
+        if let Some(touch) = touch {
+            let by = touch.translation_delta / rect.height();
+            moves.push(Motion::Pan([-by.x, by.y]));
+        } else if response.dragged() && !self.is_grasped && by != Vec2::ZERO {
             let modifiers = ui.input(|i| i.modifiers);
             let is_pan = modifiers.shift || response.dragged_by(egui::PointerButton::Secondary);
             moves.push(if is_pan {
@@ -176,8 +189,7 @@ impl ImageView {
                 moves.push(Motion::Approach(times));
             }
         }
-        let is_typing = ui.ctx().egui_wants_keyboard_input();
-        if !is_typing && ui.memory(|memory| memory.focused().is_none()) {
+        if !ui.ctx().text_edit_focused() {
             moves.extend(by_keys(ui));
         }
         moves
@@ -190,6 +202,8 @@ fn by_keys(ui: &Ui) -> Vec<Motion> {
     if !is_plain {
         return Vec::new();
     }
+    // Arrows move the focus between buttons, where one has it.
+    let is_free = ui.memory(|memory| memory.focused().is_none());
     let held = |more: Key, less: Key| {
         let [more, less] =
             [more, less].map(|key| f32::from(u8::from(ui.input(|i| i.key_down(key)))));
@@ -209,7 +223,7 @@ fn by_keys(ui: &Ui) -> Vec<Motion> {
     if fly != [0.0; 3] {
         moves.push(Motion::Fly(fly.map(|by| by * SPEED * seconds)));
     }
-    if orbit != [0.0; 2] {
+    if orbit != [0.0; 2] && is_free {
         moves.push(Motion::Orbit(orbit.map(|by| by * TURN * seconds)));
     }
     if farther != 0.0 {
@@ -228,9 +242,18 @@ fn fitted(place: Rect, size: [u32; 2]) -> Rect {
     Rect::from_center_size(place.center(), size * scale)
 }
 
-fn pixels(picture: &Picture) -> egui::ColorImage {
+/// Every pixel, or of a picture beyond the greatest texture every second, third, … of each row and column.
+fn pixels(picture: &Picture, most: usize) -> egui::ColorImage {
     let size = [picture.width as usize, picture.height as usize];
-    egui::ColorImage::from_rgb(size, picture.pixels.as_flattened())
+    let step = size[0].max(size[1]).div_ceil(most).max(1);
+    if step == 1 {
+        return egui::ColorImage::from_rgb(size, picture.pixels.as_flattened());
+    }
+    let rows = picture.pixels.chunks_exact(size[0]).step_by(step);
+    let some: Vec<[u8; 3]> = rows
+        .flat_map(|row| row.iter().copied().step_by(step))
+        .collect();
+    egui::ColorImage::from_rgb(size.map(|edge| edge.div_ceil(step)), some.as_flattened())
 }
 
 /// Says why there is no image.
@@ -244,6 +267,25 @@ fn draw_absence(ui: &Ui, painter: &egui::Painter, part: Rect, frame: &Frame, sid
         galley,
         ui.visuals().text_color(),
     );
+}
+
+/// Draws a frame around the inspected pixel.
+fn draw_pixel(ui: &Ui, rect: Rect, inspected: Option<[u32; 2]>, size: [u32; 2]) {
+    let Some(pixel) = inspected else {
+        return;
+    };
+    let scale = rect.width() / size[0] as f32;
+    let corner = rect.min + Vec2::new(pixel[0] as f32, pixel[1] as f32) * scale;
+    let frame = Rect::from_min_size(corner, Vec2::splat(scale)).expand(3.0);
+    for (out, color) in [(0.0, Color32::WHITE), (1.0, Color32::BLACK)] {
+        let stroke = Stroke::new(1.0, color);
+        (ui.painter().with_clip_rect(rect)).rect_stroke(
+            frame.expand(out),
+            0.0,
+            stroke,
+            egui::StrokeKind::Outside,
+        );
+    }
 }
 
 /// Draws the path of the inspected pixel over the image.

@@ -16,7 +16,8 @@ use eframe::egui;
 use raystone_bench::run::Registries;
 use raystone_gpu::AdapterChoice;
 use raystone_viewer::Screen;
-use std::path::PathBuf;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use worker::Worker;
 
@@ -31,6 +32,9 @@ accel = ["cwbvh"]
 sequence = ["sobol"]
 decorrelation = ["cranley-patterson"]
 "#;
+
+/// Width or height of a window, points: it has room for a button, and no adapter refuses it.
+const EDGES: RangeInclusive<u32> = 240..=8192;
 
 /// Open a window onto structures and samplers at work
 #[derive(Parser)]
@@ -117,12 +121,14 @@ impl Arguments {
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let edge = |text: &str| text.trim().parse().ok().filter(|edge| EDGES.contains(edge));
     let parsed = text
         .split_once(['x', 'X', '×'])
-        .and_then(|(width, height)| {
-            Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
-        });
-    parsed.ok_or_else(|| "must be width x height, for instance 1280x800".to_owned())
+        .and_then(|(width, height)| Some([edge(width)?, edge(height)?]));
+    parsed.ok_or_else(|| {
+        let (least, most) = (EDGES.start(), EDGES.end());
+        format!("must be width x height, each from {least} to {most}, for instance 1280x800")
+    })
 }
 
 fn main() -> ExitCode {
@@ -142,7 +148,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn take(arguments: &Arguments, screen: Screen, file: &std::path::Path) -> Result<(), String> {
+fn take(arguments: &Arguments, screen: Screen, file: &Path) -> Result<(), String> {
     let adapter = arguments.adapter.clone().unwrap_or_default();
     let worker = Worker::start(adapter, arguments.allow_outside, || ());
     let mut harness =
@@ -161,7 +167,7 @@ fn open(arguments: &Arguments, screen: Screen) -> Result<(), String> {
     let viewport = egui::ViewportBuilder::default()
         .with_title("Raystone")
         .with_inner_size([width, height])
-        .with_min_inner_size([320.0, 240.0]);
+        .with_min_inner_size([*EDGES.start() as f32; 2]);
     let options = eframe::NativeOptions {
         viewport,
         ..Default::default()

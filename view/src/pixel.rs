@@ -49,10 +49,16 @@ impl PixelPanel {
         }
     }
 
+    /// The inspected pixel.
+    pub fn pixel(&self) -> Option<[u32; 2]> {
+        self.pixel
+    }
+
     pub fn draw(&mut self, ui: &mut Ui, worker: &Worker, screen: &Screen) {
         ui.strong("Pixel");
+        self.draw_place(ui, worker, screen.size);
         let Some(pixel) = self.pixel else {
-            ui.label("Click the image to inspect a pixel.");
+            ui.label("Click the image, or choose a pixel here.");
             return;
         };
         self.side = self.side.min(screen.cells.len() - 1);
@@ -68,19 +74,17 @@ impl PixelPanel {
         if let Some(inspection) = inspection.filter(|inspection| inspection.pixel == pixel) {
             draw_inspection(ui, &inspection);
         }
-        ui.horizontal(|ui| {
-            if ui.button("Inspect again").clicked() {
-                worker.ask(Ask::Inspect(pixel));
-            }
-            if screen.cells.len() > 1 {
+        if screen.cells.len() > 1 {
+            ui.horizontal(|ui| {
                 for (side, name) in SIDE_NAMES.into_iter().enumerate() {
                     ui.radio_value(&mut self.side, side, name);
                 }
-            }
-        });
+            });
+        }
         ui.horizontal(|ui| {
-            ui.label("sample");
-            ui.add(DragValue::new(&mut self.sample).range(0..=screen.spp - 1));
+            let label = ui.label("sample");
+            ui.add(DragValue::new(&mut self.sample).range(0..=screen.spp - 1))
+                .labelled_by(label.id);
             if ui
                 .button("Path")
                 .on_hover_text("P: the path of this sample, in double precision")
@@ -120,6 +124,24 @@ impl PixelPanel {
         self.draw_points(ui, worker, screen, points);
     }
 
+    /// The pixel by its column and row.
+    fn draw_place(&mut self, ui: &mut Ui, worker: &Worker, size: [u32; 2]) {
+        let mut place = self.pixel.unwrap_or_default();
+        ui.horizontal(|ui| {
+            for (edge, name) in [(0, "column"), (1, "row")] {
+                let label = ui.label(name);
+                ui.add(DragValue::new(&mut place[edge]).range(0..=size[edge] - 1))
+                    .labelled_by(label.id);
+            }
+            if ui.button("Inspect").clicked() {
+                self.inspect(worker, place);
+            }
+        });
+        if self.pixel.unwrap_or_default() != place {
+            self.inspect(worker, place);
+        }
+    }
+
     fn draw_points(
         &mut self,
         ui: &mut Ui,
@@ -136,15 +158,22 @@ impl PixelPanel {
             return;
         };
         ui.horizontal(|ui| {
-            ui.label("dimensions");
+            let label = ui.label("dimensions");
             for dimension in &mut self.dimensions {
-                ui.add(DragValue::new(dimension).range(0..=255).speed(0.1));
+                ui.add(DragValue::new(dimension).range(0..=255).speed(0.1))
+                    .labelled_by(label.id);
             }
         });
-        let wanted = (self.side, pixel, self.dimensions, screen.clone());
-        if self.asked.as_ref() != Some(&wanted) {
+        let is_known = self
+            .asked
+            .as_ref()
+            .is_some_and(|(side, at, dimensions, of)| {
+                (*side, *at, *dimensions) == (self.side, pixel, self.dimensions)
+                    && !screen.restarts(of)
+            });
+        if !is_known {
             worker.ask(Ask::Points(self.side, pixel, self.dimensions));
-            self.asked = Some(wanted);
+            self.asked = Some((self.side, pixel, self.dimensions, screen.clone()));
         }
         let Some(points) = points else {
             return;
@@ -171,8 +200,6 @@ impl PixelPanel {
 }
 
 fn draw_inspection(ui: &mut Ui, inspection: &Inspection) {
-    let [x, y] = inspection.pixel;
-    ui.label(format!("({x}, {y})"));
     for (seen, name) in inspection.sides.iter().zip(SIDE_NAMES) {
         if inspection.sides.len() > 1 {
             ui.strong(name);

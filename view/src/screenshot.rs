@@ -1,60 +1,67 @@
 //! The window without a display: drawn into a picture once its images have their samples.
 
 use crate::app::App;
+use crate::worker::Worker;
+use eframe::egui;
 use egui_kittest::Harness;
+use raystone_viewer::{Screen, SideFrame};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The longest wait for the images.
 const PATIENCE: Duration = Duration::from_secs(300);
+/// Time between two looks at the images.
+const REST: Duration = Duration::from_millis(20);
 
-/// Draws the window until each image has so many samples, fails, or is finished, and returns it.
+/// Waits for the images of a window, and draws it. Nothing is drawn meanwhile: all of the machine is for the images.
 pub fn settled<'a>(
     app: App,
     frames: u32,
     [width, height]: [u32; 2],
 ) -> Result<Harness<'a, App>, String> {
-    let size = eframe::egui::vec2(width as f32, height as f32);
+    wait(&app.worker, &app.screen, frames)?;
     let builder = Harness::builder()
-        .with_size(size)
+        .with_size(egui::vec2(width as f32, height as f32))
+        .with_render_cursor(false)
+        // A widget without a name is a fault of the window, and no reason to refuse a picture of it.
+        .with_accessibility_check(cfg!(test))
         .allow_missing_glyphs()
         .wgpu();
-    let mut harness = builder.build_ui_state(|ui, app: &mut App| app.draw(ui), app);
-    wait(&mut harness, frames)?;
+    let draw = |ui: &mut egui::Ui, app: &mut App| {
+        // All of the picture: what is handed over has a margin.
+        let whole = ui.ctx().content_rect();
+        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(whole));
+        ui.set_clip_rect(whole);
+        app.draw(&mut ui);
+    };
+    let mut harness = builder.build_ui_state(draw, app);
+    harness.run_steps(3);
     Ok(harness)
 }
 
-/// Draws the window until each image has so many samples, fails, or is finished.
-pub fn wait(harness: &mut Harness<'_, App>, frames: u32) -> Result<(), String> {
+/// Waits until each image of a screen has so many samples, fails, or is finished; an error on screen ends it.
+pub fn wait(worker: &Worker, screen: &Screen, frames: u32) -> Result<(), String> {
     let start = Instant::now();
-    loop {
-        harness.step();
+    let is_done =
+        |side: &SideFrame| side.figures.spp >= frames.min(side.figures.of) || side.fault.is_some();
+    while start.elapsed() < PATIENCE {
         {
-            let found = harness.state().worker.found();
+            let found = worker.found();
+            if let Some(message) = found.message.as_ref().filter(|message| message.is_error) {
+                return Err(message.text.clone());
+            }
             let sides = &found.frame.sides;
-            let is_done = |side: &raystone_viewer::SideFrame| {
-                side.figures.spp >= frames.min(side.figures.of) || side.fault.is_some()
-            };
-            let is_shown = found.screen.as_ref() == Some(&harness.state().screen);
-            if is_shown && found.status.is_none() && !sides.is_empty() && sides.iter().all(is_done)
-            {
-                break;
-            }
-            if let Some(message) = harness.state().error() {
-                return Err(message);
+            let is_shown = found.status.is_none() && found.screen.as_ref() == Some(screen);
+            if is_shown && !sides.is_empty() && sides.iter().all(is_done) {
+                return Ok(());
             }
         }
-        if start.elapsed() > PATIENCE {
-            return Err(format!(
-                "the images did not get {frames} samples within {} s",
-                PATIENCE.as_secs()
-            ));
-        }
-        std::thread::sleep(Duration::from_millis(20));
+        std::thread::sleep(REST);
     }
-    // What was asked for on the way arrives, and text is laid out.
-    harness.run_steps(3);
-    Ok(())
+    let seconds = PATIENCE.as_secs();
+    Err(format!(
+        "the images did not get {frames} samples within {seconds} s"
+    ))
 }
 
 /// Writes a picture of the window.

@@ -172,7 +172,7 @@ enum End {
     /// The window was closed.
     Closed,
     /// The device is lost; this was on screen.
-    Lost(Option<Screen>),
+    Lost(Option<Box<Screen>>),
 }
 
 impl Inside {
@@ -214,13 +214,15 @@ impl Inside {
         );
     }
 
-    fn serve_with(&self, mut viewer: Viewer, screen: Option<Screen>) -> End {
-        if let Some(screen) = screen {
-            if let Err(end) = self.show(&mut viewer, screen) {
-                return end;
-            }
+    fn serve_with(&self, mut viewer: Viewer, screen: Option<Box<Screen>>) -> End {
+        if let Some(screen) = screen
+            && let Err(end) = self.show(&mut viewer, *screen)
+        {
+            return end;
         }
         let mut is_idle = true;
+        // Each image is shown at least once, however quickly the next screen follows: a camera that moves is seen.
+        let mut unseen = 0;
         loop {
             let first = if is_idle {
                 match self.asks.recv_timeout(REST) {
@@ -240,14 +242,19 @@ impl Inside {
                     Err(TryRecvError::Disconnected) => return End::Closed,
                 }
             }
+            let is_other = asks.iter().any(|ask| matches!(ask, Ask::Show(_)));
             if let Err(end) = self.answer_all(&mut viewer, asks) {
                 return end;
             }
-            let stop = || self.stop.load(Ordering::Relaxed);
+            if is_other {
+                unseen = viewer.screen().map_or(0, |screen| screen.cells.len());
+            }
+            let stop = || unseen == 0 && self.stop.load(Ordering::Relaxed);
             match viewer.step(&stop) {
                 Ok(step) => {
                     is_idle = step == Step::Idle;
                     if step == Step::Shown {
+                        unseen = unseen.saturating_sub(1);
                         self.publish(&viewer);
                     }
                     let is_new = self.found.lock().is_ok_and(|found| found.idle != is_idle);
@@ -289,6 +296,20 @@ impl Inside {
                     found.done = done;
                 }
                 found.notes = viewer.notes();
+                let was = found.screen.as_ref();
+                let is_other = |same: fn(&Screen, &Screen) -> bool| {
+                    !viewer
+                        .screen()
+                        .zip(was)
+                        .is_some_and(|(now, was)| same(now, was))
+                };
+                // What was found at a pixel holds for what it was found in; lines are drawn with any camera.
+                if is_other(|now, was| !now.restarts(was)) {
+                    (found.inspection, found.explanation) = (None, None);
+                }
+                if is_other(|now, was| now.cells == was.cells && now.size == was.size) {
+                    (found.path, found.points) = (None, None);
+                }
             }),
             Err(error) => self.tell(viewer, error)?,
         }
@@ -363,7 +384,7 @@ impl Inside {
         };
         self.say(text, true);
         match is_lost {
-            true => Err(End::Lost(viewer.screen().cloned())),
+            true => Err(End::Lost(viewer.screen().cloned().map(Box::new))),
             false => Ok(()),
         }
     }
