@@ -36,7 +36,7 @@ fn a_path_tracer_with_textures_emitters_and_counters_binds_at_most_six() {
         assert!(features.contains(&(wanted, true)), "{features:?}");
     }
     let sampler = sampler("owen-sobol", "none");
-    for kind in structures() {
+    for kind in inline_structures() {
         let traced = stage.traced(gpu(), kind);
         let renderer = stage.renderer(gpu(), &traced, &sampler, &path(4), [8, 8], true);
         let found = storage_buffers(&renderer.kernel_text());
