@@ -37,17 +37,6 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Lattice,
     ),
     row(
-        "ray-union-forgets-a-child",
-        "a node does not hold its first child",
-        text(
-            "accel/ray_hierarchy/enclosing",
-            "node = grown(node, (*children)[k]);",
-            "if (k > 0u) { node = grown(node, (*children)[k]); }",
-        ),
-        RAYS,
-        Check::Lattice,
-    ),
-    row(
         "ray-pair-forgets-the-second",
         "of two children the first comes twice",
         text(
@@ -56,39 +45,6 @@ pub const MUTANTS: &[Mutant] = &[
             "pair((*children)[k], (*children)[k])",
         ),
         PAIRS,
-        Check::Lattice,
-    ),
-    row(
-        "ray-ball-around-centres",
-        "a ball holds the centres of its children, not the balls",
-        text(
-            "accel/ray_hierarchy/node",
-            "length3(child.centre - node.centre) + child.radius",
-            "length3(child.centre - node.centre)",
-        ),
-        RAYS,
-        Check::Lattice,
-    ),
-    row(
-        "ray-cap-around-axes",
-        "a cap holds the axes of its children, not the caps",
-        text(
-            "accel/ray_hierarchy/node",
-            "let angle = sum_of(apart, cap);",
-            "let angle = apart;",
-        ),
-        RAYS,
-        Check::Lattice,
-    ),
-    row(
-        "ray-cap-wraps",
-        "an angle beyond half a turn is taken for a small one",
-        text(
-            "accel/ray_hierarchy/node",
-            "cap.x == -1.0 || angle.y < 0.0 || (apart.x < 0.0 && cap.x < 0.0)",
-            "cap.x == -2.0",
-        ),
-        RAYS,
         Check::Lattice,
     ),
     row(
