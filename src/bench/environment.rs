@@ -1,9 +1,8 @@
 //! The environment of a run.
 
 use raystone_core::program::Program;
-use raystone_gpu::{Gpu, device_type, probe_arithmetic};
+use raystone_gpu::{Gpu, device_type, limits_of_runs, probe_arithmetic};
 use raystone_record::{Environment, MachineLoad};
-use std::collections::BTreeMap;
 
 /// Current load of the machine, as far as the system reports it.
 pub(crate) fn machine_load() -> MachineLoad {
@@ -49,41 +48,6 @@ fn governor() -> Option<String> {
     Some(text.trim().to_owned()).filter(|text| !text.is_empty())
 }
 
-/// Adapter limits that runs may reach.
-fn limits(limits: &wgpu::Limits) -> BTreeMap<String, u64> {
-    let found = [
-        ("max_buffer_size", limits.max_buffer_size),
-        (
-            "max_storage_buffer_binding_size",
-            limits.max_storage_buffer_binding_size,
-        ),
-        (
-            "max_storage_buffers_per_shader_stage",
-            limits.max_storage_buffers_per_shader_stage.into(),
-        ),
-        (
-            "max_compute_workgroup_storage_size",
-            limits.max_compute_workgroup_storage_size.into(),
-        ),
-        (
-            "max_compute_invocations_per_workgroup",
-            limits.max_compute_invocations_per_workgroup.into(),
-        ),
-        (
-            "max_compute_workgroups_per_dimension",
-            limits.max_compute_workgroups_per_dimension.into(),
-        ),
-        (
-            "max_texture_dimension_2d",
-            limits.max_texture_dimension_2d.into(),
-        ),
-    ];
-    found
-        .into_iter()
-        .map(|(name, value)| (name.to_owned(), value))
-        .collect()
-}
-
 /// Captures machine, adapter, driver and program.
 pub fn capture(gpu: &Gpu, program: &Program) -> Environment {
     Environment {
@@ -105,10 +69,12 @@ pub fn capture(gpu: &Gpu, program: &Program) -> Environment {
         pci: gpu.info.device_pci_bus_id.clone(),
         subgroup: (gpu.info.subgroup_max_size > 0)
             .then_some([gpu.info.subgroup_min_size, gpu.info.subgroup_max_size]),
-        limits: limits(&gpu.limits),
+        limits: limits_of_runs(&gpu.limits),
         memory_bytes: memory_bytes(),
         governor: governor(),
         load: machine_load(),
+        browser: None,
+        clock_step_ns: None,
         command: std::env::args().collect(),
     }
 }

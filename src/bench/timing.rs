@@ -4,8 +4,7 @@
 use raystone_config::Timing;
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Elapsed, Gpu, GpuError, Stopwatch};
-use raystone_record::Interval;
-use raystone_stats::statistics::{median, median_interval};
+use raystone_stats::statistics::median;
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 
@@ -167,14 +166,6 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
     }
 }
 
-/// `samples` minus the cost of an empty measurement; at least a hundredth of it, for finite rates.
-pub(crate) fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
-    samples
-        .iter()
-        .map(|ms| (ms - empty).max(0.01 * ms))
-        .collect()
-}
-
 /// Median of an empty measurement.
 ///
 /// # Errors
@@ -186,47 +177,4 @@ pub(crate) fn empty_ms(
         .map(|_| measure().and_then(Elapsed::measured).map(|e| e.ms()))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(median(&samples).unwrap_or(0.0))
-}
-
-/// Rate in millions per second from milliseconds for `items`, median with interval.
-pub(crate) fn millions_per_second(ms: &[f64], items: f64) -> Option<Interval> {
-    let rates: Vec<f64> = ms.iter().map(|ms| items / ms * 1e-3).collect();
-    median_interval(&rates)
-}
-
-/// Checks a rate in millions per second by hand: `items` over the times next to the middle of these.
-/// Returns what is wrong, or `None`.
-pub(crate) fn rate_fault(rate: &Interval, items: f64, ms: &[f64]) -> Option<String> {
-    let mut sorted = ms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let (short, long) = (
-        sorted.get((ms.len().max(1) - 1) / 2)?,
-        sorted.get(ms.len() / 2)?,
-    );
-    let [least, most] = [long, short].map(|ms| items / 1000.0 / ms);
-    let rounding = 1e-9 * most;
-    let is_right = (least - rounding..=most + rounding).contains(&rate.value);
-    (!is_right).then(|| {
-        format!(
-            "a rate of {} million a second is not that of {items} in {short} to {long} ms",
-            rate.value
-        )
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rates_that_count_twice_are_told() {
-        for ms in [&[2.0, 1.0, 4.0][..], &[1.0, 2.0, 2.02, 4.0], &[5.0]] {
-            let rate = millions_per_second(ms, 6e4).unwrap();
-            assert_eq!(rate_fault(&rate, 6e4, ms), None);
-            assert!(rate_fault(&rate, 3e4, ms).is_some());
-            assert!(rate_fault(&rate, 6.1e4, ms).is_some());
-            let halved: Vec<f64> = ms.iter().map(|ms| ms / 2.0).collect();
-            assert!(rate_fault(&rate, 6e4, &halved).is_some());
-        }
-    }
 }

@@ -7,6 +7,7 @@ mod doctor;
 mod export;
 mod failure;
 mod faults;
+mod gallery;
 mod help;
 mod history;
 mod inspect;
@@ -100,6 +101,7 @@ commands! {
     Report(report::Report),
     Compare(compare::Compare),
     History(history::HistoryOf),
+    Gallery(gallery::GalleryOf),
     Export(export::Export),
     Repro(repro::Repro),
     Render(render::Render),

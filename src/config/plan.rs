@@ -107,6 +107,10 @@ impl Plan {
             cells.retain(|cell| renders && !is_bench(&cell[Axis::Integrator]));
             cells
         };
+        let of_images = |which: &[Axis]| match experiment.run.images {
+            true => rendering(which),
+            false => Vec::new(),
+        };
         let mut benches = cells(&Cell::BENCH);
         benches.retain(|cell| is_bench(&cell[Axis::Integrator]));
         let mut peers = rendering(&Cell::PEER);
@@ -116,13 +120,13 @@ impl Plan {
         let place = |cell: &Cell| cell.on(&place).identity();
         let places: HashSet<String> = structures.iter().map(place).collect();
         let (samplers, untraceable): (Vec<_>, Vec<_>) =
-            (rendering(&Cell::SAMPLER).into_iter()).partition(|cell| places.contains(&place(cell)));
+            (of_images(&Cell::SAMPLER).into_iter()).partition(|cell| places.contains(&place(cell)));
         skipped.extend(untraceable.iter().map(no_structure));
         let plan = Self {
             scenes: needed(&axes[Axis::Scene], Axis::Scene, [&structures, &[], &[]]),
-            times: rendering(&Cell::FULL),
+            times: of_images(&Cell::FULL),
             peers,
-            streams: rendering(&Cell::STREAM),
+            streams: of_images(&Cell::STREAM),
             benches,
             structures,
             samplers,

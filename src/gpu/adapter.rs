@@ -3,6 +3,7 @@
 use super::GpuError;
 use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
+use super::wait::wait_for;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -107,7 +108,7 @@ fn enumerate() -> Vec<wgpu::Adapter> {
 }
 
 fn enumerate_among(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance(backends).enumerate_adapters(backends));
+    let mut found = wait_for(instance(backends).enumerate_adapters(backends));
     found.retain(|a| {
         a.get_downlevel_capabilities()
             .flags
@@ -228,15 +229,60 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
     let adapter = choose(enumerate(), choice)?;
     let info = adapter.get_info();
     let limits = limits_to_ask(&adapter.limits());
+    wait_for(device_of(&adapter, info, limits, kernels))
+}
+
+/// Opens the adapter that a browser offers. `name` is what the browser says of it, which wgpu keeps to itself: adapters
+/// known by it to be software are taken for such.
+///
+/// # Errors
+/// As for [`open`].
+#[cfg(target_family = "wasm")]
+pub async fn open_in_browser(name: &str, kernels: KernelLibrary) -> Result<Gpu, GpuError> {
+    let instance = instance(wgpu::Backends::BROWSER_WEBGPU);
+    let wanted = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..Default::default()
+    };
+    let adapter = instance.request_adapter(&wanted).await;
+    let adapter = adapter.map_err(|_| GpuError::NoAdapter)?;
+    let mut info = adapter.get_info();
+    info.name = name.to_owned();
+    if names_software(name) {
+        info.device_type = wgpu::DeviceType::Cpu;
+    }
+    // What every page may ask for, so that all measure the same.
+    let gpu = device_of(&adapter, info, wgpu::Limits::default(), kernels).await?;
+    // Kernels that cannot read storage textures here are refused, and buffers it is.
+    let texels = super::load_probe::measure(&gpu).await.unwrap_or(false);
+    let _ = gpu.texels_faster.set(texels);
+    Ok(gpu)
+}
+
+/// True if this is what a software rasteriser is called.
+#[cfg(any(test, target_family = "wasm"))]
+fn names_software(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let software = ["swiftshader", "llvmpipe", "lavapipe", "basic render driver"];
+    software.iter().any(|part| name.contains(part))
+}
+
+async fn device_of(
+    adapter: &wgpu::Adapter,
+    info: wgpu::AdapterInfo,
+    limits: wgpu::Limits,
+    kernels: KernelLibrary,
+) -> Result<Gpu, GpuError> {
     let features =
         adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP);
-    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+    let descriptor = wgpu::DeviceDescriptor {
         label: Some("raystone"),
         required_features: features,
         required_limits: limits.clone(),
         ..Default::default()
-    }))
-    .map_err(|e| GpuError::NoDevice {
+    };
+    let opened = adapter.request_device(&descriptor).await;
+    let (device, queue) = opened.map_err(|e| GpuError::NoDevice {
         adapter: info.name.clone(),
         cause: e.to_string(),
     })?;
@@ -272,7 +318,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         lost,
         texels_faster: Arc::default(),
     };
-    gpu.loop_limit = super::probe::probe_loops(&gpu)?;
+    gpu.loop_limit = super::probe::probe_loops(&gpu).await?;
     Ok(gpu)
 }
 
@@ -350,8 +396,8 @@ impl Gpu {
             experimental_features,
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| refused(e.to_string()))?;
+        let (device, queue) =
+            wait_for(adapter.request_device(&descriptor)).map_err(|e| refused(e.to_string()))?;
         let fault = Arc::new(Mutex::new(None));
         let slot = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
@@ -399,5 +445,60 @@ pub fn device_type(kind: wgpu::DeviceType) -> &'static str {
         wgpu::DeviceType::VirtualGpu => "virtual-gpu",
         wgpu::DeviceType::Cpu => "cpu",
         wgpu::DeviceType::Other => "other",
+    }
+}
+
+/// Adapter limits that runs may reach.
+pub fn limits_of_runs(limits: &wgpu::Limits) -> BTreeMap<String, u64> {
+    let found = [
+        ("max_buffer_size", limits.max_buffer_size),
+        (
+            "max_storage_buffer_binding_size",
+            limits.max_storage_buffer_binding_size,
+        ),
+        (
+            "max_storage_buffers_per_shader_stage",
+            limits.max_storage_buffers_per_shader_stage.into(),
+        ),
+        (
+            "max_compute_workgroup_storage_size",
+            limits.max_compute_workgroup_storage_size.into(),
+        ),
+        (
+            "max_compute_invocations_per_workgroup",
+            limits.max_compute_invocations_per_workgroup.into(),
+        ),
+        (
+            "max_compute_workgroups_per_dimension",
+            limits.max_compute_workgroups_per_dimension.into(),
+        ),
+        (
+            "max_texture_dimension_2d",
+            limits.max_texture_dimension_2d.into(),
+        ),
+    ];
+    found
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::names_software;
+
+    #[test]
+    fn software_is_known_by_what_browsers_call_it() {
+        for name in [
+            "google swiftshader",
+            "SwiftShader Device (Subzero)",
+            "llvmpipe (LLVM 15.0.6, 256 bits)",
+            "Microsoft Basic Render Driver",
+        ] {
+            assert!(names_software(name), "{name}");
+        }
+        for name in ["nvidia ampere", "apple metal-3", ""] {
+            assert!(!names_software(name), "{name}");
+        }
     }
 }

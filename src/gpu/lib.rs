@@ -21,9 +21,13 @@ mod recording;
 mod slices;
 mod sort;
 mod uniform;
+mod wait;
 
+#[cfg(target_family = "wasm")]
+pub use adapter::open_in_browser;
 pub use adapter::{
-    AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, device_type, is_software, open,
+    AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, device_type, is_software,
+    limits_of_runs, open,
 };
 pub use bindings::{Bindings, Storage, TEXELS};
 pub use clock::{Elapsed, Stopwatch};
@@ -32,12 +36,13 @@ pub(crate) use kernel_errors::LOOPS_CUT;
 pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};
 pub use player::Player;
-pub use probe::{ArithmeticProbe, probe_arithmetic};
+pub use probe::{ArithmeticProbe, probe_arithmetic, probe_arithmetic_async, probe_clock_step};
 pub use raster::Raster;
 pub use recording::{Groups, Played, Recording, grid_of, groups_for};
 pub use slices::{MOST_SLICE_MS, Slices, slow_slice};
 pub use sort::{Pairs, RadixSort};
 pub use uniform::UniformValues;
+pub use wait::wait_for;
 
 use thiserror::Error;
 

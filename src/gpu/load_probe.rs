@@ -4,7 +4,7 @@
 //! texel (docs/performance.md); hardware with caches for buffers may well lose by textures.
 
 use super::compose::Composition;
-use super::{Bindings, Gpu, GpuError, Recording, Storage, groups_for};
+use super::{Bindings, Gpu, GpuError, Recording, Storage, groups_for, wait_for};
 
 /// Elements of the probed array: 4 MiB, beyond the first caches and a whole number of rows.
 const ELEMENTS: u32 = 1 << 18;
@@ -28,12 +28,12 @@ impl Gpu {
         if let Some(known) = self.texels_faster.get() {
             return Ok(*known);
         }
-        let measured = measure(self)?;
+        let measured = wait_for(measure(self))?;
         Ok(*self.texels_faster.get_or_init(|| measured))
     }
 }
 
-fn measure(gpu: &Gpu) -> Result<bool, GpuError> {
+pub(super) async fn measure(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut state = 1_u32;
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -55,7 +55,7 @@ fn measure(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut fastest = [f64::INFINITY; 2];
     for _ in 0..ROUNDS {
         for (recording, fastest) in recordings.iter().zip(&mut fastest) {
-            *fastest = fastest.min(gpu.play(recording)?.elapsed().ms());
+            *fastest = fastest.min(gpu.play_async(recording).await?.elapsed().ms());
         }
     }
     let [buffer, texture] = fastest;

@@ -3,8 +3,12 @@
 use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
+#[cfg(not(target_family = "wasm"))]
+use super::wait::wait_for;
 use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
+#[cfg(target_family = "wasm")]
+use std::pin::Pin;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Default edge of a workgroup of pixels, invocations.
@@ -52,6 +56,64 @@ pub struct Pipeline {
     made_ms: f64,
     /// Milliseconds of its first dispatch, which had no workgroups: see [`Pipeline::cold_ms`].
     pub(super) first_ms: OnceLock<f64>,
+    complaint: Complaint,
+}
+
+/// What the driver said of a kernel: known at once, in a browser only when awaited.
+struct Complaint {
+    #[cfg(target_family = "wasm")]
+    pending: Mutex<Option<OfOneThread<(String, Pending)>>>,
+}
+
+#[cfg(target_family = "wasm")]
+type Pending = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
+
+/// A value of the browser that never leaves its thread.
+#[cfg(target_family = "wasm")]
+struct OfOneThread<T>(T);
+
+// SAFETY: without atomics a wasm module has one thread; wgpu's own handles are `Send` there for the same reason.
+#[cfg(all(target_family = "wasm", not(target_feature = "atomics")))]
+unsafe impl<T> Send for OfOneThread<T> {}
+
+#[cfg(not(target_family = "wasm"))]
+impl Complaint {
+    fn new(label: String, scope: wgpu::ErrorScopeGuard) -> Result<Self, GpuError> {
+        match wait_for(scope.pop()) {
+            Some(error) => Err(refused(&label, &error)),
+            None => Ok(Self {}),
+        }
+    }
+
+    async fn told(&self) -> Result<(), GpuError> {
+        Ok(())
+    }
+}
+
+#[cfg(target_family = "wasm")]
+impl Complaint {
+    fn new(label: String, scope: wgpu::ErrorScopeGuard) -> Result<Self, GpuError> {
+        let pending = OfOneThread((label, Box::pin(scope.pop()) as _));
+        Ok(Self {
+            pending: Mutex::new(Some(pending)),
+        })
+    }
+
+    async fn told(&self) -> Result<(), GpuError> {
+        let pending = self.pending.lock();
+        let pending = pending.unwrap_or_else(PoisonError::into_inner).take();
+        match pending {
+            None => Ok(()),
+            Some(OfOneThread((label, scope))) => match scope.await {
+                Some(error) => Err(refused(&label, &error)),
+                None => Ok(()),
+            },
+        }
+    }
+}
+
+fn refused(label: &str, error: &wgpu::Error) -> GpuError {
+    GpuError::Driver(format!("kernel `{label}`: {error}"))
 }
 
 pub(super) fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
@@ -209,9 +271,7 @@ impl Gpu {
                 },
                 cache: None,
             });
-        if let Some(error) = pollster::block_on(scope.pop()) {
-            return Err(GpuError::Driver(format!("kernel `{label}`: {error}")));
-        }
+        let complaint = Complaint::new(label, scope)?;
         let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let layouts = (0..groups).map(|group| compute.get_bind_group_layout(group));
         Ok(Pipeline {
@@ -223,6 +283,7 @@ impl Gpu {
             bindings,
             made_ms: start.elapsed().as_secs_f64() * 1e3,
             first_ms: OnceLock::new(),
+            complaint,
         })
     }
 
@@ -294,6 +355,11 @@ impl Pipeline {
     /// second there, a tenth of one before). `None` until then; no other time contains it.
     pub fn cold_ms(&self) -> Option<f64> {
         Some(self.made_ms + self.first_ms.get()?)
+    }
+
+    /// What the driver said of the kernel, if it was not known when it was made.
+    pub(super) async fn complaint(&self) -> Result<(), GpuError> {
+        self.complaint.told().await
     }
 
     pub(super) fn unbound<'a>(

@@ -6,6 +6,7 @@ use super::bindings::{Resource, Storage};
 use super::clock::{Elapsed, Stopwatch};
 use super::pipeline::{BindingKind, Pipeline};
 use super::recording::{Groups, Played, Recording, Run, Step};
+use super::wait::wait_for;
 use raystone_core::clock::Instant;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -74,18 +75,32 @@ impl Player {
     /// A binding is missing, a buffer or the number of workgroups exceeds a limit of the adapter,
     /// the driver complains, the device is lost or does not finish.
     pub fn play(&self, recording: &Recording) -> Result<Played, GpuError> {
+        wait_for(self.play_async(recording))
+    }
+
+    /// The same as a future: between submission and answer, the caller may do other things. One recording of a player
+    /// is played at a time.
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    #[expect(
+        clippy::await_holding_lock,
+        reason = "native futures do not suspend, and a browser has one thread"
+    )]
+    pub async fn play_async(&self, recording: &Recording) -> Result<Played, GpuError> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let scope = self
             .gpu
             .device
             .push_error_scope(wgpu::ErrorFilter::Validation);
         let played = match self.gpu.turn() {
-            0 => kept.play(&self.gpu, recording),
-            _ => recording
-                .in_turn(&self.gpu)
-                .and_then(|recording| kept.play(&self.gpu, &recording)),
+            0 => kept.play(&self.gpu, recording).await,
+            _ => match recording.in_turn(&self.gpu) {
+                Ok(recording) => kept.play(&self.gpu, &recording).await,
+                Err(error) => Err(error),
+            },
         };
-        let complaint = pollster::block_on(scope.pop());
+        let complaint = scope.pop().await;
         let played = match (played, complaint) {
             (Err(lost @ GpuError::Lost(_)), _) => Err(lost),
             (_, Some(error)) => Err(GpuError::Driver(error.to_string())),
@@ -100,9 +115,9 @@ impl Player {
 }
 
 impl Kept {
-    fn play(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
+    async fn play(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
         if recording.runs().count() <= MAX_RUNS {
-            return self.play_part(gpu, recording);
+            return self.play_part(gpu, recording).await;
         }
         // Size for the largest part: growing later would lose the content.
         self.lend_scratch(gpu, recording)?;
@@ -111,7 +126,7 @@ impl Kept {
             ..Played::default()
         };
         for part in recording.parts(MAX_RUNS) {
-            let played = self.play_part(gpu, &part)?;
+            let played = self.play_part(gpu, &part).await?;
             whole.host += played.host;
             whole.runs.extend(played.runs);
             whole.downloads.extend(played.downloads);
@@ -119,7 +134,7 @@ impl Kept {
         Ok(whole)
     }
 
-    fn play_part(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
+    async fn play_part(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
         let runs: Vec<&Run> = recording.runs().collect();
         for run in &runs {
             if let Groups::Direct(groups) = run.groups {
@@ -133,7 +148,7 @@ impl Kept {
             .collect::<Result<_, _>>()?;
         for (run, groups) in runs.iter().zip(&bound) {
             if run.pipeline.first_ms.get().is_none() {
-                let ms = first_dispatch(gpu, run, groups)?;
+                let ms = first_dispatch(gpu, run, groups).await?;
                 let _ = run.pipeline.first_ms.set(ms);
             }
         }
@@ -146,10 +161,8 @@ impl Kept {
         gpu.queue.submit([commands]);
         let clock_buffer = clock.and(self.clock.as_ref().map(|clock| clock.mapped.clone()));
         let to_map = staged.iter().map(|(_, buffer)| buffer);
-        for buffer in to_map.chain(&clock_buffer) {
-            buffer.map_async(wgpu::MapMode::Read, .., |_| {});
-        }
-        gpu.wait()?;
+        let to_map: Vec<_> = to_map.chain(&clock_buffer).collect();
+        gpu.finished(&to_map).await?;
         let mut host = watch.elapsed();
         let mut downloads = BTreeMap::new();
         for (name, buffer) in staged {
@@ -158,9 +171,11 @@ impl Kept {
         let ticks = clock_buffer.map(|buffer| take(&buffer)).transpose()?;
         let ticks: Option<Vec<u64>> = ticks.map(|bytes| bytemuck::pod_collect_to_vec(&bytes));
         // Two timestamps per run.
-        let (spans, _) = ticks.as_deref().unwrap_or_default().as_chunks();
-        let spans = spans.iter().take(runs.len());
-        let spans: Vec<Option<f64>> = spans.map(|span| span_ms(*span, clock)).collect();
+        let (stamps, _) = ticks.as_deref().unwrap_or_default().as_chunks();
+        let stamps = &stamps[..runs.len().min(stamps.len())];
+        let whole = stamps.first().zip(stamps.last());
+        let gpu_span_ms = whole.and_then(|(first, last)| span_ms([first[0], last[1]], clock));
+        let spans: Vec<Option<f64>> = stamps.iter().map(|span| span_ms(*span, clock)).collect();
         host.backwards |= ticks.is_some() && spans.contains(&None);
         let ms = |place: usize| spans.get(place).copied().flatten();
         for (place, run) in runs.iter().enumerate() {
@@ -175,6 +190,8 @@ impl Kept {
         let runs = runs.map(|(place, run)| (run.name.clone(), ms(place)));
         Ok(Played {
             host,
+            gpu_span_ms,
+            ticks: stamps.to_vec(),
             runs: runs.collect(),
             downloads,
         })
@@ -464,7 +481,8 @@ fn set(pass: &mut wgpu::ComputePass, run: &Run, groups: &[wgpu::BindGroup]) {
 }
 
 /// Milliseconds of a dispatch of no workgroups.
-fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f64, GpuError> {
+async fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f64, GpuError> {
+    run.pipeline.complaint().await?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     {
         let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -473,7 +491,7 @@ fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f6
     }
     let start = Instant::now();
     gpu.queue.submit([encoder.finish()]);
-    gpu.wait()?;
+    gpu.finished(&[]).await?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 

@@ -1,7 +1,9 @@
 //! Probes of the adapter's arithmetic and loops at start-up.
 
 use super::compose::Composition;
-use super::{Bindings, Gpu, GpuError, LOOPS_CUT, Recording, Storage, UniformValues, groups_for};
+use super::{
+    Bindings, Gpu, GpuError, LOOPS_CUT, Recording, Storage, UniformValues, groups_for, wait_for,
+};
 use serde::{Deserialize, Serialize};
 
 /// Agreement of the adapter's arithmetic with the host's f32, in the patterns of traversal.
@@ -35,6 +37,14 @@ const COUNT: u32 = 4096;
 /// # Errors
 /// The kernel does not run.
 pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
+    wait_for(probe_arithmetic_async(gpu))
+}
+
+/// The same as a future.
+///
+/// # Errors
+/// As [`probe_arithmetic`].
+pub async fn probe_arithmetic_async(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     let mut state = 0x9e37_79b9_u32;
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -64,7 +74,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     recording
         .run("probe", &pipeline, &bindings, groups_for(COUNT))
         .download("probe", &output);
-    let result: Vec<[f32; 8]> = gpu.play(&recording)?.download("probe")?;
+    let result: Vec<[f32; 8]> = gpu.play_async(&recording).await?.download("probe")?;
     let all = |expected: fn(&[f32; 4]) -> f32, lane: usize| {
         input
             .iter()
@@ -104,7 +114,7 @@ const LOOPS: [[u32; 2]; 2] = [[1, 1_000_000], [1000, 1000]];
 ///
 /// # Errors
 /// The kernel does not run, or loops end early undetected by the kernel.
-pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
+pub(super) async fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
     let kernel = Composition::new("common/loops").feature("loops_cut", true);
     let pipeline = gpu.pipeline(&kernel, true)?;
     let mut limit = None;
@@ -123,7 +133,7 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
             .run("loops", &pipeline, &bindings, [1, 1, 1])
             .download("turns", &turns)
             .download("status", &status);
-        let played = gpu.play(&recording)?;
+        let played = gpu.play_async(&recording).await?;
         let taken = played.download::<u32>("turns")?[0];
         let noticed = played.download::<u32>("status")?[0] & LOOPS_CUT != 0;
         let wanted = outer * inner;
@@ -140,4 +150,63 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
         limit.get_or_insert(taken);
     }
     Ok(limit)
+}
+
+/// Timestamps that [`probe_clock_step`] looks at.
+const TICKS: usize = 32;
+
+/// Step of the adapter's timestamps in nanoseconds, where all of many are multiples of it: browsers round them. `None`
+/// without timestamps, or for a step of at most a tick.
+///
+/// # Errors
+/// The kernel does not run.
+pub async fn probe_clock_step(gpu: &Gpu) -> Result<Option<u64>, GpuError> {
+    let Some(period) = gpu.timestamp_period else {
+        return Ok(None);
+    };
+    let kernel = Composition::new("common/loops").feature("loops_cut", true);
+    let pipeline = gpu.pipeline(&kernel, true)?;
+    let loops = UniformValues::new().u32("outer", 1).u32("inner", 1);
+    let mut bindings = Bindings::new();
+    bindings
+        .buffer("turns", Storage::scratch("turns", 8))
+        .buffer("status", Storage::scratch("status", 64))
+        .uniform("loops", loops);
+    let mut recording = Recording::new();
+    recording.run("loops", &pipeline, &bindings, [1, 1, 1]);
+    let mut ticks = Vec::new();
+    while ticks.len() < TICKS {
+        let played = gpu.play_async(&recording).await?;
+        ticks.extend(played.ticks.into_iter().flatten());
+    }
+    Ok(common_step(&ticks).map(|step| (step as f64 * f64::from(period)) as u64))
+}
+
+/// The greatest step that all ticks are multiples of, if it is above 1.
+fn common_step(ticks: &[u64]) -> Option<u64> {
+    let divisor = |mut a: u64, mut b: u64| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let step = ticks.iter().copied().fold(0, divisor);
+    (step > 1).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::common_step;
+
+    #[test]
+    fn rounded_ticks_tell_their_step() {
+        let ticks: Vec<u64> = (0..32).map(|i| 7_123_456_789 + 1_234_567 * i * i).collect();
+        assert_eq!(common_step(&ticks), None);
+        for step in [65_536, 100_000] {
+            let rounded: Vec<u64> = ticks.iter().map(|tick| tick / step * step).collect();
+            assert_eq!(common_step(&rounded), Some(step));
+        }
+        assert_eq!(common_step(&[]), None);
+        assert_eq!(common_step(&[0, 0]), None);
+    }
 }

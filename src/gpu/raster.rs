@@ -6,6 +6,7 @@ use super::buffers::check;
 use super::clock::{Elapsed, Stopwatch};
 use super::compose::Composition;
 use super::pipeline::{Binding, BindingKind, reflect};
+use super::wait::wait_for;
 use super::{GpuError, UniformValues};
 
 /// Row padding in words, as required for texture copies.
@@ -72,7 +73,7 @@ impl Gpu {
             depth: texture(DEPTH, wgpu::TextureUsages::empty()),
             words,
         };
-        match pollster::block_on(scope.pop()) {
+        match wait_for(scope.pop()) {
             Some(error) => Err(GpuError::Driver(error.to_string())),
             None => Ok(raster),
         }
@@ -153,7 +154,7 @@ impl Raster {
             self.gpu.wait()?;
             Ok(watch.elapsed())
         });
-        match pollster::block_on(scope.pop()) {
+        match wait_for(scope.pop()) {
             Some(error) if self.gpu.lost().is_none() => Err(GpuError::Driver(error.to_string())),
             _ => drawn,
         }

@@ -202,6 +202,11 @@ pub struct Played {
     pub(super) host: Elapsed,
     /// Names of the runs, each with its GPU milliseconds; `None` without timestamps.
     pub runs: Vec<(String, Option<f64>)>,
+    /// GPU milliseconds from the beginning of the first run to the end of the last; `None` without timestamps, if the
+    /// clock ran backwards, or in several submissions.
+    pub gpu_span_ms: Option<f64>,
+    /// The timestamps of the first run, and so on; empty without timestamps.
+    pub(super) ticks: Vec<[u64; 2]>,
     pub(super) downloads: BTreeMap<String, Vec<u8>>,
 }
 
@@ -240,6 +245,14 @@ impl Gpu {
     /// As [`Player::play`].
     pub fn play(&self, recording: &Recording) -> Result<Played, GpuError> {
         Player::new(self).play(recording)
+    }
+
+    /// The same as a future: see [`Player::play_async`].
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    pub async fn play_async(&self, recording: &Recording) -> Result<Played, GpuError> {
+        Player::new(self).play_async(recording).await
     }
 
     /// Runs a kernel once with one uniform, and downloads its outputs, given their sizes in bytes.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 pub struct Environment {
     /// Adapter name as the driver gives it.
     pub adapter: String,
-    /// `vulkan`, `gl`, `metal`, `dx12`.
+    /// `vulkan`, `gl`, `metal`, `dx12`, `webgpu`.
     pub backend: String,
     /// Driver name.
     pub driver: String,
@@ -57,6 +57,12 @@ pub struct Environment {
     /// The state of the machine when the run began.
     #[serde(default)]
     pub load: MachineLoad,
+    /// The browser, as it names itself; absent in runs of the program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub browser: Option<String>,
+    /// The step of its timestamps in nanoseconds, as seen; absent where it was not looked for or is not above 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock_step_ns: Option<u64>,
     /// The command line.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,

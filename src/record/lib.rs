@@ -39,6 +39,7 @@ pub use sound::{Sound, fault_of};
 pub use stream::*;
 pub use structure::*;
 
+use raystone_core::text::cell_hash;
 pub use raystone_stats::interval::Interval;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
@@ -97,6 +98,20 @@ impl<B> Line<B> {
     pub fn with_readings(mut self, readings: Vec<Reading>) -> Self {
         self.readings = readings;
         self
+    }
+
+    /// Returns the content hash of its cell: its key, the hash of its scene, its kernels, and other inputs of its figures.
+    pub fn content_hash(&self, scene_hash: &str, also: &[(&str, &str)]) -> String {
+        // A scene is identified by its bytes, not its path.
+        let key = self.key.clone().with(axis::SCENE, "");
+        let key = serde_json::to_string(&key).unwrap_or_default();
+        let parts = [
+            ("key", key.as_str()),
+            ("scene", scene_hash),
+            ("kernel", &self.ran.kernel_hash),
+            ("version", env!("CARGO_PKG_VERSION")),
+        ];
+        cell_hash(&[&parts, also].concat())
     }
 
     /// Returns the same line about another body.

@@ -178,6 +178,25 @@ pub struct ClassTiming {
     /// Counted work, from a separate run; absent for a structure that counts none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counters: Option<CountersPerRay>,
+    /// Dispatches that a sample is the mean of, where the clock ticks too coarsely for one.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub dispatches: u32,
+    /// Samples that were discarded because the clock ran backwards.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub discarded: u32,
+}
+
+fn one() -> u32 {
+    1
+}
+
+// By reference, as serde asks.
+fn is_one(n: &u32) -> bool {
+    *n == 1
+}
+
+fn is_zero(n: &u32) -> bool {
+    *n == 0
 }
 
 impl ClassTiming {
@@ -247,7 +266,7 @@ impl ClassCoherence {
 }
 
 /// A structure on a scene.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StructureRecord {
     /// True if the driver caused the failure by ending loops too early for this structure: the cell then counts as
     /// skipped.

@@ -11,6 +11,7 @@ pub mod data;
 pub mod document;
 pub mod export;
 pub mod format;
+pub mod gallery;
 pub mod history;
 pub mod html;
 pub mod markdown;

@@ -3,6 +3,7 @@
 mod checks;
 mod exports;
 mod fixture;
+mod gallery;
 mod names;
 mod pages;
 mod rendering;

@@ -12,6 +12,7 @@ pub mod interval;
 pub mod known_figures;
 mod log_figure;
 pub mod metrics;
+pub mod rates;
 mod shown;
 pub mod signed_rank;
 pub mod statistics;

@@ -23,7 +23,7 @@ use raystone_accel::{
 use raystone_config::Gate;
 use raystone_core::geometry::Camera;
 use raystone_core::store::user_folder;
-use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
+use raystone_gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors, wait_for};
 use raystone_record::{ClassVerdict, GateVerdict, ReferenceCheck};
 use raystone_scene::SceneData;
 
@@ -250,6 +250,22 @@ pub fn gate(
     probe: &ArithmeticProbe,
     runtime_checks: bool,
 ) -> Result<GateVerdict, GpuError> {
+    let stage = (gpu, triangles, soup);
+    wait_for(gate_async(stage, traced, reference, probe, runtime_checks))
+}
+
+/// See [`gate`]: a future that suspends while the device works. Its first argument holds the device, and the triangles
+/// there and on the host.
+///
+/// # Errors
+/// As [`gate`].
+pub async fn gate_async(
+    (gpu, triangles, soup): (&Gpu, &TriangleBuffers, &TriangleSoup),
+    traced: &Traced,
+    reference: &ReferenceTracer,
+    probe: &ArithmeticProbe,
+    runtime_checks: bool,
+) -> Result<GateVerdict, GpuError> {
     let reference = reference.of(traced.space);
     let mut errors = 0;
     let mut classes = Vec::new();
@@ -263,19 +279,19 @@ pub fn gate(
             Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)
         };
         let (closest, any) = (batch(Query::Closest)?, batch(Query::Any)?);
-        closest.trace()?;
-        any.trace()?;
+        closest.trace_async().await?;
+        any.trace_async().await?;
         if !set.is_timed() {
             // Timed batches are checked after timing; a second pass exposes state left by the
             // first.
-            closest.trace_in_rows()?;
-            any.trace_in_rows()?;
+            closest.trace_in_rows_async().await?;
+            any.trace_in_rows_async().await?;
         }
-        errors |= closest.error_word()? | any.error_word()?;
+        errors |= closest.error_word_async().await? | any.error_word_async().await?;
         classes.push(compare(
             set,
-            &closest.hits()?,
-            &any.found()?,
+            &closest.hits_async().await?,
+            &any.found_async().await?,
             soup,
             traced.space,
             probe.is_exact(),
@@ -318,13 +334,27 @@ pub fn timed_fault(
     space: Space,
     exact: bool,
 ) -> Result<Option<String>, GpuError> {
+    wait_for(timed_fault_async(batch, set, soup, space, exact))
+}
+
+/// See [`timed_fault`].
+///
+/// # Errors
+/// As [`timed_fault`].
+pub async fn timed_fault_async(
+    batch: &RayBatch,
+    set: &RaySet,
+    soup: &TriangleSoup,
+    space: Space,
+    exact: bool,
+) -> Result<Option<String>, GpuError> {
     let mut hits = set.truth.clone();
     let mut found: Vec<_> = hits.iter().map(|h| Some(h.triangle != NO_HIT)).collect();
     match set.query() {
-        Query::Closest => hits = batch.hits()?,
-        Query::Any => found = batch.found()?,
+        Query::Closest => hits = batch.hits_async().await?,
+        Query::Any => found = batch.found_async().await?,
     }
-    let mut faults = kernel_errors(batch.error_word()?);
+    let mut faults = kernel_errors(batch.error_word_async().await?);
     let verdict = compare(set, &hits, &found, soup, space, exact);
     if let Some(first) = verdict.first_wrong {
         faults.push(format!(

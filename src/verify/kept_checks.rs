@@ -8,11 +8,11 @@
 use crate::gate::ReferenceTracer;
 use raystone_accel::Intersection;
 use raystone_config::Gate;
+use raystone_core::clock::Instant;
 use raystone_core::store::Kept;
 use raystone_record::ReferenceCheck;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::time::SystemTime;
 
 /// Where the checks of one judge are kept.
 pub(super) struct KeptChecks(Kept);
@@ -86,11 +86,10 @@ impl KeptChecks {
         if !reference.is_sound() || instances.is_some_and(|reference| !reference.is_sound()) {
             return;
         }
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let checks =
             |reference: &ReferenceTracer| [reference.brute_force.clone(), reference.oracle.clone()];
         let content = Content {
-            checked_unix_s: now.map_or(0, |d| d.as_secs()),
+            checked_unix_s: Instant::unix_s(),
             world: checks(reference),
             instances: instances.map(checks),
         };

@@ -18,6 +18,7 @@ pub mod peer_check;
 mod pixels;
 pub mod ray_counts;
 pub mod rays;
+pub mod scene_record;
 pub mod self_test;
 pub mod shadow_rays;
 mod trial_lights;

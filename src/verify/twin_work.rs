@@ -1,8 +1,13 @@
 //! Counted work of kernels against that of the twins: nodes and tests per ray have no other check.
 
+use crate::gate::ReferenceTracer;
 use crate::rays::RaySet;
 use rayon::prelude::*;
-use raystone_accel::{Counters, CpuTwin, Query, Ray};
+use raystone_accel::tracer::count_work_async;
+use raystone_accel::{
+    BuiltAccel, Counters, CpuTwin, Query, Ray, Traced, TriangleBuffers, TriangleSoup,
+};
+use raystone_gpu::{Gpu, GpuError};
 use raystone_record::RayClass;
 
 /// Rays of each class whose work is compared, besides the last: so many that one dispatch of
@@ -44,6 +49,21 @@ impl TwinWork {
         }
     }
 
+    /// Counts for all classes that are timed; empty without a twin, or on an adapter without the host's arithmetic.
+    pub fn of_structure(
+        built: &dyn BuiltAccel,
+        soup: &TriangleSoup,
+        reference: &ReferenceTracer,
+        exact: bool,
+    ) -> Vec<Self> {
+        let Some(twin) = built.cpu_twin(soup).filter(|_| exact) else {
+            return Vec::new();
+        };
+        let sets = reference.of(built.space()).sets.iter();
+        let timed = sets.filter(|set| set.is_timed());
+        timed.map(|set| Self::of(set, &*twin)).collect()
+    }
+
     /// The first ray whose work kernels count otherwise; `None` if there is none.
     pub fn fault(&self, kernel: &[Counters]) -> Option<String> {
         let class = self.class.name();
@@ -74,4 +94,24 @@ fn show(work: &Counters) -> String {
     format!(
         "{nodes} nodes, {box_tests} box tests, {triangle_tests} triangle tests, {stack_high_water} on the stack"
     )
+}
+
+/// What is wrong with the work that kernels count; `None` if nothing is.
+///
+/// # Errors
+/// A kernel does not compile, or the device is lost or hangs.
+pub async fn fault_of_kernels(
+    gpu: &Gpu,
+    triangles: &TriangleBuffers,
+    traced: &Traced,
+    expected: &[TwinWork],
+) -> Result<Option<String>, GpuError> {
+    for twin in expected {
+        let counted = count_work_async(gpu, triangles, traced, twin.query, &twin.rays).await?;
+        let fault = counted.and_then(|counted| twin.fault(&counted));
+        if fault.is_some() {
+            return Ok(fault);
+        }
+    }
+    Ok(None)
 }

@@ -3,7 +3,7 @@
 use super::{Ask, Query, RayBuffers, Traced, Tracer, TriangleBuffers};
 use crate::{Counters, Hit, Ray};
 use bytemuck::Pod;
-use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage};
+use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage, wait_for};
 use std::cell::Cell;
 
 /// Fill word of the output before a trace; no answer of either query begins with it (as a distance
@@ -84,19 +84,50 @@ impl RayBatch {
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
     pub fn trace(&self) -> Result<Elapsed, GpuError> {
-        let mut wipe = Recording::new();
-        wipe.copy(&self.poison, &self.buffers.answers);
-        self.player.play(&wipe)?;
+        wait_for(self.trace_async())
+    }
+
+    /// The same as a future, as are all that end in `_async`: see [`Player::play_async`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::trace`].
+    pub async fn trace_async(&self) -> Result<Elapsed, GpuError> {
+        self.player.play_async(&self.wipe()).await?;
         let mut total = Elapsed::nothing(self.tracer.gpu.has_clock());
         let mut first = 0;
         while first < self.rays {
             let count = self.slices.next(first, self.rays);
-            let elapsed = self.play(first, count)?;
+            let elapsed = self.play(first, count).await?;
             total += elapsed;
             self.slices.learn(u64::from(count), elapsed);
             first += count;
         }
         Ok(total)
+    }
+
+    fn wipe(&self) -> Recording {
+        let mut wipe = Recording::new();
+        wipe.copy(&self.poison, &self.buffers.answers);
+        wipe
+    }
+
+    /// Traces all rays `times` times in one submission, each time in one dispatch, and tells the time from the beginning
+    /// of the first to the end of the last: for clocks that tick too coarsely for one. A trace must be known to be short.
+    ///
+    /// # Errors
+    /// As [`RayBatch::trace`].
+    pub async fn trace_times_async(&self, times: u32) -> Result<Elapsed, GpuError> {
+        self.player.play_async(&self.wipe()).await?;
+        let mut recording = Recording::new();
+        for _ in 0..times {
+            self.tracer
+                .record(&mut recording, &self.buffers, 0..self.rays)?;
+        }
+        let played = self.player.play_async(&recording).await?;
+        Ok(Elapsed {
+            gpu_ms: played.gpu_span_ms,
+            ..played.elapsed()
+        })
     }
 
     /// Milliseconds of the longest slice so far: no dispatch took longer.
@@ -110,8 +141,16 @@ impl RayBatch {
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
     pub fn trace_in_rows(&self) -> Result<(), GpuError> {
+        wait_for(self.trace_in_rows_async())
+    }
+
+    /// See [`RayBatch::trace_in_rows`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::trace_in_rows`].
+    pub async fn trace_in_rows_async(&self) -> Result<(), GpuError> {
         self.row.set(NARROW_ROW);
-        let traced = self.trace();
+        let traced = self.trace_async().await;
         self.row.set(u32::MAX);
         traced.map(|_| ())
     }
@@ -121,21 +160,29 @@ impl RayBatch {
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
     pub fn trace_nothing(&self) -> Result<Elapsed, GpuError> {
-        self.play(0, 0)
+        wait_for(self.trace_nothing_async())
     }
 
-    fn play(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
+    /// See [`RayBatch::trace_nothing`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::trace_nothing`].
+    pub async fn trace_nothing_async(&self) -> Result<Elapsed, GpuError> {
+        self.play(0, 0).await
+    }
+
+    async fn play(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
         let mut recording = Recording::new();
         let (range, row) = (first..first + count, self.row.get());
         self.tracer
             .record_in_rows(&mut recording, &self.buffers, range, row)?;
-        Ok(self.player.play(&recording)?.elapsed())
+        Ok(self.player.play_async(&recording).await?.elapsed())
     }
 
-    fn read<T: Pod>(&self, buffer: &Storage) -> Result<Vec<T>, GpuError> {
+    async fn read<T: Pod>(&self, buffer: &Storage) -> Result<Vec<T>, GpuError> {
         let mut recording = Recording::new();
         recording.download("", buffer);
-        self.player.play(&recording)?.download("")
+        self.player.play_async(&recording).await?.download("")
     }
 
     /// Hits of the last trace of a closest-hit query.
@@ -143,7 +190,15 @@ impl RayBatch {
     /// # Errors
     /// The device is lost or hangs.
     pub fn hits(&self) -> Result<Vec<Hit>, GpuError> {
-        let mut hits: Vec<Hit> = self.read(&self.buffers.answers)?;
+        wait_for(self.hits_async())
+    }
+
+    /// See [`RayBatch::hits`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::hits`].
+    pub async fn hits_async(&self) -> Result<Vec<Hit>, GpuError> {
+        let mut hits: Vec<Hit> = self.read(&self.buffers.answers).await?;
         hits.truncate(self.rays as usize);
         Ok(hits)
     }
@@ -153,7 +208,15 @@ impl RayBatch {
     /// # Errors
     /// The device is lost or hangs.
     pub fn found(&self) -> Result<Vec<Option<bool>>, GpuError> {
-        let words: Vec<[u32; 4]> = self.read(&self.buffers.answers)?;
+        wait_for(self.found_async())
+    }
+
+    /// See [`RayBatch::found`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::found`].
+    pub async fn found_async(&self) -> Result<Vec<Option<bool>>, GpuError> {
+        let words: Vec<[u32; 4]> = self.read(&self.buffers.answers).await?;
         let answer = |w: &[u32; 4]| (w[0] <= 1).then_some(w[0] == 1);
         Ok(words.iter().take(self.rays as usize).map(answer).collect())
     }
@@ -163,7 +226,15 @@ impl RayBatch {
     /// # Errors
     /// The device is lost or hangs.
     pub fn digest(&self) -> Result<blake3::Hash, GpuError> {
-        Ok(blake3::hash(&self.read::<u8>(&self.buffers.answers)?))
+        wait_for(self.digest_async())
+    }
+
+    /// See [`RayBatch::digest`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::digest`].
+    pub async fn digest_async(&self) -> Result<blake3::Hash, GpuError> {
+        Ok(blake3::hash(&self.read::<u8>(&self.buffers.answers).await?))
     }
 
     /// Counted work of the last trace, and the corresponding answers.
@@ -171,7 +242,15 @@ impl RayBatch {
     /// # Errors
     /// The device is lost or hangs.
     pub fn work(&self) -> Result<(Vec<Counters>, Vec<Hit>), GpuError> {
-        let words: Vec<[[u32; 4]; 2]> = self.read(&self.buffers.answers)?;
+        wait_for(self.work_async())
+    }
+
+    /// See [`RayBatch::work`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::work`].
+    pub async fn work_async(&self) -> Result<(Vec<Counters>, Vec<Hit>), GpuError> {
+        let words: Vec<[[u32; 4]; 2]> = self.read(&self.buffers.answers).await?;
         let counters =
             |&[nodes, box_tests, triangle_tests, stack_high_water]: &[u32; 4]| Counters {
                 nodes,
@@ -190,7 +269,15 @@ impl RayBatch {
     /// # Errors
     /// The device is lost or hangs.
     pub fn error_word(&self) -> Result<u32, GpuError> {
-        Ok(self.read::<u32>(&self.buffers.status)?[0])
+        wait_for(self.error_word_async())
+    }
+
+    /// See [`RayBatch::error_word`].
+    ///
+    /// # Errors
+    /// As [`RayBatch::error_word`].
+    pub async fn error_word_async(&self) -> Result<u32, GpuError> {
+        Ok(self.read::<u32>(&self.buffers.status).await?[0])
     }
 }
 
@@ -205,6 +292,20 @@ pub fn count_work(
     query: Query,
     rays: &[Ray],
 ) -> Result<Option<Vec<Counters>>, GpuError> {
+    wait_for(count_work_async(gpu, triangles, traced, query, rays))
+}
+
+/// See [`count_work`].
+///
+/// # Errors
+/// As [`count_work`].
+pub async fn count_work_async(
+    gpu: &Gpu,
+    triangles: &TriangleBuffers,
+    traced: &Traced,
+    query: Query,
+    rays: &[Ray],
+) -> Result<Option<Vec<Counters>>, GpuError> {
     if !traced.passes.counts_work() {
         return Ok(None);
     }
@@ -213,6 +314,6 @@ pub fn count_work(
         ..query.into()
     };
     let batch = Tracer::new(gpu, triangles, traced, ask)?.batch(rays)?;
-    batch.trace()?;
-    Ok(Some(batch.work()?.0))
+    batch.trace_async().await?;
+    Ok(Some(batch.work_async().await?.0))
 }

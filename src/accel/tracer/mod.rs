@@ -11,7 +11,7 @@ mod refill;
 mod traced;
 mod workgroup;
 
-pub use batch::{Answers, RayBatch, count_work};
+pub use batch::{Answers, RayBatch, count_work, count_work_async};
 pub use load::{Load, LoadRegistry};
 pub use passes::{LiveRays, TracePasses, TraceSteps};
 pub(crate) use refill::Refill;

@@ -3,7 +3,7 @@
 use super::cost::{Cost, Work};
 use super::measurement::{Absent, At, Measurement, Preparation, Prepared};
 use crate::compaction::{Bench, Inputs, Load, benched, stream};
-use crate::timing::{Measured, Samples, millions_per_second};
+use crate::timing::{Measured, Samples};
 use raystone_config::{Axis, COMPACTIONS, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError, Player};
 use raystone_record::figure::{
@@ -11,6 +11,7 @@ use raystone_record::figure::{
     COMPACTION_NS, COMPACTION_PASSES, COMPACTION_SCRATCH, Figure,
 };
 use raystone_record::{Reading, Samples as Rounds};
+use raystone_stats::rates::millions_per_second;
 use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 

@@ -9,7 +9,7 @@ use super::paths;
 use super::reference::{ReferenceImage, reference, reference_structure};
 use super::reference_file::image_hash;
 use super::replicates::{Pass, all_samples, check_distinct, until_met};
-use super::session::{Session, content_hash};
+use super::session::Session;
 use super::structures::{Gated, image_settings};
 use super::world::World;
 use crate::spectrum::{ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power};
@@ -249,7 +249,7 @@ fn sampler_error(
         ("spp and seeds", &drawn),
         ("camera and size", &camera),
     ];
-    let hash = content_hash(&blank, &world.scene.hash, &made_of);
+    let hash = blank.content_hash(&world.scene.hash, &made_of);
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
     let by_tile = rule.and_then(|rule| Some((rule, rule.tile?)));
     let replicates = match (rule, by_tile.filter(|_| cell.randomised)) {

@@ -1,7 +1,7 @@
 //! Correctness check of integrators before rendering: single paths against the image oracle.
 
 use super::error::{Fault, RunError};
-use super::session::{Session, content_hash};
+use super::session::Session;
 use super::world::World;
 use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
@@ -136,7 +136,7 @@ fn judge_and_record(
         session.tell_warning(&format!("{cell}: paths are not judged: {reason}"));
     }
     let blank = Line::new(Key::from(cell), ran, ());
-    let hash = content_hash(&blank, &world.scene.hash, &[]);
+    let hash = blank.content_hash(&world.scene.hash, &[]);
     let paths = record.clone();
     session
         .checked

@@ -7,10 +7,11 @@ use super::session::{End, Session};
 use super::structures::Structures;
 use super::world::World;
 use crate::peers::{BuiltPeer, PeerBatch};
-use crate::timing::{Measured, Samples, Watch, millions_per_second};
+use crate::timing::{Measured, Samples, Watch};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError};
 use raystone_record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
+use raystone_stats::rates::millions_per_second;
 use raystone_verify::peer_check::differences;
 use raystone_verify::rays::RaySet;
 

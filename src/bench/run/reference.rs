@@ -2,7 +2,7 @@
 
 use super::error::{Fault, RunError};
 use super::images::{Estimator, attributes};
-use super::session::{Session, content_hash};
+use super::session::Session;
 use super::structures::{self, Gated};
 use super::uniform;
 use super::world::World;
@@ -271,7 +271,7 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
         ("camera", &camera),
         ("resolution", &size),
     ];
-    content_hash(line, &world.scene.hash, &made_of)
+    line.content_hash(&world.scene.hash, &made_of)
 }
 
 /// The image of one value.

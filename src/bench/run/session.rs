@@ -20,13 +20,12 @@ use raystone_gpu::Gpu;
 use raystone_image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
 use raystone_record::Environment;
 use raystone_record::{
-    Body, CellRecord, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord,
-    SkippedRecord, axis,
+    Body, CellRecord, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord, SkippedRecord,
 };
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Instant, SystemTime};
+use std::time::Instant;
 
 /// Images up to this many pixels store linear radiance by default: 1.5 MiB each.
 const MOST_KEPT_PIXELS: usize = 1 << 17;
@@ -41,10 +40,9 @@ pub(super) struct Clock {
 
 impl Clock {
     fn new() -> Self {
-        let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         Self {
             start: Instant::now(),
-            began_unix_s: since_1970.map_or(0, |since| since.as_secs()),
+            began_unix_s: raystone_core::clock::Instant::unix_s(),
             parts_s: BTreeMap::new(),
         }
     }
@@ -217,7 +215,7 @@ impl<'a> Session<'a> {
 
     /// Writes a unit's line, with the hash of all its inputs, and closes the unit.
     pub(super) fn conclude(&mut self, unit: &str, line: Line, end: End) -> Result<(), RunError> {
-        let hash = content_hash(&line, end.scene, end.of);
+        let hash = line.content_hash(end.scene, end.of);
         self.recorder.write(&line.hashed(&hash))?;
         self.ledger.failed += usize::from(end.failure.is_some());
         let outcome = match &end.failure {
@@ -516,18 +514,4 @@ fn told(cell: &str, reason: &str) -> SkippedRecord {
 /// Hash of the lines that explain a cell's failure.
 pub(super) fn failure_hash(cell: &str, reason: &str) -> String {
     cell_hash(&[("failed", cell), ("reason", reason)])
-}
-
-/// Content hash of a line's cell: its key, scene bytes, kernels, and other inputs of its figures.
-pub(super) fn content_hash<B>(line: &Line<B>, scene_hash: &str, also: &[(&str, &str)]) -> String {
-    // A scene is identified by its bytes, not its path.
-    let key = line.key.clone().with(axis::SCENE, "");
-    let key = serde_json::to_string(&key).unwrap_or_default();
-    let parts = [
-        ("key", key.as_str()),
-        ("scene", scene_hash),
-        ("kernel", &line.ran.kernel_hash),
-        ("version", env!("CARGO_PKG_VERSION")),
-    ];
-    cell_hash(&[&parts, also].concat())
 }

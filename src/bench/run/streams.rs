@@ -5,7 +5,7 @@ use super::cost::{Cost, Work};
 use super::device::Device;
 use super::error::RunError;
 use super::measurement::Measurement;
-use super::session::{Session, content_hash};
+use super::session::Session;
 use crate::sampler_cost::sampler_cost;
 use crate::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
 use crate::words::{compare, dump_stream, kernel_hash};
@@ -277,7 +277,7 @@ fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
 /// What was found of a stream, with the hash of the kernel that drew it.
 fn line(cell: &Cell, kernel_hash: String, what: &str, body: Body) -> Line {
     let line = Line::new(Key::from(cell), Ran::kernel(kernel_hash), body);
-    let hash = content_hash(&line, "", &[("what", what)]);
+    let hash = line.content_hash("", &[("what", what)]);
     line.hashed(hash)
 }
 

@@ -7,16 +7,14 @@ use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
 use crate::clock_check;
-use crate::timing::{
-    Measured, Samples, Watch, empty_ms, interleave, millions_per_second, rate_fault,
-    without_overhead,
-};
+use crate::timing::{Measured, Samples, Watch, empty_ms, interleave};
 use raystone_accel::tracer::count_work;
 use raystone_accel::{Ask, Query, Ray, RayBatch, Space, Tracer};
 use raystone_config::Axis;
 use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use raystone_image::{Picture, viridis};
 use raystone_record::{ClassTiming, CountersPerRay};
+use raystone_stats::rates::{millions_per_second, rate_fault, without_overhead};
 use raystone_stats::statistics::median;
 use raystone_verify::gate::timed_fault;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
@@ -252,6 +250,8 @@ fn class_timing(
         },
         mrays_s,
         counters: work.as_deref().map(CountersPerRay::mean_of),
+        dispatches: 1,
+        discarded: 0,
     }))
 }
 

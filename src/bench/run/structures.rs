@@ -9,15 +9,15 @@ use super::twins::of_recorded_rays;
 use super::units::Unit;
 use super::world::World;
 use crate::memory::peak_bytes;
-use raystone_accel::tracer::{count_work, kernel_hash};
-use raystone_accel::{AccelError, BuildLog, BuiltAccel, CpuTwin, Space, StructureStats, Traced};
+use raystone_accel::tracer::kernel_hash;
+use raystone_accel::{AccelError, BuildLog, BuiltAccel, Traced};
 use raystone_config::{Axis, Cell, Experiment, Plan};
-use raystone_gpu::{Gpu, GpuError};
+use raystone_gpu::{Gpu, GpuError, wait_for};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
 use raystone_verify::self_test::unseen_hit;
-use raystone_verify::twin_work::TwinWork;
+use raystone_verify::twin_work::{self, TwinWork};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -139,7 +139,10 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
     record.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let valid = (session.clock).time("gate", || built.validate(&world.soup));
     candidate.structural = valid.err().map(|e| e.to_string());
-    let work = || twin_work(world, &*built);
+    let work = || {
+        let exact = world.probe.is_exact();
+        TwinWork::of_structure(&*built, &world.soup, &world.reference, exact)
+    };
     candidate.work = Arc::new(session.clock.time("gate", work));
     match Traced::upload(world.gpu, &*built) {
         Ok(traced) => candidate.traced = Some(traced),
@@ -232,18 +235,6 @@ fn prove_gate(session: &mut Session, world: &World) -> Result<(), RunError> {
     }
 }
 
-/// The work of recorded rays through the twin of a structure, on an adapter with the host's
-/// arithmetic.
-fn twin_work(world: &World, built: &dyn BuiltAccel) -> Vec<TwinWork> {
-    let twin = (built.cpu_twin(&world.soup)).filter(|_| world.probe.is_exact());
-    let sets = &world.reference.of(built.space()).sets;
-    let of_twin = |twin: Box<dyn CpuTwin + '_>| {
-        let timed = sets.iter().filter(|set| set.is_timed());
-        timed.map(|set| TwinWork::of(set, &*twin)).collect()
-    };
-    twin.map(of_twin).unwrap_or_default()
-}
-
 /// What is wrong with the work that kernels count. Kernels of a folder that traverse otherwise may
 /// count otherwise.
 fn work_fault(
@@ -256,15 +247,10 @@ fn work_fault(
     if overridden.iter().any(|name| name.starts_with("accel/")) {
         return Ok(None);
     }
-    for twin in expected {
-        let triangles = &world.buffers.triangles;
-        let counted = count_work(gpu, triangles, traced, twin.query, &twin.rays)?;
-        let fault = counted.and_then(|counted| twin.fault(&counted));
-        if fault.is_some() {
-            return Ok(fault);
-        }
-    }
-    Ok(None)
+    let triangles = &world.buffers.triangles;
+    wait_for(twin_work::fault_of_kernels(
+        gpu, triangles, traced, expected,
+    ))
 }
 
 /// Updates of which the median is taken.
@@ -320,24 +306,7 @@ fn empty_record(cell: &Cell, runtime_checks: bool) -> Line<StructureRecord> {
         unchecked: !runtime_checks,
         ..Ran::default()
     };
-    let record = StructureRecord {
-        refused: false,
-        space: Space::World,
-        load: None,
-        build: Vec::new(),
-        build_ms: 0.0,
-        build_peak_bytes: None,
-        update_ms: None,
-        stats: StructureStats::default(),
-        figures: Default::default(),
-        gate: None,
-        timings: Vec::new(),
-        coherence: None,
-        heat_map: None,
-        heat_map_max: None,
-        failure: None,
-    };
-    Line::new(Key::from(cell), ran, record)
+    Line::new(Key::from(cell), ran, StructureRecord::default())
 }
 
 /// Everything about the structures of a world; returns those that may be used further.

@@ -8,10 +8,11 @@ use raystone_config::{Axis, Cell};
 use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
 use raystone_gpu::{ArithmeticProbe, Gpu};
-use raystone_record::{Body, Key, Line, Ran, SceneRecord};
+use raystone_record::{Body, Key, Line, Ran};
 use raystone_render::Stage;
 use raystone_scene::{self as scene, LoadOptions, SceneData};
 use raystone_verify::gate::{Checks, ReferenceTracer};
+use raystone_verify::scene_record::scene_record;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -62,13 +63,13 @@ impl From<String> for NoWorld {
 }
 
 /// Bytes that an adapter can bind for a scene's tables.
-pub(super) fn table_bytes(limits: &wgpu::Limits) -> u64 {
+pub fn table_bytes(limits: &wgpu::Limits) -> u64 {
     let binding = limits.max_storage_buffer_binding_size;
     binding.min(limits.max_buffer_size)
 }
 
 /// Scene loading options for an adapter with this binding limit.
-pub(super) fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
+pub fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
     LoadOptions {
         allow_outside: options.allow_outside,
         table_bytes,
@@ -155,22 +156,5 @@ impl<'a> World<'a> {
             camera: loaded.camera,
             reference: reference.map_err(|e| e.to_string())?,
         })
-    }
-}
-
-fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {
-    let bounds = scene.bounds();
-    SceneRecord {
-        triangles: scene.triangles.len(),
-        bounds_min: bounds.min.to_array(),
-        bounds_max: bounds.max.to_array(),
-        load_ms,
-        bytes: scene.bytes() as u64,
-        materials: scene.materials.len(),
-        textures: scene.textures.len(),
-        emitters: scene.emitters().len(),
-        camera,
-        report: scene.report.clone(),
-        scene_hash: scene.hash.clone(),
     }
 }

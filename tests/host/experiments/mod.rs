@@ -171,6 +171,18 @@ fn every_section_is_read() {
 }
 
 #[test]
+fn without_images_structures_alone_are_measured() {
+    let planned = |text: &str| {
+        let plan = Plan::new(&good(text), &[], |_, _| Ok(true)).expect("a plan");
+        let rest = plan.samplers.len() + plan.times.len() + plan.streams.len();
+        (plan.structures.len(), rest)
+    };
+    let (structures, rest) = planned("");
+    assert!(structures > 0 && rest > 0);
+    assert_eq!(planned("[run]\nimages = false\n"), (structures, 0));
+}
+
+#[test]
 fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
     let experiment = good(
         "[accel.uniform-grid]\nmax_cells = [4096, 8]\nlambda = [3, 5.0]\n\

@@ -409,6 +409,55 @@ fn a_history_finds_the_run_in_which_a_count_changed() {
 }
 
 #[test]
+fn a_gallery_has_what_inspection_finds_whole() {
+    let whole = records();
+    let other = folder_of(&whole.replace("\"software\":true", "\"software\":false"));
+    // Without the last cell: unfinished.
+    let cells: Vec<&str> = whole
+        .lines()
+        .filter(|line| line.contains("\"kind\":\"cell\""))
+        .collect();
+    let last = cells.last().expect("a cell");
+    let unfinished: String = whole
+        .lines()
+        .filter(|line| line != last)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let unfinished = folder_of(&unfinished);
+    let damaged = folder_of(&whole.replacen("\"build_ms\":", "\"build_ms\":-", 1));
+    let (run, out) = (run_folder(), RUN.path().join("gallery"));
+    let found = done(&[
+        "gallery",
+        text(&run),
+        text(other.path()),
+        text(unfinished.path()),
+        text(damaged.path()),
+        "--json",
+        "--out",
+        text(&out),
+    ]);
+    let found: Value = serde_json::from_str(&found).expect("JSON");
+    assert_eq!(
+        found["devices"].as_array().map(Vec::len),
+        Some(2),
+        "{found:#}"
+    );
+    assert_eq!(found["devices"][0]["software"], false);
+    let reasons = found["left_out"].to_string();
+    assert_eq!(
+        found["left_out"].as_array().map(Vec::len),
+        Some(2),
+        "{found:#}"
+    );
+    assert!(
+        reasons.contains("cells are missing") && reasons.contains("damaged"),
+        "{reasons}"
+    );
+    let page = std::fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("software adapters: "));
+}
+
+#[test]
 fn devices_are_never_in_one_series() {
     let other = folder_of(&records().replacen("\"adapter\":\"", "\"adapter\":\"other ", 1));
     let run = run_folder();
