@@ -63,6 +63,9 @@ pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
             (ParamRange::Integer { min, max }, _) => {
                 vec![ParamValue::Integer(*min), ParamValue::Integer(*max)]
             }
+            (ParamRange::Stepped(_, range), _) => [range.start(), range.end()]
+                .map(|x| ParamValue::Integer(*x))
+                .to_vec(),
             (ParamRange::Number { min, max }, ParamValue::Number(x)) => [x / 8.0, x * 8.0]
                 .map(|x| ParamValue::Number(x.clamp(*min, *max)))
                 .to_vec(),

@@ -24,9 +24,9 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn new(rays: u32, primitives: usize, options: &Options) -> Self {
         let branching = options.branching;
-        // No rays are as good as some: kernels compile, and find nothing.
+        // No rays are as good as some that fill more than the first level: all kernels compile, and find nothing.
         let rays = if rays == 0 {
-            branching * options.bundle + 1
+            options.start * options.bundle + 1
         } else {
             rays
         };

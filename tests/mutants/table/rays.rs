@@ -166,7 +166,7 @@ pub const MUTANTS: &[Mutant] = &[
             "if (level + 1u >= tree.level) {",
         ),
         WIDE,
-        Check::Lattice,
+        Check::Gate,
     ),
     row(
         "ray-last-workgroup-missing",
@@ -235,17 +235,6 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Lattice,
     ),
     row(
-        "ray-ray-not-raised",
-        "rays are traced as they are given",
-        text(
-            "accel/ray_hierarchy/passes/gather",
-            "ray = raised(given);",
-            "ray = given;",
-        ),
-        RAYS,
-        Check::Lattice,
-    ),
-    row(
         "ray-answers-out-of-order",
         "answers of sorted rays stay where they were sorted to",
         text(
@@ -276,17 +265,6 @@ pub const MUTANTS: &[Mutant] = &[
             "0.5 * nearest(place, ray).t",
         ),
         PARTS,
-        Check::Lattice,
-    ),
-    row(
-        "ray-union-lacks-the-last",
-        "a node does not hold the last node below",
-        text(
-            "accel/ray_hierarchy/passes/unions",
-            "if (child < below)",
-            "if (child + 1u < below)",
-        ),
-        RAYS,
         Check::Lattice,
     ),
 ];
