@@ -29,6 +29,7 @@ pub use raystone_discrepancy as discrepancy;
 pub use raystone_gpu as gpu;
 pub use raystone_gpu::compaction;
 pub use raystone_image as image;
+pub use raystone_media as media;
 pub use raystone_render as integrator;
 pub use raystone_report as report;
 pub use raystone_report::{export, history};
@@ -68,11 +69,11 @@ pub mod repro {
     }
 }
 
-/// Everything that can be named in this program: what the crates below register, and the parts of the stress suite.
+/// Everything that can be named in this program: what the crates below register, the parts of the stress suite, and the measurements of media.
 pub fn registries() -> run::Registries {
     let mut registries = run::Registries::default();
     // Their names are their own: a test of the suite adds them to the same registries.
-    let added = stress::register(&mut registries);
+    let added = stress::register(&mut registries).and_then(|()| media::register(&mut registries));
     debug_assert_eq!(added, Ok(()));
     registries
 }

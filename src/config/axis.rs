@@ -41,11 +41,11 @@ macro_rules! axes {
 
 axes! {
     /// Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory.
-    /// Not needed if all integrators are `integrand:*`, `compaction:*` or `stress:*`.
+    /// Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*` or `media:*`.
     Scene = "scene";
-    /// Acceleration structures. Not needed if all integrators are `integrand:*`, `compaction:*` or `stress:*`.
+    /// Acceleration structures. Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*` or `media:*`.
     Accel = "accel";
-    /// Sample sequences. Not needed if all integrators are `compaction:*` or `stress:*`.
+    /// Sample sequences. Not needed if all integrators are `compaction:*`, `stress:*` or `media:*`.
     Sequence = "sequence";
     /// How the pixels' sample points are made different.
     Decorrelation = "decorrelation" or "none";

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, AxisMap};
 use super::sections::{
-    Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, View,
+    Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, View, Window,
 };
 use super::settings::{Section, Settings};
 use raystone_core::params::{Entry, ParamValue, Parameter};
@@ -32,6 +32,7 @@ impl Default for Catalogue {
                 Section::of::<Discrepancy>(),
                 Section::of::<Coherence>(),
                 Section::of::<Animation>(),
+                Section::of::<Window>(),
             ],
         }
     }

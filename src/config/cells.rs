@@ -25,9 +25,12 @@ pub const NO_PEER: &str = "none";
 /// Name prefix of integrators that are parts of the numerical stress suite, which render nothing either.
 pub const STRESS: &str = "stress:";
 
+/// Name prefix of integrators that are measurements of media, which render nothing either.
+pub const MEDIA: &str = "media:";
+
 /// True if an integrator renders nothing and needs no scene: it names a measurement of something else.
 pub fn is_bench(integrator: &Variant) -> bool {
-    [COMPACTIONS, STRESS]
+    [COMPACTIONS, STRESS, MEDIA]
         .iter()
         .any(|of| integrator.name.starts_with(of))
 }

@@ -3,7 +3,9 @@
 use super::axis::{Axis, AxisMap};
 use super::error::Place;
 use super::pattern::Pattern;
-use super::sections::{Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing};
+use super::sections::{
+    Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, Window,
+};
 use super::settings::Settings;
 use super::{Catalogue, ConfigError, parse};
 use raystone_core::geometry::Camera;
@@ -52,6 +54,8 @@ pub struct Experiment {
     pub coherence: Option<Coherence>,
     /// Animation settings; `None` without motion.
     pub animation: Option<Animation>,
+    /// How a window shows images.
+    pub window: Window,
     /// Values of sections added to the catalogue by others, see [`Experiment::settings`].
     pub further: BTreeMap<String, Params>,
 }

@@ -26,14 +26,14 @@ mod variants;
 
 pub use axis::{Axis, AxisMap};
 pub use catalogue::Catalogue;
-pub use cells::{COMPACTIONS, Cell, NO_PEER, STRESS, is_bench};
+pub use cells::{COMPACTIONS, Cell, MEDIA, NO_PEER, STRESS, is_bench};
 pub use error::{ConfigError, Place};
 pub use experiment::{Axes, CellSet, Condition, Experiment, REFERENCE_PARTS, Seeds};
 pub use pattern::{Pattern, Selector};
 pub use plan::{Plan, Skipped};
 pub use sections::{
-    Animation, Coherence, Discrepancy, Gate, Motion, Reference, Rule, Run, SppCounts, StopRule,
-    Timing, View,
+    Animation, Coherence, Discrepancy, Gate, Map, Motion, Pace, Reference, Rule, Run, SppCounts,
+    StopRule, Timing, View, Window,
 };
 pub use settings::{Contradiction, Section, Settings};
 pub use units::Shard;

@@ -1,7 +1,7 @@
 //! Converts the merged tree to a checked [`Experiment`].
 
 use super::axis::Axis;
-use super::cells::{COMPACTIONS, STRESS};
+use super::cells::{COMPACTIONS, MEDIA, STRESS};
 use super::check::{
     AXES, cell_tables, check_keys, check_on_axis, check_sections, parameter_tables, pattern_list,
     texts,
@@ -52,6 +52,7 @@ pub(super) fn parse(
         discrepancy: take(&mut read).unwrap_or_default(),
         coherence,
         animation: take(&mut read),
+        window: take(&mut read).unwrap_or_default(),
         further: read,
     };
     reader.check_reference_seed(&experiment)?;
@@ -96,7 +97,7 @@ struct Reader<'t> {
 }
 
 /// Integrands trace nothing: an experiment of nothing else needs neither a scene nor a structure, and
-/// gets the least there is where it names none. Compactions and the stress suite draw nothing, too.
+/// gets the least there is where it names none. Compactions, the stress suite and media draw nothing, too.
 fn least_name(axis: Axis, integrators: &Item) -> Option<&'static str> {
     let names = texts(AXES, integrators).ok()?;
     let all_begin = |with: &[&str]| {
@@ -104,9 +105,13 @@ fn least_name(axis: Axis, integrators: &Item) -> Option<&'static str> {
         names.iter().all(begins)
     };
     match axis {
-        Axis::Scene if all_begin(&["integrand:", COMPACTIONS, STRESS]) => Some("single-triangle"),
-        Axis::Accel if all_begin(&["integrand:", COMPACTIONS, STRESS]) => Some("brute-force"),
-        Axis::Sequence if all_begin(&[COMPACTIONS, STRESS]) => Some("pixel-hash"),
+        Axis::Scene if all_begin(&["integrand:", COMPACTIONS, STRESS, MEDIA]) => {
+            Some("single-triangle")
+        }
+        Axis::Accel if all_begin(&["integrand:", COMPACTIONS, STRESS, MEDIA]) => {
+            Some("brute-force")
+        }
+        Axis::Sequence if all_begin(&[COMPACTIONS, STRESS, MEDIA]) => Some("pixel-hash"),
         _ => None,
     }
 }

@@ -223,6 +223,53 @@ parameters! {
     }
 }
 
+parameters! {
+    /// How an interactive view shows images; no measurement depends on it.
+    #[derive(Copy)]
+    pub struct Window {
+        /// Exposure in stops, over the automatic one.
+        exposure: f32 = 0.0, in -20.0..=20.0;
+        /// What is shown: the image, or the work of every pixel's first ray.
+        map: Map = Map::None;
+        /// Work at the upper end of the scale of colours; 0: the 99th percentile of all pixels.
+        scale: f32 = 0.0, in 0.0..=1e9;
+        /// Where two images meet: the share of the width that is left of it.
+        swipe: f32 = 0.5, in 0.0..=1.0;
+        /// What two images have the same of while samples are added.
+        pace: Pace = Pace::Samples;
+        /// Whether a reference is accumulated beside them, and their error against it shown.
+        error: bool = false;
+    }
+
+    /// Work of a pixel's first ray through a structure.
+    pub enum Map {
+        /// None is shown.
+        None = "none",
+        /// Nodes or cells visited.
+        Nodes = "nodes",
+        /// Box tests.
+        BoxTests = "box-tests",
+        /// Triangle tests.
+        Triangles = "triangles",
+        /// Nodes or cells, and triangle tests.
+        Steps = "steps",
+        /// Deepest stack, entries.
+        Stack = "stack",
+    }
+
+    /// What two images have the same of.
+    pub enum Pace {
+        /// Samples per pixel.
+        Samples = "samples",
+        /// Time on the device.
+        Time = "time",
+    }
+}
+
+impl Settings for Window {
+    const SECTION: &'static str = "window";
+}
+
 impl Settings for Run {
     const SECTION: &'static str = "run";
 

@@ -13,7 +13,7 @@ pub use color::*;
 pub use exr_file::Attribute;
 pub use formats::*;
 pub use picture::*;
-pub use read::read_linear;
+pub use read::{read_linear, read_npy_array};
 
 use std::io;
 use std::path::PathBuf;

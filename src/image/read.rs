@@ -120,37 +120,36 @@ pub(super) fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
     let header = header().ok_or("the header is not `PF` or `Pf`, width, height and scale")?;
     let (channels, width, height, scale, data) = header;
     let [width, height] = checked_size(width, height)?;
-    let float = if scale < 0.0 {
-        f32::from_le_bytes
-    } else {
-        f32::from_be_bytes
-    };
-    let values = floats(data, [width, height], channels, float)?;
-    // Rows go from bottom to top.
-    let rows = values.rchunks(width as usize);
-    Image::new(width, height, rows.flatten().copied().collect()).map_err(|e| e.to_string())
-}
-
-/// Pixels of an array [height, width, channels] of `N`-byte values.
-fn floats<const N: usize>(
-    data: &[u8],
-    [width, height]: [u32; 2],
-    channels: usize,
-    value: impl Fn([u8; N]) -> f32,
-) -> Result<Vec<[f32; 3]>, String> {
-    let expected = width as usize * height as usize * channels * N;
+    let expected = width as usize * height as usize * channels * 4;
     if data.len() != expected {
         return Err(format!(
             "{} bytes of values where {width} × {height} pixels of {channels} have {expected}",
             data.len()
         ));
     }
-    let (values, _) = data.as_chunks::<N>();
-    let pixel = |of: &[[u8; N]]| match channels {
-        1 => [value(of[0]); 3],
-        _ => [0, 1, 2].map(|c| value(of[c])),
+    let float = if scale < 0.0 {
+        f32::from_le_bytes
+    } else {
+        f32::from_be_bytes
     };
-    Ok(values.chunks_exact(channels).map(pixel).collect())
+    let values = pixels(&values(data, float), channels);
+    // Rows go from bottom to top.
+    let rows = values.rchunks(width as usize);
+    Image::new(width, height, rows.flatten().copied().collect()).map_err(|e| e.to_string())
+}
+
+/// Values of `N` bytes each.
+fn values<const N: usize>(data: &[u8], value: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+    data.as_chunks::<N>().0.iter().map(|b| value(*b)).collect()
+}
+
+/// Pixels of an array [height, width, channels].
+fn pixels(values: &[f32], channels: usize) -> Vec<[f32; 3]> {
+    let pixel = |of: &[f32]| match channels {
+        1 => [of[0]; 3],
+        _ => [of[0], of[1], of[2]],
+    };
+    values.chunks_exact(channels).map(pixel).collect()
 }
 
 /// The text after `'key':` in the literal of an NPY header.
@@ -159,7 +158,11 @@ fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     Some(rest.trim_start())
 }
 
-pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
+/// Reads an array of NumPy, of 16-, 32- or 64-bit floats in C order: its shape and its values.
+///
+/// # Errors
+/// A description of what is not so.
+pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
     let parts = || {
         let rest = bytes.strip_prefix(b"\x93NUMPY")?;
         let (version, rest) = rest.split_at_checked(2)?;
@@ -187,29 +190,50 @@ pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
         .filter(|size| !size.is_empty())
         .map(|size| size.parse().ok())
         .collect();
-    let (size, channels) = match sizes.as_deref() {
-        Some([height, width]) => (checked_size(*width, *height)?, 1),
-        Some([height, width, channels @ (1 | 3 | 4)]) => {
+    let sizes = sizes.ok_or_else(|| format!("its shape is ({shape})"))?;
+    let width = match kind {
+        "<f2" | ">f2" => 2,
+        "<f4" | ">f4" => 4,
+        "<f8" | ">f8" => 8,
+        _ => {
+            return Err(format!(
+                "its values are `{kind}`, not floats of 16, 32 or 64 bits"
+            ));
+        }
+    };
+    let product = |bytes: Option<u64>, size: &u64| bytes?.checked_mul(*size);
+    let expected = sizes.iter().fold(Some(width), product);
+    if expected != Some(data.len() as u64) {
+        return Err(format!(
+            "{} bytes of values do not fill the shape ({shape}) of `{kind}`",
+            data.len()
+        ));
+    }
+    let values = match kind {
+        "<f2" => values(data, |b| f16::from_le_bytes(b).to_f32()),
+        ">f2" => values(data, |b| f16::from_be_bytes(b).to_f32()),
+        "<f4" => values(data, f32::from_le_bytes),
+        ">f4" => values(data, f32::from_be_bytes),
+        "<f8" => values(data, |b| f64::from_le_bytes(b) as f32),
+        _ => values(data, |b| f64::from_be_bytes(b) as f32),
+    };
+    Ok((sizes, values))
+}
+
+pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
+    let (sizes, values) = read_npy_array(bytes)?;
+    let (size, channels) = match sizes.as_slice() {
+        [height, width] => (checked_size(*width, *height)?, 1),
+        [height, width, channels @ (1 | 3 | 4)] => {
             (checked_size(*width, *height)?, *channels as usize)
         }
         _ => {
             return Err(format!(
-                "its shape is ({shape}), not (height, width) or (height, width, 3)"
+                "its shape is {sizes:?}, not (height, width) or (height, width, 3)"
             ));
         }
     };
-    let pixels = match kind {
-        "<f2" => floats(data, size, channels, |b| f16::from_le_bytes(b).to_f32()),
-        ">f2" => floats(data, size, channels, |b| f16::from_be_bytes(b).to_f32()),
-        "<f4" => floats(data, size, channels, f32::from_le_bytes),
-        ">f4" => floats(data, size, channels, f32::from_be_bytes),
-        "<f8" => floats(data, size, channels, |b| f64::from_le_bytes(b) as f32),
-        ">f8" => floats(data, size, channels, |b| f64::from_be_bytes(b) as f32),
-        _ => Err(format!(
-            "its values are `{kind}`, not floats of 16, 32 or 64 bits"
-        )),
-    }?;
-    Image::new(size[0], size[1], pixels).map_err(|e| e.to_string())
+    Image::new(size[0], size[1], pixels(&values, channels)).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

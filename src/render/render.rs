@@ -98,6 +98,9 @@ pub struct Renderer<'a> {
     slices: Slices,
     /// Capacity of the buffers between passes, in samples.
     most: u64,
+    /// Greatest samples of a slice that takes no longer than asked, see [`Renderer::in_slices_of`].
+    short: Cell<u64>,
+    short_ms: Option<f64>,
     /// GPU milliseconds of each stage since the last reset.
     stages: RefCell<BTreeMap<String, f64>>,
     /// Time of all slices since the last reset.
@@ -206,6 +209,8 @@ impl<'a> Renderer<'a> {
             blocks: RefCell::default(),
             slices: Slices::starting_with(FIRST_SLICE).on(gpu),
             most: most_samples(gpu, job.integrator),
+            short: Cell::new(u64::MAX),
+            short_ms: None,
             stages: RefCell::default(),
             spent: Cell::default(),
         };
@@ -222,6 +227,13 @@ impl<'a> Renderer<'a> {
             renderer.record(&mut Recording::new(), band, &Slice::default())?;
         }
         Ok(renderer)
+    }
+
+    /// Shortens slices to about `ms` milliseconds, for a host that wants to do something between them.
+    #[must_use]
+    pub fn in_slices_of(mut self, ms: f64) -> Self {
+        self.short_ms = Some(ms);
+        self
     }
 
     /// Changes the camera for subsequent samples.
@@ -298,6 +310,21 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// The device is lost, hangs, or the driver complains; a finished block is incomplete.
     pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
+        self.add_samples_until((first, count), seed, &|| false)
+            .map(|_| ())
+    }
+
+    /// [`Renderer::add_samples`], unless `stop` says between two slices that they are no longer wanted: then `false` is
+    /// returned, pixels have different numbers of samples, and the next step has to be [`Renderer::reset`].
+    ///
+    /// # Errors
+    /// As [`Renderer::add_samples`].
+    pub fn add_samples_until(
+        &self,
+        (first, count): (u32, u32),
+        seed: u32,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, GpuError> {
         let mut sample = first;
         let end = first + count;
         while sample < end {
@@ -307,21 +334,27 @@ impl<'a> Renderer<'a> {
             let left_in_block = BLOCK_SAMPLES - sample % BLOCK_SAMPLES;
             let samples = self.samples_at_once().min(left_in_block).min(end - sample);
             for band in &self.bands {
-                match &self.chosen {
-                    Some(blocks) => self.add_to_blocks(band, blocks, (sample, samples), seed)?,
-                    None => self.add_to_band(band, sample, samples, seed)?,
+                let whole = match &self.chosen {
+                    Some(blocks) => {
+                        self.add_to_blocks(band, blocks, (sample, samples), seed, stop)?
+                    }
+                    None => self.add_to_band(band, (sample, samples), seed, stop)?,
+                };
+                if !whole {
+                    return Ok(false);
                 }
             }
             sample += samples;
             self.done.set(self.done.get() + samples);
             self.pending.set(self.pending.get() + samples);
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Samples of a slice, pixels times samples per pixel.
     fn fitting(&self) -> u64 {
-        self.slices.fitting().min(self.most)
+        let fitting = self.slices.fitting().min(self.most);
+        fitting.min(self.short.get())
     }
 
     /// Samples of all pixels that fit into a slice's time. If the driver ends loops, only one, so
@@ -351,10 +384,14 @@ impl<'a> Renderer<'a> {
         blocks: &Blocks,
         (first_sample, samples): (u32, u32),
         seed: u32,
-    ) -> Result<(), GpuError> {
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, GpuError> {
         let fitting = self.fitting() / (u64::from(samples) * Blocks::PIXELS).max(1);
         let mut first = 0;
         while first < blocks.len() {
+            if stop() {
+                return Ok(false);
+            }
             let count = (fitting.clamp(1, Blocks::MOST) as u32).min(blocks.len() - first);
             let slice = Slice {
                 band_row: 0,
@@ -368,18 +405,21 @@ impl<'a> Renderer<'a> {
             self.run_slice(band, &slice, items)?;
             first += count;
         }
-        Ok(())
+        Ok(true)
     }
 
     fn add_to_band(
         &self,
         band: &Band,
-        first_sample: u32,
-        samples: u32,
+        (first_sample, samples): (u32, u32),
         seed: u32,
-    ) -> Result<(), GpuError> {
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, GpuError> {
         let mut row = band.rows.start;
         while row < band.rows.end {
+            if stop() {
+                return Ok(false);
+            }
             let row_samples = u64::from(self.size[0]) * u64::from(samples);
             let fitting = self.fitting() / row_samples.max(1) / 8 * 8;
             let rows = fitting.clamp(8, 1 << 31) as u32;
@@ -394,7 +434,7 @@ impl<'a> Renderer<'a> {
             self.run_slice(band, &slice, row_samples * u64::from(slice.rows))?;
             row += slice.rows;
         }
-        Ok(())
+        Ok(true)
     }
 
     fn record(
@@ -427,6 +467,10 @@ impl<'a> Renderer<'a> {
             *stages.entry(stage).or_default() += ms;
         }
         self.slices.learn(items, elapsed);
+        if let Some(ms) = self.short_ms {
+            let fitting = items as f64 * ms / elapsed.ms().max(0.1);
+            self.short.set((fitting as u64).max(1));
+        }
         let mut spent = self.spent.get();
         spent += elapsed;
         self.spent.set(spent);

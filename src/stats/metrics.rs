@@ -309,8 +309,20 @@ pub struct ErrorReport {
 /// # Errors
 /// [`ImageError::SizeMismatch`].
 pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, ImageError> {
+    measure_those(image, reference, |_| true)
+}
+
+/// [`measure`] for the chosen metrics alone.
+///
+/// # Errors
+/// As [`measure`].
+pub fn measure_those(
+    image: &Image,
+    reference: &Reference,
+    chosen: impl Fn(&Metric) -> bool,
+) -> Result<ErrorReport, ImageError> {
     reference.mean.check_size(image, "the measured image")?;
-    let present = |m: &&Metric| !m.needs_halves || reference.halves.is_some();
+    let present = |m: &&Metric| chosen(m) && (!m.needs_halves || reference.halves.is_some());
     let means: Vec<_> = METRICS
         .iter()
         .filter(present)
@@ -356,9 +368,10 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
             report.without_part.insert(metric.id.to_owned(), values);
         }
     }
-    if report.non_finite_pixels == 0 {
+    let whole = |m: &&Metric| chosen(m) && matches!(m.rule, Rule::Whole(_));
+    if report.non_finite_pixels == 0 && METRICS.iter().any(|m| whole(&m)) {
         let compared = Comparison::new(image, reference);
-        for metric in METRICS {
+        for metric in METRICS.iter().filter(whole) {
             let Rule::Whole(value) = &metric.rule else {
                 continue;
             };

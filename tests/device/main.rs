@@ -20,4 +20,5 @@ mod refill;
 mod sorting;
 mod specialisation;
 mod storage_buffers;
+mod viewer;
 mod workgroups;

@@ -247,6 +247,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "integrator/visible",
         "reads what was drawn; tests/images/primary_visibility.rs compares it with rays",
     ),
+    (
+        "media/tracking",
+        "judged by closed forms and quadratures in src/media/tests/tracking.rs",
+    ),
     ("sampling/dump_stream", "the loop over coordinates"),
     (
         "sampling/sampler_cost",
@@ -344,6 +348,8 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ("accel/leaf", "leaf_words", "parts of an array"),
     ("accel/bvh/stack", "follow", "the body of the twin's loop"),
     ("accel/bvh/stack", "begin", "of lanes that are refilled"),
+    ("media/march", "main", "the loop over paths"),
+    ("media/segments", "main", "the loop over rays"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
     (
         "accel/bvh/short_stack",
@@ -408,6 +414,20 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "two expressions of the kernel",
     ),
     ("accel/leaf", "leaf_reference", "build"),
+    ("media/medium", "pack_halves", "build"),
+    ("media/structure/cube_bvh", "append", "build"),
+    ("media/segments", "step_fuse", "a uniform of the kernel"),
+    (
+        "media/segments",
+        "first_difference",
+        "compares with the kernel",
+    ),
+    ("media/segments", "wrong_segment", "judges in f64"),
+    ("media/segments", "exact_depth", "judges in f64"),
+    ("media/march", "parallel_rays", "where paths begin"),
+    ("media/march", "focus_miss", "judges in f64"),
+    ("media/march", "ball_deviation", "judges in f64"),
+    ("media/march", "angle_of", "judges in f64"),
     ("accel/tree/parallel/lbvh", "build", "the passes, in turn"),
     (
         "accel/tree/parallel/clusters",

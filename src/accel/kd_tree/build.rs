@@ -82,6 +82,7 @@ struct Settings<'a> {
     references: AtomicU64,
 }
 
+#[derive(Clone, Copy)]
 struct Item {
     /// Bounds of its part within the cell.
     bounds: Bounds,
@@ -143,6 +144,31 @@ struct Split {
     /// True if planar items go below.
     planar_below: bool,
     cost: f32,
+}
+
+enum Side {
+    Below,
+    Above,
+}
+
+impl Split {
+    /// The side on which all of a box lies; `None` if the plane cuts it.
+    fn side(&self, bounds: &Bounds) -> Option<Side> {
+        let (low, high) = (bounds.min[self.axis], bounds.max[self.axis]);
+        if low == high && low == self.position {
+            Some(if self.planar_below {
+                Side::Below
+            } else {
+                Side::Above
+            })
+        } else if high <= self.position {
+            Some(Side::Below)
+        } else if low >= self.position {
+            Some(Side::Above)
+        } else {
+            None
+        }
+    }
 }
 
 impl Region {
@@ -261,109 +287,132 @@ impl Region {
         best
     }
 
-    /// Both halves. Items on one side keep their events; the few on both sides get new ones.
-    fn divide(self, split: &Split, settings: &Settings) -> [Region; 2] {
-        let axis = split.axis;
+    /// Both halves. Items on one side keep their events; the few that are cut get new ones. The half
+    /// below takes over the memory of the cell.
+    fn divide(mut self, split: &Split, settings: &Settings) -> [Region; 2] {
         let mut bounds = [self.bounds; 2];
-        bounds[0].max[axis] = split.position;
-        bounds[1].min[axis] = split.position;
-        let mut halves = bounds.map(|bounds| Region {
-            bounds,
-            items: Vec::new(),
-            events: [Vec::new(), Vec::new(), Vec::new()],
-        });
-        let mut fresh: [[Vec<Event>; 3]; 2] = Default::default();
-        let mut places = vec![[ELSEWHERE; 2]; self.items.len()];
-        for (item, place) in self.items.into_iter().zip(&mut places) {
-            let (low, high) = (item.bounds.min[axis], item.bounds.max[axis]);
-            let side = if low == high && low == split.position {
-                usize::from(!split.planar_below)
-            } else if high <= split.position {
-                0
-            } else if low >= split.position {
-                1
-            } else {
-                for (half, fresh) in halves.iter_mut().zip(&mut fresh) {
-                    if let Some(bounds) = part_within(&item, &half.bounds, settings) {
-                        let index = half.items.len() as u32;
-                        (0..3).for_each(|a| push_events(&bounds, a, index, &mut fresh[a]));
-                        let id = item.id;
-                        half.items.push(Item { bounds, id });
-                    }
+        bounds[0].max[split.axis] = split.position;
+        bounds[1].min[split.axis] = split.position;
+        let mut places = Vec::with_capacity(self.items.len());
+        let mut cut = [Vec::new(), Vec::new()];
+        let (mut kept, mut above) = (0, Vec::new());
+        for index in 0..self.items.len() {
+            let item = self.items[index];
+            let [here, there] = match split.side(&item.bounds) {
+                Some(Side::Below) => {
+                    places.push(kept as u32);
+                    [Some(item), None]
                 }
-                continue;
+                Some(Side::Above) => {
+                    places.push(above.len() as u32 | ABOVE);
+                    [None, Some(item)]
+                }
+                None => {
+                    places.push(CUT);
+                    let parts = bounds.map(|half| item.part_within(&half, settings));
+                    cut[0].extend(parts[0].map(|_| kept as u32));
+                    cut[1].extend(parts[1].map(|_| above.len() as u32));
+                    parts
+                }
             };
-            place[side] = halves[side].items.len() as u32;
-            halves[side].items.push(item);
-        }
-        let lists = self.events.into_iter().zip(transpose(fresh));
-        let distribute = |(events, fresh)| distribute(events, fresh, &places);
-        let divided: Vec<[Vec<Event>; 2]> = if places.len() > PARALLEL_GRAIN {
-            lists
-                .collect::<Vec<_>>()
-                .into_par_iter()
-                .map(distribute)
-                .collect()
-        } else {
-            lists.map(distribute).collect()
-        };
-        for (axis, [below, above]) in divided.into_iter().enumerate() {
-            halves[0].events[axis] = below;
-            halves[1].events[axis] = above;
-        }
-        halves
-    }
-}
-
-/// Index of an item that is not in a half, or has new events there.
-const ELSEWHERE: u32 = u32::MAX;
-
-/// The box of an item within half a cell; `None` if the half is clearly missed.
-fn part_within(item: &Item, half: &Bounds, settings: &Settings) -> Option<Bounds> {
-    let by_box = item.bounds.intersection(half);
-    let Some(margin) = &settings.margin else {
-        return Some(by_box);
-    };
-    let record = &settings.soup.records[item.id as usize];
-    let part = clip(record, half, margin.of(record))?;
-    let clipped = by_box.intersection(&part);
-    let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
-    Some(if overlaps { clipped } else { by_box })
-}
-
-fn transpose([below, above]: [[Vec<Event>; 3]; 2]) -> impl Iterator<Item = [Vec<Event>; 2]> {
-    below.into_iter().zip(above).map(|(b, a)| [b, a])
-}
-
-/// Splits a sorted list by the sides of its items and merges each half with its new events.
-fn distribute(
-    events: Vec<Event>,
-    mut fresh: [Vec<Event>; 2],
-    places: &[[u32; 2]],
-) -> [Vec<Event>; 2] {
-    let mut halves: [Vec<Event>; 2] = Default::default();
-    for fresh in &mut fresh {
-        fresh.sort_unstable_by(|a, b| a.position.total_cmp(&b.position));
-    }
-    let mut merged = [0, 0];
-    for event in &events {
-        let place = places[event.item()];
-        for side in 0..2 {
-            if place[side] == ELSEWHERE {
-                continue;
+            // No more than one for each item so far, so nothing is overwritten that is still to come.
+            if let Some(item) = here {
+                self.items[kept] = item;
+                kept += 1;
             }
-            let waiting = &fresh[side][merged[side]..];
-            let earlier = waiting.iter().take_while(|f| f.position < event.position);
-            let before = halves[side].len();
-            halves[side].extend(earlier);
-            merged[side] += halves[side].len() - before;
-            halves[side].push(event.of_item(place[side]));
+            above.extend(there);
+        }
+        self.items.truncate(kept);
+        let below = self.items;
+        let divide_events = |(axis, events): (usize, &mut Vec<Event>)| {
+            let mut others = distribute(events, &places);
+            merge(events, new_events(&below, &cut[0], axis));
+            merge(&mut others, new_events(&above, &cut[1], axis));
+            others
+        };
+        let mut others: [Vec<Event>; 3] = Default::default();
+        if places.len() > PARALLEL_GRAIN {
+            let axes = self.events.par_iter_mut().enumerate();
+            let axes = axes.zip(&mut others);
+            axes.for_each(|(events, others)| *others = divide_events(events));
+        } else {
+            let axes = self.events.iter_mut().enumerate().zip(&mut others);
+            axes.for_each(|(events, others)| *others = divide_events(events));
+        }
+        let half = |bounds, items, events| Region {
+            bounds,
+            items,
+            events,
+        };
+        [
+            half(bounds[0], below, self.events),
+            half(bounds[1], above, others),
+        ]
+    }
+}
+
+/// Place of an item that is cut: it has new events on both sides.
+const CUT: u32 = u32::MAX;
+/// Marks a place in the half above.
+const ABOVE: u32 = 1 << 31;
+
+impl Item {
+    /// The part within half a cell; `None` if the half is clearly missed.
+    fn part_within(&self, half: &Bounds, settings: &Settings) -> Option<Item> {
+        let by_box = self.bounds.intersection(half);
+        let within = |bounds| Item { bounds, ..*self };
+        let Some(margin) = &settings.margin else {
+            return Some(within(by_box));
+        };
+        let record = &settings.soup.records[self.id as usize];
+        let part = clip(record, half, margin.of(record))?;
+        let clipped = by_box.intersection(&part);
+        let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
+        Some(within(if overlaps { clipped } else { by_box }))
+    }
+}
+
+/// Sorted events of the items at these places.
+fn new_events(items: &[Item], places: &[u32], axis: usize) -> Vec<Event> {
+    let mut events = Vec::with_capacity(2 * places.len());
+    for &place in places {
+        push_events(&items[place as usize].bounds, axis, place, &mut events);
+    }
+    events.sort_unstable_by(|a, b| a.position.total_cmp(&b.position));
+    events
+}
+
+/// Keeps the events of items below, and returns those of items above; both stay sorted.
+fn distribute(events: &mut Vec<Event>, places: &[u32]) -> Vec<Event> {
+    let (mut kept, mut above) = (0, Vec::new());
+    for index in 0..events.len() {
+        let event = events[index];
+        let place = places[event.item()];
+        if place & ABOVE == 0 {
+            events[kept] = event.of_item(place);
+            kept += 1;
+        } else if place != CUT {
+            above.push(event.of_item(place & !ABOVE));
         }
     }
-    for side in 0..2 {
-        halves[side].extend(&fresh[side][merged[side]..]);
+    events.truncate(kept);
+    above
+}
+
+/// Merges sorted events into a sorted list, from its end, so that each is moved once.
+fn merge(events: &mut Vec<Event>, new: Vec<Event>) {
+    let mut from = events.len();
+    events.extend_from_slice(&new);
+    let mut end = events.len();
+    for event in new.iter().rev() {
+        while from > 0 && events[from - 1].position > event.position {
+            end -= 1;
+            from -= 1;
+            events[end] = events[from];
+        }
+        end -= 1;
+        events[end] = *event;
     }
-    halves
 }
 
 /// Places the children of each node next to each other.

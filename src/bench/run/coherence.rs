@@ -179,7 +179,7 @@ fn rays(
     let bounds = world.scene.bounds();
     let mut all = Vec::new();
     for &spp in &settings.spp {
-        let estimator = Estimator::for_width(session, cell, spp, size[0])?;
+        let estimator = Estimator::of(session.registries, cell, spp, size[0])?;
         let count = [settings.groups, settings.warps];
         let groups = groups_of(size, settings.warp, count, estimator.sampler.stride());
         let image = path_oracle::View {

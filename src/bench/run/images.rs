@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::error::Fault;
+use super::registries::Registries;
 use super::session::Session;
 use super::words;
 use super::world::World;
@@ -23,7 +24,7 @@ pub(super) fn unfit(session: &Session, cell: &Cell, traced: &Traced) -> Option<S
 }
 
 /// Image file attributes: known properties of the rendering by name.
-pub(super) fn attributes(
+pub fn attributes(
     program: &Program,
     cell: &Cell,
     sampler: &str,
@@ -90,8 +91,10 @@ pub(super) fn sampler_label(cell: &Cell) -> String {
 }
 
 /// An integrator and a sampler with their kernels.
-pub(super) struct Estimator {
+pub struct Estimator {
+    /// The source of random numbers.
     pub sampler: Sampler,
+    /// What is computed.
     pub integrator: ConfiguredIntegrator,
     offset: RayOffset,
     kernels: Variant,
@@ -103,20 +106,20 @@ impl Estimator {
     /// # Errors
     /// A name is not registered, or the sampler has too few dimensions or samples.
     pub(super) fn new(session: &Session, cell: &Cell, samples: u32) -> Result<Self, String> {
-        Self::for_width(session, cell, samples, session.experiment.run.resolution[0])
+        let width = session.experiment.run.resolution[0];
+        Self::of(session.registries, cell, samples, width)
     }
 
-    /// [`Estimator::new`] for images of another width than the experiment's.
+    /// The estimator of a cell, for `samples` samples per pixel of images of this width.
     ///
     /// # Errors
-    /// As [`Estimator::new`].
-    pub(super) fn for_width(
-        session: &Session,
+    /// A name is not registered, or the sampler has too few dimensions or samples.
+    pub fn of(
+        registries: &Registries,
         cell: &Cell,
         samples: u32,
         width: u32,
     ) -> Result<Self, String> {
-        let registries = session.registries;
         let integrator = registries.integrator(cell)?;
         let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
         let demand = integrator.demand(samples, width);
@@ -135,8 +138,13 @@ impl Estimator {
         camera: Camera,
         runtime_checks: bool,
     ) -> RenderJob<'_> {
+        self.image(session.experiment.run.resolution, camera, runtime_checks)
+    }
+
+    /// Its image of this size.
+    pub fn image(&self, size: [u32; 2], camera: Camera, runtime_checks: bool) -> RenderJob<'_> {
         RenderJob {
-            size: session.experiment.run.resolution,
+            size,
             camera,
             sampler: &self.sampler,
             integrator: &self.integrator,

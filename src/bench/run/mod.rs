@@ -50,6 +50,7 @@ mod world;
 pub use cost::{Cost, Work};
 pub use error::RunError;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder, records_in};
+pub use images::{Estimator, attributes};
 pub use inputs::place;
 pub use inventory::{Inventory, State};
 pub use kernels::{Kernels, kernel_library};
@@ -74,7 +75,8 @@ use session::Session;
 use std::collections::HashMap;
 use std::path::PathBuf;
 pub use words::{VerifiedSampler, verify_samplers};
-use world::{Loaded, NoWorld, World, load_options};
+use world::{Loaded, NoWorld, World};
+pub use world::{load_options, table_bytes};
 
 /// Verdict on one structure, for `raystone verify`.
 #[derive(Debug, Clone)]

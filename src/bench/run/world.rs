@@ -63,13 +63,13 @@ impl From<String> for NoWorld {
 }
 
 /// Bytes that an adapter can bind for a scene's tables.
-pub(super) fn table_bytes(limits: &wgpu::Limits) -> u64 {
+pub fn table_bytes(limits: &wgpu::Limits) -> u64 {
     let binding = limits.max_storage_buffer_binding_size;
     binding.min(limits.max_buffer_size)
 }
 
 /// Scene loading options for an adapter with this binding limit.
-pub(super) fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
+pub fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
     LoadOptions {
         allow_outside: options.allow_outside,
         table_bytes,

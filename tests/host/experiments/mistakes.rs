@@ -95,6 +95,7 @@ fn settings(e: &Experiment) -> String {
         format!("{:?}", e.discrepancy),
         format!("{:?}", e.coherence),
         format!("{:?}", e.animation),
+        format!("{:?}", e.window),
     ]
     .join("\n")
 }

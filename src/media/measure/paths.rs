@@ -1,0 +1,326 @@
+//! Curved paths: schemes for the ray equation × where steps end, through a lens of Luneburg and a ball of glass.
+
+use super::name_of;
+use crate::march::{
+    Ended, March, Marcher, Path, Rule, Scheme, angle_of, ball_deviation, focus_miss, march_path,
+    parallel_rays,
+};
+use crate::medium::{Homogeneity, Key, Medium};
+use crate::optics::Optical;
+use crate::{procedures, structure};
+use glam::{UVec3, Vec3};
+use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
+use raystone_bench::timing::{Measured, Samples};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, MEDIA, Plan};
+use raystone_core::parameters;
+use raystone_core::params::{Entry, Parameters as _};
+use raystone_gpu::{Elapsed, GpuError, probe_arithmetic};
+use raystone_record::figure::{Better, Figure, Shown, Spread};
+use raystone_record::{Reading, Samples as Rounds};
+use raystone_stats::statistics::median_interval;
+use std::sync::Arc;
+
+/// The name on the axis of integrators, after [`MEDIA`].
+const NAME: &str = "paths";
+/// Radii of lens and ball, as parts of the box.
+const LENS: f64 = 50.0 / 128.0;
+const BALL: f64 = 40.0 / 128.0;
+/// Refractive index of the ball.
+const GLASS: f64 = 1.5;
+/// Rays, at equal distances of their heights.
+const RAYS: u32 = 1024;
+/// Heights of rays, as parts of the radius.
+const HEIGHTS: [f64; 2] = [0.04, 0.8];
+
+parameters! {
+    /// What bends light.
+    enum Target {
+        /// a ball of glass in a grid, its border blurred: judged by Snell's law
+        Ball = "ball",
+        /// a lens of Luneburg in closed form: judged by its focus
+        Lens = "lens",
+    }
+
+    /// curved paths through a ball of glass or a lens of Luneburg, by one scheme for the ray equation (Pfeuti 2009)
+    struct Load {
+        /// what bends light
+        target: Target = Target::Ball;
+        /// scheme for the ray equation
+        scheme: Scheme = Scheme::SemiImplicit;
+        /// where steps end; of a lens, after a fixed length always
+        rule: Rule = Rule::Fixed;
+        /// length of a step in voxels; of regions the least, 0 for none
+        step: f64 = 1.0, in 0.0..=16.0;
+        /// how much n may differ in a region
+        epsilon: f64 = 0.01, in 0.0..=1.0;
+        /// voxels along each axis
+        side: u32 = 128, in 32..=256;
+    }
+}
+
+static FIGURES: [Figure; 6] = [
+    Figure::new(
+        "media-angle/v1",
+        "error of angles, RMS",
+        "degrees",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-focus/v1",
+        "distance from the focus, mean",
+        "voxels",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-drift/v1",
+        "drift of |v| from n",
+        "",
+        Better::Lower,
+        Shown::Percent,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-path-steps/v1",
+        "steps",
+        "per path",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-capped/v1",
+        "paths that used up their steps",
+        "",
+        Better::Lower,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-path-ns/v1",
+        "time",
+        "ns per path",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+];
+
+pub(super) struct Paths;
+
+impl Measurement for Paths {
+    fn name(&self) -> &'static str {
+        "media:paths"
+    }
+
+    fn plural(&self) -> &'static str {
+        "sets of curved paths"
+    }
+
+    fn figures(&self) -> &'static [Figure] {
+        &FIGURES
+    }
+
+    fn declare(&self, catalogue: &mut Catalogue) {
+        catalogue[Axis::Integrator].push(Entry {
+            name: format!("{MEDIA}{NAME}"),
+            description: Load::ABOUT.to_owned(),
+            schema: Load::schema(),
+        });
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Kernels]);
+        cells.retain(|cell| name_of(cell) == Some(NAME));
+        cells
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!("{:?}", experiment.timing)
+    }
+
+    fn cost(&self, _: &Cell, cost: &Cost) -> Work {
+        Work::kernels(1) + cost.timed(Work::rays(16 * RAYS)) + Work::other(0.3)
+    }
+
+    fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
+        let mut balls: Vec<(u32, Arc<Ball>)> = Vec::new();
+        Box::new(cells.iter().map(move |cell| {
+            at.say(cell.to_string());
+            let load = Load::from_checked(&cell[Axis::Integrator].params);
+            let ball = match balls.iter().find(|(side, _)| *side == load.side) {
+                _ if load.target == Target::Lens => None,
+                Some((_, ball)) => Some(Arc::clone(ball)),
+                None => {
+                    let volume = procedures::ball(load.side, BALL)?;
+                    let optical = Optical::of(&volume);
+                    let ball = Arc::new(Ball { volume, optical });
+                    balls.push((load.side, Arc::clone(&ball)));
+                    Some(ball)
+                }
+            };
+            let ready = Ready::new(at, cell, &load, ball.as_deref())?;
+            Ok(Box::new(ready) as Box<dyn Prepared>)
+        }))
+    }
+}
+
+struct Ball {
+    volume: crate::Volume,
+    optical: Optical,
+}
+
+/// Paths on the device whose ends were judged.
+struct Ready {
+    marcher: Marcher,
+    /// Of angles or distances.
+    error: Reading,
+    drift: f64,
+    steps: f64,
+    capped: usize,
+}
+
+impl Ready {
+    fn new(at: &At, cell: &Cell, load: &Load, ball: Option<&Ball>) -> Result<Self, Absent> {
+        let gpu = at.gpu(cell)?;
+        if load.rule == Rule::Fixed && load.step <= 0.0 {
+            return Err(Absent::Refused(
+                "a fixed step of 0 never ends: give `step`".to_owned(),
+            ));
+        }
+        let lens = Optical::Lens {
+            size: UVec3::splat(load.side),
+            radius: (LENS * f64::from(load.side)) as f32,
+        };
+        let optical = ball.map_or(&lens, |ball| &ball.optical);
+        let regions = match ball {
+            Some(ball) if load.rule == Rule::Region => Some(level_map(ball, load.epsilon)?),
+            _ => None,
+        };
+        let march = March {
+            scheme: load.scheme,
+            step: load.step as f32,
+            nudge: 1e-3,
+            most_steps: (f64::from(8 * load.side) / load.step.clamp(0.05, 1.0)) as u32,
+        };
+        let (heights, begins) = begins(load, optical);
+        let marcher = Marcher::new(gpu, &march, optical, regions.as_ref(), &begins)?;
+        let (ended, _) = marcher.march()?;
+        // Of Runge and Kutta's sums the driver may choose the order.
+        if load.scheme != Scheme::RungeKutta && probe_arithmetic(gpu)?.is_exact() {
+            for (begin, found) in begins.iter().zip(&ended).step_by(16) {
+                let twin = march_path(&march, optical, regions.as_ref(), *begin);
+                if twin != *found {
+                    return Err(Absent::Failed(format!(
+                        "{found:?} where the twin has {twin:?}"
+                    )));
+                }
+            }
+        }
+        let mean = |sum: f64| sum / f64::from(RAYS);
+        Ok(Self {
+            error: error_of(load, &ended, &heights),
+            drift: ended.iter().map(|e| e.drift).fold(0.0, f32::max).into(),
+            steps: mean(ended.iter().map(|e| f64::from(e.steps)).sum()),
+            capped: ended.iter().filter(|e| optical.holds(e.path.x)).count(),
+            marcher,
+        })
+    }
+}
+
+fn level_map(ball: &Ball, epsilon: f64) -> Result<Medium, Absent> {
+    let registry = structure::registry();
+    let map = registry
+        .find("level-map")
+        .map(|kind| kind.make(&Default::default()));
+    let Some(Ok(map)) = map else {
+        return Err(Absent::Failed("there is no level map".to_owned()));
+    };
+    let key = Key::Refraction;
+    Ok(Medium::new(&ball.volume, map, Homogeneity { key, epsilon }))
+}
+
+/// Heights of rays above the axis, in voxels, and where they begin.
+fn begins(load: &Load, optical: &Optical) -> (Vec<f64>, Vec<Path>) {
+    let side = f64::from(load.side);
+    let radius = side
+        * if load.target == Target::Lens {
+            LENS
+        } else {
+            BALL
+        };
+    let height = |k: u32| {
+        let part = (f64::from(k) + 0.5) / f64::from(RAYS);
+        radius * (HEIGHTS[0] + (HEIGHTS[1] - HEIGHTS[0]) * part)
+    };
+    let heights: Vec<f64> = (0..RAYS).map(height).collect();
+    let middle = side / 2.0;
+    let begins = match load.target {
+        Target::Lens => parallel_rays(optical, load.side, radius, &heights),
+        Target::Ball => (heights.iter())
+            .map(|height| {
+                let x = Vec3::new(0.5, (middle + height) as f32, middle as f32);
+                Path::new(optical, x, Vec3::X)
+            })
+            .collect(),
+    };
+    (heights, begins)
+}
+
+/// Mean distance from the focus, or the root of the mean square of angles' errors.
+fn error_of(load: &Load, ended: &[Ended], heights: &[f64]) -> Reading {
+    let side = f64::from(load.side);
+    let count = ended.len() as f64;
+    match load.target {
+        Target::Lens => {
+            let miss = ended.iter().map(|e| focus_miss(load.side, LENS * side, e));
+            Reading::exact(&FIGURES[1], miss.sum::<f64>() / count)
+        }
+        Target::Ball => {
+            let off = |(e, height): (&Ended, &f64)| {
+                angle_of(e.path.v) - ball_deviation(GLASS, BALL * side, *height)
+            };
+            let squares = ended.iter().zip(heights).map(off).map(|off| off * off);
+            Reading::exact(&FIGURES[0], (squares.sum::<f64>() / count).sqrt())
+        }
+    }
+}
+
+impl Measured for Ready {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        Ok(self.marcher.march()?.1)
+    }
+}
+
+impl Prepared for Ready {
+    fn timed(&self) -> Vec<&dyn Measured> {
+        vec![self]
+    }
+
+    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
+        let samples = samples.into_iter().next().unwrap_or_default();
+        let each = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / f64::from(RAYS)).collect();
+        let rounds: Vec<f64> = each(&samples.ms);
+        let median = median_interval(&rounds).ok_or("nothing was timed")?;
+        let rounds = Rounds::Rounds {
+            adapter: rounds,
+            wall: each(&samples.wall_ms),
+            processors: Vec::new(),
+        };
+        let [_, _, drift, steps, capped, time] = &FIGURES;
+        Ok(vec![
+            self.error.clone(),
+            Reading::exact(drift, self.drift),
+            Reading::exact(steps, self.steps),
+            Reading::exact(capped, self.capped as f64),
+            Reading::new(time, median).with_samples(rounds),
+        ])
+    }
+}

@@ -1,0 +1,285 @@
+//! Structures over volumes: each answer is checked, then rays are walked through all of them in the same rounds.
+
+use super::name_of;
+use crate::medium::{Homogeneity, Medium};
+use crate::rays::{SegmentRay, random_and_hard};
+use crate::segments::{Walked, Walker, exact_depth, first_difference, wrong_segment};
+use crate::{Volume, procedures, structure};
+use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
+use raystone_bench::timing::{Measured, Samples};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, MEDIA, Plan};
+use raystone_core::parameters;
+use raystone_core::params::{Entry, Parameters as _, Variant};
+use raystone_gpu::{Elapsed, GpuError, probe_arithmetic};
+use raystone_record::figure::{Better, Figure, Shown, Spread};
+use raystone_record::{Reading, Samples as Rounds};
+use raystone_stats::statistics::median_interval;
+use std::sync::Arc;
+
+parameters! {
+    /// What a volume holds.
+    pub(crate) enum Content {
+        /// a ball of glass in fog
+        GlassBall = "glass-ball",
+        /// a cube of glass in fog, disturbed by noise
+        NoisyCube = "noisy-cube",
+        /// a gyroid of glass in fog
+        Gyroid = "gyroid",
+        /// a cloud in nothing
+        Cloud = "cloud",
+    }
+
+    /// What rays are walked through.
+    pub(crate) struct Load {
+        /// what the volume holds
+        content: Content = Content::Cloud;
+        /// voxels along each axis
+        side: u32 = 64, in 8..=512;
+        /// rays, half of them hard
+        rays: u32 = 16384, in 64..=1 << 20;
+        homogeneity: Homogeneity;
+    }
+}
+
+impl Content {
+    /// The volume with so many voxels along each axis.
+    pub(crate) fn volume(self, side: u32) -> Result<Volume, crate::MediaError> {
+        match self {
+            Self::GlassBall => procedures::glass_ball(side),
+            Self::NoisyCube => procedures::noisy_cube(side),
+            Self::Gyroid => procedures::gyroid(side),
+            Self::Cloud => procedures::cloud(side),
+        }
+    }
+}
+
+static FIGURES: [Figure; 6] = [
+    Figure::new(
+        "media-steps/v1",
+        "steps",
+        "per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-fetches/v1",
+        "fetches",
+        "per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "media-step-ns/v1",
+        "time",
+        "ns per step",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "media-ray-ns/v1",
+        "time",
+        "ns per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "media-build-ms/v1",
+        "build on the host",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
+    Figure::new(
+        "media-bytes/v1",
+        "structure",
+        "",
+        Better::Lower,
+        Shown::Bytes,
+        Spread::Exact,
+    ),
+];
+
+/// Voxels whose answers are compared with the field, about.
+const CHECKED_VOXELS: usize = 4096;
+/// Rays whose answers are compared with the scalar twin, to the bit.
+const TWIN_RAYS: usize = 2048;
+/// Rays whose segments are judged in f64.
+const JUDGED_RAYS: usize = 512;
+/// Greatest difference of transmittances.
+const TOLERANCE: f64 = 1e-6;
+
+pub(super) struct Structures;
+
+impl Measurement for Structures {
+    fn name(&self) -> &'static str {
+        "media:structures"
+    }
+
+    fn plural(&self) -> &'static str {
+        "structures over volumes"
+    }
+
+    fn figures(&self) -> &'static [Figure] {
+        &FIGURES
+    }
+
+    fn declare(&self, catalogue: &mut Catalogue) {
+        let entries = structure::registry()
+            .entries()
+            .into_iter()
+            .map(|entry| Entry {
+                name: format!("{MEDIA}{}", entry.name),
+                description: entry.description,
+                schema: Load::schema(),
+            });
+        catalogue[Axis::Integrator].extend(entries);
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        let registry = structure::registry();
+        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Kernels]);
+        cells.retain(|cell| name_of(cell).is_some_and(|name| registry.find(name).is_some()));
+        cells
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!("{:?}", (experiment.run.seed, experiment.timing))
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let load = Load::of(&cell[Axis::Integrator]);
+        let voxels = f64::from(load.side).powi(3);
+        Work::kernels(2) + cost.timed(Work::rays(load.rays)) + Work::other(2e-6 * voxels)
+    }
+
+    fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
+        let mut last: Option<(Content, u32, Arc<Volume>)> = None;
+        Box::new(cells.iter().map(move |cell| {
+            at.say(cell.to_string());
+            let load = Load::of(&cell[Axis::Integrator]);
+            let volume = match &last {
+                Some((content, side, volume)) if (*content, *side) == (load.content, load.side) => {
+                    Arc::clone(volume)
+                }
+                _ => Arc::new(load.content.volume(load.side)?),
+            };
+            last = Some((load.content, load.side, Arc::clone(&volume)));
+            let ready = Ready::new(at, cell, &load, &volume)?;
+            Ok(Box::new(ready) as Box<dyn Prepared>)
+        }))
+    }
+}
+
+impl Load {
+    fn of(variant: &Variant) -> Self {
+        Self::from_checked(&variant.params)
+    }
+}
+
+/// A structure on the device that passed its checks.
+struct Ready {
+    walker: Walker,
+    rays: f64,
+    steps: f64,
+    fetches: f64,
+    build_ms: f64,
+    bytes: f64,
+}
+
+impl Ready {
+    fn new(at: &At, cell: &Cell, load: &Load, volume: &Volume) -> Result<Self, Absent> {
+        let gpu = at.gpu(cell)?;
+        let registry = structure::registry();
+        let kind = name_of(cell).and_then(|name| registry.find(name));
+        let made = kind.map(|kind| kind.make(&Default::default()));
+        let structure = match made {
+            Some(Ok(structure)) => structure,
+            _ => return Err(Absent::Failed("there is no such structure".to_owned())),
+        };
+        let medium = Medium::new(volume, structure, load.homogeneity);
+        medium.validate((medium.field.len() / CHECKED_VOXELS) | 1)?;
+        let seed = u64::from(at.experiment.run.seed);
+        let rays = random_and_hard(volume, &medium, load.rays as usize, seed);
+        let (walked, _) = Walker::new(gpu, &medium, &rays, true)?.walk()?;
+        let exact = probe_arithmetic(gpu)?.is_exact();
+        if let Some(wrong) = fault(&medium, &rays, &walked, exact) {
+            return Err(Absent::Failed(wrong));
+        }
+        let mean = |of: fn(&Walked) -> u32| {
+            walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / f64::from(load.rays)
+        };
+        Ok(Self {
+            walker: Walker::new(gpu, &medium, &rays, false)?,
+            rays: f64::from(load.rays),
+            steps: mean(|w| w.steps),
+            fetches: mean(|w| w.fetches),
+            build_ms: medium.build_ms,
+            bytes: medium.bytes() as f64,
+        })
+    }
+}
+
+/// What is wrong with the answers of a structure: a difference from the scalar twin (on an adapter that computes like the host), a segment that
+/// f64 refutes, a transmittance beside that of all voxels.
+fn fault(medium: &Medium, rays: &[SegmentRay], walked: &[Walked], exact: bool) -> Option<String> {
+    let some = &rays[..TWIN_RAYS.min(rays.len())];
+    let differs = exact
+        .then(|| first_difference(medium, some, walked))
+        .flatten();
+    let judged = &rays[..JUDGED_RAYS.min(rays.len())];
+    let wrong = || judged.iter().find_map(|ray| wrong_segment(medium, ray, 2));
+    let off = || {
+        judged.iter().zip(walked).find_map(|(ray, walked)| {
+            let exact = (-exact_depth(medium, ray)).exp();
+            let found = (-f64::from(walked.depth)).exp();
+            let text = || format!("a transmittance of {found} where voxels have {exact}: {ray:?}");
+            ((found - exact).abs() > TOLERANCE).then(text)
+        })
+    };
+    differs.or_else(wrong).or_else(off)
+}
+
+impl Measured for Ready {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        Ok(self.walker.walk()?.1)
+    }
+}
+
+impl Prepared for Ready {
+    fn timed(&self) -> Vec<&dyn Measured> {
+        vec![self]
+    }
+
+    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
+        let samples = samples.into_iter().next().unwrap_or_default();
+        let [steps, fetches, per_step, per_ray, build, bytes] = &FIGURES;
+        let timed = |figure, items: f64| {
+            let each = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / items).collect();
+            let rounds: Vec<f64> = each(&samples.ms);
+            let median = median_interval(&rounds).ok_or("nothing was timed")?;
+            let rounds = Rounds::Rounds {
+                adapter: rounds,
+                wall: each(&samples.wall_ms),
+                processors: Vec::new(),
+            };
+            Ok::<_, String>(Reading::new(figure, median).with_samples(rounds))
+        };
+        Ok(vec![
+            Reading::exact(steps, self.steps),
+            Reading::exact(fetches, self.fetches),
+            timed(per_step, self.rays * self.steps)?,
+            timed(per_ray, self.rays)?,
+            Reading::exact(build, self.build_ms),
+            Reading::exact(bytes, self.bytes),
+        ])
+    }
+}

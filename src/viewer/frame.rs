@@ -1,0 +1,245 @@
+//! What a shell draws: pictures and figures.
+
+use super::side::Side;
+use raystone_accel::StructureStats;
+use raystone_bench::run::{RunError, attributes};
+use raystone_config::{Axis, Map, Window};
+use raystone_core::program::Program;
+use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
+use raystone_image::{
+    FileFormat, Image, Picture, automatic_exposure, tone_map, viridis, write_png,
+};
+use std::path::Path;
+
+/// Share of pixels below the upper end of an automatic scale.
+const PERCENTILE: usize = 99;
+
+/// What is on screen now.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    /// The images, from left to right.
+    pub sides: Vec<SideFrame>,
+    /// Upper end of the scale of colours, where a map is shown.
+    pub scale: Option<f32>,
+    /// Samples per pixel of the reference; `None` without one.
+    pub reference_spp: Option<u32>,
+    /// Triangles of the scene.
+    pub triangles: usize,
+}
+
+/// An image on screen.
+#[derive(Debug, Clone, Default)]
+pub struct SideFrame {
+    /// The picture, of the size of the image or coarser; `None` until there is one.
+    pub picture: Option<Picture>,
+    /// What it is made of.
+    pub label: String,
+    /// Its figures.
+    pub figures: Figures,
+    /// Why there is no picture, or none that goes on.
+    pub fault: Option<String>,
+}
+
+/// Figures of an image.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Figures {
+    /// Samples per pixel that are shown; 0 of a coarse image.
+    pub spp: u32,
+    /// Samples per pixel at which it is finished.
+    pub of: u32,
+    /// Milliseconds of a sample of all pixels, the last ones.
+    pub sample_ms: Vec<f32>,
+    /// Rays per pixel and sample, by class.
+    pub rays: Vec<(&'static str, f64)>,
+    /// Million rays per second, all classes together; with the counting of rays.
+    pub mrays_s: Option<f64>,
+    /// relMSE against the reference, free of its noise; may be negative while there is little of it.
+    pub relmse: Option<f64>,
+    /// Figures of the structure.
+    pub structure: StructureStats,
+    /// Mean of the map over pixels, where one is shown and counted.
+    pub map_mean: Option<f64>,
+}
+
+/// Tone-maps, and draws maps, of all sides on one scale.
+pub(crate) struct Painter {
+    exposure: f32,
+    scale: f32,
+    map: Map,
+}
+
+impl Painter {
+    pub(crate) fn new(sides: &[Side], window: &Window) -> Self {
+        let first = sides.iter().find_map(|side| side.image.as_ref());
+        let automatic = first.map_or(1.0, automatic_exposure);
+        let values = |side: &Side| side.map.as_ref().map(|map| map.values(window.map));
+        let greatest = |side: &Side| values(side).map_or(0.0, |values| percentile(&values));
+        let scale = match window.scale {
+            0.0 if window.map != Map::None => sides.iter().map(greatest).fold(1.0, f32::max),
+            chosen => chosen,
+        };
+        Self {
+            exposure: automatic * window.exposure.exp2(),
+            scale,
+            map: window.map,
+        }
+    }
+
+    pub(crate) fn scale(&self) -> Option<f32> {
+        (self.map != Map::None).then_some(self.scale)
+    }
+
+    /// The picture of a side, and the mean of its map.
+    pub(crate) fn picture(&self, side: &Side) -> (Option<Picture>, Option<f64>) {
+        if self.map == Map::None {
+            let image = side.image.as_ref();
+            return (image.map(|image| tone_map(image, self.exposure)), None);
+        }
+        let Some(map) = &side.map else {
+            return (None, None);
+        };
+        let values = map.values(self.map);
+        if values.is_empty() {
+            return (None, None);
+        }
+        let sum: f64 = values.iter().copied().map(f64::from).sum();
+        let picture = Picture {
+            width: map.size[0],
+            height: map.size[1],
+            pixels: values.iter().map(|v| viridis(v / self.scale)).collect(),
+        };
+        (Some(picture), Some(sum / values.len() as f64))
+    }
+}
+
+fn percentile(values: &[f32]) -> f32 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f32::total_cmp);
+    let place = sorted.len() * PERCENTILE / 100;
+    sorted.get(place).copied().unwrap_or(0.0)
+}
+
+/// The figures of a side.
+pub(crate) fn figures(side: &Side, map_mean: Option<f64>, relmse: Option<f64>) -> Figures {
+    let [width, height] = side.lens.size.map(f64::from);
+    let samples = width * height * f64::from(side.shown);
+    let all: u64 = side.rays.iter().sum();
+    let is_counted = all > 0 && side.rays_ms > 0.0;
+    let class = |class: usize| (RAY_COUNT_CLASSES[class], side.rays[class] as f64 / samples);
+    Figures {
+        spp: side.shown,
+        of: side.lens.spp,
+        sample_ms: side.history.iter().copied().collect(),
+        rays: match is_counted {
+            true => (0..TRACED_CLASSES)
+                .map(class)
+                .filter(|(_, rays)| *rays > 0.0)
+                .collect(),
+            false => Vec::new(),
+        },
+        mrays_s: is_counted.then(|| all as f64 / side.rays_ms / 1e3),
+        relmse,
+        structure: side
+            .structure
+            .as_ref()
+            .map_or_else(StructureStats::default, |s| s.stats.clone()),
+        map_mean,
+    }
+}
+
+impl Frame {
+    /// One picture of all sides: each left or right of `swipe`, a share of the width; `None` while one has none.
+    pub fn picture(&self, size: [u32; 2], swipe: f32) -> Option<Picture> {
+        let pictures: Option<Vec<&Picture>> =
+            self.sides.iter().map(|s| s.picture.as_ref()).collect();
+        let pictures = pictures.filter(|pictures| !pictures.is_empty())?;
+        let border = match pictures.len() {
+            1 => size[0],
+            _ => (swipe * size[0] as f32) as u32,
+        };
+        let pixel = |x: u32, y: u32| {
+            let picture = pictures[usize::from(x >= border)];
+            let at = |v: u32, from: u32, to: u32| u64::from(v) * u64::from(to) / u64::from(from);
+            let (x, y) = (
+                at(x, size[0], picture.width),
+                at(y, size[1], picture.height),
+            );
+            picture.pixels[(y * u64::from(picture.width) + x) as usize]
+        };
+        let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+        Some(Picture {
+            width: size[0],
+            height: size[1],
+            pixels: pixels.map(|(x, y)| pixel(x, y)).collect(),
+        })
+    }
+
+    /// Writes what is on screen, tone-mapped, as PNG.
+    ///
+    /// # Errors
+    /// There is no picture yet, or the file cannot be written.
+    pub fn write_png(&self, file: &Path, size: [u32; 2], swipe: f32) -> Result<(), RunError> {
+        let picture = self.picture(size, swipe);
+        let picture =
+            picture.ok_or_else(|| RunError::Input("there is no picture yet".to_owned()))?;
+        write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
+    }
+}
+
+/// Writes the linear image of a side, in the format of the file's ending.
+pub(crate) fn write_linear(side: &Side, file: &Path, program: &Program) -> Result<(), RunError> {
+    let input = |reason: String| RunError::Input(reason);
+    let format = FileFormat::of(file).map_err(|e| input(e.to_string()))?;
+    let image: &Image = match &side.image {
+        Some(image) if side.shown > 0 => image,
+        _ => return Err(input("no sample of all pixels is done yet".to_owned())),
+    };
+    let cell = &side.cell;
+    let sampler = format!("{} × {}", cell[Axis::Sequence], cell[Axis::Decorrelation]);
+    let about = attributes(program, cell, &sampler, side.shown, side.lens.seed);
+    format
+        .write(file, image, &about)
+        .map_err(|e| input(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn side(color: [u8; 3], size: [u32; 2]) -> SideFrame {
+        SideFrame {
+            picture: Some(Picture {
+                width: size[0],
+                height: size[1],
+                pixels: vec![color; (size[0] * size[1]) as usize],
+            }),
+            ..SideFrame::default()
+        }
+    }
+
+    #[test]
+    fn two_images_meet_at_the_swipe_whatever_their_sizes() {
+        let (red, blue) = ([255, 0, 0], [0, 0, 255]);
+        let mut frame = Frame {
+            sides: vec![side(red, [8, 6]), side(blue, [2, 2])],
+            ..Frame::default()
+        };
+        let count = |frame: &Frame, swipe: f32| {
+            let picture = frame.picture([8, 6], swipe).unwrap();
+            assert_eq!(picture.pixels.len(), 48);
+            picture.pixels.iter().filter(|p| **p == red).count()
+        };
+        assert_eq!([0.0, 0.5, 1.0].map(|s| count(&frame, s)), [0, 24, 48]);
+        frame.sides[1].picture = None;
+        assert_eq!(frame.picture([8, 6], 0.5), None);
+        assert_eq!(Frame::default().picture([8, 6], 0.5), None);
+        assert!(frame.write_png(Path::new("x.png"), [8, 6], 0.5).is_err());
+    }
+
+    #[test]
+    fn the_scale_ends_where_one_pixel_in_a_hundred_is_above() {
+        let values: Vec<f32> = (0..200).map(|i| i as f32).collect();
+        assert_eq!(percentile(&values), 198.0);
+        assert_eq!(percentile(&[]), 0.0);
+    }
+}

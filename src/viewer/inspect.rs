@@ -1,0 +1,128 @@
+//! What happens at one pixel.
+
+use super::side::Side;
+use super::world::World;
+use raystone_accel::{Counters, Hit, NO_HIT, Query, Ray};
+use raystone_bench::run::{Estimator, Registries};
+use raystone_config::Axis;
+use raystone_gpu::GpuError;
+use raystone_render::Stage;
+use raystone_stress::explain::explain;
+use raystone_verify::path_oracle::{Estimator as Rules, Path, PathId, PathOracle, Rounding, View};
+use raystone_verify::rays::{primary_pixels, primary_rays};
+
+/// What is seen at a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inspection {
+    /// Column and row.
+    pub pixel: [u32; 2],
+    /// The ray through its centre.
+    pub ray: Ray,
+    /// What each image has there.
+    pub sides: Vec<Seen>,
+}
+
+/// What an image has at a pixel.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Seen {
+    /// Mean radiance so far; `None` while the image is coarse.
+    pub value: Option<[f32; 3]>,
+    /// The nearest hit of the ray through the pixel's centre; `None` where nothing is hit.
+    pub hit: Option<Hit>,
+    /// Name of the material that is hit.
+    pub material: Option<String>,
+    /// Work of that ray; `None` if the structure does not count it.
+    pub work: Option<Counters>,
+}
+
+/// The ray through the centre of a pixel.
+fn center_ray(side: &Side, [x, y]: [u32; 2]) -> Option<Ray> {
+    let [width, height] = side.lens.size;
+    let place = primary_pixels(width, height)
+        .into_iter()
+        .position(|at| at == y * width + x)?;
+    primary_rays(side.lens.camera, width, height)
+        .get(place)
+        .copied()
+}
+
+/// Inspects a pixel of all images.
+pub(crate) fn inspect(
+    world: &World,
+    sides: &[&Side],
+    [x, y]: [u32; 2],
+) -> Result<Option<Inspection>, GpuError> {
+    let ray = sides.first().and_then(|side| center_ray(side, [x, y]));
+    let Some(ray) = ray.filter(|_| sides[0].lens.size[0] > x) else {
+        return Ok(None);
+    };
+    let seen = sides
+        .iter()
+        .map(|side| seen(&world.stage, side, [x, y], &ray));
+    Ok(Some(Inspection {
+        pixel: [x, y],
+        ray,
+        sides: seen.collect::<Result<_, _>>()?,
+    }))
+}
+
+fn seen(stage: &Stage, side: &Side, [x, y]: [u32; 2], ray: &Ray) -> Result<Seen, GpuError> {
+    let Some(structure) = &side.structure else {
+        return Ok(Seen::default());
+    };
+    let traced = &structure.traced;
+    let answers = stage.closest(traced, &[*ray])?;
+    stage.gpu.check_error_word(answers.errors)?;
+    let hit = answers.answers.first().copied();
+    let hit = hit.filter(|hit| hit.triangle != NO_HIT);
+    let work = stage.count_work(traced, Query::Closest, &[*ray])?;
+    let scene = &stage.scene;
+    let material = hit.and_then(|hit| scene.material_ids.get(hit.triangle as usize));
+    let material = material.and_then(|id| scene.materials.get(*id as usize));
+    let place = (y * side.lens.size[0] + x) as usize;
+    let image = side.image.as_ref().filter(|_| side.shown > 0);
+    Ok(Seen {
+        value: image.and_then(|image| image.pixels.get(place).copied()),
+        hit,
+        material: material.map(|material| material.name.clone()),
+        work: work.and_then(|work| work.first().copied()),
+    })
+}
+
+/// What the structure does with the ray through the centre of a pixel, in words: that of `raystone trace`.
+pub(crate) fn explained(
+    registries: &Registries,
+    world: &World,
+    side: &Side,
+    pixel: [u32; 2],
+) -> Result<String, String> {
+    let ray = center_ray(side, pixel).ok_or("the pixel is outside of the image")?;
+    let accel = &side.cell[Axis::Accel];
+    let kind = registries.accel.named("structure", &accel.name)?;
+    let (scene, soup) = (&world.stage.scene, world.soup());
+    let (text, _) = explain(scene, &soup, kind, &accel.params, &ray)?;
+    Ok(format!("ray {ray}\n{text}"))
+}
+
+/// The path of one sample of a pixel, computed on the host in double precision.
+pub(crate) fn path(
+    registries: &Registries,
+    world: &World,
+    side: &Side,
+    (pixel, sample): ([u32; 2], u32),
+) -> Result<Path, String> {
+    let estimator = Estimator::of(registries, &side.cell, side.lens.spp, side.lens.size[0])?;
+    let view = View {
+        estimator: Rules::of(&estimator.integrator)?,
+        camera: side.lens.camera,
+        size: side.lens.size,
+        sampler: &estimator.sampler,
+    };
+    let id = PathId {
+        pixel,
+        sample,
+        seed: side.lens.seed,
+    };
+    let oracle = PathOracle::knowing(&world.stage.scene, &registries.kinds)?;
+    Ok(oracle.trace(&view, id, Rounding::none()))
+}

@@ -1,0 +1,147 @@
+//! What is on screen.
+
+use raystone_bench::run::Registries;
+use raystone_config::{
+    Axis, Catalogue, Cell, ConfigError, Experiment, Plan, Reference, Window, is_bench,
+};
+use raystone_core::geometry::Camera;
+use raystone_core::params::{Entry, Variant};
+
+/// Names of the images, from left to right.
+pub const SIDE_NAMES: [&str; 2] = ["A", "B"];
+
+/// Axes that images side by side share: they show the same triangles.
+const SHARED: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Kernels];
+
+/// What is on screen: one image or two side by side, in the words of an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Screen {
+    /// What each image is made of; one or two.
+    pub cells: Vec<Cell>,
+    /// The camera; `None` is that of the scene.
+    pub camera: Option<Camera>,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Samples per pixel at which an image is finished.
+    pub spp: u32,
+    /// Seed of the images.
+    pub seed: u32,
+    /// What errors are taken against.
+    pub reference: Reference,
+    /// How images are shown.
+    pub window: Window,
+}
+
+impl Screen {
+    /// The first two cells of an experiment that render.
+    ///
+    /// # Errors
+    /// The experiment has no plan, renders nothing, or its first two cells show different triangles.
+    pub fn of(experiment: &Experiment, registries: &Registries) -> Result<Self, String> {
+        let plan = Plan::new(experiment, &[], |s, d| registries.is_randomised(s, d));
+        let plan = plan.map_err(|error: ConfigError| error.to_string())?;
+        let cells: Vec<Cell> = plan.times.into_iter().take(SIDE_NAMES.len()).collect();
+        let screen = Self {
+            cells,
+            camera: experiment.camera,
+            size: experiment.run.resolution,
+            spp: experiment.run.spp.max(),
+            seed: experiment.run.seed,
+            reference: experiment.reference.clone(),
+            window: experiment.window,
+        };
+        screen.check()?;
+        Ok(screen)
+    }
+
+    /// Reads an experiment.
+    ///
+    /// # Errors
+    /// As [`Screen::of`], or a text that is none.
+    pub fn parse(
+        text: &str,
+        file: &str,
+        overrides: &[String],
+        registries: &Registries,
+    ) -> Result<Self, String> {
+        let experiment = Experiment::parse(text, file, overrides, &registries.catalogue());
+        Self::of(&experiment.map_err(|e| e.to_string())?, registries)
+    }
+
+    /// Checks what can be seen without a device.
+    ///
+    /// # Errors
+    /// The reason why it cannot be shown.
+    pub fn check(&self) -> Result<(), String> {
+        let [first, others @ ..] = self.cells.as_slice() else {
+            return Err("there is nothing to show: no cell of the experiment renders".to_owned());
+        };
+        if self.size.contains(&0) {
+            return Err("the window has no room for an image: make it larger".to_owned());
+        }
+        if self
+            .cells
+            .iter()
+            .any(|cell| is_bench(&cell[Axis::Integrator]))
+        {
+            return Err(format!(
+                "{} renders nothing to show",
+                first[Axis::Integrator]
+            ));
+        }
+        if !first[Axis::Kernels].name.is_empty() {
+            return Err(
+                "the window shows the embedded kernels: leave out `axes.kernels`".to_owned(),
+            );
+        }
+        for other in others {
+            if let Some(axis) = SHARED.into_iter().find(|axis| first[*axis] != other[*axis]) {
+                return Err(format!(
+                    "A and B show the same triangles, but differ in {axis} ({} and {}): choose one",
+                    first[axis], other[axis]
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Chooses a variant for an image; on axes that both share, for both.
+    pub fn choose(&mut self, side: usize, axis: Axis, variant: &Variant) {
+        if axis == Axis::Scene {
+            self.camera = None;
+        }
+        for (index, cell) in self.cells.iter_mut().enumerate() {
+            if index == side || SHARED.contains(&axis) {
+                *cell = cell.clone().with(axis, variant);
+            }
+        }
+    }
+
+    /// Shows a model file instead of the scene.
+    pub fn open(&mut self, path: &str, catalogue: &Catalogue) {
+        let builtin = catalogue[Axis::Scene]
+            .iter()
+            .find(|entry| entry.name == path);
+        let variant = builtin.map_or_else(|| Variant::plain(path), Entry::default_variant);
+        self.choose(0, Axis::Scene, &variant);
+    }
+
+    /// Shows a second image, at first equal to the first; or no longer.
+    pub fn split(&mut self, is_split: bool) {
+        self.cells.truncate(1);
+        if is_split {
+            self.cells.extend(self.cells.first().cloned());
+        }
+    }
+
+    /// Width over height.
+    pub fn aspect(&self) -> f32 {
+        self.size[0] as f32 / self.size[1].max(1) as f32
+    }
+
+    /// True if the samples of `other`'s images are not those of this one's.
+    pub fn restarts(&self, other: &Self) -> bool {
+        let samples = |s: &Self| (s.cells.clone(), s.camera, s.size, s.spp, s.seed);
+        samples(self) != samples(other)
+    }
+}

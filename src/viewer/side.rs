@@ -1,0 +1,343 @@
+//! One of the images on screen: first coarse, then sample by sample.
+
+use super::world::{Structure, World};
+use raystone_accel::{Counters, Query};
+use raystone_bench::run::{Estimator, Registries};
+use raystone_config::{Axis, Cell, Map};
+use raystone_core::clock::Instant;
+use raystone_core::geometry::Camera;
+use raystone_core::structure::TRACED_CLASSES;
+use raystone_gpu::{Gpu, GpuError};
+use raystone_image::Image;
+use raystone_render::Renderer;
+use raystone_verify::rays::{primary_pixels, primary_rays};
+use std::collections::{BTreeMap, VecDeque};
+
+/// Milliseconds of a slice: a window on the same device waits no longer.
+const SLICE_MS: f64 = 30.0;
+/// Milliseconds that a coarse image may take.
+const COARSE_MS: f64 = 50.0;
+/// Milliseconds of samples that are added at a time.
+const STEP_MS: f64 = 100.0;
+/// Time between two readings of an image, milliseconds.
+const REFRESH_MS: f64 = 150.0;
+/// Width over that of the first coarse image of all.
+const COARSEST: u32 = 16;
+/// Samples whose time is kept.
+const HISTORY: usize = 240;
+
+/// What every image shares while the camera, the size and the seed stay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lens {
+    pub camera: Camera,
+    pub size: [u32; 2],
+    pub seed: u32,
+    pub spp: u32,
+}
+
+impl Lens {
+    /// The size of an image that is this many times coarser.
+    fn divided(&self, by: u32) -> [u32; 2] {
+        self.size.map(|edge| edge.div_ceil(by))
+    }
+}
+
+/// Renderers of a cell at several sizes, which share their compiled kernels.
+pub(crate) struct Renderers<'g> {
+    gpu: &'g Gpu,
+    cell: Cell,
+    /// By width over that of the renderer.
+    by_size: BTreeMap<u32, Renderer<'g>>,
+}
+
+impl<'g> Renderers<'g> {
+    pub(crate) fn new(gpu: &'g Gpu, cell: Cell) -> Self {
+        Self {
+            gpu,
+            cell,
+            by_size: BTreeMap::new(),
+        }
+    }
+
+    /// The renderer of an image that is this many times coarser; compiled at its first use.
+    pub(crate) fn at(
+        &mut self,
+        by: u32,
+        lens: &Lens,
+        (registries, world, structure): (&Registries, &World, &Structure),
+    ) -> Result<&mut Renderer<'g>, String> {
+        if !self.by_size.contains_key(&by) {
+            let size = lens.divided(by);
+            let estimator = Estimator::of(registries, &self.cell, lens.spp, size[0])?;
+            if let Some(reason) = estimator.integrator.refusal(&structure.traced) {
+                return Err(format!("{}: {reason}", self.cell[Axis::Accel]));
+            }
+            let job = estimator.image(size, lens.camera, true);
+            let renderer = Renderer::new(
+                self.gpu,
+                &world.stage.buffers,
+                &structure.traced,
+                &job,
+                true,
+            );
+            let renderer = renderer.map_err(|e| e.to_string())?;
+            self.by_size.insert(by, renderer.in_slices_of(SLICE_MS));
+        }
+        let renderer = self.by_size.get_mut(&by);
+        renderer.ok_or_else(|| "there is no renderer".to_owned())
+    }
+
+    fn whole(&self) -> Option<&Renderer<'g>> {
+        self.by_size.get(&1)
+    }
+}
+
+/// The work of the first ray of every pixel, of an image of this size; `None` if the structure does not count.
+pub(crate) struct MapOfWork {
+    pub size: [u32; 2],
+    pub work: Option<Vec<Counters>>,
+}
+
+impl MapOfWork {
+    /// The work of every pixel, row by row; empty if it is not counted.
+    pub(crate) fn values(&self, map: Map) -> Vec<f32> {
+        let value = |c: &Counters| match map {
+            Map::None => 0,
+            Map::Nodes => c.nodes,
+            Map::BoxTests => c.box_tests,
+            Map::Triangles => c.triangle_tests,
+            Map::Steps => c.nodes + c.triangle_tests,
+            Map::Stack => c.stack_high_water,
+        };
+        let pixels = primary_pixels(self.size[0], self.size[1]);
+        let work = self.work.iter().flatten();
+        let mut values = vec![0.0; self.work.iter().flatten().count()];
+        for (pixel, counters) in pixels.into_iter().zip(work) {
+            values[pixel as usize] = value(counters) as f32;
+        }
+        values
+    }
+}
+
+/// An image on screen.
+pub(crate) struct Side<'g> {
+    pub cell: Cell,
+    /// `None` of an image that could not be made.
+    pub structure: Option<Structure>,
+    pub renderers: Renderers<'g>,
+    pub lens: Lens,
+    /// The next image is this many times coarser; 1 once all samples count.
+    by: u32,
+    /// Samples of the whole image were given up midway.
+    is_torn: bool,
+    pub image: Option<Image>,
+    pub map: Option<MapOfWork>,
+    /// Samples per pixel of the whole image.
+    pub done: u32,
+    /// Samples per pixel of the image that is shown; 0 of a coarse one.
+    pub shown: u32,
+    read: Option<Instant>,
+    /// Samples of pixels per millisecond, as last seen.
+    rate: Option<f64>,
+    /// Milliseconds of each sample of all pixels, the last ones.
+    pub history: VecDeque<f32>,
+    /// Rays of each traced class since the start.
+    pub rays: [u64; TRACED_CLASSES],
+    /// Milliseconds of all samples that the rays are of.
+    pub rays_ms: f64,
+    /// Why there is no more to come.
+    pub fault: Option<String>,
+}
+
+impl<'g> Side<'g> {
+    pub(crate) fn new(
+        gpu: &'g Gpu,
+        cell: &Cell,
+        structure: Result<Structure, String>,
+        lens: Lens,
+    ) -> Self {
+        let (structure, fault) = match structure {
+            Ok(structure) => (Some(structure), None),
+            Err(reason) => (None, Some(reason)),
+        };
+        Self {
+            cell: cell.clone(),
+            structure,
+            renderers: Renderers::new(gpu, cell.clone()),
+            lens,
+            by: COARSEST,
+            is_torn: true,
+            image: None,
+            map: None,
+            done: 0,
+            shown: 0,
+            read: None,
+            rate: None,
+            history: VecDeque::new(),
+            rays: [0; TRACED_CLASSES],
+            rays_ms: 0.0,
+            fault,
+        }
+    }
+
+    /// Begins anew with this lens; the size and the samples are those of before.
+    pub(crate) fn restart(&mut self, lens: Lens) {
+        self.lens = lens;
+        self.by = self.first_coarse();
+        self.is_torn = true;
+        self.map = None;
+        (self.done, self.shown) = (0, 0);
+        self.rays = [0; TRACED_CLASSES];
+        self.rays_ms = 0.0;
+    }
+
+    /// How much coarser the first image has to be, so that it takes no longer than [`COARSE_MS`].
+    fn first_coarse(&self) -> u32 {
+        let Some(rate) = self.rate else {
+            return COARSEST;
+        };
+        let pixels = f64::from(self.lens.size[0]) * f64::from(self.lens.size[1]);
+        let fits = |by: &u32| pixels / f64::from(by * by) <= rate * COARSE_MS;
+        [1, 2, 4, 8].into_iter().find(fits).unwrap_or(COARSEST)
+    }
+
+    pub(crate) fn is_coarse(&self) -> bool {
+        self.by > 1
+    }
+
+    pub(crate) fn is_finished(&self) -> bool {
+        self.fault.is_some() || (self.done >= self.lens.spp && !self.is_coarse())
+    }
+
+    /// Milliseconds of all samples so far.
+    pub(crate) fn spent_ms(&self) -> f64 {
+        let whole = self.renderers.whole();
+        whole
+            .filter(|_| !self.is_torn)
+            .map_or(0.0, |r| r.spent().ms())
+    }
+
+    /// The renderer of an image that is this many times coarser; `None` with a fault noted.
+    fn renderer(
+        &mut self,
+        by: u32,
+        (registries, world): (&Registries, &World),
+    ) -> Option<&mut Renderer<'g>> {
+        let with = (registries, world, self.structure.as_ref()?);
+        match self.renderers.at(by, &self.lens, with) {
+            Ok(renderer) => Some(renderer),
+            Err(reason) => {
+                self.fault = Some(reason);
+                None
+            }
+        }
+    }
+
+    /// Compiles its kernels, before any of them is waited for.
+    pub(crate) fn compile(&mut self, with: (&Registries, &World)) {
+        self.renderer(1, with);
+    }
+
+    /// Renders a coarse image; the next one is finer.
+    pub(crate) fn coarse(
+        &mut self,
+        with: (&Registries, &World),
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, GpuError> {
+        let (by, lens) = (self.by, self.lens);
+        let Some(renderer) = self.renderer(by, with) else {
+            return Ok(true);
+        };
+        renderer.look(lens.camera)?;
+        if !renderer.add_samples_until((0, 1), lens.seed, stop)? {
+            return Ok(false);
+        }
+        let (image, ms) = (renderer.image()?, renderer.spent().ms());
+        self.image = Some(image);
+        self.shown = 0;
+        let [width, height] = lens.divided(by).map(f64::from);
+        self.rate = Some(width * height / ms.max(0.1));
+        self.by = by / 4;
+        Ok(true)
+    }
+
+    /// Adds samples to all pixels, as many as take about [`STEP_MS`]; `false` if `stop` said so.
+    pub(crate) fn add(
+        &mut self,
+        with: (&Registries, &World),
+        stop: &dyn Fn() -> bool,
+    ) -> Result<bool, GpuError> {
+        let lens = self.lens;
+        self.by = 1;
+        let (is_torn, done) = match self.is_torn {
+            true => (true, 0),
+            false => (false, self.done),
+        };
+        let last = f64::from(self.history.back().copied().unwrap_or(STEP_MS as f32));
+        let fitting = (STEP_MS / last.max(0.01)).clamp(1.0, 64.0) as u32;
+        let count = fitting.min(lens.spp - done);
+        let Some(renderer) = self.renderer(1, with) else {
+            return Ok(true);
+        };
+        if is_torn {
+            renderer.look(lens.camera)?;
+        }
+        let before = renderer.spent().ms();
+        let whole = renderer.add_samples_until((done, count), lens.seed, stop)?;
+        let each = (renderer.spent().ms() - before) / f64::from(count);
+        self.is_torn = !whole;
+        if !whole {
+            return Ok(false);
+        }
+        self.done = done + count;
+        let pixels = f64::from(lens.size[0]) * f64::from(lens.size[1]);
+        self.rate = Some(pixels / each.max(0.01));
+        self.history.extend((0..count).map(|_| each as f32));
+        let old = self.history.len().saturating_sub(HISTORY);
+        self.history.drain(..old);
+        Ok(true)
+    }
+
+    /// Reads the image back if it is time to; `true` if there is another one to show.
+    pub(crate) fn refresh(&mut self) -> Result<bool, GpuError> {
+        let is_due = self
+            .read
+            .is_none_or(|read| read.elapsed().as_secs_f64() * 1e3 >= REFRESH_MS);
+        let is_last = self.done == self.lens.spp;
+        let is_first = self.shown == 0;
+        if self.is_torn || self.done == self.shown || !(is_due || is_last || is_first) {
+            return Ok(false);
+        }
+        let Some(renderer) = self.renderers.whole() else {
+            return Ok(false);
+        };
+        self.image = Some(renderer.image()?);
+        let counts = renderer.ray_counts()?;
+        self.rays = std::array::from_fn(|class| counts[class]);
+        self.rays_ms = renderer.spent().ms();
+        self.shown = self.done;
+        self.read = Some(Instant::now());
+        Ok(true)
+    }
+
+    /// Counts the work of every pixel's first ray, for an image as coarse as the one that is shown; `true` if there is a new map.
+    pub(crate) fn count(&mut self, world: &World) -> Result<bool, GpuError> {
+        let by = match self.is_coarse() {
+            true => self.by * 4,
+            false => 1,
+        };
+        let size = self.lens.divided(by);
+        if self.map.as_ref().is_some_and(|map| map.size == size) {
+            return Ok(false);
+        }
+        let Some(structure) = &self.structure else {
+            return Ok(false);
+        };
+        let rays = primary_rays(self.lens.camera, size[0], size[1]);
+        let work = world
+            .stage
+            .count_work(&structure.traced, Query::Closest, &rays)?;
+        self.map = Some(MapOfWork { size, work });
+        Ok(true)
+    }
+}

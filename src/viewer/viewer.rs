@@ -1,0 +1,529 @@
+//! The viewer: what is on screen, and the steps that lead there.
+
+use super::frame::{Frame, Painter, SideFrame, figures, write_linear};
+use super::inspect::{self, Inspection};
+use super::points::SamplePoints;
+use super::reference::{Accumulated, error_of, judged};
+use super::screen::{SIDE_NAMES, Screen};
+use super::side::{Lens, Side};
+use super::world::World;
+use raystone_bench::run::{Estimator, Registries, RunError};
+use raystone_config::{Axis, Cell, Map, Pace};
+use raystone_core::clock::Instant;
+use raystone_core::geometry::Camera;
+use raystone_core::program::Program;
+use raystone_gpu::{Gpu, GpuError};
+use raystone_scene::check_camera;
+use raystone_stats::metrics;
+use raystone_verify::path_oracle::Path;
+use std::fmt;
+use std::path::Path as File;
+
+/// Time between two readings of the reference, seconds.
+const JUDGE_S: f64 = 1.0;
+
+/// What was done for a change of the screen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// A scene was read, and uploaded.
+    Loaded,
+    /// A structure was built, validated and uploaded.
+    Built,
+    /// Kernels were composed and compiled, or found compiled.
+    Compiled,
+    /// Samples were begun anew.
+    Restarted,
+    /// What was there is used further.
+    Kept,
+}
+
+/// One thing that was done for a change of the screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Done {
+    /// What was done.
+    pub work: Work,
+    /// To what, in words.
+    pub what: String,
+    /// How long it took, milliseconds.
+    pub ms: f64,
+}
+
+impl fmt::Display for Done {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { work, what, ms } = self;
+        let took = if *ms < 10.0 {
+            format!("{ms:.1} ms")
+        } else {
+            format!("{ms:.0} ms")
+        };
+        match work {
+            Work::Loaded => write!(f, "{what} loaded in {took}"),
+            Work::Built => write!(f, "{what} built in {took}"),
+            Work::Compiled => write!(f, "{what} compiled in {took}"),
+            Work::Restarted => write!(f, "{what} begun anew"),
+            Work::Kept => write!(f, "{what} kept"),
+        }
+    }
+}
+
+/// What a step led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// There is something new to show.
+    Shown,
+    /// There is more to do, and nothing new to show.
+    Worked,
+    /// The step was given up because its caller said so.
+    Stopped,
+    /// All is done until the screen changes.
+    Idle,
+}
+
+/// The viewer of one device.
+pub struct Viewer<'g> {
+    gpu: &'g Gpu,
+    registries: Registries,
+    program: Program,
+    allow_outside: bool,
+    screen: Option<Screen>,
+    world: Option<World>,
+    sides: Vec<Side<'g>>,
+    reference: Option<Accumulated<'g>>,
+    /// The reference as it was last read, and when.
+    judge: Option<(metrics::Reference, Instant)>,
+}
+
+impl<'g> Viewer<'g> {
+    /// A viewer that shows nothing yet. Models may name files outside their folder if `allow_outside` is set.
+    pub fn new(
+        gpu: &'g Gpu,
+        registries: Registries,
+        program: Program,
+        allow_outside: bool,
+    ) -> Self {
+        Self {
+            gpu,
+            registries,
+            program,
+            allow_outside,
+            screen: None,
+            world: None,
+            sides: Vec::new(),
+            reference: None,
+            judge: None,
+        }
+    }
+
+    /// The registries.
+    pub fn registries(&self) -> &Registries {
+        &self.registries
+    }
+
+    /// What is on screen, if anything.
+    pub fn screen(&self) -> Option<&Screen> {
+        self.screen.as_ref()
+    }
+
+    /// Notes on the scene: what of its file is not shown as written.
+    pub fn notes(&self) -> Vec<String> {
+        let report = self.world.as_ref().map(|world| &world.stage.scene.report);
+        report.map_or(Vec::new(), |report| report.lines())
+    }
+
+    /// The camera of the images.
+    pub fn camera(&self) -> Option<Camera> {
+        self.sides.first().map(|side| side.lens.camera)
+    }
+
+    /// Changes what is on screen, and says what that took: what can be used further is. `tell` is called with what is being done
+    /// before anything that may take long.
+    ///
+    /// # Errors
+    /// The scene does not load, the camera sees nothing, or the device is lost: what was on screen stays. An image that cannot
+    /// be made says so in its place instead.
+    pub fn show(
+        &mut self,
+        screen: Screen,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Done>, RunError> {
+        screen.check().map_err(RunError::Input)?;
+        let mut done = Vec::new();
+        let first = &screen.cells[0];
+        let of_world = first.on(&Cell::WORLD);
+        let loaded = match &self.world {
+            Some(world) if world.cell == of_world => None,
+            _ => {
+                let scene = &first[Axis::Scene];
+                tell(&format!("loading {scene}"));
+                let clock = Instant::now();
+                let world = World::load(self.gpu, &self.registries, first, self.allow_outside)?;
+                note(
+                    &mut done,
+                    Work::Loaded,
+                    format!("{scene}, {} triangles,", world.stage.scene.triangles.len()),
+                    clock,
+                );
+                Some(world)
+            }
+        };
+        let world = loaded.as_ref().or(self.world.as_ref());
+        let Some(scene) = world.map(|world| &world.stage.scene) else {
+            return Ok(done);
+        };
+        let camera = screen.camera.unwrap_or_else(|| scene.view(screen.aspect()));
+        check_camera(&camera).map_err(|e| RunError::Input(e.to_string()))?;
+        if let Some(world) = loaded {
+            self.world = Some(world);
+            self.sides.clear();
+            self.reference = None;
+        }
+        let lens = Lens {
+            camera,
+            size: screen.size,
+            seed: screen.seed,
+            spp: screen.spp,
+        };
+        self.show_sides(&screen, lens, &mut done, tell)?;
+        self.show_reference(&screen, lens);
+        self.screen = Some(screen);
+        Ok(done)
+    }
+
+    fn show_sides(
+        &mut self,
+        screen: &Screen,
+        lens: Lens,
+        done: &mut Vec<Done>,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<(), RunError> {
+        let Some(world) = &self.world else {
+            return Ok(());
+        };
+        let mut old = std::mem::take(&mut self.sides);
+        for (cell, name) in screen.cells.iter().zip(SIDE_NAMES) {
+            let name = if screen.cells.len() > 1 {
+                format!("{name}: ")
+            } else {
+                String::new()
+            };
+            let same = |side: &Side| {
+                side.cell == *cell && side.lens.size == lens.size && side.lens.spp == lens.spp
+            };
+            // An image that failed is tried again.
+            let kept = old
+                .iter()
+                .position(|side| same(side) && side.fault.is_none());
+            if let Some(place) = kept {
+                let mut side = old.swap_remove(place);
+                if side.lens == lens {
+                    note(done, Work::Kept, format!("{name}image"), Instant::now());
+                } else {
+                    side.restart(lens);
+                    note(
+                        done,
+                        Work::Restarted,
+                        format!("{name}samples"),
+                        Instant::now(),
+                    );
+                }
+                self.sides.push(side);
+                continue;
+            }
+            let accel = &cell[Axis::Accel];
+            let of_structure = cell.on(&Cell::STRUCTURE);
+            let mut known = self
+                .sides
+                .iter()
+                .chain(&old)
+                .filter_map(|side| side.structure.as_ref());
+            let known = known.find(|known| known.cell == of_structure).cloned();
+            let clock = Instant::now();
+            let structure = match known {
+                Some(known) => {
+                    note(done, Work::Kept, format!("{name}{accel}"), clock);
+                    Ok(known)
+                }
+                None => {
+                    tell(&format!("{name}building {accel}"));
+                    let built = world.build(&self.registries, cell);
+                    note(done, Work::Built, format!("{name}{accel}"), clock);
+                    built
+                }
+            };
+            tell(&format!("{name}compiling {}", cell[Axis::Integrator]));
+            let clock = Instant::now();
+            let mut side = Side::new(self.gpu, cell, structure, lens);
+            side.compile((&self.registries, world));
+            note(
+                done,
+                Work::Compiled,
+                format!("{name}{}", cell[Axis::Integrator]),
+                clock,
+            );
+            self.sides.push(side);
+            lost(self.gpu)?;
+        }
+        Ok(())
+    }
+
+    fn show_reference(&mut self, screen: &Screen, lens: Lens) {
+        let first = self.sides.first().filter(|side| side.fault.is_none());
+        let Some(side) = first.filter(|_| screen.window.error) else {
+            self.reference = None;
+            self.judge = None;
+            return;
+        };
+        let is_same = |known: &&Accumulated| {
+            let its = known.lens;
+            let lens = Lens {
+                spp: its.spp,
+                ..lens
+            };
+            known.cell == judged(&side.cell)
+                && known.settings == screen.reference
+                && Lens {
+                    seed: its.seed,
+                    ..lens
+                } == its
+        };
+        let Some(structure) = &side.structure else {
+            return;
+        };
+        if self.reference.as_ref().filter(is_same).is_none() {
+            let (settings, structure) = (&screen.reference, structure.clone());
+            self.reference = Some(Accumulated::new(
+                self.gpu, &side.cell, structure, settings, lens,
+            ));
+            self.judge = None;
+        }
+    }
+
+    /// Does a piece of the work that is left: a coarse image first, then samples in turns, short slices at a time. `stop` is
+    /// asked between slices; samples that were given up are begun anew, so it should agree only if they are not needed any more.
+    ///
+    /// # Errors
+    /// The device is lost or hangs. An image that fails in another way says so in its place.
+    pub fn step(&mut self, stop: &dyn Fn() -> bool) -> Result<Step, RunError> {
+        let (Some(world), Some(screen)) = (&self.world, &self.screen) else {
+            return Ok(Step::Idle);
+        };
+        let with = (&self.registries, world);
+        let (map, pace) = (screen.window.map, screen.window.pace);
+        if let Some(side) = self
+            .sides
+            .iter_mut()
+            .find(|side| side.fault.is_none() && side.is_coarse())
+        {
+            let step = side.coarse(with, stop).and_then(|whole| {
+                if whole && map != Map::None && side.fault.is_none() {
+                    side.count(world)?;
+                }
+                Ok(if whole { Step::Shown } else { Step::Stopped })
+            });
+            return keep(step, side, self.gpu);
+        }
+        if map != Map::None {
+            for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
+                match side.count(world) {
+                    Ok(false) => {}
+                    Ok(true) => return Ok(Step::Shown),
+                    Err(error) => return keep(Err(error), side, self.gpu),
+                }
+            }
+        }
+        let place = |side: &&mut Side| match pace {
+            Pace::Samples => f64::from(side.done),
+            Pace::Time => side.spent_ms(),
+        };
+        let behind = self.sides.iter_mut().filter(|side| !side.is_finished());
+        let behind = behind.min_by(|a, b| place(a).total_cmp(&place(b)));
+        let reference = self
+            .reference
+            .as_mut()
+            .filter(|reference| !reference.is_finished());
+        match (behind, reference) {
+            // The reference has its turn once for each sample of the image that is behind.
+            (side, Some(reference))
+                if side.as_ref().is_none_or(|side| side.done > reference.spp()) =>
+            {
+                match reference.add(with, stop) {
+                    Ok(true) => self.judge_anew(),
+                    Ok(false) => Ok(Step::Stopped),
+                    Err(reason) => {
+                        lost(self.gpu)?;
+                        self.reference = None;
+                        Err(RunError::Input(format!("no reference: {reason}")))
+                    }
+                }
+            }
+            (Some(side), _) => {
+                let step = side.add(with, stop).and_then(|whole| {
+                    if !whole {
+                        return Ok(Step::Stopped);
+                    }
+                    Ok(if side.refresh()? {
+                        Step::Shown
+                    } else {
+                        Step::Worked
+                    })
+                });
+                keep(step, side, self.gpu)
+            }
+            (None, _) => Ok(Step::Idle),
+        }
+    }
+
+    /// Reads the reference if it is time to.
+    fn judge_anew(&mut self) -> Result<Step, RunError> {
+        let is_due = |(_, read): &(_, Instant)| read.elapsed().as_secs_f64() >= JUDGE_S;
+        let (Some(world), Some(reference)) = (&self.world, &mut self.reference) else {
+            return Ok(Step::Worked);
+        };
+        if !self.judge.as_ref().is_none_or(is_due) && !reference.is_finished() {
+            return Ok(Step::Worked);
+        }
+        let read = reference
+            .images((&self.registries, world))
+            .map_err(RunError::Input)?;
+        self.judge = read.map(|reference| (reference, Instant::now()));
+        Ok(Step::Shown)
+    }
+
+    /// What to draw now.
+    pub fn frame(&self) -> Frame {
+        let Some(screen) = &self.screen else {
+            return Frame::default();
+        };
+        let painter = Painter::new(&self.sides, &screen.window);
+        let side = |side: &Side| {
+            let (picture, map_mean) = painter.picture(side);
+            let judge = self.judge.as_ref().filter(|_| side.shown > 0);
+            let relmse = judge.and_then(|(reference, _)| error_of(side.image.as_ref()?, reference));
+            let counts = side.map.as_ref().is_none_or(|map| map.work.is_some());
+            let uncounted = (screen.window.map != Map::None && !counts).then(|| {
+                format!(
+                    "{} does not count its work: there is no map",
+                    side.cell[Axis::Accel]
+                )
+            });
+            SideFrame {
+                picture,
+                label: side.cell.to_string(),
+                figures: figures(side, map_mean, relmse),
+                fault: side.fault.clone().or(uncounted),
+            }
+        };
+        Frame {
+            sides: self.sides.iter().map(side).collect(),
+            scale: painter.scale(),
+            reference_spp: self.reference.as_ref().map(Accumulated::spp),
+            triangles: self
+                .world
+                .as_ref()
+                .map_or(0, |world| world.stage.scene.triangles.len()),
+        }
+    }
+
+    /// Writes the linear image of a side, in the format of the file's ending; or what is on screen, as PNG.
+    ///
+    /// # Errors
+    /// There is nothing to write yet, the ending is unknown, or the file cannot be written.
+    pub fn save(&self, file: &File, side: usize) -> Result<(), RunError> {
+        let nothing = || RunError::Input("there is nothing to save yet".to_owned());
+        if file
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
+        {
+            let screen = self.screen.as_ref().ok_or_else(nothing)?;
+            return self
+                .frame()
+                .write_png(file, screen.size, screen.window.swipe);
+        }
+        write_linear(
+            self.sides.get(side).ok_or_else(nothing)?,
+            file,
+            &self.program,
+        )
+    }
+
+    /// What the images have at a pixel; `None` outside of them.
+    ///
+    /// # Errors
+    /// The device is lost or hangs, or a kernel does not compile.
+    pub fn inspect(&self, pixel: [u32; 2]) -> Result<Option<Inspection>, RunError> {
+        let sound: Vec<&Side> = self
+            .sides
+            .iter()
+            .filter(|side| side.fault.is_none())
+            .collect();
+        match &self.world {
+            Some(world) => Ok(inspect::inspect(world, &sound, pixel)?),
+            None => Ok(None),
+        }
+    }
+
+    /// Every node that a side's structure visits with the ray through a pixel's centre, and every triangle that it tests.
+    ///
+    /// # Errors
+    /// There is no such pixel, or the structure has no twin; in words.
+    pub fn explain(&self, side: usize, pixel: [u32; 2]) -> Result<String, String> {
+        let (world, side) = self.at(side)?;
+        inspect::explained(&self.registries, world, side, pixel)
+    }
+
+    /// The path of one sample of a side's pixel, computed on the host.
+    ///
+    /// # Errors
+    /// The oracle does not support the integrator or the scene; in words.
+    pub fn path(&self, side: usize, pixel: [u32; 2], sample: u32) -> Result<Path, String> {
+        let (world, side) = self.at(side)?;
+        inspect::path(&self.registries, world, side, (pixel, sample))
+    }
+
+    /// The first `count` points that a side's sampler gives a pixel, in two dimensions.
+    ///
+    /// # Errors
+    /// A dimension that nothing draws, or a pixel outside of the image; in words.
+    pub fn points(
+        &self,
+        side: usize,
+        pixel: [u32; 2],
+        dimensions: [u32; 2],
+        count: u32,
+    ) -> Result<SamplePoints, String> {
+        let (_, side) = self.at(side)?;
+        let (lens, cell) = (side.lens, &side.cell);
+        let estimator = Estimator::of(&self.registries, cell, lens.spp, lens.size[0])?;
+        let count = count.min(lens.spp);
+        let at = (pixel, lens.size);
+        SamplePoints::of(&estimator.sampler, at, dimensions, (count, lens.seed))
+    }
+
+    fn at(&self, side: usize) -> Result<(&World, &Side<'g>), String> {
+        let world = self.world.as_ref().ok_or("there is no scene")?;
+        let side = self.sides.get(side).ok_or("there is no such image")?;
+        Ok((world, side))
+    }
+}
+
+fn note(done: &mut Vec<Done>, work: Work, what: String, clock: Instant) {
+    let ms = clock.elapsed().as_secs_f64() * 1e3;
+    done.push(Done { work, what, ms });
+}
+
+/// An error if the device is lost.
+fn lost(gpu: &Gpu) -> Result<(), RunError> {
+    match gpu.lost() {
+        Some(cause) => Err(GpuError::Lost(cause).into()),
+        None => Ok(()),
+    }
+}
+
+/// Keeps a failure of an image with it; what a lost device does is not the image's fault.
+fn keep(step: Result<Step, GpuError>, side: &mut Side, gpu: &Gpu) -> Result<Step, RunError> {
+    step.or_else(|error| {
+        lost(gpu)?;
+        side.fault = Some(error.to_string());
+        Ok(Step::Shown)
+    })
+}
