@@ -120,7 +120,11 @@ impl<'a> World<'a> {
                     traced,
                     record: line,
                 }),
-                Err(reason) => self.conclude(run, cell, line, Some(reason)),
+                Err(reason) => {
+                    self.conclude(run, cell, line, Some(reason));
+                    // It is not timed.
+                    run.step("", Run::<H>::STRUCTURE / 3.0 * 2.0);
+                }
             }
             run.step("", Run::<H>::STRUCTURE / 3.0);
         }
