@@ -29,6 +29,7 @@ mod octree;
 pub mod oracle;
 mod polygon;
 pub mod ray;
+mod ray_hierarchy;
 mod registry;
 #[cfg(test)]
 mod scene_tests;
@@ -53,6 +54,7 @@ pub(crate) use kd_tree::KdTree;
 pub use mask::Masks;
 pub(crate) use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
+pub use ray_hierarchy::{Anatomy, LevelAnatomy, RayHierarchy};
 pub use raystone_core::structure::{Counters, Phase, Space, StructureStats};
 pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::BuildLog;

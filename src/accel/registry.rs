@@ -27,6 +27,7 @@ impl Named for dyn AccelKind {
             &super::IrregularGrid,
             &Octree,
             &KdTree,
+            &super::RayHierarchy,
             &super::ObjectList,
             &super::MetaBvh,
         ]

@@ -15,6 +15,11 @@ pub trait Structure: Sync {
     /// Its parameters, declared by [`parameters!`](raystone_core::parameters).
     type Parameters: Parameters;
 
+    /// See [`AccelKind::kernels`].
+    fn kernels() -> Vec<String> {
+        vec![format!("accel/{}", Self::NAME.replace('-', "_"))]
+    }
+
     /// Builds the structure; phases are timed in `log`.
     ///
     /// # Errors
@@ -64,6 +69,10 @@ impl<S: Structure> AccelKind for S {
 
     fn parameters(&self) -> ParameterSchema {
         S::Parameters::schema()
+    }
+
+    fn kernels(&self) -> Vec<String> {
+        S::kernels()
     }
 
     fn sources(&self) -> Sources {

@@ -7,7 +7,7 @@ use crate::path_oracle::{PathOracle, View};
 use crate::rays::RaySet;
 use glam::DVec3;
 use raystone_accel::oracle::{Verdict, judge_closest_hits};
-use raystone_accel::{Hit, NO_HIT, Space, TriangleSoup};
+use raystone_accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
 use raystone_gpu::KERNEL_ERRORS;
 use raystone_image::Image;
 use raystone_record::{ClassVerdict, ReferenceCheck};
@@ -61,7 +61,9 @@ pub fn unseen_hit(
         compare(set, hits, found, soup, Space::World, exact).wrong
     });
     let unseen = unseen.or_else(|| in_verdict(set, reference));
-    unseen.or_else(|| in_reference(scene, soup, reference, (set.rays[first], set.truth[first])))
+    let hits = set.rays.iter().zip(&set.truth);
+    let mut hits = hits.filter(|(_, hit)| hit.triangle != NO_HIT);
+    unseen.or_else(|| in_reference(scene, soup, reference, &mut hits))
 }
 
 /// At a hit, and at the last ray; `wrong` counts the wrong rays.
@@ -114,7 +116,7 @@ fn in_reference(
     scene: &SceneData,
     soup: &TriangleSoup,
     reference: &ReferenceTracer,
-    (ray, hit): (raystone_accel::Ray, Hit),
+    hits: &mut dyn Iterator<Item = (&Ray, &Hit)>,
 ) -> Option<String> {
     let most = reference.sets.iter().map(|set| set.rays.len()).max()?;
     let right = reference.thinned(most.div_ceil(OF_REFERENCE));
@@ -127,16 +129,20 @@ fn in_reference(
     if wrong.brute_force.wrong != 1 || wrong.is_sound() {
         return Some("a wrong answer of the reference tracer".to_owned());
     }
-    let question = (
-        soup.intersection.raised(&ray),
-        Some((hit.triangle, 1.01 * hit.t + 0.01)),
-    );
-    let judged = judge_closest_hits(&scene.triangles[..], &[question]);
-    let is_seen = matches!(judged[..], [Verdict::Wrong(_)]);
+    // A ray that grazes an edge may leave the oracle no verdict.
+    let questions: Vec<_> = hits
+        .take(TRIED)
+        .map(|(ray, hit)| {
+            let farther = (hit.triangle, 1.01 * hit.t + 0.01);
+            (soup.intersection.raised(ray), Some(farther))
+        })
+        .collect();
+    let judged = judge_closest_hits(&scene.triangles[..], &questions);
+    let is_seen = (judged.iter()).any(|verdict| matches!(verdict, Verdict::Wrong(_)));
     (!is_seen).then(|| "a distance that double precision refutes".to_owned())
 }
 
-/// Lit paths that are tried: rounding may explain what is planted in one of them.
+/// Hits and lit paths that are tried: rounding may explain what is planted in one of them.
 const TRIED: usize = 8;
 /// Relative error of a planted pixel.
 const OFF: f64 = 2e-3;
@@ -186,7 +192,6 @@ pub fn unseen_pixel(oracle: &PathOracle, view: &View, answers: &[Answer]) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone_accel::Ray;
     use raystone_record::RayClass;
 
     #[test]

@@ -54,7 +54,7 @@ fn same(a: &[Vec<Hit>; 2], b: &[Vec<Hit>; 2]) -> bool {
 #[test]
 fn every_structure_finds_the_same_in_workgroups_of_every_size() {
     let (stage, rays) = subject(gpu());
-    for kind in in_turn("structures in other workgroups", structures()) {
+    for kind in in_turn("structures in other workgroups", inline_structures()) {
         let traced = stage.traced(gpu(), kind);
         let expected = answers(&stage, &traced, &rays).expect("answers");
         assert!(expected[0].iter().any(|hit| hit.triangle != u32::MAX));

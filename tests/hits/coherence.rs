@@ -32,7 +32,7 @@ fn each_structure(
     mut check: impl FnMut(&str, &dyn raystone::accel::BuiltAccel),
 ) {
     let mut kernels = Vec::new();
-    for kind in support::structures() {
+    for kind in support::inline_structures() {
         for params in param_variants(&kind.parameters()) {
             let Ok(built) = kind.build(soup, &params, &mut Default::default()) else {
                 continue;

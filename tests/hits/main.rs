@@ -13,6 +13,7 @@ mod grids;
 mod instances;
 mod intersectors;
 mod peers;
+mod ray_hierarchy;
 mod real_scenes;
 mod shadow_rays;
 mod slivers;

@@ -26,8 +26,7 @@ fn kernels_read_buffers_and_textures_alike() {
     let mut rays = scenes::lattice_rays(&mut rng, 1024, 24);
     rays.extend(scenes::aimed_rays(&mut rng, &soup, 1024));
     let expected = brute_force(&soup, &rays);
-    let registry = AccelRegistry::default();
-    for kind in in_turn("structures by load path", registry.iter()) {
+    for kind in in_turn("structures by load path", support::inline_structures()) {
         let built = build(kind, &soup, &default_params(&kind.parameters()));
         let twin = built.cpu_twin(&soup);
         for load in &Load::ALL[1..] {

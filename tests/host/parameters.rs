@@ -3,7 +3,7 @@
 
 use crate::support::{Pcg, default_params, scenes};
 use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, BvhParameters, TriangleSoup};
-use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Variant};
+use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Step, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
 
@@ -32,6 +32,13 @@ fn hostile(schema: &ParameterSchema) -> Vec<(Params, String)> {
                 ParamValue::Number(1.5),
                 text,
             ],
+            ParamRange::Stepped(Step::PowerOfTwo, range) => {
+                let (min, max) = (*range.start(), *range.end());
+                let whole = [min / 2, 2 * max, 3 * min, max - 1, -min];
+                let mut wrong: Vec<_> = whole.map(ParamValue::Integer).into();
+                wrong.extend([ParamValue::Number(min as f64 + 0.5), text]);
+                wrong
+            }
             ParamRange::Flag => vec![ParamValue::Integer(1), text],
             ParamRange::Choice(_) => vec![ParamValue::Integer(1), text],
             ParamRange::Text => vec![ParamValue::Flag(false), ParamValue::Number(0.5)],

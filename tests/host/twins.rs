@@ -34,6 +34,14 @@ const NO_TWIN: &[(&str, &str)] = &[
         "stages that hand paths on; tests/device/organisations.rs holds their images to that of one kernel",
     ),
     (
+        "accel/ray_hierarchy/passes/",
+        "passes; tests/hits/ray_hierarchy compares hits, and pairs level by level",
+    ),
+    (
+        "accel/ray_hierarchy/tree",
+        "bindings, and a walk through them; src/accel/ray_hierarchy/anatomy.rs counts the same pairs",
+    ),
+    (
         "common/counters",
         "fields of Counters; the tests of structures compare counted work per ray",
     ),
@@ -414,6 +422,16 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "two expressions of the kernel",
     ),
     ("accel/leaf", "leaf_reference", "build"),
+    (
+        "accel/ray_hierarchy/node",
+        "minus",
+        "an operator of the kernel",
+    ),
+    (
+        "accel/ray_hierarchy/node",
+        "greatest",
+        "an expression of the kernel",
+    ),
     ("media/medium", "pack_halves", "build"),
     ("media/structure/cube_bvh", "append", "build"),
     ("media/segments", "step_fuse", "a uniform of the kernel"),

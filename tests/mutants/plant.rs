@@ -2,7 +2,7 @@
 
 use crate::CheckError;
 use raystone::accel::StructureStats;
-use raystone::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
+use raystone::accel::{AccelError, Access, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use raystone::gpu::KernelLibrary;
 use raystone::sampling::{
     Coordinate, Decorrelation, Demand, Facts, Partner, Sampler, SamplerTable, Seeding, Sequence,
@@ -271,6 +271,10 @@ impl BuiltAccel for Faulty<'_> {
 
     fn divisible(&self) -> &'static [&'static str] {
         self.inner.divisible()
+    }
+
+    fn access(&self) -> Access {
+        self.inner.access()
     }
 
     fn stats(&self) -> StructureStats {

@@ -2,7 +2,7 @@
 
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
-    AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Load, Query, Ray, Traced, Tracer,
+    AccelKind, Access, Ask, BuildLog, BuiltAccel, Counters, Hit, Load, Query, Ray, Traced, Tracer,
     TriangleBuffers, TriangleSoup,
 };
 use raystone::gpu::Gpu;
@@ -63,6 +63,9 @@ pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
             (ParamRange::Integer { min, max }, _) => {
                 vec![ParamValue::Integer(*min), ParamValue::Integer(*max)]
             }
+            (ParamRange::Stepped(_, range), _) => [range.start(), range.end()]
+                .map(|x| ParamValue::Integer(*x))
+                .to_vec(),
             (ParamRange::Number { min, max }, ParamValue::Number(x)) => [x / 8.0, x * 8.0]
                 .map(|x| ParamValue::Number(x.clamp(*min, *max)))
                 .to_vec(),
@@ -95,6 +98,14 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup, params: &Params) -> Box<
         .validate(soup)
         .unwrap_or_else(|e| panic!("{name} with {params:?} is not valid: {e}"));
     built
+}
+
+/// True if its kernels count the work of each ray; passes that answer many rays together may not.
+pub fn counts_work(built: &dyn BuiltAccel) -> bool {
+    match built.access() {
+        Access::Inline => true,
+        Access::Pipeline(passes) => passes.counts_work(),
+    }
 }
 
 /// The results of a batch; `work` is empty unless the feature `counters` was on.

@@ -12,7 +12,8 @@ pub use hits::*;
 pub use tier::{in_turn, is_full, one_of, so_many};
 
 use raystone::accel::{
-    AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
+    AccelError, AccelKind, AccelRegistry, Access, BuildLog, BuiltAccel, Intersection, Traced,
+    TriangleSoup,
 };
 use raystone::config::{Experiment, Gate, Plan};
 use raystone::geometry::Camera;
@@ -289,6 +290,16 @@ pub fn structures() -> Vec<&'static dyn AccelKind> {
     let found: Vec<_> = AccelRegistry::default().iter().collect();
     assert!(found.len() >= 4, "{} structures", found.len());
     found
+}
+
+/// Those that kernels can import; the others answer buffers of rays in passes of their own.
+pub fn inline_structures() -> Vec<&'static dyn AccelKind> {
+    let nothing = TriangleSoup::default();
+    let is_inline = |kind: &&'static dyn AccelKind| {
+        let built = build(*kind, &nothing, &default_params(&kind.parameters()));
+        matches!(built.access(), Access::Inline)
+    };
+    structures().into_iter().filter(is_inline).collect()
 }
 
 /// The structure of this name.

@@ -152,12 +152,12 @@ fn hits_and_counted_work() {
         return;
     }
     let mut found = Found::new();
-    let all =
-        (0..scenes().len()).flat_map(|at| structures().into_iter().map(move |k| (at, k.name())));
+    let all = (0..scenes().len())
+        .flat_map(|at| inline_structures().into_iter().map(move |k| (at, k.name())));
     let taken = in_turn("structures of unchanged hits", all);
     for (at, (scene, stage)) in scenes().into_iter().enumerate() {
         let judge = stage.judge(Checks::Kept, [256, 1, 1]);
-        for kind in structures() {
+        for kind in inline_structures() {
             let name = kind.name();
             if !taken.contains(&(at, name)) {
                 for subject in ["hits", "work"].map(|what| format!("{what} {scene}/{name}")) {
@@ -219,12 +219,12 @@ fn images() {
     let one = sampler("sobol", "cranley-patterson");
     let mut found = Found::new();
     found.insert(adapter(), String::new());
-    let all = structures()
+    let all = inline_structures()
         .into_iter()
         .flat_map(|k| (0..integrators.len()).map(move |i| (k.name(), i)));
     let taken = in_turn("kernels of unchanged images", all);
     for (scene, stage) in scenes() {
-        for kind in structures() {
+        for kind in inline_structures() {
             let traced = stage.traced(gpu(), kind);
             for (at, what) in integrators.iter().enumerate() {
                 let subject = format!("image {scene}/{}/{what}", kind.name());

@@ -1,8 +1,10 @@
 //! The passes in which a structure answers a buffer of rays.
 
 use super::{Query, RayBuffers, RefillParameters, Tracer};
+use raystone_gpu::compaction::{CompactionMethod, Passes, Stream};
 use raystone_gpu::{
-    Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, grid_of,
+    Bindings, Composition, GpuError, Groups, Pairs, RadixSort, Recording, Storage, UniformValues,
+    grid_of,
 };
 use std::ops::Range;
 
@@ -190,6 +192,25 @@ impl<'a> TraceSteps<'a> {
         let kernel = kernel.feature("counted", true);
         let name = format!("{name} live");
         self.run(&name, kernel, groups, &bindings.merged(special))
+    }
+
+    /// Sorts pairs of words by the lowest `bits` of the keys: see [`RadixSort::record`].
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    pub fn sort(&mut self, pairs: &Pairs, bits: u32) -> Result<Pairs, GpuError> {
+        let sort = RadixSort::new(&self.tracer.gpu)?;
+        Ok(sort.record(self.recording, pairs, bits))
+    }
+
+    /// Compacts a stream.
+    ///
+    /// # Errors
+    /// The adapter cannot run the method, or a kernel does not compose or compile.
+    pub fn compact(&mut self, method: CompactionMethod, stream: &Stream) -> Result<(), GpuError> {
+        let gpu = &self.tracer.gpu;
+        let method = method.on(gpu)?;
+        method.record(&mut Passes::new(gpu, self.recording, stream))
     }
 
     /// The uniform `batch` for the same number of rays, starting at `first`.

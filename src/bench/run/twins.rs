@@ -3,7 +3,7 @@
 use super::session::Session;
 use super::world::World;
 use crate::coherence::{Memory, of_rays, together};
-use raystone_accel::{BuildLog, CpuTwin, Space};
+use raystone_accel::{Access, BuildLog, CpuTwin, Space};
 use raystone_config::{Axis, Cell, Coherence};
 use raystone_record::{ClassCoherence, by_group};
 use raystone_verify::rays::RaySet;
@@ -25,6 +25,9 @@ pub(super) fn with_twin<T>(
     let built = built.map_err(|e| e.to_string())?;
     let twin = built.cpu_twin(&world.soup);
     let twin = twin.ok_or("it has no twin on the host")?;
+    if matches!(built.access(), Access::Pipeline(passes) if !passes.counts_work()) {
+        return Err("it answers rays together, and its twin one by one".to_owned());
+    }
     let memory = Memory::new(&*built, &world.soup)?;
     then(session, &*twin, &memory)
 }

@@ -5,10 +5,9 @@ use super::{Organisation, shading, sorting};
 use crate::{ImageSteps, Integrator};
 use raystone_accel::{LiveRays, Query};
 use raystone_core::parameters;
-use raystone_core::params::{Choice as _, Params, Variant};
-use raystone_gpu::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
-use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Groups, Storage, UniformValues, grid_of};
-use std::sync::Arc;
+use raystone_core::params::Params;
+use raystone_gpu::compaction::{Compaction, CompactionMethod, Passes, Stays, Stream};
+use raystone_gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, grid_of};
 
 /// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
 const PATH_BYTES: u64 = 7 * 16;
@@ -21,23 +20,6 @@ const SHADOWS: u32 = 1;
 const COUNTS_BYTES: u64 = 32;
 
 parameters! {
-    /// The compaction of the queue of live paths.
-    pub(crate) enum CompactionMethod {
-        /// `atomic` on software adapters, with their expensive barriers, else `workgroup`, as
-        /// measured.
-        Auto = "auto",
-        Atomic = "atomic",
-        /// A scan and one atomic for each workgroup.
-        Workgroup = "workgroup",
-        /// A ballot and one atomic for each subgroup.
-        Subgroup = "subgroup",
-        /// Counts, a scan of them, and each path to its place: stable.
-        ReduceScanScatter = "reduce-scan-scatter",
-        Horn = "horn",
-        Blelloch = "blelloch",
-        Roger = "roger",
-    }
-
     /// What is sorted.
     pub(crate) enum Sorting {
         Never = "none",
@@ -182,29 +164,6 @@ impl<'a> Queues<'a> {
         steps.trace_live(query, buffers, range, self.live(word))
     }
 
-    pub(super) fn method(
-        &self,
-        gpu: &Gpu,
-        wavefront: &Wavefront,
-    ) -> Result<Arc<dyn Compaction>, GpuError> {
-        let method = match wavefront.compaction {
-            CompactionMethod::Auto if gpu.is_software() => CompactionMethod::Atomic,
-            CompactionMethod::Auto => CompactionMethod::Workgroup,
-            chosen => chosen,
-        };
-        let method = Variant {
-            label: String::new(),
-            name: method.name().to_owned(),
-            params: Params::default(),
-        };
-        let method = CompactionRegistry::default().configured(&method);
-        let method = method.map_err(GpuError::Kernel)?;
-        match method.refusal(gpu) {
-            Some(reason) => Err(GpuError::Kernel(reason)),
-            None => Ok(method),
-        }
-    }
-
     /// Compacts flagged elements: words of `elements`, one per live path, are copied to `kept`, and
     /// their number to `count`.
     pub(super) fn keep(
@@ -232,7 +191,7 @@ impl<'a> Queues<'a> {
     fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let queue = self.scratch("queue", 4 * u64::from(self.capacity));
-        let method = self.method(steps.gpu(), wavefront)?;
+        let method = wavefront.compaction.on(steps.gpu())?;
         let kept = self.scratch("kept queue", 4 * u64::from(self.capacity));
         let count = self.scratch("kept_count", COUNTS_BYTES);
         self.keep(steps, &*method, Stays::All, [&queue, &kept, &count])?;

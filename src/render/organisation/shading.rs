@@ -31,7 +31,7 @@ pub(super) fn by_kind(
     wavefront: &Wavefront,
     order: Option<Storage>,
 ) -> Result<(), GpuError> {
-    let method = queues.method(steps.gpu(), wavefront)?;
+    let method = wavefront.compaction.on(steps.gpu())?;
     let words = |of: u32| 4 * u64::from(queues.capacity) * u64::from(of);
     let number = steps.material_kinds().count() as u32 + 1;
     let parts = if method.keeps_apart() { number } else { 1 };

@@ -1,10 +1,8 @@
 //! Choices of a kernel, and kernels that cover every pair of choices.
 
 use super::covering::{Choice, pairwise};
-use crate::support::{Pcg, build, param_variants, scenes};
-use raystone::accel::{
-    AccelRegistry, BoxTest, Intersection, RefillParameters, TriangleRegistry, Workgroup,
-};
+use crate::support::{Pcg, build, inline_structures, param_variants, scenes};
+use raystone::accel::{BoxTest, Intersection, RefillParameters, TriangleRegistry, Workgroup};
 use raystone::gpu::Composition;
 use raystone::integrator::{IntegratorRegistry, OffsetRegistry, SceneFeatures, with_sampler};
 use raystone::params::{Entry, Variant};
@@ -160,7 +158,7 @@ fn lay(part: &Part, kernel: &mut Composition) {
 fn structures() -> (Factor, BTreeSet<Part>) {
     let soup = scenes::lattice_soup(&mut Pcg::new(1), 50, 5);
     let (mut parts, mut refilled) = (Vec::new(), BTreeSet::new());
-    for kind in AccelRegistry::default().iter() {
+    for kind in inline_structures() {
         for params in param_variants(&kind.parameters()) {
             let built = build(kind, &soup, &params);
             let part = built.buffers().activate(part());

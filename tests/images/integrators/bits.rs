@@ -93,7 +93,7 @@ fn images(stage: &Stage, what: &Variant) -> Vec<(&'static str, Vec<[u32; 3]>)> {
         let renderer = stage.renderer(gpu(), &traced, &sampler, what, [16, 16], false);
         (kind.name(), last(&renderer, &[4], 9))
     };
-    let kinds = structures().into_iter();
+    let kinds = inline_structures().into_iter();
     let others = in_turn(
         "structures of an image",
         kinds.filter(|kind| kind.name() != "bvh"),

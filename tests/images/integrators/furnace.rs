@@ -102,7 +102,7 @@ fn every_pixel_of_the_white_furnace_is_one_and_none_is_where_the_sphere_is_grey(
         let errors = image.pixels.iter().flatten().map(|v| (v - 1.0).abs());
         errors.fold(0.0, f32::max)
     };
-    for kind in in_turn("structures of the white furnace", structures()) {
+    for kind in in_turn("structures of the white furnace", inline_structures()) {
         let error = largest_error(&white, kind.name());
         assert!(error < 1e-5, "{}: {error}", kind.name());
     }

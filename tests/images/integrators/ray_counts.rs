@@ -33,7 +33,7 @@ fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 5] {
 #[test]
 fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[("albedo", ParamValue::Number(0.8))]);
-    let kinds = in_turn("structures that count rays", structures());
+    let kinds = in_turn("structures that count rays", inline_structures());
     let [primary, shadow, ao, bounce, skipped] = counts(&stage, &path(3), &kinds);
     assert_eq!(shadow + skipped, 3 * SAMPLES);
     assert_eq!([primary, ao, bounce], [SAMPLES, 0, 3 * SAMPLES]);

@@ -11,6 +11,7 @@ mod instanced;
 mod late_samples;
 mod path_lights;
 mod paths;
+mod rays;
 mod reach;
 mod samplers;
 mod shared;
@@ -39,6 +40,7 @@ pub fn mutants() -> Vec<Mutant> {
         path_lights::MUTANTS,
         frames::MUTANTS,
         counts::MUTANTS,
+        rays::MUTANTS,
     ]
     .concat()
 }

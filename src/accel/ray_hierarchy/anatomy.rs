@@ -1,0 +1,144 @@
+//! What a descent costs, level by level, by the scalar twin of its passes.
+
+use super::enclosing::enclosing;
+use super::layout::Layout;
+use super::node::{FAR, Node, no_rays, node_of_ray};
+use super::primitives::Primitives;
+use super::{Options, Order, Union};
+use crate::{AccelError, Ray, TriangleSoup};
+use rayon::prelude::*;
+use raystone_core::params::{Parameters as _, Params};
+
+/// A level of the tree over rays, and what passed through it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LevelAnatomy {
+    /// Nodes with rays.
+    pub nodes: u64,
+    /// Pairs of a node of this level, with rays, and a primitive that were tested.
+    pub tests: u64,
+    /// Those that met: the stream of this level.
+    pub pairs: u64,
+    /// Mean and greatest half opening angle of nodes, radians.
+    pub angle: [f64; 2],
+    /// Mean and greatest radius of nodes, scene units.
+    pub radius: [f64; 2],
+}
+
+/// The levels of a descent, from the leaves up to where it began.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Anatomy {
+    /// Rays with a direction.
+    pub rays: u64,
+    /// Levels, leaves first.
+    pub levels: Vec<LevelAnatomy>,
+}
+
+impl Anatomy {
+    /// Streams all triangles through a tree over `rays` on the host, in their order, without chunks.
+    ///
+    /// # Errors
+    /// Unknown parameters, or an order or chunks that only the device has.
+    pub fn new(soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Result<Self, AccelError> {
+        let options = Options::from_params(params)?;
+        if options.order != Order::Natural || options.chunks > 1 {
+            return Err(AccelError::Contradiction(
+                "the anatomy of a ray-hierarchy is that of order = \"natural\" and chunks = 1"
+                    .to_owned(),
+            ));
+        }
+        let primitives = Primitives::new(soup, &options);
+        let layout = Layout::new(rays.len() as u32, primitives.count, &options);
+        let levels = tree(soup, &options, &layout, rays);
+        let live = rays.iter().filter(|ray| ray.is_ray()).count() as u64;
+        let mut found: Vec<LevelAnatomy> = levels.iter().map(|nodes| shape(nodes)).collect();
+        found.truncate(layout.begin + 1);
+        let (bounding, bound) = (options.bounding(), options.bound);
+        let branching = options.branching as usize;
+        let counts = primitives.all().par_iter().map(|primitive| {
+            let mut counts = vec![[0_u64; 2]; layout.begin + 1];
+            let mut met: Vec<usize> = (0..levels[layout.begin].len()).collect();
+            for level in (0..=layout.begin).rev() {
+                let nodes = &levels[level];
+                if level < layout.begin {
+                    let children = |node: &usize| node * branching..(node + 1) * branching;
+                    met = met.iter().flat_map(children).collect();
+                    met.retain(|child| *child < nodes.len());
+                }
+                counts[level][0] = met
+                    .iter()
+                    .filter(|node| nodes[**node].radius >= 0.0)
+                    .count() as u64;
+                met.retain(|node| primitive.meets(&nodes[*node], bound, &bounding));
+                counts[level][1] = met.len() as u64;
+            }
+            counts
+        });
+        for counts in counts.collect::<Vec<_>>() {
+            for (level, [tests, pairs]) in found.iter_mut().zip(counts) {
+                level.tests += tests;
+                level.pairs += pairs;
+            }
+        }
+        Ok(Self {
+            rays: live,
+            levels: found,
+        })
+    }
+
+    /// Tests of a node against a primitive.
+    pub fn tests(&self) -> u64 {
+        self.levels.iter().map(|level| level.tests).sum()
+    }
+
+    /// Pairs of the longest stream.
+    pub fn peak(&self) -> u64 {
+        self.levels
+            .iter()
+            .map(|level| level.pairs)
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+/// Nodes of all levels. CPU version of `leaves.wesl` and `unions.wesl`.
+fn tree(soup: &TriangleSoup, options: &Options, layout: &Layout, rays: &[Ray]) -> Vec<Vec<Node>> {
+    let bounding = options.bounding();
+    let pairwise = options.union == Union::Pairwise;
+    let leaf_of = |ray: &Ray| {
+        if !ray.is_ray() {
+            return no_rays();
+        }
+        let ray = soup.intersection.raised(ray);
+        let end = if options.reach { ray.t_max } else { FAR };
+        node_of_ray(ray.origin, ray.direction, end, &bounding)
+    };
+    let mut level: Vec<Node> = rays.iter().map(leaf_of).collect();
+    level.resize(layout.rays as usize, no_rays());
+    let widths = std::iter::once(options.bundle).chain(std::iter::repeat(options.branching));
+    let mut levels: Vec<Vec<Node>> = Vec::new();
+    for (_, width) in layout.levels.iter().zip(widths) {
+        let around = |children: &mut [Node]| enclosing(children, pairwise, &bounding);
+        level = level
+            .clone()
+            .par_chunks_mut(width as usize)
+            .map(around)
+            .collect();
+        levels.push(level.clone());
+    }
+    levels
+}
+
+fn shape(nodes: &[Node]) -> LevelAnatomy {
+    let live: Vec<&Node> = nodes.iter().filter(|node| node.radius >= 0.0).collect();
+    let of = |value: &dyn Fn(&Node) -> f64| {
+        let values = live.iter().map(|node| value(node));
+        let sum: f64 = values.clone().sum();
+        [sum / live.len().max(1) as f64, values.fold(0.0, f64::max)]
+    };
+    LevelAnatomy {
+        nodes: live.len() as u64,
+        angle: of(&Node::angle),
+        radius: of(&|node| f64::from(node.radius)),
+        ..LevelAnatomy::default()
+    }
+}
