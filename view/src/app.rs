@@ -387,24 +387,21 @@ impl App {
 
     /// Shows a model, or what an experiment says.
     pub fn open(&mut self, path: &Path) {
-        if !is_experiment(path) {
-            self.screen
-                .open(&path.display().to_string(), &self.worker.catalogue);
-            return;
-        }
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| format!("cannot read {}: {e}", path.display()));
         let name = path.display().to_string();
-        let screen = text.and_then(|text| Screen::parse(&text, &name, &[], &self.registries));
-        match screen {
-            Ok(screen) => self.screen = screen,
-            Err(text) => {
-                self.message = Some(Message {
-                    text,
-                    is_error: true,
-                })
-            }
-        }
+        let opened = if is_experiment(path) {
+            let text =
+                std::fs::read_to_string(path).map_err(|e| format!("cannot read {name}: {e}"));
+            text.and_then(|text| {
+                self.screen = Screen::parse(&text, &name, &[], &self.registries)?;
+                Ok(())
+            })
+        } else {
+            self.screen.open(&name, &self.worker.catalogue)
+        };
+        self.message = opened.err().map(|text| Message {
+            text,
+            is_error: true,
+        });
     }
 
     fn copy(&mut self, ui: &Ui) {

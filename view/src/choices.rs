@@ -55,6 +55,7 @@ fn draw_axis(
     ui.horizontal(|ui| {
         let list = ComboBox::from_id_salt((axis.name(), side))
             .width(150.0)
+            .truncate()
             .selected_text(&now.label)
             .show_ui(ui, |ui| {
                 let renders = |entry: &&Entry| {
@@ -70,7 +71,7 @@ fn draw_axis(
         let label = ui.label(axis.name());
         list.response.labelled_by(label.id);
     });
-    // Models have the parameters that all scenes share.
+    // Those of a model are changed in an experiment.
     let entry = entries.iter().find(|entry| entry.name == now.name);
     let schema: Vec<&Parameter> = entry.iter().flat_map(|entry| &entry.schema).collect();
     if schema.is_empty() {

@@ -259,7 +259,7 @@ fn pixels(picture: &Picture, most: usize) -> egui::ColorImage {
 /// Says why there is no image.
 fn draw_absence(ui: &Ui, painter: &egui::Painter, part: Rect, frame: &Frame, side: usize) {
     let fault = frame.sides.get(side).and_then(|side| side.fault.clone());
-    let text = fault.unwrap_or_else(|| "no image yet".to_owned());
+    let text = fault.unwrap_or_else(|| "no image yet: the driver compiles its kernels".to_owned());
     let font = egui::TextStyle::Body.resolve(ui.style());
     let galley = painter.layout(text, font, ui.visuals().text_color(), part.width() * 0.9);
     painter.galley(

@@ -1,6 +1,6 @@
 //! The pixel that was clicked: its value, hit, path and points.
 
-use crate::worker::{Ask, Worker};
+use crate::worker::{Ask, ShownPath, Worker};
 use eframe::egui;
 use egui::{Color32, DragValue, RichText, ScrollArea, Sense, Ui, Vec2};
 use raystone_viewer::{Inspection, SIDE_NAMES, SamplePoints, Screen, Seen};
@@ -100,27 +100,7 @@ impl PixelPanel {
                 worker.ask(Ask::Explain(self.side, pixel));
             }
         });
-        if let Some(path) = path {
-            egui::CollapsingHeader::new("Path")
-                .default_open(true)
-                .show(ui, |ui| {
-                    if path.text.is_empty() {
-                        ui.label("It leaves the scene at once.");
-                    }
-                    for line in &path.text {
-                        ui.label(RichText::new(line).small());
-                    }
-                });
-        }
-        if let Some(text) = explanation {
-            egui::CollapsingHeader::new("Trace")
-                .default_open(true)
-                .show(ui, |ui| {
-                    ScrollArea::both().max_height(260.0).show(ui, |ui| {
-                        ui.label(RichText::new(text).monospace().small());
-                    });
-                });
-        }
+        draw_findings(ui, path, explanation);
         self.draw_points(ui, worker, screen, points);
     }
 
@@ -196,6 +176,31 @@ impl PixelPanel {
             .star
             .map_or("–".to_owned(), |star| format!("{star:.5}"));
         ui.label(format!("{} points, D* {star}", points.points.len()));
+    }
+}
+
+/// What was asked for at the pixel: a path, and what the structure does with the ray.
+fn draw_findings(ui: &mut Ui, path: Option<ShownPath>, explanation: Option<String>) {
+    if let Some(path) = path {
+        egui::CollapsingHeader::new("Path")
+            .default_open(true)
+            .show(ui, |ui| {
+                if path.text.is_empty() {
+                    ui.label("It leaves the scene at once.");
+                }
+                for line in &path.text {
+                    ui.label(RichText::new(line).small());
+                }
+            });
+    }
+    if let Some(text) = explanation {
+        egui::CollapsingHeader::new("Trace")
+            .default_open(true)
+            .show(ui, |ui| {
+                ScrollArea::both().max_height(260.0).show(ui, |ui| {
+                    ui.label(RichText::new(text).monospace().small());
+                });
+            });
     }
 }
 

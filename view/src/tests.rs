@@ -91,6 +91,66 @@ fn keys_split_the_image_choose_a_map_and_move_the_line() {
     );
 }
 
+/// A file that is let go over the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
+#[test]
+fn a_dropped_model_is_shown_and_an_experiment_brings_back_what_was_on_screen() {
+    let folder = tempfile::tempdir().unwrap();
+    let [model, experiment] = ["one.obj", "screen.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut harness = window(&["--accel", "bvh,cwbvh"], 1);
+    let drop = |harness: &mut Harness<'_, App>, path: &Path| {
+        let file = Dropped(path.to_owned());
+        let files = &mut harness.input_mut().dropped_files;
+        files.push(std::sync::Arc::new(file));
+        settle(harness);
+    };
+    drop(&mut harness, &model);
+    assert!(has(&harness, "1 triangles"));
+    harness.key_press(egui::Key::Plus);
+    settle(&mut harness);
+    let before = harness.state().screen.clone();
+    assert_eq!((before.cells.len(), before.window.exposure), (2, 0.5));
+    let text = before.to_toml(&harness.state().worker.catalogue);
+    std::fs::write(&experiment, text).unwrap();
+    harness.key_press(egui::Key::M);
+    settle(&mut harness);
+    assert_ne!(harness.state().screen, before);
+    drop(&mut harness, &experiment);
+    assert_eq!(harness.state().screen, before);
+}
+
+#[test]
+fn a_drag_moves_the_camera_and_home_returns_to_that_of_the_scene() {
+    let mut harness = window(&[], 1);
+    assert_eq!(harness.state().screen.camera, None);
+    let middle = egui::pos2(640.0, 500.0);
+    harness.hover_at(middle);
+    harness.drag_at(middle);
+    harness.hover_at(middle + egui::vec2(40.0, 10.0));
+    harness.drop_at(middle + egui::vec2(40.0, 10.0));
+    settle(&mut harness);
+    let moved = harness.state().screen.camera.unwrap();
+    let found = harness.state().worker.found().camera;
+    assert_eq!(found, Some(moved), "the image is that of the camera");
+    harness.key_press(egui::Key::Home);
+    settle(&mut harness);
+    assert_eq!(harness.state().screen.camera, None);
+    assert_ne!(harness.state().worker.found().camera, Some(moved));
+}
+
 #[test]
 fn a_wrong_file_is_a_sentence_and_the_screen_stays() {
     let mut harness = window(&[], 1);
@@ -98,6 +158,7 @@ fn a_wrong_file_is_a_sentence_and_the_screen_stays() {
     for (path, says) in [
         ("no/such.ply", "no/such.ply"),
         ("no/such.toml", "cannot read"),
+        ("notes.txt", "neither built in"),
     ] {
         harness.state_mut().open(std::path::Path::new(path));
         expect(&mut harness, says);
