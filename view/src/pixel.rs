@@ -5,6 +5,9 @@ use eframe::egui;
 use egui::{Color32, DragValue, RichText, ScrollArea, Sense, Ui, Vec2};
 use raystone_viewer::{Inspection, SIDE_NAMES, SamplePoints, Screen, Seen};
 
+/// Height of the text of a trace, which may have hundreds of lines, points.
+const TRACE: f32 = 260.0;
+
 /// The panel of the inspected pixel.
 pub struct PixelPanel {
     pixel: Option<[u32; 2]>,
@@ -189,7 +192,7 @@ fn draw_findings(ui: &mut Ui, path: Option<ShownPath>, explanation: Option<Strin
                     ui.label("It leaves the scene at once.");
                 }
                 for line in &path.text {
-                    ui.label(RichText::new(line).small());
+                    ui.label(line);
                 }
             });
     }
@@ -197,8 +200,11 @@ fn draw_findings(ui: &mut Ui, path: Option<ShownPath>, explanation: Option<Strin
         egui::CollapsingHeader::new("Trace")
             .default_open(true)
             .show(ui, |ui| {
-                ScrollArea::both().max_height(260.0).show(ui, |ui| {
-                    ui.label(RichText::new(text).monospace().small());
+                let place = ScrollArea::both()
+                    .max_height(TRACE)
+                    .min_scrolled_height(TRACE);
+                place.show(ui, |ui| {
+                    ui.add(egui::Label::new(RichText::new(text).monospace()).extend());
                 });
             });
     }
