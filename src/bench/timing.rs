@@ -4,7 +4,9 @@
 use raystone_config::Timing;
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Elapsed, Gpu, GpuError, Stopwatch};
-use raystone_stats::statistics::median;
+use raystone_record::figure::Figure;
+use raystone_record::{Reading, Samples as Rounds};
+use raystone_stats::statistics::{median, median_interval};
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 
@@ -71,6 +73,23 @@ pub struct Samples {
     pub wall_ms: Vec<f64>,
     /// Milliseconds of all processors, if counted.
     pub cpu_ms: Vec<f64>,
+}
+
+impl Samples {
+    /// Nanoseconds per item: the median of the rounds with its interval, and the rounds.
+    ///
+    /// # Errors
+    /// Nothing was timed.
+    pub fn ns_per_item(&self, figure: &'static Figure, items: f64) -> Result<Reading, String> {
+        let each = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / items).collect();
+        let rounds: Vec<f64> = each(&self.ms);
+        let median = median_interval(&rounds).ok_or("nothing was timed")?;
+        Ok(Reading::new(figure, median).with_samples(Rounds::Rounds {
+            adapter: rounds,
+            wall: each(&self.wall_ms),
+            processors: Vec::new(),
+        }))
+    }
 }
 
 /// Measures everything `rounds` times in rounds of random order; failures keep their error.

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// Make a page of the records of many devices, by scene and class of rays; what does not hold is left out with the reason
 #[derive(Args)]
 pub struct GalleryOf {
-    /// Folders with records.jsonl; one a device
+    /// Folders with records.jsonl, which runs wrote or the web page; one a device
     #[arg(required = true)]
     dirs: Vec<PathBuf>,
     /// Folder for the page

@@ -26,6 +26,7 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+mod view;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -105,6 +106,7 @@ commands! {
     Export(export::Export),
     Repro(repro::Repro),
     Render(render::Render),
+    View(view::View),
     Verify(verify::Verify),
     Trace(trace::Trace),
     Stress(stress::Stress),

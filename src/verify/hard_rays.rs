@@ -44,17 +44,34 @@ pub fn hard_rays(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Vec
     rays
 }
 
+/// Zero for a denormal number: WGSL lets an adapter flush them, so a ray with one has no single right answer.
+fn flushed(x: f32) -> f32 {
+    if x.is_subnormal() { 0.0 } else { x }
+}
+
+/// The next number above `t` that is not denormal.
+fn next_above(t: f32) -> f32 {
+    let next = t.next_up();
+    if next.is_subnormal() {
+        f32::MIN_POSITIVE
+    } else {
+        next
+    }
+}
+
 /// A part of a whole ray, around the distance `t` of its hit.
 fn part(ray: &Ray, t: f32, turn: usize) -> Ray {
+    let t = flushed(t);
+    let (above, below) = (next_above(t), -next_above(-t));
     let [t_min, t_max] = match turn % 16 {
         0..=2 => [0.0, t],
-        3 | 4 => [0.0, t.next_down()],
-        5 => [0.0, t.next_up()],
+        3 | 4 => [0.0, below],
+        5 => [0.0, above],
         6 | 7 => [t, Ray::FAR],
-        8 | 9 => [t.next_up(), Ray::FAR],
-        10 => [t.next_down(), Ray::FAR],
+        8 | 9 => [above, Ray::FAR],
+        10 => [below, Ray::FAR],
         11 => [t, t],
-        12 => [t, t.next_down()],
+        12 => [t, below],
         13 => [0.0, 0.0],
         14 => [0.5 * t, 1e37],
         _ => [-0.0, 2.0 * t],
@@ -104,6 +121,7 @@ impl<'a> Maker<'a> {
             }
             _ => self.towards_a_triangle(),
         };
+        let [origin, direction] = [origin, direction].map(|v| v.map(flushed));
         let usable = direction.is_finite() && direction.abs().max_element() > 1e-16;
         Ray::new(origin, if usable { direction } else { Vec3::Y })
     }
@@ -235,5 +253,40 @@ impl<'a> Maker<'a> {
             }
         }
         direction
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone_accel::{AccelRegistry, BuildLog};
+    use raystone_core::params::{Params, Variant};
+    use raystone_scene::{LoadOptions, load};
+
+    #[test]
+    fn no_hard_ray_holds_a_denormal_number_and_some_end_beside_zero() {
+        let variant = Variant {
+            name: "cornell-box".to_owned(),
+            params: Params::default(),
+            label: String::new(),
+        };
+        let scene = load(&variant, &LoadOptions::default()).expect("a built-in scene");
+        let soup = TriangleSoup::new(&scene);
+        let registry = AccelRegistry::default();
+        let kind = registry.get("brute-force").expect("a structure");
+        let built = kind.build(&soup, &Params::default(), &mut BuildLog::default());
+        let built = built.unwrap_or_else(|e| panic!("{e}"));
+        let twin = built.cpu_twin(&soup).expect("a twin");
+        let rays = hard_rays(&soup, &*twin, 1);
+        assert_eq!(rays.len(), HARD_RAYS);
+        let ends = |ray: &Ray| [ray.t_min, ray.t_max];
+        for ray in &rays {
+            let numbers = [ray.origin, ray.direction].into_iter().flatten();
+            let denormal = numbers.chain(ends(ray)).any(f32::is_subnormal);
+            assert!(!denormal, "{ray}");
+        }
+        let beside = rays.iter().flat_map(ends);
+        let beside = beside.filter(|t| t.abs() == f32::MIN_POSITIVE).count();
+        assert!(beside > 100, "{beside} ends beside zero");
     }
 }

@@ -230,8 +230,13 @@ mod tests {
     #[test]
     fn a_model_with_an_odd_name_reads_back() {
         let mut screen = screen(&[]);
-        screen.open("my \"models\"/a b.obj", &Registries::default().catalogue());
-        let back = read_back(&screen);
-        assert_eq!(back.cells[0][Axis::Scene].name, "my \"models\"/a b.obj");
+        let catalogue = Registries::default().catalogue();
+        let model = "my \"models\"/a b.obj";
+        screen.open(model, &catalogue).unwrap();
+        assert_eq!(screen.cells[0][Axis::Scene].name, model);
+        assert_eq!(read_back(&screen), screen);
+        let before = screen.clone();
+        assert!(screen.open("notes.txt", &catalogue).is_err());
+        assert_eq!(screen, before);
     }
 }

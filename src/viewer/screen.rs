@@ -5,7 +5,7 @@ use raystone_config::{
     Axis, Catalogue, Cell, ConfigError, Experiment, Plan, Reference, Window, is_bench,
 };
 use raystone_core::geometry::Camera;
-use raystone_core::params::{Entry, Variant};
+use raystone_core::params::Variant;
 
 /// Names of the images, from left to right.
 pub const SIDE_NAMES: [&str; 2] = ["A", "B"];
@@ -117,13 +117,20 @@ impl Screen {
         }
     }
 
-    /// Shows a model file instead of the scene.
-    pub fn open(&mut self, path: &str, catalogue: &Catalogue) {
-        let builtin = catalogue[Axis::Scene]
-            .iter()
-            .find(|entry| entry.name == path);
-        let variant = builtin.map_or_else(|| Variant::plain(path), Entry::default_variant);
-        self.choose(0, Axis::Scene, &variant);
+    /// Shows another scene: a built-in one, or a model file.
+    ///
+    /// # Errors
+    /// It is neither by its name; in words. Whether there is such a file is not known yet.
+    pub fn open(&mut self, path: &str, catalogue: &Catalogue) -> Result<(), String> {
+        // As an experiment with this scene alone has it.
+        let name = toml::Value::from(path);
+        let text = format!("[axes]\nscene = [{name}]\naccel = [\"bvh\"]\nsequence = [\"sobol\"]\n");
+        let read = Experiment::parse(&text, "scene", &[], catalogue);
+        let scenes = &read.map_err(|e| e.to_string())?.axes[Axis::Scene];
+        if let Some(scene) = scenes.first() {
+            self.choose(0, Axis::Scene, scene);
+        }
+        Ok(())
     }
 
     /// Shows a second image, at first equal to the first; or no longer.

@@ -253,7 +253,7 @@ fn what_cannot_be_shown_is_a_sentence_and_leaves_what_is_on_screen() {
         (empty.to_str().unwrap(), "triangle"),
     ] {
         let mut screen = good.clone();
-        screen.open(path, &catalogue);
+        screen.open(path, &catalogue).unwrap();
         bad.push((screen, says));
     }
     let mut flat = good.clone();

@@ -9,6 +9,7 @@ mod discrepancy;
 mod experiments;
 mod kernel_errors;
 mod linear_images;
+mod lock_files;
 mod models;
 mod oracle;
 mod parameters;

@@ -4,7 +4,7 @@
 use std::fmt::Display;
 
 /// Possible needs, by the words that `RAYSTONE_REQUIRE` accepts, separated by blanks.
-const KNOWN: [&str; 14] = [
+const KNOWN: [&str; 15] = [
     // Adapter: one that computes as the host does; the very driver of the table of image hashes.
     "exact-adapter",
     "known-driver",
@@ -13,6 +13,7 @@ const KNOWN: [&str; 14] = [
     "fuzz",
     // Programs.
     "chromium",
+    "wasm",
     "npm",
     "slurm",
     "shells",

@@ -4,12 +4,17 @@ use super::Descent;
 use crate::timing::Samples;
 use raystone_accel::LevelAnatomy;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
-use raystone_record::{Key, Reading, Samples as Rounds, axis};
-use raystone_stats::statistics::median_interval;
+use raystone_record::{Key, Reading, axis};
 
 const fn counted(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
     let shown = Shown::Digits(3);
     Figure::new(id, title, unit, Better::Lower, shown, Spread::Exact)
+}
+
+/// What depends on the order in which pairs come, where a stream is too short.
+const fn once(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
+    let shown = Shown::Digits(3);
+    Figure::new(id, title, unit, Better::Lower, shown, Spread::Single)
 }
 
 /// What describes a level, and is neither good nor bad.
@@ -64,8 +69,8 @@ pub(super) static FIGURES: [Figure; 16] = [
     ),
     counted("descent-tests/v1", "tests of nodes", "per ray"),
     counted("descent-candidates/v1", "candidates", "per ray"),
-    counted("descent-longest/v1", "longest stream", "pairs per ray"),
-    counted("descent-walked/v1", "pairs without room", "per ray"),
+    once("descent-longest/v1", "longest stream", "pairs per ray"),
+    once("descent-walked/v1", "pairs without room", "per ray"),
     counted("level-tests/v1", "tests of a level", "per ray"),
     counted("level-pairs/v1", "pairs of a level", "per ray"),
     shape("level-nodes/v1", "nodes of a level", ""),
@@ -77,20 +82,15 @@ pub(super) static FIGURES: [Figure; 16] = [
 
 /// Times per ray, without building and with it.
 pub(super) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<Reading>, String> {
-    let timed = |figure: usize, build_ms: f64| {
-        let each = |ms: &[f64]| ms.iter().map(|ms| (ms + build_ms) * 1e6 / rays).collect();
-        let rounds: Vec<f64> = each(&samples.ms);
-        let median = median_interval(&rounds).ok_or("nothing was timed")?;
-        let rounds = Rounds::Rounds {
-            adapter: rounds,
-            wall: each(&samples.wall_ms),
-            processors: Vec::new(),
-        };
-        Ok::<_, String>(Reading::new(&FIGURES[figure], median).with_samples(rounds))
+    let after_building = |ms: &[f64]| ms.iter().map(|ms| ms + build_ms).collect();
+    let frame = Samples {
+        ms: after_building(&samples.ms),
+        wall_ms: after_building(&samples.wall_ms),
+        cpu_ms: Vec::new(),
     };
     Ok(vec![
-        timed(TIME, 0.0)?,
-        timed(FRAME, build_ms)?,
+        samples.ns_per_item(&FIGURES[TIME], rays)?,
+        frame.ns_per_item(&FIGURES[FRAME], rays)?,
         Reading::exact(&FIGURES[BUILD], build_ms),
     ])
 }

@@ -6,13 +6,12 @@ use crate::compaction::{Bench, Inputs, Load, benched, stream};
 use crate::timing::{Measured, Samples};
 use raystone_config::{Axis, COMPACTIONS, Cell, Experiment, Plan};
 use raystone_gpu::{Elapsed, GpuError, Player};
+use raystone_record::Reading;
 use raystone_record::figure::{
     COMPACTION_GB_PER_S, COMPACTION_KEPT, COMPACTION_LEAST_BYTES, COMPACTION_MELEMENTS_PER_S,
     COMPACTION_NS, COMPACTION_PASSES, COMPACTION_SCRATCH, Figure,
 };
-use raystone_record::{Reading, Samples as Rounds};
 use raystone_stats::rates::millions_per_second;
-use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 
 pub(super) struct Compactions;
@@ -81,9 +80,6 @@ impl Prepared for Ready {
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
         let elements = f64::from(self.load.elements);
-        let per_element = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / elements).collect();
-        let rounds: Vec<f64> = per_element(&samples.ms);
-        let ns = median_interval(&rounds).ok_or("nothing was timed")?;
         let rates = [
             (&COMPACTION_MELEMENTS_PER_S, elements),
             (&COMPACTION_GB_PER_S, self.bench.least_bytes() as f64 * 1e-3),
@@ -94,16 +90,10 @@ impl Prepared for Ready {
             (&COMPACTION_LEAST_BYTES, self.bench.least_bytes() as f64),
             (&COMPACTION_SCRATCH, self.bench.scratch_bytes as f64),
         ];
-        let time = Reading::new(&COMPACTION_NS, ns)
-            .of_work(format!(
-                "{} elements of {} bytes",
-                self.load.elements, self.load.bytes
-            ))
-            .with_samples(Rounds::Rounds {
-                adapter: rounds,
-                wall: per_element(&samples.wall_ms),
-                processors: Vec::new(),
-            });
+        let time = (samples.ns_per_item(&COMPACTION_NS, elements)?).of_work(format!(
+            "{} elements of {} bytes",
+            self.load.elements, self.load.bytes
+        ));
         let rates = rates.into_iter().filter_map(|(figure, items)| {
             Some(Reading::new(
                 figure,

@@ -5,7 +5,8 @@ mod photons;
 mod structures;
 
 use raystone_bench::run::{Absent, Registries};
-use raystone_config::{Axis, Cell, MEDIA};
+use raystone_config::{Axis, Catalogue, Cell, MEDIA, Plan};
+use raystone_core::params::{Entry, Parameters};
 
 /// Adds the measurements of media.
 ///
@@ -15,6 +16,22 @@ pub fn register(registries: &mut Registries) -> Result<(), String> {
     registries.measurements.add(&structures::Structures)?;
     registries.measurements.add(&paths::Paths)?;
     registries.measurements.add(&photons::Photons)
+}
+
+/// Adds a name to the axis of integrators.
+fn declare<P: Parameters>(catalogue: &mut Catalogue, name: &str, about: &str) {
+    catalogue[Axis::Integrator].push(Entry {
+        name: format!("{MEDIA}{name}"),
+        description: about.to_owned(),
+        schema: P::schema(),
+    });
+}
+
+/// The cells of a plan, distinct on these axes, whose integrator has such a name.
+fn cells_of(plan: &Plan, axes: &[Axis], is_wanted: impl Fn(&str) -> bool) -> Vec<Cell> {
+    let mut cells = plan.benches_on(axes);
+    cells.retain(|cell| name_of(cell).is_some_and(&is_wanted));
+    cells
 }
 
 /// The name of a cell's integrator without [`MEDIA`].

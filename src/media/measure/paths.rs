@@ -1,6 +1,6 @@
 //! Curved paths: schemes for the ray equation × where steps end, through a lens of Luneburg and a ball of glass.
 
-use super::name_of;
+use super::{cells_of, declare};
 use crate::march::{
     Ended, March, Marcher, Path, Rule, Scheme, angle_of, ball_deviation, focus_miss, march_path,
     parallel_rays,
@@ -11,13 +11,12 @@ use crate::{procedures, structure};
 use glam::{UVec3, Vec3};
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_bench::timing::{Measured, Samples};
-use raystone_config::{Axis, Catalogue, Cell, Experiment, MEDIA, Plan};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
-use raystone_core::params::{Entry, Parameters as _};
+use raystone_core::params::Parameters as _;
 use raystone_gpu::{Elapsed, GpuError, probe_arithmetic};
+use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
-use raystone_record::{Reading, Samples as Rounds};
-use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 
 /// The name on the axis of integrators, after [`MEDIA`].
@@ -125,17 +124,13 @@ impl Measurement for Paths {
     }
 
     fn declare(&self, catalogue: &mut Catalogue) {
-        catalogue[Axis::Integrator].push(Entry {
-            name: format!("{MEDIA}{NAME}"),
-            description: Load::ABOUT.to_owned(),
-            schema: Load::schema(),
-        });
+        declare::<Load>(catalogue, NAME, Load::ABOUT);
     }
 
     fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
-        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Kernels]);
-        cells.retain(|cell| name_of(cell) == Some(NAME));
-        cells
+        cells_of(plan, &[Axis::Integrator, Axis::Kernels], |name| {
+            name == NAME
+        })
     }
 
     fn unit_name(&self, cell: &Cell) -> String {
@@ -306,21 +301,13 @@ impl Prepared for Ready {
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
-        let each = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / f64::from(RAYS)).collect();
-        let rounds: Vec<f64> = each(&samples.ms);
-        let median = median_interval(&rounds).ok_or("nothing was timed")?;
-        let rounds = Rounds::Rounds {
-            adapter: rounds,
-            wall: each(&samples.wall_ms),
-            processors: Vec::new(),
-        };
         let [_, _, drift, steps, capped, time] = &FIGURES;
         Ok(vec![
             self.error.clone(),
             Reading::exact(drift, self.drift),
             Reading::exact(steps, self.steps),
             Reading::exact(capped, self.capped as f64),
-            Reading::new(time, median).with_samples(rounds),
+            samples.ns_per_item(time, f64::from(RAYS))?,
         ])
     }
 }

@@ -1,15 +1,15 @@
 //! Photons on a square: what is counted of a point set in an order, warped or not.
 
-use super::name_of;
+use super::{cells_of, declare};
 use crate::photons::{
     ImportanceMap, Order, Points, Warp, cell_deviation, collisions, density_deviation, ordered,
     point_set, segments_of_32,
 };
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_bench::timing::Samples;
-use raystone_config::{Axis, Catalogue, Cell, Experiment, MEDIA, Plan};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
-use raystone_core::params::{Entry, Parameters as _};
+use raystone_core::params::Parameters as _;
 use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
 
@@ -90,17 +90,11 @@ impl Measurement for Photons {
     }
 
     fn declare(&self, catalogue: &mut Catalogue) {
-        catalogue[Axis::Integrator].push(Entry {
-            name: format!("{MEDIA}{NAME}"),
-            description: Load::ABOUT.to_owned(),
-            schema: Load::schema(),
-        });
+        declare::<Load>(catalogue, NAME, Load::ABOUT);
     }
 
     fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
-        let mut cells = plan.benches_on(&[Axis::Integrator]);
-        cells.retain(|cell| name_of(cell) == Some(NAME));
-        cells
+        cells_of(plan, &[Axis::Integrator], |name| name == NAME)
     }
 
     fn unit_name(&self, cell: &Cell) -> String {

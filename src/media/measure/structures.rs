@@ -1,19 +1,18 @@
 //! Structures over volumes: each answer is checked, then rays are walked through all of them in the same rounds.
 
-use super::name_of;
+use super::{cells_of, declare, name_of};
 use crate::medium::{Homogeneity, Medium};
 use crate::rays::{SegmentRay, random_and_hard};
 use crate::segments::{Walked, Walker, exact_depth, first_difference, wrong_segment};
 use crate::{Volume, procedures, structure};
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_bench::timing::{Measured, Samples};
-use raystone_config::{Axis, Catalogue, Cell, Experiment, MEDIA, Plan};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
-use raystone_core::params::{Entry, Parameters as _, Variant};
+use raystone_core::params::{Parameters as _, Variant};
 use raystone_gpu::{Elapsed, GpuError, probe_arithmetic};
+use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
-use raystone_record::{Reading, Samples as Rounds};
-use raystone_stats::statistics::median_interval;
 use std::sync::Arc;
 
 parameters! {
@@ -129,22 +128,16 @@ impl Measurement for Structures {
     }
 
     fn declare(&self, catalogue: &mut Catalogue) {
-        let entries = structure::registry()
-            .entries()
-            .into_iter()
-            .map(|entry| Entry {
-                name: format!("{MEDIA}{}", entry.name),
-                description: entry.description,
-                schema: Load::schema(),
-            });
-        catalogue[Axis::Integrator].extend(entries);
+        for entry in structure::registry().entries() {
+            declare::<Load>(catalogue, &entry.name, &entry.description);
+        }
     }
 
     fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
         let registry = structure::registry();
-        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Kernels]);
-        cells.retain(|cell| name_of(cell).is_some_and(|name| registry.find(name).is_some()));
-        cells
+        cells_of(plan, &[Axis::Integrator, Axis::Kernels], |name| {
+            registry.find(name).is_some()
+        })
     }
 
     fn unit_name(&self, cell: &Cell) -> String {
@@ -262,22 +255,11 @@ impl Prepared for Ready {
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
         let [steps, fetches, per_step, per_ray, build, bytes] = &FIGURES;
-        let timed = |figure, items: f64| {
-            let each = |ms: &[f64]| ms.iter().map(|ms| ms * 1e6 / items).collect();
-            let rounds: Vec<f64> = each(&samples.ms);
-            let median = median_interval(&rounds).ok_or("nothing was timed")?;
-            let rounds = Rounds::Rounds {
-                adapter: rounds,
-                wall: each(&samples.wall_ms),
-                processors: Vec::new(),
-            };
-            Ok::<_, String>(Reading::new(figure, median).with_samples(rounds))
-        };
         Ok(vec![
             Reading::exact(steps, self.steps),
             Reading::exact(fetches, self.fetches),
-            timed(per_step, self.rays * self.steps)?,
-            timed(per_ray, self.rays)?,
+            samples.ns_per_item(per_step, self.rays * self.steps)?,
+            samples.ns_per_item(per_ray, self.rays)?,
             Reading::exact(build, self.build_ms),
             Reading::exact(bytes, self.bytes),
         ])

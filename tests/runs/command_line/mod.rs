@@ -302,6 +302,29 @@ fn the_version_names_the_package_and_help_the_exit_codes() {
 }
 
 #[test]
+#[cfg(unix)]
+fn view_starts_the_window_beside_it_and_says_what_builds_one_that_is_missing() {
+    use std::os::unix::fs::PermissionsExt as _;
+    // Elsewhere, for a window may lie beside the program under test.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [copy, window] = ["raystone", "raystone-view"].map(|name| folder.path().join(name));
+    std::fs::copy(env!("CARGO_BIN_EXE_raystone"), &copy).expect("a writable folder");
+    let view = || {
+        let mut command = Command::new(&copy);
+        command.args(["view", "--help", "--accel", "bvh,cwbvh"]);
+        output(command.env("PATH", folder.path().join("no-such-folder")))
+    };
+    let message = error(&view(), 2);
+    assert!(message.contains("`scripts/view` builds"), "{message}");
+    std::fs::write(&window, "#!/bin/sh\necho \"$@\"\nexit 7\n").expect("a writable folder");
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(&window, executable).expect("a file of mine");
+    let ended = view();
+    assert_eq!(ended.status.code(), Some(7));
+    assert_eq!(stdout(&ended), "--help --accel bvh,cwbvh\n");
+}
+
+#[test]
 fn a_reader_that_goes_away_is_no_failure() {
     let (reader, writer) = std::io::pipe().expect("a pipe");
     drop(reader);

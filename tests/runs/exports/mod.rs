@@ -4,6 +4,7 @@
 mod consumers;
 mod damaged;
 mod validator;
+mod web;
 
 use raystone::export::{FORMATS, record_schema};
 use raystone::image::read_linear;

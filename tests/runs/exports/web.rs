@@ -1,0 +1,264 @@
+//! The web page: what it measured once is read by every command; and, where it is built and there is a Chromium, it measures a
+//! small scene, every structure passes its gate, and nothing is logged.
+
+use super::{done, folder_of, text, validator};
+use crate::support::{needs, tier};
+use raystone::export::record_schema;
+use serde_json::Value;
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Sender, channel};
+use std::time::Duration;
+
+/// What the page measured on SwiftShader: [`QUERY`].
+const SAMPLE: &str = include_str!("../../data/web-records.jsonl");
+/// A small scene in few rounds, started at once, with the records left at the server.
+const QUERY: &str = "start&post=/records&only=scene%3Dcornell-box&set=timing.rounds%3D6&set=timing.rays%3D4096&set=gate.rays%3D4096";
+/// How long a software adapter may take, with its compiler.
+const PATIENCE: Duration = Duration::from_secs(900);
+
+fn lines(records: &str) -> Vec<Value> {
+    let lines = records.lines();
+    lines
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect()
+}
+
+/// Checks records of the page: of the schema, every structure gated and timed in five classes, on a named software adapter.
+fn check(records: &str) {
+    let (schema, lines) = (record_schema(), lines(records));
+    for line in &lines {
+        validator::validate(&schema, &schema, line).expect("a record");
+    }
+    let run = &lines[0]["body"];
+    let environment = &run["environment"];
+    assert_eq!(run["kind"], "run");
+    assert_eq!(environment["backend"], "webgpu");
+    assert_eq!(environment["software"], true, "{environment:#}");
+    assert!(
+        environment["adapter"]
+            .as_str()
+            .is_some_and(|a| a.contains("swiftshader")),
+        "{environment:#}"
+    );
+    assert!(
+        environment["browser"]
+            .as_str()
+            .is_some_and(|b| b.contains("Chrome")),
+        "{environment:#}"
+    );
+    let structures: Vec<&Value> = lines
+        .iter()
+        .map(|line| &line["body"])
+        .filter(|body| body["kind"] == "structure")
+        .collect();
+    assert_eq!(structures.len(), 10);
+    for structure in structures {
+        assert_eq!(structure["gate"]["passed"], true, "{structure:#}");
+        assert_eq!(
+            structure["gate"]["classes"].as_array().map(Vec::len),
+            Some(6)
+        );
+        let timings = structure["timings"].as_array().expect("timings");
+        assert_eq!(timings.len(), 5, "{structure:#}");
+        for timing in timings {
+            assert!(
+                timing["mrays_s"]["value"].as_f64() > Some(0.0),
+                "{timing:#}"
+            );
+            assert!(
+                timing["ms"].as_array().is_some_and(|ms| ms.len() >= 5),
+                "{timing:#}"
+            );
+        }
+    }
+    assert_eq!(lines.last().expect("lines")["body"]["kind"], "finished");
+}
+
+/// Every command that reads runs reads these records.
+fn read(records: &str) {
+    let folder = folder_of(records);
+    let dir = text(folder.path());
+    let inspected = done(&["inspect", dir]);
+    assert!(inspected.contains("10 of 10 cells"), "{inspected}");
+    done(&["report", dir]);
+    let page = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
+    assert!(page.contains("swiftshader") && page.contains("cwbvh"));
+    assert!(done(&["export", dir, "--format", "csv"]).contains("mrays-per-s"));
+    done(&["compare", dir, dir]);
+    let site = folder.path().join("site");
+    let gallery = done(&["gallery", dir, "--out", text(&site)]);
+    assert!(gallery.contains("swiftshader"), "{gallery}");
+}
+
+#[test]
+fn records_of_the_web_page_are_read_like_those_of_a_run() {
+    check(SAMPLE);
+    read(SAMPLE);
+    // The checks can fail.
+    for (what, with) in [
+        ("\"passed\":true", "\"passed\":false"),
+        ("\"webgpu\"", "\"vulkan\""),
+        ("\"timings\":[{", "\"timings\":[7,{"),
+    ] {
+        let wrong = SAMPLE.replacen(what, with, 1);
+        assert_ne!(wrong, SAMPLE);
+        assert!(
+            std::panic::catch_unwind(|| check(&wrong)).is_err(),
+            "{what}"
+        );
+    }
+}
+
+/// The built page: in a run of everything it is built first, in others it is what was built last.
+fn built() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let script = |arguments: &[&str]| {
+        let mut script = Command::new(root.join("scripts/web"));
+        script.args(arguments).output().expect("a shell")
+    };
+    if tier::is_full() {
+        let has_tools = script(&["--check"]);
+        if !has_tools.status.success() {
+            needs::skip("wasm", String::from_utf8_lossy(&has_tools.stderr).trim());
+            return None;
+        }
+        let made = script(&[]);
+        assert!(
+            made.status.success(),
+            "{}",
+            String::from_utf8_lossy(&made.stderr)
+        );
+    }
+    let dist = root.join("web/dist");
+    if !dist.join("index.html").exists() {
+        needs::skip("wasm", "scripts/web has not built the page; --full does");
+        return None;
+    }
+    Some(dist)
+}
+
+/// Answers one request: a file of the page, or the records that it leaves.
+fn answer(mut stream: TcpStream, dist: &Path, records: &Sender<Value>) -> std::io::Result<()> {
+    let (mut request, mut part) = (Vec::new(), [0; 1 << 16]);
+    let end = loop {
+        let count = stream.read(&mut part)?;
+        request.extend(&part[..count]);
+        if let Some(end) = request.windows(4).position(|w| w == b"\r\n\r\n") {
+            break end + 4;
+        }
+        if count == 0 {
+            return Ok(());
+        }
+    };
+    let head = String::from_utf8_lossy(&request[..end]).into_owned();
+    let path = head.split_whitespace().nth(1).unwrap_or("/");
+    if head.starts_with("POST") {
+        let length = head.lines().find_map(|line| {
+            line.to_lowercase()
+                .strip_prefix("content-length:")?
+                .trim()
+                .parse()
+                .ok()
+        });
+        let missing = (end + length.unwrap_or(0)).saturating_sub(request.len());
+        let mut rest = vec![0; missing];
+        stream.read_exact(&mut rest)?;
+        request.extend(rest);
+        let _ = records.send(serde_json::from_slice(&request[end..]).unwrap_or_default());
+        return stream.write_all(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n");
+    }
+    let name = path
+        .split('?')
+        .next()
+        .unwrap_or("/")
+        .trim_start_matches('/');
+    let name = if name.is_empty() { "index.html" } else { name };
+    let kind = match name.rsplit('.').next() {
+        Some("html") => "text/html",
+        Some("css") => "text/css",
+        Some("js") => "text/javascript",
+        _ => "application/wasm",
+    };
+    let body = std::fs::read(dist.join(name)).unwrap_or_default();
+    let head = format!(
+        "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n",
+        body.len()
+    );
+    stream.write_all(head.as_bytes())?;
+    stream.write_all(&body)
+}
+
+/// A browser that ends with the test.
+struct Browser(Child);
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn start_browser(address: &str, profile: &Path) -> Option<Browser> {
+    let log = std::fs::File::create(profile.join("console")).expect("a writable folder");
+    let named = std::env::var("CHROMIUM").into_iter();
+    let names = ["chromium", "chromium-browser", "google-chrome", "chrome"].map(str::to_owned);
+    let started = named.chain(names).find_map(|program| {
+        Command::new(program)
+            .args([
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-dev-shm-usage",
+                "--enable-unsafe-webgpu",
+                "--enable-logging=stderr",
+            ])
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg(address)
+            .stdout(Stdio::null())
+            .stderr(log.try_clone().expect("a file"))
+            .spawn()
+            .ok()
+    });
+    if started.is_none() {
+        needs::skip("chromium", "there is none on the path, nor in $CHROMIUM");
+    }
+    started.map(Browser)
+}
+
+#[test]
+fn the_web_page_measures_and_every_structure_passes_its_gate() {
+    let Some(dist) = built() else { return };
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    let (sender, records) = channel();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let (dist, sender) = (dist.clone(), sender.clone());
+            std::thread::spawn(move || answer(stream, &dist, &sender));
+        }
+    });
+    let profile = tempfile::tempdir().expect("a folder");
+    let Some(browser) = start_browser(&format!("http://127.0.0.1:{port}/?{QUERY}"), profile.path())
+    else {
+        return;
+    };
+    let log = || {
+        let log = std::fs::read(profile.path().join("console")).unwrap_or_default();
+        let log = String::from_utf8_lossy(&log).into_owned();
+        log.lines()
+            .filter(|line| line.contains("CONSOLE"))
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    let told = records
+        .recv_timeout(PATIENCE)
+        .unwrap_or_else(|_| panic!("no answer: {:?}", log()));
+    drop(browser);
+    assert_eq!(told["trouble"], "", "{told:#}");
+    assert_eq!(log(), Vec::<String>::new());
+    let records = told["records"].as_str().expect("records");
+    check(records);
+    read(records);
+}

@@ -1,0 +1,160 @@
+//! What the images are made of: a choice for each axis, with the parameters that its registry declares.
+
+use eframe::egui;
+use egui::{ComboBox, DragValue, Ui};
+use raystone_config::{Axis, COMPACTIONS, Catalogue, STRESS};
+use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
+use raystone_viewer::{SIDE_NAMES, Screen};
+
+/// Axes that A and B share.
+const OF_BOTH: [Axis; 3] = [Axis::Scene, Axis::Triangle, Axis::BoxTest];
+/// Axes of each image.
+const OF_EACH: [Axis; 8] = [
+    Axis::Accel,
+    Axis::Sequence,
+    Axis::Decorrelation,
+    Axis::Integrator,
+    Axis::Organisation,
+    Axis::Workgroup,
+    Axis::Load,
+    Axis::Offset,
+];
+
+pub fn draw(ui: &mut Ui, screen: &mut Screen, catalogue: &Catalogue) {
+    draw_axes(ui, screen, catalogue, 0, &OF_BOTH);
+    let sides = screen.cells.len();
+    for (side, name) in SIDE_NAMES.into_iter().enumerate().take(sides) {
+        if sides > 1 {
+            ui.separator();
+            ui.strong(name);
+        }
+        draw_axes(ui, screen, catalogue, side, &OF_EACH);
+    }
+}
+
+fn draw_axes(ui: &mut Ui, screen: &mut Screen, catalogue: &Catalogue, side: usize, axes: &[Axis]) {
+    for axis in axes {
+        let Some(now) = screen.cells[side].get(*axis).cloned() else {
+            continue;
+        };
+        let entries = &catalogue[*axis];
+        if let Some(chosen) = draw_axis(ui, (*axis, side), &now, entries) {
+            screen.choose(side, *axis, &chosen);
+        }
+    }
+}
+
+/// The variant that the user chose instead, if any.
+fn draw_axis(
+    ui: &mut Ui,
+    (axis, side): (Axis, usize),
+    now: &Variant,
+    entries: &[Entry],
+) -> Option<Variant> {
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        let list = ComboBox::from_id_salt((axis.name(), side))
+            .width(150.0)
+            .truncate()
+            .selected_text(&now.label)
+            .show_ui(ui, |ui| {
+                let renders = |entry: &&Entry| {
+                    !entry.name.starts_with(COMPACTIONS) && !entry.name.starts_with(STRESS)
+                };
+                for entry in entries.iter().filter(renders) {
+                    let label = ui.selectable_label(entry.name == now.name, &entry.name);
+                    if label.on_hover_text(&entry.description).clicked() && entry.name != now.name {
+                        chosen = Some(entry.default_variant());
+                    }
+                }
+            });
+        let label = ui.label(axis.name());
+        list.response.labelled_by(label.id);
+    });
+    // Those of a model are changed in an experiment.
+    let entry = entries.iter().find(|entry| entry.name == now.name);
+    let schema: Vec<&Parameter> = entry.iter().flat_map(|entry| &entry.schema).collect();
+    if schema.is_empty() {
+        return chosen;
+    }
+    ui.indent((axis.name(), side, "parameters"), |ui| {
+        egui::CollapsingHeader::new("parameters")
+            .id_salt((axis.name(), side))
+            .show(ui, |ui| {
+                for parameter in schema {
+                    let value = now
+                        .params
+                        .0
+                        .get(parameter.name)
+                        .unwrap_or(&parameter.default);
+                    if let Some(value) = draw_parameter(ui, (axis, side), parameter, value) {
+                        chosen = entry.map(|entry| changed(entry, now, parameter.name, value));
+                    }
+                }
+            });
+    });
+    chosen
+}
+
+/// A variant with another value of one parameter.
+fn changed(entry: &Entry, now: &Variant, name: &'static str, value: ParamValue) -> Variant {
+    let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
+        .filter_map(|p| Some((p.name, now.params.0.get(p.name)?.clone())))
+        .filter(|(other, _)| *other != name)
+        .chain([(name, value.clone())])
+        .collect();
+    entry.variant(&set)
+}
+
+/// A widget for the parameter's range, and the value that the user gave.
+fn draw_parameter(
+    ui: &mut Ui,
+    (axis, side): (Axis, usize),
+    parameter: &Parameter,
+    value: &ParamValue,
+) -> Option<ParamValue> {
+    let mut given = None;
+    ui.horizontal(|ui| {
+        let widget = match (&parameter.range, value) {
+            (ParamRange::Number { min, max }, ParamValue::Number(x)) => {
+                let (mut x, speed) = (*x, (x.abs() * 0.02).max(1e-3));
+                let number = DragValue::new(&mut x).range(*min..=*max).speed(speed);
+                let widget = ui.add(number.update_while_editing(false));
+                given = widget.changed().then_some(ParamValue::Number(x));
+                widget
+            }
+            (ParamRange::Integer { min, max }, ParamValue::Integer(x)) => {
+                let mut x = *x;
+                let number = DragValue::new(&mut x).range(*min..=*max).speed(0.1);
+                let widget = ui.add(number.update_while_editing(false));
+                given = widget.changed().then_some(ParamValue::Integer(x));
+                widget
+            }
+            (ParamRange::Flag, ParamValue::Flag(x)) => {
+                let mut x = *x;
+                let widget = ui.checkbox(&mut x, "");
+                given = widget.changed().then_some(ParamValue::Flag(x));
+                widget
+            }
+            (ParamRange::Choice(names), ParamValue::Name(now)) => {
+                let list = ComboBox::from_id_salt((axis.name(), side, parameter.name))
+                    .width(110.0)
+                    .selected_text(now);
+                let list = list.show_ui(ui, |ui| {
+                    for name in names.iter() {
+                        if ui.selectable_label(name == now, *name).clicked() && name != now {
+                            given = Some(ParamValue::Name((*name).to_owned()));
+                        }
+                    }
+                });
+                list.response
+            }
+            // Lists, texts and steps are changed in an experiment.
+            _ => ui.label(value.to_string()),
+        };
+        let label = ui.label(parameter.name);
+        widget.labelled_by(label.id);
+        label.on_hover_text(parameter.description);
+    });
+    given.filter(|value| parameter.range.allows(value))
+}

@@ -1,0 +1,212 @@
+//! The window, drawn without a display.
+
+use super::*;
+use egui::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use raystone_config::{Axis, Map};
+use raystone_viewer::Work;
+use screenshot::{settled, wait};
+
+/// A window of small images, with so many samples.
+fn window(arguments: &[&str], frames: u32) -> Harness<'static, App> {
+    let fixed = [
+        "view",
+        "--set",
+        "run.resolution=[48,36]",
+        "--set",
+        "run.spp=[4]",
+    ];
+    let arguments = Arguments::parse_from(fixed.iter().chain(arguments));
+    let screen = arguments.screen().unwrap();
+    let worker = Worker::start(AdapterChoice::Best, false, || ());
+    settled(App::new(worker, screen), frames, [1280, 1000]).unwrap()
+}
+
+/// Whether a text is on screen.
+fn has(harness: &Harness<'_, App>, text: &str) -> bool {
+    harness.query_all_by_label_contains(text).next().is_some()
+}
+
+/// Draws until the images of what was asked for are finished.
+fn settle(harness: &mut Harness<'_, App>) {
+    harness.run_steps(2);
+    let app = harness.state();
+    wait(&app.worker, &app.screen, 4).unwrap();
+    harness.run_steps(3);
+}
+
+/// Draws until a text is on screen.
+fn expect(harness: &mut Harness<'_, App>, text: &str) {
+    for _ in 0..1500 {
+        harness.run_steps(1);
+        if has(harness, text) {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    panic!("{text:?} does not come on screen");
+}
+
+#[test]
+fn one_image_has_figures_and_a_click_inspects_a_pixel() {
+    let mut harness = window(&["--accel", "bvh"], 4);
+    for text in [
+        "Mrays/s",
+        "4 of 4 spp",
+        "primary rays a sample",
+        "nodes or cells",
+    ] {
+        assert!(has(&harness, text), "{text}");
+    }
+    assert!(!has(&harness, "no such text"));
+    let middle = egui::pos2(640.0, 500.0);
+    harness.drag_at(middle);
+    harness.drop_at(middle);
+    expect(&mut harness, "radiance");
+    assert!(has(&harness, "box tests"));
+    // The picture has the image in it: not one colour.
+    let picture = harness.render().unwrap();
+    let colors: std::collections::HashSet<_> = picture.pixels().map(|p| p.0).collect();
+    assert!(colors.len() > 200, "{}", colors.len());
+}
+
+#[test]
+fn keys_split_the_image_choose_a_map_and_move_the_line() {
+    let mut harness = window(&[], 1);
+    for key in [egui::Key::B, egui::Key::M, egui::Key::OpenBracket] {
+        harness.key_press(key);
+        harness.run_steps(2);
+    }
+    settle(&mut harness);
+    let screen = &harness.state().screen;
+    assert_eq!((screen.cells.len(), screen.window.map), (2, Map::Nodes));
+    assert!((screen.window.swipe - 0.45).abs() < 1e-6);
+    assert!(has(&harness, "nodes of a pixel's first ray"));
+    let found = harness.state().worker.found();
+    assert!(
+        found.done.iter().all(|done| done.work != Work::Built),
+        "the structure is shared: {:?}",
+        found.done
+    );
+}
+
+/// A file that is let go over the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
+#[test]
+fn a_dropped_model_is_shown_and_an_experiment_brings_back_what_was_on_screen() {
+    let folder = tempfile::tempdir().unwrap();
+    let [model, experiment] = ["one.obj", "screen.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut harness = window(&["--accel", "bvh,cwbvh"], 1);
+    let drop = |harness: &mut Harness<'_, App>, path: &Path| {
+        let file = Dropped(path.to_owned());
+        let files = &mut harness.input_mut().dropped_files;
+        files.push(std::sync::Arc::new(file));
+        settle(harness);
+    };
+    drop(&mut harness, &model);
+    assert!(has(&harness, "1 triangles"));
+    harness.key_press(egui::Key::Plus);
+    settle(&mut harness);
+    let before = harness.state().screen.clone();
+    assert_eq!((before.cells.len(), before.window.exposure), (2, 0.5));
+    let text = before.to_toml(&harness.state().worker.catalogue);
+    std::fs::write(&experiment, text).unwrap();
+    harness.key_press(egui::Key::M);
+    settle(&mut harness);
+    assert_ne!(harness.state().screen, before);
+    drop(&mut harness, &experiment);
+    assert_eq!(harness.state().screen, before);
+}
+
+#[test]
+fn a_drag_moves_the_camera_and_home_returns_to_that_of_the_scene() {
+    let mut harness = window(&[], 1);
+    assert_eq!(harness.state().screen.camera, None);
+    let middle = egui::pos2(640.0, 500.0);
+    harness.hover_at(middle);
+    harness.drag_at(middle);
+    harness.hover_at(middle + egui::vec2(40.0, 10.0));
+    harness.drop_at(middle + egui::vec2(40.0, 10.0));
+    settle(&mut harness);
+    let moved = harness.state().screen.camera.unwrap();
+    let found = harness.state().worker.found().camera;
+    assert_eq!(found, Some(moved), "the image is that of the camera");
+    harness.key_press(egui::Key::Home);
+    settle(&mut harness);
+    assert_eq!(harness.state().screen.camera, None);
+    assert_ne!(harness.state().worker.found().camera, Some(moved));
+}
+
+#[test]
+fn a_wrong_file_is_a_sentence_and_the_screen_stays() {
+    let mut harness = window(&[], 1);
+    let before = harness.state().screen.clone();
+    for (path, says) in [
+        ("no/such.ply", "no/such.ply"),
+        ("no/such.toml", "cannot read"),
+        ("notes.txt", "neither built in"),
+    ] {
+        harness.state_mut().open(std::path::Path::new(path));
+        expect(&mut harness, says);
+        assert_eq!(
+            harness.state().screen.cells[0][Axis::Scene],
+            before.cells[0][Axis::Scene]
+        );
+    }
+}
+
+#[test]
+fn every_button_and_list_is_in_reach_of_the_keyboard() {
+    let mut harness = window(&[], 1);
+    let mut reached = std::collections::HashSet::new();
+    for _ in 0..80 {
+        harness.key_press(egui::Key::Tab);
+        harness.run_steps(1);
+        reached.extend(harness.ctx.memory(|memory| memory.focused()));
+    }
+    let lists = harness.query_all_by_role(Role::ComboBox).count();
+    let buttons = harness.query_all_by_role(Role::Button).count();
+    assert!(
+        lists >= 8 && buttons >= 4,
+        "{lists} lists, {buttons} buttons"
+    );
+    assert!(
+        reached.len() >= lists + buttons,
+        "{} of {lists} + {buttons}",
+        reached.len()
+    );
+}
+
+#[test]
+fn two_names_on_an_axis_make_two_images_and_more_than_the_axis_has_is_an_error() {
+    let screen =
+        |arguments: &[&str]| Arguments::parse_from(["view"].iter().chain(arguments)).screen();
+    let two = screen(&["--accel", "bvh,cwbvh", "--sequence", "sobol,halton"]).unwrap();
+    let names =
+        |side: usize| [Axis::Accel, Axis::Sequence].map(|axis| two.cells[side][axis].name.clone());
+    assert_eq!(
+        [names(0), names(1)],
+        [["bvh", "sobol"], ["cwbvh", "halton"]].map(|n| n.map(str::to_owned))
+    );
+    assert_eq!(screen(&[]).unwrap().cells.len(), 1);
+    assert!(screen(&["--accel", "bhv"]).unwrap_err().contains("bvh"));
+    assert!(
+        screen(&["--experiment", "no/such.toml"])
+            .unwrap_err()
+            .contains("no/such.toml")
+    );
+}
