@@ -54,7 +54,7 @@ pub(crate) use kd_tree::KdTree;
 pub use mask::Masks;
 pub(crate) use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
-pub use ray_hierarchy::{Anatomy, LevelAnatomy, RayHierarchy};
+pub use ray_hierarchy::{Anatomy, LevelAnatomy, RayHierarchy, StreamCounts};
 pub use raystone_core::structure::{Counters, Phase, Space, StructureStats};
 pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::BuildLog;

@@ -10,6 +10,7 @@ pub mod figure_registry;
 pub mod known_words;
 pub mod memory;
 pub mod peers;
+pub mod ray_sets;
 pub mod run;
 pub mod sampler_cost;
 pub mod spectrum;

@@ -28,11 +28,15 @@ pub const STRESS: &str = "stress:";
 /// Name prefix of integrators that are measurements of media, which render nothing either.
 pub const MEDIA: &str = "media:";
 
+/// Name prefix of integrators that are sets of rays in a room, traced through structures alone.
+pub const RAYS: &str = "rays:";
+
+/// Name prefixes of integrators that render nothing and need no scene.
+pub(super) const BENCHES: [&str; 4] = [COMPACTIONS, STRESS, MEDIA, RAYS];
+
 /// True if an integrator renders nothing and needs no scene: it names a measurement of something else.
 pub fn is_bench(integrator: &Variant) -> bool {
-    [COMPACTIONS, STRESS, MEDIA]
-        .iter()
-        .any(|of| integrator.name.starts_with(of))
+    BENCHES.iter().any(|of| integrator.name.starts_with(of))
 }
 
 /// The value of an axis that does not matter.

@@ -1,7 +1,7 @@
 //! Converts the merged tree to a checked [`Experiment`].
 
 use super::axis::Axis;
-use super::cells::{COMPACTIONS, MEDIA, STRESS};
+use super::cells::BENCHES;
 use super::check::{
     AXES, cell_tables, check_keys, check_on_axis, check_sections, parameter_tables, pattern_list,
     texts,
@@ -97,21 +97,16 @@ struct Reader<'t> {
 }
 
 /// Integrands trace nothing: an experiment of nothing else needs neither a scene nor a structure, and
-/// gets the least there is where it names none. Compactions, the stress suite and media draw nothing, too.
+/// gets the least there is where it names none. What needs no scene at all draws nothing, too.
 fn least_name(axis: Axis, integrators: &Item) -> Option<&'static str> {
     let names = texts(AXES, integrators).ok()?;
-    let all_begin = |with: &[&str]| {
-        let begins = |(_, name): &(_, &str)| with.iter().any(|with| name.starts_with(with));
-        names.iter().all(begins)
-    };
+    let is_bench = |name: &str| BENCHES.iter().any(|of| name.starts_with(of));
+    let all = |is: &dyn Fn(&str) -> bool| names.iter().all(|(_, name)| is(name));
+    let traces_nothing = |name: &str| name.starts_with("integrand:") || is_bench(name);
     match axis {
-        Axis::Scene if all_begin(&["integrand:", COMPACTIONS, STRESS, MEDIA]) => {
-            Some("single-triangle")
-        }
-        Axis::Accel if all_begin(&["integrand:", COMPACTIONS, STRESS, MEDIA]) => {
-            Some("brute-force")
-        }
-        Axis::Sequence if all_begin(&[COMPACTIONS, STRESS, MEDIA]) => Some("pixel-hash"),
+        Axis::Scene if all(&traces_nothing) => Some("single-triangle"),
+        Axis::Accel if all(&traces_nothing) => Some("brute-force"),
+        Axis::Sequence if all(&is_bench) => Some("pixel-hash"),
         _ => None,
     }
 }

@@ -15,10 +15,12 @@ mod layout;
 mod node;
 mod passes;
 mod primitives;
+mod streams;
 #[cfg(test)]
 mod tests;
 
 pub use anatomy::{Anatomy, LevelAnatomy};
+pub use streams::StreamCounts;
 
 use super::Access;
 use super::structure::prelude::*;

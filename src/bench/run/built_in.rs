@@ -15,6 +15,7 @@ use super::structures::Gated;
 use super::times;
 use super::units::MeasurementRegistry;
 use super::world::World;
+use crate::ray_sets::RaySets;
 
 /// How a measurement's cells are run.
 #[derive(Clone, Copy)]
@@ -30,7 +31,7 @@ pub(super) enum Run {
 }
 
 /// The program's measurements, in run order.
-static BUILT_IN: [(&dyn Measurement, Run); 8] = [
+static BUILT_IN: [(&dyn Measurement, Run); 9] = [
     (&structures::Structures, Run::First),
     (&peers::Peers, Run::First),
     (&errors::Errors, Run::OfWorld(errors::run)),
@@ -39,6 +40,7 @@ static BUILT_IN: [(&dyn Measurement, Run); 8] = [
     (&animation::Animations, Run::OfWorld(animation::run)),
     (&streams::Streams, Run::Alone(streams::run)),
     (&compactions::Compactions, Run::CellByCell),
+    (&RaySets, Run::CellByCell),
 ];
 
 impl Default for MeasurementRegistry {

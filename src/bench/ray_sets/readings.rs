@@ -1,0 +1,140 @@
+//! Figures of sets of rays.
+
+use super::Descent;
+use crate::timing::Samples;
+use raystone_accel::LevelAnatomy;
+use raystone_record::figure::{Better, Figure, Shown, Spread};
+use raystone_record::{Key, Reading, axis};
+
+const fn counted(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
+    let shown = Shown::Digits(3);
+    Figure::new(id, title, unit, Better::Lower, shown, Spread::Exact)
+}
+
+/// What depends on the order in which pairs come, where a stream is too short.
+const fn once(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
+    let shown = Shown::Digits(3);
+    Figure::new(id, title, unit, Better::Lower, shown, Spread::Single)
+}
+
+/// What describes a level, and is neither good nor bad.
+const fn shape(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
+    let shown = Shown::Digits(3);
+    Figure::new(id, title, unit, Better::Neither, shown, Spread::Exact)
+}
+
+const fn time(id: &'static str, title: &'static str) -> Figure {
+    let (shown, spread) = (Shown::Digits(3), Spread::Median);
+    Figure::new(id, title, "ns per ray", Better::Lower, shown, spread)
+}
+
+const TIME: usize = 0;
+const FRAME: usize = 1;
+const BUILD: usize = 2;
+const BYTES: usize = 3;
+const LIVE: usize = 4;
+const TESTS: usize = 5;
+const CANDIDATES: usize = 6;
+const LONGEST: usize = 7;
+const WALKED: usize = 8;
+/// The first of those of a level.
+const LEVEL: usize = 9;
+
+pub(super) static FIGURES: [Figure; 16] = [
+    time("rays-ns/v1", "time"),
+    time("rays-frame-ns/v1", "time with building"),
+    Figure::new(
+        "rays-build-ms/v1",
+        "building",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
+    Figure::new(
+        "rays-bytes/v1",
+        "structure",
+        "",
+        Better::Lower,
+        Shown::Bytes,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "rays-live/v1",
+        "rays",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    counted("descent-tests/v1", "tests of nodes", "per ray"),
+    counted("descent-candidates/v1", "candidates", "per ray"),
+    once("descent-longest/v1", "longest stream", "pairs per ray"),
+    once("descent-walked/v1", "pairs without room", "per ray"),
+    counted("level-tests/v1", "tests of a level", "per ray"),
+    counted("level-pairs/v1", "pairs of a level", "per ray"),
+    shape("level-nodes/v1", "nodes of a level", ""),
+    shape("level-angle/v1", "mean half angle", "rad"),
+    shape("level-widest/v1", "greatest half angle", "rad"),
+    shape("level-radius/v1", "mean radius", "scene units"),
+    shape("level-largest/v1", "greatest radius", "scene units"),
+];
+
+/// Times per ray, without building and with it.
+pub(super) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<Reading>, String> {
+    let after_building = |ms: &[f64]| ms.iter().map(|ms| ms + build_ms).collect();
+    let frame = Samples {
+        ms: after_building(&samples.ms),
+        wall_ms: after_building(&samples.wall_ms),
+        cpu_ms: Vec::new(),
+    };
+    Ok(vec![
+        samples.ns_per_item(&FIGURES[TIME], rays)?,
+        frame.ns_per_item(&FIGURES[FRAME], rays)?,
+        Reading::exact(&FIGURES[BUILD], build_ms),
+    ])
+}
+
+pub(super) fn counts(rays: usize, bytes: u64) -> [Reading; 2] {
+    [
+        Reading::exact(&FIGURES[BYTES], bytes as f64),
+        Reading::exact(&FIGURES[LIVE], rays as f64),
+    ]
+}
+
+/// What a descent did as a whole, and level by level, leaves first.
+pub(super) fn descent(descent: &Descent, rays: f64) -> Vec<Reading> {
+    let streams = descent.streams.iter();
+    let longest = streams.clone().map(|level| level.longest).max();
+    let walked: u64 = streams.map(|level| u64::from(level.walked)).sum();
+    let whole = |figure: usize, count: f64| Reading::exact(&FIGURES[figure], count / rays);
+    let mut found = vec![
+        whole(LONGEST, f64::from(longest.unwrap_or(0))),
+        whole(WALKED, walked as f64),
+    ];
+    let Some(anatomy) = &descent.anatomy else {
+        return found;
+    };
+    let candidates = anatomy.levels.first().map_or(0, |level| level.pairs);
+    found.push(whole(TESTS, anatomy.tests() as f64));
+    found.push(whole(CANDIDATES, candidates as f64));
+    let levels = anatomy.levels.iter().enumerate();
+    found.extend(levels.flat_map(|(number, level)| of_level(number, level, rays)));
+    found
+}
+
+fn of_level(number: usize, level: &LevelAnatomy, rays: f64) -> impl Iterator<Item = Reading> {
+    let at = Key::default().with(axis::SUBJECT, format!("level {number:02}"));
+    let values = [
+        level.tests as f64 / rays,
+        level.pairs as f64 / rays,
+        level.nodes as f64,
+        level.angle[0],
+        level.angle[1],
+        level.radius[0],
+        level.radius[1],
+    ];
+    let figures = FIGURES[LEVEL..].iter();
+    let readings = figures.zip(values);
+    readings.map(move |(figure, value)| Reading::exact(figure, value).at(at.clone()))
+}

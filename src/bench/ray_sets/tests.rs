@@ -1,0 +1,115 @@
+use super::*;
+use crate::run::{Registries, RunOptions, run};
+use raystone_record::{Line, MeasuredRecord, Recorded, all_of};
+
+const SMALL: &str = r#"
+[run]
+name = "rays"
+[axes]
+accel = ["ray-hierarchy", "bvh"]
+integrator = ["rays:primary", "rays:bounce", "rays:shadow"]
+[accel."ray-hierarchy"]
+capacity = [16384, 2097152]
+[integrator."rays:primary"]
+squares = 4
+side = 32
+[[integrator."rays:bounce"]]
+squares = 4
+side = 32
+bounce = [1, 2]
+[[integrator."rays:bounce"]]
+squares = 4
+side = 32
+spread = 30
+sequence = "sobol"
+decorrelation = ["none", "cranley-patterson"]
+[integrator."rays:shadow"]
+squares = 4
+side = 32
+reversed = [false, true]
+[timing]
+rounds = 3
+min_warmup_ms = 0
+max_warmup_ms = 1
+"#;
+
+#[test]
+fn rays_need_no_scene_and_leave_times_counts_and_levels() {
+    let registries = Registries::default();
+    let parsed = |text: &str| Experiment::parse(text, "test", &[], &registries.catalogue());
+    let experiment = parsed(SMALL).unwrap_or_else(|e| panic!("{e}"));
+    let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let options = RunOptions {
+        out: folder.path().join("run"),
+        ..RunOptions::default()
+    };
+    let summary = run(&experiment, &plan, &registries, &options).unwrap();
+    assert_eq!((summary.failed, summary.skipped), (0, 0));
+    let text = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
+    let lines: Vec<Line> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let cells: Vec<Recorded<MeasuredRecord>> = all_of::<MeasuredRecord>(&lines).collect();
+    // Seven sets of rays through three structures.
+    assert_eq!(cells.len(), 21);
+    for cell in &cells {
+        let whole = |figure: &str| {
+            let reading = cell
+                .reading(figure)
+                .unwrap_or_else(|| panic!("no {figure}"));
+            reading.value.value
+        };
+        assert!(whole("rays-frame-ns/v1") > whole("rays-ns/v1"));
+        assert!(whole("rays-live/v1") > 100.0);
+        let is_tree = cell
+            .key
+            .label(raystone_record::axis::ACCEL)
+            .starts_with("ray");
+        assert_eq!(cell.reading("descent-tests/v1").is_some(), is_tree);
+        if is_tree {
+            let levels = cell.readings.iter();
+            let levels = levels.filter(|r| r.figure == "level-tests/v1");
+            let sum: f64 = levels.map(|r| r.value.value).sum();
+            let tests = whole("descent-tests/v1");
+            assert!((sum / tests - 1.0).abs() < 1e-12 && tests > 1.0);
+        }
+    }
+    for file in [
+        include_str!("../../../experiments/ray-hierarchy.toml"),
+        include_str!("../../../experiments/thesis/roger-ray-hierarchy.toml"),
+    ] {
+        parsed(file).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn lobes_are_on_the_side_of_the_normal_and_widen_a_tree() {
+    let soup = room(8);
+    let judge = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default());
+    let judge = judge.unwrap();
+    let twin = judge.cpu_twin(&soup).unwrap();
+    let host = (&soup, &*twin);
+    let seen = on_mirror(32, 0.0);
+    let draw = |pixel: u32, number: u32| {
+        [0, 1]
+            .map(|k| (pixel.wrapping_mul(0x9e37_79b9) >> (4 * (k + number))) as f32 / 2f32.powi(32))
+    };
+    let params = Default::default();
+    let mean_angle = |spread: f32| {
+        let rays = room::bounced(seen.clone(), (1, spread), &draw, host);
+        for (ray, vertex) in rays.iter().zip(&seen) {
+            assert_eq!(ray.is_ray(), vertex.is_some());
+            let outward = glam::Vec3::from(ray.direction).dot(glam::Vec3::from(ray.origin));
+            assert!(outward > -1e-5, "{ray:?}");
+        }
+        Anatomy::new(&soup, &params, &rays).unwrap().levels[2].angle[0]
+    };
+    let angles = [0.0, 0.2, 1.0].map(mean_angle);
+    assert!(angles.is_sorted_by(|a, b| a < b), "{angles:?}");
+    // A closed room lets no path out.
+    let third = room::bounced(seen.clone(), (3, 0.0), &draw, host);
+    let live = |rays: &[Ray]| rays.iter().filter(|ray| ray.is_ray()).count();
+    assert_eq!(live(&third), live(&mirrored(&seen)));
+}
