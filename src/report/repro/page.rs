@@ -9,7 +9,6 @@ use crate::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::format;
 use raystone_config::expect::{Expect, Substitute};
 use raystone_record::Interval;
-use raystone_record::figure::FIGURES;
 
 /// Tables that failed to run: name and reason.
 pub type Failures = [(String, String)];
@@ -302,15 +301,19 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
             counted.collect::<Vec<_>>().join("; ").into(),
         ]
     };
-    let shown = Table::of(how(expect), &columns, table.claims[index].iter().map(row));
+    let shown = Table::of(
+        how(table, expect),
+        &columns,
+        table.claims[index].iter().map(row),
+    );
     blocks.extend(shown.into_block());
     blocks
 }
 
 /// Describes the comparison, with the unit if it has one.
-fn how(expect: &Expect) -> String {
+fn how(table: &Reproduced, expect: &Expect) -> String {
     use raystone_config::expect::Compare;
-    let figure = FIGURES.iter().find(|figure| figure.id == expect.figure);
+    let figure = table.figure(&expect.figure);
     let with_unit = figure.map_or_else(|| expect.figure.clone(), |figure| figure.heading());
     let title = figure.map_or(expect.figure.as_str(), |figure| &figure.title);
     match expect.compare {

@@ -8,7 +8,6 @@ use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::plot::rates::{Bar, RatePlot};
 use raystone_config::expect::Expect;
 use raystone_record::Interval;
-use raystone_record::figure::FIGURES;
 
 /// Returns all plots of a table.
 pub(super) fn of(table: &Reproduced) -> Option<Block> {
@@ -42,7 +41,7 @@ fn curves(table: &Reproduced, figure: &str) -> Option<Illustration> {
 }
 
 fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
-    let known = FIGURES.iter().find(|f| f.id == figure);
+    let known = table.figure(figure);
     let mut curves: Vec<Curve> = Vec::new();
     let pairs = table.thesis.expects.iter().zip(&table.claims);
     for (expect, rows) in pairs.filter(|(e, _)| e.figure == figure && !is_ratio(e)) {
@@ -159,6 +158,7 @@ mod tests {
             quick: false,
             changes: Vec::new(),
             scenes: Vec::new(),
+            figures: Vec::new(),
             claims,
         }
     }

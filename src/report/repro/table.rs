@@ -8,8 +8,10 @@ use crate::data::{RunData, without_repeats};
 use crate::values::values;
 use raystone_config::expect::{Compare, Substitute, Thesis, same_experiment};
 use raystone_config::{Catalogue, ConfigError, Experiment, Pattern};
-use raystone_record::Environment;
-use raystone_record::{Body, Key, Line, RecordError, RunRecord, read_records, records_file};
+use raystone_record::figure::{self, Figure};
+use raystone_record::{
+    Body, Environment, Key, Line, RecordError, RunRecord, read_records, records_file,
+};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -59,11 +61,18 @@ pub struct Reproduced {
     pub changes: Vec<String>,
     /// Original scene → ours with its triangles, or why there is none.
     pub scenes: Vec<(Substitute, Result<Placed, String>)>,
+    /// Figures that the run describes itself: those of measurements that add their own.
+    pub figures: Vec<Figure>,
     /// Rows of each expectation, in the order of the file.
     pub claims: Vec<Vec<Row>>,
 }
 
 impl Reproduced {
+    /// Returns the figure with this id, if the program or the run describes it.
+    pub(crate) fn figure(&self, id: &str) -> Option<&Figure> {
+        figure::find(id).or_else(|| self.figures.iter().find(|figure| figure.id == id))
+    }
+
     /// Returns the verdict on an expectation as a whole.
     pub fn verdict(&self, index: usize) -> ClaimVerdict {
         let found = ClaimVerdict::of_all(self.claims[index].iter().map(|row| row.verdict));
@@ -229,6 +238,7 @@ pub fn judged(
         started: run.map_or(0, |run| run.started_unix_s),
         quick,
         changes: prepared.changes,
+        figures: run.map_or_else(Vec::new, |run| run.figures.clone()),
         claims,
     })
 }

@@ -39,6 +39,7 @@ fn thesis(names: [&str; 2]) -> String {
             started: 0,
             quick: false,
             changes: vec!["run.replicates=4".into()],
+            figures: Vec::new(),
             scenes,
             claims: claims.collect(),
             thesis,
