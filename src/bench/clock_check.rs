@@ -14,10 +14,10 @@ const LEAST_CLAIMED: f64 = 0.65;
 const SPARE_MS: f64 = 2.0;
 /// Milliseconds below which a time says nothing about a clock.
 const LEAST_MS: f64 = 5.0;
-/// Rounds of which the shortest count, and how often they may fail: other work on the machine
-/// lengthens times, again and again only by accident.
+/// Rounds between two verdicts, and the most verdicts: other work on the machine lengthens times, so the shortest of all
+/// rounds so far count, and a wrong verdict asks for more rounds.
 const ROUNDS: usize = 5;
-const TRIES: usize = 5;
+const TRIES: usize = 8;
 
 /// The shortest times of a measurement: as told, and around it.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +33,8 @@ struct Shortest {
 /// The device is lost or hangs, or a clock ran backwards.
 pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<String>, GpuError> {
     let mut last = None;
+    let mut shortest = [Shortest::NONE; 2];
     for _ in 0..TRIES {
-        let mut shortest = [Shortest::NONE; 2];
         for _ in 0..ROUNDS {
             for (shortest, batch) in shortest.iter_mut().zip([single, double]) {
                 let around = Stopwatch::start();

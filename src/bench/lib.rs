@@ -16,5 +16,6 @@ pub mod sampler_cost;
 pub mod spectrum;
 pub mod stopping;
 pub mod stream;
+mod timed_rays;
 pub mod timing;
 pub mod words;

@@ -86,8 +86,14 @@ impl Cell {
         Axis::Kernels,
     ];
     /// Axes that a measurement without a scene depends on.
-    pub(crate) const BENCH: [Axis; 4] =
-        [Axis::Integrator, Axis::Kernels, Axis::Triangle, Axis::Accel];
+    pub(crate) const BENCH: [Axis; 6] = [
+        Axis::Integrator,
+        Axis::Kernels,
+        Axis::Triangle,
+        Axis::Accel,
+        Axis::Sequence,
+        Axis::Decorrelation,
+    ];
     /// Axes that a sampler's random words depend on.
     pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
     /// Axes of scene data loaded, uploaded and checked once for all cells.

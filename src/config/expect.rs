@@ -3,7 +3,8 @@
 //! An experiment file of a thesis has more sections, which do not affect measurements: `[thesis]` describes the thesis,
 //! `[[substitute]]` the scenes used instead of its own, `[[expect]]` the claims, `[quick]` the changes of a short run,
 //! `[software]` those of a whole run on a software adapter. docs/repro.md describes them. Without `[thesis]`,
-//! `[[expect]]` holds the experiment's own targets, which are checks of every run.
+//! `[[expect]]` holds the experiment's own targets, which are checks of every run. `[[plot]]` asks for plots of the
+//! report ([`super::plot`]).
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
@@ -12,7 +13,14 @@ use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "software"];
+const SECTIONS: [&str; 6] = [
+    "thesis",
+    "substitute",
+    "expect",
+    "quick",
+    "software",
+    "plot",
+];
 
 /// Printed results of a thesis, or targets of an experiment, and the tests of them.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -285,7 +293,7 @@ impl Expect {
     }
 }
 
-fn refused(file: &str, reason: String) -> ConfigError {
+pub(super) fn refused(file: &str, reason: String) -> ConfigError {
     ConfigError::Refused {
         at: file.to_owned(),
         reason,
@@ -293,7 +301,7 @@ fn refused(file: &str, reason: String) -> ConfigError {
 }
 
 /// An error in one of these sections, with the nearest known key for an unknown one.
-fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
+pub(super) fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let offset = error.span().map_or(0, |span| span.start);
     let line = 1 + text[..offset.min(text.len())].matches('\n').count();
     let at = Place::File {

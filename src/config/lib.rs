@@ -16,6 +16,7 @@ mod experiment;
 mod parse;
 mod pattern;
 mod plan;
+pub mod plot;
 mod product;
 mod sections;
 mod settings;

@@ -8,6 +8,7 @@ use super::check::{
 };
 use super::error::{ConfigError, Place};
 use super::experiment::{Axes, CellSet, Condition, Experiment};
+use super::plot::PlotRequest;
 use super::sections::{Coherence, Reference, Run, View};
 use super::settings::{find, not_allowed, read_all, take};
 use super::tree::{self, Item, Table};
@@ -62,9 +63,10 @@ pub(super) fn parse(
 /// Merges file and overrides into one tree.
 fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
     let mut tree = tree::parse_file(text, file)?;
-    // The thesis sections do not affect measurements, but an error in them is still an error.
+    // Neither expectations nor plots affect measurements, but an error in them is still an error.
     if expect::take(&mut tree) {
         expect::Thesis::parse(text, file)?;
+        PlotRequest::all(text, file)?;
     }
     for text in overrides {
         tree::merge(&mut tree, tree::parse_override(text)?);

@@ -2,8 +2,9 @@
 
 use super::ReportError;
 use super::document::Document;
-use minijinja::value::Serde;
+use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
+use raystone_core::text::escape::xml;
 
 /// Placeholder of the nonce until that is known.
 const PLACE: &str = "NONCE-OF-THIS-PAGE";
@@ -15,6 +16,7 @@ const PLACE: &str = "NONCE-OF-THIS-PAGE";
 /// [`ReportError::Template`].
 pub fn page(document: &Document) -> Result<String, ReportError> {
     let mut environment = Environment::new();
+    environment.add_filter("breakable", breakable);
     // The name's extension turns escaping on.
     environment.add_template("page.html", include_str!("template.html"))?;
     let page = environment.get_template("page.html")?.render(context! {
@@ -27,4 +29,30 @@ pub fn page(document: &Document) -> Result<String, ReportError> {
     let (policy, rest) = page.split_once(PLACE).unwrap_or((&page, ""));
     let (body, script) = rest.rsplit_once(PLACE).unwrap_or((rest, ""));
     Ok([policy, body, script].join(&nonce))
+}
+
+/// A text of a cell, in which lines may break behind the commas of a label, which no blank follows, and no digit as in numbers.
+fn breakable(text: &str) -> Value {
+    let mut parts = text.split(',');
+    let first = xml(parts.next().unwrap_or_default());
+    let whole = parts.fold(first, |whole, part| {
+        let is_label = part.starts_with(char::is_alphabetic);
+        let comma = if is_label { ",<wbr>" } else { "," };
+        whole + comma + &xml(part)
+    });
+    Value::from_safe_string(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_break_behind_commas_and_stay_escaped() {
+        assert_eq!(breakable("a(b=1,c=2)").to_string(), "a(b=1,<wbr>c=2)");
+        assert_eq!(
+            breakable("<b>&, 65,536").to_string(),
+            "&lt;b&gt;&amp;, 65,536"
+        );
+    }
 }

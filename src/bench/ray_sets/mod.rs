@@ -4,26 +4,28 @@
 mod readings;
 mod room;
 
+use room::Lobes;
 pub use room::{Vertex, mirrored, on_mirror, room};
 
+use crate::coherence::{Memory, of_rays, together};
 use crate::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
-use crate::timing::{Measured, Samples, Watch};
+use crate::timed_rays::TimedRays;
+use crate::timing::{Measured, Samples};
 use rayon::prelude::*;
 use raystone_accel::{
-    AccelError, Anatomy, Ask, BuildLog, BuiltAccel as _, BuiltBvh, BvhParameters, Hit, Ray,
-    RayBatch, RayHierarchy, Space, StreamCounts, Structure as _, Traced, Tracer, TriangleBuffers,
+    AccelError, Access, Anatomy, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, Ray,
+    RayHierarchy, Space, StreamCounts, Structure as _, Traced, Tracer, TriangleBuffers,
     TriangleSoup,
 };
-use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan, RAYS};
+use raystone_config::{Axis, Catalogue, Cell, Coherence, Experiment, Plan, RAYS};
 use raystone_core::parameters;
 use raystone_core::params::{Entry, Parameters as _, Variant};
-use raystone_gpu::{Elapsed, Gpu, GpuError, probe_arithmetic};
+use raystone_gpu::{Gpu, probe_arithmetic};
 use raystone_record::figure::Figure;
 use raystone_record::{RayClass, Reading};
-use raystone_sampling::{Coordinate, Demand, to_unit};
-use raystone_verify::gate::timed_fault;
+use raystone_sampling::{Coordinate, Demand, Sampler, to_unit};
 use raystone_verify::rays::RaySet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 parameters! {
@@ -47,12 +49,8 @@ parameters! {
         waves: f64 = 0.0, in 0.0..=1000.0;
         /// number of the reflection; the first leaves the mirror
         bounce: u32 = 1, in 1..=6;
-        /// half-angle of the lobe around the mirror's direction, degrees
+        /// half-angle of the lobe around the mirror's direction, degrees; the sampler of the cell chooses in it
         spread: f64 = 0.0, in 0.0..=90.0;
-        /// sequence of the numbers that choose a direction in a lobe
-        sequence: Variant = Variant::plain("pixel-hash"), where entry_of("sequence");
-        /// decorrelation of these numbers from pixel to pixel
-        decorrelation: Variant = Variant::plain("none"), where entry_of("decorrelation");
     }
 
     /// Rays between a point light and what a mirror shows.
@@ -103,7 +101,12 @@ impl Kind {
         }
     }
 
-    fn set(&self, at: &At, world: &World) -> Result<RaySet, Absent> {
+    /// Whether a sampler chooses directions.
+    fn is_sampled(&self) -> bool {
+        matches!(self, Self::Bounce(bounce) if bounce.spread > 0.0)
+    }
+
+    fn set(&self, draw: Option<&Draw>, world: &World) -> Result<RaySet, Absent> {
         let twin = world.judge.cpu_twin(&world.soup);
         let twin = twin.ok_or_else(|| Absent::Failed("the reference has no twin".to_owned()))?;
         let host = (&world.soup, &*twin);
@@ -116,7 +119,9 @@ impl Kind {
             Self::Bounce(bounce) => {
                 let seen = room::on_mirror(side, bounce.waves as f32);
                 let spread = bounce.spread.to_radians() as f32;
-                room::bounced(seen, (bounce.bounce, spread), &bounce.draw(at)?, host)
+                let draw =
+                    |pixel, number| draw.map_or([0.0; 2], |draw| draw.at(pixel, SAMPLE, number));
+                room::bounced(seen, (bounce.bounce, spread), &draw, host)
             }
         };
         let truth = |ray: &Ray| match ray.is_ray() {
@@ -132,32 +137,70 @@ impl Kind {
     }
 }
 
-/// Samples of a pixel, and the one whose numbers are taken: the first of some sequences is no direction but the axis.
+/// Samples of a pixel, and the one whose rays are traced: the first of some sequences is no direction but the axis.
 const SAMPLES: u32 = 16;
 const SAMPLE: u32 = 5;
 
-impl Bounce {
-    /// Two numbers in [0, 1) for a pixel and a reflection.
-    fn draw(&self, at: &At) -> Result<impl Fn(u32, u32) -> [f32; 2] + Sync + use<>, Absent> {
+/// Where the numbers that choose directions in lobes come from.
+struct Draw {
+    sampler: Sampler,
+    seed: u32,
+}
+
+impl Draw {
+    /// The sampler of a cell; `None` where nothing is chosen.
+    fn new(at: &At, cell: &Cell, kind: &Kind) -> Result<Option<Self>, Absent> {
+        let Kind::Bounce(bounce) = kind else {
+            return Ok(None);
+        };
+        let pair = cell.get(Axis::Sequence).zip(cell.get(Axis::Decorrelation));
+        let Some((sequence, decorrelation)) = pair.filter(|_| kind.is_sampled()) else {
+            return Ok(None);
+        };
         let demand = Demand {
             samples: Some(SAMPLES),
-            dimensions: 2 * self.bounce,
-            width: Some(self.room.side),
+            dimensions: 2 * bounce.bounce,
+            width: Some(bounce.room.side),
         };
-        let registry = &at.registries.samplers;
-        let sampler = registry.sampler(&self.sequence, &self.decorrelation, &demand);
+        let sampler = at
+            .registries
+            .samplers
+            .sampler(sequence, decorrelation, &demand);
         let sampler = sampler.map_err(|error| Absent::Refused(error.to_string()))?;
         let seed = at.experiment.run.seed;
-        Ok(move |pixel, number| {
-            [2 * number, 2 * number + 1].map(|dimension| {
-                to_unit(sampler.sample_u32(Coordinate {
-                    pixel,
-                    sample: SAMPLE,
-                    dimension,
-                    seed,
-                }))
-            })
+        Ok(Some(Self { sampler, seed }))
+    }
+
+    /// Two numbers in [0, 1) for a pixel, a sample and a reflection.
+    fn at(&self, pixel: u32, sample: u32, number: u32) -> [f32; 2] {
+        [2 * number, 2 * number + 1].map(|dimension| {
+            to_unit(self.sampler.sample_u32(Coordinate {
+                pixel,
+                sample,
+                dimension,
+                seed: self.seed,
+            }))
         })
+    }
+}
+
+impl Bounce {
+    /// RMSE over the pixels that see the mirror of the brightness that its lobes see; `None` for later reflections.
+    fn error(&self, draw: &Draw, world: &World) -> Option<f64> {
+        let twin = world
+            .judge
+            .cpu_twin(&world.soup)
+            .filter(|_| self.bounce == 1)?;
+        let lobes = Lobes {
+            from: &room::on_mirror(self.room.side, self.waves as f32),
+            spread: self.spread.to_radians() as f32,
+            host: (&world.soup, &*twin),
+        };
+        let truth = world.truth(self, || lobes.truth());
+        let found = lobes.means(SAMPLES, &|pixel, sample| draw.at(pixel, sample, 0));
+        let squares = found.iter().zip(&*truth);
+        let squares = squares.map(|(x, truth)| (x - truth).powi(2));
+        Some((squares.sum::<f64>() / truth.len() as f64).sqrt())
     }
 }
 
@@ -166,10 +209,20 @@ struct World {
     squares: u32,
     soup: TriangleSoup,
     judge: BuiltBvh,
+    exact: bool,
+    truth: Mutex<Option<Truth>>,
+}
+
+/// What lobes see.
+struct Truth {
+    /// Edge of the image, waves and half-angle.
+    of: [f64; 3],
+    /// Pixel by pixel.
+    brightness: Arc<Vec<f64>>,
 }
 
 impl World {
-    fn new(squares: u32) -> Result<Self, Absent> {
+    fn new(gpu: &Gpu, squares: u32) -> Result<Self, Absent> {
         let soup = room::room(squares);
         let parameters = BvhParameters::default();
         let judge = BuiltBvh::build(&soup, &parameters, &mut BuildLog::default());
@@ -178,7 +231,26 @@ impl World {
             squares,
             soup,
             judge,
+            exact: probe_arithmetic(gpu)?.is_exact(),
+            truth: Mutex::default(),
         })
+    }
+
+    /// The brightness that these lobes see; samplers and structures share the last one.
+    fn truth(&self, of: &Bounce, find: impl FnOnce() -> Vec<f64>) -> Arc<Vec<f64>> {
+        let of = [f64::from(of.room.side), of.waves, of.spread];
+        let mut last = self.truth.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*last {
+            Some(truth) if truth.of == of => Arc::clone(&truth.brightness),
+            _ => {
+                let brightness = Arc::new(find());
+                *last = Some(Truth {
+                    of,
+                    brightness: Arc::clone(&brightness),
+                });
+                brightness
+            }
+        }
     }
 }
 
@@ -224,9 +296,16 @@ impl Measurement for RaySets {
     }
 
     fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
-        let mut cells = plan.benches_on(&[Axis::Integrator, Axis::Accel, Axis::Kernels]);
-        cells.retain(|cell| Kind::of(cell).is_some());
-        cells
+        let own = [Axis::Integrator, Axis::Accel, Axis::Kernels];
+        let sampled = [&own[..], &[Axis::Sequence, Axis::Decorrelation]].concat();
+        let cells = [(own.to_vec(), false), (sampled, true)].into_iter();
+        let cells = cells.flat_map(|(axes, is_sampled)| {
+            let cells = plan.benches_on(&axes).into_iter();
+            cells.filter(move |cell| {
+                Kind::of(cell).is_some_and(|kind| kind.is_sampled() == is_sampled)
+            })
+        });
+        cells.collect()
     }
 
     fn unit_name(&self, cell: &Cell) -> String {
@@ -235,7 +314,8 @@ impl Measurement for RaySets {
 
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
         let run = &experiment.run;
-        format!("{:?}", (run.seed, run.runtime_checks, experiment.timing))
+        let own = (run.seed, run.runtime_checks, experiment.timing);
+        format!("{:?}", (own, &experiment.coherence))
     }
 
     fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
@@ -251,7 +331,7 @@ impl Measurement for RaySets {
             let squares = kind.room().squares;
             let world = match last.take().filter(|world| world.squares == squares) {
                 Some(world) => world,
-                None => Arc::new(World::new(squares)?),
+                None => Arc::new(World::new(at.gpu(cell)?, squares)?),
             };
             last = Some(Arc::clone(&world));
             let ready = Ready::new(at, cell, &kind, world)?;
@@ -271,16 +351,16 @@ struct Descent {
 
 /// A structure on the device, with rays for it.
 struct Ready {
-    batch: RayBatch,
+    rays: TimedRays,
     set: RaySet,
     world: Arc<World>,
     space: Space,
-    exact: bool,
     live: usize,
+    error: Option<f64>,
+    cycles: Option<f64>,
     build_ms: f64,
     bytes: u64,
     descent: Option<Descent>,
-    watch: Watch,
 }
 
 impl Ready {
@@ -301,7 +381,8 @@ impl Ready {
             build_ms = build_ms.min(build().map_err(text)?.0);
         }
         built.validate(soup).map_err(text)?;
-        let set = kind.set(at, &world)?;
+        let draw = Draw::new(at, cell, kind)?;
+        let set = kind.set(draw.as_ref(), &world)?;
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let traced = Traced::upload(gpu, &*built)?;
         let ask = Ask {
@@ -309,24 +390,53 @@ impl Ready {
             ..set.query().into()
         };
         let tracer = Tracer::new(gpu, &triangles, &traced, ask)?;
-        let exact = probe_arithmetic(gpu)?.is_exact();
+        let exact = world.exact;
         let descent = match accel.name == RayHierarchy::NAME {
             true => Some(Descent::new(gpu, &tracer, &set, (soup, accel), exact)?),
             false => None,
         };
         Ok(Self {
-            batch: tracer.batch(&set.rays)?,
+            rays: TimedRays::new(tracer.batch(&set.rays)?),
             live: set.rays.iter().filter(|ray| ray.is_ray()).count(),
             build_ms,
             bytes: built.stats().bytes,
             space: built.space(),
-            exact,
+            error: match (kind, &draw) {
+                (Kind::Bounce(bounce), Some(draw)) => bounce.error(draw, &world),
+                _ => None,
+            },
+            cycles: match &at.experiment.coherence {
+                Some(settings) => cycles(&*built, soup, &set, settings).map_err(Absent::Failed)?,
+                None => None,
+            },
             descent,
             set,
             world,
-            watch: Watch::default(),
         })
     }
+}
+
+/// Predicted cycles per ray in warps of rays that follow each other; `None` for a structure that answers rays together.
+fn cycles(
+    built: &dyn BuiltAccel,
+    soup: &TriangleSoup,
+    set: &RaySet,
+    settings: &Coherence,
+) -> Result<Option<f64>, String> {
+    let is_inline = matches!(built.access(), Access::Inline);
+    let Some(twin) = built.cpu_twin(soup).filter(|_| is_inline) else {
+        return Ok(None);
+    };
+    let memory = Memory::new(built, soup)?;
+    let rays: Vec<Ray> = set
+        .rays
+        .iter()
+        .filter(|ray| ray.is_ray())
+        .copied()
+        .collect();
+    let groups = of_rays(&rays, set.query(), (&*twin, &memory), settings)?;
+    let all = together(&groups).into_values().next().unwrap_or_default();
+    Ok((all.rays > 0).then(|| all.cost() as f64 / all.rays as f64))
 }
 
 impl Descent {
@@ -355,32 +465,23 @@ impl Descent {
     }
 }
 
-impl Measured for Ready {
-    fn measure(&self) -> Result<Elapsed, GpuError> {
-        let elapsed = self.batch.trace()?;
-        self.watch.note(self.batch.digest()?);
-        Ok(elapsed)
-    }
-
-    fn device(&self) -> Option<&Gpu> {
-        Some(self.batch.gpu())
-    }
-}
-
 impl Prepared for Ready {
     fn timed(&self) -> Vec<&dyn Measured> {
-        vec![self]
+        vec![&self.rays]
     }
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let soup = &self.world.soup;
-        let wrong = timed_fault(&self.batch, &self.set, soup, self.space, self.exact);
-        if let Some(wrong) = self.watch.fault().or(wrong.map_err(|e| e.to_string())?) {
+        let exact = self.world.exact;
+        let wrong = self.rays.fault(&self.set, soup, self.space, exact);
+        if let Some(wrong) = wrong.map_err(|e| e.to_string())? {
             return Err(wrong);
         }
         let samples = samples.into_iter().next().unwrap_or_default();
         let mut found = readings::times(&samples, self.live as f64, self.build_ms)?;
-        found.extend(readings::counts(self.live, self.bytes));
+        let triangles = self.world.soup.records.len();
+        found.extend(readings::counts(self.live, triangles, self.bytes));
+        found.extend(readings::of_sampler(self.error, self.cycles));
         if let Some(descent) = &self.descent {
             found.extend(readings::descent(descent, self.live as f64));
         }

@@ -3,7 +3,7 @@
 use super::Descent;
 use crate::timing::Samples;
 use raystone_accel::LevelAnatomy;
-use raystone_record::figure::{Better, Figure, Shown, Spread};
+use raystone_record::figure::{Better, CYCLES_PER_RAY, Figure, Shown, Spread};
 use raystone_record::{Key, Reading, axis};
 
 const fn counted(id: &'static str, title: &'static str, unit: &'static str) -> Figure {
@@ -39,8 +39,10 @@ const LONGEST: usize = 7;
 const WALKED: usize = 8;
 /// The first of those of a level.
 const LEVEL: usize = 9;
+const TRIANGLES: usize = 16;
+const ERROR: usize = 17;
 
-pub(super) static FIGURES: [Figure; 16] = [
+pub(super) static FIGURES: [Figure; 18] = [
     time("rays-ns/v1", "time"),
     time("rays-frame-ns/v1", "time with building"),
     Figure::new(
@@ -78,6 +80,15 @@ pub(super) static FIGURES: [Figure; 16] = [
     shape("level-widest/v1", "greatest half angle", "rad"),
     shape("level-radius/v1", "mean radius", "scene units"),
     shape("level-largest/v1", "greatest radius", "scene units"),
+    Figure::new(
+        "rays-triangles/v1",
+        "triangles",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    once("lobe-error/v1", "RMSE of 16 samples of a lobe", ""),
 ];
 
 /// Times per ray, without building and with it.
@@ -95,11 +106,17 @@ pub(super) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<R
     ])
 }
 
-pub(super) fn counts(rays: usize, bytes: u64) -> [Reading; 2] {
+pub(super) fn counts(rays: usize, triangles: usize, bytes: u64) -> [Reading; 3] {
     [
+        Reading::exact(&FIGURES[TRIANGLES], triangles as f64),
         Reading::exact(&FIGURES[BYTES], bytes as f64),
         Reading::exact(&FIGURES[LIVE], rays as f64),
     ]
+}
+
+/// The error of an image of a glossy mirror, and what tracing its rays costs by the model of coherence.
+pub(super) fn of_sampler(error: Option<f64>, cycles: Option<f64>) -> Vec<Reading> {
+    Reading::known([(&FIGURES[ERROR], error), (&CYCLES_PER_RAY, cycles)])
 }
 
 /// What a descent did as a whole, and level by level, leaves first.

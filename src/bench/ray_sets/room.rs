@@ -201,6 +201,56 @@ pub(super) fn bounced(
     }
 }
 
+/// Edge of the stratified samples of a lobe that count as all of it.
+const STRATA: u32 = 24;
+
+/// Lobes of half-angle `spread` radians around the directions in which a mirror reflects.
+pub(super) struct Lobes<'a> {
+    /// Where they begin.
+    pub(super) from: &'a [Option<Vertex>],
+    /// Radians.
+    pub(super) spread: f32,
+    /// What they see.
+    pub(super) host: Host<'a>,
+}
+
+impl Lobes<'_> {
+    /// The mean brightness of what each sees through samples of it, whose two numbers in [0, 1) `draw` has for a
+    /// pixel and a sample. Walls brighten from 0 at the floor to 1 at the ceiling, balls are black.
+    pub(super) fn means(
+        &self,
+        samples: u32,
+        draw: &(dyn Fn(u32, u32) -> [f32; 2] + Sync),
+    ) -> Vec<f64> {
+        let twin = self.host.1;
+        let brightness = |vertex: &Vertex, sample| {
+            let direction = vertex.in_lobe(self.spread, draw(vertex.pixel, sample));
+            let hit = twin.closest_hit(&Ray::new(vertex.place, direction), &mut Default::default());
+            let place = vertex.place + direction * hit.t;
+            // Balls touch no wall.
+            match place.abs().max_element() > HALF * (1.0 - 1e-4) {
+                true => f64::from((place.y / HALF + 1.0) / 2.0),
+                false => 0.0,
+            }
+        };
+        let mean = |vertex: &Vertex| {
+            let all = (0..samples).map(|sample| brightness(vertex, sample));
+            all.sum::<f64>() / f64::from(samples)
+        };
+        self.from.par_iter().flatten().map(mean).collect()
+    }
+
+    /// The same through so many stratified samples that what is left of their error is small beside that of a few.
+    pub(super) fn truth(&self) -> Vec<f64> {
+        self.means(STRATA * STRATA, &|pixel, sample| {
+            let seed = u64::from(pixel) << 32 | u64::from(sample);
+            let mut random = Pcg32::new(seed);
+            [sample % STRATA, sample / STRATA]
+                .map(|stratum| (stratum as f32 + random.uniform() as f32) / STRATA as f32)
+        })
+    }
+}
+
 /// Rays between a point light and what the mirror shows, from there or from the light, one or none
 /// a pixel.
 pub(super) fn shadows(from: &[Option<Vertex>], reversed: bool, host: Host) -> Vec<Ray> {

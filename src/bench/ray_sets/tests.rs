@@ -1,6 +1,6 @@
 use super::*;
 use crate::run::{Registries, RunOptions, run};
-use raystone_record::{Line, MeasuredRecord, Recorded, all_of};
+use raystone_record::{Line, MeasuredRecord, Recorded, all_of, axis};
 
 const SMALL: &str = r#"
 [run]
@@ -8,6 +8,8 @@ name = "rays"
 [axes]
 accel = ["ray-hierarchy", "bvh"]
 integrator = ["rays:primary", "rays:bounce", "rays:shadow"]
+sequence = "sobol"
+decorrelation = ["none", "cranley-patterson"]
 [accel."ray-hierarchy"]
 capacity = [16384, 2097152]
 [integrator."rays:primary"]
@@ -21,8 +23,6 @@ bounce = [1, 2]
 squares = 4
 side = 32
 spread = 30
-sequence = "sobol"
-decorrelation = ["none", "cranley-patterson"]
 [integrator."rays:shadow"]
 squares = 4
 side = 32
@@ -52,7 +52,7 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     let cells: Vec<Recorded<MeasuredRecord>> = all_of::<MeasuredRecord>(&lines).collect();
-    // Seven sets of rays through three structures.
+    // Seven sets of rays through three structures: a sampler is varied where there is a choice.
     assert_eq!(cells.len(), 21);
     for cell in &cells {
         let whole = |figure: &str| {
@@ -63,10 +63,10 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
         };
         assert!(whole("rays-frame-ns/v1") > whole("rays-ns/v1"));
         assert!(whole("rays-live/v1") > 100.0);
-        let is_tree = cell
-            .key
-            .label(raystone_record::axis::ACCEL)
-            .starts_with("ray");
+        assert_eq!(whole("rays-triangles/v1"), 384.0);
+        let is_sampled = !cell.key.label(axis::SEQUENCE).is_empty();
+        assert_eq!(cell.reading("lobe-error/v1").is_some(), is_sampled);
+        let is_tree = cell.key.label(axis::ACCEL).starts_with("ray");
         assert_eq!(cell.reading("descent-tests/v1").is_some(), is_tree);
         if is_tree {
             let levels = cell.readings.iter();
@@ -82,6 +82,43 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
     ] {
         parsed(file).unwrap_or_else(|e| panic!("{e}"));
     }
+}
+
+#[test]
+fn the_error_of_a_lobe_falls_with_samples_at_the_rate_of_independent_ones_and_faster_for_a_net() {
+    let soup = room(8);
+    let judge = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default());
+    let twin = judge.as_ref().unwrap().cpu_twin(&soup).unwrap();
+    let lobes = Lobes {
+        from: &on_mirror(64, 0.0),
+        spread: 0.6,
+        host: (&soup, &*twin),
+    };
+    let truth = lobes.truth();
+    let registry = raystone_sampling::SamplerRegistry::default();
+    let error = |sequence: &str, decorrelation: &str, samples: u32| {
+        let [sequence, decorrelation] = [sequence, decorrelation].map(Variant::plain);
+        let demand = Demand {
+            samples: Some(samples),
+            dimensions: 2,
+            width: Some(64),
+        };
+        let sampler = registry
+            .sampler(&sequence, &decorrelation, &demand)
+            .unwrap();
+        let draw = Draw { sampler, seed: 1 };
+        let found = lobes.means(samples, &|pixel, sample| draw.at(pixel, sample, 0));
+        let squares = found
+            .iter()
+            .zip(&truth)
+            .map(|(x, truth)| (x - truth).powi(2));
+        (squares.sum::<f64>() / truth.len() as f64).sqrt()
+    };
+    let [few, many] = [4, 64].map(|samples| error("pixel-hash", "none", samples));
+    // 1/√16 of it, and an error of 16 pixels in a thousand.
+    assert!((few / many / 4.0 - 1.0).abs() < 0.1, "{few} {many}");
+    let net = error("sobol", "owen-hash", 64);
+    assert!(net < 0.5 * many, "{net} {many}");
 }
 
 #[test]

@@ -7,16 +7,16 @@ use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
 use crate::clock_check;
-use crate::timing::{Measured, Samples, Watch, empty_ms, interleave};
+use crate::timed_rays::TimedRays;
+use crate::timing::{Measured, Samples, empty_ms, interleave};
 use raystone_accel::tracer::count_work;
-use raystone_accel::{Ask, Query, Ray, RayBatch, Space, Tracer};
+use raystone_accel::{Ask, Query, Ray, RayBatch, Tracer};
 use raystone_config::Axis;
-use raystone_gpu::{Elapsed, Gpu, GpuError, slow_slice};
+use raystone_gpu::{Gpu, GpuError, slow_slice};
 use raystone_image::{Picture, viridis};
 use raystone_record::{ClassTiming, CountersPerRay};
 use raystone_stats::rates::{millions_per_second, rate_fault, without_overhead};
 use raystone_stats::statistics::median;
-use raystone_verify::gate::timed_fault;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
 use raystone_verify::shadow_rays::unlike_shadow;
 
@@ -25,30 +25,7 @@ struct Timed<'a> {
     /// Place among the gated.
     structure: usize,
     set: &'a RaySet,
-    batch: RayBatch,
-    watch: Watch,
-}
-
-impl Measured for Timed<'_> {
-    fn measure(&self) -> Result<Elapsed, GpuError> {
-        let elapsed = self.batch.trace()?;
-        self.watch.note(self.batch.digest()?);
-        Ok(elapsed)
-    }
-
-    fn device(&self) -> Option<&Gpu> {
-        Some(self.batch.gpu())
-    }
-}
-
-impl Timed<'_> {
-    /// What is wrong with the timed answers; no figure is printed then.
-    fn fault(&self, world: &World, space: Space) -> Result<Option<String>, GpuError> {
-        let exact = world.probe.is_exact();
-        let last = timed_fault(&self.batch, self.set, &world.soup, space, exact)?;
-        let fault = self.watch.fault().into_iter().chain(last);
-        Ok(fault.reduce(|a, b| format!("{a}; {b}")))
-    }
+    rays: TimedRays,
 }
 
 /// Records the structure under which the device was lost; the others get their turn on a new one.
@@ -81,8 +58,7 @@ pub(super) fn time_all(
                 Ok(batch) => timed.push(Timed {
                     structure,
                     set,
-                    batch,
-                    watch: Watch::default(),
+                    rays: TimedRays::new(batch),
                 }),
                 Err(error) if world.gpu.lost().is_some() => {
                     return fail_lost(session, world, gated.swap_remove(structure), error);
@@ -99,7 +75,7 @@ pub(super) fn time_all(
     let seed = u64::from(session.experiment.run.seed);
     let turns = session.cost.timed(Work::rays(timing.rays));
     let (progress, step_s) = (session.progress.clone(), session.cost.step_s(turns));
-    let ours = timed.iter().map(|item| item as &dyn Measured);
+    let ours = timed.iter().map(|item| &item.rays as &dyn Measured);
     let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
     let mut samples = match session.clock.time("gpu", || {
         interleave(&all, &timing, seed, || progress.add(step_s))
@@ -126,7 +102,7 @@ pub(super) fn time_all(
             Ok(timing) => one.record.body.timings.extend(timing),
             Err(fault) => failures[item.structure] = Some(fault.of_cell()?),
         }
-        one.record.ran.features = item.batch.tracer().features();
+        one.record.ran.features = item.rays.batch.tracer().features();
         session.recorder.note_kernels(&one.cell.to_string());
     }
     let mut kept = Vec::new();
@@ -187,7 +163,7 @@ fn prove_clock(
             .cycle()
             .take(times * repeats * set.rays.len());
         let rays: Vec<Ray> = rays.copied().collect();
-        prepare(item.batch.gpu(), world, one, set, &rays)
+        prepare(item.rays.batch.gpu(), world, one, set, &rays)
     };
     let found = session
         .clock
@@ -213,16 +189,18 @@ fn class_timing(
     let text = |error: GpuError| error.to_string();
     let set = item.set;
     let gpu = world.device.of(&one.cell[Axis::Kernels])?;
-    if let Some(fault) = item.fault(world, one.traced.space).map_err(text)? {
+    let exact = world.probe.is_exact();
+    let fault = (item.rays).fault(set, &world.soup, one.traced.space, exact);
+    if let Some(fault) = fault.map_err(text)? {
         return Err(format!("{:?} rays: {fault}", set.class).into());
     }
     let samples = samples.map_err(text)?;
-    if let Some(slow) = slow_slice(item.batch.longest_slice_ms()) {
+    if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }
     let empty = session
         .clock
-        .time("gpu", || empty_ms(|| item.batch.trace_nothing()))
+        .time("gpu", || empty_ms(|| item.rays.batch.trace_nothing()))
         .map_err(text)?;
     let triangles = &world.buffers.triangles;
     let work = session

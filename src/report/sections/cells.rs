@@ -17,6 +17,7 @@ const SHORT_HASH: usize = 16;
 
 /// All cells of a run, in the order of their values.
 pub struct Cells<'a> {
+    values: &'a [Value<'a>],
     found: Vec<Cell<'a>>,
 }
 
@@ -81,7 +82,7 @@ impl<'a> Cells<'a> {
                 });
             }
         }
-        Self { found }
+        Self { values, found }
     }
 
     /// Returns the address of the cell of a key.
@@ -93,6 +94,11 @@ impl<'a> Cells<'a> {
     /// Returns `true` if all of them are in the page itself.
     fn is_inside(&self) -> bool {
         self.found.len() <= MOST_INSIDE
+    }
+
+    /// Returns the values of all cells.
+    pub(crate) fn values(&self) -> &'a [Value<'a>] {
+        self.values
     }
 
     /// Returns the section of the page: the cells, or where they are.

@@ -8,40 +8,68 @@ use crate::values::{Value, of_readings};
 use raystone_record::axis;
 use raystone_record::figure::Figure;
 
-/// Returns one table for each measurement.
+/// Returns a table of each measurement.
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
+    both(data).map(|[wholes, _]| wholes).collect()
+}
+
+/// Returns the figures of each measurement, and apart from them those of parts that its cells tell of.
+fn both(data: &RunData) -> impl Iterator<Item = [Table; 2]> {
     let names = data.measured.iter().map(|cell| cell.measurement.clone());
     let names = without_repeats(names.collect()).into_iter();
     let own = [compactions::NAME, streams::COST];
-    let others = names.filter(|name| !own.contains(&name.as_str()) && !stress::is_shown(name));
-    others.map(|name| table(data, &name)).collect()
+    let others = names.filter(move |name| !own.contains(&name.as_str()) && !stress::is_shown(name));
+    others.map(|name| of_measurement(data, &name))
 }
 
-fn table(data: &RunData, name: &str) -> Table {
+fn of_measurement(data: &RunData, name: &str) -> [Table; 2] {
     let cells = data.measured_by(name);
-    let values: Vec<Value> = cells
-        .iter()
-        .flat_map(|cell| of_readings(data, *cell))
-        .collect();
-    let figures = grouped(values.iter(), |value| &value.figure.id).into_iter();
-    let figures: Vec<&Figure> = figures.map(|(_, values)| &*values[0].figure).collect();
+    let values = cells.iter().flat_map(|cell| of_readings(data, *cell));
+    let (mut wholes, mut parts): (Vec<Value>, Vec<Value>) =
+        values.partition(|value| value.key.label(axis::SUBJECT).is_empty());
+    if wholes.is_empty() {
+        std::mem::swap(&mut wholes, &mut parts);
+    }
     let failed = cells.iter().filter(|cell| cell.failure.is_some()).count();
     let mut caption = format!("Measured: {name}");
     if failed > 0 {
         caption += &format!("; failed: {failed} of {}", cells.len());
     }
-    Rows::of_labels(&axis::ALL, &axis::ALL, &values).table(
-        &values,
-        caption,
-        &figures,
-        FIGURES_ALONE,
-    )
+    [
+        table(&wholes, caption),
+        table(&parts, format!("Measured: {name}, part by part")),
+    ]
+}
+
+/// Returns a table with a column for each axis on which rows differ; the caption has what all of them share. A single row has
+/// its labels as columns.
+fn table(values: &[Value], mut caption: String) -> Table {
+    let Some(first) = values.first() else {
+        return Table::default();
+    };
+    let is_row = values.iter().all(|value| value.key == first.key);
+    let differs = |axis: &str| is_row || values.iter().any(|v| !v.key.agrees(&first.key, &[axis]));
+    let (varied, shared): (Vec<&str>, Vec<&str>) = axis::ALL.into_iter().partition(|a| differs(a));
+    for axis in shared {
+        let label = first.key.label(axis);
+        if !label.is_empty() {
+            caption += &format!("; {axis} {label}");
+        }
+    }
+    let figures = grouped(values.iter(), |value| &value.figure.id).into_iter();
+    let figures: Vec<&Figure> = figures.map(|(_, values)| &*values[0].figure).collect();
+    let heads: Vec<String> = varied.iter().map(|axis| format!(":{axis}")).collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    Rows::of_labels(&varied, &heads, values).table(values, caption, &figures, FIGURES_ALONE)
 }
 
 /// Returns the section; `None` where there is no such measurement.
 pub(crate) fn section(data: &RunData) -> Option<Section> {
     let mut section = Section::new("measured", "Further measurements");
-    let tables = tables(data).into_iter().filter_map(Table::into_block);
-    section.blocks.extend(tables);
+    for [wholes, parts] in both(data) {
+        section.blocks.extend(wholes.into_block());
+        let parts = parts.into_block().into_iter().collect();
+        section.blocks.extend(Block::fold("Part by part", parts));
+    }
     (!section.blocks.is_empty()).then_some(section)
 }

@@ -10,6 +10,7 @@ pub mod kernels;
 pub(crate) mod measured;
 pub(crate) mod organisations;
 pub mod peers;
+pub(crate) mod plots;
 pub(crate) mod point_sets;
 pub(crate) mod race;
 pub(crate) mod rendering;
@@ -43,6 +44,7 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
 /// Returns the same with cells that are known already.
 pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
     let mut sections = vec![verdict::section(dir, data), belief::section(data)];
+    sections.extend(plots::section(data, cells.values()));
     for (index, scene) in data.scenes.iter().enumerate() {
         sections.push(scene_section(dir, data, cells, index, scene));
     }
