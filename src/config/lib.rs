@@ -33,8 +33,8 @@ pub use experiment::{Axes, CellSet, Condition, Experiment, REFERENCE_PARTS, Seed
 pub use pattern::{Pattern, Selector};
 pub use plan::{Plan, Skipped};
 pub use sections::{
-    Animation, Coherence, Discrepancy, Gate, Map, Motion, Pace, Reference, Rule, Run, SppCounts,
-    StopRule, Timing, View, Window,
+    Animation, Coherence, Discrepancy, Follow, Gate, Map, Motion, Pace, Reference, Rule, Run,
+    SppCounts, StopRule, Timing, View, Window,
 };
 pub use settings::{Contradiction, Section, Settings};
 pub use units::Shard;

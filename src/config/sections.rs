@@ -239,6 +239,22 @@ parameters! {
         pace: Pace = Pace::Samples;
         /// Whether a reference is accumulated beside them, and their error against it shown.
         error: bool = false;
+        /// The frame of `[animation]` that is shown.
+        frame: u32 = 0, in 0..=1023;
+        /// Whether its frames follow one another.
+        play: bool = false;
+        /// Samples per pixel of a frame while they do.
+        frame_spp: u32 = 1, in 1..=256;
+        /// How structures follow a scene that moves.
+        follow: Follow = Follow::Refit;
+    }
+
+    /// How a structure follows a scene that moves.
+    pub enum Follow {
+        /// The tree of the scene as it was loaded, with new boxes, or objects under new transforms; built anew where it has neither.
+        Refit = "refit",
+        /// Built anew.
+        Rebuild = "rebuild",
     }
 
     /// Work of a pixel's first ray through a structure.

@@ -60,6 +60,8 @@ pub struct Gpu {
     /// Total loop iterations per invocation after which the driver silently ends loops, if it does.
     /// Kernels then check that it did not happen.
     pub loop_limit: Option<u32>,
+    /// Kernels read arrays as sampled textures, see [`Gpu::sampling_texels`].
+    pub(super) samples_texels: bool,
     /// Kernel sources.
     pub kernels: KernelLibrary,
     pub(super) pipelines: Arc<Mutex<PipelineCache>>,
@@ -72,6 +74,9 @@ pub struct Gpu {
     /// See [`Gpu::reads_texels_faster`].
     pub(super) texels_faster: Arc<OnceLock<bool>>,
 }
+
+/// Arrays that a kernel may read as textures: nodes, triangles of leaves and of the scene, shading tables, words of a sampler.
+const TEXEL_ARRAYS: u32 = 5;
 
 fn instance(backends: wgpu::Backends) -> wgpu::Instance {
     wgpu::Instance::new(wgpu::InstanceDescriptor {
@@ -229,7 +234,8 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
     let adapter = choose(enumerate(), choice)?;
     let info = adapter.get_info();
     let limits = limits_to_ask(&adapter.limits());
-    wait_for(device_of(&adapter, info, limits, kernels))
+    // naga translates reads of storage textures for every backend.
+    wait_for(device_of(&adapter, info, limits, true, kernels))
 }
 
 /// Opens the adapter that a browser offers. `name` is what the browser says of it, which wgpu keeps to itself: adapters
@@ -252,9 +258,11 @@ pub async fn open_in_browser(name: &str, kernels: KernelLibrary) -> Result<Gpu, 
         info.device_type = wgpu::DeviceType::Cpu;
     }
     // What every page may ask for, so that all measure the same.
-    let gpu = device_of(&adapter, info, wgpu::Limits::default(), kernels).await?;
-    // Kernels that cannot read storage textures here are refused, and buffers it is.
-    let texels = super::load_probe::measure(&gpu).await.unwrap_or(false);
+    let limits = wgpu::Limits::default();
+    let language = instance.wgsl_language_features();
+    let reads = language.contains(wgpu::WgslLanguageFeatures::ReadOnlyAndReadWriteStorageTextures);
+    let gpu = device_of(&adapter, info, limits, reads, kernels).await?;
+    let texels = super::load_probe::measure(&gpu).await?;
     let _ = gpu.texels_faster.set(texels);
     Ok(gpu)
 }
@@ -271,6 +279,7 @@ async fn device_of(
     adapter: &wgpu::Adapter,
     info: wgpu::AdapterInfo,
     limits: wgpu::Limits,
+    reads_storage_textures: bool,
     kernels: KernelLibrary,
 ) -> Result<Gpu, GpuError> {
     let features =
@@ -307,9 +316,11 @@ async fn device_of(
         device,
         queue,
         info,
-        limits,
         timestamp_period,
         loop_limit: None,
+        samples_texels: !reads_storage_textures
+            || limits.max_storage_textures_per_shader_stage < TEXEL_ARRAYS,
+        limits,
         kernels,
         pipelines: Arc::default(),
         used: Arc::default(),
@@ -329,6 +340,16 @@ impl Gpu {
     pub fn with_kernels(&self, kernels: KernelLibrary) -> Self {
         Self {
             kernels,
+            ..self.clone()
+        }
+    }
+
+    /// The same device, whose kernels read arrays as sampled textures and not as storage textures: what a device does that
+    /// cannot read five of the latter. Every device has sampled ones; Mesa's software driver takes more than twice as long to read them.
+    #[must_use]
+    pub fn sampling_texels(&self) -> Self {
+        Self {
+            samples_texels: true,
             ..self.clone()
         }
     }

@@ -93,7 +93,7 @@ impl Bindings {
     }
 
     /// Binds a storage buffer to the kernel variable `name`. A kernel that declares the variable as
-    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when
+    /// `Texels` (`kernels/common/texels.wesl`) gets a copy in rows of [`TEXELS_PER_ROW`], made when
     /// it is first bound: the buffer must have its content by then, and must not change afterwards.
     pub fn buffer(&mut self, name: &str, storage: impl Into<Storage>) -> &mut Self {
         let array = Array {
@@ -243,7 +243,9 @@ fn copy_to_texture(
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: TEXEL_FORMAT,
-        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+        usage: wgpu::TextureUsages::STORAGE_BINDING
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
     let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -174,6 +174,9 @@ impl Gpu {
         if self.loop_limit.is_some() {
             composition = composition.feature("loops_cut", true);
         }
+        if self.samples_texels {
+            composition = composition.feature("sampled_texels", true);
+        }
         let key = (composition, runtime_checks);
         let library = self.kernels.hash();
         let known = |is_it: &dyn Fn(&str, &Pipeline) -> bool| {

@@ -10,18 +10,13 @@ use raystone_accel::tracer::RayBuffers;
 use raystone_accel::{Ask, GroupShape, LiveRays, Query, Tracer, TriangleBuffers};
 use raystone_core::structure::RAY_QUERIES;
 use raystone_gpu::{
-    Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, TEXELS,
-    UniformValues,
+    Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
 use raystone_scene::MaterialKind;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Arrays that an image kernel can read as textures: sampler words and shading tables of the scene;
-/// and with texels also nodes and triangles of the structure, and triangles of the scene.
-const STORAGE_TEXTURES: [u32; 2] = [2, 5];
 
 /// Composition and bindings of a job's passes, and the compiled ones.
 pub(super) struct Passes {
@@ -84,9 +79,6 @@ impl Passes {
             chosen = chosen.constant(name, value);
         }
         let chosen = bindings.compose(scene.features.activate(chosen));
-        let textures = STORAGE_TEXTURES[usize::from(chosen.features.contains(TEXELS))];
-        let most = gpu.limits.max_storage_textures_per_shader_stage;
-        let chosen = chosen.feature("scene_texels", most >= textures);
         bindings
             .buffer("status", status)
             .buffer("sampler_table", &table);

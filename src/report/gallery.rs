@@ -257,8 +257,8 @@ fn about(of: &Environment) -> String {
 fn clock(of: &Environment) -> String {
     match (of.timestamps, of.clock_step_ns) {
         (false, _) => "wall clock".into(),
-        (true, None) => "timestamps".into(),
-        (true, Some(step)) => format!("timestamps in steps of {} ns", format::count(step)),
+        (true, None) => "GPU clock".into(),
+        (true, Some(step)) => format!("GPU clock in steps of {} ns", format::count(step)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The experiment that reproduces what is on screen.
 
 use super::screen::Screen;
-use raystone_config::{Axis, Catalogue, Window};
+use raystone_config::{Animation, Axis, Catalogue, Window};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{Entry, ParamValue, ParameterType, Variant};
 use std::fmt::Write as _;
@@ -37,6 +37,9 @@ impl Screen {
             keys.push((key, ParamValue::Name(variant.name.clone())));
         }
         section(text, "reference", &keys);
+        if let Some(animation) = &self.animation {
+            section(text, "animation", &motion(animation));
+        }
         section(text, "window", &shown(&self.window));
         written
     }
@@ -121,7 +124,16 @@ fn view(camera: &Camera) -> [(&'static str, ParamValue); 4] {
     ]
 }
 
-fn shown(window: &Window) -> [(&'static str, ParamValue); 6] {
+fn motion(animation: &Animation) -> [(&'static str, ParamValue); 4] {
+    [
+        ("motion", animation.motion.value()),
+        ("frames", animation.frames.value()),
+        ("amplitude", animation.amplitude.value()),
+        ("wavelength", animation.wavelength.value()),
+    ]
+}
+
+fn shown(window: &Window) -> [(&'static str, ParamValue); 10] {
     [
         ("exposure", window.exposure.value()),
         ("map", window.map.value()),
@@ -129,6 +141,10 @@ fn shown(window: &Window) -> [(&'static str, ParamValue); 6] {
         ("swipe", window.swipe.value()),
         ("pace", window.pace.value()),
         ("error", window.error.value()),
+        ("frame", window.frame.value()),
+        ("play", window.play.value()),
+        ("frame_spp", window.frame_spp.value()),
+        ("follow", window.follow.value()),
     ]
 }
 
@@ -161,7 +177,7 @@ mod tests {
     use super::*;
     use glam::Vec3;
     use raystone_bench::run::Registries;
-    use raystone_config::{Map, Pace};
+    use raystone_config::{Follow, Map, Motion, Pace};
 
     fn screen(overrides: &[&str]) -> Screen {
         let text = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"sobol\"]\n";
@@ -193,7 +209,17 @@ mod tests {
             swipe: 0.3,
             pace: Pace::Time,
             error: true,
+            frame: 3,
+            play: true,
+            frame_spp: 2,
+            follow: Follow::Rebuild,
         };
+        moved.animation = Some(Animation {
+            motion: Motion::Instances,
+            frames: 12,
+            amplitude: 0.3,
+            wavelength: 2.0,
+        });
         moved.reference.spp = 512;
         assert_eq!(read_back(&moved), moved);
         // The comparison can fail.

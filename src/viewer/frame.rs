@@ -1,5 +1,6 @@
 //! What a shell draws: pictures and figures.
 
+use super::motion::FrameTimes;
 use super::side::Side;
 use raystone_accel::StructureStats;
 use raystone_bench::run::{RunError, attributes};
@@ -25,6 +26,8 @@ pub struct Frame {
     pub reference_spp: Option<u32>,
     /// Triangles of the scene.
     pub triangles: usize,
+    /// What the last frame took, of a scene that moves.
+    pub times: Option<FrameTimes>,
 }
 
 /// An image on screen.

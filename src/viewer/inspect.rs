@@ -35,6 +35,15 @@ pub struct Seen {
     pub work: Option<Counters>,
 }
 
+/// An instance that is seen at a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grasp {
+    /// Its index.
+    pub instance: u32,
+    /// Where it is seen, scene units.
+    pub point: glam::Vec3,
+}
+
 /// The ray through the centre of a pixel.
 fn center_ray(side: &Side, [x, y]: [u32; 2]) -> Option<Ray> {
     let [width, height] = side.lens.size;
@@ -63,6 +72,25 @@ pub(crate) fn inspect(
         pixel: [x, y],
         ray,
         sides: seen.collect::<Result<_, _>>()?,
+    }))
+}
+
+/// The instance that is seen at a pixel.
+pub(crate) fn grasp(world: &World, side: &Side, pixel: [u32; 2]) -> Result<Option<Grasp>, String> {
+    let assembly = world.stage.scene.assembly.as_ref();
+    let assembly = assembly.filter(|assembly| assembly.instances().len() > 1);
+    let assembly = assembly.ok_or(
+        "nothing can be dragged: the scene has no instances (objects that are placed by a transform) as they are shown",
+    )?;
+    let ray = center_ray(side, pixel).ok_or("there is no such pixel")?;
+    let seen = seen(&world.stage, side, pixel, &ray).map_err(|e| e.to_string())?;
+    Ok(seen.hit.map(|hit| {
+        let before = |instance: &raystone_scene::Instance| instance.first <= hit.triangle;
+        let count = assembly.instances().iter().filter(|i| before(i)).count();
+        Grasp {
+            instance: count.saturating_sub(1) as u32,
+            point: glam::Vec3::from(ray.origin) + hit.t * glam::Vec3::from(ray.direction),
+        }
     }))
 }
 

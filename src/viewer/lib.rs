@@ -6,9 +6,11 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod done;
 mod experiment;
 mod frame;
 mod inspect;
+mod motion;
 mod points;
 mod reference;
 mod screen;
@@ -17,8 +19,10 @@ mod viewer;
 mod world;
 
 pub use camera::{Motion, moved, projected};
+pub use done::{Done, Step, Work};
 pub use frame::{Figures, Frame, SideFrame};
-pub use inspect::{Inspection, Seen};
+pub use inspect::{Grasp, Inspection, Seen};
+pub use motion::{FrameTimes, SideTimes};
 pub use points::SamplePoints;
 pub use screen::{SIDE_NAMES, Screen};
-pub use viewer::{Done, Step, Viewer, Work};
+pub use viewer::Viewer;

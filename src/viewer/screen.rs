@@ -1,11 +1,13 @@
 //! What is on screen.
 
+use glam::Vec3;
 use raystone_bench::run::Registries;
 use raystone_config::{
-    Axis, Catalogue, Cell, ConfigError, Experiment, Plan, Reference, Window, is_bench,
+    Animation, Axis, Catalogue, Cell, ConfigError, Experiment, Plan, Reference, Window, is_bench,
 };
 use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
+use std::collections::BTreeMap;
 
 /// Names of the images, from left to right.
 pub const SIDE_NAMES: [&str; 2] = ["A", "B"];
@@ -28,6 +30,10 @@ pub struct Screen {
     pub seed: u32,
     /// What errors are taken against.
     pub reference: Reference,
+    /// How the scene moves from frame to frame.
+    pub animation: Option<Animation>,
+    /// Ways of instances that were dragged, scene units; no experiment has them.
+    pub dragged: BTreeMap<u32, Vec3>,
     /// How images are shown.
     pub window: Window,
 }
@@ -48,6 +54,8 @@ impl Screen {
             spp: experiment.run.spp.max(),
             seed: experiment.run.seed,
             reference: experiment.reference.clone(),
+            animation: experiment.animation,
+            dragged: BTreeMap::new(),
             window: experiment.window,
         };
         screen.check()?;
@@ -109,6 +117,7 @@ impl Screen {
     pub fn choose(&mut self, side: usize, axis: Axis, variant: &Variant) {
         if axis == Axis::Scene {
             self.camera = None;
+            self.dragged.clear();
         }
         for (index, cell) in self.cells.iter_mut().enumerate() {
             if index == side || SHARED.contains(&axis) {
@@ -149,6 +158,21 @@ impl Screen {
     /// True if the samples of `other`'s images are not those of this one's.
     pub fn restarts(&self, other: &Self) -> bool {
         let samples = |s: &Self| (s.cells.clone(), s.camera, s.size, s.spp, s.seed);
-        samples(self) != samples(other)
+        samples(self) != samples(other) || self.moves_on(other)
+    }
+
+    /// True if the scene stands otherwise than on `other`, or moves in another way.
+    fn moves_on(&self, other: &Self) -> bool {
+        let motion = |s: &Self| {
+            let shown = s.window;
+            (s.animation, s.dragged.clone(), shown.frame, shown.follow)
+        };
+        motion(self) != motion(other) || self.plays() != other.plays()
+    }
+
+    /// Samples per pixel of a frame, if frames follow one another.
+    pub(crate) fn plays(&self) -> Option<u32> {
+        let plays = self.window.play && self.animation.is_some();
+        plays.then_some(self.window.frame_spp)
     }
 }

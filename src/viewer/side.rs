@@ -1,12 +1,13 @@
 //! One of the images on screen: first coarse, then sample by sample.
 
+use super::motion::SideTimes;
 use super::world::{Structure, World};
 use raystone_accel::{Counters, Query};
 use raystone_bench::run::{Estimator, Registries};
 use raystone_config::{Axis, Cell, Map};
 use raystone_core::clock::Instant;
 use raystone_core::geometry::Camera;
-use raystone_core::structure::TRACED_CLASSES;
+use raystone_core::structure::{RAY_QUERIES, TRACED_CLASSES};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_image::Image;
 use raystone_render::Renderer;
@@ -145,6 +146,8 @@ pub(crate) struct Side<'g> {
     pub rays: [u64; TRACED_CLASSES],
     /// Milliseconds of all samples that the rays are of.
     pub rays_ms: f64,
+    /// Milliseconds in which the structure followed the last move of the scene.
+    update_ms: f64,
     /// Why there is no more to come.
     pub fault: Option<String>,
 }
@@ -176,6 +179,7 @@ impl<'g> Side<'g> {
             history: VecDeque::new(),
             rays: [0; TRACED_CLASSES],
             rays_ms: 0.0,
+            update_ms: 0.0,
             fault,
         }
     }
@@ -189,6 +193,37 @@ impl<'g> Side<'g> {
         (self.done, self.shown) = (0, 0);
         self.rays = [0; TRACED_CLASSES];
         self.rays_ms = 0.0;
+    }
+
+    /// Begins anew over a scene that moved, with the structure that took so long to follow it. What was shown stays until then.
+    pub(crate) fn follow(&mut self, structure: Result<Structure, String>, update_ms: f64) {
+        self.renderers = Renderers::new(self.renderers.gpu, self.cell.clone());
+        self.restart(self.lens);
+        self.update_ms = update_ms;
+        match structure {
+            Ok(structure) => (self.structure, self.fault) = (Some(structure), None),
+            Err(reason) => self.fault = Some(reason),
+        }
+    }
+
+    /// Leaves out coarse images: those of before are as good.
+    pub(crate) fn skip_coarse(&mut self) {
+        self.by = 1;
+    }
+
+    /// What the samples so far took, and following the scene before.
+    pub(crate) fn times(&self) -> SideTimes {
+        let stages = self
+            .renderers
+            .whole()
+            .map_or_else(BTreeMap::new, Renderer::stages);
+        let queries = RAY_QUERIES.iter().filter_map(|query| stages.get(*query));
+        let traced: Vec<f64> = queries.copied().collect();
+        SideTimes {
+            update_ms: self.update_ms,
+            render_ms: self.spent_ms(),
+            trace_ms: (!traced.is_empty()).then(|| traced.iter().sum()),
+        }
     }
 
     /// How much coarser the first image has to be, so that it takes no longer than [`COARSE_MS`].

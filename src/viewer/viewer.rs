@@ -1,12 +1,14 @@
 //! The viewer: what is on screen, and the steps that lead there.
 
+use super::done::{Done, Step, Work, note};
 use super::frame::{Frame, Painter, SideFrame, figures, write_linear};
-use super::inspect::{self, Inspection};
+use super::inspect::{self, Grasp, Inspection};
+use super::motion::{FrameClock, FrameTimes, Pose};
 use super::points::SamplePoints;
 use super::reference::{Accumulated, error_of, judged};
 use super::screen::{SIDE_NAMES, Screen};
 use super::side::{Lens, Side};
-use super::world::World;
+use super::world::{Structure, World};
 use raystone_bench::run::{Estimator, Registries, RunError};
 use raystone_config::{Axis, Cell, Map, Pace};
 use raystone_core::clock::Instant;
@@ -16,68 +18,10 @@ use raystone_gpu::{Gpu, GpuError};
 use raystone_scene::check_camera;
 use raystone_stats::metrics;
 use raystone_verify::path_oracle::Path;
-use std::fmt;
 use std::path::Path as File;
 
 /// Time between two readings of the reference, seconds.
 const JUDGE_S: f64 = 1.0;
-
-/// What was done for a change of the screen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Work {
-    /// A scene was read, and uploaded.
-    Loaded,
-    /// A structure was built, validated and uploaded.
-    Built,
-    /// Kernels were composed and compiled, or found compiled.
-    Compiled,
-    /// Samples were begun anew.
-    Restarted,
-    /// What was there is used further.
-    Kept,
-}
-
-/// One thing that was done for a change of the screen.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Done {
-    /// What was done.
-    pub work: Work,
-    /// To what, in words.
-    pub what: String,
-    /// How long it took, milliseconds.
-    pub ms: f64,
-}
-
-impl fmt::Display for Done {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { work, what, ms } = self;
-        let took = if *ms < 10.0 {
-            format!("{ms:.1} ms")
-        } else {
-            format!("{ms:.0} ms")
-        };
-        match work {
-            Work::Loaded => write!(f, "{what} loaded in {took}"),
-            Work::Built => write!(f, "{what} built in {took}"),
-            Work::Compiled => write!(f, "{what} compiled in {took}"),
-            Work::Restarted => write!(f, "{what} begun anew"),
-            Work::Kept => write!(f, "{what} kept"),
-        }
-    }
-}
-
-/// What a step led to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
-    /// There is something new to show.
-    Shown,
-    /// There is more to do, and nothing new to show.
-    Worked,
-    /// The step was given up because its caller said so.
-    Stopped,
-    /// All is done until the screen changes.
-    Idle,
-}
 
 /// The viewer of one device.
 pub struct Viewer<'g> {
@@ -91,6 +35,9 @@ pub struct Viewer<'g> {
     reference: Option<Accumulated<'g>>,
     /// The reference as it was last read, and when.
     judge: Option<(metrics::Reference, Instant)>,
+    clock: FrameClock,
+    /// What the last frame took, while frames follow one another.
+    times: Option<FrameTimes>,
 }
 
 impl<'g> Viewer<'g> {
@@ -111,6 +58,8 @@ impl<'g> Viewer<'g> {
             sides: Vec::new(),
             reference: None,
             judge: None,
+            clock: FrameClock::default(),
+            times: None,
         }
     }
 
@@ -167,26 +116,118 @@ impl<'g> Viewer<'g> {
             }
         };
         let world = loaded.as_ref().or(self.world.as_ref());
-        let Some(scene) = world.map(|world| &world.stage.scene) else {
+        let Some(scene) = world.map(|world| &world.still) else {
             return Ok(done);
         };
         let camera = screen.camera.unwrap_or_else(|| scene.view(screen.aspect()));
         check_camera(&camera).map_err(|e| RunError::Input(e.to_string()))?;
-        if let Some(world) = loaded {
-            self.world = Some(world);
-            self.sides.clear();
-            self.reference = None;
+        let mut pose = Pose {
+            animation: screen.animation,
+            frame: screen.window.frame,
+            dragged: screen.dragged.clone(),
+        };
+        match loaded {
+            Some(mut world) => {
+                world.take(&pose)?;
+                self.world = Some(world);
+                self.sides.clear();
+                self.reference = None;
+            }
+            None => {
+                pose.frame = self.frame_of(&screen);
+                self.pose(&pose, &screen, &mut done)?;
+            }
         }
         let lens = Lens {
             camera,
             size: screen.size,
             seed: screen.seed,
-            spp: screen.spp,
+            spp: screen.plays().unwrap_or(screen.spp),
         };
         self.show_sides(&screen, lens, &mut done, tell)?;
         self.show_reference(&screen, lens);
         self.screen = Some(screen);
         Ok(done)
+    }
+
+    /// The frame of a screen: that which frames following one another came to, unless another is chosen.
+    fn frame_of(&self, screen: &Screen) -> u32 {
+        let goes_on = |was: &&Screen| {
+            was.animation == screen.animation && was.window.frame == screen.window.frame
+        };
+        let on = self.screen.as_ref().filter(goes_on);
+        let now = self.world.as_ref().map(|world| world.pose.frame);
+        on.and(now).unwrap_or(screen.window.frame)
+    }
+
+    /// Moves the scene to a pose, if it is another one, and all structures after it.
+    fn pose(&mut self, pose: &Pose, screen: &Screen, done: &mut Vec<Done>) -> Result<(), RunError> {
+        let Some(world) = &mut self.world else {
+            return Ok(());
+        };
+        let clock = Instant::now();
+        let Some(soup) = world.take(pose)? else {
+            return Ok(());
+        };
+        self.clock.scene_ms = clock.elapsed().as_secs_f64() * 1e3;
+        self.reference = None;
+        self.judge = None;
+        let mut followed: Vec<Structure> = Vec::new();
+        for side in &mut self.sides {
+            let (cell, clock) = (side.cell.on(&Cell::STRUCTURE), Instant::now());
+            let known = followed.iter().find(|known| known.cell == cell).cloned();
+            let structure = known.map_or_else(
+                || world.follow(&self.registries, (&side.cell, screen.window.follow), &soup),
+                Ok,
+            );
+            followed.extend(structure.as_ref().ok().cloned());
+            side.follow(structure, clock.elapsed().as_secs_f64() * 1e3);
+            note(
+                done,
+                Work::Followed,
+                side.cell[Axis::Accel].to_string(),
+                clock,
+            );
+            lost(self.gpu)?;
+        }
+        Ok(())
+    }
+
+    /// Shows a frame that has its samples, then begins the next one, if frames follow one another.
+    fn next_frame(&mut self) -> Result<Step, RunError> {
+        let screen = self
+            .screen
+            .clone()
+            .filter(|screen| screen.plays().is_some());
+        let (Some(screen), Some(world)) = (screen, &self.world) else {
+            return Ok(Step::Idle);
+        };
+        let mut is_new = false;
+        for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
+            match side.refresh() {
+                Ok(is_read) => is_new |= is_read,
+                Err(error) => return keep(Err(error), side, self.gpu),
+            }
+        }
+        if is_new {
+            return Ok(Step::Shown);
+        }
+        let frames = screen.animation.map_or(1, |animation| animation.frames);
+        let frame = (world.pose.frame + 1) % frames;
+        let pose = Pose {
+            frame,
+            ..world.pose.clone()
+        };
+        self.clock.tick();
+        self.times = Some(FrameTimes {
+            frame: [world.pose.frame, frames],
+            whole_ms: self.clock.whole_ms(),
+            scene_ms: self.clock.scene_ms,
+            sides: self.sides.iter().map(Side::times).collect(),
+        });
+        self.pose(&pose, &screen, &mut Vec::new())?;
+        self.sides.iter_mut().for_each(Side::skip_coarse);
+        Ok(Step::Worked)
     }
 
     fn show_sides(
@@ -268,7 +309,8 @@ impl<'g> Viewer<'g> {
 
     fn show_reference(&mut self, screen: &Screen, lens: Lens) {
         let first = self.sides.first().filter(|side| side.fault.is_none());
-        let Some(side) = first.filter(|_| screen.window.error) else {
+        let is_wanted = screen.window.error && screen.plays().is_none();
+        let Some(side) = first.filter(|_| is_wanted) else {
             self.reference = None;
             self.judge = None;
             return;
@@ -309,6 +351,7 @@ impl<'g> Viewer<'g> {
         };
         let with = (&self.registries, world);
         let (map, pace) = (screen.window.map, screen.window.pace);
+        let plays = screen.plays().is_some();
         if let Some(side) = self
             .sides
             .iter_mut()
@@ -361,7 +404,8 @@ impl<'g> Viewer<'g> {
                     if !whole {
                         return Ok(Step::Stopped);
                     }
-                    Ok(if side.refresh()? {
+                    // Images of a frame are shown together.
+                    Ok(if !plays && side.refresh()? {
                         Step::Shown
                     } else {
                         Step::Worked
@@ -369,7 +413,7 @@ impl<'g> Viewer<'g> {
                 });
                 keep(step, side, self.gpu)
             }
-            (None, _) => Ok(Step::Idle),
+            (None, _) => self.next_frame(),
         }
     }
 
@@ -421,7 +465,22 @@ impl<'g> Viewer<'g> {
                 .world
                 .as_ref()
                 .map_or(0, |world| world.stage.scene.triangles.len()),
+            times: self.times.clone().filter(|_| screen.plays().is_some()),
         }
+    }
+
+    /// The frame of the animation that is shown.
+    pub fn frame_number(&self) -> u32 {
+        self.world.as_ref().map_or(0, |world| world.pose.frame)
+    }
+
+    /// The instance that is seen at a pixel, and where; `None` where nothing is.
+    ///
+    /// # Errors
+    /// The scene has no instances, or the device is lost; in words.
+    pub fn grasp(&self, pixel: [u32; 2]) -> Result<Option<Grasp>, String> {
+        let (world, side) = self.at(0)?;
+        inspect::grasp(world, side, pixel)
     }
 
     /// Writes the linear image of a side, in the format of the file's ending; or what is on screen, as PNG.
@@ -504,11 +563,6 @@ impl<'g> Viewer<'g> {
         let side = self.sides.get(side).ok_or("there is no such image")?;
         Ok((world, side))
     }
-}
-
-fn note(done: &mut Vec<Done>, work: Work, what: String, clock: Instant) {
-    let ms = clock.elapsed().as_secs_f64() * 1e3;
-    done.push(Done { work, what, ms });
 }
 
 /// An error if the device is lost.

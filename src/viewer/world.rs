@@ -1,16 +1,23 @@
 //! The scene on the device.
 
-use raystone_accel::{BuildLog, StructureStats, Traced, TriangleSoup};
+use super::motion::{Follower, Pose};
+use raystone_accel::{BuildLog, BuiltAccel, StructureStats, Traced, TriangleSoup};
 use raystone_bench::run::{Registries, RunError, RunOptions, load_options, table_bytes};
 use raystone_config::{Axis, Cell};
 use raystone_gpu::{Gpu, probe_arithmetic};
 use raystone_render::Stage;
-use raystone_scene as scene;
+use raystone_scene::{self as scene, SceneData};
+use std::sync::Arc;
 
 pub(crate) struct World {
     /// See [`Cell::WORLD`].
     pub cell: Cell,
+    /// In its pose.
     pub stage: Stage,
+    /// As it was loaded.
+    pub still: Arc<SceneData>,
+    pub pose: Pose,
+    pub followers: Vec<Follower>,
 }
 
 /// A structure on the device, with its figures.
@@ -43,7 +50,10 @@ impl World {
         stage.soup = TriangleSoup::default().intersecting(tests);
         Ok(Self {
             cell: cell.on(&Cell::WORLD),
+            still: Arc::clone(&stage.scene),
             stage,
+            pose: Pose::default(),
+            followers: Vec::new(),
         })
     }
 
@@ -62,7 +72,18 @@ impl World {
         let built = built.map_err(|e| e.to_string())?;
         let valid = built.validate(&soup);
         valid.map_err(|fault| format!("{accel} is not valid: {fault}"))?;
-        let traced = Traced::upload(gpu, &*built).map_err(|e| e.to_string())?;
+        self.upload(registries, cell, &*built)
+    }
+
+    /// Uploads the structure of a cell.
+    pub(crate) fn upload(
+        &self,
+        registries: &Registries,
+        cell: &Cell,
+        built: &dyn BuiltAccel,
+    ) -> Result<Structure, String> {
+        let gpu = &self.stage.gpu;
+        let traced = Traced::upload(gpu, built).map_err(|e| e.to_string())?;
         let (workgroup, load) = (registries.workgroup(cell)?, registries.load(cell)?);
         let traced = traced
             .in_workgroups(gpu, &workgroup)

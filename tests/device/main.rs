@@ -15,6 +15,7 @@ mod kernels;
 mod orders;
 mod organisations;
 mod pipelines;
+mod portability;
 mod recordings;
 mod refill;
 mod sorting;

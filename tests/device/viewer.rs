@@ -1,5 +1,7 @@
 //! The core of the window: its images are those of `raystone render`, and a change begins no more anew than it has to.
 
+mod motion;
+
 use crate::support;
 use raystone::config::{Axis, Map};
 use raystone::image::read_linear;

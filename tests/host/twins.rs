@@ -120,6 +120,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("common/lane", "an invocation's place in its workgroup"),
     (
+        "common/numbers",
+        "tests/device/portability.rs compares it with the host",
+    ),
+    (
         "common/texels",
         "arrays as textures; tests/device/kernels.rs compares the length of a row",
     ),

@@ -3,6 +3,7 @@
 use crate::choices;
 use crate::figures;
 use crate::image::ImageView;
+use crate::motion;
 use crate::pixel::PixelPanel;
 use crate::worker::{Ask, Message, Worker};
 use eframe::egui;
@@ -19,10 +20,11 @@ const MOST_PIXELS: u32 = 2048;
 /// Widths of a window from which the panels, left and right, are open, points.
 const WIDTHS: [f32; 2] = [700.0, 1000.0];
 /// What the keys do.
-const KEYS: [(&str, &str); 17] = [
+const KEYS: [(&str, &str); 19] = [
     ("drag, arrow keys", "orbit around the target"),
     ("Shift + drag, right drag", "move along the image"),
     ("Ctrl + drag", "look around"),
+    ("Alt + drag", "move an object (instance) along the image"),
     ("wheel, pinch, Page Up, Page Down", "nearer, farther"),
     ("W A S D, Q E", "fly"),
     ("click", "inspect a pixel"),
@@ -31,6 +33,7 @@ const KEYS: [(&str, &str); 17] = [
     ("[ and ], drag the line", "move where they meet"),
     ("M", "next map"),
     ("+ and −", "exposure"),
+    ("Space", "let the scene move, or stand still"),
     ("P", "path of the inspected pixel"),
     ("Ctrl + O", "open a model or an experiment"),
     ("Ctrl + S", "save the image"),
@@ -156,7 +159,7 @@ impl App {
                 self.copy(ui);
             }
             let save = ui.button("Save").on_hover_text(
-                "Ctrl + S; the ending chooses the format: .png is what is on screen, .exr, .hdr, .pfm and .npy the linear radiance of A, .toml the experiment",
+                "Ctrl + S; what is there stays, names are numbered; the ending chooses the format: .png is what is on screen, .exr, .hdr, .pfm and .npy the linear radiance of A, .toml the experiment",
             );
             if save.clicked() {
                 self.save();
@@ -257,6 +260,10 @@ impl App {
                 .labelled_by(label.id);
             ui.end_row();
         });
+        ui.separator();
+        ui.strong("Motion");
+        let frame = self.worker.found().frame_number;
+        motion::draw(ui, &mut self.screen, frame);
         ui.separator();
         ui.strong("Shown");
         self.draw_shown(ui);
@@ -365,6 +372,11 @@ impl App {
             let is_split = self.screen.cells.len() > 1;
             self.screen.split(!is_split);
         }
+        if !ui.ctx().memory(|memory| memory.focused().is_some())
+            && pressed(Modifiers::NONE, Key::Space)
+        {
+            motion::play(&mut self.screen, self.worker.found().frame_number);
+        }
         if pressed(Modifiers::NONE, Key::Home) {
             self.screen.camera = None;
         }
@@ -414,7 +426,8 @@ impl App {
     }
 
     fn save(&mut self) {
-        let file = PathBuf::from(&self.file);
+        // What is there stays.
+        let file = unused(Path::new(&self.file));
         if !is_experiment(&file) {
             return self.worker.ask(Ask::Save(file, 0));
         }
@@ -437,6 +450,17 @@ impl eframe::App for App {
 fn is_experiment(file: &Path) -> bool {
     file.extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// The file, or the first of `name-2`, `name-3`, … that does not exist.
+pub fn unused(file: &Path) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().display();
+    let ending = file.extension().unwrap_or_default().display();
+    let numbered = (2..).map(|number| file.with_file_name(format!("{stem}-{number}.{ending}")));
+    std::iter::once(file.to_owned())
+        .chain(numbered)
+        .find(|file| !file.exists())
+        .unwrap_or_default()
 }
 
 fn draw_themes(ui: &mut Ui) {

@@ -6,7 +6,7 @@ use egui::{Grid, ProgressBar, RichText, Sense, Stroke, Ui, Vec2};
 use raystone_config::Map;
 use raystone_core::params::Choice as _;
 use raystone_image::viridis;
-use raystone_viewer::{Figures, Frame, SIDE_NAMES, Screen};
+use raystone_viewer::{Figures, Frame, FrameTimes, SIDE_NAMES, Screen};
 
 pub fn draw(ui: &mut Ui, frame: &Frame, adapter: &str, screen: &Screen) {
     ui.strong("Figures");
@@ -16,6 +16,9 @@ pub fn draw(ui: &mut Ui, frame: &Frame, adapter: &str, screen: &Screen) {
     ));
     if let Some(scale) = frame.scale {
         draw_scale(ui, screen.window.map, scale);
+    }
+    if let Some(times) = &frame.times {
+        draw_times(ui, times);
     }
     for (side, name) in frame.sides.iter().zip(SIDE_NAMES) {
         ui.separator();
@@ -83,7 +86,39 @@ fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u
     draw_history(ui, &figures.sample_ms);
 }
 
-/// The times of the last samples as a line, from 0 up.
+/// The parts of a frame's time.
+fn draw_times(ui: &mut Ui, times: &FrameTimes) {
+    ui.separator();
+    let [frame, of] = times.frame;
+    let ms = median(&times.whole_ms).unwrap_or_default();
+    ui.label(format!(
+        "frame {frame} of {of}: {ms:.0} ms, {:.1} a second",
+        1e3 / ms.max(1e-3)
+    ));
+    Grid::new("times").num_columns(2).show(ui, |ui| {
+        let mut row = |what: String, ms: f64| {
+            ui.label(what.trim_start());
+            ui.label(RichText::new(format!("{ms:.1} ms")).monospace());
+            ui.end_row();
+        };
+        row("scene moved, uploaded".to_owned(), times.scene_ms);
+        for (side, name) in times.sides.iter().zip(SIDE_NAMES) {
+            let name = if times.sides.len() > 1 { name } else { "" };
+            row(format!("{name} structure updated"), side.update_ms);
+            match side.trace_ms {
+                Some(trace) => {
+                    row(format!("{name} traced"), trace);
+                    row(format!("{name} shaded"), side.render_ms - trace);
+                }
+                None => row(format!("{name} traced and shaded"), side.render_ms),
+            }
+        }
+        row("rest".to_owned(), times.rest_ms());
+    });
+    draw_history(ui, &times.whole_ms);
+}
+
+/// The last times as a line, from 0 up.
 fn draw_history(ui: &mut Ui, ms: &[f32]) {
     if ms.len() < 2 {
         return;
@@ -102,10 +137,7 @@ fn draw_history(ui: &mut Ui, ms: &[f32]) {
         )
     });
     painter.line(points.collect(), Stroke::new(1.0, ink));
-    response.on_hover_text(format!(
-        "ms of the last {} samples, from 0 to {most:.1}",
-        ms.len()
-    ));
+    response.on_hover_text(format!("ms of the last {}, from 0 to {most:.1}", ms.len()));
 }
 
 /// The colours of a map, from 0 to its upper end.

@@ -1,6 +1,6 @@
 //! The images: drawn side by side with a line between them, and moved by mouse, touch and keys.
 
-use crate::worker::{Found, Worker};
+use crate::worker::{Ask, Found, Worker};
 use eframe::egui;
 use egui::{
     Color32, Context, Key, Pos2, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
@@ -27,6 +27,8 @@ pub struct ImageView {
     room: [f32; 2],
     /// True while the line between two images is dragged.
     is_grasped: bool,
+    /// True while an object is dragged.
+    is_moving: bool,
 }
 
 impl ImageView {
@@ -63,6 +65,7 @@ impl ImageView {
         drop(found);
         self.move_line(ui, &response, rect, screen);
         let camera = screen.camera.or(camera)?;
+        self.move_object(ui, (worker, &response), rect, (screen, &camera));
         let next = self
             .moves(ui, &response, rect)
             .into_iter()
@@ -73,8 +76,7 @@ impl ImageView {
         let at = response
             .interact_pointer_pos()
             .filter(|at| response.clicked() && rect.contains(*at))?;
-        let of = (at - rect.min) / rect.size();
-        Some([0, 1].map(|axis| ((of[axis] * size[axis] as f32) as u32).min(size[axis] - 1)))
+        Some(pixel_at(rect, size, at))
     }
 
     fn upload(&mut self, ctx: &Context, found: &Found) {
@@ -163,6 +165,39 @@ impl ImageView {
         }
     }
 
+    /// Moves an object along the image while it is dragged.
+    fn move_object(
+        &mut self,
+        ui: &Ui,
+        (worker, response): (&Worker, &egui::Response),
+        rect: Rect,
+        (screen, camera): (&mut Screen, &Camera),
+    ) {
+        if response.drag_started() && !self.is_grasped && ui.input(|i| i.modifiers.alt) {
+            let pressed = ui.input(|i| i.pointer.press_origin());
+            if let Some(at) = pressed.filter(|at| rect.contains(*at)) {
+                self.is_moving = true;
+                worker.found().grasp = None;
+                worker.ask(Ask::Grasp(pixel_at(rect, screen.size, at)));
+            }
+        }
+        if response.drag_stopped() {
+            self.is_moving = false;
+        }
+        let by = response.drag_delta() / rect.size() * 2.0;
+        if !self.is_moving || by == Vec2::ZERO {
+            return;
+        }
+        ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
+        let Some(grasp) = worker.found().grasp else {
+            return;
+        };
+        let [forward, right, up] = camera.basis(screen.size);
+        let depth = (grasp.point - camera.eye).dot(forward);
+        let way = screen.dragged.entry(grasp.instance).or_default();
+        *way += depth * (by.x * right - by.y * up);
+    }
+
     /// The moves of the camera that mouse, touch and keys ask for.
     fn moves(&self, ui: &Ui, response: &egui::Response, rect: Rect) -> Vec<Motion> {
         let mut moves = Vec::new();
@@ -171,7 +206,7 @@ impl ImageView {
         if let Some(touch) = touch {
             let by = touch.translation_delta / rect.height();
             moves.push(Motion::Pan([-by.x, by.y]));
-        } else if response.dragged() && !self.is_grasped && by != Vec2::ZERO {
+        } else if response.dragged() && !self.is_grasped && !self.is_moving && by != Vec2::ZERO {
             let modifiers = ui.input(|i| i.modifiers);
             let is_pan = modifiers.shift || response.dragged_by(egui::PointerButton::Secondary);
             moves.push(if is_pan {
@@ -233,6 +268,12 @@ fn by_keys(ui: &Ui) -> Vec<Motion> {
         ui.ctx().request_repaint();
     }
     moves
+}
+
+/// The pixel at a point of the image.
+fn pixel_at(rect: Rect, size: [u32; 2], at: Pos2) -> [u32; 2] {
+    let of = (at - rect.min) / rect.size();
+    [0, 1].map(|axis| ((of[axis] * size[axis] as f32) as u32).min(size[axis] - 1))
 }
 
 /// The greatest rectangle of an image's shape in the middle of a place.

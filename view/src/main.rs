@@ -4,6 +4,7 @@ mod app;
 mod choices;
 mod figures;
 mod image;
+mod motion;
 mod pixel;
 mod screenshot;
 #[cfg(test)]

@@ -210,3 +210,62 @@ fn two_names_on_an_axis_make_two_images_and_more_than_the_axis_has_is_an_error()
             .contains("no/such.toml")
     );
 }
+
+#[test]
+fn the_scene_moves_and_stops_and_its_frames_are_timed() {
+    let set = ["--accel", "bvh,kd-tree", "--set", "animation.frames=5"];
+    let mut harness = window(&set, 1);
+    assert!(!has(&harness, "structure updated"));
+    harness.key_press(egui::Key::Space);
+    for text in [
+        "A structure updated",
+        "B structure updated",
+        "rest",
+        "a second",
+    ] {
+        expect(&mut harness, text);
+    }
+    harness.key_press(egui::Key::Space);
+    settle(&mut harness);
+    let app = harness.state();
+    assert_eq!(app.screen.window.frame, app.worker.found().frame_number);
+    assert!(!has(&harness, "a second"));
+}
+
+#[test]
+fn an_object_follows_the_pointer() {
+    let mut harness = window(&["--scene", "instances", "--accel", "meta-bvh"], 4);
+    let before = harness.state().worker.found().number;
+    let [from, to] = [egui::pos2(640.0, 500.0), egui::pos2(700.0, 470.0)];
+    harness.event(egui::Event::ModifiersChanged(egui::Modifiers::ALT));
+    harness.drag_at(from);
+    harness.hover_at(from + egui::vec2(8.0, 0.0));
+    harness.run_steps(2);
+    for _ in 0..500 {
+        harness.run_steps(1);
+        if harness.state().worker.found().grasp.is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    harness.hover_at(to);
+    harness.run_steps(2);
+    harness.drop_at(to);
+    harness.event(egui::Event::ModifiersChanged(egui::Modifiers::NONE));
+    settle(&mut harness);
+    let app = harness.state();
+    assert_eq!(app.screen.dragged.len(), 1, "{:?}", app.screen.dragged);
+    assert_eq!(app.screen.camera, None, "the camera stays");
+    assert!(app.worker.found().number > before);
+}
+
+#[test]
+fn names_of_files_that_are_there_are_numbered() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("view.png");
+    assert_eq!(app::unused(&file), file);
+    for name in ["view.png", "view-2.png"] {
+        std::fs::write(folder.path().join(name), "").unwrap();
+    }
+    assert_eq!(app::unused(&file), folder.path().join("view-3.png"));
+}

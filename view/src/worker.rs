@@ -5,7 +5,7 @@ use raystone_config::Catalogue;
 use raystone_core::geometry::Camera;
 use raystone_core::program::Program;
 use raystone_gpu::{AdapterChoice, GpuError};
-use raystone_viewer::{Done, Frame, Inspection, SamplePoints, Screen, Step, Viewer};
+use raystone_viewer::{Done, Frame, Grasp, Inspection, SamplePoints, Screen, Step, Viewer};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -33,6 +33,8 @@ pub enum Ask {
     Explain(usize, [u32; 2]),
     /// Compute the points of a side's pixel in two dimensions.
     Points(usize, [u32; 2], [u32; 2]),
+    /// Look for the instance that is seen at a pixel.
+    Grasp([u32; 2]),
     /// Write an image of a side.
     Save(PathBuf, usize),
 }
@@ -71,6 +73,10 @@ pub struct Found {
     /// The adapter.
     pub adapter: String,
     pub inspection: Option<Inspection>,
+    /// The instance that is being dragged.
+    pub grasp: Option<Grasp>,
+    /// The frame of the animation that is shown.
+    pub frame_number: u32,
     pub path: Option<ShownPath>,
     pub explanation: Option<String>,
     pub points: Option<SamplePoints>,
@@ -331,6 +337,10 @@ impl Inside {
                 Ok(inspection) => self.change(|found| found.inspection = inspection),
                 Err(error) => self.tell(viewer, error)?,
             },
+            Ask::Grasp(pixel) => match viewer.grasp(pixel) {
+                Ok(grasp) => self.change(|found| found.grasp = grasp),
+                Err(reason) => self.say(reason, true),
+            },
             Ask::Path(side, pixel, sample) => {
                 self.change(|found| {
                     found.status = Some("following the path on the host".to_owned())
@@ -393,8 +403,10 @@ impl Inside {
         let frame = Arc::new(viewer.frame());
         let is_first = frame.sides.iter().any(|side| side.picture.is_some());
         let ms = self.start.elapsed().as_secs_f64() * 1e3;
+        let frame_number = viewer.frame_number();
         self.change(|found| {
             found.frame = frame;
+            found.frame_number = frame_number;
             found.number += 1;
             if is_first {
                 found.first_picture_ms.get_or_insert(ms);

@@ -61,8 +61,8 @@ function take(message) {
 function say(what, share) {
   at("bar").value = share;
   const seconds = (performance.now() - began) / 1000;
-  const left = share > 0.03 ? (seconds * (1 - share)) / share : NaN;
-  const eta = Number.isFinite(left) ? ` · about ${duration(left)} left` : "";
+  // Known by what this adapter took so far; not by an adapter of ours.
+  const eta = share > 0.03 ? ` · about ${duration((seconds * (1 - share)) / share)} left` : " · how long it takes is told soon";
   at("status").textContent = `${what}${share < 1 ? eta : ""}`;
 }
 

@@ -40,10 +40,6 @@ impl Default for Load {
     }
 }
 
-/// Textures that a kernel may bind for it: nodes, triangles of leaves, triangles, and the words of
-/// a sampler. WebGPU guarantees so many.
-const TEXTURES: u32 = 4;
-
 impl Load {
     /// All load paths, the default first.
     pub const ALL: [Self; 3] = [
@@ -69,10 +65,9 @@ impl Load {
     /// # Errors
     /// The measurement does not run.
     pub fn reads_texels(&self, gpu: &Gpu) -> Result<bool, GpuError> {
-        let most = gpu.limits.max_storage_textures_per_shader_stage;
         match self.texels {
             Some(texels) => Ok(texels),
-            None => Ok(most >= TEXTURES && gpu.reads_texels_faster()?),
+            None => gpu.reads_texels_faster(),
         }
     }
 }

@@ -22,7 +22,7 @@ pub enum Way {
 /// A structure built over the first frame.
 pub struct Actor<'a> {
     kind: &'a dyn AccelKind,
-    params: &'a Params,
+    params: Params,
     first: First<'a>,
 }
 
@@ -48,7 +48,7 @@ impl<'a> Actor<'a> {
     /// It cannot be built, or can only be rebuilt from frame to frame.
     pub fn new(
         kind: &'a dyn AccelKind,
-        params: &'a Params,
+        params: &Params,
         motion: Motion,
         (soup, gpu): (&TriangleSoup, &Gpu),
     ) -> Result<Self, String> {
@@ -72,7 +72,7 @@ impl<'a> Actor<'a> {
         };
         Ok(Self {
             kind,
-            params,
+            params: params.clone(),
             first,
         })
     }
@@ -97,7 +97,7 @@ impl<'a> Actor<'a> {
                 let mut log = BuildLog::default();
                 Some(Taken::Built(self.kind.build(
                     first,
-                    self.params,
+                    &self.params,
                     &mut log,
                 )?))
             }
@@ -127,8 +127,8 @@ impl<'a> Actor<'a> {
                 built.update(soup).transpose()?;
                 Ok(Taken::Built(built))
             }
-            (None, First::Tree(over, _)) => over.tree(soup, self.params, log).map(Taken::Tree),
-            (None, First::Objects) => self.kind.build(soup, self.params, log).map(Taken::Built),
+            (None, First::Tree(over, _)) => over.tree(soup, &self.params, log).map(Taken::Tree),
+            (None, First::Objects) => self.kind.build(soup, &self.params, log).map(Taken::Built),
         }
     }
 
@@ -143,7 +143,7 @@ impl<'a> Actor<'a> {
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         match (taken, &self.first) {
             (Taken::Tree(tree), First::Tree(over, _)) => {
-                over.lay_out(&tree, soup, self.params, &mut BuildLog::default())
+                over.lay_out(&tree, soup, &self.params, &mut BuildLog::default())
             }
             (Taken::Tree(_), First::Objects) => Err(AccelError::Invalid(
                 "a structure over objects has no tree of its own to lay out".to_owned(),

@@ -3,7 +3,8 @@
 use glam::{DVec3, Vec3};
 use raystone_config::{Animation, Motion};
 use raystone_core::random::Pcg32;
-use raystone_scene::{Assembly, SceneData, Transform};
+use raystone_scene::{SceneData, Transform};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 const SEED: u64 = 1;
@@ -31,11 +32,9 @@ pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<Sce
             }
         }
         Motion::Instances => {
-            let assembly = moved.assembly.as_mut();
-            let assembly = assembly.ok_or("the scene has no instances that could move")?;
-            part(assembly, amplitude * time)?;
-            let instances = assembly.instances().iter();
-            moved.triangles = instances.flat_map(|i| assembly.copy(i)).collect();
+            let assembly = moved.assembly.as_ref();
+            let count = assembly.map_or(0, |assembly| assembly.instances().len());
+            shift(&mut moved, directions(count).map(|d| amplitude * time * d))?;
         }
     }
     moved.hash = format!("{}, frame {frame} of {animation:?}", scene.hash);
@@ -64,24 +63,47 @@ impl Wave {
     }
 }
 
-/// Moves every instance by `way` in a direction of its own.
-fn part(assembly: &mut Assembly, way: f64) -> Result<(), String> {
-    let mut random = Pcg32::new(SEED);
-    let directions: Vec<DVec3> = (assembly.instances().iter())
-        .map(|_| {
-            let z = 1.0 - 2.0 * random.uniform();
-            let (sine, cosine) = (TAU * random.uniform()).sin_cos();
-            let radius = (1.0 - z * z).max(0.0).sqrt();
-            DVec3::new(radius * cosine, radius * sine, z)
-        })
-        .collect();
-    for (instance, direction) in directions.into_iter().enumerate() {
-        let mut to_world: Transform = assembly.instances()[instance].to_world;
-        for (row, by) in to_world.rows.iter_mut().zip((way * direction).to_array()) {
+/// The scene with some instances shifted, each by a way of its own, scene units.
+///
+/// # Errors
+/// There is no such instance, or it cannot be placed.
+pub fn shifted(scene: &SceneData, ways: &BTreeMap<u32, Vec3>) -> Result<SceneData, String> {
+    let mut moved = scene.clone();
+    let count = ways.keys().last().map_or(0, |last| last + 1);
+    let way = |instance| ways.get(&instance).copied().unwrap_or_default();
+    shift(
+        &mut moved,
+        (0..count).map(|instance| way(instance).as_dvec3()),
+    )?;
+    moved.hash = format!("{}, shifted by {ways:?}", scene.hash);
+    Ok(moved)
+}
+
+/// Shifts the first instances by these ways.
+fn shift(scene: &mut SceneData, ways: impl Iterator<Item = DVec3>) -> Result<(), String> {
+    let assembly = scene.assembly.as_mut();
+    let assembly = assembly.ok_or("the scene has no instances that could move")?;
+    for (instance, way) in ways.enumerate() {
+        let now = assembly.instances().get(instance);
+        let mut to_world = now.map_or(Transform::IDENTITY, |now| now.to_world);
+        for (row, by) in to_world.rows.iter_mut().zip(way.to_array()) {
             row[3] += by as f32;
         }
         let placed = assembly.move_to(instance, to_world);
         placed.map_err(|e| e.to_string())?;
     }
+    let instances = assembly.instances().iter();
+    scene.triangles = instances.flat_map(|i| assembly.copy(i)).collect();
     Ok(())
+}
+
+/// Directions of so many instances.
+fn directions(count: usize) -> impl Iterator<Item = DVec3> {
+    let mut random = Pcg32::new(SEED);
+    (0..count).map(move |_| {
+        let z = 1.0 - 2.0 * random.uniform();
+        let (sine, cosine) = (TAU * random.uniform()).sin_cos();
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(radius * cosine, radius * sine, z)
+    })
 }

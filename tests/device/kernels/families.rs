@@ -309,6 +309,7 @@ pub fn batches() -> Family {
         "counted",
         "alpha_masks",
         "texels",
+        "sampled_texels",
         "loops_cut",
     ];
     factors.extend(features.map(Factor::feature));
@@ -349,8 +350,8 @@ pub fn renderers() -> Family {
     factors.extend(flags(&[
         "alpha_masks",
         "block_list",
-        "scene_texels",
         "texels",
+        "sampled_texels",
     ]));
     let clash = |a: Level, b: Level| {
         let is_whole = b.factor == "integrator" && !staged.contains(&text_of(b.part));
@@ -386,7 +387,7 @@ pub fn queued() -> Family {
     let mut factors = vec![integrator, Factor::entry(&entries)];
     factors.extend(samplers);
     factors.extend([offsets(), workgroups()]);
-    factors.extend(flags(&["scene_texels", "texels", "compacted"]));
+    factors.extend(flags(&["texels", "sampled_texels", "compacted"]));
     factors.extend(OF_QUEUES.map(Factor::feature));
     let clash = |a: Level, b: Level| {
         let needs_queue = compacted.contains(&b.part.entry) || OF_QUEUES.iter().any(|f| b.is_on(f));

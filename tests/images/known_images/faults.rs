@@ -116,8 +116,8 @@ const OTHERS: [Fault; 38] = [
     fault(
         PATH,
         &[(
-            "if (!(density > 0.0 && light.pdf > 0.0))",
-            "if (!(density > 0.02 && light.pdf > 0.0))",
+            "if (!(is_positive(density) && is_positive(light.pdf)))",
+            "if (!(density > 0.02 && is_positive(light.pdf)))",
         )],
         "grazing lamps",
     ),

@@ -111,8 +111,8 @@ pub const MUTANTS: &[Mutant] = &[
     path(
         "grazing-rays-end",
         "bounces that leave near the horizon are dropped",
-        "if (!(brightest > 0.0)) {",
-        "if (!(brightest > 0.0) || abs(dot(next.direction, surface.normal)) < 0.05) {",
+        "if (!is_positive(brightest)) {",
+        "if (!is_positive(brightest) || abs(dot(next.direction, surface.normal)) < 0.05) {",
     ),
     path(
         "bright-samples-cut",
@@ -123,7 +123,7 @@ pub const MUTANTS: &[Mutant] = &[
     path(
         "dark-paths-cut",
         "paths end where less than a fiftieth is left",
-        "if (!(brightest > 0.0)) {",
+        "if (!is_positive(brightest)) {",
         "if (!(brightest > 0.02)) {",
     ),
     fault(
@@ -281,8 +281,8 @@ pub const MUTANTS: &[Mutant] = &[
         "what a glossy surface reflects behind itself is lost",
         text(
             "shading/bsdf",
-            "if (!(other.pdf > 0.0)) { return own; }",
-            "if (other.pdf > 0.0) { return own; }",
+            "if (!is_positive(other.pdf)) { return own; }",
+            "if (is_positive(other.pdf)) { return own; }",
         ),
     ),
     fault(
