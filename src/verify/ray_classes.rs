@@ -212,7 +212,7 @@ mod tests {
                     .for_each(|ray| ray.direction = ray.direction.map(|x| 1.2 * x))
             }),
             (RayClass::Chord, |set| {
-                set.rays.iter_mut().for_each(|ray| ray.origin[2] *= 0.97)
+                set.rays.iter_mut().for_each(|ray| ray.origin[2] *= 0.8)
             }),
         ];
         for (class, change) in changes {
