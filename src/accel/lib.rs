@@ -23,6 +23,7 @@ mod instancing;
 mod intersection;
 mod irregular_grid;
 mod kd_tree;
+pub mod known_figures;
 mod leaf;
 pub mod mask;
 mod octree;

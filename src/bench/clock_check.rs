@@ -39,6 +39,9 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
             for (shortest, batch) in shortest.iter_mut().zip([single, double]) {
                 let around = Stopwatch::start();
                 let elapsed = batch.trace()?.measured()?;
+                if let Some(fault) = other_clock(&elapsed) {
+                    return Ok(Some(fault));
+                }
                 shortest.note(elapsed, around.elapsed());
             }
         }
@@ -48,6 +51,13 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
         }
     }
     Ok(last)
+}
+
+/// That of the device counts where there is one, and else that on the wall; never that of the processors.
+fn other_clock(elapsed: &Elapsed) -> Option<String> {
+    let counts = elapsed.gpu_ms.unwrap_or(elapsed.wall_ms);
+    let is_other = elapsed.ms().to_bits() != counts.to_bits();
+    is_other.then(|| format!("{:.3} ms are told where {counts:.3} ms count", elapsed.ms()))
 }
 
 impl Shortest {

@@ -57,6 +57,60 @@ impl SeedFigures {
     }
 }
 
+/// Eight points in eighths, as in the known figures of discrepancies.
+const KNOWN: [[f64; 2]; 8] = [
+    [0.0, 0.0],
+    [0.5, 0.5],
+    [0.25, 0.75],
+    [0.75, 0.25],
+    [0.125, 0.375],
+    [0.625, 0.875],
+    [0.375, 0.625],
+    [0.875, 0.125],
+];
+
+/// Measures known points: D* and the centred discrepancy of all boxes in NumPy, the root of SciPy's L2-star discrepancy, and
+/// ((Σ e^(x + y)) / 8 − (e − 1)²)² in Python.
+///
+/// # Errors
+/// A figure is not what it should be: which, and both values.
+pub fn check() -> Result<(), String> {
+    let mut found = SeedFigures::default();
+    let measured = found.add(&KNOWN, &[KNOWN.len()]);
+    measured.map_err(|e| format!("known points: {e}"))?;
+    let of_exponential = found
+        .squared_errors
+        .first()
+        .and_then(|errors| errors.first());
+    let known = [
+        ("D*", found.star.first(), 0.25),
+        (
+            "L2-star discrepancy",
+            found.l2_star.first(),
+            0.092_255_154_082_908_05,
+        ),
+        (
+            "centred discrepancy",
+            found.centered.first(),
+            0.015_346_950_954_860_938,
+        ),
+        (
+            "squared error of e^(x + y)",
+            of_exponential,
+            0.13123593500391467,
+        ),
+    ];
+    known.into_iter().try_for_each(|(name, found, expected)| {
+        let found = found.copied().unwrap_or(f64::NAN);
+        ((found - expected).abs() <= 1e-12).then_some(()).ok_or_else(|| {
+            format!(
+                "the {name} of known points is {found}, and should be {expected}: this program computes wrong figures; \
+                 build it anew, and report what stays wrong"
+            )
+        })
+    })
+}
+
 /// Squared error of a function's mean over the first `n` points, for ascending `counts`.
 pub(crate) fn squared_errors(
     function: &Function,
@@ -196,6 +250,11 @@ pub(crate) fn coverage(points: &[[f64; 2]], n: usize) -> f64 {
 mod tests {
     use super::*;
     use raystone_core::random::Pcg32;
+
+    #[test]
+    fn known_points_have_their_figures() {
+        assert_eq!(check(), Ok(()));
+    }
 
     #[test]
     fn errors_of_a_midpoint_grid_have_the_slope_of_its_theory() {

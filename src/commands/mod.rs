@@ -159,6 +159,10 @@ fn known_figures() -> Result<()> {
     let checks = [
         raystone::measure::known_figures::check,
         raystone::discrepancy::known_figures::check,
+        raystone::measure::record::known_readings::check,
+        raystone::measure::stream::check,
+        raystone::accel::known_figures::check,
+        raystone::report::check_rulings,
     ];
     checks
         .into_iter()

@@ -62,12 +62,37 @@ pub fn tone_map(image: &Image, exposure: f32) -> Picture {
     }
 }
 
-/// Writes a picture as PNG, atomically.
+/// Writes a picture as PNG, atomically. What was encoded is decoded first, and compared.
 ///
 /// # Errors
-/// [`ImageError::Write`], [`ImageError::Encode`].
+/// [`ImageError::Write`], [`ImageError::Encode`], [`ImageError::Altered`].
 pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
-    save(path, encode_png(picture))
+    let encoded = encode_png(picture);
+    let fault = encoded
+        .as_ref()
+        .ok()
+        .and_then(|bytes| differing(picture, bytes));
+    if let Some(fault) = fault {
+        let path = path.to_owned();
+        return Err(ImageError::Altered { path, fault });
+    }
+    save(path, encoded)
+}
+
+/// The first pixel of an encoded picture that is another.
+fn differing(picture: &Picture, bytes: &[u8]) -> Option<String> {
+    let read = match image::load_from_memory_with_format(bytes, image::ImageFormat::Png) {
+        Ok(read) => read.into_rgb8(),
+        Err(error) => return Some(error.to_string()),
+    };
+    let is_other = |place: u32| {
+        let [x, y] = [place % picture.width, place / picture.width];
+        let found = read.get_pixel_checked(x, y).map(|pixel| pixel.0);
+        found.as_ref() != picture.pixels.get(place as usize)
+    };
+    let place = (0..picture.width * picture.height).find(|place| is_other(*place))?;
+    let [x, y] = [place % picture.width, place / picture.width];
+    Some(format!("pixel ({x}, {y}) is not the one that was encoded"))
 }
 
 /// Encodes a PNG file.

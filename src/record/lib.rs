@@ -9,6 +9,7 @@ mod environment;
 mod error;
 pub mod figure;
 mod key;
+pub mod known_readings;
 mod old;
 mod paths;
 mod peer;
@@ -35,7 +36,7 @@ pub use read::{
 };
 pub use reading::{MeasuredRecord, Note, Reading, Samples};
 pub use run::*;
-pub use sound::{Sound, fault_of};
+pub use sound::{Sound, contradiction, fault_of};
 pub use stream::*;
 pub use structure::*;
 

@@ -1,7 +1,15 @@
 //! Values that no run writes: negative times and counts, shares above one, rounds that lack one of their clocks. A record that
-//! holds one was damaged, and none of its figures counts.
+//! holds one was damaged, and none of its figures counts. And figures that contradict each other, as a rate that is not rays over
+//! time: a run ends before it writes them.
 
 use super::*;
+use raystone_core::structure::StructureStats;
+use raystone_stats::rates::rate_fault;
+use raystone_stats::statistics::median;
+use std::collections::BTreeSet;
+
+/// Relative difference of two figures that is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// A body of a record that can detect its own damage.
 pub trait Sound {
@@ -58,6 +66,20 @@ pub fn fault_of(readings: &[Reading]) -> Option<String> {
     faults.into_iter().next()
 }
 
+/// Describes two figures of a record that contradict each other.
+pub fn contradiction(body: &Body) -> Option<String> {
+    let mut faults = Vec::new();
+    match body {
+        Body::Structure(record) => of_rays(record, &mut faults),
+        Body::Time(record) => of_image(record, &mut faults),
+        Body::Error(record) => of_errors(&record.errors, &mut faults),
+        Body::Bias(record) => of_bias(record, &mut faults),
+        Body::Stream(record) => of_stream(record, &mut faults),
+        _ => {}
+    }
+    faults.into_iter().next()
+}
+
 /// Metrics that are sums of squares or of magnitudes.
 const NOT_NEGATIVE: [&str; 5] = ["mae", "relmse-trimmed", "mse-luminance", "smape", "flip"];
 
@@ -66,6 +88,55 @@ fn of_error(at: &ErrorAtSpp, faults: &mut Vec<String>) {
         let name = id.split('/').next().unwrap_or_default();
         if NOT_NEGATIVE.contains(&name) {
             not_negative(id, [value], faults);
+        }
+    }
+}
+
+fn of_errors(errors: &[ErrorAtSpp], faults: &mut Vec<String>) {
+    if !errors.is_sorted_by(|a, b| a.spp < b.spp) {
+        faults.push("numbers of samples do not ascend".to_owned());
+    }
+    for at in errors {
+        let metric = |id: &str| at.metrics.get(id).copied();
+        let (mse, root) = (metric("mse/v1"), metric("rmse/v1"));
+        equal(
+            "the square of rmse",
+            root.map(|root| root * root),
+            mse,
+            faults,
+        );
+        let channels = ["mse-red/v1", "mse-green/v1", "mse-blue/v1"].map(metric);
+        let sum = channels.into_iter().sum::<Option<f64>>();
+        let mean = sum.map(|sum| sum / 3.0);
+        equal("the mean over channels of mse", mean, mse, faults);
+    }
+}
+
+fn of_bias(record: &BiasRecord, faults: &mut Vec<String>) {
+    let counted: usize = record.p_histogram.iter().sum();
+    if record.rejected > record.tiles || counted > record.tiles {
+        faults.push(format!(
+            "{} tiles are rejected and {counted} are in a histogram of {}",
+            record.rejected, record.tiles
+        ));
+    }
+    for (what, p) in [("p", record.p), ("p_of_all", record.p_of_all)] {
+        share(what, p.unwrap_or_default(), faults);
+    }
+}
+
+fn of_stream(record: &StreamRecord, faults: &mut Vec<String>) {
+    if !record.star.is_sorted_by(|a, b| a.n < b.n) {
+        faults.push("numbers of points do not ascend".to_owned());
+    }
+    for star in &record.star {
+        // A mean square over all boxes is at most the square of the greatest.
+        let same = record.figures.l2_star.iter().find(|at| at.n == star.n);
+        if let Some(l2) = same.filter(|l2| l2.value.value > star.value.value * (1.0 + ROUNDING)) {
+            faults.push(format!(
+                "the L2-star discrepancy {} of {} points is above D* = {}",
+                l2.value.value, star.n, star.value.value
+            ));
         }
     }
 }
@@ -83,6 +154,78 @@ fn of_structure(record: &StructureRecord, faults: &mut Vec<String>) {
             let counted = [&work.nodes, &work.box_tests, &work.triangle_tests];
             not_negative("counters", counted, faults);
         }
+    }
+}
+
+/// Times, rates, rays and leaves of a structure.
+fn of_rays(record: &StructureRecord, faults: &mut Vec<String>) {
+    let phases = record.build.iter().map(|phase| phase.ms).sum();
+    equal(
+        "the sum of build",
+        Some(phases),
+        Some(record.build_ms),
+        faults,
+    );
+    of_leaves(&record.stats, faults);
+    let gated = record.gate.iter().flat_map(|gate| &gate.classes);
+    let gated: Vec<(RayClass, usize)> = gated.map(|class| (class.class, class.rays)).collect();
+    let mut known = BTreeSet::new();
+    for timing in &record.timings {
+        let class = (timing.class, timing.rays);
+        let is_judged = gated.is_empty() || gated.contains(&class);
+        if !known.insert(timing.class) || !is_judged {
+            faults.push(format!(
+                "{} {} rays are timed twice, or others than were judged",
+                timing.rays,
+                timing.class.name()
+            ));
+        }
+        faults.extend(rate_fault(&timing.mrays_s, timing.rays as f64, &timing.ms));
+    }
+}
+
+/// Leaves and references against the histogram, whose last class holds longer leaves as well. Some structures count
+/// empty leaves, too.
+fn of_leaves(stats: &StructureStats, faults: &mut Vec<String>) {
+    let histogram = &stats.leaf_histogram;
+    if histogram.is_empty() {
+        return;
+    }
+    let all: u64 = histogram.iter().sum();
+    let known = [all, all - histogram[0]].contains(&stats.leaves);
+    let references = histogram
+        .iter()
+        .zip(0..)
+        .map(|(leaves, size)| leaves * size);
+    if !known || references.sum::<u64>() > stats.references {
+        faults.push(format!(
+            "{} leaves with {} references have a histogram of {all} leaves",
+            stats.leaves, stats.references
+        ));
+    }
+}
+
+/// Times and rates of a whole cell against its rays, and those against its pixels.
+fn of_image(record: &TimeRecord, faults: &mut Vec<String>) {
+    let spp = f64::from(record.spp);
+    let per_spp = record.ms_per_spp.map(|ms| ms.value);
+    let ms = median(&record.ms).filter(|_| per_spp.is_some());
+    equal("ms_per_spp", per_spp, ms.map(|ms| ms / spp), faults);
+    if let Some(rate) = record.mrays_s {
+        faults.extend(rate_fault(&rate, record.traced_rays() as f64, &record.ms));
+    }
+    let rays = |class: &str| record.rays.get(class).copied();
+    let Some(primary) = rays("primary") else {
+        return;
+    };
+    let [width, height] = record.resolution.map(u64::from);
+    let bounced = rays("bounce").unwrap_or_default();
+    let (samples, live) = (width * height * u64::from(record.spp), &record.live_paths);
+    let is_followed = live.is_empty() || live.iter().sum::<u64>() == primary + bounced;
+    if primary != samples || !is_followed {
+        faults.push(format!(
+            "{primary} primary and {bounced} bounce rays, paths by bounce {live:?}, are not those of {samples} samples"
+        ));
     }
 }
 
@@ -110,6 +253,15 @@ fn rounds(ms: &[f64], others: [&[f64]; 2], faults: &mut Vec<String>) {
     }
 }
 
+/// Two ways to one figure, where both are there.
+fn equal(what: &str, found: Option<f64>, expected: Option<f64>, faults: &mut Vec<String>) {
+    if let (Some(found), Some(expected)) = (found, expected)
+        && (found - expected).abs() > ROUNDING * expected.abs()
+    {
+        faults.push(format!("{what} is {found} where {expected} was to be"));
+    }
+}
+
 fn not_negative<'a>(
     what: &str,
     values: impl IntoIterator<Item = &'a f64>,
@@ -131,6 +283,70 @@ fn share(what: &str, value: f64, faults: &mut Vec<String>) {
 mod tests {
     use super::*;
     use crate::figure::{BUILD_MS, COMPACTION_NS};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn figures_that_contradict_each_other_are_faults() {
+        let (structure, cell) = crate::known_readings::known();
+        let said = |body: Body| contradiction(&body).unwrap_or_default();
+        assert_eq!(said(Body::Structure(structure.clone())), "");
+        assert_eq!(said(Body::Time(cell.clone())), "");
+        type Of<T> = (&'static str, fn(&mut T));
+        let structures: [Of<StructureRecord>; 5] = [
+            ("sum of build", |r| r.build_ms = 0.005),
+            ("rate", |r| r.timings[0].mrays_s = Interval::exact(4.0)),
+            ("timed twice", |r| r.timings.push(r.timings[0].clone())),
+            ("histogram", |r| r.stats.leaves = 7),
+            ("histogram", |r| r.stats.references = 8),
+        ];
+        for (part, change) in structures {
+            let mut record = structure.clone();
+            change(&mut record);
+            assert!(said(Body::Structure(record)).contains(part), "{part}");
+        }
+        let cells: [Of<TimeRecord>; 5] = [
+            ("ms_per_spp", |r| r.ms_per_spp = Some(Interval::exact(10.0))),
+            ("rate", |r| r.mrays_s = Some(Interval::exact(0.17))),
+            ("samples", |r| r.resolution = [20, 10]),
+            ("samples", |r| r.live_paths = vec![400, 99]),
+            ("rate", |r| drop(r.rays.insert("shadow".to_owned(), 400))),
+        ];
+        for (part, change) in cells {
+            let mut record = cell.clone();
+            change(&mut record);
+            let fault = said(Body::Time(record));
+            assert!(fault.contains(part), "{part}: {fault}");
+        }
+        let errors = |metrics: &[(&str, f64)], spp: [u32; 2]| {
+            let at = |spp| ErrorAtSpp {
+                partial_net: false,
+                spp,
+                metrics: metrics
+                    .iter()
+                    .map(|(id, x)| ((*id).to_owned(), *x))
+                    .collect(),
+                without_part: BTreeMap::new(),
+                tail: None,
+            };
+            let mut faults = Vec::new();
+            of_errors(&spp.map(at), &mut faults);
+            faults.into_iter().next().unwrap_or_default()
+        };
+        let right = [
+            ("mse/v1", 4.0),
+            ("rmse/v1", 2.0),
+            ("mse-red/v1", 3.0),
+            ("mse-green/v1", 4.0),
+            ("mse-blue/v1", 5.0),
+        ];
+        assert_eq!(errors(&right, [1, 2]), "");
+        assert!(errors(&right, [2, 2]).contains("ascend"));
+        for place in 1..right.len() {
+            let mut wrong = right;
+            wrong[place].1 *= 1.01;
+            assert!(errors(&wrong, [1, 2]).contains("mse"), "{place}");
+        }
+    }
 
     #[test]
     fn readings_that_are_no_numbers_or_lack_a_clock_are_faults() {

@@ -120,7 +120,7 @@ pub struct GateVerdict {
     pub work: Option<String>,
     /// Structural faults found by `validate`.
     pub structural: Option<String>,
-    /// The fault on the gate's second scene.
+    /// The fault on one of the gate's further scenes.
     #[serde(default)]
     pub elsewhere: Option<String>,
 }

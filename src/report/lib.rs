@@ -32,6 +32,7 @@ mod tests;
 pub(crate) mod trust;
 pub mod values;
 
+pub use ruling::check as check_rulings;
 pub use terminal::{failed_checks, terminal_tables};
 
 use data::RunData;
@@ -54,6 +55,14 @@ pub enum ReportError {
         path: PathBuf,
         /// The cause.
         source: std::io::Error,
+    },
+    /// A table does not hold what was to be written to it.
+    #[error("{} would not hold the figures of its records: {fault}; this program is at fault: report this", path.display())]
+    Altered {
+        /// The file.
+        path: PathBuf,
+        /// The first difference.
+        fault: String,
     },
     /// A plot cannot be drawn.
     #[error("cannot draw a plot: {0}")]
@@ -83,7 +92,7 @@ pub struct ReportPaths {
 /// Each file is whole or absent: it is written under another name and renamed.
 ///
 /// # Errors
-/// Unreadable records, see [`read_records`], or a folder that cannot be written.
+/// Unreadable records, see [`read_records`], a table that is wrong, or a folder that cannot be written.
 pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
@@ -95,7 +104,12 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
     let figures = dir.join("figures.csv");
-    write_file(&figures, values::csv(&values).as_bytes())?;
+    let table = values::csv(&values);
+    if let Some(fault) = values::csv_fault(&values, &table) {
+        let path = figures;
+        return Err(ReportError::Altered { path, fault });
+    }
+    write_file(&figures, table.as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,

@@ -20,6 +20,38 @@ pub(crate) struct Contender {
     pub log: Option<LogFigure>,
 }
 
+/// Judges two known cases.
+///
+/// # Errors
+/// The winner is another one: of which, and what to do.
+pub fn check() -> Result<(), String> {
+    use Better::{Higher, Lower};
+    // Three and five, known to a twentieth.
+    let contender = |value: f64| {
+        let figure = Interval {
+            value,
+            low: 0.95 * value,
+            high: 1.05 * value,
+        };
+        Contender {
+            name: value.to_string(),
+            figure,
+            log: LogFigure::of_interval(figure, 10.0),
+        }
+    };
+    for (better, wins) in [(Higher, 5.0), (Lower, 3.0)] {
+        let ruling = judge([3.0, 5.0].map(contender).into(), better);
+        if !matches!(&ruling, Ruling::Winner(winner, ..) if winner.figure.value == wins) {
+            return Err(format!(
+                "of 3 and 5 the winner is {} where {better:?} is better: this program names wrong winners; build it anew, \
+                 and report what stays wrong",
+                ruling.answer()
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// The outcome of a comparison of all with all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Ruling {

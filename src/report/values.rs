@@ -379,6 +379,53 @@ pub fn csv(values: &[Value]) -> String {
     text
 }
 
+/// Returns the first line of a table that does not hold its value: columns are found by their heads.
+pub(crate) fn csv_fault(values: &[Value], text: &str) -> Option<String> {
+    let mut rows = rows_of(text).into_iter();
+    let heads = rows.next().unwrap_or_default();
+    let wrong = values.iter().zip(1..).find_map(|(value, line)| {
+        let row = rows.next().unwrap_or_default();
+        let field = |name: &str| {
+            let column = heads.iter().position(|head| head == name)?;
+            row.get(column).map(String::as_str)
+        };
+        let number = |name: &str| field(name).and_then(|text| text.parse::<f64>().ok());
+        let holds = |numbers: [Option<f64>; 3]| ["value", "low", "high"].map(number) == numbers;
+        let is_named = field("figure") == Some(&*value.figure.id);
+        let mut labels = value.key.labels();
+        let is_at = labels.all(|(axis, label)| field(axis) == Some(&*no_formula(label)));
+        let is_there = match value.estimate {
+            Estimate::Known(i) | Estimate::HeavyTailed(i) => {
+                holds([i.value, i.low, i.high].map(Some))
+            }
+            Estimate::Below(bound) => holds([None, None, Some(bound)]),
+            Estimate::Word(_) => holds([None; 3]),
+        };
+        (!(is_named && is_at && is_there)).then(|| format!("value {line}, {}", value.key))
+    });
+    wrong.or_else(|| rows.next().map(|_| "a line too many".to_owned()))
+}
+
+/// Fields by line (RFC 4180).
+fn rows_of(text: &str) -> Vec<Vec<String>> {
+    let (mut rows, mut row, mut field) = (Vec::new(), Vec::new(), String::new());
+    let mut is_quoted = false;
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '"' if is_quoted && letters.next_if_eq(&'"').is_some() => field.push('"'),
+            '"' => is_quoted = !is_quoted,
+            ',' if !is_quoted => row.push(std::mem::take(&mut field)),
+            '\n' if !is_quoted => {
+                row.push(std::mem::take(&mut field));
+                rows.push(std::mem::take(&mut row));
+            }
+            _ => field.push(letter),
+        }
+    }
+    rows
+}
+
 /// Returns a name, with an apostrophe before it if a spreadsheet would read it as a formula.
 fn no_formula(name: &str) -> String {
     match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
@@ -420,5 +467,21 @@ mod tests {
              ,bvh,rmse-unbiased/v1,unbiased RMSE,,,,0.5,\"jackknife, Student's 95 % interval\"\n\
              ,bvh,break-even/v1,break-even,thousand rays,,,,never\n"
         );
+        let text = csv(&values);
+        assert_eq!(csv_fault(&values, &text), None);
+        for (from, to) in [
+            (",2,1,3,", ",2,3,1,"),
+            ("scene,accel", "accel,scene"),
+            ("value,low,high", "low,value,high"),
+            (",never", ",never\nx"),
+        ] {
+            let wrong = text.replace(from, to);
+            assert!(
+                wrong != text && csv_fault(&values, &wrong).is_some(),
+                "{from}"
+            );
+        }
+        let less = text.lines().take(2).collect::<Vec<_>>().join("\n") + "\n";
+        assert!(csv_fault(&values, &less).is_some());
     }
 }

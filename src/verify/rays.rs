@@ -118,7 +118,7 @@ pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
 }
 
 /// Point and unit normal, on the ray's side, of every primary hit.
-fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
+pub(super) fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
     let hits = primary
         .rays
         .iter()

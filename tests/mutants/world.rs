@@ -10,14 +10,15 @@ use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
 use raystone::measure::gate::{Checks, ReferenceTracer};
+use raystone::measure::strained_copies::strained_copies;
 use raystone::params::ParamValue;
 use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
 /// Seeds of the integer-grid soups.
 const SOUPS: [u64; 3] = [40, 41, 42];
 
-/// Scenes of the gate: walls that meet in edges, a closed mesh, copies that are moved and turned, and its
-/// second scene.
+/// Scenes of the gate: walls that meet in edges, a closed mesh, copies that are moved and turned, and the first of its
+/// further scenes.
 const SCENES: &[(&str, &[(&str, i64)])] = &[
     ("cornell-box", &[]),
     ("displaced-sphere", &[("triangles", 800)]),
@@ -100,6 +101,8 @@ impl World {
             world.soups = SOUPS.map(soup).into();
             let scenes: Result<_, CheckError> = SCENES.iter().map(scene).collect();
             world.scenes = scenes?;
+            let strained = strained_copies().map_err(|e| CheckError::Other(e.to_string()))?;
+            world.scenes.push(judged(Stage::new(strained))?);
         }
         if has(|s| matches!(s, Subject::Integrators)) {
             let folder = options.folder.join("reference");
@@ -147,7 +150,11 @@ fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
         .iter()
         .map(|&(key, value)| (key, ParamValue::Integer(value)))
         .collect();
-    let stage = Stage::builtin(name, &changes)?;
+    judged(Stage::builtin(name, &changes)?)
+}
+
+/// A scene with the gate's rays.
+fn judged(stage: Stage) -> Result<Case, CheckError> {
     let reference = ReferenceTracer::new(
         &stage.scene,
         &stage.soup,

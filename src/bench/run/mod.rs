@@ -27,6 +27,7 @@ mod paths;
 mod peers;
 mod primary;
 mod progress;
+mod promised;
 mod recorder;
 mod reference;
 mod reference_file;

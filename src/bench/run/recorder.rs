@@ -4,13 +4,17 @@ use super::error::RunError;
 use super::folder::Folder;
 use super::inputs::{Current, kernel_set};
 use super::options::RunOptions;
+use super::promised::Promised;
 use super::resume::Earlier;
 use super::units::Unit;
 use raystone_config::Axis;
 use raystone_core::params::Variant;
 use raystone_gpu::Gpu;
 use raystone_image::ImageError;
-use raystone_record::{Body, CellRecord, KernelSetRecord, Line, text_of};
+use raystone_record::{
+    Body, CellRecord, KernelSetRecord, Line, Sound, contradiction, fault_of, text_of,
+};
+use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,6 +26,8 @@ pub(super) struct Recorder<'a> {
     folder: Option<Arc<Folder>>,
     /// What cells depend on.
     pub current: Option<Current<'a>>,
+    /// What the experiment asks for.
+    pub promised: Option<RefCell<Promised>>,
     /// Modules of kernels that were used for a unit, or for something that several share.
     used: BTreeMap<String, BTreeMap<String, String>>,
     /// Kernel sets that are recorded.
@@ -99,11 +105,21 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Appends one record as one whole line and flushes it to the disk.
+    /// Appends one record as one whole line and flushes it to the disk. One that contradicts itself or the experiment ends the
+    /// run.
     pub(super) fn write(&self, line: &Line) -> Result<(), RunError> {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
+        let promised = self.promised.iter();
+        let other = promised.filter_map(|promised| promised.borrow_mut().fault(line));
+        let own = line.body.fault().or_else(|| contradiction(&line.body));
+        let own = own.or_else(|| fault_of(&line.readings));
+        if let Some(fault) = other.chain(own).next() {
+            return Err(RunError::Wrong(format!(
+                "a record is wrong: {fault}; this program measures or writes otherwise than it should: report this"
+            )));
+        }
         let mut text = serde_json::to_string(line).map_err(unwritable)?;
         text.push('\n');
         folder.append(&text)

@@ -8,6 +8,7 @@ use super::kernels::Kernels;
 use super::ledger::Ledger;
 use super::options::RunOptions;
 use super::progress::Progress;
+use super::promised::Promised;
 use super::recorder::Recorder;
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
@@ -22,6 +23,7 @@ use raystone_record::Environment;
 use raystone_record::{
     Body, CellRecord, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord, SkippedRecord,
 };
+use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -123,6 +125,7 @@ impl<'a> Session<'a> {
         let recorder = Recorder::open(options)?;
         let mut session = Self::unrecorded(experiment, plan, registries, options);
         session.recorder = recorder;
+        session.recorder.promised = Some(RefCell::new(Promised::of(experiment)));
         session.reference_file = reference_file;
         Ok(session)
     }

@@ -530,5 +530,25 @@ fn dump_points(
     seed: u32,
 ) -> Result<Vec<[f64; 2]>, String> {
     let numbers = dump_numbers(gpu, sampler, &coordinates(pixels, count, pair, seed))?;
-    Ok(numbers.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
+    let points: Vec<[f64; 2]> = numbers.chunks_exact(2).map(|p| [p[0], p[1]]).collect();
+    // The ends by themselves: points of other dimensions or samples would be as good to look at.
+    let ends = [
+        (pixels.first(), 0, points.first()),
+        (pixels.last(), count - 1, points.last()),
+    ];
+    for (pixel, sample, point) in ends {
+        let at = |dimension| Coordinate {
+            pixel: pixel.copied().unwrap_or_default(),
+            sample,
+            dimension,
+            seed,
+        };
+        let asked = pair.map(|dimension| f64::from(to_unit(sampler.sample_u32(at(dimension)))));
+        if point != Some(&asked) {
+            return Err(format!(
+                "sample {sample} of dimensions {pair:?} is {point:?}, not {asked:?}"
+            ));
+        }
+    }
+    Ok(points)
 }

@@ -195,6 +195,13 @@ fn class_timing(
         return Err(format!("{:?} rays: {fault}", set.class).into());
     }
     let samples = samples.map_err(text)?;
+    if gpu.has_clock() && !samples.ms.is_empty() && samples.ms == samples.wall_ms {
+        return Err(
+            "its rounds are those of the wall clock, though the device has one"
+                .to_owned()
+                .into(),
+        );
+    }
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }

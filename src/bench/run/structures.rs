@@ -16,6 +16,7 @@ use raystone_gpu::{Gpu, GpuError, wait_for};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
+use raystone_verify::ray_classes;
 use raystone_verify::self_test::unseen_hit;
 use raystone_verify::twin_work::{self, TwinWork};
 use std::sync::Arc;
@@ -138,7 +139,12 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
     record.stats = built.stats();
     record.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let valid = (session.clock).time("gate", || built.validate(&world.soup));
-    candidate.structural = valid.err().map(|e| e.to_string());
+    let on_device = built.on_device();
+    let held = on_device.iter().map(|(_, buffer)| buffer.size());
+    let held = built.buffers().bytes() + held.sum::<u64>();
+    let bytes = candidate.record.body.stats.bytes;
+    let other = (bytes != held).then(|| format!("it has {held} bytes, and says {bytes}"));
+    candidate.structural = valid.err().map(|e| e.to_string()).or(other);
     let work = || {
         let exact = world.probe.is_exact();
         TwinWork::of_structure(&*built, &world.soup, &world.reference, exact)
@@ -220,12 +226,20 @@ fn as_configured(
     traced.map_err(|error| error.to_string())
 }
 
-/// Ends the run if the gate does not see what is planted into its own data, once per run.
+/// Ends the run if its rays are not those of their classes, or the gate does not see what is planted into its own data, once per
+/// run.
 fn prove_gate(session: &mut Session, world: &World) -> Result<(), RunError> {
     if std::mem::replace(&mut session.checked.gate_is_proven, true) {
         return Ok(());
     }
     let (scene, soup) = (&world.scene, &world.soup);
+    let (settings, sets) = (&session.experiment.gate, &world.reference.sets);
+    let classes = || ray_classes::fault(scene, soup, world.camera, settings, sets);
+    if let Some(fault) = session.clock.time("gate", classes) {
+        return Err(RunError::Wrong(format!(
+            "the recorded rays are not what they should be: {fault}; no figure of them would mean anything"
+        )));
+    }
     let plant = || unseen_hit(scene, soup, &world.reference, world.probe.is_exact());
     match session.clock.time("gate", plant) {
         None => Ok(()),

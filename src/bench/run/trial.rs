@@ -1,5 +1,5 @@
-//! Second scene of the correctness check: small, but exercises code that otherwise only large or
-//! deep scenes reach. Every structure of a run is tested on it once.
+//! Further scenes of the correctness check: small, but exercise code that otherwise only large, deep or
+//! distorted scenes reach. Every structure of a run is tested on them once.
 
 use super::session::Session;
 use super::world::World;
@@ -10,11 +10,26 @@ use raystone_record::fault_text;
 use raystone_render::{Stage, StageError};
 use raystone_scene::{LoadOptions, SceneData, builtin_scenes, load};
 use raystone_verify::gate::{Checks, ReferenceTracer, gate};
+use raystone_verify::strained_copies::strained_copies;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-const SCENE: &str = "far-corners";
-/// Its rays: per class, against brute force, and in double precision (besides hard ones).
+/// What loads a scene.
+type Load = fn() -> Result<SceneData, String>;
+
+const SCENES: [(&str, Load); 2] = [
+    ("far-corners", || {
+        let entry = builtin_scenes()
+            .into_iter()
+            .find(|e| e.name == "far-corners");
+        let variant = entry.ok_or("it is not registered")?.default_variant();
+        load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())
+    }),
+    ("strained-copies", || {
+        strained_copies().map_err(|e| e.to_string())
+    }),
+];
+/// Their rays: per class, against brute force, and in double precision (besides hard ones).
 const GATE: Gate = Gate {
     rays: 1024,
     brute_force_tests: 1,
@@ -26,10 +41,10 @@ const GATE: Gate = Gate {
 /// Brute force checks one ray in this many.
 const EVERY: usize = 8;
 
-/// The scene with its reference tracers, prepared once per run, and its results.
+/// The scenes with their reference tracers, prepared once per run, and their results.
 #[derive(Default)]
 pub(super) struct Trial {
-    /// By the tests used for checking.
+    /// By name and the tests used for checking.
     scenes: BTreeMap<String, Arc<CheckedScene>>,
     outcomes: BTreeMap<String, Option<String>>,
 }
@@ -40,10 +55,8 @@ struct CheckedScene {
 }
 
 impl CheckedScene {
-    fn new(intersection: Intersection) -> Result<Self, String> {
-        let entry = builtin_scenes().into_iter().find(|e| e.name == SCENE);
-        let variant = entry.ok_or("it is not registered")?.default_variant();
-        let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
+    fn new(load: Load, intersection: Intersection) -> Result<Self, String> {
+        let scene = load()?;
         let soup = TriangleSoup::new(&scene).intersecting(intersection);
         let camera = scene.view(1.0);
         let reference = ReferenceTracer::new(&scene, &soup, camera, &GATE, 1, Checks::Kept)
@@ -53,7 +66,7 @@ impl CheckedScene {
     }
 }
 
-/// The error of a structure on the second scene; `None` if there is none, if the run's scene is the
+/// The error of a structure on the further scenes; `None` if there is none, if the run's scene is the
 /// same, or with tests that do not promise hard rays.
 ///
 /// # Errors
@@ -65,7 +78,7 @@ pub(super) fn fault(
     cell: &Cell,
 ) -> Result<Option<String>, GpuError> {
     let tests = world.soup.intersection;
-    if world.cell[Axis::Scene].name == SCENE || !tests.bears_hard_rays() {
+    if !tests.bears_hard_rays() {
         return Ok(None);
     }
     // Structures with equal parameters, tests, workgroups, load paths and kernels are the same.
@@ -77,28 +90,51 @@ pub(super) fn fault(
         Axis::Load,
         Axis::Kernels,
     ];
-    let key = format!("{:?}", cell.on(&parts));
-    if let Some(known) = session.checked.trial.outcomes.get(&key) {
-        return Ok(known.clone());
-    }
-    let of_tests = format!("{tests:?}");
-    let judged = match session.checked.trial.scenes.get(&of_tests) {
-        Some(judged) => Arc::clone(judged),
-        None => {
-            let made = session.clock.time("judge", || CheckedScene::new(tests));
-            match made {
-                Ok(judged) => Arc::new(judged),
-                Err(reason) => return Ok(Some(format!("{SCENE}: {reason}"))),
-            }
+    for (name, load) in SCENES {
+        if world.cell[Axis::Scene].name == name {
+            continue;
         }
-    };
-    (session.checked.trial.scenes).insert(of_tests, Arc::clone(&judged));
-    let found = session.clock.time("gate", || {
-        judged.fault_of(session.registries, world, gpu, cell)
-    })?;
-    let found = found.map(|fault| format!("{SCENE}: {fault}"));
-    session.checked.trial.outcomes.insert(key, found.clone());
-    Ok(found)
+        let key = format!("{name}, {:?}", cell.on(&parts));
+        let found = match session.checked.trial.outcomes.get(&key) {
+            Some(known) => known.clone(),
+            None => {
+                let judged = match prepared(session, (name, load), tests) {
+                    Ok(judged) => judged,
+                    Err(reason) => return Ok(Some(format!("{name}: {reason}"))),
+                };
+                let judge = || judged.fault_of(session.registries, world, gpu, cell);
+                let found = session.clock.time("gate", judge)?;
+                found.map(|fault| format!("{name}: {fault}"))
+            }
+        };
+        session.checked.trial.outcomes.insert(key, found.clone());
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
+}
+
+/// A scene with its reference tracers.
+fn prepared(
+    session: &mut Session,
+    (name, load): (&str, Load),
+    tests: Intersection,
+) -> Result<Arc<CheckedScene>, String> {
+    let key = format!("{name}, {tests:?}");
+    if let Some(judged) = session.checked.trial.scenes.get(&key) {
+        return Ok(Arc::clone(judged));
+    }
+    let made = session
+        .clock
+        .time("judge", || CheckedScene::new(load, tests));
+    let judged = Arc::new(made?);
+    session
+        .checked
+        .trial
+        .scenes
+        .insert(key, Arc::clone(&judged));
+    Ok(judged)
 }
 
 impl CheckedScene {

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use raystone_core::geometry::Camera;
 
 /// A camera with its image plane.
-pub(super) struct Lens {
+pub(crate) struct Lens {
     pub eye: DVec3,
     forward: DVec3,
     /// Half the image at distance 1.
@@ -14,7 +14,7 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    pub(super) fn new(camera: &Camera, [width, height]: [u32; 2]) -> Self {
+    pub(crate) fn new(camera: &Camera, [width, height]: [u32; 2]) -> Self {
         let size = DVec2::new(width.into(), height.into());
         let eye = camera.eye.as_dvec3();
         let forward = (camera.target.as_dvec3() - eye).normalize();
@@ -30,7 +30,7 @@ impl Lens {
     }
 
     /// Direction of the ray through the point (u, v) of a pixel; rows and v run downwards.
-    pub(super) fn direction(&self, pixel: [u32; 2], [u, v]: [f64; 2]) -> DVec3 {
+    pub(crate) fn direction(&self, pixel: [u32; 2], [u, v]: [f64; 2]) -> DVec3 {
         let [column, row] = pixel.map(f64::from);
         let across = 2.0 * (column + u) / self.size.x - 1.0;
         let down = 2.0 * (row + v) / self.size.y - 1.0;

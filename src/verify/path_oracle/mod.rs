@@ -31,7 +31,7 @@ pub use surface::Surface;
 
 use crate::kinds::KindChecks;
 use crate::materials::MaterialChecks;
-use camera::Lens;
+pub(crate) use camera::Lens;
 use glam::DVec3;
 use hits::{Blocked, Hits, Nearest, Segment};
 use light::{Choice, Lights};

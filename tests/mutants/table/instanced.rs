@@ -94,4 +94,26 @@ pub const MUTANTS: &[Mutant] = &[
         NESTED,
         Check::Lattice,
     ),
+    row(
+        "ray-not-raised-in-an-object",
+        "in an object's space a component of a direction may be 0",
+        text(
+            "accel/meta_bvh",
+            "level(raised(object_ray(entry, ray)), 0.0)",
+            "level(object_ray(entry, ray), 0.0)",
+        ),
+        META,
+        Check::Gate,
+    ),
+    row(
+        "unmoved-copy-taken-for-its-object",
+        "rays into copies without a translation are not transformed",
+        text(
+            "accel/instance",
+            "(entry.z.w & IDENTITY) != 0u",
+            "entry.offset.x == 0.0 && entry.offset.y == 0.0",
+        ),
+        META,
+        Check::Gate,
+    ),
 ];
