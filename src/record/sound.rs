@@ -309,7 +309,9 @@ mod tests {
             ("rate", |r| r.mrays_s = Some(Interval::exact(0.17))),
             ("samples", |r| r.resolution = [20, 10]),
             ("samples", |r| r.live_paths = vec![400, 99]),
-            ("rate", |r| drop(r.rays.insert("shadow".to_owned(), 400))),
+            ("rate", |r| {
+                r.rays.insert("shadow".to_owned(), 400);
+            }),
         ];
         for (part, change) in cells {
             let mut record = cell.clone();
