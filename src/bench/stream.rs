@@ -1,6 +1,7 @@
 //! Figures of the points drawn by a pair of dimensions: discrepancies, errors of analytic
 //! integrands, coherence between pixels and joint coverage by many pixels.
 
+use raystone_discrepancy::known_figures::POINTS;
 use raystone_discrepancy::{
     Budget, DiscrepancyError, PointSet, Quadratic, quadratic, star_2d_prefixes,
 };
@@ -57,18 +58,6 @@ impl SeedFigures {
     }
 }
 
-/// Eight points in eighths, as in the known figures of discrepancies.
-const KNOWN: [[f64; 2]; 8] = [
-    [0.0, 0.0],
-    [0.5, 0.5],
-    [0.25, 0.75],
-    [0.75, 0.25],
-    [0.125, 0.375],
-    [0.625, 0.875],
-    [0.375, 0.625],
-    [0.875, 0.125],
-];
-
 /// Measures known points: D* and the centred discrepancy of all boxes in NumPy, the root of SciPy's L2-star discrepancy, and
 /// ((Σ e^(x + y)) / 8 − (e − 1)²)² in Python.
 ///
@@ -76,7 +65,7 @@ const KNOWN: [[f64; 2]; 8] = [
 /// A figure is not what it should be: which, and both values.
 pub fn check() -> Result<(), String> {
     let mut found = SeedFigures::default();
-    let measured = found.add(&KNOWN, &[KNOWN.len()]);
+    let measured = found.add(&POINTS, &[POINTS.len()]);
     measured.map_err(|e| format!("known points: {e}"))?;
     let of_exponential = found
         .squared_errors

@@ -3,7 +3,7 @@
 use crate::{Budget, DiscrepancyError, PointSet, Quadratic, net_quality, quadratic, star_2d};
 
 /// Eight points in eighths.
-const POINTS: [[f64; 2]; 8] = [
+pub const POINTS: [[f64; 2]; 8] = [
     [0.0, 0.0],
     [0.5, 0.5],
     [0.25, 0.75],
