@@ -46,8 +46,8 @@ pub mod compare {
 /// What is measured and how it is judged: checks, figures, statistics, records.
 pub mod measure {
     pub use raystone_bench::{
-        animation, compaction, environment, figure_registry, known_words, memory, ray_sets,
-        sampler_cost, spectrum, stopping, stream, timing, words,
+        animation, compaction, environment, figure_registry, known_pictures, known_words, memory,
+        ray_sets, sampler_cost, spectrum, stopping, stream, timing, words,
     };
     pub use raystone_record as record;
     pub use raystone_record::{figure, replicates};

@@ -7,6 +7,8 @@ pub mod coherence;
 pub mod compaction;
 pub mod environment;
 pub mod figure_registry;
+mod heat_map;
+pub mod known_pictures;
 pub mod known_words;
 pub mod memory;
 pub mod peers;

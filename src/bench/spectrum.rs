@@ -41,14 +41,16 @@ pub struct ErrorSpectrum {
     pub filtered: Vec<f64>,
 }
 
-/// Signed luminance error of every pixel.
+/// Analyses the signed luminance error of every pixel.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].
-pub(crate) fn luminance_error(image: &Image, reference: &Image) -> Result<Vec<f64>, ImageError> {
+pub(crate) fn spectrum_of(image: &Image, reference: &Image) -> Result<ErrorSpectrum, ImageError> {
     reference.check_size(image, "the image of an error spectrum")?;
     let pairs = image.pixels.iter().zip(&reference.pixels);
-    Ok(pairs.map(|(a, b)| luminance(a) - luminance(b)).collect())
+    let error: Vec<f64> = pairs.map(|(a, b)| luminance(a) - luminance(b)).collect();
+    let size = [image.width, image.height].map(|edge| edge as usize);
+    Ok(error_spectrum(&error, size))
 }
 
 /// Analyses errors of `width * height` pixels, row by row.

@@ -162,6 +162,9 @@ fn known_figures() -> Result<()> {
         raystone::measure::record::known_readings::check,
         raystone::measure::stream::check,
         raystone::accel::known_figures::check,
+        raystone::scene::known_figures::check,
+        raystone::measure::known_pictures::check,
+        raystone::report::plot::known::check,
         raystone::report::check_rulings,
     ];
     checks

@@ -2,6 +2,7 @@
 
 use super::gltf::{AT_REST, Geometry, Place};
 use super::gltf_document::Item;
+use super::normals::of_normals;
 use glam::{DMat3, Mat4, Vec2, Vec3};
 use raystone_core::geometry::Triangle;
 
@@ -185,7 +186,7 @@ impl<'a> Geometry<'a> {
     /// World-space normals; empty if none can be read.
     fn read_normals(&mut self, attributes: Item<'a>, world: Mat4, place: Place<'_>) -> Vec<Vec3> {
         // In f64, so that a small scale does not make it singular.
-        let to_world = DMat3::from_mat4(world.as_dmat4()).inverse().transpose();
+        let to_world = of_normals(DMat3::from_mat4(world.as_dmat4()));
         let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
         let normals = self.read(attributes, "NORMAL", place, |values| values.vectors::<3>());
         normals.into_iter().map(|n| moved(n).as_vec3()).collect()

@@ -34,6 +34,7 @@ mod gltf_texture;
 mod hung_lamps;
 mod ies;
 mod instances;
+pub mod known_figures;
 mod light;
 mod mask;
 mod material;

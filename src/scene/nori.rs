@@ -7,6 +7,7 @@
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
 use super::material::{emitted, reflectance};
+use super::normals::of_normals;
 use super::{
     CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError,
     decode_normal, obj, ply,
@@ -145,10 +146,10 @@ impl Reader<'_> {
         self.builder.reserve(mesh.triangles.len());
         // Reflections reverse the corners, which define the sides of emitters and glass.
         let mirrored = to_world.determinant() < 0.0;
-        let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
+        let to_world_of_normals = of_normals(DMat3::from_mat4(to_world));
         let normals = |index: usize| -> Option<[Vec3; 3]> {
             let words = mesh.normals.get(index)?.map(decode_normal);
-            let turned = |n: Option<DVec3>| (of_normals * n.unwrap_or_default()).as_vec3();
+            let turned = |n: Option<DVec3>| (to_world_of_normals * n.unwrap_or_default()).as_vec3();
             words.iter().any(Option::is_some).then(|| words.map(turned))
         };
         for (index, triangle) in mesh.triangles.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Vertex normals: two 16-bit numbers each, octahedral. Twin: `kernels/shading/normals.wesl`.
 
 use super::Transform;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use raystone_core::geometry::Triangle;
 
 /// Marks a corner that uses the triangle's normal. No encoded normal has these bits.
@@ -66,11 +66,16 @@ pub(super) fn encode_corners(triangle: &Triangle, normals: [Vec3; 3]) -> [u32; 3
     normals.map(encode_normal)
 }
 
+/// The map of normals under a linear map: its inverse transpose, which keeps them perpendicular.
+pub(super) fn of_normals(linear: DMat3) -> DMat3 {
+    linear.inverse().transpose()
+}
+
 /// Re-encodes normals after a body has moved.
 pub(super) fn moved(words: [u32; 3], from: &Transform, to: &Transform) -> [u32; 3] {
-    // Normals transform by the inverse transpose: back by the transpose, then forward.
+    // Back by the transpose, then forward.
     let back = from.parts().0.transpose();
-    let on = to.parts().0.inverse().transpose();
+    let on = of_normals(to.parts().0);
     words.map(|word| {
         let moved = decode_normal(word).map(|normal| (on * (back * normal)).normalize_or_zero());
         moved.map_or(GEOMETRIC, |normal| encode_normal(normal.as_vec3()))

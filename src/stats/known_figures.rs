@@ -4,6 +4,7 @@
 //! The constants are those of NumPy 2 and SciPy 1.17 (`scipy.stats`, and for jackknives, slopes, trimmed
 //! means and images the formulas in NumPy), printed with all digits; the calls stand beside them.
 
+use crate::bias::{BiasOptions, check_bias};
 use crate::comparison::Pairs;
 use crate::hypothesis::{
     benjamini_hochberg, capped_t_test, holm, student_t_quantile, student_t_two_sided, t_test_power,
@@ -46,6 +47,7 @@ pub fn check() -> Result<(), String> {
         (OF_FUNCTIONS, intervals()),
         (OF_POWER, vec![power()]),
         (ROUNDING, images()?),
+        (OF_FUNCTIONS, bias()?),
     ];
     groups
         .into_iter()
@@ -322,6 +324,50 @@ fn intervals() -> Vec<Known> {
             -0.354_594_983_486_821_95,
         ),
     ]
+}
+
+/// ttest_ind(A + 4, B, equal_var=False) of two tiles, A and A + 8, against B in both; p with 7 degrees of freedom. A and B are
+/// X and Y in eighths, so that pixels hold them.
+fn bias() -> Result<Vec<Known>, String> {
+    let eighths = |values: &[f64]| -> Vec<f32> {
+        let round = |x: &f64| ((x * 8.0).round() / 8.0) as f32;
+        values.iter().map(round).collect()
+    };
+    let image = |left: f32, right: f32| Image {
+        width: 4,
+        height: 2,
+        pixels: [[left; 3], [left; 3], [right; 3], [right; 3]].repeat(2),
+    };
+    let ours: Vec<Image> = (eighths(&X).into_iter())
+        .map(|value| image(value, value + 8.0))
+        .collect();
+    let theirs: Vec<Image> = (eighths(&Y).into_iter())
+        .map(|value| image(value, value))
+        .collect();
+    let options = BiasOptions {
+        tile: 2,
+        rounding: 0.0,
+        ..BiasOptions::default()
+    };
+    let found = check_bias(&ours, &theirs, options).map_err(|e| e.to_string())?;
+    let whole = found.whole;
+    let place = (found.rejected.first()).map(|[x, y]| f64::from(10 * x + y));
+    Ok(vec![
+        ("t of a bias", whole.map(|w| w.t), 5.987_629_235_071_879),
+        (
+            "standard error of a bias",
+            whole.map(|w| w.standard_error),
+            1.017_723_336_025_305_3,
+        ),
+        ("p of a bias", whole.map(|w| w.p), 5.489_943_013_088_752e-4),
+        (
+            "least p of a tile",
+            Some(found.min_p),
+            2.258_743_895_435_726e-5,
+        ),
+        ("number of tiles", Some(found.tiles as f64), 2.0),
+        ("place of a biased tile", place, 20.0),
+    ])
 }
 
 /// Metrics of an image of four pixels whose values are short binary fractions.

@@ -37,9 +37,42 @@ pub fn rate_fault(rate: &Interval, items: f64, ms: &[f64]) -> Option<String> {
     })
 }
 
+/// Checks rounds above an empty measurement by their sum. Returns what is wrong, or `None`.
+pub fn overhead_fault(samples: &[f64], empty: f64, above: &[f64]) -> Option<String> {
+    let least: f64 = samples.iter().sum::<f64>() - empty * samples.len() as f64;
+    // Rounds that are hardly longer than an empty one are cut off, and add at most a hundredth each.
+    let room = 0.01 * samples.iter().filter(|ms| 0.99 * **ms < empty).sum::<f64>();
+    let cut: f64 = samples.iter().map(|ms| (empty - ms).max(0.0)).sum();
+    let found: f64 = above.iter().sum();
+    let rounding = 1e-9 * samples.iter().sum::<f64>();
+    let is_right = (least - rounding..=least + cut + room + rounding).contains(&found);
+    (!is_right).then(|| {
+        format!(
+            "rounds of {samples:?} ms are told as {above:?} ms, where an empty one takes {empty} ms"
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_empty_measurement_that_is_not_taken_off_is_told() {
+        for (samples, empty) in [
+            (&[2.0, 1.0, 4.0][..], 0.5),
+            (&[2.0, 0.4, 4.0], 0.5),
+            (&[0.501, 3.0], 0.5),
+        ] {
+            let above = without_overhead(samples, empty);
+            assert_eq!(overhead_fault(samples, empty, &above), None, "{samples:?}");
+            let twice = without_overhead(&above, empty);
+            for wrong in [samples, &twice] {
+                let found = overhead_fault(samples, empty, wrong);
+                assert!(found.is_some(), "{samples:?} {wrong:?}");
+            }
+        }
+    }
 
     #[test]
     fn rates_that_count_twice_are_told() {

@@ -1,6 +1,7 @@
 //! Checks of hits and images: the gate, the path oracle, closed-form images, Mitsuba.
 #![warn(missing_docs)]
 
+pub mod full_stacks;
 pub mod gate;
 pub mod hard_rays;
 mod holes;

@@ -34,8 +34,15 @@ pub(super) fn scenes(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> 
         },
     ];
     for (name, factor) in [("large-room", LARGE), ("small-room", SMALL)] {
+        let mut scene = scaled(lamps()?, name, factor);
+        // Behind the block for most of the floor, and as far away as the lamps.
+        scene.lights.push(Light::Sphere {
+            center: factor * vec3(0.9, 2.4, -0.8),
+            radius: 0.15 * factor,
+            radiance: vec3(14.0, 9.0, 12.0),
+        });
         scenes.push(TrialScene {
-            scene: scaled(lamps()?, name, factor),
+            scene,
             trials: vec![path(&[depth(8)]), occlusion(), primary()],
         });
     }

@@ -2,7 +2,7 @@
 
 use crate::{Check, CheckError, Plant};
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
-use raystone::params::{Entry, ParamValue, Variant};
+use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 
 /// Parameters that are not at their defaults, as a user would write them.
@@ -58,7 +58,7 @@ impl Subject {
     /// The checks that apply to it, cheapest first.
     pub fn checks(&self) -> &'static [Check] {
         match self {
-            Self::Structure { .. } => &[Check::Lattice, Check::Gate, Check::Work],
+            Self::Structure { .. } => &[Check::Lattice, Check::Gate, Check::Work, Check::Stacks],
             Self::Sampler { .. } => &[
                 Check::Stream,
                 Check::Known,
@@ -103,13 +103,23 @@ pub fn build(
     changes: Changes,
     soup: &TriangleSoup,
 ) -> Result<Box<dyn BuiltAccel>, CheckError> {
+    let built = of_kind(name, changes, |kind, params| {
+        Ok(kind.build(soup, params, &mut BuildLog::default())?)
+    })?;
+    built.validate(soup)?;
+    Ok(built)
+}
+
+/// What `make` makes of the kind of structure `name` with its parameters.
+pub fn of_kind<T>(
+    name: &str,
+    changes: Changes,
+    make: impl FnOnce(&dyn AccelKind, &Params) -> Result<T, CheckError>,
+) -> Result<T, CheckError> {
     let registry = AccelRegistry::default();
     let variant = variant(&registry.entries(), name, changes)?;
     let unknown = || CheckError::Stale(format!("there is no structure `{name}`"));
-    let kind: &dyn AccelKind = registry.get(name).ok_or_else(unknown)?;
-    let built = kind.build(soup, &variant.params, &mut BuildLog::default())?;
-    built.validate(soup)?;
-    Ok(built)
+    make(registry.get(name).ok_or_else(unknown)?, &variant.params)
 }
 
 /// Samples and dimensions that samplers are made for, and the width of the image.

@@ -42,7 +42,7 @@ const PAD: f64 = 1.0 / 524_288.0;
 
 /// An instance with the norms of the proof.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct BoxMap {
+pub(crate) struct BoxMap {
     instance: Instance,
     inverse: glam::DMat3,
     offset: DVec3,
@@ -52,7 +52,7 @@ pub(super) struct BoxMap {
 }
 
 impl BoxMap {
-    pub(super) fn new(instance: &Instance) -> Self {
+    pub(crate) fn new(instance: &Instance) -> Self {
         Self::with_pad(instance, PAD)
     }
 
@@ -72,7 +72,7 @@ impl BoxMap {
     }
 
     /// Growth of top-level boxes per unit of the ray origin's largest coordinate.
-    pub(super) fn growth(&self) -> f32 {
+    pub(crate) fn growth(&self) -> f32 {
         if self.instance.is_identity() {
             0.0
         } else {
@@ -81,7 +81,7 @@ impl BoxMap {
     }
 
     /// The grown world box of an object-space box; empty if that is empty.
-    pub(super) fn world_box(&self, bounds: &Bounds) -> Bounds {
+    pub(crate) fn world_box(&self, bounds: &Bounds) -> Bounds {
         if self.instance.is_identity() || bounds.min[0] > bounds.max[0] {
             return *bounds;
         }

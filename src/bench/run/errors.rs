@@ -12,7 +12,7 @@ use super::replicates::{Pass, all_samples, check_distinct, until_met};
 use super::session::Session;
 use super::structures::{Gated, image_settings};
 use super::world::World;
-use crate::spectrum::{ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power};
+use crate::spectrum::{ErrorSpectrum, mean_filtered, mean_power, spectrum_of};
 use raystone_config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS};
 use raystone_image::Image;
 use raystone_record::{BiasRecord, Body, Key, Line, Outcome, Ran, SpectrumRecord};
@@ -272,7 +272,7 @@ fn sampler_error(
     write_spread(session, cell, spp, &finals)?;
     let bias = bias_record(session, cell, &finals, reference_image)?;
     session.recorder.write(&line(Body::Bias(bias)))?;
-    let spectrum = spectrum_record(session, spp, &finals, reference_image)?;
+    let spectrum = spectrum_record(spp, &finals, reference_image)?;
     session.recorder.write(&line(Body::Spectrum(spectrum)))?;
     let judged = session
         .checked
@@ -299,16 +299,11 @@ fn single<'p, 'a>(passes: &'p [Pass<'a>]) -> Result<&'p Pass<'a>, Fault> {
 
 /// The spectra of all replicates, at the highest number of samples.
 fn spectrum_record(
-    session: &Session,
     spp: u32,
     images: &[Image],
     reference_image: &ReferenceImage,
 ) -> Result<SpectrumRecord, String> {
-    let size = session.experiment.run.resolution.map(|edge| edge as usize);
-    let spectrum = |image: &Image| {
-        let error = luminance_error(image, reference_image.reference.image());
-        error.map(|error| error_spectrum(&error, size))
-    };
+    let spectrum = |image: &Image| spectrum_of(image, reference_image.reference.image());
     let spectra: Result<Vec<_>, _> = images.iter().map(spectrum).collect();
     let spectra = spectra.map_err(|e| e.to_string())?;
     let mean = |figure: fn(&ErrorSpectrum) -> Option<f64>| {

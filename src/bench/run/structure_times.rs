@@ -7,15 +7,15 @@ use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
 use crate::clock_check;
+use crate::heat_map::heat_map;
 use crate::timed_rays::TimedRays;
 use crate::timing::{Measured, Samples, empty_ms, interleave};
 use raystone_accel::tracer::count_work;
 use raystone_accel::{Ask, Query, Ray, RayBatch, Tracer};
 use raystone_config::Axis;
 use raystone_gpu::{Gpu, GpuError, slow_slice};
-use raystone_image::{Picture, viridis};
 use raystone_record::{ClassTiming, CountersPerRay};
-use raystone_stats::rates::{millions_per_second, rate_fault, without_overhead};
+use raystone_stats::rates::{millions_per_second, overhead_fault, rate_fault, without_overhead};
 use raystone_stats::statistics::median;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
 use raystone_verify::shadow_rays::unlike_shadow;
@@ -219,7 +219,9 @@ fn class_timing(
     let ms = without_overhead(&samples.ms, empty);
     let rays = set.rays.len() as f64;
     let rate = millions_per_second(&ms, rays);
-    if let Some(fault) = rate.and_then(|rate| rate_fault(&rate, rays, &ms)) {
+    let fault = overhead_fault(&samples.ms, empty, &ms)
+        .or_else(|| rate.and_then(|rate| rate_fault(&rate, rays, &ms)));
+    if let Some(fault) = fault {
         return Err(fault.into());
     }
     Ok(rate.map(|mrays_s| ClassTiming {
@@ -279,11 +281,7 @@ pub(super) fn draw_heat_maps(
         .filter(|g| g.cell[Axis::Accel].name != "brute-force");
     let scale = others.map(|g| percentile(&g.costs)).fold(1.0, f32::max);
     for structure in gated.iter_mut().filter(|s| !s.costs.is_empty()) {
-        let picture = Picture {
-            width,
-            height,
-            pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
-        };
+        let picture = heat_map(&structure.costs, scale, [width, height]);
         let labels = structure.cell.labels(&[Axis::Scene, Axis::Accel]);
         structure.record.body.heat_map = session.picture("heat", &labels, &picture)?;
         structure.record.body.heat_map_max = Some(f64::from(scale));

@@ -1,14 +1,15 @@
 //! Further scenes of the correctness check: small, but exercise code that otherwise only large, deep or
-//! distorted scenes reach. Every structure of a run is tested on them once.
+//! distorted scenes reach, and a full stack. Every structure of a run is tested on them once.
 
 use super::session::Session;
 use super::world::World;
-use raystone_accel::{AccelError, Intersection, TriangleSoup};
+use raystone_accel::{AccelError, Intersection, Traced, TriangleSoup};
 use raystone_config::{Axis, Cell, Gate};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_record::fault_text;
 use raystone_render::{Stage, StageError};
 use raystone_scene::{LoadOptions, SceneData, builtin_scenes, load};
+use raystone_verify::full_stacks::FullStack;
 use raystone_verify::gate::{Checks, ReferenceTracer, gate};
 use raystone_verify::strained_copies::strained_copies;
 use std::collections::BTreeMap;
@@ -90,29 +91,72 @@ pub(super) fn fault(
         Axis::Load,
         Axis::Kernels,
     ];
+    let of_cell = format!("{:?}", cell.on(&parts));
     for (name, load) in SCENES {
         if world.cell[Axis::Scene].name == name {
             continue;
         }
-        let key = format!("{name}, {:?}", cell.on(&parts));
-        let found = match session.checked.trial.outcomes.get(&key) {
-            Some(known) => known.clone(),
-            None => {
-                let judged = match prepared(session, (name, load), tests) {
-                    Ok(judged) => judged,
-                    Err(reason) => return Ok(Some(format!("{name}: {reason}"))),
-                };
-                let judge = || judged.fault_of(session.registries, world, gpu, cell);
-                let found = session.clock.time("gate", judge)?;
-                found.map(|fault| format!("{name}: {fault}"))
-            }
-        };
-        session.checked.trial.outcomes.insert(key, found.clone());
+        let found = remembered(session, (name, &of_cell), |session| {
+            let judged = match prepared(session, (name, load), tests) {
+                Ok(judged) => judged,
+                Err(reason) => return Ok(Some(reason)),
+            };
+            let judge = || judged.fault_of(session.registries, world, gpu, cell);
+            session.clock.time("gate", judge)
+        })?;
         if found.is_some() {
             return Ok(found);
         }
     }
-    Ok(None)
+    remembered(session, ("full-stack", &of_cell), |session| {
+        let judge = || of_full_stack(session.registries, world, gpu, cell);
+        session.clock.time("gate", judge)
+    })
+}
+
+/// What `judge` finds by this name for the parts of a cell that matter, once per run.
+fn remembered(
+    session: &mut Session,
+    (name, of_cell): (&str, &str),
+    judge: impl FnOnce(&mut Session) -> Result<Option<String>, GpuError>,
+) -> Result<Option<String>, GpuError> {
+    let key = format!("{name}, {of_cell}");
+    if let Some(known) = session.checked.trial.outcomes.get(&key) {
+        return Ok(known.clone());
+    }
+    let found = judge(session)?.map(|fault| format!("{name}: {fault}"));
+    session.checked.trial.outcomes.insert(key, found.clone());
+    Ok(found)
+}
+
+/// The error of a structure whose stack is as full as it becomes.
+fn of_full_stack(
+    registries: &super::Registries,
+    world: &World,
+    gpu: &Gpu,
+    cell: &Cell,
+) -> Result<Option<String>, GpuError> {
+    let accel = &cell[Axis::Accel];
+    let tests = world.soup.intersection;
+    let kind = registries.accel.get(&accel.name);
+    let Some(full) = kind.and_then(|kind| FullStack::of(kind, &accel.params, tests)) else {
+        return Ok(None);
+    };
+    let traced = Traced::upload(gpu, &*full.built)?;
+    let traced = as_in(registries, gpu, cell, traced)?;
+    full.fault(gpu, &traced, &world.probe)
+}
+
+/// The same in the workgroups and by the load path of a cell.
+fn as_in(
+    registries: &super::Registries,
+    gpu: &Gpu,
+    cell: &Cell,
+    traced: Traced,
+) -> Result<Traced, GpuError> {
+    let workgroup = registries.workgroup(cell).map_err(GpuError::Kernel)?;
+    let load = registries.load(cell).map_err(GpuError::Kernel)?;
+    traced.in_workgroups(gpu, &workgroup)?.loading(gpu, &load)
 }
 
 /// A scene with its reference tracers.
@@ -158,9 +202,7 @@ impl CheckedScene {
             Err(StageError::Accel(AccelError::Invalid(fault))) => return Ok(Some(fault)),
             Err(_) => return Ok(None),
         };
-        let workgroup = registries.workgroup(cell).map_err(GpuError::Kernel)?;
-        let load = registries.load(cell).map_err(GpuError::Kernel)?;
-        let traced = traced.in_workgroups(gpu, &workgroup)?.loading(gpu, &load)?;
+        let traced = as_in(registries, gpu, cell, traced)?;
         let thinned = (accel.name == "brute-force").then(|| self.reference.thinned(EVERY));
         let reference = thinned.as_ref().unwrap_or(&self.reference);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);

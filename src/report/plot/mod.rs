@@ -5,6 +5,7 @@ pub mod curves;
 pub mod drawing;
 pub mod heat;
 pub(crate) mod histogram;
+pub mod known;
 pub(crate) mod legend;
 pub mod marker;
 pub(crate) mod paint;

@@ -2,11 +2,12 @@
 
 use super::{Bench, Finding};
 use crate::plant::Faulty;
-use crate::subject::{Changes, build};
+use crate::subject::{Changes, build, of_kind};
 use crate::world::Case;
 use raystone::accel::tracer::count_work;
-use raystone::accel::{Counters, Query, Ray, Traced, TriangleBuffers};
+use raystone::accel::{Counters, Intersection, Query, Ray, Traced, TriangleBuffers};
 use raystone::gpu::ArithmeticProbe;
+use raystone::measure::full_stacks::FullStack;
 use raystone::measure::gate::gate;
 use raystone::measure::record::GateVerdict;
 
@@ -15,13 +16,7 @@ const COUNTED_RAYS: usize = 2048;
 
 /// Runs the gate on these cases, each against its own reference tracer.
 pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) -> Finding {
-    let probe = ArithmeticProbe {
-        unfused: bench.exact,
-        exact_division: bench.exact,
-        exact_sqrt: bench.exact,
-        exact_products: bench.exact,
-        denormals: bench.exact,
-    };
+    let probe = probe(bench.exact);
     for Case { stage, reference } in cases {
         let built = build(name, changes, &stage.soup)?;
         let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
@@ -36,6 +31,29 @@ pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) ->
         }
     }
     Ok(None)
+}
+
+/// An adapter that computes like the host in every respect, or in none.
+fn probe(exact: bool) -> ArithmeticProbe {
+    ArithmeticProbe {
+        unfused: exact,
+        exact_division: exact,
+        exact_sqrt: exact,
+        exact_products: exact,
+        denormals: exact,
+    }
+}
+
+/// Hits where the stack of a structure is full.
+pub fn full_stack(bench: &Bench, name: &str, changes: Changes) -> Finding {
+    let filled = of_kind(name, changes, |kind, params| {
+        Ok(FullStack::of(kind, params, Intersection::default()))
+    })?;
+    let Some(full) = filled else {
+        return Ok(None);
+    };
+    let traced = Traced::upload(bench.gpu, &Faulty::new(&*full.built, bench.plant)?)?;
+    Ok(full.fault(bench.gpu, &traced, &probe(bench.exact))?)
 }
 
 fn evidence(verdict: &GateVerdict) -> String {

@@ -25,6 +25,8 @@ pub enum Check {
     Gate,
     /// Nodes, box tests, triangle tests and stack of every ray equal those of the scalar twin.
     Work,
+    /// Hits are right where the stack is full.
+    Stacks,
     /// The words of a sampler's kernel equal those of its twin.
     Stream,
     /// Words of kernel and twin are those computed anew or checked before, and no two seeds, pixels or dimensions
@@ -59,6 +61,7 @@ impl Check {
             Self::Lattice => "lattice",
             Self::Gate => "gate",
             Self::Work => "work",
+            Self::Stacks => "stacks",
             Self::Stream => "stream",
             Self::Known => "known",
             Self::Integrand => "integrand",
@@ -119,6 +122,7 @@ impl<'a> Bench<'a> {
                 Check::Lattice => hits::same_hits(self, name, changes, &self.world.soups),
                 Check::Gate => hits::same_hits(self, name, changes, &self.world.scenes),
                 Check::Work => hits::same_work(self, name, changes),
+                Check::Stacks => hits::full_stack(self, name, changes),
                 _ => Ok(None),
             },
             Subject::Sampler {

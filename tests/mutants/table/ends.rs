@@ -150,6 +150,28 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Lattice,
     ),
     row(
+        "kd-tree-entered-late",
+        "a ray is thought to enter the tree a little farther along",
+        text(
+            "accel/kd_tree",
+            "var enter = max(span.x, ray.t_min);",
+            "var enter = max(span.x, ray.t_min) * 1.00001;",
+        ),
+        KD,
+        Check::Lattice,
+    ),
+    row(
+        "kd-cell-entered-late",
+        "a cell that waits is thought to begin a little farther along",
+        text(
+            "accel/kd_tree",
+            "distances[entries] = max(enter, plane);",
+            "distances[entries] = max(enter, plane) * 1.000002;",
+        ),
+        KD,
+        Check::Lattice,
+    ),
+    row(
         "kd-ends-too-early",
         "waiting cells that begin just before the hit are dropped",
         text(

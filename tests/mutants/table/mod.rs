@@ -15,6 +15,7 @@ mod rays;
 mod reach;
 mod samplers;
 mod shared;
+mod stacks;
 mod wide;
 mod words;
 
@@ -41,6 +42,7 @@ pub fn mutants() -> Vec<Mutant> {
         frames::MUTANTS,
         counts::MUTANTS,
         rays::MUTANTS,
+        stacks::MUTANTS,
     ]
     .concat()
 }

@@ -89,6 +89,15 @@ pub const MUTANTS: &[Mutant] = &[
         ),
     ),
     path(
+        "shadow-rays-of-spheres-end-at-1000",
+        "nothing blocks the light of spheres from farther than 1000 units",
+        text(
+            "shading/light/sphere",
+            "shadow_ray(surface, distance * direction),",
+            "shadow_ray(surface, min(distance, 1000.0) * direction),",
+        ),
+    ),
+    path(
         "occlusion-ends-at-1000",
         "rays of ambient occlusion have 1000 units at most",
         text(

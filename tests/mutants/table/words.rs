@@ -278,3 +278,20 @@ pub fn halve_the_stack(buffers: &mut GpuBuffers) -> usize {
         .filter(|c| c.0 == "STACK_ENTRIES" && c.1 > 1);
     stack.map(|c| c.1 /= 2).count()
 }
+
+pub fn take_an_entry(buffers: &mut GpuBuffers) -> usize {
+    take_entries(buffers, 1)
+}
+
+/// Of a stack that has one to spare, or two where the kernel needs one itself.
+pub fn take_two_entries(buffers: &mut GpuBuffers) -> usize {
+    take_entries(buffers, 2)
+}
+
+fn take_entries(buffers: &mut GpuBuffers, fewer: u32) -> usize {
+    let stack = buffers
+        .constants
+        .iter_mut()
+        .filter(|c| c.0 == "STACK_ENTRIES" && c.1 > fewer);
+    stack.map(|c| c.1 -= fewer).count()
+}

@@ -1,0 +1,98 @@
+//! Known pictures, made anew before any is shown: a heat map with its colours reversed, or the spectrum of an image with its
+//! sides exchanged, looks like another result.
+
+use crate::heat_map::heat_map;
+use crate::spectrum::spectrum_of;
+use raystone_image::Image;
+use std::f64::consts::TAU;
+
+/// The ends of the colour map viridis, as Matplotlib 3.9 prints them: violet for nothing, yellow for the most.
+const ENDS: [[u8; 3]; 2] = [[68, 1, 84], [253, 231, 37]];
+/// Width and height.
+const SIZE: [u32; 2] = [8, 4];
+/// Relative error of sums over pixels of f32.
+const ROUNDING: f64 = 1e-6;
+
+/// Makes them.
+///
+/// # Errors
+/// One is not what it should be: what of which, and both values.
+pub fn check() -> Result<(), String> {
+    let [cheap, dear] = ENDS;
+    let map = heat_map(&[0.0, 3.0, 3.0, 0.0, 0.0, 9.0], 3.0, [3, 2]);
+    let pixels = vec![cheap, dear, dear, cheap, cheap, dear];
+    if (map.width, map.height, &map.pixels) != (3, 2, &pixels) {
+        return Err(wrong("heat map", format!("{map:?}"), format!("{pixels:?}")));
+    }
+    let found = spectrum_of(&wave(1.0), &wave(0.0)).map_err(|e| e.to_string())?;
+    for (what, found, expected) in [
+        // The wave has all power in two of 31 frequencies, an eighth of a cycle per pixel each way.
+        ("greatest power", found.loudest, 15.5),
+        ("power of low frequencies", found.low_frequency, 15.5),
+        // Along x cos(2π/8) of all cosines but one of eight, which is lost with its neighbour; along y 1.
+        ("autocorrelation", found.autocorrelation, along_both()),
+        ("variance", Some(found.variance), 0.5),
+    ] {
+        let agrees = found.is_some_and(|x| (x - expected).abs() <= ROUNDING * expected);
+        if !agrees {
+            return Err(wrong(what, format!("{found:?}"), expected.to_string()));
+        }
+    }
+    Ok(())
+}
+
+fn wrong(what: &str, found: String, expected: String) -> String {
+    format!(
+        "the {what} of a known picture is {found}, and should be {expected}: this program shows wrong figures; build it \
+         anew, and report what stays wrong"
+    )
+}
+
+fn cosine(column: u32) -> f64 {
+    (TAU * f64::from(column) / f64::from(SIZE[0])).cos()
+}
+
+/// A wave of one cycle along the width, as bright as `size`, over grey.
+fn wave(size: f64) -> Image {
+    let [width, height] = SIZE;
+    let pixel = |at: u32| [(2.0 + size * cosine(at % width)) as f32; 3];
+    Image {
+        width,
+        height,
+        pixels: (0..width * height).map(pixel).collect(),
+    }
+}
+
+/// Means of products with the neighbour to the right and below, over the variance.
+fn along_both() -> f64 {
+    let [width, height] = SIZE;
+    let right: f64 = (1..width).map(|x| cosine(x - 1) * cosine(x)).sum();
+    let below: f64 = (0..width).map(|x| cosine(x).powi(2)).sum();
+    let products = f64::from(height) * right + f64::from(height - 1) * below;
+    let count = height * (width - 1) + (height - 1) * width;
+    products / f64::from(count) / 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_are_as_by_hand() {
+        assert_eq!(check(), Ok(()));
+    }
+
+    #[test]
+    fn an_image_of_other_sides_has_another_spectrum() {
+        let turned = |image: Image| Image {
+            width: image.height,
+            height: image.width,
+            ..image
+        };
+        let found = spectrum_of(&turned(wave(1.0)), &turned(wave(0.0))).expect("a spectrum");
+        assert!(
+            found.low_frequency.is_none_or(|power| power < 10.0),
+            "{found:?}"
+        );
+    }
+}

@@ -1,0 +1,76 @@
+//! Normals of known triangles under known maps, computed anew: rays show where a surface is, and not how it is lit.
+
+use crate::Transform;
+use crate::normals::{decode_normal, encode_normal, moved, of_normals};
+use glam::{DMat3, DVec3, Vec3};
+
+/// Columns of maps: sheared; mirrored and stretched; both, and turned.
+const MAPS: [[[f64; 3]; 3]; 3] = [
+    [[1.0, 0.0, 0.0], [0.75, 1.0, 0.0], [-0.5, 0.25, 1.0]],
+    [[-3.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]],
+    [[0.5, 2.0, 0.25], [-1.0, 0.5, 0.75], [0.25, 1.5, -2.0]],
+];
+/// Edges of triangles from their first corner.
+const EDGES: [[[f64; 3]; 2]; 2] = [
+    [[1.0, 0.0, 0.5], [0.25, 1.0, 0.0]],
+    [[0.0, 1.0, 0.25], [-1.0, 0.5, 1.0]],
+];
+/// Largest difference of unit vectors, and of those of sixteen bits.
+const ROUNDING: f64 = 1e-12;
+const OF_WORDS: f64 = 3e-4;
+
+/// Moves the normals, and compares them with those of the moved triangles.
+///
+/// # Errors
+/// One is not perpendicular to its triangle, or points to the other side.
+pub fn check() -> Result<(), String> {
+    for columns in MAPS {
+        let map = DMat3::from_cols_array_2d(&columns);
+        let columns = columns.map(|column| DVec3::from_array(column).as_vec3());
+        let to = Transform::new(columns, Vec3::ONE);
+        for edges in EDGES {
+            let [along, across] = edges.map(DVec3::from_array);
+            let before = along.cross(across).normalize();
+            // The corners of a mirrored triangle turn the other way.
+            let side = map.determinant().signum();
+            let after = side * (map * along).cross(map * across).normalize();
+            let word = encode_normal(before.as_vec3());
+            let [word, ..] = moved([word; 3], &Transform::IDENTITY, &to);
+            let found = (of_normals(map) * before).normalize();
+            agree(found, after, ROUNDING)?;
+            agree(decode_normal(word).unwrap_or_default(), after, OF_WORDS)?;
+        }
+    }
+    Ok(())
+}
+
+fn agree(found: DVec3, expected: DVec3, tolerance: f64) -> Result<(), String> {
+    let agrees = found.distance(expected) <= tolerance;
+    agrees.then_some(()).ok_or_else(|| {
+        format!(
+            "the normal of a known triangle is {found}, and should be {expected}: this program lights surfaces wrongly; \
+             build it anew, and report what stays wrong"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_are_perpendicular_and_those_of_points_are_not() {
+        assert_eq!(check(), Ok(()));
+        for columns in MAPS {
+            let map = DMat3::from_cols_array_2d(&columns);
+            for edges in EDGES {
+                let [along, across] = edges.map(DVec3::from_array);
+                let before = along.cross(across).normalize();
+                let wrong = (map * before).normalize();
+                let after = (of_normals(map) * before).normalize();
+                assert!(agree(wrong, after, OF_WORDS).is_err(), "{map}");
+                assert!(agree(-after, after, OF_WORDS).is_err(), "{map}");
+            }
+        }
+    }
+}
