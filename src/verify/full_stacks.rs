@@ -36,7 +36,7 @@ pub struct FullStack {
     pub built: Box<dyn BuiltAccel>,
     /// Entries that its kernel's stack offers.
     pub entries: u32,
-    /// Entries that the rays need at most.
+    /// Entries that a ray to the first triangle of a sheaf needs at most: all rays meet the same boxes.
     pub held: u32,
     depth: u32,
     rays: Vec<Ray>,
@@ -45,14 +45,22 @@ pub struct FullStack {
 impl FullStack {
     /// The row that fills the smallest stack best, or is deepest where several do; `None` for structures without a stack.
     pub fn of(kind: &dyn AccelKind, params: &Params, tests: Intersection) -> Option<Self> {
-        let mut params = params.clone();
-        if let Some(depth) = params.0.get_mut("max_depth") {
-            *depth = ParamValue::Integer(DEEPEST);
-        }
+        let deep = params.0.contains_key("max_depth").then(|| {
+            let mut deep = params.clone();
+            let deepest = ParamValue::Integer(DEEPEST);
+            deep.0.insert("max_depth".to_owned(), deepest);
+            deep
+        });
+        let each = std::iter::once(params).chain(&deep);
+        let full = each.filter_map(|params| Self::fullest(kind, params, tests));
+        full.max_by_key(|one| (one.held, one.depth))
+    }
+
+    fn fullest(kind: &dyn AccelKind, params: &Params, tests: Intersection) -> Option<Self> {
         let mut best: Option<Self> = None;
         for sheaves in 2..=MOST_SHEAVES {
             // Longer rows exceed a limit of the structure, or need another kernel.
-            let Some(next) = Self::over(sheaves, kind, &params, tests) else {
+            let Some(next) = Self::over(sheaves, kind, params, tests) else {
                 break;
             };
             if best
@@ -91,7 +99,7 @@ impl FullStack {
         let rays: Vec<Ray> = (0..all).map(|id| towards(id, all)).collect();
         let mut work = Counters::default();
         let twin = built.cpu_twin(&soup)?;
-        for ray in &rays {
+        for ray in rays.iter().step_by(SHEAF as usize) {
             twin.closest_hit(ray, &mut work);
         }
         drop(twin);
