@@ -11,8 +11,9 @@ onmessage = ({ data }) => {
     paused = data.pause;
   } else {
     // Of screens only the last counts.
-    if (data.ask.show) asks = asks.filter(({ ask }) => !ask.show);
-    asks.push(data);
+    const others = data.ask.show ? asks.filter(({ ask }) => !ask.show) : asks;
+    const restarts = data.restarts || asks.some((other) => other.restarts);
+    asks = [...others, { ask: data.ask, restarts }];
   }
   wake();
 };
