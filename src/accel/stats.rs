@@ -22,8 +22,11 @@ pub struct BuildLog {
 impl BuildLog {
     /// A log of a build that may use the device.
     pub fn with_gpu(gpu: &Gpu) -> Self {
+        if cfg!(target_family = "wasm") {
+            // A build waits for its device, and a browser lets nobody wait.
+            return Self::default().binding(most_bytes(gpu));
+        }
         Self {
-            phases: Vec::new(),
             player: Some(Arc::new(Player::new(gpu))),
             ..Self::default()
         }
@@ -50,8 +53,7 @@ impl BuildLog {
 
     /// Maximum words of an array: the adapter's limit, or the guaranteed one.
     pub(crate) fn most_words(&self) -> u64 {
-        let limits = self.gpu().map(|gpu| &gpu.limits);
-        let bound = limits.map(|l| l.max_storage_buffer_binding_size.min(l.max_buffer_size));
+        let bound = self.gpu().map(most_bytes);
         self.binding.or(bound).unwrap_or(LEAST_BINDING) / 4
     }
 
@@ -80,7 +82,8 @@ impl BuildLog {
         let player = self.player.as_ref();
         let player = player.ok_or_else(|| {
             AccelError::Device(
-                "this structure is built on the device, and there is none".to_owned(),
+                "this structure is built on the device, and there is none for it; no build has one in a browser"
+                    .to_owned(),
             )
         })?;
         let played = player.play(recording);
@@ -127,4 +130,12 @@ impl BuildLog {
         // Not sum(): the sum of nothing is −0.
         self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
     }
+}
+
+/// Bytes of the largest array that a device binds.
+fn most_bytes(gpu: &Gpu) -> u64 {
+    let limits = &gpu.limits;
+    limits
+        .max_storage_buffer_binding_size
+        .min(limits.max_buffer_size)
 }

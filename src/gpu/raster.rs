@@ -41,6 +41,10 @@ impl Gpu {
         bound: &Bindings,
         size: [u32; 2],
     ) -> Result<Raster, GpuError> {
+        if cfg!(target_family = "wasm") {
+            let reason = "a browser does not let rasterisation be waited for: choose rays";
+            return Err(GpuError::Kernel(reason.to_owned()));
+        }
         let kernel = self.kernels.compose(&bound.compose(composition.clone()))?;
         self.note_modules(&kernel);
         let edge = u64::from(self.limits.max_texture_dimension_2d);

@@ -4,6 +4,7 @@ use super::adapter::Gpu;
 use super::bindings::{Bindings, Storage};
 use super::clock::Elapsed;
 use super::pipeline::{Pipeline, WORKGROUP_SIZE};
+use super::wait::wait_for;
 use super::{Composition, GpuError, Player, UniformValues};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
@@ -288,7 +289,17 @@ impl Gpu {
     /// # Errors
     /// The device is lost or does not finish in time.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-        self.play(Recording::new().download("", buffer))?
+        wait_for(self.read_async(buffer))
+    }
+
+    /// The same as a future: see [`Player::play_async`].
+    ///
+    /// # Errors
+    /// As [`Gpu::read`].
+    pub async fn read_async<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+        let mut recording = Recording::new();
+        self.play_async(recording.download("", buffer))
+            .await?
             .download("")
     }
 }

@@ -84,6 +84,17 @@ impl FileFormat {
         FILE_FORMATS.iter().filter(|format| format.decode.is_some())
     }
 
+    /// The bytes of a file of this format, for those who have no files.
+    ///
+    /// # Errors
+    /// [`ImageError::Encode`].
+    pub fn encoded(&self, image: &Image, about: &[Attribute]) -> Result<Vec<u8>, ImageError> {
+        (self.encode)(image, about).map_err(|source| ImageError::Encode {
+            path: format!("image.{}", self.ending).into(),
+            source,
+        })
+    }
+
     /// Writes an image atomically. Radiance is stored unchanged, including NaN, except by RGBE,
     /// which replaces NaN and negative numbers by 0. Only EXR stores the attributes. What keeps every
     /// bit is read back, by another decoder than the encoder, and compared.

@@ -5,6 +5,8 @@
 //! Every returned image was checked: no kernel raised its error word, and every pixel took exactly
 //! the requested samples.
 
+mod read_back;
+
 use super::blocks::Blocks;
 use super::kind::ConfiguredIntegrator;
 use super::offset::RayOffset;
@@ -14,9 +16,10 @@ use super::tables::SceneBuffers;
 use super::visibility::Visibility;
 use raystone_accel::Traced;
 use raystone_core::geometry::Camera;
-use raystone_core::structure::RAY_COUNT_CLASSES;
 use raystone_core::text::cell_hash;
-use raystone_gpu::{Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues};
+use raystone_gpu::{
+    Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues, wait_for,
+};
 use raystone_image::Image;
 use raystone_sampling::Sampler;
 use std::cell::{Cell, RefCell};
@@ -241,11 +244,19 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`Renderer::reset`], which discards earlier samples.
     pub fn look(&mut self, camera: Camera) -> Result<(), GpuError> {
+        wait_for(self.look_async(camera))
+    }
+
+    /// The same as a future, as are all that end in `_async`: see [`Player::play_async`].
+    ///
+    /// # Errors
+    /// As [`Renderer::look`].
+    pub async fn look_async(&mut self, camera: Camera) -> Result<(), GpuError> {
         self.uniform = lens(self.uniform.clone(), camera, self.size);
         if let Some(visibility) = self.visibility() {
             visibility.draw(camera)?;
         }
-        self.reset()
+        self.reset_async().await
     }
 
     /// The rasterised visibility, if paths begin there.
@@ -287,10 +298,14 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// The device is lost or hangs.
     pub fn reset(&self) -> Result<(), GpuError> {
+        wait_for(self.reset_async())
+    }
+
+    async fn reset_async(&self) -> Result<(), GpuError> {
         let mut recording = Recording::new();
         recording.clear(&self.status);
         self.clear_sums(&mut recording);
-        self.player.play(&recording)?;
+        self.player.play_async(&recording).await?;
         self.pending.set(0);
         self.done.set(0);
         self.blocks.borrow_mut().clear();
@@ -310,8 +325,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// The device is lost, hangs, or the driver complains; a finished block is incomplete.
     pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
-        self.add_samples_until((first, count), seed, &|| false)
-            .map(|_| ())
+        wait_for(self.add_samples_until_async((first, count), seed, &|| false)).map(|_| ())
     }
 
     /// [`Renderer::add_samples`], unless `stop` says between two slices that they are no longer wanted: then `false` is
@@ -319,7 +333,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// As [`Renderer::add_samples`].
-    pub fn add_samples_until(
+    pub async fn add_samples_until_async(
         &self,
         (first, count): (u32, u32),
         seed: u32,
@@ -329,16 +343,20 @@ impl<'a> Renderer<'a> {
         let end = first + count;
         while sample < end {
             if sample.is_multiple_of(BLOCK_SAMPLES) && self.pending.get() > 0 {
-                self.close_block()?;
+                self.close_block().await?;
             }
             let left_in_block = BLOCK_SAMPLES - sample % BLOCK_SAMPLES;
             let samples = self.samples_at_once().min(left_in_block).min(end - sample);
             for band in &self.bands {
                 let whole = match &self.chosen {
                     Some(blocks) => {
-                        self.add_to_blocks(band, blocks, (sample, samples), seed, stop)?
+                        self.add_to_blocks(band, blocks, (sample, samples), seed, stop)
+                            .await?
                     }
-                    None => self.add_to_band(band, (sample, samples), seed, stop)?,
+                    None => {
+                        self.add_to_band(band, (sample, samples), seed, stop)
+                            .await?
+                    }
                 };
                 if !whole {
                     return Ok(false);
@@ -378,7 +396,7 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    fn add_to_blocks(
+    async fn add_to_blocks(
         &self,
         band: &Band,
         blocks: &Blocks,
@@ -402,13 +420,13 @@ impl<'a> Renderer<'a> {
                 seed,
             };
             let items = u64::from(count) * u64::from(samples) * Blocks::PIXELS;
-            self.run_slice(band, &slice, items)?;
+            self.run_slice(band, &slice, items).await?;
             first += count;
         }
         Ok(true)
     }
 
-    fn add_to_band(
+    async fn add_to_band(
         &self,
         band: &Band,
         (first_sample, samples): (u32, u32),
@@ -431,7 +449,8 @@ impl<'a> Renderer<'a> {
                 samples,
                 seed,
             };
-            self.run_slice(band, &slice, row_samples * u64::from(slice.rows))?;
+            let items = row_samples * u64::from(slice.rows);
+            self.run_slice(band, &slice, items).await?;
             row += slice.rows;
         }
         Ok(true)
@@ -456,10 +475,10 @@ impl<'a> Renderer<'a> {
         ))
     }
 
-    fn run_slice(&self, band: &Band, slice: &Slice, items: u64) -> Result<(), GpuError> {
+    async fn run_slice(&self, band: &Band, slice: &Slice, items: u64) -> Result<(), GpuError> {
         let mut recording = Recording::new();
         self.record(&mut recording, band, slice)?;
-        let played = self.player.play(&recording)?;
+        let played = self.player.play_async(&recording).await?;
         let elapsed = played.elapsed();
         let mut stages = self.stages.borrow_mut();
         for (stage, ms) in played.runs {
@@ -517,120 +536,15 @@ impl<'a> Renderer<'a> {
         Ok(out)
     }
 
-    /// The mean so far.
-    ///
-    /// # Errors
-    /// A kernel raised its error word, a pixel lacks samples, or the device is lost or hangs.
-    pub fn image(&self) -> Result<Image, GpuError> {
-        let mut totals = self.blocks.borrow().clone();
-        self.add_pending(&mut totals)?;
-        let count = f64::from(self.done.get());
-        let mean = |total: &[f64; 3]| total.map(|sum| (sum / count) as f32);
-        Ok(Image {
-            width: self.size[0],
-            height: self.size[1],
-            pixels: totals.iter().map(mean).collect(),
-        })
-    }
-
     /// Adds the sums of a whole block on the host.
-    fn close_block(&self) -> Result<(), GpuError> {
-        self.add_pending(&mut self.blocks.borrow_mut())?;
+    async fn close_block(&self) -> Result<(), GpuError> {
+        let earlier = self.blocks.take();
+        let totals = self.with_pending(earlier).await?;
+        self.blocks.replace(totals);
         let mut recording = Recording::new();
         self.clear_sums(&mut recording);
-        self.player.play(&recording)?;
+        self.player.play_async(&recording).await?;
         self.pending.set(0);
         Ok(())
-    }
-
-    /// Checks everything since the last reset.
-    ///
-    /// # Errors
-    /// As for [`Renderer::image`].
-    pub fn check(&self) -> Result<(), GpuError> {
-        self.add_pending(&mut Vec::new())
-    }
-
-    /// Adds the sums on the device to those of earlier blocks, if they are valid.
-    fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
-        let mut recording = Recording::new();
-        recording.download("status", &self.status);
-        for (index, band) in self.bands.iter().enumerate() {
-            recording.download(&index.to_string(), &band.sums);
-        }
-        let played = self.player.play(&recording)?;
-        let status: Vec<u32> = played.download("status")?;
-        self.gpu.check_error_word(status[0])?;
-        let [width, height] = self.size.map(|edge| edge as usize);
-        totals.resize(width * height, [0.0; 3]);
-        let wanted = self.pending.get();
-        let (mut wrong, mut first) = (0, None);
-        for (index, band) in self.bands.iter().enumerate() {
-            let sums: Vec<[f32; 4]> = played.download(&index.to_string())?;
-            let [start, end] = [band.rows.start, band.rows.end].map(|row| row as usize * width);
-            let pixels = totals[start..end].iter_mut().zip(&sums);
-            for (pixel, (total, [r, g, b, taken])) in (start..).zip(pixels) {
-                let blocks = self.chosen.as_ref();
-                let is_off = blocks.is_some_and(|blocks| !blocks.has(pixel, width));
-                let wanted = if is_off { 0 } else { wanted };
-                // Exact: a block has far fewer samples than 2²⁴.
-                if *taken != wanted as f32 {
-                    wrong += 1;
-                    first.get_or_insert((pixel, *taken));
-                }
-                for (total, sum) in total.iter_mut().zip([r, g, b]) {
-                    *total += f64::from(*sum);
-                }
-            }
-        }
-        match first {
-            None => Ok(()),
-            Some((pixel, taken)) => Err(GpuError::Samples {
-                wrong,
-                wanted,
-                x: (pixel % width) as u32,
-                y: (pixel / width) as u32,
-                taken,
-            }),
-        }
-    }
-
-    /// The error word of the kernels since the last reset.
-    ///
-    /// # Errors
-    /// The device is lost or hangs.
-    pub fn error_word(&self) -> Result<u32, GpuError> {
-        Ok(self.gpu.read::<u32>(&self.status)?[0])
-    }
-
-    /// Rays per class since the last reset, in the order of [`CountedRays`](super::CountedRays);
-    /// zeros unless the kernel was compiled to count.
-    ///
-    /// # Errors
-    /// As for [`Renderer::image`].
-    pub fn ray_counts(&self) -> Result<[u64; RAY_COUNT_CLASSES.len()], GpuError> {
-        let totals = self.totals()?;
-        Ok(std::array::from_fn(|class| totals[class]))
-    }
-
-    /// Paths alive at the camera, after one bounce, after two, …, since the last reset; empty
-    /// unless the kernel was compiled to count.
-    ///
-    /// # Errors
-    /// As for [`Renderer::image`].
-    pub fn live_paths(&self) -> Result<Vec<u64>, GpuError> {
-        let mut live = self.totals()?.split_off(RAY_COUNT_CLASSES.len());
-        let last = live.iter().rposition(|paths| *paths > 0);
-        live.truncate(last.map_or(0, |last| last + 1));
-        Ok(live)
-    }
-
-    /// The kernels' counters after the error word.
-    fn totals(&self) -> Result<Vec<u64>, GpuError> {
-        self.check()?;
-        let words: Vec<u32> = self.gpu.read(&self.status)?;
-        let pairs = words[1..].as_chunks::<2>().0.iter();
-        let total = |[low, high]: &[u32; 2]| u64::from(*low) | u64::from(*high) << 32;
-        Ok(pairs.map(total).collect())
     }
 }

@@ -1,7 +1,7 @@
 //! A scene on the device, ready for structures: the complete setup from scene to answers.
 
 use super::tables::SceneBuffers;
-use raystone_accel::tracer::count_work;
+use raystone_accel::tracer::{count_work, count_work_async};
 use raystone_accel::{
     AccelError, AccelKind, AccelRegistry, Answers, Ask, BuildLog, BuiltAccel, Counters, Hit,
     Intersection, Query, Ray, Traced, Tracer, TriangleSoup,
@@ -147,6 +147,19 @@ impl Stage {
         rays: &[Ray],
     ) -> Result<Option<Vec<Counters>>, GpuError> {
         count_work(&self.gpu, &self.buffers.triangles, traced, query, rays)
+    }
+
+    /// The same as a future: see [`raystone_gpu::Player::play_async`].
+    ///
+    /// # Errors
+    /// As for [`Stage::closest`].
+    pub async fn count_work_async(
+        &self,
+        traced: &Traced,
+        query: Query,
+        rays: &[Ray],
+    ) -> Result<Option<Vec<Counters>>, GpuError> {
+        count_work_async(&self.gpu, &self.buffers.triangles, traced, query, rays).await
     }
 
     /// Changes to other intersection tests that need no other precomputed words.

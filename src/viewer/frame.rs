@@ -8,7 +8,7 @@ use raystone_config::{Axis, Map, Window};
 use raystone_core::program::Program;
 use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use raystone_image::{
-    FileFormat, Image, Picture, automatic_exposure, tone_map, viridis, write_png,
+    Attribute, FileFormat, Image, Picture, automatic_exposure, tone_map, viridis, write_png,
 };
 use std::path::Path;
 
@@ -189,20 +189,38 @@ impl Frame {
     }
 }
 
-/// Writes the linear image of a side, in the format of the file's ending.
-pub(crate) fn write_linear(side: &Side, file: &Path, program: &Program) -> Result<(), RunError> {
-    let input = |reason: String| RunError::Input(reason);
-    let format = FileFormat::of(file).map_err(|e| input(e.to_string()))?;
-    let image: &Image = match &side.image {
-        Some(image) if side.shown > 0 => image,
-        _ => return Err(input("no sample of all pixels is done yet".to_owned())),
-    };
+/// The linear image of a side, and what its file says of it.
+fn linear<'s>(
+    side: &'s Side,
+    program: &Program,
+) -> Result<(&'s Image, Vec<Attribute<'static>>), RunError> {
+    let image = side.image.as_ref().filter(|_| side.shown > 0);
+    let image =
+        image.ok_or_else(|| RunError::Input("no sample of all pixels is done yet".to_owned()))?;
     let cell = &side.cell;
     let sampler = format!("{} × {}", cell[Axis::Sequence], cell[Axis::Decorrelation]);
     let about = attributes(program, cell, &sampler, side.shown, side.lens.seed);
-    format
-        .write(file, image, &about)
-        .map_err(|e| input(e.to_string()))
+    Ok((image, about))
+}
+
+/// Writes the linear image of a side, in the format of the file's ending.
+pub(crate) fn write_linear(side: &Side, file: &Path, program: &Program) -> Result<(), RunError> {
+    let format = format_of(file)?;
+    let (image, about) = linear(side, program)?;
+    let written = format.write(file, image, &about);
+    written.map_err(|e| RunError::Input(e.to_string()))
+}
+
+/// The bytes of such a file.
+pub(crate) fn encoded(side: &Side, file: &Path, program: &Program) -> Result<Vec<u8>, RunError> {
+    let format = format_of(file)?;
+    let (image, about) = linear(side, program)?;
+    let bytes = format.encoded(image, &about);
+    bytes.map_err(|e| RunError::Input(e.to_string()))
+}
+
+fn format_of(file: &Path) -> Result<&'static FileFormat, RunError> {
+    FileFormat::of(file).map_err(|e| RunError::Input(e.to_string()))
 }
 
 #[cfg(test)]

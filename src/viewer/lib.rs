@@ -24,5 +24,5 @@ pub use frame::{Figures, Frame, SideFrame};
 pub use inspect::{Grasp, Inspection, Seen};
 pub use motion::{FrameTimes, SideTimes};
 pub use points::SamplePoints;
-pub use screen::{SIDE_NAMES, Screen};
+pub use screen::{SIDE_NAMES, START, Screen};
 pub use viewer::Viewer;

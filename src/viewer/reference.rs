@@ -80,7 +80,7 @@ impl<'g> Accumulated<'g> {
     }
 
     /// Adds a sample to the half that has fewer; `false` if `stop` said so.
-    pub(crate) fn add(
+    pub(crate) async fn add(
         &mut self,
         (registries, world): (&Registries, &World),
         stop: &dyn Fn() -> bool,
@@ -92,11 +92,12 @@ impl<'g> Accumulated<'g> {
         let renderer = half.renderers.at(1, &lens, with)?;
         let text = |error: GpuError| error.to_string();
         if half.is_torn {
-            renderer.look(lens.camera).map_err(text)?;
+            renderer.look_async(lens.camera).await.map_err(text)?;
             (half.done, half.is_torn) = (0, false);
         }
         if !renderer
-            .add_samples_until((half.done, 1), half.seed, stop)
+            .add_samples_until_async((half.done, 1), half.seed, stop)
+            .await
             .map_err(text)?
         {
             half.is_torn = true;
@@ -107,7 +108,7 @@ impl<'g> Accumulated<'g> {
     }
 
     /// The images of both halves; `None` while one has no sample.
-    pub(crate) fn images(
+    pub(crate) async fn images(
         &mut self,
         with: (&Registries, &World),
     ) -> Result<Option<metrics::Reference>, String> {
@@ -122,7 +123,7 @@ impl<'g> Accumulated<'g> {
         let mut images: Vec<Image> = Vec::new();
         for half in &mut self.halves {
             let renderer = half.renderers.at(1, &lens, (with.0, with.1, structure))?;
-            images.push(renderer.image().map_err(|e| e.to_string())?);
+            images.push(renderer.image_async().await.map_err(|e| e.to_string())?);
         }
         let reference = metrics::Reference::from_parts(images);
         reference.map(Some).map_err(|e| e.to_string())

@@ -12,6 +12,18 @@ use std::collections::BTreeMap;
 /// Names of the images, from left to right.
 pub const SIDE_NAMES: [&str; 2] = ["A", "B"];
 
+/// The experiment that a shell begins with.
+pub const START: &str = r#"
+[run]
+resolution = [512, 384]
+spp = [1024]
+[axes]
+scene = ["cornell-box"]
+accel = ["cwbvh"]
+sequence = ["sobol"]
+decorrelation = ["cranley-patterson"]
+"#;
+
 /// Axes that images side by side share: they show the same triangles.
 const SHARED: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Kernels];
 
@@ -74,6 +86,29 @@ impl Screen {
     ) -> Result<Self, String> {
         let experiment = Experiment::parse(text, file, overrides, &registries.catalogue());
         Self::of(&experiment.map_err(|e| e.to_string())?, registries)
+    }
+
+    /// The screen of an experiment that is read with overrides of its own for each image, one or two.
+    ///
+    /// # Errors
+    /// As [`Screen::parse`].
+    pub fn parse_sides(
+        text: &str,
+        file: &str,
+        sides: &[Vec<String>],
+        registries: &Registries,
+    ) -> Result<Self, String> {
+        let parse = |overrides: &Vec<String>| Self::parse(text, file, overrides, registries);
+        let [first, others @ ..] = sides else {
+            return Self::parse(text, file, &[], registries);
+        };
+        let mut screen = parse(first)?;
+        if let [second, ..] = others {
+            screen.cells.truncate(1);
+            screen.cells.push(parse(second)?.cells.swap_remove(0));
+            screen.check()?;
+        }
+        Ok(screen)
     }
 
     /// Checks what can be seen without a device.

@@ -1,5 +1,6 @@
 //! One of the images on screen: first coarse, then sample by sample.
 
+use super::done::Step;
 use super::motion::SideTimes;
 use super::world::{Structure, World};
 use raystone_accel::{Counters, Query};
@@ -273,8 +274,40 @@ impl<'g> Side<'g> {
         self.renderer(1, with);
     }
 
+    /// A coarse image, and the map that is wanted.
+    pub(crate) async fn refine(
+        &mut self,
+        (registries, world): (&Registries, &World),
+        map: Map,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Step, GpuError> {
+        if !self.coarse((registries, world), stop).await? {
+            return Ok(Step::Stopped);
+        }
+        if map != Map::None && self.fault.is_none() {
+            self.count(world).await?;
+        }
+        Ok(Step::Shown)
+    }
+
+    /// Samples for all pixels, and the image if it is time to and `shows` it.
+    pub(crate) async fn accumulate(
+        &mut self,
+        with: (&Registries, &World),
+        shows: bool,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Step, GpuError> {
+        if !self.add(with, stop).await? {
+            return Ok(Step::Stopped);
+        }
+        Ok(match shows && self.refresh().await? {
+            true => Step::Shown,
+            false => Step::Worked,
+        })
+    }
+
     /// Renders a coarse image; the next one is finer.
-    pub(crate) fn coarse(
+    async fn coarse(
         &mut self,
         with: (&Registries, &World),
         stop: &dyn Fn() -> bool,
@@ -283,11 +316,14 @@ impl<'g> Side<'g> {
         let Some(renderer) = self.renderer(by, with) else {
             return Ok(true);
         };
-        renderer.look(lens.camera)?;
-        if !renderer.add_samples_until((0, 1), lens.seed, stop)? {
+        renderer.look_async(lens.camera).await?;
+        if !renderer
+            .add_samples_until_async((0, 1), lens.seed, stop)
+            .await?
+        {
             return Ok(false);
         }
-        let (image, ms) = (renderer.image()?, renderer.spent().ms());
+        let (image, ms) = (renderer.image_async().await?, renderer.spent().ms());
         self.image = Some(image);
         self.shown = 0;
         let [width, height] = lens.divided(by).map(f64::from);
@@ -297,7 +333,7 @@ impl<'g> Side<'g> {
     }
 
     /// Adds samples to all pixels, as many as take about [`STEP_MS`]; `false` if `stop` said so.
-    pub(crate) fn add(
+    async fn add(
         &mut self,
         with: (&Registries, &World),
         stop: &dyn Fn() -> bool,
@@ -315,10 +351,12 @@ impl<'g> Side<'g> {
             return Ok(true);
         };
         if is_torn {
-            renderer.look(lens.camera)?;
+            renderer.look_async(lens.camera).await?;
         }
         let before = renderer.spent().ms();
-        let whole = renderer.add_samples_until((done, count), lens.seed, stop)?;
+        let whole = renderer
+            .add_samples_until_async((done, count), lens.seed, stop)
+            .await?;
         let each = (renderer.spent().ms() - before) / f64::from(count);
         self.is_torn = !whole;
         if !whole {
@@ -334,7 +372,7 @@ impl<'g> Side<'g> {
     }
 
     /// Reads the image back if it is time to; `true` if there is another one to show.
-    pub(crate) fn refresh(&mut self) -> Result<bool, GpuError> {
+    pub(crate) async fn refresh(&mut self) -> Result<bool, GpuError> {
         let is_due = self
             .read
             .is_none_or(|read| read.elapsed().as_secs_f64() * 1e3 >= REFRESH_MS);
@@ -346,8 +384,8 @@ impl<'g> Side<'g> {
         let Some(renderer) = self.renderers.whole() else {
             return Ok(false);
         };
-        self.image = Some(renderer.image()?);
-        let counts = renderer.ray_counts()?;
+        self.image = Some(renderer.image_async().await?);
+        let counts = renderer.ray_counts_async().await?;
         self.rays = std::array::from_fn(|class| counts[class]);
         self.rays_ms = renderer.spent().ms();
         self.shown = self.done;
@@ -356,7 +394,7 @@ impl<'g> Side<'g> {
     }
 
     /// Counts the work of every pixel's first ray, for an image as coarse as the one that is shown; `true` if there is a new map.
-    pub(crate) fn count(&mut self, world: &World) -> Result<bool, GpuError> {
+    pub(crate) async fn count(&mut self, world: &World) -> Result<bool, GpuError> {
         let by = match self.is_coarse() {
             true => self.by * 4,
             false => 1,
@@ -371,7 +409,8 @@ impl<'g> Side<'g> {
         let rays = primary_rays(self.lens.camera, size[0], size[1]);
         let work = world
             .stage
-            .count_work(&structure.traced, Query::Closest, &rays)?;
+            .count_work_async(&structure.traced, Query::Closest, &rays)
+            .await?;
         self.map = Some(MapOfWork { size, work });
         Ok(true)
     }

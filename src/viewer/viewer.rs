@@ -1,7 +1,9 @@
-//! The viewer: what is on screen, and the steps that lead there.
+//! The viewer: what is on screen.
 
-use super::done::{Done, Step, Work, note};
-use super::frame::{Frame, Painter, SideFrame, figures, write_linear};
+mod steps;
+
+use super::done::{Done, Work, note};
+use super::frame::{Frame, Painter, SideFrame, encoded, figures, write_linear};
 use super::inspect::{self, Grasp, Inspection};
 use super::motion::{FrameClock, FrameTimes, Pose};
 use super::points::SamplePoints;
@@ -10,18 +12,15 @@ use super::screen::{SIDE_NAMES, Screen};
 use super::side::{Lens, Side};
 use super::world::{Structure, World};
 use raystone_bench::run::{Estimator, Registries, RunError};
-use raystone_config::{Axis, Cell, Map, Pace};
+use raystone_config::{Axis, Cell, Map};
 use raystone_core::clock::Instant;
 use raystone_core::geometry::Camera;
 use raystone_core::program::Program;
-use raystone_gpu::{Gpu, GpuError};
+use raystone_gpu::{Gpu, GpuError, wait_for};
 use raystone_scene::check_camera;
 use raystone_stats::metrics;
 use raystone_verify::path_oracle::Path;
 use std::path::Path as File;
-
-/// Time between two readings of the reference, seconds.
-const JUDGE_S: f64 = 1.0;
 
 /// The viewer of one device.
 pub struct Viewer<'g> {
@@ -38,6 +37,8 @@ pub struct Viewer<'g> {
     clock: FrameClock,
     /// What the last frame took, while frames follow one another.
     times: Option<FrameTimes>,
+    /// Images of the screen that were not shown yet.
+    unseen: usize,
 }
 
 impl<'g> Viewer<'g> {
@@ -60,6 +61,7 @@ impl<'g> Viewer<'g> {
             judge: None,
             clock: FrameClock::default(),
             times: None,
+            unseen: 0,
         }
     }
 
@@ -71,6 +73,12 @@ impl<'g> Viewer<'g> {
     /// What is on screen, if anything.
     pub fn screen(&self) -> Option<&Screen> {
         self.screen.as_ref()
+    }
+
+    /// True once each image of the screen was shown. Steps before it are better not stopped, so that a camera that moves
+    /// is seen.
+    pub fn is_seen(&self) -> bool {
+        self.unseen == 0
     }
 
     /// Notes on the scene: what of its file is not shown as written.
@@ -95,6 +103,18 @@ impl<'g> Viewer<'g> {
         screen: Screen,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Vec<Done>, RunError> {
+        wait_for(self.show_async(screen, tell))
+    }
+
+    /// The same as a future, as are all that end in `_async`: a browser is not blocked.
+    ///
+    /// # Errors
+    /// As [`Viewer::show`].
+    pub async fn show_async(
+        &mut self,
+        screen: Screen,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<Vec<Done>, RunError> {
         screen.check().map_err(RunError::Input)?;
         let mut done = Vec::new();
         let first = &screen.cells[0];
@@ -105,7 +125,8 @@ impl<'g> Viewer<'g> {
                 let scene = &first[Axis::Scene];
                 tell(&format!("loading {scene}"));
                 let clock = Instant::now();
-                let world = World::load(self.gpu, &self.registries, first, self.allow_outside)?;
+                let allow = self.allow_outside;
+                let world = World::load(self.gpu, &self.registries, first, allow).await?;
                 note(
                     &mut done,
                     Work::Loaded,
@@ -146,6 +167,7 @@ impl<'g> Viewer<'g> {
         };
         self.show_sides(&screen, lens, &mut done, tell)?;
         self.show_reference(&screen, lens);
+        self.unseen = screen.cells.len();
         self.screen = Some(screen);
         Ok(done)
     }
@@ -191,43 +213,6 @@ impl<'g> Viewer<'g> {
             lost(self.gpu)?;
         }
         Ok(())
-    }
-
-    /// Shows a frame that has its samples, then begins the next one, if frames follow one another.
-    fn next_frame(&mut self) -> Result<Step, RunError> {
-        let screen = self
-            .screen
-            .clone()
-            .filter(|screen| screen.plays().is_some());
-        let (Some(screen), Some(world)) = (screen, &self.world) else {
-            return Ok(Step::Idle);
-        };
-        let mut is_new = false;
-        for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
-            match side.refresh() {
-                Ok(is_read) => is_new |= is_read,
-                Err(error) => return keep(Err(error), side, self.gpu),
-            }
-        }
-        if is_new {
-            return Ok(Step::Shown);
-        }
-        let frames = screen.animation.map_or(1, |animation| animation.frames);
-        let frame = (world.pose.frame + 1) % frames;
-        let pose = Pose {
-            frame,
-            ..world.pose.clone()
-        };
-        self.clock.tick();
-        self.times = Some(FrameTimes {
-            frame: [world.pose.frame, frames],
-            whole_ms: self.clock.whole_ms(),
-            scene_ms: self.clock.scene_ms,
-            sides: self.sides.iter().map(Side::times).collect(),
-        });
-        self.pose(&pose, &screen, &mut Vec::new())?;
-        self.sides.iter_mut().for_each(Side::skip_coarse);
-        Ok(Step::Worked)
     }
 
     fn show_sides(
@@ -340,99 +325,6 @@ impl<'g> Viewer<'g> {
         }
     }
 
-    /// Does a piece of the work that is left: a coarse image first, then samples in turns, short slices at a time. `stop` is
-    /// asked between slices; samples that were given up are begun anew, so it should agree only if they are not needed any more.
-    ///
-    /// # Errors
-    /// The device is lost or hangs. An image that fails in another way says so in its place.
-    pub fn step(&mut self, stop: &dyn Fn() -> bool) -> Result<Step, RunError> {
-        let (Some(world), Some(screen)) = (&self.world, &self.screen) else {
-            return Ok(Step::Idle);
-        };
-        let with = (&self.registries, world);
-        let (map, pace) = (screen.window.map, screen.window.pace);
-        let plays = screen.plays().is_some();
-        if let Some(side) = self
-            .sides
-            .iter_mut()
-            .find(|side| side.fault.is_none() && side.is_coarse())
-        {
-            let step = side.coarse(with, stop).and_then(|whole| {
-                if whole && map != Map::None && side.fault.is_none() {
-                    side.count(world)?;
-                }
-                Ok(if whole { Step::Shown } else { Step::Stopped })
-            });
-            return keep(step, side, self.gpu);
-        }
-        if map != Map::None {
-            for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
-                match side.count(world) {
-                    Ok(false) => {}
-                    Ok(true) => return Ok(Step::Shown),
-                    Err(error) => return keep(Err(error), side, self.gpu),
-                }
-            }
-        }
-        let place = |side: &&mut Side| match pace {
-            Pace::Samples => f64::from(side.done),
-            Pace::Time => side.spent_ms(),
-        };
-        let behind = self.sides.iter_mut().filter(|side| !side.is_finished());
-        let behind = behind.min_by(|a, b| place(a).total_cmp(&place(b)));
-        let reference = self
-            .reference
-            .as_mut()
-            .filter(|reference| !reference.is_finished());
-        match (behind, reference) {
-            // The reference has its turn once for each sample of the image that is behind.
-            (side, Some(reference))
-                if side.as_ref().is_none_or(|side| side.done > reference.spp()) =>
-            {
-                match reference.add(with, stop) {
-                    Ok(true) => self.judge_anew(),
-                    Ok(false) => Ok(Step::Stopped),
-                    Err(reason) => {
-                        lost(self.gpu)?;
-                        self.reference = None;
-                        Err(RunError::Input(format!("no reference: {reason}")))
-                    }
-                }
-            }
-            (Some(side), _) => {
-                let step = side.add(with, stop).and_then(|whole| {
-                    if !whole {
-                        return Ok(Step::Stopped);
-                    }
-                    // Images of a frame are shown together.
-                    Ok(if !plays && side.refresh()? {
-                        Step::Shown
-                    } else {
-                        Step::Worked
-                    })
-                });
-                keep(step, side, self.gpu)
-            }
-            (None, _) => self.next_frame(),
-        }
-    }
-
-    /// Reads the reference if it is time to.
-    fn judge_anew(&mut self) -> Result<Step, RunError> {
-        let is_due = |(_, read): &(_, Instant)| read.elapsed().as_secs_f64() >= JUDGE_S;
-        let (Some(world), Some(reference)) = (&self.world, &mut self.reference) else {
-            return Ok(Step::Worked);
-        };
-        if !self.judge.as_ref().is_none_or(is_due) && !reference.is_finished() {
-            return Ok(Step::Worked);
-        }
-        let read = reference
-            .images((&self.registries, world))
-            .map_err(RunError::Input)?;
-        self.judge = read.map(|reference| (reference, Instant::now()));
-        Ok(Step::Shown)
-    }
-
     /// What to draw now.
     pub fn frame(&self) -> Frame {
         let Some(screen) = &self.screen else {
@@ -505,6 +397,19 @@ impl<'g> Viewer<'g> {
         )
     }
 
+    /// The linear image of a side as the bytes of such a file, which is not written.
+    ///
+    /// # Errors
+    /// There is nothing to write yet, or the ending is unknown.
+    pub fn encoded(&self, file: &File, side: usize) -> Result<Vec<u8>, RunError> {
+        let nothing = || RunError::Input("there is nothing to save yet".to_owned());
+        encoded(
+            self.sides.get(side).ok_or_else(nothing)?,
+            file,
+            &self.program,
+        )
+    }
+
     /// What the images have at a pixel; `None` outside of them.
     ///
     /// # Errors
@@ -571,13 +476,4 @@ fn lost(gpu: &Gpu) -> Result<(), RunError> {
         Some(cause) => Err(GpuError::Lost(cause).into()),
         None => Ok(()),
     }
-}
-
-/// Keeps a failure of an image with it; what a lost device does is not the image's fault.
-fn keep(step: Result<Step, GpuError>, side: &mut Side, gpu: &Gpu) -> Result<Step, RunError> {
-    step.or_else(|error| {
-        lost(gpu)?;
-        side.fault = Some(error.to_string());
-        Ok(Step::Shown)
-    })
 }

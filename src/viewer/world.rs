@@ -4,7 +4,7 @@ use super::motion::{Follower, Pose};
 use raystone_accel::{BuildLog, BuiltAccel, StructureStats, Traced, TriangleSoup};
 use raystone_bench::run::{Registries, RunError, RunOptions, load_options, table_bytes};
 use raystone_config::{Axis, Cell};
-use raystone_gpu::{Gpu, probe_arithmetic};
+use raystone_gpu::{Gpu, probe_arithmetic_async};
 use raystone_render::Stage;
 use raystone_scene::{self as scene, SceneData};
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub(crate) struct Structure {
 
 impl World {
     /// Loads a scene and uploads it.
-    pub(crate) fn load(
+    pub(crate) async fn load(
         gpu: &Gpu,
         registries: &Registries,
         cell: &Cell,
@@ -44,7 +44,7 @@ impl World {
         let loaded = scene::load(&cell[Axis::Scene], &options);
         let loaded = loaded.map_err(|e| RunError::Input(e.to_string()))?;
         let tests = registries.intersection(cell).map_err(RunError::Input)?;
-        let kept = tests.kept_by(&probe_arithmetic(gpu)?);
+        let kept = tests.kept_by(&probe_arithmetic_async(gpu).await?);
         kept.map_err(RunError::Input)?;
         let mut stage = Stage::new(gpu, loaded, tests)?;
         stage.soup = TriangleSoup::default().intersecting(tests);

@@ -16,23 +16,11 @@ use clap::Parser;
 use eframe::egui;
 use raystone_bench::run::Registries;
 use raystone_gpu::AdapterChoice;
-use raystone_viewer::Screen;
+use raystone_viewer::{START, Screen};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use worker::Worker;
-
-/// What is on screen unless the user says otherwise.
-const START: &str = r#"
-[run]
-resolution = [512, 384]
-spp = [1024]
-[axes]
-scene = ["cornell-box"]
-accel = ["cwbvh"]
-sequence = ["sobol"]
-decorrelation = ["cranley-patterson"]
-"#;
 
 /// Width or height of a window, points: it has room for a button, and no adapter refuses it.
 const EDGES: RangeInclusive<u32> = 240..=8192;
@@ -88,19 +76,10 @@ impl Arguments {
             }
             None => (START.to_owned(), "raystone view".to_owned()),
         };
-        let parse = |side: usize| {
-            let overrides = self.of_side(side).chain(self.set.iter().cloned());
-            let overrides: Vec<String> = overrides.collect();
-            Screen::parse(&text, &name, &overrides, &Registries::default())
-        };
-        let mut screen = parse(0)?;
-        if self.lists().iter().any(|(_, names)| names.len() > 1) {
-            let other = parse(1)?.cells.swap_remove(0);
-            screen.cells.truncate(1);
-            screen.cells.push(other);
-            screen.check()?;
-        }
-        Ok(screen)
+        let is_split = self.lists().iter().any(|(_, names)| names.len() > 1);
+        let overrides = |side: usize| self.of_side(side).chain(self.set.iter().cloned()).collect();
+        let sides: Vec<Vec<String>> = (0..=usize::from(is_split)).map(overrides).collect();
+        Screen::parse_sides(&text, &name, &sides, &Registries::default())
     }
 
     fn lists(&self) -> [(&'static str, &[String]); 4] {

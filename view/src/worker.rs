@@ -227,8 +227,6 @@ impl Inside {
             return end;
         }
         let mut is_idle = true;
-        // Each image is shown at least once, however quickly the next screen follows: a camera that moves is seen.
-        let mut unseen = 0;
         loop {
             let first = if is_idle {
                 match self.asks.recv_timeout(REST) {
@@ -248,19 +246,16 @@ impl Inside {
                     Err(TryRecvError::Disconnected) => return End::Closed,
                 }
             }
-            let is_other = asks.iter().any(|ask| matches!(ask, Ask::Show(_)));
             if let Err(end) = self.answer_all(&mut viewer, asks) {
                 return end;
             }
-            if is_other {
-                unseen = viewer.screen().map_or(0, |screen| screen.cells.len());
-            }
-            let stop = || unseen == 0 && self.stop.load(Ordering::Relaxed);
+            // Each image is shown at least once, however quickly the next screen follows.
+            let is_seen = viewer.is_seen();
+            let stop = || is_seen && self.stop.load(Ordering::Relaxed);
             match viewer.step(&stop) {
                 Ok(step) => {
                     is_idle = step == Step::Idle;
                     if step == Step::Shown {
-                        unseen = unseen.saturating_sub(1);
                         self.publish(&viewer);
                     }
                     let is_new = self.found.lock().is_ok_and(|found| found.idle != is_idle);

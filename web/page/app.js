@@ -11,6 +11,10 @@ let worker = null;
 let began = 0;
 let records = [];
 
+export function isMeasuring() {
+  return worker !== null;
+}
+
 function trouble(text) {
   at("trouble").textContent = text;
   at("trouble").hidden = !text;
@@ -43,6 +47,7 @@ async function start() {
   worker.onerror = (event) => end(`The measurement broke off: ${event.message || "the worker could not be started"}.`);
   worker.postMessage({ set: asked.set.join("\n"), only: filters().join("\n") });
   worker.postMessage({ pause: document.hidden });
+  dispatchEvent(new Event("measuring"));
 }
 
 function take(message) {
@@ -88,6 +93,7 @@ async function end(reason) {
   at("scenes").disabled = false;
   at("progress").hidden = true;
   trouble(reason);
+  dispatchEvent(new Event("measuring"));
   if (asked.post) {
     const body = JSON.stringify({ trouble: reason, records: records.join("\n") + "\n" });
     // Only on this server.

@@ -1,11 +1,12 @@
 //! A measurement from its first record to its last.
 
+use crate::PROGRAM;
 use crate::host::Host;
-use crate::plan::{FILE, Registries};
+use crate::plan::{FILE, plan};
 use crate::world::{Outcome, World};
+use raystone_bench::run::Registries;
 use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_core::clock::Instant;
-use raystone_core::program::Program;
 use raystone_core::text::cell_hash;
 use raystone_gpu::{
     ArithmeticProbe, Gpu, GpuError, device_type, limits_of_runs, probe_arithmetic_async,
@@ -58,7 +59,7 @@ impl Device {
 /// An override or filter is wrong, or there is no device.
 pub async fn run(host: &impl Host, overrides: &[String], only: &[String]) -> Result<(), String> {
     let registries = Registries::default();
-    let (experiment, plan) = registries.plan(overrides, only)?;
+    let (experiment, plan) = plan(&registries, overrides, only)?;
     let start = Instant::now();
     let text = |e: GpuError| e.to_string();
     let mut device = Device::open(host, &registries).await.map_err(text)?;
@@ -231,12 +232,6 @@ impl<H: Host> Run<'_, H> {
         }
     }
 }
-
-const PROGRAM: Program = Program {
-    version: env!("CARGO_PKG_VERSION"),
-    commit: option_env!("RAYSTONE_COMMIT"),
-    dirty: None,
-};
 
 /// Name of a scene in messages.
 pub(crate) fn name_of(cell: &Cell) -> String {

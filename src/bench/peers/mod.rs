@@ -2,6 +2,8 @@
 //! by rounding, so they are checked in double precision, not bit by bit, and listed next to this
 //! crate's structures, never among them: no verdict compares the two.
 
+// A library of the system.
+#[cfg(not(target_family = "wasm"))]
 mod embree;
 mod native;
 mod obvhs;

@@ -1,6 +1,8 @@
 //! The registry of peers: one line each.
 
-use super::{BuiltPeer, Peer, embree::Embree, obvhs::Obvhs, ray_query::RayQuery};
+#[cfg(not(target_family = "wasm"))]
+use super::embree::Embree;
+use super::{BuiltPeer, Peer, obvhs::Obvhs, ray_query::RayQuery};
 use raystone_accel::TriangleSoup;
 use raystone_config::NO_PEER;
 use raystone_core::params::{Kinds, Named};
@@ -27,7 +29,14 @@ impl Peer for NoPeer {
 
 impl Named for dyn Peer {
     fn built_in() -> Vec<&'static Self> {
-        vec![&NoPeer, &Obvhs::Binary, &Obvhs::Wide, &Embree, &RayQuery]
+        vec![
+            &NoPeer,
+            &Obvhs::Binary,
+            &Obvhs::Wide,
+            #[cfg(not(target_family = "wasm"))]
+            &Embree,
+            &RayQuery,
+        ]
     }
 
     fn name(&self) -> &'static str {

@@ -17,14 +17,18 @@ use std::sync::LazyLock;
 const HOSTILE: &str =
     "=cmd|'/C calc'!A0 <script>\\input{/etc/passwd} \u{1b}[31m $(rm x) `y` \"]]>&%#_{}~^, 中 [a]*";
 
-fn program(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_raystone"))
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_raystone"));
+    command
         .args(arguments)
         .env("RAYSTONE_CACHE", "")
         .env_remove("COLUMNS")
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .output()
-        .expect("the program starts")
+        .current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+fn program(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("the program starts")
 }
 
 /// Standard output of a command that was done.

@@ -1,9 +1,10 @@
 //! The web page: what it measured once is read by every command; and, where it is built and there is a Chromium, it measures a
-//! small scene, every structure passes its gate, and nothing is logged.
+//! small scene, every structure passes its gate, it shows the images that `raystone render` makes, and nothing is logged.
 
 use super::{done, folder_of, text, validator};
 use crate::support::{needs, tier};
 use raystone::export::record_schema;
+use raystone::image::{Image, read_linear};
 use serde_json::Value;
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -16,6 +17,10 @@ use std::time::Duration;
 const SAMPLE: &str = include_str!("../../data/web-records.jsonl");
 /// A small scene in few rounds, started at once, with the records left at the server.
 const QUERY: &str = "start&post=/records&only=scene%3Dcornell-box&set=timing.rounds%3D6&set=timing.rays%3D4096&set=gate.rays%3D4096";
+/// Settings of a small view.
+const VIEWED: [&str; 2] = ["run.resolution=[48,36]", "run.seed=7"];
+/// Pixels of 1728 in which a path may go another way on the browser's adapter: drivers round division, roots and sines otherwise.
+const MOST_TIES: usize = 17;
 /// How long a software adapter may take, with its compiler.
 const PATIENCE: Duration = Duration::from_secs(900);
 
@@ -227,12 +232,12 @@ fn start_browser(address: &str, profile: &Path) -> Option<Browser> {
     started.map(Browser)
 }
 
-#[test]
-fn the_web_page_measures_and_every_structure_passes_its_gate() {
-    let Some(dist) = built() else { return };
+/// What the page leaves at the server when it is opened with this query, in a browser that logs nothing.
+fn told(query: &str) -> Option<Value> {
+    let dist = built()?;
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = listener.local_addr().expect("an address").port();
-    let (sender, records) = channel();
+    let (sender, left) = channel();
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let (dist, sender) = (dist.clone(), sender.clone());
@@ -240,10 +245,7 @@ fn the_web_page_measures_and_every_structure_passes_its_gate() {
         }
     });
     let profile = tempfile::tempdir().expect("a folder");
-    let Some(browser) = start_browser(&format!("http://127.0.0.1:{port}/?{QUERY}"), profile.path())
-    else {
-        return;
-    };
+    let browser = start_browser(&format!("http://127.0.0.1:{port}/?{query}"), profile.path())?;
     let log = || {
         let log = std::fs::read(profile.path().join("console")).unwrap_or_default();
         let log = String::from_utf8_lossy(&log).into_owned();
@@ -252,13 +254,113 @@ fn the_web_page_measures_and_every_structure_passes_its_gate() {
             .map(str::to_owned)
             .collect::<Vec<_>>()
     };
-    let told = records
+    let told = left
         .recv_timeout(PATIENCE)
         .unwrap_or_else(|_| panic!("no answer: {:?}", log()));
     drop(browser);
     assert_eq!(told["trouble"], "", "{told:#}");
     assert_eq!(log(), Vec::<String>::new());
+    Some(told)
+}
+
+#[test]
+fn the_web_page_measures_and_every_structure_passes_its_gate() {
+    let Some(told) = told(QUERY) else { return };
     let records = told["records"].as_str().expect("records");
     check(records);
     read(records);
+}
+
+/// The image that `raystone render` makes of these settings, on the adapter of the tests or with this driver of Vulkan.
+fn rendered(settings: &[String], driver: Option<&Path>) -> Image {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("native.pfm");
+    let mut arguments = vec!["render", "-o", text(&file)];
+    arguments.extend(settings.iter().flat_map(|s| ["--set", s.as_str()]));
+    let mut render = super::command(&arguments);
+    if let Some(driver) = driver {
+        render
+            .env("VK_DRIVER_FILES", driver)
+            .env("VK_ICD_FILENAMES", driver);
+        render.env("WGPU_BACKEND", "vulkan");
+    }
+    let output = render.output().expect("the program starts");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    read_linear(&file).expect("an image")
+}
+
+/// Pixels whose bits differ, and those of them that differ by more than rounding: a path went another way.
+fn differing(image: &Image, other: &Image) -> [usize; 2] {
+    assert_eq!(image.pixels.len(), other.pixels.len());
+    let beyond = |(a, b): (&[f32; 3], &[f32; 3])| {
+        a.iter()
+            .zip(b)
+            .any(|(a, b)| (a - b).abs() > 1e-3 * a.abs().max(b.abs()))
+    };
+    let pairs = || image.pixels.iter().zip(&other.pixels);
+    [
+        pairs().filter(|(a, b)| a != b).count(),
+        pairs().filter(|pair| beyond(*pair)).count(),
+    ]
+}
+
+#[test]
+fn the_web_page_shows_the_images_of_raystone_render() {
+    let settings = [
+        VIEWED.map(str::to_owned).to_vec(),
+        vec!["run.spp=[4]".to_owned()],
+    ]
+    .concat();
+    let query: String = settings
+        .iter()
+        .map(|s| format!("&set={}", s.replace('=', "%3D")))
+        .collect();
+    let Some(told) = told(&format!("view&split&post=/images{query}")) else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let images: Vec<Image> = told["images"]
+        .as_array()
+        .expect("two images")
+        .iter()
+        .map(|bytes| {
+            let bytes: Vec<u8> = serde_json::from_value(bytes.clone()).expect("bytes");
+            let file = folder.path().join("page.pfm");
+            std::fs::write(&file, bytes).expect("a writable folder");
+            read_linear(&file).expect("an image")
+        })
+        .collect();
+    for (side, figures) in told["figures"]["sides"]
+        .as_array()
+        .expect("figures")
+        .iter()
+        .enumerate()
+    {
+        assert_eq!(figures["spp"], 4, "{side}: {figures:#}");
+        assert!(figures["fault"].is_null(), "{figures:#}");
+        assert!(figures["mrays_s"].as_f64() > Some(0.0), "{figures:#}");
+    }
+    // A structure changes no image, in a browser no more than elsewhere.
+    let [first, second] = &images[..] else {
+        panic!("{} images", images.len())
+    };
+    assert_eq!(differing(first, second), [0, 0]);
+    // With the driver that the browser brings along, no bit is another one.
+    let driver = Path::new("/usr/lib/chromium/vk_swiftshader_icd.json");
+    if driver.exists() {
+        let native = rendered(&settings, Some(driver));
+        assert_eq!(differing(first, &native), [0, 0]);
+    }
+    let [bits, beyond] = differing(first, &rendered(&settings, None));
+    assert!(
+        beyond <= MOST_TIES,
+        "{bits} pixels differ, {beyond} by more than rounding"
+    );
+    // The check can fail: another seed is another image.
+    let other = [settings, vec!["run.seed=8".to_owned()]].concat();
+    assert!(differing(first, &rendered(&other, None))[1] > 10 * MOST_TIES);
 }

@@ -1,0 +1,67 @@
+// A choice for each axis of an experiment, with the parameters that its entries declare; and the settings that they stand for.
+
+const TITLES = { scene: "Scene", accel: "Structure", sequence: "Sequence", decorrelation: "Decorrelation", integrator: "Integrator", organisation: "Organisation" };
+
+const idOf = (axis, side) => (side ? `${axis}-${side}` : axis);
+
+function element(name, attributes = {}, ...children) {
+  const made = Object.assign(document.createElement(name), attributes);
+  made.append(...children);
+  return made;
+}
+
+// The field of an axis; `changed` is called when something else is chosen.
+export function axisField(axis, side, { entries, first }, changed) {
+  const id = idOf(axis, side);
+  const options = entries.map(({ name, description }) => element("option", { value: name, textContent: name, title: description }));
+  const select = element("select", { id }, ...options);
+  select.value = first;
+  const details = element("details", { className: "parameters" });
+  const draw = () => {
+    const entry = entries.find(({ name }) => name === select.value);
+    select.title = entry.description;
+    details.hidden = entry.parameters.length === 0;
+    const fields = entry.parameters.map((parameter) => parameterField(id, parameter, changed));
+    details.replaceChildren(element("summary", { textContent: `Parameters of ${entry.name}` }), ...fields);
+  };
+  select.onchange = () => {
+    draw();
+    changed();
+  };
+  draw();
+  return element("div", { className: "axis" }, element("label", { htmlFor: id, textContent: TITLES[axis] }), select, details);
+}
+
+function parameterField(axis, { name, description, default: initial, range }, changed) {
+  const id = `${axis}-${name}`;
+  let input;
+  if (range.names) {
+    input = element("select", { id }, ...range.names.map((value) => element("option", { value, textContent: value })));
+    input.value = initial;
+  } else if (typeof initial === "boolean") {
+    input = element("input", { id, type: "checkbox", checked: initial });
+  } else {
+    input = element("input", { id, type: "number", min: range.min, max: range.max, step: range.step, value: initial });
+  }
+  input.title = description;
+  input.dataset.parameter = name;
+  input.dataset.initial = String(initial);
+  input.onchange = () => (input.reportValidity() ? changed() : undefined);
+  return element("div", {}, element("label", { htmlFor: id, textContent: name.replaceAll("_", " ") }), input);
+}
+
+// What is chosen on an axis, as settings of an experiment; parameters at their defaults need none.
+export function overridesOf(axis, side) {
+  const select = document.getElementById(idOf(axis, side));
+  const inputs = [...select.parentElement.querySelectorAll("[data-parameter]")];
+  const value = (input) => {
+    if (input.type === "checkbox") return String(input.checked);
+    return input.type === "number" ? input.value : JSON.stringify(input.value);
+  };
+  const isChanged = (input) => String(input.type === "checkbox" ? input.checked : input.value) !== input.dataset.initial;
+  const changed = inputs.filter((input) => isChanged(input) && input.checkValidity());
+  return [
+    `axes.${axis}=[${JSON.stringify(select.value)}]`,
+    ...changed.map((input) => `${axis}.${select.value}.${input.dataset.parameter}=${value(input)}`),
+  ];
+}

@@ -1,0 +1,237 @@
+// The view: sends what is chosen and how the camera moves to its worker, and draws what comes back.
+import { adapterTrouble } from "./adapter.js";
+import { isMeasuring } from "./app.js";
+import { axisField, overridesOf } from "./choices.js";
+import { canvasMoves } from "./moves.js";
+
+const at = (id) => document.getElementById(id);
+const parameters = new URLSearchParams(location.search);
+// What a link or a test may ask for: settings with the last word, two images, and where on this server to leave what is finished.
+const asked = { set: parameters.getAll("set"), post: parameters.get("start") === null && parameters.get("post") };
+const SIDES = ["a", "b"];
+const OF_SIDE = ["accel", "sequence", "decorrelation", "integrator", "organisation"];
+
+let worker = null;
+let figures = null;
+// Of a test, once it asks for them.
+let images = null;
+
+function trouble(text) {
+  at("view-trouble").textContent = text;
+  at("view-trouble").hidden = !text;
+}
+
+async function open() {
+  const refused = await adapterTrouble();
+  if (refused) return end(refused);
+  trouble("");
+  at("view-status").textContent = "opening the adapter";
+  worker = new Worker("view-worker.js", { type: "module" });
+  worker.onmessage = ({ data }) => take(data);
+  worker.onerror = (event) => end(`The view broke off: ${event.message || "its worker could not be started"}.`);
+}
+
+function end(reason) {
+  worker?.terminate();
+  worker = null;
+  at("view-status").textContent = "";
+  at("again").hidden = false;
+  trouble(reason);
+  post({ trouble: reason });
+}
+
+function ask(request, restarts = false) {
+  worker?.postMessage({ ask: request, restarts });
+}
+
+function take(news) {
+  if (news.picture) return draw(news);
+  if (news.opened) return opened(news.opened);
+  if (news.ended) return end(news.ended);
+  if (news.trouble) {
+    at("view-status").textContent = "";
+    trouble(news.trouble);
+    post({ trouble: news.trouble });
+  } else if (news.status) {
+    at("view-status").textContent = news.status;
+  } else if (news.done) {
+    trouble("");
+    at("view-status").textContent = news.done.join("; ");
+    at("notes").textContent = news.notes.join(" ");
+  } else if (news.experiment) {
+    copy(news.experiment);
+  } else if (news.bytes) {
+    if (!asked.post) return download(news.name, new Blob([news.bytes]));
+    images.push([...news.bytes]);
+    if (images.length === figures.sides.length) post({ trouble: "", images, figures });
+  } else if (news.idle && asked.post && !images) {
+    images = [];
+    figures.sides.forEach((_, side) => ask({ save: [side, "pfm"] }));
+  }
+}
+
+// Only on this server, and once.
+async function post(told) {
+  if (!asked.post) return;
+  const address = new URL(asked.post, location.origin).pathname;
+  asked.post = null;
+  await fetch(address, { method: "POST", body: JSON.stringify(told) });
+}
+
+// The choices are those of the program: the page knows none by heart.
+function opened({ adapter, software, axes }) {
+  at("view-adapter").textContent = adapter || "an adapter that the browser does not name";
+  at("view-software").hidden = !software;
+  if (!at("scene-field").firstChild) {
+    at("scene-field").append(axisField("scene", "", axes.scene, show));
+    for (const side of SIDES) {
+      at(`side-${side}`).append(...OF_SIDE.map((axis) => axisField(axis, side, axes[axis], show)));
+    }
+    // A processor takes seconds where a GPU takes one.
+    if (software) [at("size").value, at("spp").value] = ["320,240", "64"];
+    // Two structures at first: they give the same image, and other maps.
+    at("accel-b").value = "bvh";
+    at("split").checked = parameters.has("split");
+    at("accel-b").onchange();
+    showSides();
+  }
+  for (const control of document.querySelectorAll("#view fieldset, #view button")) control.disabled = false;
+}
+
+function showSides() {
+  const isSplit = at("split").checked;
+  at("side-b").hidden = !isSplit;
+  at("name-a").textContent = isSplit ? "A, left" : "Structure and sampler";
+}
+
+function show() {
+  ask({ show: screen() }, true);
+}
+
+// Exposure, maps and the line between two images leave the samples.
+function reshow() {
+  ask({ show: screen() });
+}
+
+function screen() {
+  const common = [
+    `run.resolution=[${at("size").value}]`,
+    `run.spp=[${at("spp").value}]`,
+    `window.map=${JSON.stringify(at("map").value)}`,
+    `window.exposure=${Number(at("exposure").value).toFixed(2)}`,
+    `window.swipe=${Number(at("swipe").value).toFixed(3)}`,
+    `window.error=${at("error").checked}`,
+    ...overridesOf("scene", ""),
+  ];
+  const sides = at("split").checked ? SIDES : SIDES.slice(0, 1);
+  return sides.map((side) => [...common, ...OF_SIDE.flatMap((axis) => overridesOf(axis, side)), ...asked.set]);
+}
+
+function draw({ figures: known, width, height, picture }) {
+  const canvas = at("canvas");
+  figures = known;
+  if (picture.length > 0) {
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    canvas.getContext("2d").putImageData(new ImageData(picture, width, height), 0, 0);
+  }
+  const { sides } = known;
+  at("swipe-field").hidden = sides.length < 2;
+  at("triangles").textContent = `${known.triangles.toLocaleString("en")} triangles`;
+  at("scale").textContent = known.scale ? ` · colours from 0 to ${digits(known.scale)} ${at("map").selectedOptions[0].textContent}` : "";
+  const faults = sides.map((side, index) => side.fault && `${sides.length > 1 ? `${"AB"[index]}: ` : ""}${side.fault}`);
+  at("faults").textContent = faults.filter(Boolean).join(" ");
+  at("faults").hidden = !faults.some(Boolean);
+  const rows = [
+    ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],
+    ["ms a sample", (side) => digits(side.sample_ms)],
+    ["Mrays/s", (side) => digits(side.mrays_s)],
+    ...sides[0].rays.map(([name], index) => [`${name} rays a sample`, (side) => digits(side.rays[index]?.[1])]),
+    ["mean of the map", (side) => digits(side.map_mean)],
+    ["relMSE", (side) => digits(side.relmse)],
+    ["nodes or cells", (side) => (side.nodes ? side.nodes.toLocaleString("en") : "–")],
+    ["SAH cost", (side) => digits(side.sah_cost)],
+    ["structure, KiB", (side) => digits(side.bytes ? side.bytes / 1024 : null)],
+  ].map(([name, value]) => [name, ...sides.map(value)]);
+  const shown = rows.filter(([, ...values]) => values.some((value) => value !== "–"));
+  const title = sides.length > 1 ? [["", "A", "B"]] : [];
+  at("figures").replaceChildren(...[...title, ...shown].map((cells, row) => {
+    const line = document.createElement("tr");
+    line.append(...cells.map((text, column) => {
+      const cell = document.createElement(column === 0 || (title.length > 0 && row === 0) ? "th" : "td");
+      cell.textContent = text;
+      return cell;
+    }));
+    return line;
+  }));
+}
+
+function digits(value) {
+  return value == null ? "–" : Number(value.toPrecision(3)).toLocaleString("en", { maximumSignificantDigits: 3 });
+}
+
+function download(name, blob) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    at("view-status").textContent = "copied: raystone view --experiment FILE shows it again, raystone run FILE measures it";
+  } catch {
+    download("raystone.toml", new Blob([text]));
+  }
+}
+
+// One panel at a time, so that a view takes nothing from a measurement.
+function turn(to) {
+  for (const panel of ["view", "measure"]) {
+    at(panel).hidden = panel !== to;
+    at(`to-${panel}`).ariaPressed = String(panel === to);
+  }
+  if (to === "view" && !worker) open();
+  pause();
+}
+
+function pause() {
+  const rests = document.hidden || at("view").hidden || isMeasuring();
+  worker?.postMessage({ pause: rests });
+  at("resting").hidden = !isMeasuring();
+}
+
+at("to-view").onclick = () => turn("view");
+at("to-measure").onclick = () => turn("measure");
+at("again").onclick = () => location.reload();
+for (const id of ["size", "spp", "error"]) at(id).onchange = show;
+for (const id of ["map", "exposure", "swipe"]) at(id).oninput = reshow;
+at("split").onchange = () => {
+  showSides();
+  show();
+};
+at("home").onclick = () => ask("home", true);
+at("save-png").onclick = () => at("canvas").toBlob((blob) => download("raystone.png", blob));
+at("save-pfm").onclick = () => ask({ save: [0, "pfm"] });
+at("copy-experiment").onclick = () => ask("experiment");
+canvasMoves(at("canvas"), (request) => ask(request, true), {
+  b: () => at("split").click(),
+  m: () => step(at("map"), 1),
+  "[": () => swipe(-0.05),
+  "]": () => swipe(0.05),
+});
+
+function step(select, by) {
+  select.selectedIndex = (select.selectedIndex + by) % select.options.length;
+  reshow();
+}
+
+function swipe(by) {
+  at("swipe").value = Number(at("swipe").value) + by;
+  reshow();
+}
+
+document.addEventListener("visibilitychange", pause);
+addEventListener("measuring", pause);
+turn(parameters.has("start") || location.hash === "#measure" ? "measure" : "view");
