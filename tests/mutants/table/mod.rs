@@ -3,6 +3,7 @@
 mod binary;
 mod cells;
 mod counts;
+mod divide;
 mod ends;
 mod frames;
 mod hard;
@@ -41,6 +42,7 @@ pub fn mutants() -> Vec<Mutant> {
         frames::MUTANTS,
         counts::MUTANTS,
         rays::MUTANTS,
+        divide::MUTANTS,
     ]
     .concat()
 }
