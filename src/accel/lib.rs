@@ -16,6 +16,7 @@ macro_rules! ensure {
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod divide_and_conquer;
 #[cfg(test)]
 mod fixtures;
 mod grid;
@@ -48,6 +49,7 @@ mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhParameters, RopedBvh};
+pub use divide_and_conquer::{DivideAndConquer, Division, DivisionLevel};
 pub use instancing::{InstanceReference, MetaBvh, ObjectList, Placed, brute_force_instances};
 pub use intersection::{BoxTest, Intersection};
 pub(crate) use irregular_grid::IrregularGrid;

@@ -28,6 +28,7 @@ impl Named for dyn AccelKind {
             &Octree,
             &KdTree,
             &super::RayHierarchy,
+            &super::DivideAndConquer,
             &super::ObjectList,
             &super::MetaBvh,
         ]

@@ -7,6 +7,7 @@ mod animation;
 mod builders;
 mod coherence;
 mod cracks;
+mod divide_and_conquer;
 mod faults;
 mod gate;
 mod grids;

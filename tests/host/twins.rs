@@ -34,6 +34,18 @@ const NO_TWIN: &[(&str, &str)] = &[
         "stages that hand paths on; tests/device/organisations.rs holds their images to that of one kernel",
     ),
     (
+        "accel/divide_and_conquer/passes/",
+        "passes; tests/hits/divide_and_conquer compares hits, and problems and pairs level by level",
+    ),
+    (
+        "accel/divide_and_conquer/enter",
+        "a binding and a box test; the division on the host has the test",
+    ),
+    (
+        "accel/found",
+        "a word a ray that many invocations offer to; twins offer to the hit of a walk",
+    ),
+    (
         "accel/ray_hierarchy/passes/",
         "passes; tests/hits/ray_hierarchy compares hits, and pairs level by level",
     ),

@@ -2,7 +2,7 @@
 
 use super::Options;
 
-/// Levels of a tree at most, as in `kernels/accel/ray_hierarchy/tree.wesl`.
+/// Levels of a tree at most: each has at most a quarter of the nodes below.
 pub(super) const LEVELS: u32 = 18;
 
 /// The levels of a tree over rays, and how primitives come in.

@@ -21,6 +21,7 @@ mod tests;
 
 pub use anatomy::{Anatomy, LevelAnatomy};
 pub use streams::StreamCounts;
+pub(crate) use streams::trace_state;
 
 use super::Access;
 use super::structure::prelude::*;
@@ -155,6 +156,7 @@ impl Structure for RayHierarchy {
         let modules = shared.into_iter().chain(passes);
         modules
             .map(|module| format!("accel/ray_hierarchy/{module}"))
+            .chain(["accel/found".to_owned()])
             .collect()
     }
 
@@ -203,6 +205,7 @@ impl BuiltAccel for Built {
             constants: vec![
                 ("BRANCHING_BITS", self.options.branching.trailing_zeros()),
                 ("BUNDLE", self.options.bundle),
+                ("LEVELS", layout::LEVELS),
             ],
         }
     }

@@ -28,16 +28,7 @@ impl RayHierarchy {
         tracer: &Tracer,
         rays: &[Ray],
     ) -> Result<Vec<StreamCounts>, GpuError> {
-        let buffers = RayBuffers {
-            rays: Storage::Own(gpu.storage("rays", rays)?),
-            answers: Storage::Own(gpu.zeroed("answers", 16 * rays.len() as u64)?),
-            status: Storage::Own(gpu.zeroed("status", 64)?),
-        };
-        let mut recording = Recording::new();
-        tracer.record(&mut recording, &buffers, 0..rays.len() as u32)?;
-        let state = Storage::scratch("trace state", 16 * u64::from(LEVELS));
-        recording.download("state", state);
-        let words: Vec<u32> = gpu.play(&recording)?.download("state")?;
+        let words = trace_state(gpu, tracer, rays, LEVELS)?;
         let levels = words.as_chunks::<4>().0.iter().take(LEVELS as usize);
         let counts = levels.map(|[_, pairs, longest, walked]| StreamCounts {
             pairs: *pairs,
@@ -46,4 +37,23 @@ impl RayHierarchy {
         });
         Ok(counts.collect())
     }
+}
+
+/// Traces `rays` once and returns the four words that the passes of a structure leave for each level: see `kernels/accel/found.wesl`.
+pub(crate) fn trace_state(
+    gpu: &Gpu,
+    tracer: &Tracer,
+    rays: &[Ray],
+    levels: u32,
+) -> Result<Vec<u32>, GpuError> {
+    let buffers = RayBuffers {
+        rays: Storage::Own(gpu.storage("rays", rays)?),
+        answers: Storage::Own(gpu.zeroed("answers", 16 * rays.len() as u64)?),
+        status: Storage::Own(gpu.zeroed("status", 64)?),
+    };
+    let mut recording = Recording::new();
+    tracer.record(&mut recording, &buffers, 0..rays.len() as u32)?;
+    let state = Storage::scratch("trace state", 16 * u64::from(levels));
+    recording.download("state", state);
+    gpu.play(&recording)?.download("state")
 }

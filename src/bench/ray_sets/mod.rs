@@ -13,9 +13,9 @@ use crate::timed_rays::TimedRays;
 use crate::timing::{Measured, Samples};
 use rayon::prelude::*;
 use raystone_accel::{
-    AccelError, Access, Anatomy, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, Ray,
-    RayHierarchy, Space, StreamCounts, Structure as _, Traced, Tracer, TriangleBuffers,
-    TriangleSoup,
+    AccelError, Access, Anatomy, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters,
+    DivideAndConquer, Division, DivisionLevel, Hit, Ray, RayHierarchy, Space, StreamCounts,
+    Structure as _, Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
 use raystone_config::{Axis, Catalogue, Cell, Coherence, Experiment, Plan, RAYS};
 use raystone_core::parameters;
@@ -343,10 +343,15 @@ impl Measurement for RaySets {
 /// Builds, of which the fastest counts: the first touches pages for the first time.
 const BUILDS: usize = 3;
 
-/// What a descent did, by its twin and by the device.
-struct Descent {
-    anatomy: Option<Anatomy>,
-    streams: Vec<StreamCounts>,
+/// What passes over rays and triangles did, by the scalar twin and by the device.
+enum Descent {
+    /// Triangles through a tree over rays.
+    Tree {
+        anatomy: Option<Anatomy>,
+        streams: Vec<StreamCounts>,
+    },
+    /// Problems, of which the device had no room for the parts of some pairs.
+    Division { host: Division, without_room: u64 },
 }
 
 /// A structure on the device, with rays for it.
@@ -391,9 +396,13 @@ impl Ready {
         };
         let tracer = Tracer::new(gpu, &triangles, &traced, ask)?;
         let exact = world.exact;
-        let descent = match accel.name == RayHierarchy::NAME {
-            true => Some(Descent::new(gpu, &tracer, &set, (soup, accel), exact)?),
-            false => None,
+        let counted = (&tracer, set.rays.as_slice());
+        let descent = match accel.name.as_str() {
+            RayHierarchy::NAME => Some(Descent::of_tree(gpu, counted, (soup, accel), exact)?),
+            DivideAndConquer::NAME => {
+                Some(Descent::of_division(gpu, counted, (soup, accel), exact)?)
+            }
+            _ => None,
         };
         Ok(Self {
             rays: TimedRays::new(tracer.batch(&set.rays)?),
@@ -440,29 +449,57 @@ fn cycles(
 }
 
 impl Descent {
-    fn new(
+    fn of_tree(
         gpu: &Gpu,
-        tracer: &Tracer,
-        set: &RaySet,
+        (tracer, rays): (&Tracer, &[Ray]),
         (soup, accel): (&TriangleSoup, &Variant),
         exact: bool,
     ) -> Result<Self, Absent> {
-        let streams = RayHierarchy::streams(gpu, tracer, &set.rays)?;
+        let streams = RayHierarchy::streams(gpu, tracer, rays)?;
         // There is none of sorted rays, and of parts.
-        let anatomy = Anatomy::new(soup, &accel.params, &set.rays).ok();
+        let anatomy = Anatomy::new(soup, &accel.params, rays).ok();
         let is_whole = streams.iter().all(|level| level.walked == 0);
         if let Some(anatomy) = anatomy.as_ref().filter(|_| exact && is_whole) {
-            for (level, (twin, own)) in anatomy.levels.iter().zip(&streams).enumerate() {
-                if twin.pairs != u64::from(own.pairs) {
-                    return Err(Absent::Failed(format!(
-                        "level {level} has {} pairs on the device and {} in the scalar twin",
-                        own.pairs, twin.pairs
-                    )));
-                }
-            }
+            let twin = anatomy.levels.iter().map(|level| level.pairs);
+            agree(twin, streams.iter().map(|level| u64::from(level.pairs)))?;
         }
-        Ok(Self { anatomy, streams })
+        Ok(Self::Tree { anatomy, streams })
     }
+
+    fn of_division(
+        gpu: &Gpu,
+        (tracer, rays): (&Tracer, &[Ray]),
+        (soup, accel): (&TriangleSoup, &Variant),
+        exact: bool,
+    ) -> Result<Self, Absent> {
+        let host = Division::new(soup, &accel.params, rays);
+        let host = host.map_err(|error| Absent::Failed(error.to_string()))?;
+        let levels = host.levels.len() as u32;
+        let found = DivideAndConquer::division(gpu, tracer, rays, levels)?;
+        let without_room = found.iter().map(|level| level.without_room).sum();
+        if exact && without_room == 0 {
+            let pairs = |levels: &[DivisionLevel]| {
+                levels.iter().map(|level| level.pairs).collect::<Vec<_>>()
+            };
+            agree(pairs(&host.levels), pairs(&found))?;
+        }
+        Ok(Self::Division { host, without_room })
+    }
+}
+
+/// Compares pairs level by level.
+fn agree(
+    twin: impl IntoIterator<Item = u64>,
+    device: impl IntoIterator<Item = u64>,
+) -> Result<(), Absent> {
+    for (level, (twin, device)) in twin.into_iter().zip(device).enumerate() {
+        if twin != device {
+            return Err(Absent::Failed(format!(
+                "level {level} has {device} pairs on the device and {twin} in the scalar twin"
+            )));
+        }
+    }
+    Ok(())
 }
 
 impl Prepared for Ready {

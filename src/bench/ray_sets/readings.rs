@@ -2,7 +2,7 @@
 
 use super::Descent;
 use crate::timing::Samples;
-use raystone_accel::LevelAnatomy;
+use raystone_accel::{Anatomy, Division, LevelAnatomy, StreamCounts};
 use raystone_record::figure::{Better, CYCLES_PER_RAY, Figure, Shown, Spread};
 use raystone_record::{Key, Reading, axis};
 
@@ -119,17 +119,23 @@ pub(super) fn of_sampler(error: Option<f64>, cycles: Option<f64>) -> Vec<Reading
     Reading::known([(&FIGURES[ERROR], error), (&CYCLES_PER_RAY, cycles)])
 }
 
-/// What a descent did as a whole, and level by level, leaves first.
+/// What passes did as a whole, and level by level: leaves first in a tree over rays, and in a division the first problem.
 pub(super) fn descent(descent: &Descent, rays: f64) -> Vec<Reading> {
-    let streams = descent.streams.iter();
-    let longest = streams.clone().map(|level| level.longest).max();
-    let walked: u64 = streams.map(|level| u64::from(level.walked)).sum();
+    match descent {
+        Descent::Tree { anatomy, streams } => tree(anatomy.as_ref(), streams, rays),
+        Descent::Division { host, without_room } => division(host, *without_room, rays),
+    }
+}
+
+fn tree(anatomy: Option<&Anatomy>, streams: &[StreamCounts], rays: f64) -> Vec<Reading> {
+    let longest = streams.iter().map(|level| level.longest).max();
+    let walked: u64 = streams.iter().map(|level| u64::from(level.walked)).sum();
     let whole = |figure: usize, count: f64| Reading::exact(&FIGURES[figure], count / rays);
     let mut found = vec![
         whole(LONGEST, f64::from(longest.unwrap_or(0))),
         whole(WALKED, walked as f64),
     ];
-    let Some(anatomy) = &descent.anatomy else {
+    let Some(anatomy) = anatomy else {
         return found;
     };
     let candidates = anatomy.levels.first().map_or(0, |level| level.pairs);
@@ -137,6 +143,25 @@ pub(super) fn descent(descent: &Descent, rays: f64) -> Vec<Reading> {
     found.push(whole(CANDIDATES, candidates as f64));
     let levels = anatomy.levels.iter().enumerate();
     found.extend(levels.flat_map(|(number, level)| of_level(number, level, rays)));
+    found
+}
+
+fn division(host: &Division, without_room: u64, rays: f64) -> Vec<Reading> {
+    let whole = |figure: usize, count: u64| Reading::exact(&FIGURES[figure], count as f64 / rays);
+    let longest = host.levels.iter().map(|level| level.pairs).max();
+    let mut found = vec![
+        whole(LONGEST, longest.unwrap_or(0)),
+        whole(WALKED, without_room),
+        whole(TESTS, host.box_tests),
+        whole(CANDIDATES, host.tests),
+    ];
+    let levels = host.levels.iter().enumerate();
+    for (number, level) in levels.filter(|(_, level)| level.pairs > 0) {
+        let at = Key::default().with(axis::SUBJECT, format!("level {number:02}"));
+        let [pairs, nodes] = [&FIGURES[LEVEL + 1], &FIGURES[LEVEL + 2]];
+        found.push(Reading::exact(pairs, level.pairs as f64 / rays).at(at.clone()));
+        found.push(Reading::exact(nodes, level.problems as f64).at(at));
+    }
     found
 }
 

@@ -3,6 +3,7 @@
 mod binary;
 mod cells;
 mod counts;
+mod divide;
 mod ends;
 mod frames;
 mod hard;
@@ -43,6 +44,7 @@ pub fn mutants() -> Vec<Mutant> {
         counts::MUTANTS,
         rays::MUTANTS,
         stacks::MUTANTS,
+        divide::MUTANTS,
     ]
     .concat()
 }

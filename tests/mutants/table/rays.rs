@@ -205,7 +205,7 @@ pub const MUTANTS: &[Mutant] = &[
         "ray-last-offer-wins",
         "the last triangle that is hit stays, not the nearest",
         text(
-            "accel/ray_hierarchy/tree",
+            "accel/found",
             "load_triangle(found), ray, inverse, &hit",
             "load_triangle(triangle), ray, inverse, &hit",
         ),

@@ -1,0 +1,189 @@
+//! `divide-and-conquer` as a whole: every parameter against brute force, problems and pairs against the division
+//! on the host, sets of rays of every shape, streams that are too short, and faults that must be seen.
+
+use crate::support;
+use crate::support::scenes::{self, Case};
+use crate::support::{
+    Pcg, assert_same_hits, brute_force, build, default_params, differences, in_turn,
+    param_variants, trace,
+};
+use raystone::accel::{
+    AccelKind, DivideAndConquer, Division, DivisionLevel, Hit, NO_HIT, Query, Ray, Traced, Tracer,
+    TriangleBuffers, TriangleSoup,
+};
+use raystone::gpu::Gpu;
+use raystone::params::{ParamValue, Params};
+
+const KIND: &dyn AccelKind = &DivideAndConquer;
+
+fn with(changes: &[(&str, i64)]) -> Params {
+    let mut params = default_params(&KIND.parameters());
+    for (name, value) in changes {
+        let known = params
+            .0
+            .insert((*name).to_owned(), ParamValue::Integer(*value));
+        assert!(known.is_some(), "no parameter {name}");
+    }
+    params
+}
+
+fn answers(gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
+    let built = build(KIND, soup, params);
+    let any = trace(gpu, &*built, soup, rays, &["any"]).found();
+    (trace(gpu, &*built, soup, rays, &[]).hits, any)
+}
+
+fn assert_right(what: &str, gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) {
+    let expected = brute_force(soup, rays);
+    let (hits, any) = answers(gpu, soup, params, rays);
+    let what = format!("{what} {params:?}");
+    assert_same_hits(&what, rays, &expected, &hits);
+    let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
+    assert_eq!(any, blocked, "{what}: any hit");
+}
+
+fn counted(gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Vec<DivisionLevel> {
+    let built = build(KIND, soup, params);
+    let triangles = TriangleBuffers::upload(gpu, soup).expect("triangles");
+    let traced = Traced::upload(gpu, &*built).expect("a structure");
+    let tracer = Tracer::new(gpu, &triangles, &traced, Query::Closest).expect("kernels");
+    let Some(ParamValue::Integer(levels)) = params.0.get("levels") else {
+        panic!("no levels: {params:?}");
+    };
+    DivideAndConquer::division(gpu, &tracer, rays, *levels as u32).expect("counts")
+}
+
+#[test]
+fn every_parameter_answers_like_brute_force() {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
+        return;
+    }
+    let mut rng = Pcg::new(43);
+    let mut cases = scenes::degenerate_cases();
+    let soup = scenes::lattice_soup(&mut rng, 300, 8);
+    cases.push(Case {
+        name: "lattice",
+        soup,
+    });
+    let mut sets = param_variants(&KIND.parameters());
+    sets.extend([with(&[("naive", 1)]), with(&[("naive", 3), ("levels", 4)])]);
+    for case in in_turn("scenes of divide-and-conquer", cases) {
+        let mut rays = scenes::aimed_rays(&mut rng, &case.soup, 150);
+        rays.extend(scenes::lattice_rays(&mut rng, 150, 16));
+        let hits = brute_force(&case.soup, &rays);
+        rays.extend(scenes::cut_at_hits(&rays, &hits));
+        rays[5].origin[1] = f32::NAN;
+        rays[6].direction = [f32::INFINITY, 0.0, f32::NAN];
+        rays[7].direction = [0.0; 3];
+        rays[8].t_max = f32::INFINITY;
+        rays[9].origin = [1e30, -1e30, 1e30];
+        for params in &sets {
+            assert_right(case.name, gpu, &case.soup, params, &rays);
+        }
+    }
+}
+
+#[test]
+fn problems_and_pairs_are_those_of_the_division_on_the_host() {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
+        return;
+    }
+    let mut rng = Pcg::new(8);
+    let soup = scenes::lattice_soup(&mut rng, 500, 16);
+    let mut rays = scenes::aimed_rays(&mut rng, &soup, 1500);
+    rays[17].direction = [f32::NAN; 3];
+    for params in [
+        with(&[]),
+        with(&[("naive", 1)]),
+        with(&[("naive", 40), ("levels", 3)]),
+    ] {
+        let host = Division::new(&soup, &params, &rays).expect("a division");
+        let found = counted(gpu, &soup, &params, &rays);
+        assert!(host.levels[2].problems > 2, "{:?}", host.levels);
+        assert_eq!(found, host.levels, "{params:?}");
+        assert_same_hits("host", &rays, &brute_force(&soup, &rays), &host.hits);
+    }
+}
+
+#[test]
+fn batches_and_pairs_without_room_are_counted_and_answered_all_the_same() {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
+        return;
+    }
+    let mut rng = Pcg::new(9);
+    // Triangles across the whole scene: rays enter nearly all problems.
+    let soup = scenes::lattice_soup(&mut rng, 120, 6);
+    let rays = scenes::lattice_rays(&mut rng, 5000, 6);
+    let params = with(&[("capacity", 16_384), ("naive", 1)]);
+    let found = counted(gpu, &soup, &params, &rays);
+    let without: u64 = found.iter().map(|level| level.without_room).sum();
+    assert!(
+        without > 1000,
+        "only {without} pairs had no room: the test is blunt"
+    );
+    assert_right("short streams", gpu, &soup, &params, &rays);
+    // Three batches with room.
+    let rays = scenes::aimed_rays(&mut rng, &soup, 5000);
+    let params = with(&[("capacity", 16_384), ("naive", 100)]);
+    let host = Division::new(&soup, &params, &rays).expect("a division");
+    assert_eq!(counted(gpu, &soup, &params, &rays), host.levels);
+}
+
+#[test]
+fn sets_of_no_ray_one_and_a_million_equal_ones_are_answered() {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
+        return;
+    }
+    let mut rng = Pcg::new(3);
+    let soup = scenes::lattice_soup(&mut rng, 12, 4);
+    let rays = scenes::aimed_rays(&mut rng, &soup, 64);
+    let hits = brute_force(&soup, &rays);
+    let at = hits.iter().position(|h| h.triangle != NO_HIT);
+    let at = at.expect("a hit");
+    let built = build(KIND, &soup, &with(&[]));
+    for count in [1, 1_000_000] {
+        let found = trace(gpu, &*built, &soup, &vec![rays[at]; count], &[]).hits;
+        assert!(found.len() == count && found.iter().all(|hit| hit.same_bits(&hits[at])));
+    }
+    let nothing = TriangleSoup::from(Vec::new());
+    assert_right("no triangles", gpu, &nothing, &with(&[]), &rays);
+    let none = Division::new(&soup, &with(&[]), &[]).expect("a division");
+    assert_eq!(none.tests, 0);
+}
+
+#[test]
+fn faults_of_the_division_are_seen() {
+    if !support::is_exact(support::gpu()) {
+        return;
+    }
+    let mut rng = Pcg::new(12);
+    let soup = scenes::lattice_soup(&mut rng, 400, 12);
+    let rays = scenes::aimed_rays(&mut rng, &soup, 2000);
+    let expected = brute_force(&soup, &rays);
+    let host = Division::new(&soup, &with(&[]), &rays).expect("a division");
+    for (file, from, to) in [
+        (
+            "passes/plan",
+            "(pairs + LANES - 1u) / LANES",
+            "pairs / LANES",
+        ),
+        ("passes/answer", "slot < end", "slot + 1u < end"),
+        (
+            "passes/divide",
+            "level.level + 1u < LEVELS &&",
+            "level.level < 3u &&",
+        ),
+        ("passes/expand", "nearest(place, ray).t", "ray.t_max"),
+    ] {
+        let module = format!("accel/divide_and_conquer/{file}");
+        let gpu = support::open(support::kernels_with(&module, &[(from, to)]));
+        let (hits, _) = answers(&gpu, &soup, &with(&[]), &rays);
+        let counts = counted(&gpu, &soup, &with(&[]), &rays);
+        let is_seen = !differences(&expected, &hits).is_empty() || counts != host.levels;
+        assert!(is_seen, "{to}");
+    }
+}
