@@ -7,7 +7,7 @@ use crate::{AccelRegistry, BuildLog, TriangleSoup, triangle::TriangleRecord};
 use glam::Vec3;
 use raystone_core::geometry::Triangle;
 use raystone_core::params::Params;
-use raystone_scene::{Assembly, Transform};
+use raystone_scene::{Assembly, Instance, Transform};
 
 /// Structures, and their cost by the surface area heuristic with both constants 1: the root, 1, and two leaves of a triangle
 /// each, (1 + 1) / 4, for halves of the boxes' surfaces are 1, 1 and 4.
@@ -28,7 +28,15 @@ const OF_BOX: f64 = 1.5e-6;
 /// One is not what it should be: of which, and both values.
 pub fn check() -> Result<(), String> {
     costs()?;
-    let (found, growth) = placed_box()?;
+    box_agrees(&BoxMap::new(&placed()?))
+}
+
+fn box_agrees(map: &BoxMap) -> Result<(), String> {
+    let object = Bounds {
+        min: [-1.0, -2.0, -1.0],
+        max: [1.0, 1.0, 3.0],
+    };
+    let (found, growth) = (map.world_box(&object), map.growth());
     let grown = |at: f64, out: f64| at + out * PAD;
     let low = WORLD_BOX[0].map(|at| grown(at, -1.0));
     let high = WORLD_BOX[1].map(|at| grown(at, 1.0));
@@ -46,20 +54,15 @@ pub fn check() -> Result<(), String> {
     })
 }
 
-/// The box of a sheared copy, and how much it grows for each unit of an origin.
-fn placed_box() -> Result<(Bounds, f32), String> {
+/// The sheared copy.
+fn placed() -> Result<Instance, String> {
     let columns = [[2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
     let to_world = Transform::new(columns.map(Vec3::from), Vec3::new(3.0, -1.0, 2.0));
     let mut assembly = Assembly::default();
     let placed = assembly
         .add_object(vec![half_a_square(0)])
         .and_then(|object| assembly.place(object, to_world));
-    let map = BoxMap::new(&placed.map_err(|e| e.to_string())?);
-    let object = Bounds {
-        min: [-1.0, -2.0, -1.0],
-        max: [1.0, 1.0, 3.0],
-    };
-    Ok((map.world_box(&object), map.growth()))
+    placed.map_err(|e| e.to_string())
 }
 
 fn costs() -> Result<(), String> {
@@ -92,8 +95,19 @@ fn half_a_square(place: u32) -> Triangle {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
     #[test]
     fn they_are_as_by_hand() {
-        assert_eq!(super::check(), Ok(()));
+        assert_eq!(check(), Ok(()));
+    }
+
+    #[test]
+    fn boxes_with_another_pad_are_told() {
+        let placed = placed().expect("a copy");
+        for share in [0.0, 0.98, 1.02] {
+            let map = BoxMap::with_pad(&placed, share / 524_288.0);
+            assert!(box_agrees(&map).is_err(), "{share}");
+        }
     }
 }

@@ -31,13 +31,13 @@ const ROUNDING: f32 = 1e-5;
 /// from the origin the deepest subtree is always the nearest, and all others wait.
 pub struct FullStack {
     /// The triangles.
-    pub soup: TriangleSoup,
+    soup: TriangleSoup,
     /// The structure.
     pub built: Box<dyn BuiltAccel>,
     /// Entries that its kernel's stack offers.
-    pub entries: u32,
+    entries: u32,
     /// Entries that a ray to the first triangle of a sheaf needs at most: all rays meet the same boxes.
-    pub held: u32,
+    held: u32,
     depth: u32,
     rays: Vec<Ray>,
 }

@@ -57,7 +57,7 @@ impl BoxMap {
     }
 
     /// With a pad other than that of the proof, for tests.
-    pub(super) fn with_pad(instance: &Instance, pad: f64) -> Self {
+    pub(crate) fn with_pad(instance: &Instance, pad: f64) -> Self {
         let (linear, offset) = instance.to_object.parts();
         let inverse = linear.inverse();
         let norm_of_inverse = row_sum_norm(inverse);
