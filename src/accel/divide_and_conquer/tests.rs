@@ -2,7 +2,7 @@
 
 use super::Division;
 use crate::fixtures::{lattice, soup};
-use crate::{Ray, brute_force_hits};
+use crate::{NO_HIT, Query, Ray, brute_force_hits};
 use raystone_core::params::{ParamValue, Params};
 use raystone_core::random::Pcg32 as Pcg;
 
@@ -32,12 +32,18 @@ fn a_division_finds_what_every_triangle_for_every_ray_finds() {
     rays[5].t_max = 0.5;
     let expected = brute_force_hits(&soup, &rays);
     for (naive, levels) in [(1, 40), (8, 40), (3, 2), (1, 1), (1024, 40)] {
-        let found = Division::new(&soup, &params(naive, levels), &rays).expect("a division");
+        let found = Division::new(&soup, &params(naive, levels), Query::Closest, &rays)
+            .expect("a division");
         assert_eq!(found.levels.len(), levels as usize);
         for (ray, (found, expected)) in found.hits.iter().zip(&expected).enumerate() {
             let bits = |hit: &crate::Hit| (hit.triangle, hit.t.to_bits());
             assert_eq!(bits(found), bits(expected), "ray {ray}, {naive} {levels}");
         }
+        let any = Division::new(&soup, &params(naive, levels), Query::Any, &rays);
+        let any = any.expect("a division");
+        let is_hit = |hit: &crate::Hit| hit.triangle != NO_HIT;
+        assert!(any.hits.iter().map(is_hit).eq(expected.iter().map(is_hit)));
+        assert!(any.tests < found.tests);
     }
 }
 
@@ -55,7 +61,7 @@ fn pairs_and_tests_are_those_of_halves() {
         t_max: f32::INFINITY,
     };
     let rays: Vec<Ray> = (0..256).map(at).collect();
-    let found = Division::new(&soup, &params(1, 40), &rays).expect("a division");
+    let found = Division::new(&soup, &params(1, 40), Query::Closest, &rays).expect("a division");
     for (level, counts) in found.levels.iter().enumerate() {
         let problems = if level <= 6 { 1 << level } else { 0 };
         let pairs = if level <= 6 { 256 } else { 0 };
@@ -67,6 +73,6 @@ fn pairs_and_tests_are_those_of_halves() {
     }
     assert_eq!(found.tests, 256);
     // Problems of four rays: with four naive ones, halves of two triangles are not divided.
-    let found = Division::new(&soup, &params(8, 40), &rays).expect("a division");
+    let found = Division::new(&soup, &params(8, 40), Query::Closest, &rays).expect("a division");
     assert_eq!(found.tests, 256 * 8);
 }

@@ -396,12 +396,19 @@ impl Ready {
         };
         let tracer = Tracer::new(gpu, &triangles, &traced, ask)?;
         let exact = world.exact;
-        let counted = (&tracer, set.rays.as_slice());
         let descent = match accel.name.as_str() {
-            RayHierarchy::NAME => Some(Descent::of_tree(gpu, counted, (soup, accel), exact)?),
-            DivideAndConquer::NAME => {
-                Some(Descent::of_division(gpu, counted, (soup, accel), exact)?)
-            }
+            RayHierarchy::NAME => Some(Descent::of_tree(
+                gpu,
+                (&tracer, &set),
+                (soup, accel),
+                exact,
+            )?),
+            DivideAndConquer::NAME => Some(Descent::of_division(
+                gpu,
+                (&tracer, &set),
+                (soup, accel),
+                exact,
+            )?),
             _ => None,
         };
         Ok(Self {
@@ -451,13 +458,13 @@ fn cycles(
 impl Descent {
     fn of_tree(
         gpu: &Gpu,
-        (tracer, rays): (&Tracer, &[Ray]),
+        (tracer, set): (&Tracer, &RaySet),
         (soup, accel): (&TriangleSoup, &Variant),
         exact: bool,
     ) -> Result<Self, Absent> {
-        let streams = RayHierarchy::streams(gpu, tracer, rays)?;
+        let streams = RayHierarchy::streams(gpu, tracer, &set.rays)?;
         // There is none of sorted rays, and of parts.
-        let anatomy = Anatomy::new(soup, &accel.params, rays).ok();
+        let anatomy = Anatomy::new(soup, &accel.params, &set.rays).ok();
         let is_whole = streams.iter().all(|level| level.walked == 0);
         if let Some(anatomy) = anatomy.as_ref().filter(|_| exact && is_whole) {
             let twin = anatomy.levels.iter().map(|level| level.pairs);
@@ -468,14 +475,14 @@ impl Descent {
 
     fn of_division(
         gpu: &Gpu,
-        (tracer, rays): (&Tracer, &[Ray]),
+        (tracer, set): (&Tracer, &RaySet),
         (soup, accel): (&TriangleSoup, &Variant),
         exact: bool,
     ) -> Result<Self, Absent> {
-        let host = Division::new(soup, &accel.params, rays);
+        let host = Division::new(soup, &accel.params, set.query(), &set.rays);
         let host = host.map_err(|error| Absent::Failed(error.to_string()))?;
         let levels = host.levels.len() as u32;
-        let found = DivideAndConquer::division(gpu, tracer, rays, levels)?;
+        let found = DivideAndConquer::division(gpu, tracer, &set.rays, levels)?;
         let without_room = found.iter().map(|level| level.without_room).sum();
         if exact && without_room == 0 {
             let pairs = |levels: &[DivisionLevel]| {
