@@ -34,12 +34,8 @@ const NO_TWIN: &[(&str, &str)] = &[
         "stages that hand paths on; tests/device/organisations.rs holds their images to that of one kernel",
     ),
     (
-        "accel/divide_and_conquer/passes/",
-        "passes; tests/hits/divide_and_conquer compares hits, and problems and pairs level by level",
-    ),
-    (
-        "accel/divide_and_conquer/enter",
-        "a binding and a box test; the division on the host has the test",
+        "accel/divide_and_conquer/",
+        "passes, and rows of their buffers; tests/hits/divide_and_conquer compares hits, and problems and pairs level by level",
     ),
     (
         "accel/found",
