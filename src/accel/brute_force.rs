@@ -61,15 +61,20 @@ impl BuiltAccel for Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
-        for triangle in &soup.records {
-            walk.test(triangle);
-            if walk.is_answered() {
-                break;
-            }
-        }
-        walk.hit
+    fn trace(&self, soup: &TriangleSoup, walk: Walk) -> Hit {
+        test_all(soup, walk)
     }
+}
+
+/// Tests the triangles of a soup one after the other.
+pub(crate) fn test_all(soup: &TriangleSoup, mut walk: Walk) -> Hit {
+    for triangle in &soup.records {
+        walk.test(triangle);
+        if walk.is_answered() {
+            break;
+        }
+    }
+    walk.hit
 }
 
 /// Number of neighbouring triangles stored together, so that the compiler tests several at once.

@@ -10,6 +10,7 @@ use raystone::config::Axis;
 use raystone::image::FileFormat;
 use raystone::integrator::Order;
 use raystone::params::Choice as _;
+use raystone::report::format::{count, plural};
 use raystone::run::{Pictures, Registries, Rendering};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -151,14 +152,17 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
             in_order.passes, in_order.total.wall_ms, in_order.first_picture.wall_ms,
         ),
         None => format!(
-            "{:.1} million rays, {:.2} Mrays/s",
-            rendering.rays as f64 / 1e6,
+            "{} rays, {:.2} Mrays/s",
+            count(rendering.rays),
             rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
         ),
     };
     text + &format!(
-        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; {work}\n",
-        rendering.triangles, rendering.spp, rendering.total_s, rendering.first_picture_s,
+        "{}, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; {work}\n",
+        plural(rendering.triangles, "triangle"),
+        rendering.spp,
+        rendering.total_s,
+        rendering.first_picture_s,
     )
 }
 

@@ -140,7 +140,7 @@ pub(crate) fn percent(share: f64) -> String {
 }
 
 /// Formats `1 sampler`, `3 samplers`.
-pub(crate) fn plural(n: usize, noun: &str) -> String {
+pub fn plural(n: usize, noun: &str) -> String {
     if n == 1 {
         format!("1 {noun}")
     } else {

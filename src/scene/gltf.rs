@@ -52,9 +52,16 @@ pub(super) fn load(
     })
 }
 
-/// glTF 1.0 is another format with the same ending.
+/// glTF 1.0 is another format with the same ending. Its version may be a number, and its parts have names in place of
+/// indices.
 fn check_version(path: &Path, document: Item<'_>) -> Result<(), SceneError> {
-    let version = document.get("asset").text("version").unwrap_or("2.0");
+    let named_parts = |key| document.get(key).members().next().is_some();
+    let by_names = ["accessors", "meshes", "nodes"]
+        .into_iter()
+        .any(named_parts);
+    let assumed = if by_names { "1.0" } else { "2.0" };
+    let given = document.get("asset").get("version");
+    let version = given.as_written().unwrap_or_else(|| assumed.to_owned());
     match version.split('.').next() {
         Some("0" | "1") => Err(SceneError::Unsupported {
             path: path.to_owned(),

@@ -91,6 +91,21 @@ impl<'a> Item<'a> {
         self.0.as_str()
     }
 
+    /// A text that is not empty, or a number as it is written.
+    pub(crate) fn as_written(self) -> Option<String> {
+        match self.0 {
+            Value::String(text) => Some(text.clone()).filter(|text| !text.is_empty()),
+            Value::Number(number) => Some(number.to_string()),
+            _ => None,
+        }
+    }
+
+    /// Whether something is given where a list belongs that is none.
+    pub(crate) fn lacks_list(self, key: &str) -> bool {
+        let part = self.get(key);
+        part.is_given() && !part.0.is_array()
+    }
+
     /// A text that is not empty.
     pub(crate) fn text(self, key: &str) -> Option<&'a str> {
         self.get(key).as_text().filter(|text| !text.is_empty())

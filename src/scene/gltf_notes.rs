@@ -67,6 +67,7 @@ impl Notes {
             let mut known = READ.iter().chain(&OF_NODES).chain(&COMPRESSIONS);
             known.any(|read| *read == name) || named.contains(&name)
         };
+        self.see_lists(document);
         for (key, kind) in LISTS {
             for (index, item) in document.list(key).enumerate() {
                 each_extension(item, &mut |name| {
@@ -88,6 +89,24 @@ impl Notes {
         }
         for (index, animation) in document.list("animations").enumerate() {
             self.unread("animations", || animation.place("animation", index));
+        }
+    }
+
+    /// Records what is written in place of the lists that are read.
+    fn see_lists(&mut self, document: Item<'_>) {
+        let what = "not a list, and left out";
+        for (key, _) in LISTS
+            .into_iter()
+            .filter(|(key, _)| document.lacks_list(key))
+        {
+            self.tell(format!("`{key}` is {what}"), String::new);
+        }
+        for (index, mesh) in document.list("meshes").enumerate() {
+            if mesh.lacks_list("primitives") {
+                self.tell(format!("`primitives` is {what}"), || {
+                    mesh.place("mesh", index)
+                });
+            }
         }
     }
 

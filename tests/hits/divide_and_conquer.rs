@@ -4,12 +4,12 @@
 use crate::support;
 use crate::support::scenes::{self, Case};
 use crate::support::{
-    Pcg, assert_same_hits, brute_force, build, default_params, differences, in_turn,
-    param_variants, trace,
+    Pcg, brute_force, build, default_params, differences, in_turn, param_variants, trace,
 };
+use crate::together::{answers, assert_right, mixed_rays};
 use raystone::accel::{
-    AccelKind, DivideAndConquer, Division, DivisionLevel, Hit, NO_HIT, Query, Ray, Traced, Tracer,
-    TriangleBuffers, TriangleSoup,
+    AccelKind, BoxTest, DivideAndConquer, Division, DivisionLevel, Intersection, NO_HIT, Query,
+    Ray, Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
 use raystone::gpu::Gpu;
 use raystone::params::{ParamValue, Params};
@@ -25,21 +25,6 @@ fn with(changes: &[(&str, i64)]) -> Params {
         assert!(known.is_some(), "no parameter {name}");
     }
     params
-}
-
-fn answers(gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
-    let built = build(KIND, soup, params);
-    let any = trace(gpu, &*built, soup, rays, &["any"]).found();
-    (trace(gpu, &*built, soup, rays, &[]).hits, any)
-}
-
-fn assert_right(what: &str, gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) {
-    let expected = brute_force(soup, rays);
-    let (hits, any) = answers(gpu, soup, params, rays);
-    let what = format!("{what} {params:?}");
-    assert_same_hits(&what, rays, &expected, &hits);
-    let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
-    assert_eq!(any, blocked, "{what}: any hit");
 }
 
 fn counted(
@@ -75,17 +60,9 @@ fn every_parameter_answers_like_brute_force() {
     let mut sets = param_variants(&KIND.parameters());
     sets.extend([with(&[("naive", 1)]), with(&[("naive", 3), ("levels", 4)])]);
     for case in in_turn("scenes of divide-and-conquer", cases) {
-        let mut rays = scenes::aimed_rays(&mut rng, &case.soup, 150);
-        rays.extend(scenes::lattice_rays(&mut rng, 150, 16));
-        let hits = brute_force(&case.soup, &rays);
-        rays.extend(scenes::cut_at_hits(&rays, &hits));
-        rays[5].origin[1] = f32::NAN;
-        rays[6].direction = [f32::INFINITY, 0.0, f32::NAN];
-        rays[7].direction = [0.0; 3];
-        rays[8].t_max = f32::INFINITY;
-        rays[9].origin = [1e30, -1e30, 1e30];
+        let rays = mixed_rays(&mut rng, &case.soup, 150);
         for params in &sets {
-            assert_right(case.name, gpu, &case.soup, params, &rays);
+            assert_right(case.name, gpu, &case.soup, (KIND, params), &rays);
         }
     }
 }
@@ -97,19 +74,27 @@ fn problems_and_pairs_are_those_of_the_division_on_the_host() {
         return;
     }
     let mut rng = Pcg::new(8);
-    let soup = scenes::lattice_soup(&mut rng, 500, 16);
-    let mut rays = scenes::aimed_rays(&mut rng, &soup, 1500);
+    let lattice = scenes::lattice_soup(&mut rng, 500, 16);
+    let mut rays = scenes::aimed_rays(&mut rng, &lattice, 1500);
     rays[17].direction = [f32::NAN; 3];
-    for params in [
-        with(&[]),
-        with(&[("naive", 1)]),
-        with(&[("naive", 40), ("levels", 3)]),
-    ] {
-        for query in [Query::Closest, Query::Any] {
-            let host = Division::new(&soup, &params, query, &rays).expect("a division");
-            let found = counted(gpu, &soup, &params, query, &rays);
-            assert!(host.levels[2].problems > 2, "{:?}", host.levels);
-            assert_eq!(found, host.levels, "{params:?}");
+    for name in ["padded-16", "padded-0"] {
+        let box_test = BoxTest::ALL.into_iter().find(|test| test.name == name);
+        let tests = Intersection {
+            box_test: box_test.expect("a box test"),
+            ..Default::default()
+        };
+        let soup = lattice.clone().intersecting(tests);
+        for params in [
+            with(&[]),
+            with(&[("naive", 1)]),
+            with(&[("naive", 40), ("levels", 3)]),
+        ] {
+            for query in [Query::Closest, Query::Any] {
+                let host = Division::new(&soup, &params, query, &rays).expect("a division");
+                let found = counted(gpu, &soup, &params, query, &rays);
+                assert!(host.levels[2].problems > 2, "{:?}", host.levels);
+                assert_eq!(found, host.levels, "{name} {params:?}");
+            }
         }
     }
 }
@@ -131,7 +116,7 @@ fn batches_and_pairs_without_room_are_counted_and_answered_all_the_same() {
         without > 1000,
         "only {without} pairs had no room: the test is blunt"
     );
-    assert_right("short streams", gpu, &soup, &params, &rays);
+    assert_right("short streams", gpu, &soup, (KIND, &params), &rays);
     // Three batches with room.
     let rays = scenes::aimed_rays(&mut rng, &soup, 5000);
     let params = with(&[("capacity", 16_384), ("naive", 100)]);
@@ -160,7 +145,7 @@ fn sets_of_no_ray_one_and_a_million_equal_ones_are_answered() {
         assert!(found.len() == count && found.iter().all(|hit| hit.same_bits(&hits[at])));
     }
     let nothing = TriangleSoup::from(Vec::new());
-    assert_right("no triangles", gpu, &nothing, &with(&[]), &rays);
+    assert_right("no triangles", gpu, &nothing, (KIND, &with(&[])), &rays);
     let none = Division::new(&soup, &with(&[]), Query::Closest, &[]).expect("a division");
     assert_eq!(none.tests, 0);
 }
@@ -191,7 +176,7 @@ fn faults_of_the_division_are_seen() {
     ] {
         let module = format!("accel/divide_and_conquer/{file}");
         let gpu = support::open(support::kernels_with(&module, &[(from, to)]));
-        let (hits, _) = answers(&gpu, &soup, &with(&[]), &rays);
+        let (hits, _) = answers(&gpu, &soup, (KIND, &with(&[])), &rays);
         let counts = counted(&gpu, &soup, &with(&[]), Query::Closest, &rays);
         let is_seen = !differences(&expected, &hits).is_empty() || counts != host.levels;
         assert!(is_seen, "{to}");

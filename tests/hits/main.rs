@@ -20,5 +20,6 @@ mod shadow_rays;
 mod slivers;
 mod spatial;
 mod structures;
+mod together;
 mod traversals;
 mod wide;

@@ -4,11 +4,11 @@
 use crate::support;
 use crate::support::scenes::{self, Case};
 use crate::support::{
-    Pcg, assert_same_hits, brute_force, build, default_params, differences, in_turn,
-    param_variants, trace,
+    Pcg, brute_force, build, default_params, differences, in_turn, param_variants, trace,
 };
+use crate::together::{answers, assert_right, mixed_rays};
 use raystone::accel::{
-    AccelKind, Anatomy, Hit, NO_HIT, Query, Ray, RayHierarchy, Traced, Tracer, TriangleBuffers,
+    AccelKind, Anatomy, NO_HIT, Query, Ray, RayHierarchy, Traced, Tracer, TriangleBuffers,
     TriangleSoup,
 };
 use raystone::gpu::Gpu;
@@ -32,36 +32,6 @@ fn number(x: i64) -> ParamValue {
 
 fn name(x: &str) -> ParamValue {
     ParamValue::Name(x.to_owned())
-}
-
-/// Closest and any hits of a set of rays, all traced at once.
-fn answers(gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
-    let built = build(KIND, soup, params);
-    let any = trace(gpu, &*built, soup, rays, &["any"]).found();
-    (trace(gpu, &*built, soup, rays, &[]).hits, any)
-}
-
-fn assert_right(what: &str, gpu: &Gpu, soup: &TriangleSoup, params: &Params, rays: &[Ray]) {
-    let expected = brute_force(soup, rays);
-    let (hits, any) = answers(gpu, soup, params, rays);
-    let what = format!("{what} {params:?}");
-    assert_same_hits(&what, rays, &expected, &hits);
-    let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
-    assert_eq!(any, blocked, "{what}: any hit");
-}
-
-/// Rays of all kinds: aimed, on the lattice, cut at hits, and none at all.
-fn mixed_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
-    let mut rays = scenes::aimed_rays(rng, soup, count);
-    rays.extend(scenes::lattice_rays(rng, count, 16));
-    let hits = brute_force(soup, &rays);
-    rays.extend(scenes::cut_at_hits(&rays, &hits));
-    rays[5].origin[1] = f32::NAN;
-    rays[6].direction = [f32::INFINITY, 0.0, f32::NAN];
-    rays[7].direction = [0.0; 3];
-    rays[8].t_max = f32::INFINITY;
-    rays[9].origin = [1e30, -1e30, 1e30];
-    rays
 }
 
 #[test]
@@ -103,7 +73,7 @@ fn every_parameter_answers_like_brute_force() {
     for case in in_turn("scenes of ray-hierarchy", cases) {
         let rays = mixed_rays(&mut rng, &case.soup, 150);
         for params in &sets {
-            assert_right(case.name, gpu, &case.soup, params, &rays);
+            assert_right(case.name, gpu, &case.soup, (KIND, params), &rays);
         }
     }
 }
@@ -180,7 +150,7 @@ fn pairs_without_room_are_counted_and_answered_all_the_same() {
         walked > 1000,
         "only {walked} pairs had no room: the test is blunt"
     );
-    assert_right("short streams", gpu, &soup, &params, &rays);
+    assert_right("short streams", gpu, &soup, (KIND, &params), &rays);
 }
 
 #[test]
@@ -203,7 +173,7 @@ fn sets_of_no_ray_one_and_a_million_equal_ones_are_answered() {
         assert!(found.len() == count && found.iter().all(|hit| hit.same_bits(&hits[at])));
     }
     let nothing = TriangleSoup::from(Vec::new());
-    assert_right("no triangles", gpu, &nothing, &with(&[]), &rays);
+    assert_right("no triangles", gpu, &nothing, (KIND, &with(&[])), &rays);
     assert!(
         Anatomy::new(&soup, &with(&[]), &[])
             .expect("an anatomy")
@@ -249,7 +219,7 @@ fn faults_of_the_descent_are_seen() {
     ] {
         let module = format!("accel/ray_hierarchy/{file}");
         let gpu = support::open(support::kernels_with(&module, &[(from, to)]));
-        let (hits, _) = answers(&gpu, &soup, &params, &rays);
+        let (hits, _) = answers(&gpu, &soup, (KIND, &params), &rays);
         assert!(!differences(&expected, &hits).is_empty(), "{to}");
     }
 }

@@ -15,6 +15,7 @@ mod tests;
 pub use problem::{Division, DivisionLevel};
 
 use super::Access;
+use super::brute_force::test_all;
 use super::ray_hierarchy::trace_state;
 use super::structure::prelude::*;
 use super::tracer::Tracer;
@@ -132,13 +133,7 @@ impl BuiltAccel for Built {
 
 /// A ray alone is so few that all triangles are tested; [`Division`] is the twin of many.
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
-        for triangle in &soup.records {
-            walk.test(triangle);
-            if walk.is_answered() {
-                break;
-            }
-        }
-        walk.hit
+    fn trace(&self, soup: &TriangleSoup, walk: Walk) -> Hit {
+        test_all(soup, walk)
     }
 }

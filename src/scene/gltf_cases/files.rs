@@ -167,15 +167,34 @@ fn containers_may_be_padded_and_counted_wrongly() {
 
 #[test]
 fn other_versions_say_what_to_do() {
-    let of = |version: &str| {
-        case("a version")
-            .set("/asset/version", json!(version))
-            .load()
-    };
-    of("1.0").fails(&["glTF of version 1.0", "export it as glTF 2.0"]);
-    of("2.1").whole(2);
+    let of = |version: Value| case("a version").set("/asset/version", version).load();
+    of(json!("1.0")).fails(&["glTF of version 1.0", "export it as glTF 2.0"]);
+    of(json!(1)).fails(&["glTF of version 1", "export it as glTF 2.0"]);
+    of(json!("2.1")).whole(2);
+    of(json!(2)).whole(2);
+    // collada2gltf wrote some without a version.
+    case("parts with names")
+        .set("/asset", Value::Null)
+        .set("/meshes", json!({"mesh_1": {"primitives": []}}))
+        .load()
+        .fails(&["glTF of version 1.0"]);
     case("no version")
         .set("/asset", Value::Null)
         .load()
         .whole(2);
+}
+
+#[test]
+fn what_is_no_list_is_named() {
+    case("primitives in no list")
+        .set(
+            "/meshes/0/primitives",
+            json!({"attributes": {"POSITION": 0}}),
+        )
+        .load()
+        .fails(&["no triangles", "`primitives` is not a list", "mesh 0"]);
+    case("animations in no list")
+        .set("/animations", json!("none"))
+        .load()
+        .but(2, &["`animations` is not a list"]);
 }

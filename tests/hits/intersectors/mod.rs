@@ -268,7 +268,7 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
             if !box_test.finite {
                 continue;
             }
-            // Its twin of a single ray has no boxes.
+            // Its twin of a single ray has no boxes; `divide_and_conquer` compares pairs with boxes without pad.
             if kind.name() == DivideAndConquer::NAME {
                 continue;
             }

@@ -78,9 +78,10 @@ fn render_says_what_was_approximated_and_how_long_it_took() {
         "note: 1 triangle dropped",
         "missing.png",
         "no light",
-        "1 triangles",
+        "1 triangle, ",
         "16×16",
         "4 spp",
+        " rays, ",
         "Mrays/s",
     ] {
         assert!(said.contains(part), "{part}: {said}");
