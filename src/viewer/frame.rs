@@ -1,6 +1,7 @@
 //! What a shell draws: pictures and figures.
 
 use super::motion::FrameTimes;
+use super::reference::error_of;
 use super::side::Side;
 use raystone_accel::StructureStats;
 use raystone_bench::run::{RunError, attributes};
@@ -10,6 +11,7 @@ use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use raystone_image::{
     Attribute, FileFormat, Image, Picture, automatic_exposure, tone_map, viridis, write_png,
 };
+use raystone_stats::metrics::Reference;
 use std::path::Path;
 
 /// Share of pixels below the upper end of an automatic scale.
@@ -52,16 +54,30 @@ pub struct Figures {
     pub of: u32,
     /// Milliseconds of a sample of all pixels, the last ones.
     pub sample_ms: Vec<f32>,
-    /// Rays per pixel and sample, by class.
-    pub rays: Vec<(&'static str, f64)>,
+    /// Rays, by class.
+    pub rays: Vec<RaysOfClass>,
     /// Million rays per second, all classes together; with the counting of rays.
     pub mrays_s: Option<f64>,
     /// relMSE against the reference, free of its noise; may be negative while there is little of it.
     pub relmse: Option<f64>,
+    /// Mean FLIP against the reference, both tone-mapped: 0 of equal pictures, 1 at most. It takes longer than a sample, so it is
+    /// that of an image a little before, until the image and the reference are finished.
+    pub flip: Option<f64>,
     /// Figures of the structure.
     pub structure: StructureStats,
     /// Mean of the map over pixels, where one is shown and counted.
     pub map_mean: Option<f64>,
+}
+
+/// Rays of a class that an image took.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RaysOfClass {
+    /// The class.
+    pub class: &'static str,
+    /// Rays per pixel and sample.
+    pub per_sample: f64,
+    /// Million rays of the class per second of the whole image: a single kernel does not say which of them took how long.
+    pub mrays_s: f64,
 }
 
 /// Tone-maps, and draws maps, of all sides on one scale.
@@ -122,13 +138,24 @@ fn percentile(values: &[f32]) -> f32 {
     sorted.get(place).copied().unwrap_or(0.0)
 }
 
-/// The figures of a side.
-pub(crate) fn figures(side: &Side, map_mean: Option<f64>, relmse: Option<f64>) -> Figures {
+/// The figures of a side; its errors against this reference.
+pub(crate) fn figures(
+    side: &Side,
+    map_mean: Option<f64>,
+    reference: Option<&Reference>,
+) -> Figures {
+    let reference = reference.filter(|_| side.shown > 0);
+    let relmse = reference.and_then(|reference| error_of(side.image.as_ref()?, reference));
+    let flip = reference.and(side.flip.as_ref());
     let [width, height] = side.lens.size.map(f64::from);
     let samples = width * height * f64::from(side.shown);
     let all: u64 = side.rays.iter().sum();
     let is_counted = all > 0 && side.rays_ms > 0.0;
-    let class = |class: usize| (RAY_COUNT_CLASSES[class], side.rays[class] as f64 / samples);
+    let class = |class: usize| RaysOfClass {
+        class: RAY_COUNT_CLASSES[class],
+        per_sample: side.rays[class] as f64 / samples,
+        mrays_s: side.rays[class] as f64 / side.rays_ms / 1e3,
+    };
     Figures {
         spp: side.shown,
         of: side.lens.spp,
@@ -136,12 +163,13 @@ pub(crate) fn figures(side: &Side, map_mean: Option<f64>, relmse: Option<f64>) -
         rays: match is_counted {
             true => (0..TRACED_CLASSES)
                 .map(class)
-                .filter(|(_, rays)| *rays > 0.0)
+                .filter(|rays| rays.per_sample > 0.0)
                 .collect(),
             false => Vec::new(),
         },
         mrays_s: is_counted.then(|| all as f64 / side.rays_ms / 1e3),
         relmse,
+        flip: flip.and_then(|flip| flip.value),
         structure: side
             .structure
             .as_ref()

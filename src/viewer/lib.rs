@@ -20,7 +20,7 @@ mod world;
 
 pub use camera::{Motion, moved, projected};
 pub use done::{Done, Step, Work};
-pub use frame::{Figures, Frame, SideFrame};
+pub use frame::{Figures, Frame, RaysOfClass, SideFrame};
 pub use inspect::{Grasp, Inspection, Seen};
 pub use motion::{FrameTimes, SideTimes};
 pub use points::SamplePoints;

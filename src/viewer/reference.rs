@@ -4,6 +4,7 @@ use super::side::{Lens, Renderers};
 use super::world::{Structure, World};
 use raystone_bench::run::Registries;
 use raystone_config::{Axis, Cell, Reference};
+use raystone_core::clock::Instant;
 use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, GpuError};
 use raystone_image::Image;
@@ -12,6 +13,10 @@ use raystone_stats::metrics::{self, measure_those};
 
 /// The metric that is free of the reference's own noise.
 const METRIC: &str = "relmse-unbiased/eps=1e-2/v1";
+/// What a person sees of the difference.
+const FLIP: &str = "flip/tone-mapped/ppd=67/v1";
+/// Share of the time that FLIP may take while images go on.
+const FLIP_SHARE: f64 = 0.1;
 
 /// Two halves of a reference with seeds of their own, so that its noise cancels in the error.
 pub(crate) struct Accumulated<'g> {
@@ -132,8 +137,39 @@ impl<'g> Accumulated<'g> {
 
 /// relMSE of an image, free of the reference's own noise.
 pub(crate) fn error_of(image: &Image, reference: &metrics::Reference) -> Option<f64> {
-    let report = measure_those(image, reference, |metric| metric.id == METRIC);
-    report.ok()?.metrics.get(METRIC).copied()
+    measure(METRIC, image, reference)
+}
+
+fn measure(id: &str, image: &Image, reference: &metrics::Reference) -> Option<f64> {
+    let report = measure_those(image, reference, |metric| metric.id == id);
+    report.ok()?.metrics.get(id).copied()
+}
+
+/// FLIP of an image, with what it is of.
+pub(crate) struct Flip {
+    pub value: Option<f64>,
+    /// Samples per pixel of the image, and when the reference was read.
+    of: (u32, Instant),
+    taken: Instant,
+    took_s: f64,
+}
+
+impl Flip {
+    pub(crate) fn new(image: &Image, reference: &metrics::Reference, of: (u32, Instant)) -> Self {
+        let clock = Instant::now();
+        Self {
+            value: measure(FLIP, image, reference),
+            of,
+            took_s: clock.elapsed().as_secs_f64(),
+            taken: Instant::now(),
+        }
+    }
+
+    /// Whether it is of something else than what is shown, and enough time has passed, or nothing else will come.
+    pub(crate) fn is_due(&self, of: (u32, Instant), is_last: bool) -> bool {
+        let pause = self.took_s / FLIP_SHARE;
+        self.of != of && (is_last || self.taken.elapsed().as_secs_f64() >= pause)
+    }
 }
 
 #[cfg(test)]
@@ -147,5 +183,16 @@ mod tests {
         assert_eq!(error_of(&image(1.0), &reference), Some(0.0));
         let error = error_of(&image(1.5), &reference).unwrap();
         assert!((error - 0.25 / 1.01).abs() < 1e-9, "{error}");
+        let (first, second) = ((1, Instant::now()), (2, Instant::now()));
+        let flip = |v: f32| Flip::new(&image(v), &reference, first);
+        assert_eq!(flip(1.0).value, Some(0.0));
+        assert!(flip(1.5).value > Some(0.01));
+        let slow = Flip {
+            took_s: 60.0,
+            ..flip(1.0)
+        };
+        let due = [(first, true), (second, false), (second, true)];
+        let due = due.map(|(of, is_last)| slow.is_due(of, is_last));
+        assert_eq!(due, [false, false, true]);
     }
 }

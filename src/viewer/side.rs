@@ -2,6 +2,7 @@
 
 use super::done::Step;
 use super::motion::SideTimes;
+use super::reference::Flip;
 use super::world::{Structure, World};
 use raystone_accel::{Counters, Query};
 use raystone_bench::run::{Estimator, Registries};
@@ -12,6 +13,7 @@ use raystone_core::structure::{RAY_QUERIES, TRACED_CLASSES};
 use raystone_gpu::{Gpu, GpuError};
 use raystone_image::Image;
 use raystone_render::Renderer;
+use raystone_stats::metrics::Reference;
 use raystone_verify::rays::{primary_pixels, primary_rays};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -134,6 +136,7 @@ pub(crate) struct Side<'g> {
     is_torn: bool,
     pub image: Option<Image>,
     pub map: Option<MapOfWork>,
+    pub flip: Option<Flip>,
     /// Samples per pixel of the whole image.
     pub done: u32,
     /// Samples per pixel of the image that is shown; 0 of a coarse one.
@@ -173,6 +176,7 @@ impl<'g> Side<'g> {
             is_torn: true,
             image: None,
             map: None,
+            flip: None,
             done: 0,
             shown: 0,
             read: None,
@@ -190,7 +194,7 @@ impl<'g> Side<'g> {
         self.lens = lens;
         self.by = self.first_coarse();
         self.is_torn = true;
-        self.map = None;
+        (self.map, self.flip) = (None, None);
         (self.done, self.shown) = (0, 0);
         self.rays = [0; TRACED_CLASSES];
         self.rays_ms = 0.0;
@@ -391,6 +395,23 @@ impl<'g> Side<'g> {
         self.shown = self.done;
         self.read = Some(Instant::now());
         Ok(true)
+    }
+
+    /// Compares what is shown with a reference that was read then, if it is time to; `true` if there is a new figure.
+    pub(crate) fn compare(
+        &mut self,
+        (reference, read): &(Reference, Instant),
+        is_last: bool,
+    ) -> bool {
+        let of = (self.shown, *read);
+        let known = self.flip.as_ref();
+        let is_last = is_last && self.is_finished();
+        let is_due = self.shown > 0 && known.is_none_or(|flip| flip.is_due(of, is_last));
+        let Some(image) = self.image.as_ref().filter(|_| is_due) else {
+            return false;
+        };
+        self.flip = Some(Flip::new(image, reference, of));
+        true
     }
 
     /// Counts the work of every pixel's first ray, for an image as coarse as the one that is shown; `true` if there is a new map.

@@ -7,7 +7,7 @@ use super::frame::{Frame, Painter, SideFrame, encoded, figures, write_linear};
 use super::inspect::{self, Grasp, Inspection};
 use super::motion::{FrameClock, FrameTimes, Pose};
 use super::points::SamplePoints;
-use super::reference::{Accumulated, error_of, judged};
+use super::reference::{Accumulated, judged};
 use super::screen::{SIDE_NAMES, Screen};
 use super::side::{Lens, Side};
 use super::world::{Structure, World};
@@ -333,8 +333,7 @@ impl<'g> Viewer<'g> {
         let painter = Painter::new(&self.sides, &screen.window);
         let side = |side: &Side| {
             let (picture, map_mean) = painter.picture(side);
-            let judge = self.judge.as_ref().filter(|_| side.shown > 0);
-            let relmse = judge.and_then(|(reference, _)| error_of(side.image.as_ref()?, reference));
+            let reference = self.judge.as_ref().map(|(reference, _)| reference);
             let counts = side.map.as_ref().is_none_or(|map| map.work.is_some());
             let uncounted = (screen.window.map != Map::None && !counts).then(|| {
                 format!(
@@ -345,7 +344,7 @@ impl<'g> Viewer<'g> {
             SideFrame {
                 picture,
                 label: side.cell.to_string(),
-                figures: figures(side, map_mean, relmse),
+                figures: figures(side, map_mean, reference),
                 fault: side.fault.clone().or(uncounted),
             }
         };

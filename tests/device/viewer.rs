@@ -194,14 +194,20 @@ fn maps_figures_and_errors_are_there_once_they_are_asked_for() {
         assert_eq!((figures.spp, figures.of), (5, 5));
         assert!(figures.mrays_s.unwrap() > 0.0 && figures.sample_ms.len() >= 5);
         // One ray of the camera for each sample of a pixel.
-        assert_eq!(figures.rays[0], ("primary", 1.0));
+        let camera = figures.rays[0];
+        assert_eq!((camera.class, camera.per_sample), ("primary", 1.0));
+        let rates: f64 = figures.rays.iter().map(|rays| rays.mrays_s).sum();
+        assert!((rates / figures.mrays_s.unwrap() - 1.0).abs() < 1e-12);
     }
     // The images are the same, and so are their errors.
     assert_eq!(bvh.relmse, brute.relmse);
     assert!(bvh.relmse.unwrap() > 0.0);
+    assert_eq!(bvh.flip, brute.flip);
+    assert!((0.0..1.0).contains(&bvh.flip.unwrap()) && bvh.flip > Some(0.0));
     now.window.error = false;
     show(&mut viewer, now);
-    assert_eq!(viewer.frame().sides[0].figures.relmse, None);
+    let figures = &viewer.frame().sides[0].figures;
+    assert_eq!([figures.relmse, figures.flip], [None; 2]);
 }
 
 #[test]

@@ -292,7 +292,7 @@ impl App {
                 }
             });
         }
-        ui.checkbox(&mut window.error, "accumulate a reference, show relMSE");
+        ui.checkbox(&mut window.error, "accumulate a reference, show relMSE and FLIP");
     }
 
     fn draw_help(&mut self, ui: &mut Ui) {

@@ -53,14 +53,17 @@ fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u
         if let Some(ms) = median(&figures.sample_ms) {
             row("ms a sample", format!("{ms:.1}"));
         }
-        for (class, rays) in &figures.rays {
-            row(&format!("{class} rays a sample"), format!("{rays:.3}"));
+        for rays in &figures.rays {
+            let value = format!("{:.3} ({:.2} Mrays/s)", rays.per_sample, rays.mrays_s);
+            row(&format!("{} rays a sample", rays.class), value);
         }
         if let Some(spp) = reference_spp {
             let error = figures
                 .relmse
                 .map_or("–".to_owned(), |error| format!("{error:.3e}"));
             row("relMSE", error);
+            let flip = figures.flip.map(|flip| format!("{flip:.4}"));
+            row("FLIP", flip.unwrap_or("–".to_owned()));
             row("reference, spp", spp.to_string());
         }
         if let Some(mean) = figures.map_mean {

@@ -145,9 +145,10 @@ function draw({ figures: known, width, height, picture }) {
     ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],
     ["ms a sample", (side) => digits(side.sample_ms)],
     ["Mrays/s", (side) => digits(side.mrays_s)],
-    ...sides[0].rays.map(([name], index) => [`${name} rays a sample`, (side) => digits(side.rays[index]?.[1])]),
+    ...sides[0].rays.map(([name], index) => [`${name} rays a sample`, (side) => raysOf(side.rays[index])]),
     ["mean of the map", (side) => digits(side.map_mean)],
     ["relMSE", (side) => digits(side.relmse)],
+    ["FLIP", (side) => digits(side.flip)],
     ["nodes or cells", (side) => (side.nodes ? side.nodes.toLocaleString("en") : "–")],
     ["SAH cost", (side) => digits(side.sah_cost)],
     ["structure, KiB", (side) => digits(side.bytes ? side.bytes / 1024 : null)],
@@ -163,6 +164,10 @@ function draw({ figures: known, width, height, picture }) {
     }));
     return line;
   }));
+}
+
+function raysOf(ofClass) {
+  return ofClass ? `${digits(ofClass[1])} (${digits(ofClass[2])} Mrays/s)` : "–";
 }
 
 function digits(value) {

@@ -3,6 +3,7 @@
 use super::{Viewer, lost};
 use crate::done::Step;
 use crate::motion::{FrameTimes, Pose};
+use crate::reference::Accumulated;
 use crate::side::Side;
 use raystone_bench::run::RunError;
 use raystone_config::{Map, Pace};
@@ -56,6 +57,16 @@ impl Viewer<'_> {
                     Ok(true) => return Ok(Step::Shown),
                     Err(error) => return keep(Err(error), side, self.gpu),
                 }
+            }
+        }
+        if let Some(judge) = &self.judge {
+            let is_last = self.reference.as_ref().is_none_or(Accumulated::is_finished);
+            if self
+                .sides
+                .iter_mut()
+                .any(|side| side.compare(judge, is_last))
+            {
+                return Ok(Step::Shown);
             }
         }
         let place = |side: &&mut Side| match pace {
