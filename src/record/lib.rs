@@ -21,6 +21,7 @@ mod run;
 mod sound;
 mod stream;
 mod structure;
+mod time;
 
 pub use animation::*;
 pub use cell::*;
@@ -39,6 +40,7 @@ pub use run::*;
 pub use sound::{Sound, contradiction, fault_of};
 pub use stream::*;
 pub use structure::*;
+pub use time::*;
 
 use raystone_core::text::cell_hash;
 pub use raystone_stats::interval::Interval;
