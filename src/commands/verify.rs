@@ -317,7 +317,7 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
         let word = match record.verdict() {
             Verdict::Pass => "passed",
             Verdict::Fail => "FAILED",
-            Verdict::Open => "not judged",
+            Verdict::Open => "not checked",
         };
         let names = cell.labels(&[Axis::Integrator]).join(", ");
         let numbers = [

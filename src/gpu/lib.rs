@@ -177,7 +177,7 @@ pub enum GpuError {
     Driver(String),
     /// A clock ran backwards during a measurement.
     #[error(
-        "a clock of the device or of the processors ran backwards in every try, or told more time than had passed, so that there is no time: update the driver, or measure on another machine"
+        "a clock of the device or of the processors ran backwards in every try, or reported more time than had passed, so that there is no time: update the driver, or measure on another machine"
     )]
     Clock,
     /// The device is lost.

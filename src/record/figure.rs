@@ -252,7 +252,7 @@ figures! {
     FRAME_REFIT_MS = "frame-refit-ms/v1", "refit", "ms", Lower, THREE, Median;
     FRAME_REFIT_HOST_MS = "frame-refit-host-ms/v1", "refit on the host", "ms", Lower, THREE, Median;
     FRAME_REBUILD_MS = "frame-rebuild-ms/v1", "rebuild", "ms", Lower, THREE, Median;
-    FRAME_JUDGED = "frame-judged/v1", "judged rays", "", Neither, Count, Exact;
+    FRAME_JUDGED = "frame-judged/v1", "checked rays", "", Neither, Count, Exact;
     FRAME_NODES_RATIO = "frame-nodes-ratio/v1", "nodes/ray, refitted over rebuilt", "", Lower, THREE, Exact;
     FRAME_TIME_RATIO = "frame-time-ratio/v1", "time of rays, refitted over rebuilt", "", Lower, THREE, Median;
     FRAME_BREAK_EVEN = "frame-break-even/v1", "rebuilding pays from", "million rays", Neither, THREE, Single;

@@ -175,7 +175,7 @@ fn of_rays(record: &StructureRecord, faults: &mut Vec<String>) {
         let is_judged = gated.is_empty() || gated.contains(&class);
         if !known.insert(timing.class) || !is_judged {
             faults.push(format!(
-                "{} {} rays are timed twice, or others than were judged",
+                "{} {} rays are timed twice, or others than were checked",
                 timing.rays,
                 timing.class.name()
             ));

@@ -48,7 +48,7 @@ pub fn overhead_fault(samples: &[f64], empty: f64, above: &[f64]) -> Option<Stri
     let is_right = (least - rounding..=least + cut + room + rounding).contains(&found);
     (!is_right).then(|| {
         format!(
-            "rounds of {samples:?} ms are told as {above:?} ms, where an empty one takes {empty} ms"
+            "rounds of {samples:?} ms are reported as {above:?} ms, where an empty one takes {empty} ms"
         )
     })
 }

@@ -479,5 +479,5 @@ rays = 1024
         "{times:?}"
     );
     let page = std::fs::read_to_string(out.path().join("index.html")).expect("the page");
-    assert!(page.contains("update, ms") && page.contains("judged over instances"));
+    assert!(page.contains("update, ms") && page.contains("checked over instances"));
 }

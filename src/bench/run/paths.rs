@@ -133,7 +133,7 @@ fn judge_and_record(
         .integrators
         .insert(key(world, cell), record.fault.clone());
     if let Some(reason) = &record.not_judged {
-        session.tell_warning(&format!("{cell}: paths are not judged: {reason}"));
+        session.tell_warning(&format!("{cell}: paths are not checked: {reason}"));
     }
     let blank = Line::new(Key::from(cell), ran, ());
     let hash = blank.content_hash(&world.scene.hash, &[]);

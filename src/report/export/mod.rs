@@ -145,7 +145,7 @@ pub static FORMATS: [Format; 11] = [
     Format::text("github-smaller-is-better", "json", "figures that rank downwards, for github-action-benchmark's customSmallerIsBetter", github::smaller),
     Format::text("google-benchmark", "json", "raw times as repetitions, as Google Benchmark writes them, for its compare.py", google_benchmark::write),
     Format::text("hyperfine", "json", "raw times in seconds, as `hyperfine --export-json` writes them", hyperfine::write),
-    Format::text("junit", "xml", "gates, judged paths and checks as test cases", junit::write).of_all(),
+    Format::text("junit", "xml", "gates, checked paths and checks as test cases", junit::write).of_all(),
     Format::text("markdown", "md", "a table for each figure", tables::markdown),
     Format::text("latex", "tex", "a table for each figure, with booktabs", latex::write),
     Format { name: "npy", description: "linear images of a run made with --images, as NumPy arrays [height, width, 3] of f32", ending: "npy", selective: false, write: Writer::Folder(npy::write) },

@@ -238,7 +238,7 @@ impl<'e> Place<'e> {
             true => unit,
             false => self.expect.unit.as_str(),
         };
-        let problem = || format!("the thesis's {from} cannot be told in the figure's \"{unit}\"");
+        let problem = || format!("the thesis's {from} cannot be given in the figure's \"{unit}\"");
         Ok(Some(thesis * factor(from, unit).ok_or_else(problem)?))
     }
 

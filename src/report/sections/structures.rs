@@ -116,7 +116,7 @@ pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -
         };
         let judge = match s.space {
             Space::World => "",
-            Space::Instances => "judged over instances",
+            Space::Instances => "checked over instances",
         };
         TableCell::with_detail(verdict, judge).toned(tone)
     };
