@@ -58,7 +58,12 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
 fn other_clock(elapsed: &Elapsed) -> Option<String> {
     let counts = elapsed.gpu_ms.unwrap_or(elapsed.wall_ms);
     let is_other = elapsed.ms().to_bits() != counts.to_bits();
-    is_other.then(|| format!("{:.3} ms are reported where {counts:.3} ms count", elapsed.ms()))
+    is_other.then(|| {
+        format!(
+            "{:.3} ms are reported where {counts:.3} ms count",
+            elapsed.ms()
+        )
+    })
 }
 
 impl Shortest {
