@@ -1,0 +1,2 @@
+//! x
+pub fn register(_: &mut raystone_bench::run::Registries) -> Result<(), String> { Ok(()) }
