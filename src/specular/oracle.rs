@@ -43,13 +43,20 @@ struct Node {
     t: DVec3,
 }
 
+/// A node with the normal there, which all vertices share.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    node: Node,
+    n: DVec3,
+}
+
 /// A reflector with its charts.
 pub struct Oracle {
     shape: Shape,
     amplitude: f64,
     frequency: f64,
     /// (CELLS + 1)² nodes of each chart; none where a closed form is known.
-    charts: Vec<Vec<Node>>,
+    charts: Vec<Vec<Known>>,
 }
 
 impl Oracle {
@@ -69,7 +76,11 @@ impl Oracle {
         let side = CELLS + 1;
         oracle.charts = (0..charts)
             .map(|chart| {
-                let node = |k: usize| oracle.node(chart, oracle.place([k % side, k / side]));
+                let node = |k: usize| {
+                    let node = oracle.node(chart, oracle.place([k % side, k / side]));
+                    let n = normal(&node);
+                    Known { node, n }
+                };
                 (0..side * side).map(node).collect()
             })
             .collect();
@@ -208,7 +219,10 @@ impl Oracle {
                 for column in 0..side {
                     let begins = is_least(&felt, [column, row]) || changes(&felt, [column, row]);
                     let at = self.place([column, row]);
-                    if let Some(p) = begins.then(|| self.polished(eye, vertex, chart, at)).flatten() {
+                    if let Some(p) = begins
+                        .then(|| self.polished(eye, vertex, chart, at))
+                        .flatten()
+                    {
                         found.push(p);
                     }
                 }
@@ -230,8 +244,8 @@ impl Oracle {
             let [x, y] = [DVec2::X, DVec2::Y]
                 .map(|axis| (derivatives(at + axis * h) - derivatives(at - axis * h)) / (2.0 * h));
             let determinant = x.x * y.y - x.y * y.x;
-            let step = DVec2::new(here.x * y.y - here.y * y.x, here.y * x.x - here.x * x.y)
-                / -determinant;
+            let step =
+                DVec2::new(here.x * y.y - here.y * y.x, here.y * x.x - here.x * x.y) / -determinant;
             if !step.is_finite() {
                 return None;
             }
@@ -260,11 +274,7 @@ fn torus_node(at: DVec2) -> Node {
     Node {
         p: DVec3::new(TUBE * sine, core * turn - CORE, core * turn_sine),
         s: DVec3::new(0.0, -core * turn_sine, core * turn),
-        t: DVec3::new(
-            TUBE * cosine,
-            -TUBE * sine * turn,
-            -TUBE * sine * turn_sine,
-        ),
+        t: DVec3::new(TUBE * cosine, -TUBE * sine * turn, -TUBE * sine * turn_sine),
     }
 }
 
@@ -285,12 +295,13 @@ fn pulls(eye: DVec3, vertex: DVec3, node: &Node) -> (DVec2, DVec3) {
 }
 
 /// Derivatives and the squared gradient along the surface; nothing where the surface faces away from the eye.
-fn felt(eye: DVec3, vertex: DVec3, node: &Node) -> Option<(DVec2, f64)> {
-    let n = normal(node);
-    if n.dot((eye - node.p).normalize()) < -0.1 {
+fn felt(eye: DVec3, vertex: DVec3, known: &Known) -> Option<(DVec2, f64)> {
+    let Known { node, n } = *known;
+    // A little beyond the silhouette, so that points at it have neighbours.
+    if n.dot(eye - node.p) < -0.4 {
         return None;
     }
-    let (along, e) = pulls(eye, vertex, node);
+    let (along, e) = pulls(eye, vertex, &node);
     Some((along, (e - n * n.dot(e)).length_squared()))
 }
 
@@ -302,9 +313,7 @@ fn is_least(felt: &[Option<(DVec2, f64)>], at: [usize; 2]) -> bool {
     };
     let near = |k: usize| k.saturating_sub(1)..=(k + 1).min(CELLS);
     near(at[1]).all(|row| {
-        near(at[0]).all(|column| {
-            felt[column + side * row].is_none_or(|(_, other)| other >= here)
-        })
+        near(at[0]).all(|column| felt[column + side * row].is_none_or(|(_, other)| other >= here))
     })
 }
 

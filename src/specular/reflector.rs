@@ -259,21 +259,27 @@ pub fn bend_of<T: Real>(reflector: Reflector<T>, p: V3<T>, v: V3<T>) -> V3<T> {
 }
 
 fn bumpy_bend<T: Real>(reflector: Reflector<T>, p: V3<T>, v: V3<T>) -> V3<T> {
-    let length = dot3(p, p).sqrt();
+    // Its square is kept, as compilers know that of a root.
+    let square = dot3(p, p);
+    let length = square.sqrt();
     let u = p / length;
     let (_, h) = bumps(reflector, u);
     let radial = dot3(u, h);
     let tangent = h - u * radial;
     let flat = v - u * dot3(u, v);
     let second = bump_bend(reflector, u, flat);
-    let inner = second - u * dot3(u, second) - flat * radial - tangent * dot3(u, v)
-        - u * dot3(tangent, v);
-    flat / length - inner / (length * length)
+    let inner =
+        second - u * dot3(u, second) - flat * radial - tangent * dot3(u, v) - u * dot3(tangent, v);
+    flat / length - inner / square
 }
 
 /// 1 where light turns outside the surface, −1 inside.
 pub fn side_of<T: Real>(reflector: Reflector<T>) -> T {
-    T::of(if reflector.shape == CONCAVE { -1.0 } else { 1.0 })
+    T::of(if reflector.shape == CONCAVE {
+        -1.0
+    } else {
+        1.0
+    })
 }
 
 /// Whether a point belongs to the part that is the reflector.

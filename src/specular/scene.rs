@@ -5,8 +5,8 @@ use crate::path::{Form, Setup};
 use crate::real::{Real, V3};
 use crate::reflector::{Reflector, Shape, radius_of};
 use glam::DVec3;
-use raystone_core::random::Pcg32;
 use rayon::prelude::*;
+use raystone_core::random::Pcg32;
 
 /// Pixels along each side of the picture.
 pub(crate) const PICTURE: f64 = 512.0;
@@ -142,7 +142,11 @@ pub(crate) fn pixel<T: Real>(setup: &Setup<T>, p: DVec3) -> [f64; 2] {
 /// Three directions a vertex, anywhere on the side that faces the eye.
 pub(crate) fn random_begins(mirror: &Mirror, count: usize, seed: u64) -> Vec<DVec3> {
     let mut random = Pcg32::with_stream(seed, 1);
-    let flip = if mirror.shape == Shape::Concave { -1.0 } else { 1.0 };
+    let flip = if mirror.shape == Shape::Concave {
+        -1.0
+    } else {
+        1.0
+    };
     let mut one = || {
         let u = random.direction();
         DVec3::new(u.x.abs() * flip, u.y, u.z)
@@ -152,7 +156,11 @@ pub(crate) fn random_begins(mirror: &Mirror, count: usize, seed: u64) -> Vec<DVe
 
 /// Directions on the side that faces the eye, spread by the golden angle.
 pub(crate) fn spread_begins(mirror: &Mirror, count: usize) -> Vec<DVec3> {
-    let flip = if mirror.shape == Shape::Concave { -1.0 } else { 1.0 };
+    let flip = if mirror.shape == Shape::Concave {
+        -1.0
+    } else {
+        1.0
+    };
     let turn = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count)
         .map(|k| {

@@ -1,10 +1,10 @@
 //! The search of the thesis: a triangle of samples, and the place at which the gradient through them would be 0.
 //! Kernel: `kernels/specular/secant.wesl`.
 
+use crate::newton::{CAPPED, CONVERGED, SINGULAR, Search, Solved};
 use crate::path::{Sample, Setup, apart, sample_at, screen_of};
 use crate::real::{Real, V3, c};
 use crate::reflector::{cross3, dot3, facing, unit};
-use crate::newton::{CAPPED, CONVERGED, SINGULAR, Search, Solved};
 
 pub(crate) const BY_AREA: u32 = 0;
 pub(crate) const BY_EDGE: u32 = 1;
@@ -71,7 +71,12 @@ fn is_small<T: Real>(setup: Setup<T>, search: Search<T>, s: &[Sample<T>; 3]) -> 
 }
 
 /// Searches from a triangle.
-pub fn secant<T: Real>(setup: Setup<T>, search: Search<T>, v: V3<T>, first: [V3<T>; 3]) -> Solved<T> {
+pub fn secant<T: Real>(
+    setup: Setup<T>,
+    search: Search<T>,
+    v: V3<T>,
+    first: [V3<T>; 3],
+) -> Solved<T> {
     let mut s = first.map(|u| sample_at(setup, v, u));
     let mut out = s[0];
     let mut has_out = false;

@@ -1,4 +1,7 @@
 //! Tests of the search: its parts against closed forms and differences, its figures against those known.
 
+mod device;
+mod measure;
 mod oracle;
 mod search;
+mod table;

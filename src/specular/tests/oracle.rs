@@ -49,7 +49,11 @@ fn conjugate(a: DVec2) -> DVec2 {
 #[test]
 fn points_of_spheres_are_roots_of_alhazens_polynomial() {
     for shape in [Shape::Sphere, Shape::Concave] {
-        let mirror = Mirror { shape, amplitude: 0.0, frequency: 4.0 };
+        let mirror = Mirror {
+            shape,
+            amplitude: 0.0,
+            frequency: 4.0,
+        };
         let all = vertices(&mirror, &mirror.oracle(), 0.0, 200, 3).unwrap();
         for vertex in &all {
             for point in &vertex.points {
@@ -76,7 +80,10 @@ fn light_turns_by_the_law_of_reflection_at_all_points() {
         for vertex in &all {
             for point in &vertex.points {
                 // Both directions make the same angle with the normal.
-                assert!((point.to_eye - point.to_vertex).abs() < 1e-8, "{mirror:?} {point:?}");
+                assert!(
+                    (point.to_eye - point.to_vertex).abs() < 1e-8,
+                    "{mirror:?} {point:?}"
+                );
             }
         }
         assert!(seen.eye.f64() == EYE);
@@ -94,7 +101,10 @@ fn a_dense_grid_finds_no_shorter_path_than_the_oracle() {
         for vertex in &all {
             let least = grid_least(&mirror, vertex.v);
             let found = vertex.points[0].length;
-            assert!(found <= least + 1e-12 && least - found < 1e-3, "{mirror:?} {found} {least}");
+            assert!(
+                found <= least + 1e-12 && least - found < 1e-3,
+                "{mirror:?} {found} {least}"
+            );
         }
     }
 }
@@ -110,7 +120,10 @@ fn grid_least(mirror: &Mirror, v: DVec3) -> f64 {
             Shape::Ellipsoid => (u * u).dot(DVec3::new(4.0, 1.0, 16.0)).sqrt().recip(),
             Shape::Bumpy => {
                 let f = mirror.frequency;
-                1.0 + mirror.amplitude * (f * u.x + 0.4).cos() * (f * u.y - 0.3).cos() * (f * u.z).cos()
+                1.0 + mirror.amplitude
+                    * (f * u.x + 0.4).cos()
+                    * (f * u.y - 0.3).cos()
+                    * (f * u.z).cos()
             }
             _ => 1.0,
         };
