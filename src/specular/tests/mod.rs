@@ -3,5 +3,6 @@
 mod device;
 mod measure;
 mod oracle;
+mod reflectors;
 mod search;
 mod table;
