@@ -11,8 +11,8 @@ use crate::scene::{Mirror, setup, spread_begins, vertices};
 use crate::secant::BY_EDGE_AND_GRADIENT;
 use crate::solve::reflect_vertex;
 
-fn told<T: Real>(mirror: &Mirror, search: Search<T>) -> Summary {
-    let all = vertices(mirror, &mirror.oracle(), 0.0, 600, 9).unwrap();
+fn told<T: Real>(mirror: &Mirror, search: Search<T>, count: usize) -> Summary {
+    let all = vertices(mirror, &mirror.oracle(), 0.0, count, 9).unwrap();
     let own = setup::<T>(mirror, Form::Transposed, 0.0);
     let exact = setup::<f64>(mirror, Form::Transposed, 0.0);
     let begins: Vec<V3<T>> = spread_begins(mirror, search.starts as usize)
@@ -41,6 +41,7 @@ fn newtons_method_finds_the_point_of_every_convex_reflector() {
                     is_exact,
                     ..newton()
                 },
+                600,
             );
             assert!(
                 found.wrong < 0.004,
@@ -60,7 +61,7 @@ fn many_begins_find_all_points_of_a_bowl_and_of_the_torus() {
         ..newton()
     };
     for mirror in mirrors() {
-        let found = told(&mirror, search);
+        let found = told(&mirror, search, 600);
         assert!(found.wrong < 0.01, "{mirror:?}: {found:?}");
         assert!(
             found.points > 0.97 && found.points < 1.01,
@@ -77,13 +78,13 @@ fn secants_begin_on_the_side_of_the_bowl_that_reflects() {
         stop: BY_EDGE_AND_GRADIENT,
         ..newton()
     };
-    let found = told(&bowl, search);
+    let found = told(&bowl, search, 600);
     assert!(found.wrong < 0.2, "{found:?}");
 }
 
 #[test]
 fn a_singular_system_takes_back_the_sample_before() {
-    // In f32 with a coarse threshold systems are singular often; one level of history saves most of them.
+    // The digest has 2.2 % of singular exits in f32. Without the sample before, there are more.
     let sphere = mirrors()[1];
     let search = Search::<f32> {
         is_newton: false,
@@ -93,9 +94,9 @@ fn a_singular_system_takes_back_the_sample_before() {
         is_given: false,
         starts: 1,
         most: 60,
-        singular: 1e-3,
+        singular: 1e-6,
         difference: 1e-3,
     };
-    let found = told(&sphere, search);
-    assert!(found.singular > 0.0 && found.singular < 0.2, "{found:?}");
+    let found = told(&sphere, search, 5000);
+    assert!((found.singular - 0.022).abs() < 0.006, "{found:?}");
 }

@@ -6,7 +6,7 @@ use crate::newton::Search;
 use crate::path::Form;
 use crate::real::V3;
 use crate::reflector::Shape;
-use crate::scene::{Mirror, setup, vertices};
+use crate::scene::{Mirror, Vertex, setup, vertices};
 use crate::secant::{BY_AREA, BY_EDGE, BY_EDGE_AND_GRADIENT};
 use crate::solve::reflect_vertex;
 
@@ -18,8 +18,25 @@ fn bumpy(amplitude: f64, frequency: f64) -> Mirror {
     }
 }
 
-fn told(mirror: &Mirror, form: Form, search: Search<f64>) -> Summary {
-    let all = vertices(mirror, &mirror.oracle(), 0.0, 3000, 1).unwrap();
+fn sphere() -> World {
+    World::new(Mirror {
+        shape: Shape::Sphere,
+        amplitude: 0.0,
+        frequency: 1.0,
+    })
+}
+
+/// A reflector with its vertices.
+struct World(Mirror, Vec<Vertex>);
+
+impl World {
+    fn new(mirror: Mirror) -> Self {
+        let all = vertices(&mirror, &mirror.oracle(), 0.0, 3000, 1).unwrap();
+        Self(mirror, all)
+    }
+}
+
+fn told(World(mirror, all): &World, form: Form, search: Search<f64>) -> Summary {
     let setup = setup(mirror, form, 0.0);
     let each = all.iter().filter_map(|vertex| {
         let found = reflect_vertex(setup, search, V3::of(vertex.v), &[]);
@@ -51,11 +68,7 @@ fn is_near(found: f64, told: f64, part: f64, least: f64) {
 
 #[test]
 fn the_sphere_has_the_figures_of_the_digest() {
-    let sphere = Mirror {
-        shape: Shape::Sphere,
-        amplitude: 0.0,
-        frequency: 1.0,
-    };
+    let sphere = sphere();
     // Stop, mean, 99 %, middle, silhouette, error of 90 %, share beyond a pixel.
     let rows = [
         (BY_AREA, 6.0, 14.0, 4.0, 8.7, 8.4, 0.247),
@@ -79,29 +92,28 @@ fn the_sphere_has_the_figures_of_the_digest() {
 
 #[test]
 fn bumps_have_the_figures_of_the_digest() {
-    // Amplitude and frequency, stop, mean, share beyond a pixel.
-    let rows = [
-        ((0.05, 4.0), BY_AREA, 6.7, 0.261),
-        ((0.05, 4.0), BY_EDGE_AND_GRADIENT, 8.8, 0.013),
-        ((0.02, 10.0), BY_AREA, 13.1, 0.466),
-        ((0.02, 10.0), BY_EDGE_AND_GRADIENT, 20.9, 0.220),
-        ((0.05, 10.0), BY_AREA, 20.9, 0.743),
+    // Rows of a reflector: its amplitude and frequency; stop, mean, share beyond a pixel; the last two of Newton's method.
+    let reflectors: [((f64, f64), &[(u32, f64, f64)], (f64, f64)); 3] = [
+        (
+            (0.05, 4.0),
+            &[(BY_AREA, 6.7, 0.261), (BY_EDGE_AND_GRADIENT, 8.8, 0.013)],
+            (3.2, 0.0),
+        ),
+        (
+            (0.02, 10.0),
+            &[(BY_AREA, 13.1, 0.466), (BY_EDGE_AND_GRADIENT, 20.9, 0.220)],
+            (4.1, 0.011),
+        ),
+        ((0.05, 10.0), &[(BY_AREA, 20.9, 0.743)], (4.7, 0.123)),
     ];
-    for ((amplitude, frequency), stop, mean, wrong) in rows {
-        let found = told(
-            &bumpy(amplitude, frequency),
-            Form::Transposed,
-            secants(stop),
-        );
-        is_near(found.iterations, mean, 0.12, 0.0);
-        is_near(found.other, wrong, 0.15, 0.015);
-    }
-    for (amplitude, frequency, mean, wrong) in [
-        (0.05, 4.0, 3.2, 0.0),
-        (0.02, 10.0, 4.1, 0.011),
-        (0.05, 10.0, 4.7, 0.123),
-    ] {
-        let found = told(&bumpy(amplitude, frequency), Form::Transposed, newton());
+    for ((amplitude, frequency), rows, (mean, wrong)) in reflectors {
+        let world = World::new(bumpy(amplitude, frequency));
+        for (stop, mean, wrong) in rows {
+            let found = told(&world, Form::Transposed, secants(*stop));
+            is_near(found.iterations, *mean, 0.12, 0.0);
+            is_near(found.other, *wrong, 0.15, 0.015);
+        }
+        let found = told(&world, Form::Transposed, newton());
         is_near(found.iterations, mean, 0.1, 0.0);
         is_near(found.other, wrong, 0.3, 0.01);
     }
@@ -109,16 +121,12 @@ fn bumps_have_the_figures_of_the_digest() {
 
 #[test]
 fn the_printed_gradient_is_wrong_where_its_normal_is() {
-    let bumps = bumpy(0.05, 4.0);
+    let bumps = World::new(bumpy(0.05, 4.0));
     let printed = told(&bumps, Form::SignMended, secants(BY_AREA));
     let transposed = told(&bumps, Form::Transposed, secants(BY_AREA));
     // The digest has 98.5 % and 26 %.
     assert!(printed.other > 0.95 && transposed.other < 0.35);
-    let sphere = Mirror {
-        shape: Shape::Sphere,
-        amplitude: 0.0,
-        frequency: 1.0,
-    };
+    let sphere = sphere();
     let mended = told(&sphere, Form::SignMended, secants(BY_AREA));
     assert!(mended.other < 0.3);
     assert!(told(&sphere, Form::AsPrinted, secants(BY_AREA)).other > 0.9);
