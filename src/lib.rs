@@ -35,6 +35,7 @@ pub use raystone_report as report;
 pub use raystone_report::{export, history};
 pub use raystone_sampling as sampling;
 pub use raystone_scene as scene;
+pub use raystone_specular as specular;
 pub use raystone_stress as stress;
 
 /// Comparisons of records, and the runs that confirm them.
@@ -69,11 +70,13 @@ pub mod repro {
     }
 }
 
-/// Everything that can be named in this program: what the crates below register, the parts of the stress suite, and the measurements of media.
+/// Everything that can be named in this program: what the crates below register, the parts of the stress suite, and the measurements of media and of searches for points of reflection.
 pub fn registries() -> run::Registries {
     let mut registries = run::Registries::default();
     // Their names are their own: a test of the suite adds them to the same registries.
-    let added = stress::register(&mut registries).and_then(|()| media::register(&mut registries));
+    let added = stress::register(&mut registries)
+        .and_then(|()| media::register(&mut registries))
+        .and_then(|()| specular::register(&mut registries));
     debug_assert_eq!(added, Ok(()));
     registries
 }

@@ -12,7 +12,7 @@ use raystone::repro::claim::Row;
 use raystone::repro::judge::ClaimVerdict;
 use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
 use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
-use raystone::run::{Registries, RunError, RunOptions};
+use raystone::run::{RunError, RunOptions};
 use raystone::store::user_folder;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ impl Repro {
                 .unwrap_or_else(|| PathBuf::from("results").join(folder)),
             force: self.force,
         };
-        let registries = Registries::default();
+        let registries = raystone::registries();
         let catalogue = registries.catalogue();
         let options = RunOptions {
             program: raystone::PROGRAM,

@@ -31,8 +31,11 @@ pub const MEDIA: &str = "media:";
 /// Name prefix of integrators that are sets of rays in a room, traced through structures alone.
 pub const RAYS: &str = "rays:";
 
+/// Name prefix of integrators that search for points of reflection, which render nothing either.
+pub const SPECULAR: &str = "specular:";
+
 /// Name prefixes of integrators that render nothing and need no scene.
-pub(super) const BENCHES: [&str; 4] = [COMPACTIONS, STRESS, MEDIA, RAYS];
+pub(super) const BENCHES: [&str; 5] = [COMPACTIONS, STRESS, MEDIA, RAYS, SPECULAR];
 
 /// True if an integrator renders nothing and needs no scene: it names a measurement of something else.
 pub fn is_bench(integrator: &Variant) -> bool {

@@ -74,7 +74,7 @@ impl Compaction {
         let measured = MeasuredRecord {
             measurement: "compaction".to_owned(),
             failure: self.failure,
-            notes: Vec::new(),
+            ..MeasuredRecord::default()
         };
         (measured, readings)
     }

@@ -43,6 +43,7 @@ impl Pictures {
             }
             Body::Structure(record) => all.shown.extend(record.heat_map.iter().cloned()),
             Body::Reference(record) => all.add_with_linear(&record.image),
+            Body::Measured(record) => all.shown.extend(record.picture.iter().cloned()),
             _ => {}
         }
         for names in [&mut all.shown, &mut all.linear, &mut all.spread] {

@@ -118,6 +118,9 @@ pub struct MeasuredRecord {
     /// Findings that are no figures.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<Note>,
+    /// A picture of what was found: a PNG file relative to the run's folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picture: Option<String>,
 }
 
 /// Something that was found, in words.

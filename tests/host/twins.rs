@@ -370,6 +370,7 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ("accel/bvh/stack", "begin", "of lanes that are refilled"),
     ("media/march", "main", "the loop over paths"),
     ("media/segments", "main", "the loop over rays"),
+    ("specular/solve", "main", "the loop over vertices"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
     (
         "accel/bvh/short_stack",

@@ -7,6 +7,7 @@ use super::session::{End, Session};
 use crate::timing::{Measured, Samples, interleave};
 use raystone_config::{Axis, Cell};
 use raystone_gpu::GpuError;
+use raystone_image::Picture;
 use raystone_record::{Body, Key, Line, MeasuredRecord, Note, Ran, Reading, fault_of};
 
 struct Ready<'a> {
@@ -77,7 +78,13 @@ pub(super) fn run(
             Err(Absent::Failed(reason)) => Err(reason),
             Ok(samples) => Ok(samples),
         };
-        let found = samples.and_then(|samples| Ok((sound(item.readings(samples)?)?, item.notes())));
+        let found = samples.and_then(|samples| {
+            Ok(Found {
+                readings: sound(item.readings(samples)?)?,
+                notes: item.notes(),
+                picture: item.picture(),
+            })
+        });
         write(session, measurement, at, (cell, found))?;
     }
     Ok(())
@@ -139,7 +146,12 @@ fn time(
 }
 
 /// Readings of a cell, and what they cannot say.
-type Found = (Vec<Reading>, Vec<Note>);
+#[derive(Default)]
+struct Found {
+    readings: Vec<Reading>,
+    notes: Vec<Note>,
+    picture: Option<Picture>,
+}
 
 fn write(
     session: &mut Session,
@@ -147,10 +159,13 @@ fn write(
     at: &At,
     (cell, found): (&Cell, Result<Found, String>),
 ) -> Result<(), RunError> {
-    let (readings, notes, failure) = match found {
-        Ok((readings, notes)) => (readings, notes, None),
-        Err(reason) => (Vec::new(), Vec::new(), Some(reason)),
+    let (found, failure) = match found {
+        Ok(found) => (found, None),
+        Err(reason) => (Found::default(), Some(reason)),
     };
+    let labels = [measurement.unit_name(cell)];
+    let drawn = found.picture.map(|p| session.picture("map", &labels, &p));
+    let readings = found.readings;
     let ran = Ran {
         unchecked: at.stage.is_some() && !session.experiment.run.runtime_checks,
         ..Ran::default()
@@ -158,7 +173,8 @@ fn write(
     let body = MeasuredRecord {
         measurement: measurement.name().to_owned(),
         failure: failure.clone(),
-        notes,
+        notes: found.notes,
+        picture: drawn.transpose()?.flatten(),
     };
     let line = Line::new(Key::from(cell), ran, Body::Measured(body)).with_readings(readings);
     let scene = at.stage.map_or("", |stage| &stage.scene.hash);

@@ -13,6 +13,7 @@ use crate::timing::{Measured, Samples};
 use raystone_accel::Traced;
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_gpu::Gpu;
+use raystone_image::Picture;
 use raystone_record::figure::Figure;
 use raystone_record::{Note, Reading};
 use raystone_render::Stage;
@@ -110,6 +111,11 @@ pub trait Prepared {
     /// What figures cannot say.
     fn notes(&self) -> Vec<Note> {
         Vec::new()
+    }
+
+    /// A picture of what was found, for the page.
+    fn picture(&self) -> Option<Picture> {
+        None
     }
 }
 

@@ -37,7 +37,7 @@ macro_rules! sources {
 }
 
 /// All experiments, in the order of the theses.
-pub static SOURCES: [Source; 18] = sources![
+pub static SOURCES: [Source; 19] = sources![
     "nilsson-table-5-2",
     "nilsson-table-5-3",
     "nilsson-table-5-4",
@@ -55,6 +55,7 @@ pub static SOURCES: [Source; 18] = sources![
     "dufay-fig-5-17",
     "micro-jitter-amplitude",
     "roger-ray-hierarchy",
+    "roger-specular",
     "roger-stream-reduction",
 ];
 

@@ -3,10 +3,12 @@
 use super::{compactions, streams, stress};
 use crate::data::{RunData, grouped, without_repeats};
 use crate::document::*;
+use crate::pictures;
 use crate::pivot::{FIGURES_ALONE, Rows};
 use crate::values::{Value, of_readings};
 use raystone_record::axis;
 use raystone_record::figure::Figure;
+use std::path::Path;
 
 /// Returns a table of each measurement.
 pub(crate) fn tables(data: &RunData) -> Vec<Table> {
@@ -63,13 +65,30 @@ fn table(values: &[Value], mut caption: String) -> Table {
     Rows::of_labels(&varied, &heads, values).table(values, caption, &figures, FIGURES_ALONE)
 }
 
+/// Returns the pictures of all cells that have one.
+fn pictures_of(data: &RunData, dir: &Path) -> Option<Block> {
+    let items = data.measured.iter().filter_map(|cell| {
+        let path = cell.picture.as_deref()?;
+        let labels = axis::ALL.map(|axis| cell.key.label(axis).to_owned());
+        let caption: Vec<String> = labels
+            .into_iter()
+            .filter(|label| !label.is_empty())
+            .collect();
+        let alt = format!("Map of {}", caption.join(", "));
+        Some(pictures::load(dir, path, caption.join(", ")).described(alt))
+    });
+    Block::gallery("Maps", items.collect(), None)
+}
+
 /// Returns the section; `None` where there is no such measurement.
-pub(crate) fn section(data: &RunData) -> Option<Section> {
+pub(crate) fn section(data: &RunData, dir: &Path) -> Option<Section> {
     let mut section = Section::new("measured", "Further measurements");
     for [wholes, parts] in both(data) {
         section.blocks.extend(wholes.into_block());
         let parts = parts.into_block().into_iter().collect();
         section.blocks.extend(Block::fold("Part by part", parts));
     }
+    let maps = pictures_of(data, dir).into_iter().collect();
+    section.blocks.extend(Block::fold("Where: maps", maps));
     (!section.blocks.is_empty()).then_some(section)
 }

@@ -52,7 +52,7 @@ pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]
     sections.extend(point_sets::section(data));
     sections.extend(compactions::section(data));
     sections.extend(stress::section(data));
-    sections.extend(measured::section(data));
+    sections.extend(measured::section(data, dir));
     sections.extend(cells.section(data));
     sections.extend(run::sections(data));
     let mut document = Document {

@@ -108,8 +108,8 @@ mod tests {
     fn measured(key: Key, readings: Vec<Reading>, notes: Vec<Note>) -> Line {
         let body = MeasuredRecord {
             measurement: "stress".into(),
-            failure: None,
             notes,
+            ..MeasuredRecord::default()
         };
         Line::new(key, Ran::default(), Body::Measured(body)).with_readings(readings)
     }

@@ -16,7 +16,6 @@ use raystone::measure::statistics::LEAST_FOR_MEDIAN;
 use raystone::params::Variant;
 use raystone::repro::run::{Prepared, Settings, prepare};
 use raystone::repro::{SOURCES, chosen, not_covered, scenes};
-use raystone::run::Registries;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -55,7 +54,7 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
         .collect();
     let embedded: BTreeSet<String> = SOURCES.iter().map(|s| s.name.to_owned()).collect();
     assert_eq!(files, embedded);
-    let registries = Registries::default();
+    let registries = raystone::registries();
     for source in &SOURCES {
         for quick in [true, false] {
             let settings = Settings {
@@ -116,7 +115,7 @@ fn unmeasured(prepared: &Prepared, quick: bool) -> Vec<String> {
 #[test]
 fn a_whole_run_is_smaller_on_a_software_adapter_where_its_file_says_so_and_a_short_one_is_short_there_too()
  {
-    let registries = Registries::default();
+    let registries = raystone::registries();
     let source = chosen(&["dufay-table-2-2".to_owned()]).expect("one")[0];
     let resolution = |quick, software| {
         let settings = Settings {
@@ -146,7 +145,7 @@ fn a_whole_run_is_smaller_on_a_software_adapter_where_its_file_says_so_and_a_sho
 
 #[test]
 fn a_variant_of_a_built_in_scene_stands_for_a_scene() {
-    let registries = Registries::default();
+    let registries = raystone::registries();
     let source = chosen(&["dufay-table-4-1".to_owned()]).expect("one")[0];
     for quick in [true, false] {
         let settings = Settings {
@@ -177,7 +176,7 @@ fn a_variant_of_a_built_in_scene_stands_for_a_scene() {
 
 #[test]
 fn every_figure_of_an_expectation_exists() {
-    let registries = Registries::default();
+    let registries = raystone::registries();
     let figures: Vec<_> = registries.measurements.figures().collect();
     for (name, thesis) in theses() {
         for expect in &thesis.expects {
