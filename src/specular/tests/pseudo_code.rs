@@ -100,7 +100,7 @@ fn samples_go_and_come_back_as_in_the_pseudo_code() {
             differing += usize::from(!is_same);
         }
         // Rounding turns a few comparisons, as far as searches wander.
-        assert!(differing <= 8, "{least}: {differing}");
+        assert!(differing <= 3, "{least}: {differing}");
     }
     assert!(singular > 100, "{singular}");
 }
