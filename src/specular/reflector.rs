@@ -27,6 +27,8 @@ const TORUS_STEPS: u32 = 8;
 /// Phases of the bumps.
 const PHASE_X: f32 = 0.4;
 const PHASE_Y: f32 = -0.3;
+/// Quarters of a turn in a radian.
+const QUARTERS: f32 = std::f32::consts::FRAC_2_PI;
 /// Vectors whose square is less have no direction.
 const TINY: f32 = 1e-20;
 
@@ -107,13 +109,13 @@ pub fn unit<T: Real>(v: V3<T>) -> V3<T> {
 
 /// Cosine and sine by the quarter of a turn and series, as WGSL promises too little of its own.
 pub fn turn(angle: f32) -> [f32; 2] {
-    let quarter = (angle * 0.636_619_8 + 0.5).floor();
+    let quarter = (angle * QUARTERS + 0.5).floor();
     let x = angle - quarter * 1.570_796_4;
     let s = x * x;
     let sine = x
         * (1.0
             + s * (-0.166_666_67
-                + s * (0.008_333_333_5 + s * (-0.000_198_412_7 + s * 0.000_002_755_731_9))));
+                + s * (0.008_333_334 + s * (-0.000_198_412_7 + s * 0.000_002_755_731_9))));
     let cosine = 1.0
         + s * (-0.5
             + s * (0.041_666_668

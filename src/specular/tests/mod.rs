@@ -3,6 +3,7 @@
 mod device;
 mod measure;
 mod oracle;
+mod pseudo_code;
 mod reflectors;
 mod search;
 mod table;

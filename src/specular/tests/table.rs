@@ -90,10 +90,12 @@ fn the_sphere_has_the_figures_of_the_digest() {
     assert!(found.error < 1e-3 && found.wrong < 1e-9 && found.most <= 8.0);
 }
 
+/// Amplitude and frequency; stop, mean and share beyond a pixel; the last two of Newton's method.
+type Rows = ((f64, f64), &'static [(u32, f64, f64)], (f64, f64));
+
 #[test]
 fn bumps_have_the_figures_of_the_digest() {
-    // Rows of a reflector: its amplitude and frequency; stop, mean, share beyond a pixel; the last two of Newton's method.
-    let reflectors: [((f64, f64), &[(u32, f64, f64)], (f64, f64)); 3] = [
+    let reflectors: [Rows; 3] = [
         (
             (0.05, 4.0),
             &[(BY_AREA, 6.7, 0.261), (BY_EDGE_AND_GRADIENT, 8.8, 0.013)],
