@@ -276,6 +276,10 @@ impl Pipeline {
         };
         let rays: Vec<[[f32; 4]; 3]> = self.view.iter().flatten().copied().collect();
         let count = rays.len() as u32;
+        if rays.is_empty() {
+            self.image = vec![Vec3::ZERO; self.view.len()];
+            return Ok(Elapsed::default());
+        }
         let values = UniformValues::new()
             .u32("count", count)
             .f32("albedo", albedo(&self.volume)?)

@@ -282,8 +282,8 @@ const SCATTERS: [(Strategy, &str, &str, &str); 13] = [
     (
         Strategy::Tiles,
         "tiles",
-        "entry += LANES",
-        "entry += 2u * LANES",
+        "if (owner == 0u) {",
+        "if (owner <= 1u) {",
     ),
     (
         Strategy::Tiles,
@@ -306,8 +306,8 @@ const SCATTERS: [(Strategy, &str, &str, &str); 13] = [
     (
         Strategy::Sort,
         "sum",
-        "direction += of[1].xyz *",
-        "direction = of[1].xyz *",
+        "direction += one[1].xyz *",
+        "direction = one[1].xyz *",
     ),
 ];
 

@@ -131,9 +131,10 @@ fn photons_leave_in_each_voxel_what_planes_in_f64_say_and_all_energy_that_is_los
     for strategy in Strategy::PORTABLE {
         let [worst, all] = deposit_error(&gpu, "level-map", strategy);
         println!("{strategy:?}: {worst:.2e}, {all:.2e}");
-        // Of 2^12 units for the largest deposit half is lost at most, of each of up to 16 in a voxel.
+        // Half a unit is 2^-12 of the largest deposit at most, which a voxel's diagonal allows, 1.9 times what these
+        // photons leave on their way along x.
         let slack = if strategy == Strategy::Fixed32 {
-            3e-4
+            1.9 * 2_f64.powi(-12)
         } else {
             1e-5
         };
@@ -232,7 +233,7 @@ fn random_photons_have_a_small_bias_and_a_variance_that_falls_with_their_number(
         })
         .collect();
     let mut variances = Vec::new();
-    for side in [32, 64] {
+    for side in [64, 128] {
         let runs: Vec<Vec<Vec3>> = (0..12)
             .map(|seed| {
                 let points = points(Points::Random, side, 100 + seed);
@@ -254,14 +255,24 @@ fn random_photons_have_a_small_bias_and_a_variance_that_falls_with_their_number(
             all += exact;
             // The grid blurs a cloud by a voxel; chance does the rest.
             let slack = 5.0 * (of / count + error * error).sqrt() + 0.06 * exact;
-            assert!((mean - exact).abs() < slack, "{pixel}: {mean}, not {exact}");
+            assert!(
+                (mean - exact).abs() <= slack,
+                "{pixel}: {mean}, not {exact}"
+            );
         }
         println!(
             "{side}²: bias {:.4}, deviation {:.4}",
             bias / all,
             (variance * reference.len() as f64).sqrt() / all
         );
-        assert!((bias / all).abs() < 0.03, "{bias} of {all}");
+        // Chance, by the means of whole images, and 3 % for the blur of the grid.
+        let means = runs
+            .iter()
+            .map(|run| run.iter().map(|v| f64::from(v.x)).sum::<f64>());
+        let middle = all + bias;
+        let chance = means.map(|m| (m - middle).powi(2)).sum::<f64>() / (count - 1.0) / count;
+        let slack = 5.0 * chance.sqrt() + 0.03 * all;
+        assert!(bias.abs() < slack, "{bias} of {all}, beyond {slack}");
         variances.push(variance);
     }
     // Four times the photons: a quarter of the variance.
