@@ -338,8 +338,7 @@ fn lights_and_media_that_give_no_photons_are_refused() {
         let some = points(Points::Grid, 16, 0);
         Pipeline::new(&gpu, (volume, &medium), adding, source, some)
             .and_then(|mut pipeline| pipeline.render())
-            .err()
-            .expect("an error")
+            .unwrap_err()
             .to_string()
     };
     let sound = Adding::new(Strategy::Fixed64, 0);

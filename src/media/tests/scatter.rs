@@ -157,8 +157,7 @@ fn what_cannot_be_added_is_refused_by_name() {
     let some = deposits(8);
     let refused = |adding: Adding, deposits: &[Deposit]| {
         scatter_list(&gpu, adding, CELLS, deposits)
-            .err()
-            .expect("an error")
+            .unwrap_err()
             .to_string()
     };
     let lacks = refused(Adding::new(Strategy::PackedSwap, 0), &some);
