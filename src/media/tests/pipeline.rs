@@ -3,7 +3,7 @@
 use super::segments::adapter;
 use crate::medium::{Homogeneity, Medium};
 use crate::phase::{HENYEY_GREENSTEIN, SCHLICK};
-use crate::photons::{Points, point_set};
+use crate::photons::{ImportanceMap, Points, Warp, point_set};
 use crate::pipeline::{Photon, Pipeline, Source, camera};
 use crate::scatter::{Adding, Strategy};
 use crate::tracking::{Estimator, Light, Tracker, single_scattering};
@@ -169,9 +169,12 @@ fn light_of(ray: &(DVec3, DVec3)) -> Light {
 
 /// Root of the mean square of the differences from the quadrature, as a part of the mean.
 pub(super) fn image_error(gpu: &Gpu, volume: &Volume, name: &str, photons: u32) -> f64 {
+    error_of_points(gpu, volume, name, points(Points::Hammersley, photons, 0))
+}
+
+fn error_of_points(gpu: &Gpu, volume: &Volume, name: &str, points: Vec<([f64; 2], f64)>) -> f64 {
     let medium = medium(volume, name);
     let adding = Adding::new(Strategy::Fixed64, 0);
-    let points = points(Points::Hammersley, photons, 0);
     let rays = view(12);
     let made = Pipeline::new(gpu, (volume, &medium), adding, LAMP, points);
     let mut pipeline = made.unwrap();
@@ -208,6 +211,26 @@ fn images_of_fog_converge_to_a_quadrature_as_the_grid_is_refined() {
     };
     let error = image_error(&gpu, &flat, "min-max", 256);
     assert!(error < 0.03, "{error}");
+}
+
+#[test]
+fn photons_by_importance_weigh_less_where_they_are_many() {
+    let Some(gpu) = adapter() else { return };
+    let value = |cell: usize| if cell % 8 < 4 { 1.0 } else { 3.0 };
+    let map = ImportanceMap::new((0..64).map(value).collect()).unwrap();
+    let volume = fog([16; 3]);
+    let even = points(Points::Hammersley, 192, 0);
+    let warp = |(point, _): &([f64; 2], f64)| {
+        let at = map.warped(Warp::Hierarchical, *point);
+        (at, map.density(at))
+    };
+    let warped: Vec<_> = even.iter().map(warp).collect();
+    let unweighted = warped.iter().map(|(at, _)| (*at, 1.0)).collect();
+    let error = |points| error_of_points(&gpu, &volume, "dda", points);
+    let [even, warped, unweighted] = [even, warped, unweighted].map(error);
+    println!("{even:.4}, by importance {warped:.4}, without weights {unweighted:.4}");
+    assert!(warped < 2.0 * even, "{warped} of {even}");
+    assert!(unweighted > 5.0 * warped, "{unweighted} of {warped}");
 }
 
 #[test]
