@@ -162,6 +162,11 @@ impl Medium {
         difference / self.voxel
     }
 
+    /// Size of a voxel in the world.
+    pub fn size_of_voxel(&self) -> DVec3 {
+        self.voxel
+    }
+
     /// Uploads it for kernels that import `media/medium`.
     ///
     /// # Errors

@@ -165,7 +165,7 @@ impl Tracker {
 }
 
 /// σ_s / σ of a volume, if it is the same everywhere.
-fn albedo(volume: &Volume) -> Result<f32, TrackingError> {
+pub(crate) fn albedo(volume: &Volume) -> Result<f32, TrackingError> {
     let pairs = volume.scattering.iter().zip(&volume.absorption);
     let mut shares = pairs
         .filter(|(s, a)| *s + *a > 0.0)

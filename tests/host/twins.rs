@@ -268,6 +268,18 @@ const NO_TWIN: &[(&str, &str)] = &[
         "reads what was drawn; tests/images/primary_visibility.rs compares it with rays",
     ),
     (
+        "media/scatter/",
+        "judged by sums in f64 in src/media/tests/scatter.rs",
+    ),
+    (
+        "media/photons",
+        "judged by planes in f64 in src/media/tests/pipeline.rs",
+    ),
+    (
+        "media/gather",
+        "judged by quadratures in f64 in src/media/tests/pipeline.rs",
+    ),
+    (
         "media/tracking",
         "judged by closed forms and quadratures in src/media/tests/tracking.rs",
     ),

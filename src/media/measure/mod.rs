@@ -2,6 +2,7 @@
 
 mod paths;
 mod photons;
+mod pipeline;
 mod structures;
 
 use raystone_bench::run::{Absent, Registries};
@@ -15,7 +16,8 @@ use raystone_core::params::{Entry, Parameters};
 pub fn register(registries: &mut Registries) -> Result<(), String> {
     registries.measurements.add(&structures::Structures)?;
     registries.measurements.add(&paths::Paths)?;
-    registries.measurements.add(&photons::Photons)
+    registries.measurements.add(&photons::Photons)?;
+    registries.measurements.add(&pipeline::Photons)
 }
 
 /// Adds a name to the axis of integrators.

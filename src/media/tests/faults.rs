@@ -1,10 +1,12 @@
 //! Faults planted into the kernels of structures, walks and paths: each must be seen.
 
+use super::scatter::first_wrong;
 use super::segments::adapter;
 use crate::march::{March, Marcher, Scheme, march_path, parallel_rays};
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::optics::Optical;
 use crate::rays::random_and_hard;
+use crate::scatter::{Adding, Strategy, scatter_list};
 use crate::segments::{Walker, first_difference};
 use crate::{procedures, structure};
 use raystone_gpu::{Gpu, KernelLibrary};
@@ -228,6 +230,184 @@ fn faults_of_paths_are_seen() {
         assert!(
             differs(&faulty),
             "{file}: `{text}` as `{fault}` was not seen"
+        );
+    }
+}
+
+/// Strategy that shows it, kernel, text, its replacement.
+const SCATTERS: [(Strategy, &str, &str, &str); 13] = [
+    // A carry that is lost, and one that comes for nothing.
+    (
+        Strategy::Fixed64,
+        "wide",
+        "select(0u, 1u, old + low < old)",
+        "0u",
+    ),
+    (
+        Strategy::Tiles,
+        "wide",
+        "select(carry, carry + 0xffffffffu, units < 0)",
+        "carry",
+    ),
+    // A wrong scale, and numbers that are cut off.
+    (
+        Strategy::Fixed64,
+        "resolve",
+        "f32(low)) / scatter.units",
+        "f32(low)) / (2.0 * scatter.units)",
+    ),
+    (Strategy::Fixed32, "tallies", "units + 0.5));", "units));"),
+    (
+        Strategy::Fixed64,
+        "resolve",
+        "select(value, -value, negative)",
+        "value",
+    ),
+    // A wrap that is told of sums without one.
+    (Strategy::Fixed32, "fixed_32", "sum < old", "sum > old"),
+    // No second attempt, and energy that is dropped and not told.
+    (
+        Strategy::Swap,
+        "swap",
+        "if (swapped.exchanged) {",
+        "if (true) {",
+    ),
+    (
+        Strategy::Swap,
+        "tallies",
+        "dropped += energy.x + energy.y + energy.z;",
+        "dropped += energy.x;",
+    ),
+    // Entries of a table that are not flushed, or are taken from another voxel.
+    (
+        Strategy::Tiles,
+        "tiles",
+        "if (owner == 0u) {",
+        "if (owner <= 1u) {",
+    ),
+    (
+        Strategy::Tiles,
+        "tiles",
+        "return owner == place + 1u;",
+        "return true;",
+    ),
+    (
+        Strategy::Sort,
+        "append",
+        "vec4<f32>(direction, f32(place >> 16u))",
+        "vec4<f32>(direction, 0.0)",
+    ),
+    (
+        Strategy::Sort,
+        "sum",
+        "keys[middle] < key",
+        "keys[middle] <= key",
+    ),
+    (
+        Strategy::Sort,
+        "sum",
+        "direction += one[1].xyz *",
+        "direction = one[1].xyz *",
+    ),
+];
+
+#[test]
+fn faults_of_scatter_are_seen() {
+    let Some(gpu) = adapter() else { return };
+    let mut deposits = super::scatter::deposits(20_000);
+    deposits[3].place = super::scatter::MOST;
+    // Enough in one voxel for a carry of two words.
+    for k in 1..2000 {
+        deposits[10 * k - 1].place = 1;
+        deposits[10 * k - 1].energy = glam::Vec3::splat(0.9);
+    }
+    let all: f64 = (deposits.iter())
+        .map(|d| f64::from(d.energy.element_sum()))
+        .sum();
+    let differs = |gpu: &Gpu, strategy: Strategy| {
+        let adding = Adding::new(strategy, 20_001);
+        let whole = match first_wrong(gpu, adding, &deposits) {
+            Ok((wrong, tallies)) => wrong.is_some() || tallies.wraps > 0,
+            Err(_) => true,
+        };
+        // With one attempt, what is kept and what is told to be dropped are all.
+        let once = Adding {
+            attempts: 1,
+            ..adding
+        };
+        let (found, tallies, _) =
+            scatter_list(gpu, once, super::scatter::CELLS, &deposits).unwrap();
+        let kept = found.iter().map(|v| f64::from(v[0] + v[1] + v[2]));
+        let kept: f64 = kept.sum::<f64>() + tallies.dropped;
+        whole || (kept / all - 1.0).abs() > 1e-3
+    };
+    for strategy in Strategy::PORTABLE {
+        assert!(!differs(&gpu, strategy), "{strategy:?} without a fault");
+    }
+    for (strategy, file, text, fault) in SCATTERS {
+        let faulty = with_fault(&gpu, &format!("scatter/{file}"), text, fault);
+        assert!(
+            differs(&faulty, strategy),
+            "{file}: `{text}` as `{fault}` was not seen"
+        );
+    }
+}
+
+/// Of photons: text, its replacement.
+const PHOTONS: [(&str, &str); 5] = [
+    // A voxel too far.
+    ("voxel_index(voxel)", "voxel_index(vec3<u32>(next.voxel))"),
+    ("through *= exp(-depth);", ""),
+    ("way * mean_transmittance(depth)", "way"),
+    ("energy, photon[2].xyz", "energy, photon[1].xyz"),
+    ("let stop = min(next.t, end);", "let stop = next.t;"),
+];
+
+/// Of the view.
+const VIEWS: [(&str, &str); 7] = [
+    // No phase function, and one the other way round.
+    (
+        "phase_density(Phase(gather.phase_kind, gather.anisotropy), cosine)",
+        "0.07957747",
+    ),
+    ("-dot(sums.direction", "dot(sums.direction"),
+    // No transmittance up to the eye.
+    ("through *= after;", ""),
+    (
+        "* (through * (1.0 - after))",
+        "* (through * (stop - walk.t))",
+    ),
+    // Half a voxel beside.
+    ("position - 0.5", "position"),
+    ("* gather.albedo", ""),
+    ("light += scattered(", "light = scattered("),
+];
+
+#[test]
+fn faults_of_photons_and_views_are_seen() {
+    let Some(gpu) = adapter() else { return };
+    let worst = |gpu: &Gpu| {
+        let [worst, all] = super::pipeline::deposit_error(gpu, "level-map", Strategy::Fixed64);
+        worst.max(all)
+    };
+    let sound = worst(&gpu);
+    assert!(sound < 1e-5, "{sound}");
+    for (text, fault) in PHOTONS {
+        let found = worst(&with_fault(&gpu, "photons", text, fault));
+        assert!(
+            found.is_nan() || found >= 1e-4,
+            "photons: `{text}` as `{fault}`: {found}"
+        );
+    }
+    let fog = super::pipeline::fog([24; 3]);
+    let error = |gpu: &Gpu| super::pipeline::image_error(gpu, &fog, "dda", 192);
+    let sound = error(&gpu);
+    assert!(sound < 0.01, "{sound}");
+    for (text, fault) in VIEWS {
+        let found = error(&with_fault(&gpu, "gather", text, fault));
+        assert!(
+            found.is_nan() || found >= 2.0 * sound,
+            "view: `{text}` as `{fault}`: {found} of {sound}"
         );
     }
 }

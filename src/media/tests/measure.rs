@@ -12,7 +12,7 @@ name = "media"
 [axes]
 integrator = [
     "media:dda", "media:level-map", "media:min-max", "media:bricks", "media:sparse-tree", "media:chebyshev",
-    "media:cube-bvh", "media:paths", "media:photons",
+    "media:cube-bvh", "media:paths", "media:photons", "media:pipeline",
 ]
 [[integrator."media:dda"]]
 content = ["cloud", "glass-ball", "noisy-cube", "gyroid"]
@@ -40,6 +40,10 @@ points = ["grid", "hammersley"]
 side = 64
 cells = 16
 warp = ["none", "alias"]
+[[integrator."media:pipeline"]]
+strategy = ["swap", "fixed-64", "sort", "packed-swap"]
+photons = 32
+side = 8
 [timing]
 rounds = 3
 min_warmup_ms = 0
@@ -59,8 +63,8 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
         ..RunOptions::default()
     };
     let summary = run(&experiment, &plan, &registries, &options).unwrap();
-    // A fixed step of 0 is refused.
-    assert_eq!((summary.failed, summary.skipped), (0, 1));
+    // A fixed step of 0 is refused, and so are atomics that no device is opened with.
+    assert_eq!((summary.failed, summary.skipped), (0, 2));
     let text = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
     let lines: Vec<Line> = text
         .lines()
@@ -106,6 +110,14 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
         even_by_alias > 0.1 && grid_by_alias > 2.0 * even_by_alias,
         "{deviations:?}"
     );
+    let pipelines = of("media:pipeline");
+    assert_eq!(pipelines.len(), 3);
+    for cell in &pipelines {
+        assert!((0.0..0.1).contains(&value(cell, "scatter-rmse/v1")));
+        assert!(
+            value(cell, "scatter-deposit-ns/v1") > 0.0 && value(cell, "scatter-view-ns/v1") > 0.0
+        );
+    }
     let whole = include_str!("../../../experiments/media.toml");
     assert!(parsed(whole).is_ok());
 }

@@ -3,6 +3,8 @@
 mod faults;
 mod march;
 mod measure;
+mod pipeline;
+mod scatter;
 mod segments;
 mod tracking;
 

@@ -1,0 +1,311 @@
+//! Photons to an image of fog, by one strategy of scatter: times, what is dropped, and the error against a quadrature.
+
+use super::{cells_of, declare};
+use crate::medium::{Homogeneity, Medium};
+use crate::photons::{Points, point_set};
+use crate::pipeline::{Pipeline, PipelineError, Source, camera};
+use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
+use crate::tracking::{Light, single_scattering};
+use crate::{Phase, Volume, phase, structure};
+use glam::{DVec3, Vec3};
+use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
+use raystone_bench::timing::{Measured, Samples};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
+use raystone_core::parameters;
+use raystone_core::params::Parameters as _;
+use raystone_gpu::{Elapsed, GpuError};
+use raystone_record::Reading;
+use raystone_record::figure::{Better, Figure, Shown, Spread};
+use std::rc::Rc;
+
+/// The name on the axis of integrators, after [`MEDIA`].
+const NAME: &str = "pipeline";
+/// Scattering and absorption of the fog.
+const FOG: [f32; 2] = [1.2, 0.3];
+/// The lamp.
+const LAMP: DVec3 = DVec3::new(0.3, 2.0, 0.4);
+const INTENSITY: f64 = 2.0;
+/// Pixels along each axis of the image whose error is taken.
+const IMAGE: u32 = 32;
+/// Intervals of the quadrature along a ray.
+const STEPS: u32 = 512;
+/// Photons reach this many voxels for each along an axis, at most on average.
+const REACH: u32 = 3;
+
+parameters! {
+    /// photons of a lamp through fog into a grid of radiance, by one strategy of scatter, and an image of it (Pfeuti 2009)
+    struct Load {
+        /// how energy is added to the grid
+        strategy: Strategy = Strategy::Swap;
+        /// attempts to compare and swap; 0 for as many as it takes
+        attempts: u32 = 10, in 0..=1000;
+        /// points of the lamp's square
+        points: Points = Points::Hammersley;
+        /// photons along each axis of the square
+        photons: u32 = 128, in 8..=1024;
+        /// voxels along each axis
+        side: u32 = 32, in 2..=256;
+    }
+}
+
+static FIGURES: [Figure; 7] = [
+    Figure::new(
+        "scatter-deposit-ns/v1",
+        "photons to grid",
+        "ns per deposit",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "scatter-view-ns/v1",
+        "grid to image",
+        "ns per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "scatter-dropped/v1",
+        "energy dropped",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-retries/v1",
+        "retries",
+        "per deposit",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
+    Figure::new(
+        "scatter-rmse/v1",
+        "RMSE of the image, relative to its mean",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-bias/v1",
+        "mean error of the image, relative",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-bytes/v1",
+        "written by photons",
+        "",
+        Better::Lower,
+        Shown::Bytes,
+        Spread::Exact,
+    ),
+];
+
+pub(super) struct Photons;
+
+impl Measurement for Photons {
+    fn name(&self) -> &'static str {
+        "media:pipeline"
+    }
+
+    fn plural(&self) -> &'static str {
+        "photon pipelines"
+    }
+
+    fn figures(&self) -> &'static [Figure] {
+        &FIGURES
+    }
+
+    fn declare(&self, catalogue: &mut Catalogue) {
+        declare::<Load>(catalogue, NAME, Load::ABOUT);
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        cells_of(plan, &[Axis::Integrator, Axis::Kernels], |name| {
+            name == NAME
+        })
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!("{:?}", (experiment.run.seed, experiment.timing))
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let load = Load::from_checked(&cell[Axis::Integrator].params);
+        let rays = load.photons * load.photons + IMAGE * IMAGE;
+        Work::kernels(3) + cost.timed(Work::rays(rays)) + Work::other(0.5)
+    }
+
+    fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
+        Box::new(cells.iter().map(move |cell| {
+            at.say(cell.to_string());
+            let load = Load::from_checked(&cell[Axis::Integrator].params);
+            let ready = Ready::new(at, cell, &load)?;
+            Ok(Box::new(ready) as Box<dyn Prepared>)
+        }))
+    }
+}
+
+impl From<PipelineError> for Absent {
+    fn from(error: PipelineError) -> Self {
+        match error {
+            PipelineError::Gpu(error) | PipelineError::Scatter(ScatterError::Gpu(error)) => {
+                error.into()
+            }
+            // Not a fault of the strategy: the device or the load does not allow it.
+            PipelineError::Scatter(error) => Self::Refused(error.to_string()),
+            error => Self::Failed(error.to_string()),
+        }
+    }
+}
+
+/// The passes of photons, or those of the view.
+struct Half {
+    pipeline: Rc<Pipeline>,
+    view: bool,
+}
+
+impl Measured for Half {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        self.pipeline.replay(self.view)
+    }
+}
+
+/// A pipeline whose image was compared.
+struct Ready {
+    halves: [Half; 2],
+    bytes: f64,
+    tallies: Tallies,
+    /// Dropped energy as a part of all deposits.
+    dropped: f64,
+    rmse: f64,
+    bias: f64,
+}
+
+impl Ready {
+    fn new(at: &At, cell: &Cell, load: &Load) -> Result<Self, Absent> {
+        let gpu = at.gpu(cell)?;
+        let [scattering, absorption] = FOG;
+        let mut volume = Volume::new([load.side; 3], |_| [scattering, absorption, 1.0])?;
+        volume.phase = Phase {
+            kind: phase::HENYEY_GREENSTEIN,
+            anisotropy: 0.4,
+        };
+        let made = structure::registry()
+            .find("level-map")
+            .map(|kind| kind.make(&Default::default()));
+        let Some(Ok(structure)) = made else {
+            return Err(Absent::Failed("there is no level map".to_owned()));
+        };
+        let medium = Medium::new(&volume, structure, Homogeneity::default());
+        let seed = u64::from(at.experiment.run.seed);
+        let points = point_set(load.points, load.photons, seed).map_err(Absent::Failed)?;
+        let points = points.into_iter().map(|point| (point, 1.0)).collect();
+        let adding = Adding {
+            attempts: load.attempts,
+            ..Adding::new(
+                load.strategy,
+                load.photons * load.photons * load.side.saturating_mul(REACH) / 2,
+            )
+        };
+        let source = Source::Point {
+            position: LAMP,
+            intensity: Vec3::splat(INTENSITY as f32),
+        };
+        let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, source, points)?;
+        let rays = view();
+        pipeline.set_view(&rays);
+        let rendered = pipeline.render()?;
+        let [rmse, bias] = errors(&volume, &rays, &rendered.image);
+        let kept: f64 = pipeline
+            .radiance()?
+            .iter()
+            .map(|sums| f64::from(sums[0] + sums[1] + sums[2]))
+            .sum();
+        let dropped = rendered.tallies.dropped;
+        let bytes = pipeline.bytes() as f64;
+        let pipeline = Rc::new(pipeline);
+        let halves = [false, true].map(|view| Half {
+            pipeline: Rc::clone(&pipeline),
+            view,
+        });
+        Ok(Self {
+            halves,
+            bytes,
+            tallies: rendered.tallies,
+            dropped: dropped / (kept + dropped),
+            rmse,
+            bias,
+        })
+    }
+}
+
+/// Rays of the image.
+fn view() -> Vec<(DVec3, DVec3)> {
+    camera(DVec3::new(0.6, 0.4, -1.6), DVec3::splat(0.5), 0.35, IMAGE)
+}
+
+/// RMSE and mean error of an image of the fog, both as parts of its mean, against a quadrature in f64.
+fn errors(volume: &Volume, rays: &[(DVec3, DVec3)], image: &[Vec3]) -> [f64; 2] {
+    let sigma = f64::from(FOG[0] + FOG[1]);
+    let depth = |a: DVec3, b: DVec3| {
+        let way = b - a;
+        let span = volume.clip(a, way.normalize());
+        span.map_or(0.0, |[enter, leave]| {
+            sigma * (way.length().min(leave) - enter).max(0.0)
+        })
+    };
+    let (mut square, mut off, mut mean) = (0.0, 0.0, 0.0);
+    for ((origin, direction), found) in rays.iter().zip(image) {
+        let light = Light {
+            origin: *origin,
+            direction: *direction,
+            point: LAMP,
+            intensity: INTENSITY,
+            background: 0.0,
+        };
+        // A ray beside the fog sees nothing.
+        let exact = single_scattering(volume, &light, STEPS, |_| sigma, depth).unwrap_or(0.0);
+        let error = f64::from(found.x) - exact;
+        square += error * error;
+        off += error;
+        mean += exact;
+    }
+    let count = image.len() as f64;
+    [(square / count).sqrt() * count / mean, off / mean]
+}
+
+impl Prepared for Ready {
+    fn timed(&self) -> Vec<&dyn Measured> {
+        self.halves
+            .iter()
+            .map(|half| half as &dyn Measured)
+            .collect()
+    }
+
+    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
+        let mut samples = samples.into_iter();
+        let mut next = || samples.next().unwrap_or_default();
+        let [deposit, view, dropped, retries, rmse, bias, bytes] = &FIGURES;
+        let deposits = self.tallies.deposits as f64;
+        Ok(vec![
+            next().ns_per_item(deposit, deposits)?,
+            next().ns_per_item(view, f64::from(IMAGE * IMAGE))?,
+            Reading::exact(dropped, self.dropped),
+            Reading::exact(retries, self.tallies.retries as f64 / deposits),
+            Reading::exact(rmse, self.rmse),
+            Reading::exact(bias, self.bias),
+            Reading::exact(bytes, self.bytes),
+        ])
+    }
+}
