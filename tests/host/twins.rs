@@ -435,6 +435,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "brute_force_hits",
         "the reference tracer, in batches",
     ),
+    (
+        "accel/brute_force",
+        "test_all",
+        "the loop of the kernel, also that of a structure that answers rays together",
+    ),
     ("accel/bvh4", "child", "one expression of the kernel"),
     (
         "accel/brute_force",

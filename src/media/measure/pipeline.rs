@@ -14,6 +14,7 @@ use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
 use raystone_core::params::Parameters as _;
 use raystone_gpu::{Elapsed, GpuError};
+use raystone_image::{Image, Picture, automatic_exposure, tone_map};
 use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
 use std::rc::Rc;
@@ -27,6 +28,8 @@ const LAMP: DVec3 = DVec3::new(0.3, 2.0, 0.4);
 const INTENSITY: f64 = 2.0;
 /// Pixels along each axis of the image whose error is taken.
 const IMAGE: u32 = 32;
+/// Pixels of the page along each axis of a pixel of the image.
+const ENLARGED: u32 = 6;
 /// Intervals of the quadrature along a ray.
 const STEPS: u32 = 512;
 /// Photons reach this many voxels for each along an axis, at most on average.
@@ -184,6 +187,7 @@ impl Measured for Half {
 /// A pipeline whose image was compared.
 struct Ready {
     halves: [Half; 2],
+    picture: Option<Picture>,
     bytes: f64,
     tallies: Tallies,
     /// Dropped energy as a part of all deposits.
@@ -241,6 +245,7 @@ impl Ready {
         });
         Ok(Self {
             halves,
+            picture: drawn(&rendered.image),
             bytes,
             tallies: rendered.tallies,
             dropped: dropped / (kept + dropped),
@@ -253,6 +258,18 @@ impl Ready {
 /// Rays of the image.
 fn view() -> Vec<(DVec3, DVec3)> {
     camera(DVec3::new(0.6, 0.4, -1.6), DVec3::splat(0.5), 0.35, IMAGE)
+}
+
+/// The image as a picture, each pixel as a square; `None` without an image.
+fn drawn(image: &[Vec3]) -> Option<Picture> {
+    let side = IMAGE * ENLARGED;
+    let pixel = |at: u32| {
+        let [x, y] = [at % side, at / side].map(|c| c / ENLARGED);
+        image[(y * IMAGE + x) as usize].to_array()
+    };
+    let pixels = (0..side * side).map(pixel).collect();
+    let image = Image::new(side, side, pixels).ok()?;
+    Some(tone_map(&image, automatic_exposure(&image)))
 }
 
 /// RMSE and mean error of an image of the fog, both as parts of its mean, against a quadrature in f64.
@@ -307,5 +324,9 @@ impl Prepared for Ready {
             Reading::exact(bias, self.bias),
             Reading::exact(bytes, self.bytes),
         ])
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        self.picture.clone()
     }
 }
