@@ -20,10 +20,6 @@ parameters! {
         Fixed64 = "fixed-64",
         /// floats by a loop that compares and swaps their bits
         Swap = "swap",
-        /// floats by the adapter's atomic addition; needs 32-bit float atomics
-        FloatAdd = "float-add",
-        /// the thesis's word of 64 bits (RGBE and a direction), compared and swapped; needs 64-bit atomics
-        PackedSwap = "packed-swap",
         /// a list that is sorted by voxels and summed
         Sort = "sort",
         /// a table for each workgroup, then whole numbers of two words
@@ -32,15 +28,6 @@ parameters! {
 }
 
 impl Strategy {
-    /// Those that need nothing beyond WebGPU.
-    pub const PORTABLE: [Self; 5] = [
-        Self::Fixed32,
-        Self::Fixed64,
-        Self::Swap,
-        Self::Sort,
-        Self::Tiles,
-    ];
-
     /// Words of a voxel in the grid that is added to; 0 for none.
     const fn words(self) -> u64 {
         match self {
@@ -50,14 +37,13 @@ impl Strategy {
         }
     }
 
-    fn module(self) -> Option<&'static str> {
+    fn module(self) -> &'static str {
         match self {
-            Self::Fixed32 => Some("media/scatter/fixed_32"),
-            Self::Fixed64 => Some("media/scatter/fixed_64"),
-            Self::Swap => Some("media/scatter/swap"),
-            Self::Sort => Some("media/scatter/append"),
-            Self::Tiles => Some("media/scatter/tiles"),
-            Self::FloatAdd | Self::PackedSwap => None,
+            Self::Fixed32 => "media/scatter/fixed_32",
+            Self::Fixed64 => "media/scatter/fixed_64",
+            Self::Swap => "media/scatter/swap",
+            Self::Sort => "media/scatter/append",
+            Self::Tiles => "media/scatter/tiles",
         }
     }
 }
@@ -111,18 +97,6 @@ pub struct Tallies {
 /// Reasons why energy cannot be added.
 #[derive(Debug, thiserror::Error)]
 pub enum ScatterError {
-    /// The device lacks what the strategy needs.
-    #[error(
-        "the strategy `{strategy}` needs {needed}, which the device on `{adapter}` was opened without: take `swap` or `fixed-64`, which need nothing beyond WebGPU"
-    )]
-    Lacks {
-        /// Its name.
-        strategy: &'static str,
-        /// The feature.
-        needed: &'static str,
-        /// The adapter's name.
-        adapter: String,
-    },
     /// A number of the strategy is not allowed.
     #[error("{what} of a strategy is {value}: it has to be {range}")]
     Value {

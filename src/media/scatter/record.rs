@@ -2,7 +2,6 @@
 
 use super::{Adding, ScatterError, Strategy, Tallies};
 use glam::Vec3;
-use raystone_core::params::Choice as _;
 use raystone_gpu::{
     Bindings, Composition, Elapsed, Gpu, GpuError, Pairs, Pipeline, Played, RadixSort, Recording,
     Storage, UniformValues, groups_for,
@@ -47,10 +46,10 @@ impl Scatter {
     /// A grid of so many voxels, for deposits of which no component is above `largest`.
     ///
     /// # Errors
-    /// A number is not allowed, the adapter lacks what the strategy needs, or an array exceeds what it binds.
+    /// A number is not allowed, or an array exceeds what the adapter binds.
     pub fn new(gpu: &Gpu, adding: Adding, cells: u32, largest: f32) -> Result<Self, ScatterError> {
         check(&adding, largest)?;
-        let module = module_of(gpu, adding.strategy)?;
+        let module = adding.strategy.module();
         let after = match adding.strategy {
             Strategy::Sort => {
                 let kernel = |name: &str| gpu.pipeline(&Composition::new(name), true);
@@ -215,18 +214,6 @@ fn check(adding: &Adding, largest: f32) -> Result<(), ScatterError> {
         return value("the capacity", 0.0, "at least 1");
     }
     Ok(())
-}
-
-/// The kernel module of a strategy, if the device has what it needs.
-fn module_of(gpu: &Gpu, strategy: Strategy) -> Result<&'static str, ScatterError> {
-    strategy.module().ok_or_else(|| ScatterError::Lacks {
-        strategy: strategy.name(),
-        needed: match strategy {
-            Strategy::FloatAdd => "atomic addition of 32-bit floats (SHADER_FLOAT32_ATOMIC)",
-            _ => "64-bit atomics (SHADER_INT64_ATOMIC_ALL_OPS)",
-        },
-        adapter: gpu.info.name.clone(),
-    })
 }
 
 /// Adds a list of deposits to a grid of `cells` voxels; returns six sums for each.

@@ -9,6 +9,7 @@ use crate::rays::random_and_hard;
 use crate::scatter::{Adding, Strategy, scatter_list};
 use crate::segments::{Walker, first_difference};
 use crate::{procedures, structure};
+use raystone_core::params::Choice as _;
 use raystone_gpu::{Gpu, KernelLibrary};
 
 /// Structure that shows it, kernel, text, its replacement.
@@ -341,7 +342,7 @@ fn faults_of_scatter_are_seen() {
         let kept: f64 = kept.sum::<f64>() + tallies.dropped;
         whole || (kept / all - 1.0).abs() > 1e-3
     };
-    for strategy in Strategy::PORTABLE {
+    for strategy in Strategy::ALL.iter().copied() {
         assert!(!differs(&gpu, strategy), "{strategy:?} without a fault");
     }
     for (strategy, file, text, fault) in SCATTERS {

@@ -9,6 +9,7 @@ use crate::scatter::{Adding, Strategy};
 use crate::tracking::{Estimator, Light, Tracker, single_scattering};
 use crate::{Bounds, Phase, Volume, procedures, structure};
 use glam::{DVec3, Vec3};
+use raystone_core::params::Choice as _;
 use raystone_gpu::Gpu;
 
 const SIGMA: f64 = 1.5;
@@ -128,7 +129,7 @@ fn photons_leave_in_each_voxel_what_planes_in_f64_say_and_all_energy_that_is_los
         println!("{}: {worst:.2e}, {all:.2e}", kind.name());
         assert!(worst < 1e-5 && all < 2e-6, "{}: {worst} {all}", kind.name());
     }
-    for strategy in Strategy::PORTABLE {
+    for strategy in Strategy::ALL.iter().copied() {
         let [worst, all] = deposit_error(&gpu, "level-map", strategy);
         println!("{strategy:?}: {worst:.2e}, {all:.2e}");
         // Half a unit is 2^-12 of the largest deposit at most, which a voxel's diagonal allows, 1.9 times what these

@@ -3,6 +3,7 @@
 use super::segments::adapter;
 use crate::scatter::{Adding, Deposit, ScatterError, Strategy, Tallies, scatter_list, sums_in_f64};
 use glam::Vec3;
+use raystone_core::params::Choice as _;
 use raystone_core::random::Pcg32;
 use raystone_gpu::Gpu;
 
@@ -78,7 +79,7 @@ pub(super) fn first_wrong(
 fn sums_of_all_strategies_are_those_of_f64() {
     let Some(gpu) = adapter() else { return };
     let deposits = deposits(100_000);
-    for strategy in Strategy::PORTABLE {
+    for strategy in Strategy::ALL.iter().copied() {
         let adding = Adding::new(strategy, 100_001);
         let (wrong, tallies) = first_wrong(&gpu, adding, &deposits).unwrap();
         println!("{strategy:?}: {tallies:?}");
@@ -118,7 +119,7 @@ fn attempts_that_are_used_up_drop_what_is_missing() {
         last = tallies.dropped;
         assert_eq!(tallies.drops > 0, tallies.dropped > 0.0);
         if attempts > 0 {
-            assert!(tallies.retries <= 6 * 4096 * u64::from(attempts));
+            assert!(tallies.retries <= 6 * 4096 * u64::from(attempts - 1));
         }
     }
     assert_eq!(last, 0.0);
@@ -160,13 +161,6 @@ fn what_cannot_be_added_is_refused_by_name() {
             .unwrap_err()
             .to_string()
     };
-    let lacks = refused(Adding::new(Strategy::PackedSwap, 0), &some);
-    assert!(
-        lacks.contains("`packed-swap` needs 64-bit atomics"),
-        "{lacks}"
-    );
-    let lacks = refused(Adding::new(Strategy::FloatAdd, 0), &some);
-    assert!(lacks.contains("SHADER_FLOAT32_ATOMIC") && lacks.contains("swap"));
     let sound = Adding::new(Strategy::Fixed64, 0);
     let bits = Adding { bits: 25, ..sound };
     assert!(refused(bits, &some).contains("bits of a strategy is 25"));

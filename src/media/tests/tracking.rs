@@ -1,7 +1,8 @@
 //! Estimators of tracking against closed forms, sums in f64 that know no structure, and quadratures.
 
+use super::pipeline::medium;
 use super::segments::adapter;
-use crate::medium::{Homogeneity, Medium};
+use crate::medium::Medium;
 use crate::phase::{HENYEY_GREENSTEIN, SCHLICK};
 use crate::rays::SegmentRay;
 use crate::segments::exact_depth;
@@ -12,16 +13,6 @@ use raystone_gpu::Gpu;
 
 /// Standard errors by which a mean may be off: one of these tests in a million would fail by chance.
 const SIGMAS: f64 = 4.9;
-
-fn medium(volume: &Volume, name: &str) -> Medium {
-    let registry = structure::registry();
-    let structure = registry
-        .find(name)
-        .unwrap()
-        .make(&Default::default())
-        .unwrap();
-    Medium::new(volume, structure, Homogeneity::default())
-}
 
 fn across() -> Light {
     let origin = DVec3::new(-0.5, 0.4, 0.3);
