@@ -20,6 +20,7 @@ mod reproduce;
 
 pub use raystone_accel as accel;
 pub use raystone_accel::oracle;
+pub use raystone_advice as advice;
 pub use raystone_bench::{coherence, peers, run};
 pub use raystone_config as config;
 pub use raystone_core::{

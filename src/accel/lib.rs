@@ -13,6 +13,7 @@ macro_rules! ensure {
     };
 }
 
+mod auto;
 pub mod bounds;
 mod brute_force;
 mod bvh;
@@ -47,6 +48,7 @@ mod uniform_grid;
 pub mod watch;
 mod wide;
 
+pub(crate) use auto::Auto;
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhParameters, RopedBvh};
 pub use divide_and_conquer::{DivideAndConquer, Division, DivisionLevel};

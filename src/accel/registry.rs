@@ -31,6 +31,7 @@ impl Named for dyn AccelKind {
             &super::DivideAndConquer,
             &super::ObjectList,
             &super::MetaBvh,
+            &super::Auto,
         ]
     }
 

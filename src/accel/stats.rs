@@ -1,9 +1,8 @@
 //! Build times and static statistics of structures.
 
 use super::AccelError;
-use raystone_core::clock::Instant;
 use raystone_core::structure::Phase;
-use raystone_gpu::{Gpu, Played, Player, Recording};
+use raystone_gpu::{Gpu, Played, Player, Recording, Stopwatch};
 use raystone_scene::LEAST_BINDING;
 use std::sync::Arc;
 
@@ -86,9 +85,12 @@ impl BuildLog {
                     .to_owned(),
             )
         })?;
+        let watch = Stopwatch::start();
         let played = player.play(recording);
+        let spent = watch.elapsed();
         let played = played.map_err(|e| AccelError::Device(e.to_string()))?;
         let is_timed = played.runs.iter().all(|(_, ms)| ms.is_some());
+        let noted = self.phases.len();
         for (name, ms) in played.runs.iter().filter(|_| is_timed) {
             self.note(name, ms.unwrap_or(0.0));
         }
@@ -100,6 +102,10 @@ impl BuildLog {
             }
             self.note(&phase, played.wall_ms());
         }
+        // Which of the passes kept the processors busy is not known.
+        if let Some(phase) = self.phases.get_mut(noted) {
+            phase.cpu_ms = spent.cpu_ms;
+        }
         Ok(played)
     }
 
@@ -110,17 +116,20 @@ impl BuildLog {
             None => self.phases.push(Phase {
                 name: name.to_owned(),
                 ms,
+                cpu_ms: None,
             }),
         }
     }
 
     /// Runs `work` and records its time.
     pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
+        let watch = Stopwatch::start();
         let result = work();
+        let spent = watch.elapsed();
         self.phases.push(Phase {
             name: name.to_owned(),
-            ms: start.elapsed().as_secs_f64() * 1e3,
+            ms: spent.wall_ms,
+            cpu_ms: spent.cpu_ms,
         });
         result
     }

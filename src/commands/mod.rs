@@ -1,6 +1,7 @@
 //! Commands: their names, and their ends.
 
 mod adapters;
+mod advise;
 mod arguments;
 mod compare;
 mod doctor;
@@ -107,6 +108,7 @@ commands! {
     Repro(repro::Repro),
     Render(render::Render),
     View(view::View),
+    Advise(advise::Advise),
     Verify(verify::Verify),
     Trace(trace::Trace),
     Stress(stress::Stress),

@@ -252,7 +252,7 @@ fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
     if summary.failed == 0 && !summary.bad_input && failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    for (cell, reason) in data.failures() {
+    for (cell, reason) in data.failures_by_reason() {
         output::tell(&format!("failed: {cell}: {reason}"));
     }
     for check in &failed_checks {

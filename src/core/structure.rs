@@ -9,6 +9,9 @@ pub struct Phase {
     pub name: String,
     /// Milliseconds: wall time, or GPU time of a pass on the device.
     pub ms: f64,
+    /// Milliseconds of all processors, all threads of the process together; absent where not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu_ms: Option<f64>,
 }
 
 /// Static figures of a built structure.

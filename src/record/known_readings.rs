@@ -82,6 +82,7 @@ fn structure() -> StructureRecord {
     let phase = |name: &str, ms| Phase {
         name: name.to_owned(),
         ms,
+        cpu_ms: None,
     };
     StructureRecord {
         build: vec![phase("one", 2.0), phase("other", 3.0)],

@@ -2,6 +2,7 @@
 
 use super::{Environment, MachineLoad};
 use crate::figure::Figure;
+use raystone_advice::SceneFeatures;
 use raystone_core::geometry::Camera;
 use raystone_core::load::LoadReport;
 use serde::{Deserialize, Serialize};
@@ -122,6 +123,9 @@ pub struct SceneRecord {
     pub emitters: usize,
     /// The camera in use.
     pub camera: Camera,
+    /// What structures are advised by; absent in records of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub features: Option<SceneFeatures>,
     /// Dropped and approximated things.
     pub report: LoadReport,
     /// BLAKE3 of the content.

@@ -6,6 +6,7 @@
 //! [`markdown`] and [`terminal`] show that document.
 #![warn(missing_docs)]
 
+pub mod advice;
 pub mod compare;
 pub mod data;
 pub mod document;

@@ -317,7 +317,11 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
     let json = || text.trim_ascii_start().starts_with('{');
     let xml = || text.trim_ascii_start().starts_with('<');
     let (begins_well, expected) = match extension(path).as_str() {
-        "obj" => (!text.contains('\0'), "it is not text"),
+        // Exporters pad files with zeros at the end.
+        "obj" => (
+            !text.trim_end_matches('\0').contains('\0'),
+            "it is not text",
+        ),
         "gltf" | "glb" => (
             start.starts_with(b"glTF") || json(),
             "it begins neither with `glTF` nor with `{`",

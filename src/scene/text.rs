@@ -5,6 +5,13 @@ use raystone_core::text::plain_text_or_latin1;
 /// The plain text of a file. A line that ends in `\`, unless in a comment, continues on the next; empty lines replace the joined ones, to preserve line numbers.
 pub(super) fn normalised(bytes: Vec<u8>) -> String {
     let mut bytes = plain_text_or_latin1(bytes).into_bytes();
+    // Exporters pad files with zeros at the end.
+    bytes.truncate(
+        bytes
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |last| last + 1),
+    );
     // Writing never overtakes reading, as the output is at most as long as the input.
     let (mut from, mut to, mut line, mut joined) = (0, 0, 0, 0);
     let mut is_comment = false;
@@ -56,6 +63,7 @@ mod tests {
             (b"f 1 2 \\\n", "f 1 2  "),
             (b"\\\n\\\n\\\n", "   "),
             (b"usemtl M\xfcll\n", "usemtl M\u{fc}ll\n"),
+            (b"f 1 2 3\n\0\0\0", "f 1 2 3\n"),
             (b"", ""),
         ] {
             assert_eq!(normalised(given.to_vec()), expected);

@@ -1,5 +1,6 @@
 //! The record of a scene.
 
+use raystone_advice::SceneFeatures;
 use raystone_core::geometry::Camera;
 use raystone_record::SceneRecord;
 use raystone_scene::SceneData;
@@ -17,6 +18,10 @@ pub fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRec
         textures: scene.textures.len(),
         emitters: scene.emitters().len(),
         camera,
+        features: Some(SceneFeatures::of(
+            scene.triangles.iter().map(|t| t.vertices),
+            scene.assembly.as_ref().map_or(1, |a| a.instances().len()),
+        )),
         report: scene.report.clone(),
         scene_hash: scene.hash.clone(),
     }

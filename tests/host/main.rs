@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod advice;
 mod compare;
 mod declared_parameters;
 mod discrepancy;

@@ -9,7 +9,7 @@ use raystone::measure::record::GateVerdict;
 use raystone::params::{ParamValue, Variant};
 use raystone::scene::SceneData;
 
-const STRUCTURES: usize = 14;
+const STRUCTURES: usize = 15;
 
 fn few_plants() -> SceneData {
     builtin("foliage", &[("plants", ParamValue::Integer(9))])

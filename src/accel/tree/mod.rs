@@ -23,7 +23,7 @@ pub(super) use leaves::distinct;
 pub use parameters::{Builder, TreeParameters};
 
 use super::bounds::Bounds;
-use super::{AccelError, BuildLog, TriangleSoup};
+use super::{AccelError, BuildLog, TriangleSoup, auto};
 use parallel::Method;
 use raystone_core::params::Choice as _;
 use sweep::Axes;
@@ -84,6 +84,7 @@ impl Tree {
         if soup.records.is_empty() {
             return Ok(Tree::default());
         }
+        let settings = &*auto::with_builder(settings, soup, log)?;
         let mut tree = Tree::grow(soup, settings, log)?;
         if settings.reinsertion > 0 {
             tree = log.phase("reinsertion", || reinsertion::optimise(tree, settings));
@@ -126,6 +127,8 @@ impl Tree {
                 Builder::HostPloc | Builder::DevicePloc => {
                     parallel::build(soup, &settings.parallel(settings.clustering()))?.into()
                 }
+                // Another one before a tree is grown.
+                Builder::Auto => binned::build(references, settings),
             })
         })
     }

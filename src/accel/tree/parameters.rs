@@ -15,7 +15,8 @@ parameters! {
         /// the longest axis (Dufay 2017); sbvh: spatial splits (Stich et al. 2009); ploc: bottom-up
         /// (Meister & Bittner 2018, crate obvhs), also with obvhs' reinsertion; lbvh: the radix tree over
         /// Morton codes (Karras 2012); host-*, device-*: a tree that is made (and collapsed) on the device, or
-        /// the same to the bit on the host
+        /// the same to the bit on the host; auto: by the table of
+        /// advice
         builder: Builder = Builder::Binned;
         /// most triangles in a leaf
         leaf_size: usize = 4, in 1..=31;
@@ -72,6 +73,8 @@ parameters! {
         HostPloc = "host-ploc",
         /// Clustering along the curve of Morton codes, on the device.
         DevicePloc = "device-ploc",
+        /// The builder that the table of advice expects to cost least on the scene.
+        Auto = "auto",
     }
 
     /// Presets of the crate obvhs.

@@ -70,17 +70,23 @@ impl Work {
 
     /// Describes the work for `--dry-run`.
     pub fn describe(&self) -> String {
+        let elements = match self.elements {
+            0.0 => String::new(),
+            elements => format!(
+                "{} million elements to be compacted at {} million a second, ",
+                millions(elements),
+                ELEMENTS_PER_SECOND / 1e6
+            ),
+        };
         format!(
             "estimate: about {} on a software adapter with two cores, from {} million rays at \
-             {} million a second, {} million elements to be compacted at {} million a second, \
+             {} million a second, {elements}\
              {} kernels that the driver compiles in {SECONDS_PER_KERNEL} s each, and {:.0} s of \
              loading, building, checks and warm-up. These are round figures, nothing was measured here: a GPU needs a \
              small part of it. The report comes on top.",
             duration(self.seconds()),
             millions(self.rays),
             RAYS_PER_SECOND / 1e6,
-            millions(self.elements),
-            ELEMENTS_PER_SECOND / 1e6,
             self.kernels,
             self.other_s,
         )

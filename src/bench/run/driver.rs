@@ -29,6 +29,9 @@ pub(super) fn run(
     };
     let mut cells = measurement.cells(session.experiment, session.plan);
     cells.retain(|cell| is_here(cell) && !session.ledger.is_done(&measurement.unit_name(cell)));
+    if cells.is_empty() {
+        return Ok(());
+    }
     let mut ready = Vec::new();
     let mut preparation = measurement.prepare(at, &cells);
     for cell in &cells {

@@ -124,6 +124,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             return Ok(());
         }
     }
+    if timed.is_empty() {
+        return Ok(());
+    }
     session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.run.seed);

@@ -11,8 +11,13 @@ use std::borrow::Borrow;
 /// Camera rays per side of the picture that look for the reason.
 const GRID: u32 = 16;
 
-/// What to say of a picture that has the same value in every pixel, with the likely reason; `None`
-/// if its pixels differ. Only then are the `triangles` asked for.
+/// Linear radiance that a screen shows as black: less than one step of 255 in sRGB.
+const SHOWN_AS_BLACK: f32 = 3e-4;
+/// Share of pixels from which a picture counts as nearly black.
+const NEARLY_ALL: f64 = 0.98;
+
+/// What to say of a picture that has the same value in every pixel, or is nearly black, with the likely reason; `None`
+/// for others. Only then are the `triangles` asked for.
 pub(super) fn remark<S: Borrow<TriangleSoup>>(
     image: &Image,
     scene: &SceneData,
@@ -21,7 +26,17 @@ pub(super) fn remark<S: Borrow<TriangleSoup>>(
 ) -> Option<String> {
     let first = image.pixels.first()?;
     if image.pixels.iter().any(|pixel| pixel != first) {
-        return None;
+        let dark = |pixel: &&[f32; 3]| pixel.iter().all(|c| *c < SHOWN_AS_BLACK);
+        let dark = image.pixels.iter().filter(dark).count();
+        let share = dark as f64 / image.pixels.len() as f64;
+        return (share >= NEARLY_ALL).then(|| {
+            let sight = Sight::new(scene, triangles().borrow(), camera);
+            format!(
+                "{:.1} % of the pixels are black on a screen: {}",
+                100.0 * share,
+                sight.why_dim(scene)
+            )
+        });
     }
     let sight = Sight::new(scene, triangles().borrow(), camera);
     let [what, reason] = if *first == [0.0; 3] {
@@ -111,6 +126,27 @@ impl Sight {
         })
     }
 
+    fn why_dim(&self, scene: &SceneData) -> String {
+        let missed = 1.0 - self.triangles.len() as f64 / self.rays.max(1) as f64;
+        if scene.environment == Vec3::ZERO && missed > NEARLY_ALL * 0.9 {
+            return format!(
+                "{:.0} % of what the camera sees is a black sky; move it nearer, or give the scene an environment",
+                100.0 * missed
+            );
+        }
+        let lights = LightList::of(scene).lights;
+        let emissive = |light: &ListedLight| matches!(light.source, Source::Triangle(_));
+        match scene.environment == Vec3::ZERO && lights.iter().all(emissive) {
+            true => format!(
+                "all that shines are {} emissive triangles, which light little of what the camera sees; give the scene a lamp or an environment",
+                lights.len()
+            ),
+            false => {
+                "its lights reach little of what the camera sees, or are weak beside the size of the scene".to_owned()
+            }
+        }
+    }
+
     fn why_uniform(&self, scene: &SceneData) -> String {
         self.why_nothing(scene).unwrap_or_else(|| {
             let id = self
@@ -195,10 +231,28 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_with_a_few_bright_pixels_says_what_shines() {
+        let scene = named("cornell-box").unwrap();
+        let mut pixels = vec![[1e-5; 3]; 100];
+        pixels[7] = [3.0; 3];
+        let image = Image::new(10, 10, pixels).unwrap();
+        let said = |camera| remark(&image, &scene, || TriangleSoup::new(&scene), camera).unwrap();
+        let lit = said(scene.view(1.0));
+        assert!(lit.starts_with("99.0 % of the pixels are black"), "{lit}");
+        assert!(lit.contains("2 emissive triangles"), "{lit}");
+        let view = scene.view(1.0);
+        let away = Camera {
+            target: view.eye * 2.0 - view.target,
+            ..view
+        };
+        assert!(said(away).contains("100 % of what the camera sees is a black sky"));
+    }
+
+    #[test]
     fn pictures_with_two_values_pass() {
         let scene = named("cornell-box").unwrap();
         let mut pixels = vec![[0.0; 3]; 16];
-        pixels[15] = [0.0, 0.0, 1e-9];
+        pixels[15] = [0.0, 0.0, 1e-3];
         let image = Image::new(4, 4, pixels).unwrap();
         let soup = || -> TriangleSoup { unreachable!("the pixels differ") };
         assert_eq!(remark(&image, &scene, soup, scene.view(1.0)), None);

@@ -4,6 +4,7 @@ use super::file_stem;
 use super::specs::{BUILD, LEAF_SIZES, OUTSIDE, RECORDED_RAYS, SHAPE, SPEED, WORK};
 use super::trade_off;
 use super::verdict::ray_classes;
+use crate::advice;
 use crate::data::{Measured, RunData, SceneGroup};
 use crate::document::*;
 use crate::names::Names;
@@ -48,7 +49,9 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         ),
         (
             "What a build costs and when it pays",
-            costs.into_iter().chain(to_image).collect(),
+            (costs.into_iter().chain(to_image))
+                .chain([advice::table(data, scene)])
+                .collect(),
         ),
         (
             "Size, shape and further figures",

@@ -8,6 +8,10 @@ const RED_AND_BLUE: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.1 
 const OBJ: &[(&str, Outcome)] = &[
     ("mtllib m.mtl\nusemtl\tred\nf 1 2 3 4\n", Reads("rr", &[])),
     (
+        "mtllib m.mtl\nusemtl red\nf 1 2 3 4\n\0\0\0",
+        Reads("rr", &[]),
+    ),
+    (
         "mtllib\tm.mtl\nusemtl red\nf\t1\t2  3 4\n",
         Reads("rr", &[]),
     ),

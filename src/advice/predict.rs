@@ -1,0 +1,133 @@
+//! Predicted costs, and the choice of least cost.
+
+use crate::features::SceneFeatures;
+use crate::table::{AdviceTable, Choice, Costs};
+use std::collections::BTreeMap;
+
+/// The rays that a structure is built for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Demand {
+    /// Their number.
+    pub rays: f64,
+    /// The classes they are of in equal parts; all that the table knows if empty.
+    pub classes: Vec<String>,
+}
+
+/// Predicted costs of a choice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// What would be built.
+    pub choice: Choice,
+    /// Milliseconds of the build.
+    pub build_ms: f64,
+    /// Nanoseconds of a ray, by class.
+    pub ns: BTreeMap<String, f64>,
+}
+
+impl Prediction {
+    /// Milliseconds of building and of all rays; `None` if a class is not known.
+    pub fn total_ms(&self, demand: &Demand) -> Option<f64> {
+        Some(self.build_ms + demand.rays * mean_ns(&self.ns, &demand.classes)? * 1e-6)
+    }
+}
+
+/// Mean over these classes of nanoseconds per ray, over all of them if none is named.
+pub(crate) fn mean_ns(ns: &BTreeMap<String, f64>, classes: &[String]) -> Option<f64> {
+    let all: Option<Vec<f64>> = match classes {
+        [] => Some(ns.values().copied().collect()),
+        classes => classes.iter().map(|class| ns.get(class).copied()).collect(),
+    };
+    let all = all.filter(|all| !all.is_empty())?;
+    Some(all.iter().sum::<f64>() / all.len() as f64)
+}
+
+impl AdviceTable {
+    /// Costs of every choice that suits the scene, in the order of the table. Features beyond those of the scenes that it was
+    /// fitted on count as the nearest of them, but for the number of triangles.
+    pub fn predict(&self, features: &SceneFeatures) -> Vec<Prediction> {
+        let mut terms = features.terms();
+        let bounds = self.least.iter().zip(&self.most).enumerate();
+        for (i, (least, most)) in bounds.filter(|(i, _)| *i != TRIANGLES) {
+            terms[i] = terms[i].max(*least).min(*most);
+        }
+        let cost = |weights: &[f64]| {
+            let log: f64 = weights.iter().zip(terms).map(|(w, t)| w * t).sum();
+            log.exp2()
+        };
+        let one = |costs: &Costs| Prediction {
+            choice: costs.choice.clone(),
+            build_ms: cost(&costs.build_ms),
+            ns: (costs.ns.iter())
+                .map(|(class, weights)| (class.clone(), cost(weights)))
+                .collect(),
+        };
+        let suits = |costs: &&Costs| features.copies >= costs.least_copies;
+        self.choices.iter().filter(suits).map(one).collect()
+    }
+
+    /// The same with the total for `demand`, least first.
+    pub fn advise(&self, features: &SceneFeatures, demand: &Demand) -> Vec<(Prediction, f64)> {
+        let mut all: Vec<_> = (self.predict(features).into_iter())
+            .filter_map(|p| p.total_ms(demand).map(|ms| (p, ms)))
+            .collect();
+        all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        all
+    }
+}
+
+/// Index of the term of the number of triangles.
+const TRIANGLES: usize = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> AdviceTable {
+        AdviceTable::parse(
+            "adapter = 'test'\nscenes = []\nleast = [1, 3, 0, 0, 0, 0, 0]\nmost = [1, 20, 4, 4, 4, 4, 9]\n\
+             [[choice]]\nstructure = 'quick'\nbuild_ms = [0, 0, 0, 0, 0, 0, 0]\nns.bounce = [10, 0, 0, 0, 0, 0, 0]\n\
+             [[choice]]\nstructure = 'good'\nbuild_ms = [4, 0, 0, 0, 0, 0, 0]\nns.bounce = [9, 0, 0, 0, 0, 0, 0]\n\
+             [[choice]]\nstructure = 'two-level'\nleast_copies = 2\nbuild_ms = [0, 0, 0, 0, 0, 0, 0]\nns.bounce = [0, 0.9, 0, 0, 0, 0, 0]\n",
+        )
+        .unwrap()
+    }
+
+    fn best(copies: u64, rays: f64) -> String {
+        let features = SceneFeatures {
+            triangles: 1 << 10,
+            copies,
+            ..SceneFeatures::default()
+        };
+        let demand = Demand {
+            rays,
+            classes: vec!["bounce".to_owned()],
+        };
+        table().advise(&features, &demand)[0].0.choice.label()
+    }
+
+    #[test]
+    fn the_budget_decides_between_a_quick_build_and_quick_rays() {
+        // 1 + 1024e-6 n = 16 + 512e-6 n at 29,297 rays.
+        assert_eq!(best(1, 29_000.0), "quick");
+        assert_eq!(best(1, 29_600.0), "good");
+    }
+
+    #[test]
+    fn trees_over_copies_are_for_copies() {
+        assert_eq!(best(2, 1e5), "two-level");
+        assert_eq!(best(1, 1e5), "good");
+    }
+
+    #[test]
+    fn a_class_that_is_not_known_has_no_total() {
+        let demand = Demand {
+            rays: 1.0,
+            classes: vec!["x-rays".to_owned()],
+        };
+        assert!(
+            table()
+                .advise(&SceneFeatures::default(), &demand)
+                .is_empty()
+        );
+    }
+}
