@@ -169,7 +169,7 @@ mod tests {
                 .0
                 .insert("class".to_owned(), ParamValue::Name(class.to_owned()));
             let mut log = BuildLog::default();
-            let built = AccelKind::build(&Auto, &soup, &params, &mut log).unwrap();
+            let built = crate::AccelKind::build(&Auto, &soup, &params, &mut log).unwrap();
             let [label] = &chosen(&log)[..] else {
                 panic!("{:?}", log.phases)
             };

@@ -31,7 +31,10 @@ fn the_table_is_that_of_the_committed_records() {
     assert_eq!(other, None);
     assert_eq!(samples.len(), 472);
     assert_eq!(built_in.scenes.len(), 39);
-    assert_eq!(fit(&adapter, &samples).unwrap().to_text(), built_in.to_text());
+    assert_eq!(
+        fit(&adapter, &samples).unwrap().to_text(),
+        built_in.to_text()
+    );
 }
 
 #[test]
@@ -43,19 +46,28 @@ fn advice_on_scenes_not_seen_costs_little_more_than_the_best() {
     assert!(regret.mean < 0.03, "{regret:?}");
     // What the docs state: structures over copies are known from one family of scenes, and without it not at all.
     let is_known = |trial: &&Trial| !trial.scene.starts_with("instances");
-    let worst = trials.iter().filter(is_known).map(|t| t.regret).fold(0.0, f64::max);
+    let worst = trials
+        .iter()
+        .filter(is_known)
+        .map(|t| t.regret)
+        .fold(0.0, f64::max);
     assert!(worst < 0.3, "{worst}");
     // Against what everyone would take without advice, and against what is fastest to build.
     for plain in ["cwbvh", "bvh", "uniform-grid"] {
         let mean = mean_regret_of(plain, &samples);
-        assert!(regret.mean < 0.5 * mean, "{plain}: {mean} for {}", regret.mean);
+        assert!(
+            regret.mean < 0.5 * mean,
+            "{plain}: {mean} for {}",
+            regret.mean
+        );
     }
 }
 
 /// Mean over scenes and budgets of the cost of one structure over the least, less one.
 fn mean_regret_of(label: &str, samples: &[Sample]) -> f64 {
     let mut regrets = Vec::new();
-    let scenes: std::collections::BTreeSet<&str> = samples.iter().map(|s| s.scene.as_str()).collect();
+    let scenes: std::collections::BTreeSet<&str> =
+        samples.iter().map(|s| s.scene.as_str()).collect();
     for scene in scenes {
         for rays in BUDGETS {
             let cost = |s: &Sample| {
