@@ -1,7 +1,7 @@
 //! The measurements in a run: planned, prepared, timed, written.
 
 use crate::register;
-use raystone_bench::run::{Registries, RunOptions, run};
+use raystone_bench::run::{Existing, Registries, RunOptions, run};
 use raystone_config::{Experiment, Plan};
 use raystone_record::{Line, MeasuredRecord, Recorded, all_of};
 
@@ -64,8 +64,8 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
     };
     let summary = run(&experiment, &plan, &registries, &options).unwrap();
     // A fixed step of 0 is refused.
-    assert_eq!((summary.failed, summary.skipped), (0, 1));
     let text = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
+    assert_eq!((summary.failed, summary.skipped), (0, 1), "{text}");
     let lines: Vec<Line> = text
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -120,4 +120,157 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
     }
     let whole = include_str!("../../../experiments/media.toml");
     assert!(parsed(whole).is_ok());
+}
+
+/// File, text, its replacement, strategy: faults of the kernels that a run has to see.
+const FAULTS: [(&str, &str, &str, &str); 20] = [
+    // Transmittance that is lost, and energy as if the way began at its end.
+    ("photons", "through *= exp(-depth);", "", "fixed-64"),
+    ("photons", "way * mean_transmittance(depth)", "way", "swap"),
+    // The last group left out, of photons and of rays.
+    (
+        "photons",
+        "i < photons.count",
+        "i + 64u < photons.count",
+        "tiles",
+    ),
+    (
+        "gather",
+        "i < gather.count",
+        "i + 64u < gather.count",
+        "fixed-64",
+    ),
+    // Twice the power.
+    (
+        "photons",
+        "photon[3].xyz * (through",
+        "photon[3].xyz * (2.0 * through",
+        "sort",
+    ),
+    // Two colours exchanged; one in the place of all.
+    (
+        "photons",
+        "energy, photon[2].xyz",
+        "energy.xzy, photon[2].xyz",
+        "fixed-64",
+    ),
+    (
+        "scatter/tallies",
+        "return energy[channel];",
+        "return energy[2u - channel];",
+        "swap",
+    ),
+    (
+        "gather",
+        "energy += weight * one[0].xyz",
+        "energy += weight * one[0].xxx",
+        "fixed-64",
+    ),
+    // A voxel too far; half a voxel beside; the place where a piece begins instead of its middle.
+    (
+        "photons",
+        "deposit(place_of(voxel)",
+        "deposit(place_of(vec3<u32>(next.voxel))",
+        "fixed-64",
+    ),
+    ("gather", "position - 0.5", "position", "fixed-64"),
+    ("gather", "(0.5 * (walk.t + stop))", "walk.t", "fixed-64"),
+    // Photons that go back where they came from.
+    (
+        "photons",
+        "energy, photon[2].xyz",
+        "energy, -photon[2].xyz",
+        "fixed-32",
+    ),
+    // The phase function's sign, and its other half.
+    (
+        "gather",
+        "-dot(sums.direction",
+        "dot(sums.direction",
+        "fixed-64",
+    ),
+    (
+        "phase",
+        "1.0 + a * a - 2.0 * a * cosine",
+        "1.0 + a * a + 2.0 * a * cosine",
+        "fixed-64",
+    ),
+    // No transmittance up to the eye; no albedo; a voxel instead of a sum.
+    ("gather", "through *= after;", "", "fixed-64"),
+    ("gather", "* gather.albedo", "", "fixed-64"),
+    (
+        "gather",
+        "light += scattered(",
+        "light = scattered(",
+        "fixed-64",
+    ),
+    // Sums without their sign, of another scale, and with a lost carry.
+    (
+        "scatter/resolve",
+        "select(value, -value, negative)",
+        "value",
+        "fixed-64",
+    ),
+    (
+        "scatter/resolve",
+        "f32(low)) / scatter.units",
+        "f32(low)) / (2.0 * scatter.units)",
+        "tiles",
+    ),
+    (
+        "scatter/wide",
+        "select(carry, carry + 0xffffffffu, units < 0)",
+        "carry",
+        "fixed-64",
+    ),
+];
+
+/// A run of one pipeline with these kernels: how many cells failed, and why.
+fn pipeline_run(folder: &std::path::Path, kernels: &str, strategy: &str) -> (usize, String) {
+    let text = format!(
+        "[run]\nname = \"faults\"\n[axes]\nintegrator = [\"media:pipeline\"]\nkernels = [\"{kernels}\"]\n\
+         [[integrator.\"media:pipeline\"]]\nstrategy = \"{strategy}\"\nphotons = 48\nside = 12\n\
+         [timing]\nrounds = 3\nmin_warmup_ms = 0\nmax_warmup_ms = 1\n"
+    );
+    let mut registries = Registries::default();
+    register(&mut registries).unwrap();
+    let experiment = Experiment::parse(&text, "test", &[], &registries.catalogue());
+    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
+    let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
+    let options = RunOptions {
+        out: folder.join("run"),
+        existing: Existing::Replace,
+        ..RunOptions::default()
+    };
+    let summary = run(&experiment, &plan, &registries, &options).unwrap();
+    let records = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
+    (summary.failed, records)
+}
+
+#[test]
+fn a_fault_in_a_kernel_of_photons_fails_the_run() {
+    if super::segments::adapter().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for strategy in ["fixed-32", "fixed-64", "swap", "sort", "tiles"] {
+        let (failed, records) = pipeline_run(folder.path(), "", strategy);
+        assert_eq!(failed, 0, "{strategy} without a fault: {records}");
+    }
+    let library = raystone_gpu::KernelLibrary::default();
+    for (k, (file, text, fault, strategy)) in FAULTS.into_iter().enumerate() {
+        let sound = library.text(&format!("media/{file}")).unwrap();
+        assert_eq!(sound.matches(text).count(), 1, "{file}: `{text}`");
+        let kernels = folder.path().join(format!("kernels-{k}"));
+        let path = kernels.join(format!("media/{file}.wesl"));
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, sound.replace(text, fault)).unwrap();
+        let (failed, records) = pipeline_run(folder.path(), kernels.to_str().unwrap(), strategy);
+        let reason = records
+            .lines()
+            .find_map(|line| line.split_once("reason\":\"").map(|(_, rest)| rest))
+            .map_or("", |rest| &rest[..rest.len().min(180)]);
+        println!("{file}: `{text}` as `{fault}`: {reason}");
+        assert_eq!(failed, 1, "{file}: `{text}` as `{fault}` was not seen");
+    }
 }

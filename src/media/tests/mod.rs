@@ -5,7 +5,7 @@ mod march;
 mod measure;
 mod pipeline;
 mod scatter;
-mod segments;
+pub(crate) mod segments;
 mod tracking;
 
 use crate::medium::{Homogeneity, Key, Medium};

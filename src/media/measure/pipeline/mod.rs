@@ -1,19 +1,23 @@
 //! Photons to an image of fog, by one strategy of scatter: times, what is dropped, and the error against a quadrature.
 
+mod checks;
+#[cfg(test)]
+mod tests;
+
 use super::{cells_of, declare};
 use crate::medium::{Homogeneity, Medium};
 use crate::photons::{Points, point_set};
-use crate::pipeline::{Pipeline, PipelineError, Source, camera};
+use crate::pipeline::{Part, Pipeline, PipelineError, Rendered, Source, camera};
 use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
-use crate::tracking::{Light, single_scattering};
 use crate::{Phase, Volume, phase, structure};
+use checks::{Judge, Judged, truth_of};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_bench::timing::{Measured, Samples};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
 use raystone_core::params::Parameters as _;
-use raystone_gpu::{Elapsed, GpuError};
+use raystone_gpu::{Elapsed, Gpu, GpuError};
 use raystone_image::{Image, Picture, automatic_exposure, tone_map};
 use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
@@ -25,13 +29,16 @@ const NAME: &str = "pipeline";
 const FOG: [f32; 2] = [1.2, 0.3];
 /// The lamp.
 const LAMP: DVec3 = DVec3::new(0.3, 2.0, 0.4);
-const INTENSITY: f64 = 2.0;
+const INTENSITY: Vec3 = Vec3::new(2.0, 1.6, 1.0);
+/// How the fog scatters.
+const PHASE: Phase = Phase {
+    kind: phase::HENYEY_GREENSTEIN,
+    anisotropy: 0.4,
+};
 /// Pixels along each axis of the image whose error is taken.
 const IMAGE: u32 = 32;
 /// Pixels of the page along each axis of a pixel of the image.
 const ENLARGED: u32 = 6;
-/// Intervals of the quadrature along a ray.
-const STEPS: u32 = 512;
 /// Photons reach this many voxels for each along an axis, at most on average.
 const REACH: u32 = 3;
 
@@ -172,28 +179,25 @@ impl From<PipelineError> for Absent {
     }
 }
 
-/// The passes of photons, or those of the view.
-struct Half {
+/// Passes of one kind.
+struct Passes {
     pipeline: Rc<Pipeline>,
-    view: bool,
+    part: Part,
 }
 
-impl Measured for Half {
+impl Measured for Passes {
     fn measure(&self) -> Result<Elapsed, GpuError> {
-        self.pipeline.replay(self.view)
+        self.pipeline.replay(self.part)
     }
 }
 
-/// A pipeline whose image was compared.
+/// A pipeline that passed its checks.
 struct Ready {
-    halves: [Half; 2],
+    halves: [Passes; 2],
     picture: Option<Picture>,
     bytes: f64,
     tallies: Tallies,
-    /// Dropped energy as a part of all deposits.
-    dropped: f64,
-    rmse: f64,
-    bias: f64,
+    judged: Judged,
 }
 
 impl Ready {
@@ -201,10 +205,7 @@ impl Ready {
         let gpu = at.gpu(cell)?;
         let [scattering, absorption] = FOG;
         let mut volume = Volume::new([load.side; 3], |_| [scattering, absorption, 1.0])?;
-        volume.phase = Phase {
-            kind: phase::HENYEY_GREENSTEIN,
-            anisotropy: 0.4,
-        };
+        volume.phase = PHASE;
         let made = structure::registry()
             .find("level-map")
             .map(|kind| kind.make(&Default::default()));
@@ -222,36 +223,100 @@ impl Ready {
                 load.photons * load.photons * load.side.saturating_mul(REACH) / 2,
             )
         };
-        let source = Source::Point {
-            position: LAMP,
-            intensity: Vec3::splat(INTENSITY as f32),
-        };
-        let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, source, points)?;
+        let source = lamp();
         let rays = view();
-        pipeline.set_view(&rays);
+        let mut pipeline = begun(gpu, (&volume, &medium), adding)?;
+        turn_to(&mut pipeline, source, &rays)?;
+        pipeline.set_points(points);
         let rendered = pipeline.render()?;
-        let [rmse, bias] = errors(&volume, &rays, &rendered.image);
-        let kept: f64 = pipeline
-            .radiance()?
-            .iter()
-            .map(|sums| f64::from(sums[0] + sums[1] + sums[2]))
-            .sum();
-        let dropped = rendered.tallies.dropped;
+        ran("other points", &rendered, true)?;
+        let truth = truth_of(&volume, &medium, LAMP, &rays);
+        let judge = Judge {
+            volume: &volume,
+            medium: &medium,
+            source: &source,
+            rays: &rays,
+            truth: &truth,
+            side: load.side,
+            unit: pipeline.unit(),
+            smoothing: Default::default(),
+            adaptive: None,
+        };
+        let judged = judge.check(&pipeline, &rendered).map_err(Absent::Failed)?;
         let bytes = pipeline.bytes() as f64;
         let pipeline = Rc::new(pipeline);
-        let halves = [false, true].map(|view| Half {
+        let halves = [Part::Photons, Part::View].map(|part| Passes {
             pipeline: Rc::clone(&pipeline),
-            view,
+            part,
         });
         Ok(Self {
             halves,
             picture: drawn(&rendered.image),
             bytes,
             tallies: rendered.tallies,
-            dropped: dropped / (kept + dropped),
-            rmse,
-            bias,
+            judged,
         })
+    }
+}
+
+/// A pipeline that has shown another light, of few points, by another phase function to another view.
+fn begun(
+    gpu: &Gpu,
+    (volume, medium): (&Volume, &Medium),
+    adding: Adding,
+) -> Result<Pipeline, PipelineError> {
+    let beam = Source::Beam {
+        middle: DVec3::new(0.5, 0.5, -0.5),
+        direction: DVec3::Z,
+        half: 0.3,
+        power: Vec3::ONE,
+    };
+    let few = [[0.2, 0.3], [0.7, 0.6]].map(|point| (point, 1.0)).to_vec();
+    let mut of_volume = volume.clone();
+    of_volume.phase = Phase::ISOTROPIC;
+    let mut pipeline = Pipeline::new(gpu, (&of_volume, medium), adding, beam, few)?;
+    pipeline.set_view(&camera(
+        DVec3::new(0.5, 0.9, -2.0),
+        DVec3::splat(0.5),
+        0.2,
+        4,
+    ));
+    pipeline.render()?;
+    Ok(pipeline)
+}
+
+/// Changes light, phase function and view one after the other: each has to run its passes again, and no others.
+fn turn_to(pipeline: &mut Pipeline, source: Source, rays: &[(DVec3, DVec3)]) -> Result<(), Absent> {
+    pipeline.set_source(source);
+    ran("another light", &pipeline.render()?, true)?;
+    pipeline.set_phase(PHASE);
+    ran("another phase function", &pipeline.render()?, false)?;
+    pipeline.set_view(rays);
+    ran("another view", &pipeline.render()?, false)
+}
+
+/// Whether what ran after a change was the view, and the photons before it if they had to.
+fn ran(change: &str, rendered: &Rendered, photons: bool) -> Result<(), Absent> {
+    let has = |name: &str| rendered.passes.iter().any(|pass| pass == name);
+    if has("gather") && has("photons") == photons {
+        return Ok(());
+    }
+    let wanted = if photons {
+        "photons and view"
+    } else {
+        "the view alone"
+    };
+    Err(Absent::Failed(format!(
+        "after {change} the passes {:?} ran, where {wanted} have to",
+        rendered.passes
+    )))
+}
+
+/// The lamp, whose colours differ.
+fn lamp() -> Source {
+    Source::Point {
+        position: LAMP,
+        intensity: INTENSITY,
     }
 }
 
@@ -272,36 +337,6 @@ fn drawn(image: &[Vec3]) -> Option<Picture> {
     Some(tone_map(&image, automatic_exposure(&image)))
 }
 
-/// RMSE and mean error of an image of the fog, both as parts of its mean, against a quadrature in f64.
-fn errors(volume: &Volume, rays: &[(DVec3, DVec3)], image: &[Vec3]) -> [f64; 2] {
-    let sigma = f64::from(FOG[0] + FOG[1]);
-    let depth = |a: DVec3, b: DVec3| {
-        let way = b - a;
-        let span = volume.clip(a, way.normalize());
-        span.map_or(0.0, |[enter, leave]| {
-            sigma * (way.length().min(leave) - enter).max(0.0)
-        })
-    };
-    let (mut square, mut off, mut mean) = (0.0, 0.0, 0.0);
-    for ((origin, direction), found) in rays.iter().zip(image) {
-        let light = Light {
-            origin: *origin,
-            direction: *direction,
-            point: LAMP,
-            intensity: INTENSITY,
-            background: 0.0,
-        };
-        // A ray beside the fog sees nothing.
-        let exact = single_scattering(volume, &light, STEPS, |_| sigma, depth).unwrap_or(0.0);
-        let error = f64::from(found.x) - exact;
-        square += error * error;
-        off += error;
-        mean += exact;
-    }
-    let count = image.len() as f64;
-    [(square / count).sqrt() * count / mean, off / mean]
-}
-
 impl Prepared for Ready {
     fn timed(&self) -> Vec<&dyn Measured> {
         self.halves
@@ -318,10 +353,10 @@ impl Prepared for Ready {
         Ok(vec![
             next().ns_per_item(deposit, deposits)?,
             next().ns_per_item(view, f64::from(IMAGE * IMAGE))?,
-            Reading::exact(dropped, self.dropped),
+            Reading::exact(dropped, self.judged.dropped),
             Reading::exact(retries, self.tallies.retries as f64 / deposits),
-            Reading::exact(rmse, self.rmse),
-            Reading::exact(bias, self.bias),
+            Reading::exact(rmse, self.judged.rmse),
+            Reading::exact(bias, self.judged.bias),
             Reading::exact(bytes, self.bytes),
         ])
     }
