@@ -225,11 +225,88 @@ const FAULTS: [(&str, &str, &str, &str); 20] = [
     ),
 ];
 
+/// The same of adaptive photons, with the filter that shows it.
+const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 14] = [
+    // Pilots in the wrong cells, counted for every voxel, from the wrong column, and without squares.
+    (
+        "photons",
+        "voxel * photons.cells / medium.resolution",
+        "voxel / photons.cells",
+        "none",
+    ),
+    ("photons", "place != counted_place", "true", "none"),
+    (
+        "adaptive/origins",
+        "counts[5u * place + 1u], at.x",
+        "counts[5u * place + 1u], at.y",
+        "none",
+    ),
+    ("adaptive/origins", "at.y * at.y", "at.y", "none"),
+    // Weights that are not added up, or cut off.
+    (
+        "adaptive/weights",
+        "marks.x * counting.units + 0.5",
+        "counting.units",
+        "both",
+    ),
+    (
+        "adaptive/weights",
+        "atomicAdd(&counts[2u * place], 1u)",
+        "atomicAdd(&counts[2u * place], 2u)",
+        "weight",
+    ),
+    // A pyramid from other taps, another place, with a mean over empty cells or without the last level.
+    (
+        "adaptive/mip",
+        "vec3<f32>(FAR), vec3<f32>(NEAR), inner",
+        "vec3<f32>(NEAR), vec3<f32>(FAR), inner",
+        "constant",
+    ),
+    (
+        "adaptive/mip",
+        "k & 3u, (k >> 2u) & 3u, k >> 4u)) - 1",
+        "k & 3u, (k >> 2u) & 3u, k >> 4u))",
+        "constant",
+    ),
+    ("adaptive/mip", "max(weights, 1.0)", "8.0", "weight"),
+    (
+        "adaptive/levels",
+        "+ ((1u << level) - 1u)) >>",
+        ") >>",
+        "surround",
+    ),
+    // Half a cell beside; levels by other rules; a blur of other taps.
+    (
+        "adaptive/smooth",
+        "/ f32(1u << level) - 0.5",
+        "/ f32(1u << level)",
+        "constant",
+    ),
+    (
+        "adaptive/smooth",
+        "counted(level, voxel).x < least",
+        "counted(level, voxel).x <= least",
+        "count",
+    ),
+    (
+        "adaptive/smooth",
+        "after <= before",
+        "after > before",
+        "surround",
+    ),
+    (
+        "adaptive/smooth",
+        "vec3<f32>(0.25), vec3<f32>(0.5)",
+        "vec3<f32>(0.5), vec3<f32>(0.25)",
+        "blur",
+    ),
+];
+
 /// A run of one pipeline with these kernels: how many cells failed, and why.
-fn pipeline_run(folder: &std::path::Path, kernels: &str, strategy: &str) -> (usize, String) {
+fn pipeline_run(folder: &std::path::Path, kernels: &str, load: &str) -> (usize, String) {
     let text = format!(
         "[run]\nname = \"faults\"\n[axes]\nintegrator = [\"media:pipeline\"]\nkernels = [\"{kernels}\"]\n\
-         [[integrator.\"media:pipeline\"]]\nstrategy = \"{strategy}\"\nphotons = 48\nside = 12\n\
+         [[integrator.\"media:pipeline\"]]\nside = 12\n{load}\n\
          [timing]\nrounds = 3\nmin_warmup_ms = 0\nmax_warmup_ms = 1\n"
     );
     let mut registries = Registries::default();
@@ -244,7 +321,11 @@ fn pipeline_run(folder: &std::path::Path, kernels: &str, strategy: &str) -> (usi
     };
     let summary = run(&experiment, &plan, &registries, &options).unwrap();
     let records = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
-    (summary.failed, records)
+    let reasons = records
+        .lines()
+        .filter_map(|line| line.split_once("reason\":\"").map(|(_, rest)| rest))
+        .map(|rest| &rest[..rest.find("\",\"").unwrap_or(rest.len())]);
+    (summary.failed, reasons.collect::<Vec<_>>().join("; "))
 }
 
 #[test]
@@ -253,23 +334,40 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    for strategy in ["fixed-32", "fixed-64", "swap", "sort", "tiles"] {
-        let (failed, records) = pipeline_run(folder.path(), "", strategy);
-        assert_eq!(failed, 0, "{strategy} without a fault: {records}");
+    let all = [
+        "photons = 48\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
+        "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
+        "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",
+    ];
+    for load in all {
+        let (failed, reason) = pipeline_run(folder.path(), "", load);
+        assert_eq!(failed, 0, "{load} without a fault: {reason}");
     }
     let library = raystone_gpu::KernelLibrary::default();
-    for (k, (file, text, fault, strategy)) in FAULTS.into_iter().enumerate() {
+    let fixed = FAULTS.map(|(file, text, fault, strategy)| {
+        (
+            file,
+            text,
+            fault,
+            format!("photons = 48\nstrategy = \"{strategy}\""),
+        )
+    });
+    let adaptive = ADAPTIVE_FAULTS.map(|(file, text, fault, filter)| {
+        (
+            file,
+            text,
+            fault,
+            format!("photons = 16\nmode = \"adaptive\"\npilot_cells = 5\nfilter = \"{filter}\""),
+        )
+    });
+    for (k, (file, text, fault, load)) in fixed.into_iter().chain(adaptive).enumerate() {
         let sound = library.text(&format!("media/{file}")).unwrap();
         assert_eq!(sound.matches(text).count(), 1, "{file}: `{text}`");
         let kernels = folder.path().join(format!("kernels-{k}"));
         let path = kernels.join(format!("media/{file}.wesl"));
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, sound.replace(text, fault)).unwrap();
-        let (failed, records) = pipeline_run(folder.path(), kernels.to_str().unwrap(), strategy);
-        let reason = records
-            .lines()
-            .find_map(|line| line.split_once("reason\":\"").map(|(_, rest)| rest))
-            .map_or("", |rest| &rest[..rest.len().min(180)]);
+        let (failed, reason) = pipeline_run(folder.path(), kernels.to_str().unwrap(), &load);
         println!("{file}: `{text}` as `{fault}`: {reason}");
         assert_eq!(failed, 1, "{file}: `{text}` as `{fault}` was not seen");
     }

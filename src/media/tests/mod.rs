@@ -1,5 +1,6 @@
 //! Tests of structures and walks: answers of every structure against the field, in f64, and against the device.
 
+mod adaptive;
 mod faults;
 mod march;
 mod measure;

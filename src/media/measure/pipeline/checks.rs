@@ -25,12 +25,13 @@ const ENERGY: f64 = 2e-5;
 const PIXEL: f64 = 1e-4;
 /// The power of a set of m² photons may be off by so many of the m on its border.
 const BORDER: f64 = 6.0;
-/// RMSE of an image, relative: so much times the square of a voxel's side (of the box) for the blur of the grid, …
-const BLUR: f64 = 6.0;
-/// … so much over the root of the photons that go through a voxel's cross-section, …
-const NOISE: f64 = 0.6;
+/// RMSE of an image, relative: beside what the grid blurs, so much over the root of the photons that go through a voxel's
+/// cross-section, of random points and of others, …
+const NOISE: [f64; 2] = [0.6, 0.2];
 /// … and so much times the share of energy that is dropped.
 const DROPPED: f64 = 6.0;
+/// A smoothed grid blurs this much more, and a pyramid so much more again.
+const WIDE: f64 = 3.0;
 
 /// What a pipeline is judged by.
 #[derive(Clone, Copy)]
@@ -43,6 +44,10 @@ pub(super) struct Judge<'a> {
     pub(super) truth: &'a [f64],
     /// Voxels along each axis.
     pub(super) side: u32,
+    /// What the grid blurs: an RMSE, relative, times the square of the voxels along an axis.
+    pub(super) blur: f64,
+    /// True if points are more even than random ones.
+    pub(super) even: bool,
     /// Half a unit of whole numbers, 0 for floats.
     pub(super) unit: f64,
     /// How the grid is smoothed.
@@ -206,16 +211,15 @@ impl Judge<'_> {
             return Ok(());
         };
         let exact = crossed_by(self.medium, photons, adaptive.cells, adaptive.pilots);
-        for (channel, what) in [
-            "number",
-            "columns",
-            "rows",
-            "squares of columns",
-            "squares of rows",
-        ]
-        .into_iter()
-        .enumerate()
-        {
+        let map = f64::from(adaptive.pilots);
+        let sums = [
+            ("number", 1.0),
+            ("columns", map),
+            ("rows", map),
+            ("squares of columns", map * map),
+            ("squares of rows", map * map),
+        ];
+        for (channel, (what, one)) in sums.into_iter().enumerate() {
             let found = |cell: &Pilots| {
                 let [[x, y], [xx, yy]] = [cell.sum, cell.squares];
                 u64::from([cell.count, x, y, xx, yy][channel])
@@ -225,7 +229,7 @@ impl Judge<'_> {
                 .map(|(exact, cell)| exact[channel].abs_diff(found(cell)))
                 .sum();
             let all: u64 = exact.iter().map(|exact| exact[channel]).sum();
-            if off as f64 > SLIVER * all as f64 + 8.0 * f64::from(adaptive.pilots).powi(2) {
+            if off as f64 > SLIVER * all as f64 + 8.0 * one {
                 return Err(format!(
                     "the {what} of pilots in all cells are {off} beside those of f64, whose sum is {all}"
                 ));
@@ -361,8 +365,23 @@ impl Judge<'_> {
         };
         let [rmse, bias] = errors(self.truth, intensity.as_dvec3(), image);
         let side = f64::from(self.side);
-        let through = pipeline.photons().len() as f64 / (side * side);
-        let slack = BLUR / (side * side) + NOISE / through.sqrt() + DROPPED * dropped;
+        // As many photons of one power would be as even as these.
+        let powers = || {
+            pipeline
+                .photons()
+                .iter()
+                .map(|p| f64::from(p.energy.element_sum()))
+        };
+        let effective = powers().sum::<f64>().powi(2) / powers().map(|p| p * p).sum::<f64>();
+        let through = effective / (side * side);
+        let wide = match self.smoothing.filter {
+            Filter::None => 1.0,
+            Filter::Blur => WIDE,
+            // The widest cell that a rule may choose.
+            _ => WIDE * WIDE,
+        };
+        let noise = NOISE[usize::from(self.even)] / through.sqrt();
+        let slack = self.blur * wide / (side * side) + noise + DROPPED * dropped;
         if rmse <= slack && bias.abs() <= slack {
             return Ok(Judged {
                 dropped,

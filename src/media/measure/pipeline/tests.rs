@@ -1,8 +1,15 @@
 //! Faults of the host that a run has to see: flags that are forgotten, and another light or medium than the one judged.
 
+use super::checks::{Judge, truth_of};
+use super::ready::{begun, ran, turn_to};
+use super::scene::{lamp, view};
 use super::*;
+use crate::medium::{Homogeneity, Medium};
 use crate::photons::Points;
+use crate::pipeline::{Pipeline, Rendered, Source};
+use crate::scatter::Adding;
 use crate::tests::segments::adapter;
+use crate::{Volume, structure};
 
 fn fog(side: u32) -> (Volume, Medium) {
     let mut volume = Volume::new([side; 3], |_| [FOG[0], FOG[1], 1.0]).unwrap();
@@ -75,6 +82,8 @@ fn another_light_or_medium_than_the_one_judged_fails_the_cell() {
         rays: &rays,
         truth: &truth,
         side: 12,
+        blur: 6.0,
+        even: true,
         unit: pipeline.unit(),
         smoothing: Default::default(),
         adaptive: None,
