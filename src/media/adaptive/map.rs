@@ -5,6 +5,8 @@ use crate::photons::ImportanceMap;
 
 /// Taps of a Gaussian of variance 2 over five cells.
 const TAPS: [f64; 5] = [0.11170, 0.23648, 0.30364, 0.23648, 0.11170];
+/// What a complement has where nothing is left: no density may be 0.
+const LEAST: f64 = 1e-3;
 /// Rounds in which what a greatest density cuts off is spread again.
 const ROUNDS: u32 = 32;
 
@@ -25,6 +27,12 @@ pub fn importance(adaptive: &Adaptive, cells: &[Pilots]) -> Result<ImportanceMap
     values = blurred(&values, side);
     if adaptive.most_density > 0.0 {
         limit(&mut values, adaptive.most_density);
+    }
+    if adaptive.complement > 0.0 {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        for value in &mut values {
+            *value = (adaptive.complement - *value / mean).max(LEAST);
+        }
     }
     ImportanceMap::new(values)
 }

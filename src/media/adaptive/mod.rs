@@ -105,6 +105,8 @@ pub struct Adaptive {
     pub background: f64,
     /// The greatest density, relative to even photons; 0 for any (Pfeuti 2009, §4.3).
     pub most_density: f64,
+    /// Above 0, the map's complement: what it leaves of even photons, so many times as many as follow it (Pfeuti 2009, §4.3).
+    pub complement: f64,
     /// How points follow the map.
     pub warp: Warp,
     /// Seed of the pilots' places.

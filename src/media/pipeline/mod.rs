@@ -2,6 +2,7 @@
 //! rays of a view (the reference pipeline of Pfeuti 2009). Kernels: `kernels/media/photons.wesl`, `kernels/media/gather.wesl`
 //! and those of [`crate::scatter`].
 
+mod left;
 mod light;
 mod marched;
 pub(crate) mod oracle;
@@ -95,6 +96,8 @@ pub enum Part {
     Smooth,
     /// The grid to the image.
     View,
+    /// All of them, one after the other.
+    All,
 }
 
 /// The passes with what they leave for each other.
@@ -224,97 +227,6 @@ impl Pipeline {
         self.dirty = Dirty::Nothing;
     }
 
-    /// The photons of the last image that ran them.
-    pub fn photons(&self) -> &[Photon] {
-        self.grid.as_ref().map_or(&[], |grid| &grid.photons)
-    }
-
-    /// The pilots of the last image that ran them, what they left in each of their cells, and the map that followed.
-    pub fn pilots(&self) -> Option<(&[Photon], &[Pilots], &ImportanceMap)> {
-        let piloted = self.grid.as_ref()?.pilots.as_ref()?;
-        Some((&piloted.photons, &piloted.cells, &piloted.map))
-    }
-
-    /// The grid of radiance: six sums for each voxel, as [`crate::scatter::scatter_list`] returns them.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn radiance(&self) -> Result<Vec<[f32; 6]>, PipelineError> {
-        let Some(grid) = &self.grid else {
-            return Ok(Vec::new());
-        };
-        let words = self.words_of(&grid.marched.scatter.radiance)?;
-        Ok(words.into_iter().map(|(sums, _)| sums).collect())
-    }
-
-    /// The grid that the view gathers, with the level that each voxel was smoothed by.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn gathered(&self) -> Result<Vec<([f32; 6], u32)>, PipelineError> {
-        let Some(grid) = &self.grid else {
-            return Ok(Vec::new());
-        };
-        let words = self.words_of(grid.gathered())?;
-        Ok(words
-            .into_iter()
-            .map(|(sums, [level, _])| (sums, level as u32))
-            .collect())
-    }
-
-    /// Photons that crossed each voxel and the sum of their weights; empty where they were not counted.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn counts(&self) -> Result<Vec<(u32, f64)>, PipelineError> {
-        let Some(grid) = &self.grid else {
-            return Ok(Vec::new());
-        };
-        let Some(counts) = &grid.marched.counts else {
-            return Ok(Vec::new());
-        };
-        let words: Vec<[u32; 2]> = self.downloaded(counts)?;
-        let unit = grid.marched.unit;
-        Ok(words
-            .into_iter()
-            .map(|[count, weight]| (count, f64::from(weight) * unit))
-            .collect())
-    }
-
-    fn words_of(&self, grid: &Storage) -> Result<Vec<([f32; 6], [f32; 2])>, PipelineError> {
-        let words: Vec<[f32; 8]> = self.downloaded(grid)?;
-        let sums = words
-            .into_iter()
-            .take(self.medium.field.len())
-            .map(|[r, g, b, v, x, y, z, w]| ([r, g, b, x, y, z], [v, w]));
-        Ok(sums.collect())
-    }
-
-    fn downloaded<T: bytemuck::Pod>(&self, storage: &Storage) -> Result<Vec<T>, PipelineError> {
-        let mut recording = Recording::new();
-        recording.download("words", storage);
-        Ok(self.player.play(&recording)?.download::<T>("words")?)
-    }
-
-    /// Half a unit of the whole numbers that energy is added as, which each deposit may be off by; 0 for floats.
-    pub(crate) fn unit(&self) -> f64 {
-        match (&self.grid, self.adding.strategy) {
-            (None, _) | (_, Strategy::Swap | Strategy::Sort) => 0.0,
-            (Some(grid), _) => grid.marched.scatter.unit() / 2.0,
-        }
-    }
-
-    /// Bytes of what photons write to and what is made of it, without the grid of sums.
-    pub fn bytes(&self) -> u64 {
-        self.grid.as_ref().map_or(0, |grid| {
-            let smooth = grid
-                .smooth
-                .as_ref()
-                .map_or(0, |(smoother, _)| smoother.bytes);
-            grid.marched.scatter.bytes() + smooth
-        })
-    }
-
     /// Runs the passes whose input changed, and returns the image.
     ///
     /// # Errors
@@ -345,17 +257,34 @@ impl Pipeline {
     /// # Errors
     /// The device fails.
     pub fn replay(&self, part: Part) -> Result<Elapsed, GpuError> {
-        let passes = match (&self.grid, part) {
-            (Some(grid), Part::Photons) => Some(&grid.marched.passes),
-            (Some(grid), Part::Pilots) => grid.pilots.as_ref().map(|pilots| &pilots.passes),
-            (Some(grid), Part::Smooth) => grid.smooth.as_ref().map(|(_, passes)| passes),
-            (_, Part::View) => Some(&self.view_passes),
-            (None, _) => None,
-        };
-        let Some(passes) = passes else {
-            return Ok(Elapsed::default());
-        };
-        Ok(self.play(passes, &mut Vec::new())?.elapsed())
+        let all = [Part::Pilots, Part::Photons, Part::Smooth, Part::View];
+        let mut sum = Elapsed::default();
+        for (place, part) in all
+            .into_iter()
+            .filter(|one| part == *one || part == Part::All)
+            .filter_map(|part| self.passes_of(part))
+            .enumerate()
+        {
+            let elapsed = self.play(part, &mut Vec::new())?.elapsed();
+            if place == 0 {
+                sum = elapsed;
+            } else {
+                sum += elapsed;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// The passes of one kind, if they are there.
+    fn passes_of(&self, part: Part) -> Option<&Recording> {
+        let grid = self.grid.as_ref()?;
+        match part {
+            Part::Photons => Some(&grid.marched.passes),
+            Part::Pilots => grid.pilots.as_ref().map(|pilots| &pilots.passes),
+            Part::Smooth => grid.smooth.as_ref().map(|(_, passes)| passes),
+            Part::View => Some(&self.view_passes),
+            Part::All => None,
+        }
     }
 
     /// Photons to the grid of radiance, after pilots where there are any; and to the smooth grid.

@@ -17,6 +17,7 @@ const EVEN: Adaptive = Adaptive {
     shadows: 0.0,
     background: 1.0,
     most_density: 0.0,
+    complement: 0.0,
     warp: Warp::Inversion,
     seed: 5,
 };
@@ -141,6 +142,20 @@ fn the_map_has_a_disc_where_selected_cells_got_their_photons_from() {
     };
     let limited = importance(&limited, &lit([10, 4], 1)).unwrap().greatest();
     assert!((limited - 4.0).abs() < 0.01, "{limited}");
+    // A map and what it leaves of four times as many even photons are those.
+    let four = Adaptive {
+        most_density: 4.0,
+        ..adaptive
+    };
+    let left = Adaptive {
+        complement: 4.0,
+        ..four
+    };
+    let [four, left] = [four, left].map(|one| importance(&one, &lit([10, 4], 1)).unwrap());
+    for at in [place(10.0, 4.0), place(11.0, 5.0), place(2.0, 12.0)] {
+        let sum = four.density(at) + 3.0 * left.density(at);
+        assert!((sum - 4.0).abs() < 0.01, "{sum}");
+    }
     let odd = Adaptive { pilots: 12, ..EVEN };
     assert!(
         importance(&odd, &lit([5, 5], 1))

@@ -113,7 +113,7 @@ fn triangles_of_scenes_are_those_of_the_digest() {
 }
 
 /// Faults planted in the files: file, text, replacement.
-const PLANTED: [(&str, &str, &str); 16] = [
+const PLANTED: [(&str, &str, &str); 19] = [
     // A row swapped, a column swapped, neighbouring digits.
     (
         "nilsson-table-5-2",
@@ -181,6 +181,22 @@ const PLANTED: [(&str, &str, &str); 16] = [
         "compaction:horn(elements=262144,valid=0.6,bytes=8)\" }, thesis = 3.9",
     ),
     ("roger-stream-reduction", "thesis = 0.37", "thesis = 0.36"),
+    // Another list, the other pipeline, another size.
+    (
+        "pfeuti-tables-4-1-to-4-5",
+        "media:pipeline(points=halton,photons=512,side=128)\" }, thesis = 163",
+        "media:pipeline(points=random,photons=512,side=128)\" }, thesis = 163",
+    ),
+    (
+        "pfeuti-tables-4-1-to-4-5",
+        "column = \"Reference\", thesis = 110",
+        "column = \"Adaptive\", thesis = 110",
+    ),
+    (
+        "pfeuti-tables-4-1-to-4-5",
+        "(photons=512,side=128)\" }, thesis = 109",
+        "(photons=256,side=128)\" }, thesis = 109",
+    ),
 ];
 
 #[test]

@@ -44,7 +44,7 @@ pub(super) struct Judge<'a> {
     pub(super) truth: &'a [f64],
     /// Voxels along each axis.
     pub(super) side: u32,
-    /// What the grid blurs: an RMSE, relative, times the square of the voxels along an axis.
+    /// What the grid blurs: an RMSE, relative.
     pub(super) blur: f64,
     /// True if points are more even than random ones.
     pub(super) even: bool,
@@ -176,7 +176,7 @@ impl Judge<'_> {
     ) -> Result<(), String> {
         let all = kept + found.tallies.dropped;
         let check = |what: &str, found: f64, exact: f64, slack: f64| {
-            let off = (found / exact - 1.0).abs();
+            let off = (found - exact).abs() / exact;
             if off <= slack {
                 return Ok(());
             }
@@ -381,7 +381,7 @@ impl Judge<'_> {
             _ => WIDE * WIDE,
         };
         let noise = NOISE[usize::from(self.even)] / through.sqrt();
-        let slack = self.blur * wide / (side * side) + noise + DROPPED * dropped;
+        let slack = self.blur * wide + noise + DROPPED * dropped;
         if rmse <= slack && bias.abs() <= slack {
             return Ok(Judged {
                 dropped,

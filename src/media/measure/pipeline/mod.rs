@@ -82,6 +82,8 @@ parameters! {
         background: f64 = 1.0, in 0.001..=1000.0;
         /// greatest density of photons, relative to even ones; 0 for any
         most_density: f64 = 0.0, in 0.0..=1000.0;
+        /// above 0, the complement of the map: what it leaves of so many times as many even photons
+        complement: f64 = 0.0, in 0.0..=1000.0;
         /// how points follow the map
         warp: Warp = Warp::Inversion;
         /// how the grid is smoothed
@@ -104,6 +106,7 @@ impl Load {
             shadows: self.shadows,
             background: self.background,
             most_density: self.most_density,
+            complement: self.complement,
             warp: self.warp,
             seed,
         })
@@ -127,7 +130,7 @@ impl Load {
     }
 }
 
-static FIGURES: [Figure; 15] = [
+static FIGURES: [Figure; 18] = [
     Figure::new(
         "scatter-deposit-ns/v1",
         "photons to grid",
@@ -247,6 +250,30 @@ static FIGURES: [Figure; 15] = [
         Better::Lower,
         Shown::Digits(3),
         Spread::Median,
+    ),
+    Figure::new(
+        "photon-march-ms/v1",
+        "photons to grid",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-frame-ms/v1",
+        "all passes on the device",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-conflicts/v1",
+        "retries of all deposits",
+        "",
+        Better::Lower,
+        Shown::Count,
+        Spread::Single,
     ),
 ];
 

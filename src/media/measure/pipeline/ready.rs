@@ -77,7 +77,7 @@ impl Ready {
             rays: &scene.rays,
             truth: &scene.truth,
             side: load.side,
-            blur: load.content.blur(),
+            blur: load.content.blur(load.side),
             even: load.points != Points::Random,
             unit: pipeline.unit(),
             smoothing: load.smoothing(),
@@ -94,7 +94,7 @@ impl Ready {
             }),
         };
         let bytes = pipeline.bytes() as f64;
-        let mut parts = vec![Part::Photons, Part::View];
+        let mut parts = vec![Part::Photons, Part::View, Part::All];
         if pilots.is_some() {
             parts.push(Part::Pilots);
         }
@@ -244,6 +244,9 @@ impl Prepared for Ready {
             equal_all,
             pilots_ms,
             smooth_ms,
+            photons_ms,
+            frame_ms,
+            conflicts,
         ] = rest;
         let deposits = self.tallies.deposits as f64;
         let mut readings = vec![
@@ -254,15 +257,23 @@ impl Prepared for Ready {
             Reading::exact(bytes, self.bytes),
             Reading::exact(noise, self.noise),
             Reading::exact(count, self.photons as f64),
+            Reading::exact(conflicts, self.tallies.retries as f64),
         ];
         for (passes, samples) in self.passes.iter().zip(samples) {
-            readings.push(match passes.part {
-                Part::Photons => samples.ns_per_item(deposit, deposits)?,
-                Part::View => samples.ns_per_item(view, f64::from(IMAGE * IMAGE))?,
-                // Nanoseconds to milliseconds.
-                Part::Pilots => samples.ns_per_item(pilots_ms, 1e6)?,
-                Part::Smooth => samples.ns_per_item(smooth_ms, 1e6)?,
-            });
+            // Nanoseconds to milliseconds.
+            let ms = |figure| samples.ns_per_item(figure, 1e6);
+            match passes.part {
+                Part::Photons => {
+                    readings.push(samples.ns_per_item(deposit, deposits)?);
+                    readings.push(ms(photons_ms)?);
+                }
+                Part::View => {
+                    readings.push(samples.ns_per_item(view, f64::from(IMAGE * IMAGE))?);
+                }
+                Part::Pilots => readings.push(ms(pilots_ms)?),
+                Part::Smooth => readings.push(ms(smooth_ms)?),
+                Part::All => readings.push(ms(frame_ms)?),
+            }
         }
         if let Some(of) = &self.pilots {
             readings.extend([

@@ -38,12 +38,14 @@ impl Content {
         Ok(volume)
     }
 
-    /// RMSE of an image, relative, times the square of the voxels along an axis: what the grid blurs.
-    pub(super) const fn blur(self) -> f64 {
+    /// What the grid blurs: RMSE of an image, relative, at most. It falls as the square of a voxel's side in fog, and as the
+    /// side where the medium has borders or details of any size.
+    pub(super) fn blur(self, side: u32) -> f64 {
+        let side = f64::from(side);
         match self {
-            Self::Fog => 6.0,
-            Self::Cloud => 60.0,
-            Self::Shadow => 200.0,
+            Self::Fog => 6.0 / (side * side),
+            Self::Cloud => 1.6 / side,
+            Self::Shadow => (8.0 / (side * side)).max(0.8 / side),
         }
     }
 }
@@ -79,6 +81,12 @@ impl Scene {
         let medium = Medium::new(&volume, structure, Homogeneity::default());
         let rays = view();
         let truth = truth_of(&volume, &medium, LAMP, &rays);
+        if truth.iter().all(|light| *light <= 0.0) {
+            let side = load.side;
+            return Err(Absent::Refused(format!(
+                "nothing scatters light in {side}³ voxels of this content: give more"
+            )));
+        }
         let points = point_set(Points::Hammersley, MANY, 0).map_err(Absent::Failed)?;
         let points = points.into_iter().map(|point| (point, 1.0)).collect();
         let adding = Adding::new(Strategy::Fixed64, 0);

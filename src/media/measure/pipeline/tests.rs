@@ -82,7 +82,7 @@ fn another_light_or_medium_than_the_one_judged_fails_the_cell() {
         rays: &rays,
         truth: &truth,
         side: 12,
-        blur: 6.0,
+        blur: Content::Fog.blur(12),
         even: true,
         unit: pipeline.unit(),
         smoothing: Default::default(),
