@@ -377,6 +377,7 @@ impl Judge<'_> {
         let wide = match self.smoothing.filter {
             Filter::None => 1.0,
             Filter::Blur => WIDE,
+            Filter::Constant => WIDE.powi(self.smoothing.level as i32 + 1),
             // The widest cell that a rule may choose.
             _ => WIDE * WIDE,
         };
