@@ -142,7 +142,8 @@ impl Smoothed {
         }
     }
 
-    fn most(&self) -> u32 {
+    /// The coarsest level.
+    pub(crate) fn most(&self) -> u32 {
         self.levels.len() as u32 - 1
     }
 

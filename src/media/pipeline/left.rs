@@ -6,6 +6,9 @@ use crate::photons::ImportanceMap;
 use crate::scatter::Strategy;
 use raystone_gpu::{Recording, Storage};
 
+/// Six sums of a voxel, and the words beside energy and direction.
+type Sums = ([f32; 6], [f32; 2]);
+
 impl Pipeline {
     /// The photons of the last image that ran them.
     pub fn photons(&self) -> &[Photon] {
@@ -64,7 +67,7 @@ impl Pipeline {
             .collect())
     }
 
-    fn words_of(&self, grid: &Storage) -> Result<Vec<([f32; 6], [f32; 2])>, PipelineError> {
+    fn words_of(&self, grid: &Storage) -> Result<Vec<Sums>, PipelineError> {
         let words: Vec<[f32; 8]> = self.downloaded(grid)?;
         let sums = words
             .into_iter()

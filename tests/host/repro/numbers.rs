@@ -184,8 +184,8 @@ const PLANTED: [(&str, &str, &str); 19] = [
     // Another list, the other pipeline, another size.
     (
         "pfeuti-tables-4-1-to-4-5",
-        "media:pipeline(points=halton,photons=512,side=128)\" }, thesis = 163",
-        "media:pipeline(points=random,photons=512,side=128)\" }, thesis = 163",
+        "media:pipeline(points=halton,photons=512,side=*)\" }, thesis = 163",
+        "media:pipeline(points=random,photons=512,side=*)\" }, thesis = 163",
     ),
     (
         "pfeuti-tables-4-1-to-4-5",
@@ -194,8 +194,8 @@ const PLANTED: [(&str, &str, &str); 19] = [
     ),
     (
         "pfeuti-tables-4-1-to-4-5",
-        "(photons=512,side=128)\" }, thesis = 109",
-        "(photons=256,side=128)\" }, thesis = 109",
+        "(photons=512,side=*)\" }, thesis = 109",
+        "(photons=256,side=*)\" }, thesis = 109",
     ),
 ];
 

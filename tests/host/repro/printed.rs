@@ -384,7 +384,7 @@ impl<'e> Place<'e> {
         let label = self.of.get("integrator")?;
         let is_adaptive = label.contains("mode=adaptive");
         let size = if is_adaptive { "photons=256," } else { "photons=512," };
-        if !label.contains(size) || !label.contains("side=128") {
+        if !label.contains(size) || !label.contains("side=*") {
             return None;
         }
         if self.expect.id == "table-4-1" {
