@@ -4,7 +4,7 @@
 use super::printed::Place;
 use super::{digest, theses};
 use raystone::config::expect::{Compare, Expect, Thesis};
-use raystone::measure::figure::figure;
+use raystone::measure::figure::FIGURES;
 use raystone::repro::SOURCES;
 use std::collections::BTreeSet;
 
@@ -30,6 +30,15 @@ fn rounding(expect: &Expect, ours: f64, value: f64) -> f64 {
     0.51 * 10f64.powi(-(digits as i32))
 }
 
+/// The unit of a figure, of the table or of a measurement.
+fn unit_of(id: &str) -> String {
+    let registries = raystone::registries();
+    let figures = registries.measurements.figures();
+    let mut all = FIGURES.iter().copied().chain(figures);
+    let found = all.find(|figure| figure.id == id);
+    found.map_or_else(String::new, |figure| figure.unit.to_string())
+}
+
 /// Faults in a file's numbers, and how many were compared with the digest.
 fn faults(name: &str, thesis: &Thesis, text: &str) -> (Vec<String>, usize) {
     let mut faults = Vec::new();
@@ -52,7 +61,7 @@ fn faults(name: &str, thesis: &Thesis, text: &str) -> (Vec<String>, usize) {
             }
             let unit = UNITS.iter().find(|(column, _)| *column == place.column());
             let own = if expect.unit.is_empty() {
-                figure(&expect.figure).unit.to_string()
+                unit_of(&expect.figure)
             } else {
                 expect.unit.clone()
             };

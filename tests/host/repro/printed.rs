@@ -383,14 +383,21 @@ impl<'e> Place<'e> {
     fn pfeuti(&self, text: &str) -> Option<(String, f64)> {
         let label = self.of.get("integrator")?;
         let is_adaptive = label.contains("mode=adaptive");
-        let size = if is_adaptive { "photons=256," } else { "photons=512," };
+        let size = if is_adaptive {
+            "photons=256,"
+        } else {
+            "photons=512,"
+        };
         if !label.contains(size) || !label.contains("side=*") {
             return None;
         }
         if self.expect.id == "table-4-1" {
             let column = label.contains("order=column");
             let order = if column { "column" } else { "row" };
-            let row = match label.split(['(', ',']).find(|part| part.starts_with("points=")) {
+            let row = match label
+                .split(['(', ','])
+                .find(|part| part.starts_with("points="))
+            {
                 None => "Hammersley".to_owned(),
                 Some("points=halton") => "Halton".to_owned(),
                 Some("points=random") => "Random".to_owned(),
