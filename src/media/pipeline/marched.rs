@@ -61,13 +61,13 @@ pub(super) struct Marched {
 }
 
 impl Marched {
-    /// Records photons to a grid.
+    /// Records photons to a grid; if `general`, σ is read where it is known to be the same, too.
     ///
     /// # Errors
     /// They carry no power, an array exceeds what the adapter binds, or a kernel does not compile.
     pub(super) fn record(
         gpu: &Gpu,
-        medium: &Medium,
+        (medium, general): (&Medium, bool),
         adding: Adding,
         photons: &[Photon],
         counting: Counting,
@@ -106,7 +106,8 @@ impl Marched {
             .buffer("status", &status);
         let mut kernel = Composition::new("media/photons")
             .with("structure", medium.structure.module())
-            .feature("coarse", cells > 0);
+            .feature("coarse", cells > 0)
+            .feature("general", general);
         let mut passes = Recording::new();
         passes.clear(&status);
         scatter.record_before(&mut passes);

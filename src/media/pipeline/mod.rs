@@ -110,6 +110,7 @@ pub struct Pipeline {
     points: Vec<([f64; 2], f64)>,
     adaptive: Option<Adaptive>,
     smoothing: Smoothing,
+    general: bool,
     view: Vec<ViewRay>,
     grid: Option<Grid>,
     view_passes: Recording,
@@ -152,6 +153,7 @@ impl Pipeline {
             points,
             adaptive: None,
             smoothing: Smoothing::default(),
+            general: false,
             view: Vec::new(),
             grid: None,
             view_passes: Recording::new(),
@@ -181,6 +183,12 @@ impl Pipeline {
     /// Another way to smooth the grid of radiance: photons run again, since some count what crosses a voxel.
     pub fn set_smoothing(&mut self, smoothing: Smoothing) {
         self.smoothing = smoothing;
+        self.touch(Dirty::Photons);
+    }
+
+    /// Whether σ is read where it is known to be the same, too: what generality costs. Photons run again.
+    pub fn set_general(&mut self, general: bool) {
+        self.general = general;
         self.touch(Dirty::Photons);
     }
 
@@ -307,7 +315,13 @@ impl Pipeline {
         } else {
             Counting::None
         };
-        let marched = Marched::record(&gpu, &self.medium, self.adding, &photons, counting)?;
+        let marched = Marched::record(
+            &gpu,
+            (&self.medium, self.general),
+            self.adding,
+            &photons,
+            counting,
+        )?;
         let played = self.play(&marched.passes, passes)?;
         let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let smooth = match self.smoothing.filter {
@@ -349,7 +363,13 @@ impl Pipeline {
         // Their grid is small, so that a strategy of few collisions would count for little.
         let adding = Adding::new(Strategy::Fixed64, 0);
         let gpu = self.player.gpu();
-        let marched = Marched::record(gpu, &self.medium, adding, &photons, counting)?;
+        let marched = Marched::record(
+            gpu,
+            (&self.medium, self.general),
+            adding,
+            &photons,
+            counting,
+        )?;
         let played = self.play(&marched.passes, passes)?;
         marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let radiance: Vec<[f32; 8]> = self.downloaded(&marched.scatter.radiance)?;
@@ -425,8 +445,9 @@ impl Pipeline {
             .buffer("radiance", grid.gathered())
             .buffer("image", &image)
             .buffer("status", &status);
-        let kernel =
-            Composition::new("media/gather").with("structure", self.medium.structure.module());
+        let kernel = Composition::new("media/gather")
+            .with("structure", self.medium.structure.module())
+            .feature("general", self.general);
         let mut recording = Recording::new();
         recording
             .clear(&status)

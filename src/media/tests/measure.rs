@@ -123,7 +123,7 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
 }
 
 /// File, text, its replacement, strategy: faults of the kernels that a run has to see.
-const FAULTS: [(&str, &str, &str, &str); 20] = [
+const FAULTS: [(&str, &str, &str, &str); 22] = [
     // Transmittance that is lost, and energy as if the way began at its end.
     ("photons", "through *= exp(-depth);", "", "fixed-64"),
     ("photons", "way * mean_transmittance(depth)", "way", "swap"),
@@ -181,6 +181,19 @@ const FAULTS: [(&str, &str, &str, &str); 20] = [
         "energy, photon[2].xyz",
         "energy, -photon[2].xyz",
         "fixed-32",
+    ),
+    // A region that is kept beyond its border, and one whose least σ stands for all.
+    (
+        "gather",
+        "if (!is_in(walk, region)) {",
+        "if (false) {",
+        "fixed-64\"\ncontent = \"shadow",
+    ),
+    (
+        "photons",
+        "return region.sigma.x == region.sigma.y;",
+        "return true;",
+        "fixed-64\"\ncontent = \"cloud",
     ),
     // The phase function's sign, and its other half.
     (
@@ -336,6 +349,7 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
     let folder = tempfile::tempdir().unwrap();
     let all = [
         "photons = 48\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
+        "photons = 48\ngeneral = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",
     ];

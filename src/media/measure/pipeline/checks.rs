@@ -9,8 +9,9 @@ use crate::tracking::{Light, albedo, single_scattering};
 use crate::{Medium, Volume};
 use glam::{DVec3, Vec3};
 
-/// Intervals of the quadrature along a ray.
+/// Intervals of the quadrature along a ray in a uniform medium; in others so many for each voxel along an axis.
 const STEPS: u32 = 512;
+const STEPS_PER_VOXEL: u32 = 4;
 /// A voxel's sum of floats may be off by the rounding of each of its additions.
 const FLOAT: f64 = 1.2e-7;
 /// Of each deposit: its exponential, its products.
@@ -76,6 +77,10 @@ pub(super) fn truth_of(
 ) -> Vec<f64> {
     use rayon::prelude::*;
     let fields = Fields::new(medium);
+    let steps = match fields.uniform {
+        Some(_) => STEPS,
+        None => (STEPS_PER_VOXEL * medium.resolution.max_element()).clamp(64, STEPS),
+    };
     let sigma = |x: DVec3| medium.exact_at(medium.in_voxels(x))[1];
     let depth = |a: DVec3, b: DVec3| fields.depth_between(volume, a, b);
     let radiance = |(origin, direction): &(DVec3, DVec3)| {
@@ -87,7 +92,7 @@ pub(super) fn truth_of(
             background: 0.0,
         };
         // A ray beside the medium sees nothing.
-        single_scattering(volume, &light, STEPS, sigma, depth).unwrap_or(0.0)
+        single_scattering(volume, &light, steps, sigma, depth).unwrap_or(0.0)
     };
     rays.par_iter().map(radiance).collect()
 }

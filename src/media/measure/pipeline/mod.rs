@@ -94,6 +94,8 @@ parameters! {
         least: u32 = 1, in 1..=1000;
         /// weight for which the weight filter is a level wider; an even photon has 1
         weight_step: f64 = 1.0, in 0.01..=1000.0;
+        /// true to read σ even where it is known to be the same: what generality costs
+        general: bool = false;
     }
 }
 

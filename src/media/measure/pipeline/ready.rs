@@ -66,6 +66,7 @@ impl Ready {
         // Before points: those few find too little for a map.
         pipeline.set_points(load.points(load.photons, seed)?);
         pipeline.set_smoothing(load.smoothing());
+        pipeline.set_general(load.general);
         ran("other points", &pipeline.render()?, true)?;
         pipeline.set_adaptive(adaptive);
         let rendered = pipeline.render()?;
