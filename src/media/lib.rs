@@ -5,6 +5,7 @@
 //! ([`walk`]). `docs/media.md` explains the contract and what is measured.
 #![warn(missing_docs)]
 
+pub mod adaptive;
 mod error;
 pub mod files;
 pub mod march;

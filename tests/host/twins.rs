@@ -268,6 +268,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "reads what was drawn; tests/images/primary_visibility.rs compares it with rays",
     ),
     (
+        "media/adaptive/",
+        "judged in f64 by every run of media:pipeline (src/media/measure/pipeline/checks.rs), whose faults src/media/tests/measure.rs plants",
+    ),
+    (
         "media/scatter/",
         "judged by sums in f64 in src/media/tests/scatter.rs",
     ),

@@ -10,6 +10,7 @@ mod points;
 mod warp;
 
 pub use count::{cell_deviation, collisions, density_deviation, segments_of_32};
+pub(crate) use order::cell_of;
 pub use order::{Order, ordered};
 pub use points::{Points, point_set};
 pub use warp::{ImportanceMap, Warp};

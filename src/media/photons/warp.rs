@@ -56,6 +56,11 @@ impl ImportanceMap {
         self.share[cell(x) + self.side * cell(y)] * self.share.len() as f64
     }
 
+    /// The greatest density, relative to that of the uniform square.
+    pub fn greatest(&self) -> f64 {
+        self.share.iter().fold(0.0, |a: f64, b| a.max(*b)) * self.share.len() as f64
+    }
+
     /// The point to which a way of warping takes a point.
     pub fn warped(&self, warp: Warp, at: [f64; 2]) -> [f64; 2] {
         match warp {

@@ -37,16 +37,26 @@ pub struct Photon {
     pub direction: Vec3,
     /// Power in red, green and blue.
     pub energy: Vec3,
+    /// The point of the light's square that it comes from.
+    pub point: [f64; 2],
+    /// One over the density of points there, relative to even ones.
+    pub weight: f64,
 }
 
 impl Photon {
-    pub(super) fn words(&self) -> [[f32; 4]; 4] {
+    /// The cell of a map of the light's square that it comes from.
+    pub(crate) fn cell_of(&self, map: u32) -> [u32; 2] {
+        self.point.map(|c| crate::photons::cell_of(c, map))
+    }
+
+    /// The words that the kernel reads; `marks` is what it counts of the photon.
+    pub(super) fn words(&self, marks: [f32; 2]) -> [[f32; 4]; 4] {
         let ray = &self.ray.ray;
         let vector = |v: Vec3, last: f32| [v.x, v.y, v.z, last];
         [
             vector(ray.origin, self.ray.to),
-            vector(ray.direction, 0.0),
-            vector(self.direction, 0.0),
+            vector(ray.direction, marks[0]),
+            vector(self.direction, marks[1]),
             vector(self.energy, 0.0),
         ]
     }
@@ -140,6 +150,8 @@ pub fn photons(
             ray,
             direction: direction.as_vec3(),
             energy: (energy / (count * density)).as_vec3(),
+            point: [*u, *v],
+            weight: 1.0 / density,
         })
     };
     Ok(points.iter().filter_map(photon).collect())

@@ -2,15 +2,21 @@
 //! rays of a view (the reference pipeline of Pfeuti 2009). Kernels: `kernels/media/photons.wesl`, `kernels/media/gather.wesl`
 //! and those of [`crate::scatter`].
 
+mod left;
 mod light;
+mod marched;
+pub(crate) mod oracle;
 
 pub use light::{Photon, Source, photons};
 
+use crate::adaptive::{Adaptive, Filter, Pilots, Smoother, Smoothing, importance};
+use crate::photons::{ImportanceMap, Points, point_set};
 use crate::rays::SegmentRay;
-use crate::scatter::{Adding, Scatter, ScatterError, Tallies};
+use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
 use crate::tracking::{TrackingError, albedo};
 use crate::{Bounds, Medium, Phase, Volume};
 use glam::{DVec3, Vec3};
+use marched::{Counting, Marched};
 use raystone_gpu::{
     Bindings, Composition, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues,
     groups_for,
@@ -31,6 +37,9 @@ pub enum PipelineError {
     /// Energy cannot be added.
     #[error(transparent)]
     Scatter(#[from] ScatterError),
+    /// A number of the map of importance is not allowed.
+    #[error("{0}")]
+    Importance(String),
     /// A kernel does not run.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -49,10 +58,46 @@ type ViewRay = Option<[[f32; 4]; 3]>;
 
 /// What photons leave for the view.
 struct Grid {
-    scatter: Scatter,
+    marched: Marched,
     tallies: Tallies,
     photons: Vec<Photon>,
+    /// The smooth grid with its passes, if there is one.
+    smooth: Option<(Smoother, Recording)>,
+    /// Of an adaptive pipeline.
+    pilots: Option<Piloted>,
+}
+
+/// What pilots leave for photons.
+struct Piloted {
+    photons: Vec<Photon>,
+    cells: Vec<Pilots>,
+    map: ImportanceMap,
     passes: Recording,
+}
+
+impl Grid {
+    /// What the view gathers.
+    fn gathered(&self) -> &Storage {
+        match &self.smooth {
+            Some((smoother, _)) => &smoother.smoothed,
+            None => &self.marched.scatter.radiance,
+        }
+    }
+}
+
+/// Passes that can be timed on their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Pilots to their grid.
+    Pilots,
+    /// Photons to the grid of radiance.
+    Photons,
+    /// That to a smooth one.
+    Smooth,
+    /// The grid to the image.
+    View,
+    /// All of them, one after the other.
+    All,
 }
 
 /// The passes with what they leave for each other.
@@ -63,6 +108,9 @@ pub struct Pipeline {
     adding: Adding,
     source: Source,
     points: Vec<([f64; 2], f64)>,
+    adaptive: Option<Adaptive>,
+    smoothing: Smoothing,
+    general: bool,
     view: Vec<ViewRay>,
     grid: Option<Grid>,
     view_passes: Recording,
@@ -103,6 +151,9 @@ impl Pipeline {
             adding,
             source,
             points,
+            adaptive: None,
+            smoothing: Smoothing::default(),
+            general: false,
             view: Vec::new(),
             grid: None,
             view_passes: Recording::new(),
@@ -120,6 +171,24 @@ impl Pipeline {
     /// Other points of the light's square: photons run again.
     pub fn set_points(&mut self, points: Vec<([f64; 2], f64)>) {
         self.points = points;
+        self.touch(Dirty::Photons);
+    }
+
+    /// Points by a map of importance from pilots, or as they are: photons run again.
+    pub fn set_adaptive(&mut self, adaptive: Option<Adaptive>) {
+        self.adaptive = adaptive;
+        self.touch(Dirty::Photons);
+    }
+
+    /// Another way to smooth the grid of radiance: photons run again, since some count what crosses a voxel.
+    pub fn set_smoothing(&mut self, smoothing: Smoothing) {
+        self.smoothing = smoothing;
+        self.touch(Dirty::Photons);
+    }
+
+    /// Whether σ is read where it is known to be the same, too: what generality costs. Photons run again.
+    pub fn set_general(&mut self, general: bool) {
+        self.general = general;
         self.touch(Dirty::Photons);
     }
 
@@ -160,33 +229,10 @@ impl Pipeline {
         self.dirty = self.dirty.min(dirty);
     }
 
-    /// The photons of the last image that ran them.
-    pub fn photons(&self) -> &[Photon] {
-        self.grid.as_ref().map_or(&[], |grid| &grid.photons)
-    }
-
-    /// The grid of radiance: six sums for each voxel, as [`crate::scatter::scatter_list`] returns them.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn radiance(&self) -> Result<Vec<[f32; 6]>, PipelineError> {
-        let Some(grid) = &self.grid else {
-            return Ok(Vec::new());
-        };
-        let mut recording = Recording::new();
-        recording.download("radiance", &grid.scatter.radiance);
-        let played = self.player.play(&recording)?;
-        let words = played.download::<[f32; 8]>("radiance")?;
-        let sums = words
-            .iter()
-            .take(self.medium.field.len())
-            .map(|[r, g, b, _, x, y, z, _]| [*r, *g, *b, *x, *y, *z]);
-        Ok(sums.collect())
-    }
-
-    /// Bytes of what photons write to and what is made of it, without the grid of sums.
-    pub fn bytes(&self) -> u64 {
-        self.grid.as_ref().map_or(0, |grid| grid.scatter.bytes())
+    /// Forgets that something changed: a fault that tests plant.
+    #[cfg(test)]
+    pub(crate) fn forget(&mut self) {
+        self.dirty = Dirty::Nothing;
     }
 
     /// Runs the passes whose input changed, and returns the image.
@@ -214,64 +260,165 @@ impl Pipeline {
         })
     }
 
-    /// Plays the passes of photons once more, or those of the view, for their time alone.
+    /// Plays passes once more, for their time alone.
     ///
     /// # Errors
     /// The device fails.
-    pub fn replay(&self, view: bool) -> Result<Elapsed, GpuError> {
-        let passes = match &self.grid {
-            Some(grid) if !view => &grid.passes,
-            _ => &self.view_passes,
-        };
-        Ok(self.play(passes, &mut Vec::new())?.elapsed())
+    pub fn replay(&self, part: Part) -> Result<Elapsed, GpuError> {
+        let all = [Part::Pilots, Part::Photons, Part::Smooth, Part::View];
+        let mut sum = Elapsed::default();
+        for (place, part) in all
+            .into_iter()
+            .filter(|one| part == *one || part == Part::All)
+            .filter_map(|part| self.passes_of(part))
+            .enumerate()
+        {
+            let elapsed = self.play(part, &mut Vec::new())?.elapsed();
+            if place == 0 {
+                sum = elapsed;
+            } else {
+                sum += elapsed;
+            }
+        }
+        Ok(sum)
     }
 
-    /// Photons to the grid of radiance.
+    /// The passes of one kind, if they are there.
+    fn passes_of(&self, part: Part) -> Option<&Recording> {
+        let grid = self.grid.as_ref()?;
+        match part {
+            Part::Photons => Some(&grid.marched.passes),
+            Part::Pilots => grid.pilots.as_ref().map(|pilots| &pilots.passes),
+            Part::Smooth => grid.smooth.as_ref().map(|(_, passes)| passes),
+            Part::View => Some(&self.view_passes),
+            Part::All => None,
+        }
+    }
+
+    /// Photons to the grid of radiance, after pilots where there are any; and to the smooth grid.
     fn run_photons(&mut self, passes: &mut Vec<String>) -> Result<Elapsed, PipelineError> {
         let gpu = self.player.gpu().clone();
-        let photons = photons((&self.volume, &self.medium), &self.source, &self.points)?;
-        let brightest = photons.iter().map(|p| p.energy.max_element());
-        let brightest = brightest.fold(0.0, f32::max);
-        if photons.is_empty() || brightest <= 0.0 {
-            return Err(PipelineError::Dark(self.points.len()));
-        }
-        // No way through a voxel is longer than its diagonal; rounding may make it a little so.
-        let longest = self.medium.size_of_voxel().length() * 1.001;
-        let cells = self.medium.field.len() as u32;
-        let scatter = Scatter::new(&gpu, self.adding, cells, brightest * longest as f32)?;
-        let words: Vec<_> = photons.iter().map(Photon::words).collect();
-        let status = Storage::scratch("status", 64);
-        let mut bindings = self.medium.bindings(&gpu)?;
-        scatter.bind(&mut bindings);
-        let count = photons.len() as u32;
-        bindings
-            .uniform("photons", UniformValues::new().u32("count", count))
-            .buffer("list", &gpu.storage("photons", &words)?)
-            .buffer("status", &status);
-        let kernel =
-            Composition::new("media/photons").with("structure", self.medium.structure.module());
-        let pipeline = gpu.pipeline(&scatter.compose(kernel), true)?;
-        let mut recording = Recording::new();
-        recording.clear(&status);
-        scatter.record_before(&mut recording);
-        recording.run("photons", &pipeline, &bindings, groups_for(count));
-        scatter.record_after(&mut recording);
-        recording.download("status", &status);
-        let played = self.play(&recording, passes)?;
-        let tallies = scatter.checked(scatter.tallies(&played)?)?;
+        let (points, pilots) = match self.adaptive {
+            None => (self.points.clone(), None),
+            Some(adaptive) => {
+                let piloted = self.run_pilots(&adaptive, passes)?;
+                let warped = |(point, density): &([f64; 2], f64)| {
+                    let at = piloted.map.warped(adaptive.warp, *point);
+                    (at, piloted.map.density(at) * density)
+                };
+                (self.points.iter().map(warped).collect(), Some(piloted))
+            }
+        };
+        let photons = self.photons_of(&points)?;
+        let counting = if self.smoothing.filter.counts() {
+            Counting::Weights
+        } else {
+            Counting::None
+        };
+        let marched = Marched::record(
+            &gpu,
+            (&self.medium, self.general),
+            self.adding,
+            &photons,
+            counting,
+        )?;
+        let played = self.play(&marched.passes, passes)?;
+        let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
+        let smooth = match self.smoothing.filter {
+            Filter::None => None,
+            _ => Some(self.run_smooth(&marched, passes)?),
+        };
         self.grid = Some(Grid {
-            scatter,
+            marched,
             tallies,
             photons,
-            passes: recording,
+            smooth,
+            pilots,
         });
         Ok(played.elapsed())
+    }
+
+    fn photons_of(&self, points: &[([f64; 2], f64)]) -> Result<Vec<Photon>, PipelineError> {
+        let found = photons((&self.volume, &self.medium), &self.source, points)?;
+        if found.is_empty() {
+            return Err(PipelineError::Dark(points.len()));
+        }
+        Ok(found)
+    }
+
+    /// Pilots to a coarse grid, and the map of importance that follows.
+    fn run_pilots(
+        &self,
+        adaptive: &Adaptive,
+        passes: &mut Vec<String>,
+    ) -> Result<Piloted, PipelineError> {
+        let points = point_set(Points::Jitter, adaptive.pilots, adaptive.seed);
+        let points = points.map_err(PipelineError::Importance)?;
+        let points: Vec<_> = points.into_iter().map(|point| (point, 1.0)).collect();
+        let photons = self.photons_of(&points)?;
+        let counting = Counting::Origins {
+            cells: adaptive.cells,
+            map: adaptive.pilots,
+        };
+        // Their grid is small, so that a strategy of few collisions would count for little.
+        let adding = Adding::new(Strategy::Fixed64, 0);
+        let gpu = self.player.gpu();
+        let marched = Marched::record(
+            gpu,
+            (&self.medium, self.general),
+            adding,
+            &photons,
+            counting,
+        )?;
+        let played = self.play(&marched.passes, passes)?;
+        marched.scatter.checked(marched.scatter.tallies(&played)?)?;
+        let radiance: Vec<[f32; 8]> = self.downloaded(&marched.scatter.radiance)?;
+        let counts: Vec<[u32; 5]> = match &marched.counts {
+            Some(counts) => self.downloaded(counts)?,
+            None => Vec::new(),
+        };
+        let cell = |([count, x, y, xx, yy], sums): ([u32; 5], [f32; 8])| Pilots {
+            count,
+            sum: [x, y],
+            squares: [xx, yy],
+            radiance: sums[..3].iter().map(|v| f64::from(*v)).sum(),
+        };
+        let cells: Vec<Pilots> = counts.into_iter().zip(radiance).map(cell).collect();
+        let map = importance(adaptive, &cells).map_err(PipelineError::Importance)?;
+        Ok(Piloted {
+            photons,
+            cells,
+            map,
+            passes: marched.passes,
+        })
+    }
+
+    /// The grid of radiance to a smooth one.
+    fn run_smooth(
+        &self,
+        marched: &Marched,
+        passes: &mut Vec<String>,
+    ) -> Result<(Smoother, Recording), PipelineError> {
+        let status = Storage::scratch("status", 64);
+        let mut recording = Recording::new();
+        recording.clear(&status);
+        let smoother = Smoother::record(
+            self.player.gpu(),
+            &mut recording,
+            self.medium.resolution,
+            &self.smoothing,
+            &marched.scatter.radiance,
+            marched.counts.as_ref().map(|counts| (counts, marched.unit)),
+        )?;
+        recording.download("status", &status);
+        self.play(&recording, passes)?;
+        Ok((smoother, recording))
     }
 
     /// The grid of radiance to the image.
     fn run_view(&mut self, passes: &mut Vec<String>) -> Result<Elapsed, PipelineError> {
         let gpu = self.player.gpu().clone();
-        let Some(Grid { scatter, .. }) = &self.grid else {
+        let Some(grid) = &self.grid else {
             return Err(PipelineError::Dark(self.points.len()));
         };
         let rays: Vec<[[f32; 4]; 3]> = self.view.iter().flatten().copied().collect();
@@ -295,11 +442,12 @@ impl Pipeline {
         bindings
             .uniform("gather", values)
             .buffer("rays", &gpu.storage("rays", &rays)?)
-            .buffer("radiance", &scatter.radiance)
+            .buffer("radiance", grid.gathered())
             .buffer("image", &image)
             .buffer("status", &status);
-        let kernel =
-            Composition::new("media/gather").with("structure", self.medium.structure.module());
+        let kernel = Composition::new("media/gather")
+            .with("structure", self.medium.structure.module())
+            .feature("general", self.general);
         let mut recording = Recording::new();
         recording
             .clear(&status)

@@ -357,7 +357,10 @@ fn faults_of_scatter_are_seen() {
 /// Of photons: text, its replacement.
 const PHOTONS: [(&str, &str); 5] = [
     // A voxel too far.
-    ("voxel_index(voxel)", "voxel_index(vec3<u32>(next.voxel))"),
+    (
+        "deposit(place_of(voxel)",
+        "deposit(place_of(vec3<u32>(next.voxel))",
+    ),
     ("through *= exp(-depth);", ""),
     ("way * mean_transmittance(depth)", "way"),
     ("energy, photon[2].xyz", "energy, photon[1].xyz"),

@@ -1,7 +1,7 @@
 //! The measurements in a run: planned, prepared, timed, written.
 
 use crate::register;
-use raystone_bench::run::{Registries, RunOptions, run};
+use raystone_bench::run::{Existing, Registries, RunOptions, run};
 use raystone_config::{Experiment, Plan};
 use raystone_record::{Line, MeasuredRecord, Recorded, all_of};
 
@@ -64,8 +64,8 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
     };
     let summary = run(&experiment, &plan, &registries, &options).unwrap();
     // A fixed step of 0 is refused.
-    assert_eq!((summary.failed, summary.skipped), (0, 1));
     let text = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
+    assert_eq!((summary.failed, summary.skipped), (0, 1), "{text}");
     let lines: Vec<Line> = text
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -120,4 +120,269 @@ fn an_experiment_of_media_needs_no_scene_and_leaves_its_figures() {
     }
     let whole = include_str!("../../../experiments/media.toml");
     assert!(parsed(whole).is_ok());
+}
+
+/// File, text, its replacement, strategy: faults of the kernels that a run has to see.
+const FAULTS: [(&str, &str, &str, &str); 22] = [
+    // Transmittance that is lost, and energy as if the way began at its end.
+    ("photons", "through *= exp(-depth);", "", "fixed-64"),
+    ("photons", "way * mean_transmittance(depth)", "way", "swap"),
+    // The last group left out, of photons and of rays.
+    (
+        "photons",
+        "i < photons.count",
+        "i + 64u < photons.count",
+        "tiles",
+    ),
+    (
+        "gather",
+        "i < gather.count",
+        "i + 64u < gather.count",
+        "fixed-64",
+    ),
+    // Twice the power.
+    (
+        "photons",
+        "photon[3].xyz * (through",
+        "photon[3].xyz * (2.0 * through",
+        "sort",
+    ),
+    // Two colours exchanged; one in the place of all.
+    (
+        "photons",
+        "energy, photon[2].xyz",
+        "energy.xzy, photon[2].xyz",
+        "fixed-64",
+    ),
+    (
+        "scatter/tallies",
+        "return energy[channel];",
+        "return energy[2u - channel];",
+        "swap",
+    ),
+    (
+        "gather",
+        "energy += weight * one[0].xyz",
+        "energy += weight * one[0].xxx",
+        "fixed-64",
+    ),
+    // A voxel too far; half a voxel beside; the place where a piece begins instead of its middle.
+    (
+        "photons",
+        "deposit(place_of(voxel)",
+        "deposit(place_of(vec3<u32>(next.voxel))",
+        "fixed-64",
+    ),
+    ("gather", "position - 0.5", "position", "fixed-64"),
+    ("gather", "(0.5 * (walk.t + stop))", "walk.t", "fixed-64"),
+    // Photons that go back where they came from.
+    (
+        "photons",
+        "energy, photon[2].xyz",
+        "energy, -photon[2].xyz",
+        "fixed-32",
+    ),
+    // A region that is kept beyond its border, and one whose least σ stands for all.
+    (
+        "gather",
+        "if (!is_in(walk, region)) {",
+        "if (false) {",
+        "fixed-64\"\ncontent = \"shadow",
+    ),
+    (
+        "photons",
+        "return region.sigma.x == region.sigma.y;",
+        "return true;",
+        "fixed-64\"\ncontent = \"cloud",
+    ),
+    // The phase function's sign, and its other half.
+    (
+        "gather",
+        "-dot(sums.direction",
+        "dot(sums.direction",
+        "fixed-64",
+    ),
+    (
+        "phase",
+        "1.0 + a * a - 2.0 * a * cosine",
+        "1.0 + a * a + 2.0 * a * cosine",
+        "fixed-64",
+    ),
+    // No transmittance up to the eye; no albedo; a voxel instead of a sum.
+    ("gather", "through *= after;", "", "fixed-64"),
+    ("gather", "* gather.albedo", "", "fixed-64"),
+    (
+        "gather",
+        "light += scattered(",
+        "light = scattered(",
+        "fixed-64",
+    ),
+    // Sums without their sign, of another scale, and with a lost carry.
+    (
+        "scatter/resolve",
+        "select(value, -value, negative)",
+        "value",
+        "fixed-64",
+    ),
+    (
+        "scatter/resolve",
+        "f32(low)) / scatter.units",
+        "f32(low)) / (2.0 * scatter.units)",
+        "tiles",
+    ),
+    (
+        "scatter/wide",
+        "select(carry, carry + 0xffffffffu, units < 0)",
+        "carry",
+        "fixed-64",
+    ),
+];
+
+/// The same of adaptive photons, with the filter that shows it.
+const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 14] = [
+    // Pilots in the wrong cells, counted for every voxel, from the wrong column, and without squares.
+    (
+        "photons",
+        "voxel * photons.cells / medium.resolution",
+        "voxel / photons.cells",
+        "none",
+    ),
+    ("photons", "place != counted_place", "true", "none"),
+    (
+        "adaptive/origins",
+        "counts[5u * place + 1u], at.x",
+        "counts[5u * place + 1u], at.y",
+        "none",
+    ),
+    ("adaptive/origins", "at.y * at.y", "at.y", "none"),
+    // Weights that are not added up, or cut off.
+    (
+        "adaptive/weights",
+        "marks.x * counting.units + 0.5",
+        "counting.units",
+        "both",
+    ),
+    (
+        "adaptive/weights",
+        "atomicAdd(&counts[2u * place], 1u)",
+        "atomicAdd(&counts[2u * place], 2u)",
+        "weight",
+    ),
+    // A pyramid from other taps, another place, with a mean over empty cells or without the last level.
+    (
+        "adaptive/mip",
+        "vec3<f32>(FAR), vec3<f32>(NEAR), inner",
+        "vec3<f32>(NEAR), vec3<f32>(FAR), inner",
+        "constant",
+    ),
+    (
+        "adaptive/mip",
+        "k & 3u, (k >> 2u) & 3u, k >> 4u)) - 1",
+        "k & 3u, (k >> 2u) & 3u, k >> 4u))",
+        "constant",
+    ),
+    ("adaptive/mip", "max(weights, 1.0)", "8.0", "weight"),
+    (
+        "adaptive/levels",
+        "+ ((1u << level) - 1u)) >>",
+        ") >>",
+        "surround",
+    ),
+    // Half a cell beside; levels by other rules; a blur of other taps.
+    (
+        "adaptive/smooth",
+        "/ f32(1u << level) - 0.5",
+        "/ f32(1u << level)",
+        "constant",
+    ),
+    (
+        "adaptive/smooth",
+        "counted(level, voxel).x < least",
+        "counted(level, voxel).x <= least",
+        "count",
+    ),
+    (
+        "adaptive/smooth",
+        "after <= before",
+        "after > before",
+        "surround",
+    ),
+    (
+        "adaptive/smooth",
+        "vec3<f32>(0.25), vec3<f32>(0.5)",
+        "vec3<f32>(0.5), vec3<f32>(0.25)",
+        "blur",
+    ),
+];
+
+/// A run of one pipeline with these kernels: how many cells failed, and why.
+fn pipeline_run(folder: &std::path::Path, kernels: &str, load: &str) -> (usize, String) {
+    let text = format!(
+        "[run]\nname = \"faults\"\n[axes]\nintegrator = [\"media:pipeline\"]\nkernels = [\"{kernels}\"]\n\
+         [[integrator.\"media:pipeline\"]]\nside = 12\n{load}\n\
+         [timing]\nrounds = 3\nmin_warmup_ms = 0\nmax_warmup_ms = 1\n"
+    );
+    let mut registries = Registries::default();
+    register(&mut registries).unwrap();
+    let experiment = Experiment::parse(&text, "test", &[], &registries.catalogue());
+    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
+    let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
+    let options = RunOptions {
+        out: folder.join("run"),
+        existing: Existing::Replace,
+        ..RunOptions::default()
+    };
+    let summary = run(&experiment, &plan, &registries, &options).unwrap();
+    let records = std::fs::read_to_string(options.out.join("records.jsonl")).unwrap();
+    let reasons = records
+        .lines()
+        .filter_map(|line| line.split_once("reason\":\"").map(|(_, rest)| rest))
+        .map(|rest| &rest[..rest.find("\",\"").unwrap_or(rest.len())]);
+    (summary.failed, reasons.collect::<Vec<_>>().join("; "))
+}
+
+#[test]
+fn a_fault_in_a_kernel_of_photons_fails_the_run() {
+    if super::segments::adapter().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let all = [
+        "photons = 48\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
+        "photons = 48\ngeneral = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
+        "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
+        "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",
+    ];
+    for load in all {
+        let (failed, reason) = pipeline_run(folder.path(), "", load);
+        assert_eq!(failed, 0, "{load} without a fault: {reason}");
+    }
+    let library = raystone_gpu::KernelLibrary::default();
+    let fixed = FAULTS.map(|(file, text, fault, strategy)| {
+        (
+            file,
+            text,
+            fault,
+            format!("photons = 48\nstrategy = \"{strategy}\""),
+        )
+    });
+    let adaptive = ADAPTIVE_FAULTS.map(|(file, text, fault, filter)| {
+        (
+            file,
+            text,
+            fault,
+            format!("photons = 16\nmode = \"adaptive\"\npilot_cells = 5\nfilter = \"{filter}\""),
+        )
+    });
+    for (k, (file, text, fault, load)) in fixed.into_iter().chain(adaptive).enumerate() {
+        let sound = library.text(&format!("media/{file}")).unwrap();
+        assert_eq!(sound.matches(text).count(), 1, "{file}: `{text}`");
+        let kernels = folder.path().join(format!("kernels-{k}"));
+        let path = kernels.join(format!("media/{file}.wesl"));
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, sound.replace(text, fault)).unwrap();
+        let (failed, reason) = pipeline_run(folder.path(), kernels.to_str().unwrap(), &load);
+        println!("{file}: `{text}` as `{fault}`: {reason}");
+        assert_eq!(failed, 1, "{file}: `{text}` as `{fault}` was not seen");
+    }
 }

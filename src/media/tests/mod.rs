@@ -1,11 +1,12 @@
 //! Tests of structures and walks: answers of every structure against the field, in f64, and against the device.
 
+mod adaptive;
 mod faults;
 mod march;
 mod measure;
 mod pipeline;
 mod scatter;
-mod segments;
+pub(crate) mod segments;
 mod tracking;
 
 use crate::medium::{Homogeneity, Key, Medium};

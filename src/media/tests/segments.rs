@@ -88,7 +88,7 @@ fn the_optical_depth_of_a_constant_medium_is_its_closed_form() {
 }
 
 /// An adapter that computes like the host; none says so.
-pub(super) fn adapter() -> Option<Gpu> {
+pub(crate) fn adapter() -> Option<Gpu> {
     let gpu = raystone_gpu::open(&AdapterChoice::Best, KernelLibrary::default());
     let gpu = gpu.unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"));
     let exact = probe_arithmetic(&gpu).unwrap().is_exact();

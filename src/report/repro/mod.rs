@@ -37,7 +37,7 @@ macro_rules! sources {
 }
 
 /// All experiments, in the order of the theses.
-pub static SOURCES: [Source; 19] = sources![
+pub static SOURCES: [Source; 20] = sources![
     "nilsson-table-5-2",
     "nilsson-table-5-3",
     "nilsson-table-5-4",
@@ -57,6 +57,7 @@ pub static SOURCES: [Source; 19] = sources![
     "roger-ray-hierarchy",
     "roger-specular",
     "roger-stream-reduction",
+    "pfeuti-tables-4-1-to-4-5",
 ];
 
 /// The list of untested parts, with reasons.

@@ -260,7 +260,7 @@ fn an_unknown_table_names_the_known_ones_and_one_that_is_not_yet_says_what_is_mi
         "{unknown}"
     );
     assert!(unknown.contains("nilsson-table-5-2"), "{unknown}");
-    let not_yet = ask("pfeuti-table-4-1").expect_err("not yet");
+    let not_yet = ask("pfeuti-table-4-4").expect_err("not yet");
     assert!(not_yet.contains("photon"), "{not_yet}");
 }
 

@@ -131,6 +131,7 @@ impl<'e> Place<'e> {
             "dufay-fig-5-14" => self.fit(text, "Halton"),
             "dufay-fig-5-15" => self.fit(text, "Hammersley"),
             "roger-stream-reduction" => self.roger(text),
+            "pfeuti-tables-4-1-to-4-5" => self.pfeuti(text),
             _ => None,
         }
     }
@@ -376,6 +377,48 @@ impl<'e> Place<'e> {
         let is_his = *self.of.get("sequence")? == format!("{}*", sequence.to_lowercase());
         let n = self.of.get("points").filter(|_| is_his)?;
         Some((n.clone(), k / n.parse::<f64>().ok()?.sqrt()))
+    }
+
+    /// Tables 4.1 (a list a row) and 4.2 (a pass a row, both pipelines), of the thesis's 512² photons and 128³ voxels.
+    fn pfeuti(&self, text: &str) -> Option<(String, f64)> {
+        let label = self.of.get("integrator")?;
+        let is_adaptive = label.contains("mode=adaptive");
+        let size = if is_adaptive {
+            "photons=256,"
+        } else {
+            "photons=512,"
+        };
+        if !label.contains(size) || !label.contains("side=*") {
+            return None;
+        }
+        if self.expect.id == "table-4-1" {
+            let column = label.contains("order=column");
+            let order = if column { "column" } else { "row" };
+            let row = match label
+                .split(['(', ','])
+                .find(|part| part.starts_with("points="))
+            {
+                None => "Hammersley".to_owned(),
+                Some("points=halton") => "Halton".to_owned(),
+                Some("points=random") => "Random".to_owned(),
+                Some("points=grid") => format!("Grid ({order} first)"),
+                Some("points=jitter") => format!("Jittering ({order} first)"),
+                Some(_) => return None,
+            };
+            let table = Printed::new(text, "### 3.3 E2");
+            let value = table.at(&[&row], "Photon marching")?;
+            return Some((row, value));
+        }
+        let row = match &*self.expect.figure {
+            "photon-pilots-ms/v1" => "Pilot photon marching",
+            "photon-march-ms/v1" => "Photon marching",
+            "photon-count/v1" => "Photon count",
+            _ => return None,
+        };
+        let column = if is_adaptive { "Adaptive" } else { "Reference" };
+        let table = Printed::new(text, "**Table 4.2, sphere**");
+        let value = (self.column() == column).then(|| table.at(&[row], column))??;
+        Some((row.to_owned(), value))
     }
 
     fn roger(&self, text: &str) -> Option<(String, f64)> {

@@ -1,0 +1,362 @@
+//! Photons to an image of fog, by one strategy of scatter: times, what is dropped, and the error against a quadrature.
+
+mod checks;
+mod ready;
+mod scene;
+#[cfg(test)]
+mod tests;
+
+use super::{cells_of, declare};
+use crate::adaptive::{Adaptive, Filter, Mode, Smoothing};
+use crate::photons::{Order, Points, Warp, ordered, point_set};
+use crate::pipeline::PipelineError;
+use crate::scatter::{ScatterError, Strategy};
+use crate::{Phase, phase};
+use glam::{DVec3, Vec3};
+use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
+use raystone_core::parameters;
+use raystone_core::params::Parameters as _;
+use raystone_record::figure::{Better, Figure, Shown, Spread};
+use ready::Ready;
+use scene::Scene;
+use std::rc::Rc;
+
+/// The name on the axis of integrators, after [`MEDIA`].
+const NAME: &str = "pipeline";
+/// Scattering and absorption of the fog.
+const FOG: [f32; 2] = [1.2, 0.3];
+/// The lamp.
+const LAMP: DVec3 = DVec3::new(0.3, 2.0, 0.4);
+const INTENSITY: Vec3 = Vec3::new(2.0, 1.6, 1.0);
+/// How the fog scatters.
+const PHASE: Phase = Phase {
+    kind: phase::HENYEY_GREENSTEIN,
+    anisotropy: 0.4,
+};
+/// Pixels along each axis of the image whose error is taken.
+const IMAGE: u32 = 32;
+/// Seconds of a deposit on a software adapter with two cores.
+const SECONDS_PER_DEPOSIT: f64 = 4e-8;
+/// Photons reach this many voxels for each along an axis, at most on average.
+const REACH: u32 = 3;
+
+parameters! {
+    /// What a lamp shines into.
+    enum Content {
+        /// fog that is the same everywhere
+        Fog = "fog",
+        /// a dense ball in fog, with its shadow
+        Shadow = "shadow",
+        /// a cloud in nothing
+        Cloud = "cloud",
+    }
+
+    /// photons of a lamp through a medium into a grid of radiance, evenly or by a map of importance, by one strategy of scatter, and an image of it (Pfeuti 2009)
+    struct Load {
+        /// how energy is added to the grid
+        strategy: Strategy = Strategy::Swap;
+        /// attempts to compare and swap; 0 for as many as it takes
+        attempts: u32 = 10, in 0..=1000;
+        /// what the lamp shines into
+        content: Content = Content::Fog;
+        /// points of the lamp's square
+        points: Points = Points::Hammersley;
+        /// order of the list of points
+        order: Order = Order::Natural;
+        /// photons along each axis of the square
+        photons: u32 = 128, in 8..=1024;
+        /// voxels along each axis
+        side: u32 = 32, in 2..=256;
+        /// how photons are spread over the square
+        mode: Mode = Mode::Reference;
+        /// pilots along each axis of the square and cells of the map: a power of two
+        pilots: u32 = 64, in 4..=256;
+        /// cells of the pilots' grid along each axis
+        pilot_cells: u32 = 16, in 2..=64;
+        /// share of lit cells that are sampled as edges: those with the greatest gradients
+        edges: f64 = 0.15, in 0.0..=1.0;
+        /// share of lit cells that are sampled as shadows: those with the least radiance
+        shadows: f64 = 0.05, in 0.0..=1.0;
+        /// what the map has everywhere beside the discs of these cells, each of height 1
+        background: f64 = 1.0, in 0.001..=1000.0;
+        /// greatest density of photons, relative to even ones; 0 for any
+        most_density: f64 = 0.0, in 0.0..=1000.0;
+        /// above 0, the complement of the map: what it leaves of so many times as many even photons
+        complement: f64 = 0.0, in 0.0..=1000.0;
+        /// how points follow the map
+        warp: Warp = Warp::Inversion;
+        /// how the grid is smoothed
+        filter: Filter = Filter::None;
+        /// level of the constant filter
+        level: u32 = 1, in 0..=6;
+        /// photons that a cell of the count filter has to hold
+        least: u32 = 1, in 1..=1000;
+        /// weight for which the weight filter is a level wider; an even photon has 1
+        weight_step: f64 = 1.0, in 0.01..=1000.0;
+        /// true to read σ even where it is known to be the same: what generality costs
+        general: bool = false;
+    }
+}
+
+impl Load {
+    fn adaptive(&self, seed: u64) -> Option<Adaptive> {
+        (self.mode == Mode::Adaptive).then_some(Adaptive {
+            pilots: self.pilots,
+            cells: self.pilot_cells,
+            edges: self.edges,
+            shadows: self.shadows,
+            background: self.background,
+            most_density: self.most_density,
+            complement: self.complement,
+            warp: self.warp,
+            seed,
+        })
+    }
+
+    fn smoothing(&self) -> Smoothing {
+        Smoothing {
+            filter: self.filter,
+            level: self.level,
+            least: self.least,
+            weight_step: self.weight_step,
+            ..Smoothing::default()
+        }
+    }
+
+    /// So many photons along each axis of the square, in the order of the list.
+    fn points(&self, photons: u32, seed: u64) -> Result<Vec<([f64; 2], f64)>, Absent> {
+        let set = point_set(self.points, photons, seed).map_err(Absent::Failed)?;
+        let set = ordered(set, self.order, photons, seed);
+        Ok(set.into_iter().map(|point| (point, 1.0)).collect())
+    }
+}
+
+static FIGURES: [Figure; 18] = [
+    Figure::new(
+        "scatter-deposit-ns/v1",
+        "photons to grid",
+        "ns per deposit",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "scatter-view-ns/v1",
+        "grid to image",
+        "ns per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "scatter-dropped/v1",
+        "energy dropped",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-retries/v1",
+        "retries",
+        "per deposit",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
+    Figure::new(
+        "scatter-rmse/v1",
+        "RMSE of the image, relative to its mean",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-bias/v1",
+        "mean error of the image, relative",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-bytes/v1",
+        "written by photons",
+        "",
+        Better::Lower,
+        Shown::Bytes,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-noise/v1",
+        "RMSE of the image from that of 2²⁰ photons, relative",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-count/v1",
+        "photons that meet the medium",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-pilots/v1",
+        "pilots that meet it",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-density/v1",
+        "greatest density of photons, relative to even ones",
+        "",
+        Better::Neither,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-equal/v1",
+        "photons for the error of the reference pipeline, as a part of its own",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-equal-all/v1",
+        "the same with pilots",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-pilots-ms/v1",
+        "pilots to their grid",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-smooth-ms/v1",
+        "grid to smooth grid",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-march-ms/v1",
+        "photons to grid",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-frame-ms/v1",
+        "all passes on the device",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Median,
+    ),
+    Figure::new(
+        "photon-conflicts/v1",
+        "retries of all deposits",
+        "",
+        Better::Lower,
+        Shown::Count,
+        Spread::Single,
+    ),
+];
+
+pub(super) struct Photons;
+
+impl Measurement for Photons {
+    fn name(&self) -> &'static str {
+        "media:pipeline"
+    }
+
+    fn plural(&self) -> &'static str {
+        "photon pipelines"
+    }
+
+    fn figures(&self) -> &'static [Figure] {
+        &FIGURES
+    }
+
+    fn declare(&self, catalogue: &mut Catalogue) {
+        declare::<Load>(catalogue, NAME, Load::ABOUT);
+    }
+
+    fn cells(&self, _: &Experiment, plan: &Plan) -> Vec<Cell> {
+        cells_of(plan, &[Axis::Integrator, Axis::Kernels], |name| {
+            name == NAME
+        })
+    }
+
+    fn unit_name(&self, cell: &Cell) -> String {
+        cell.to_string()
+    }
+
+    fn settings(&self, experiment: &Experiment, _: &str) -> String {
+        format!("{:?}", (experiment.run.seed, experiment.timing))
+    }
+
+    fn cost(&self, cell: &Cell, cost: &Cost) -> Work {
+        let load = Load::from_checked(&cell[Axis::Integrator].params);
+        let rays = load.photons * load.photons + IMAGE * IMAGE;
+        let deposits = f64::from(load.photons).powi(2) * f64::from(load.side);
+        let (kernels, runs) = match load.mode {
+            Mode::Reference => (3, 3.0),
+            Mode::Adaptive => (8, 30.0),
+        };
+        let seconds = 0.5 + runs * deposits * SECONDS_PER_DEPOSIT;
+        Work::kernels(kernels) + cost.timed(Work::rays(rays)) + Work::other(seconds)
+    }
+
+    fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
+        let mut scenes: Vec<Rc<Scene>> = Vec::new();
+        Box::new(cells.iter().map(move |cell| {
+            at.say(cell.to_string());
+            let load = Load::from_checked(&cell[Axis::Integrator].params);
+            let known = |scene: &&Rc<Scene>| scene.is_of(&load, &cell[Axis::Kernels].label);
+            let scene = match scenes.iter().find(known) {
+                Some(scene) => Rc::clone(scene),
+                None => {
+                    let scene = Rc::new(Scene::new(
+                        at.gpu(cell)?,
+                        &load,
+                        &cell[Axis::Kernels].label,
+                    )?);
+                    scenes.push(Rc::clone(&scene));
+                    scene
+                }
+            };
+            let ready = Ready::new(at, cell, &load, &scene)?;
+            Ok(Box::new(ready) as Box<dyn Prepared>)
+        }))
+    }
+}
+
+impl From<PipelineError> for Absent {
+    fn from(error: PipelineError) -> Self {
+        match error {
+            PipelineError::Gpu(error) | PipelineError::Scatter(ScatterError::Gpu(error)) => {
+                error.into()
+            }
+            // Not a fault of the strategy: the device or the load does not allow it.
+            PipelineError::Scatter(error) => Self::Refused(error.to_string()),
+            error => Self::Failed(error.to_string()),
+        }
+    }
+}

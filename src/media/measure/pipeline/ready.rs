@@ -1,0 +1,293 @@
+//! A pipeline that is fed, judged and timed.
+
+use super::checks::{Judge, Judged};
+use super::scene::{Scene, drawn, lamp};
+use super::{FIGURES, IMAGE, Load, PHASE, REACH};
+use crate::adaptive::{Filter, Smoothing};
+use crate::photons::Points;
+use crate::pipeline::{Part, Pipeline, PipelineError, Rendered, Source, camera};
+use crate::scatter::{Adding, Strategy, Tallies};
+use crate::{Medium, Phase, Volume};
+use glam::{DVec3, Vec3};
+use raystone_bench::run::{Absent, At, Prepared};
+use raystone_bench::timing::{Measured, Samples};
+use raystone_config::Cell;
+use raystone_gpu::{Elapsed, Gpu, GpuError};
+use raystone_image::Picture;
+use raystone_record::Reading;
+use std::rc::Rc;
+
+/// Steps of the search for the photons of an equal error: quarters of an octave of photons along an axis, from a quarter to twice.
+const LADDER: std::ops::RangeInclusive<i32> = -8..=4;
+
+/// Passes of one kind.
+struct Passes {
+    pipeline: Rc<Pipeline>,
+    part: Part,
+}
+
+impl Measured for Passes {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        self.pipeline.replay(self.part)
+    }
+}
+
+/// A pipeline that passed its checks.
+pub(super) struct Ready {
+    passes: Vec<Passes>,
+    picture: Option<Picture>,
+    bytes: f64,
+    tallies: Tallies,
+    judged: Judged,
+    noise: f64,
+    photons: usize,
+    pilots: Option<Piloted>,
+}
+
+/// What is told of pilots.
+struct Piloted {
+    photons: usize,
+    /// The greatest density of their map.
+    density: f64,
+    /// Photons of an equal error as a part of those of the reference; with pilots.
+    equal: [f64; 2],
+}
+
+impl Ready {
+    pub(super) fn new(at: &At, cell: &Cell, load: &Load, scene: &Scene) -> Result<Self, Absent> {
+        let gpu = at.gpu(cell)?;
+        let seed = u64::from(at.experiment.run.seed);
+        let medium = (&scene.volume, &scene.medium);
+        let adding = adding(load);
+        let source = lamp();
+        let mut pipeline = begun(gpu, medium, adding)?;
+        turn_to(&mut pipeline, source, &scene.rays)?;
+        let adaptive = load.adaptive(seed);
+        // Before points: those few find too little for a map.
+        pipeline.set_points(load.points(load.photons, seed)?);
+        pipeline.set_smoothing(load.smoothing());
+        pipeline.set_general(load.general);
+        ran("other points", &pipeline.render()?, true)?;
+        pipeline.set_adaptive(adaptive);
+        let rendered = pipeline.render()?;
+        ran("another importance", &rendered, true)?;
+        let judge = Judge {
+            volume: &scene.volume,
+            medium: &scene.medium,
+            source: &source,
+            rays: &scene.rays,
+            truth: &scene.truth,
+            side: load.side,
+            blur: load.content.blur(load.side),
+            even: load.points != Points::Random,
+            unit: pipeline.unit(),
+            smoothing: load.smoothing(),
+            adaptive,
+        };
+        let judged = judge.check(&pipeline, &rendered).map_err(Absent::Failed)?;
+        let photons = pipeline.photons().len();
+        let pilots = match pipeline.pilots() {
+            None => None,
+            Some((pilots, _, map)) => Some(Piloted {
+                photons: pilots.len(),
+                density: map.greatest(),
+                equal: equal(gpu, load, scene, seed)?,
+            }),
+        };
+        let bytes = pipeline.bytes() as f64;
+        let mut parts = vec![Part::Photons, Part::View, Part::All];
+        if pilots.is_some() {
+            parts.push(Part::Pilots);
+        }
+        if load.filter != Filter::None {
+            parts.push(Part::Smooth);
+        }
+        let pipeline = Rc::new(pipeline);
+        let passes = parts.into_iter().map(|part| Passes {
+            pipeline: Rc::clone(&pipeline),
+            part,
+        });
+        Ok(Self {
+            passes: passes.collect(),
+            picture: drawn(&rendered.image),
+            bytes,
+            tallies: rendered.tallies,
+            judged,
+            noise: scene.noise(&rendered.image),
+            photons,
+            pilots,
+        })
+    }
+}
+
+fn adding(load: &Load) -> Adding {
+    let capacity = load.photons * load.photons * load.side.saturating_mul(REACH) / 2;
+    Adding {
+        attempts: load.attempts,
+        ..Adding::new(load.strategy, capacity)
+    }
+}
+
+/// Photons that the adaptive pipeline needs for the error of the reference pipeline, which is smoothed by the thesis's blur: as a
+/// part of the reference's, without pilots and with them. The error is that from the image of many photons. Where four times as
+/// many are not enough, that.
+fn equal(gpu: &Gpu, load: &Load, scene: &Scene, seed: u64) -> Result<[f64; 2], Absent> {
+    let medium = (&scene.volume, &scene.medium);
+    let adding = Adding::new(Strategy::Fixed64, 0);
+    let points = load.points(load.photons, seed)?;
+    let mut pipeline = Pipeline::new(gpu, medium, adding, lamp(), points)?;
+    pipeline.set_view(&scene.rays);
+    pipeline.set_smoothing(Smoothing {
+        filter: Filter::Blur,
+        ..Smoothing::default()
+    });
+    let wanted = scene.noise(&pipeline.render()?.image);
+    let reference = pipeline.photons().len() as f64;
+    pipeline.set_smoothing(load.smoothing());
+    pipeline.set_adaptive(load.adaptive(seed));
+    let mut parts = [0.0; 2];
+    for step in LADDER {
+        let side = f64::from(load.photons) * (f64::from(step) / 4.0).exp2();
+        pipeline.set_points(load.points((side.round() as u32).max(1), seed)?);
+        let noise = scene.noise(&pipeline.render()?.image);
+        let photons = pipeline.photons().len() as f64;
+        let pilots = pipeline.pilots().map_or(0, |(pilots, ..)| pilots.len()) as f64;
+        parts = [photons, photons + pilots].map(|count| count / reference);
+        if noise <= wanted {
+            break;
+        }
+    }
+    Ok(parts)
+}
+
+/// A pipeline that has shown another light, of few points, by another phase function to another view.
+pub(super) fn begun(
+    gpu: &Gpu,
+    (volume, medium): (&Volume, &Medium),
+    adding: Adding,
+) -> Result<Pipeline, PipelineError> {
+    let beam = Source::Beam {
+        middle: DVec3::new(0.5, 0.5, -0.5),
+        direction: DVec3::Z,
+        half: 0.3,
+        power: Vec3::ONE,
+    };
+    let few = [[0.2, 0.3], [0.7, 0.6]].map(|point| (point, 1.0)).to_vec();
+    let mut of_volume = volume.clone();
+    of_volume.phase = Phase::ISOTROPIC;
+    let mut pipeline = Pipeline::new(gpu, (&of_volume, medium), adding, beam, few)?;
+    pipeline.set_view(&camera(
+        DVec3::new(0.5, 0.9, -2.0),
+        DVec3::splat(0.5),
+        0.2,
+        4,
+    ));
+    pipeline.render()?;
+    Ok(pipeline)
+}
+
+/// Changes light, phase function and view one after the other: each has to run its passes again, and no others.
+pub(super) fn turn_to(
+    pipeline: &mut Pipeline,
+    source: Source,
+    rays: &[(DVec3, DVec3)],
+) -> Result<(), Absent> {
+    pipeline.set_source(source);
+    ran("another light", &pipeline.render()?, true)?;
+    pipeline.set_phase(PHASE);
+    ran("another phase function", &pipeline.render()?, false)?;
+    pipeline.set_view(rays);
+    ran("another view", &pipeline.render()?, false)
+}
+
+/// Whether what ran after a change was the view, and the photons before it if they had to.
+pub(super) fn ran(change: &str, rendered: &Rendered, photons: bool) -> Result<(), Absent> {
+    let has = |name: &str| rendered.passes.iter().any(|pass| pass == name);
+    if has("gather") && has("photons") == photons {
+        return Ok(());
+    }
+    let wanted = if photons {
+        "photons and view"
+    } else {
+        "the view alone"
+    };
+    Err(Absent::Failed(format!(
+        "after {change} the passes {:?} ran, where {wanted} have to",
+        rendered.passes
+    )))
+}
+
+impl Prepared for Ready {
+    fn timed(&self) -> Vec<&dyn Measured> {
+        self.passes
+            .iter()
+            .map(|passes| passes as &dyn Measured)
+            .collect()
+    }
+
+    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
+        let [
+            deposit,
+            view,
+            dropped,
+            retries,
+            rmse,
+            bias,
+            bytes,
+            rest @ ..,
+        ] = &FIGURES;
+        let [
+            noise,
+            count,
+            pilots,
+            density,
+            equal,
+            equal_all,
+            pilots_ms,
+            smooth_ms,
+            photons_ms,
+            frame_ms,
+            conflicts,
+        ] = rest;
+        let deposits = self.tallies.deposits as f64;
+        let mut readings = vec![
+            Reading::exact(dropped, self.judged.dropped),
+            Reading::exact(retries, self.tallies.retries as f64 / deposits),
+            Reading::exact(rmse, self.judged.rmse),
+            Reading::exact(bias, self.judged.bias),
+            Reading::exact(bytes, self.bytes),
+            Reading::exact(noise, self.noise),
+            Reading::exact(count, self.photons as f64),
+            Reading::exact(conflicts, self.tallies.retries as f64),
+        ];
+        for (passes, samples) in self.passes.iter().zip(samples) {
+            // Nanoseconds to milliseconds.
+            let ms = |figure| samples.ns_per_item(figure, 1e6);
+            match passes.part {
+                Part::Photons => {
+                    readings.push(samples.ns_per_item(deposit, deposits)?);
+                    readings.push(ms(photons_ms)?);
+                }
+                Part::View => {
+                    readings.push(samples.ns_per_item(view, f64::from(IMAGE * IMAGE))?);
+                }
+                Part::Pilots => readings.push(ms(pilots_ms)?),
+                Part::Smooth => readings.push(ms(smooth_ms)?),
+                Part::All => readings.push(ms(frame_ms)?),
+            }
+        }
+        if let Some(of) = &self.pilots {
+            readings.extend([
+                Reading::exact(pilots, of.photons as f64),
+                Reading::exact(density, of.density),
+                Reading::exact(equal, of.equal[0]),
+                Reading::exact(equal_all, of.equal[1]),
+            ]);
+        }
+        Ok(readings)
+    }
+
+    fn picture(&self) -> Option<Picture> {
+        self.picture.clone()
+    }
+}

@@ -1,0 +1,144 @@
+//! What the lamp shines into, with the images that others are compared with.
+
+use super::checks::truth_of;
+use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
+use crate::adaptive::Smoothing;
+use crate::medium::{Homogeneity, Medium};
+use crate::photons::{Points, point_set};
+use crate::pipeline::{Pipeline, Source, camera};
+use crate::scatter::{Adding, Strategy};
+use crate::{MediaError, Volume, procedures, structure};
+use glam::{DVec3, Vec3};
+use raystone_bench::run::Absent;
+use raystone_gpu::Gpu;
+use raystone_image::{Image, Picture, automatic_exposure, tone_map};
+
+/// Pixels of the page along each axis of a pixel of the image.
+const ENLARGED: u32 = 6;
+/// The dense ball, and how many times as dense as the fog it is.
+const BALL: DVec3 = DVec3::new(0.45, 0.6, 0.5);
+const RADIUS: f64 = 0.15;
+const DENSE: f32 = 40.0;
+/// Photons along each axis of the image that has next to no noise.
+const MANY: u32 = 1024;
+
+impl Content {
+    fn volume(self, side: u32) -> Result<Volume, MediaError> {
+        let fog = |density: f32| [FOG[0] * density, FOG[1] * density, 1.0];
+        let mut volume = match self {
+            Self::Fog => Volume::new([side; 3], |_| fog(1.0)),
+            Self::Cloud => procedures::cloud(side),
+            Self::Shadow => Volume::new([side; 3], |p| {
+                // A border of one voxel.
+                let depth = (RADIUS - (p - BALL).length()) * f64::from(side) + 0.5;
+                fog(1.0 + (DENSE - 1.0) * depth.clamp(0.0, 1.0) as f32)
+            }),
+        }?;
+        volume.phase = PHASE;
+        Ok(volume)
+    }
+
+    /// What the grid blurs: RMSE of an image, relative, at most. It falls as the square of a voxel's side in fog, and as the
+    /// side where the medium has borders or details of any size.
+    pub(super) fn blur(self, side: u32) -> f64 {
+        let side = f64::from(side);
+        match self {
+            Self::Fog => 6.0 / (side * side),
+            Self::Cloud => 1.6 / side,
+            Self::Shadow => (8.0 / (side * side)).max(0.8 / side),
+        }
+    }
+}
+
+/// A medium under the lamp.
+pub(super) struct Scene {
+    content: Content,
+    side: u32,
+    kernels: String,
+    pub(super) volume: Volume,
+    pub(super) medium: Medium,
+    pub(super) rays: Vec<(DVec3, DVec3)>,
+    /// Radiance of each ray for an intensity of 1, by a quadrature.
+    pub(super) truth: Vec<f64>,
+    /// The image of 2²⁰ even photons, not smoothed.
+    pub(super) many: Vec<Vec3>,
+}
+
+impl Scene {
+    pub(super) fn is_of(&self, load: &Load, kernels: &str) -> bool {
+        self.content == load.content && self.side == load.side && self.kernels == kernels
+    }
+
+    /// The volume with a level map over it, and its images.
+    pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
+        let volume = load.content.volume(load.side)?;
+        let made = structure::registry()
+            .find("level-map")
+            .map(|kind| kind.make(&Default::default()));
+        let Some(Ok(structure)) = made else {
+            return Err(Absent::Failed("there is no level map".to_owned()));
+        };
+        let medium = Medium::new(&volume, structure, Homogeneity::default());
+        let rays = view();
+        let truth = truth_of(&volume, &medium, LAMP, &rays);
+        if truth.iter().all(|light| *light <= 0.0) {
+            let side = load.side;
+            return Err(Absent::Refused(format!(
+                "nothing scatters light in {side}³ voxels of this content: give more"
+            )));
+        }
+        let points = point_set(Points::Hammersley, MANY, 0).map_err(Absent::Failed)?;
+        let points = points.into_iter().map(|point| (point, 1.0)).collect();
+        let adding = Adding::new(Strategy::Fixed64, 0);
+        let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, lamp(), points)?;
+        pipeline.set_smoothing(Smoothing::default());
+        pipeline.set_view(&rays);
+        let many = pipeline.render()?.image;
+        Ok(Self {
+            content: load.content,
+            side: load.side,
+            kernels: kernels.to_owned(),
+            volume,
+            medium,
+            rays,
+            truth,
+            many,
+        })
+    }
+
+    /// RMSE of an image from that of many photons, as a part of its mean.
+    pub(super) fn noise(&self, image: &[Vec3]) -> f64 {
+        let (mut square, mut mean) = (0.0, 0.0);
+        for (found, exact) in image.iter().zip(&self.many) {
+            square += f64::from((*found - *exact).length_squared());
+            mean += f64::from(exact.element_sum());
+        }
+        let count = 3.0 * image.len() as f64;
+        (square / count).sqrt() * count / mean
+    }
+}
+
+/// The lamp, whose colours differ.
+pub(super) fn lamp() -> Source {
+    Source::Point {
+        position: LAMP,
+        intensity: INTENSITY,
+    }
+}
+
+/// Rays of the image.
+pub(super) fn view() -> Vec<(DVec3, DVec3)> {
+    camera(DVec3::new(0.6, 0.4, -1.6), DVec3::splat(0.5), 0.35, IMAGE)
+}
+
+/// The image as a picture, each pixel as a square; `None` without an image.
+pub(super) fn drawn(image: &[Vec3]) -> Option<Picture> {
+    let side = IMAGE * ENLARGED;
+    let pixel = |at: u32| {
+        let [x, y] = [at % side, at / side].map(|c| c / ENLARGED);
+        image[(y * IMAGE + x) as usize].to_array()
+    };
+    let pixels = (0..side * side).map(pixel).collect();
+    let image = Image::new(side, side, pixels).ok()?;
+    Some(tone_map(&image, automatic_exposure(&image)))
+}

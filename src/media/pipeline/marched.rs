@@ -1,0 +1,139 @@
+//! The pass of photons through a medium to a grid.
+
+use super::{Photon, PipelineError};
+use crate::Medium;
+use crate::scatter::{Adding, Scatter};
+use raystone_gpu::{Composition, Gpu, Recording, Storage, UniformValues, groups_for};
+
+/// What is counted of photons beside their energy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Counting {
+    /// Nothing.
+    None,
+    /// Of each voxel, photons and their weights.
+    Weights,
+    /// Of each of so many cells along an axis, photons and the cells of so large a map that they came from: pilots.
+    Origins {
+        /// Cells of the grid along each axis.
+        cells: u32,
+        /// Cells of the map along each axis.
+        map: u32,
+    },
+}
+
+impl Counting {
+    fn module(self) -> Option<&'static str> {
+        match self {
+            Self::None => None,
+            Self::Weights => Some("media/adaptive/weights"),
+            Self::Origins { .. } => Some("media/adaptive/origins"),
+        }
+    }
+
+    /// Words of a voxel or cell.
+    const fn words(self) -> u64 {
+        match self {
+            Self::None => 0,
+            Self::Weights => 2,
+            Self::Origins { .. } => 5,
+        }
+    }
+
+    /// What the kernel counts of a photon.
+    fn marks(self, photon: &Photon) -> [f32; 2] {
+        match self {
+            Self::Origins { map, .. } => photon.cell_of(map).map(|c| c as f32),
+            _ => [photon.weight as f32, 0.0],
+        }
+    }
+}
+
+/// Photons with what they leave.
+pub(super) struct Marched {
+    /// The grid.
+    pub(super) scatter: Scatter,
+    /// What was counted.
+    pub(super) counts: Option<Storage>,
+    /// Weight of a unit of the counted weights.
+    pub(super) unit: f64,
+    /// The passes, with their downloads.
+    pub(super) passes: Recording,
+}
+
+impl Marched {
+    /// Records photons to a grid; if `general`, σ is read where it is known to be the same, too.
+    ///
+    /// # Errors
+    /// They carry no power, an array exceeds what the adapter binds, or a kernel does not compile.
+    pub(super) fn record(
+        gpu: &Gpu,
+        (medium, general): (&Medium, bool),
+        adding: Adding,
+        photons: &[Photon],
+        counting: Counting,
+    ) -> Result<Self, PipelineError> {
+        let brightest = photons.iter().map(|p| p.energy.max_element());
+        let brightest = brightest.fold(0.0, f32::max);
+        if brightest <= 0.0 {
+            return Err(PipelineError::Dark(photons.len()));
+        }
+        // No way through a voxel is longer than its diagonal; rounding may make it a little so.
+        let longest = medium.size_of_voxel().length() * 1.001;
+        let places = match counting {
+            Counting::Origins { cells, .. } => cells.pow(3),
+            _ => medium.field.len() as u32,
+        };
+        let scatter = Scatter::new(gpu, adding, places, brightest * longest as f32)?;
+        // A power of two with which all weights together stay below 2³¹.
+        let all: f64 = photons.iter().map(|p| p.weight).sum();
+        let units = (30.0 - all.max(1.0).log2().ceil()).exp2();
+        let words: Vec<_> = photons
+            .iter()
+            .map(|photon| photon.words(counting.marks(photon)))
+            .collect();
+        let status = Storage::scratch("status", 64);
+        let mut bindings = medium.bindings(gpu)?;
+        scatter.bind(&mut bindings);
+        let count = photons.len() as u32;
+        let cells = match counting {
+            Counting::Origins { cells, .. } => cells,
+            _ => 0,
+        };
+        let values = UniformValues::new().u32("count", count).u32("cells", cells);
+        bindings
+            .uniform("photons", values)
+            .buffer("list", &gpu.storage("photons", &words)?)
+            .buffer("status", &status);
+        let mut kernel = Composition::new("media/photons")
+            .with("structure", medium.structure.module())
+            .feature("coarse", cells > 0)
+            .feature("general", general);
+        let mut passes = Recording::new();
+        passes.clear(&status);
+        scatter.record_before(&mut passes);
+        let counts = match counting.module() {
+            None => None,
+            Some(module) => {
+                let bytes = u64::from(places) * counting.words() * 4;
+                let counts = Storage::from(&gpu.zeroed("counts", bytes)?);
+                kernel = kernel.with("counts", module).feature("counted", true);
+                bindings
+                    .uniform("counting", UniformValues::new().f32("units", units as f32))
+                    .buffer("counts", &counts);
+                passes.clear(&counts);
+                Some(counts)
+            }
+        };
+        let pipeline = gpu.pipeline(&scatter.compose(kernel), true)?;
+        let name = if cells > 0 { "pilots" } else { "photons" };
+        passes.run(name, &pipeline, &bindings, groups_for(count));
+        scatter.record_after(&mut passes);
+        passes.download("status", &status);
+        Ok(Self {
+            scatter,
+            counts,
+            unit: 1.0 / units,
+            passes,
+        })
+    }
+}
