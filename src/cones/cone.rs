@@ -100,8 +100,9 @@ fn framed<T: Real>(apex: V3<T>, axis: V3<T>, tangent: T, near: T) -> Cone<T> {
 
 /// The tangent of the angle of a circular cone with a pixel's solid angle.
 fn pixel_tangent<T: Angle>(camera: &Camera<T>, x: T, y: T) -> T {
-    let square = camera.distance * camera.distance + x * x + y * y;
-    (camera.distance / (square * square.sqrt() * T::PI)).sqrt()
+    let far = (camera.distance * camera.distance + x * x + y * y).sqrt();
+    // No product of three factors, whose order compilers of kernels choose.
+    (camera.distance * T::PART / far).sqrt() / far
 }
 
 /// The cone off a mirror: wider by the curvature and by the lobe, its apex behind the mirror.

@@ -12,6 +12,8 @@ use std::ops::{Add, Div, Mul};
 const PI: f32 = std::f32::consts::PI;
 const HALF_PI: f32 = std::f32::consts::FRAC_PI_2;
 const QUARTER_PI: f32 = std::f32::consts::FRAC_PI_4;
+/// 1 / π.
+const PART: f32 = std::f32::consts::FRAC_1_PI;
 /// The tangent of a sixteenth of a turn.
 const TAN_EIGHTH: f32 = 0.414_213_56;
 /// Lines shorter than this have no direction.
@@ -65,6 +67,8 @@ pub trait Angle: Real {
     fn angle_of(y: Self, x: Self) -> Self;
     /// π.
     const PI: Self;
+    /// 1 / π.
+    const PART: Self;
 }
 
 impl Angle for f32 {
@@ -72,6 +76,7 @@ impl Angle for f32 {
         angle_of(y, x)
     }
     const PI: Self = PI;
+    const PART: Self = PART;
 }
 
 impl Angle for f64 {
@@ -79,6 +84,7 @@ impl Angle for f64 {
         y.atan2(x)
     }
     const PI: Self = std::f64::consts::PI;
+    const PART: Self = std::f64::consts::FRAC_1_PI;
 }
 
 /// What covers the disk: signed area, first moments, and edges that cross the disk.
@@ -86,7 +92,7 @@ impl Angle for f64 {
 pub struct Sum<T> {
     /// Positive for counterclockwise edges.
     pub area: T,
-    /// First moments, of the same sign.
+    /// Thrice the first moments, of the same sign: compilers of kernels move constants within products.
     pub moment: V2<T>,
     /// Edges with a part in the disk.
     pub crossing: u32,
@@ -158,7 +164,7 @@ fn angle_of(y: f32, x: f32) -> f32 {
 fn sector<T: Angle>(sum: Sum<T>, a: V2<T>, b: V2<T>) -> Sum<T> {
     let from_a = a / dot2(a, a).max(c(TINY)).sqrt();
     let to_b = b / dot2(b, b).max(c(TINY)).sqrt();
-    let moment = V2::new(to_b.y - from_a.y, from_a.x - to_b.x) / c(3.0);
+    let moment = V2::new(to_b.y - from_a.y, from_a.x - to_b.x);
     Sum {
         area: sum.area + c::<T>(0.5) * T::angle_of(cross2(a, b), dot2(a, b)),
         moment: sum.moment + moment,
@@ -195,7 +201,8 @@ pub fn edge<T: Angle>(sum: Sum<T>, a: V3<T>, b: V3<T>) -> Sum<T> {
     }
     let part = c::<T>(0.5) * h * (high - low);
     out.area = out.area + part;
-    out.moment = out.moment + (p + q) * (part / c(3.0));
+    // Not p + q, of which compilers of kernels take the common factor out.
+    out.moment = out.moment + (foot * c(2.0) + along * (low + high)) * part;
     if end > half {
         out = sector(out, q, xy(b));
     }
@@ -223,7 +230,7 @@ pub fn overlap<T: Angle>(sum: Sum<T>) -> Overlap<T> {
     if area < c(TINY) {
         return none;
     }
-    let mut centroid = sum.moment / sum.area;
+    let mut centroid = sum.moment / (c::<T>(3.0) * sum.area);
     // What is left of a sliver's cancels: the centroid stays in the disk.
     let size = dot2(centroid, centroid).sqrt();
     if size > c(1.0) {

@@ -184,7 +184,7 @@ impl<T: Angle> Tracing<'_, T> {
         let zero = c::<T>(0.0);
         let mut out = Layer {
             colour: V3::new(zero, zero, zero),
-            share: part.area / T::PI,
+            share: part.area * T::PART,
             depth: zero,
             place: 2 * index,
             bits: [0; 2],
@@ -208,7 +208,7 @@ impl<T: Angle> Tracing<'_, T> {
         let one = c::<T>(1.0);
         let at_b = clamp(dot3(n, cross3(w, v)) / size, zero, one);
         let at_c = clamp(dot3(n, cross3(u, w)) / size, zero, one - at_b);
-        let at_a = one - at_b - at_c;
+        let at_a = one - (at_b + at_c);
         let colours = patch.colours;
         out.colour = colours[0] * at_a + colours[1] * at_b + colours[2] * at_c;
         if self.given.blend != SATURATE {
