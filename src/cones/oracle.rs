@@ -23,6 +23,17 @@ const OFF_PLACE: f64 = 2e-6;
 const OFF_DEPTH: f64 = 2e-6;
 /// What rounding of colours and sums may change.
 const OFF_COLOUR: f64 = 2e-4;
+/// What a direction of a mask may change that falls to another layer: its own weight, and that of its layer's others.
+const OPEN_BIT: f64 = 2.0 / 64.0;
+
+/// What f32 may be off in the place of a vertex in the disk, in its radii. Directions are known to 2⁻²³, of which a
+/// narrow cone has few. Off the sphere the discriminant, a difference of numbers up to 16, is known to 2⁻²⁰ and is the
+/// square of the cosine: the point and with it the axis are off by that over the cosine, the width by that over its square.
+fn reach_of(beam: &Beam) -> f64 {
+    let cancelled = if beam.is_curved { 2.0_f64.powi(-20) } else { 0.0 };
+    let axis = 4e-7 + cancelled / beam.cosine;
+    OFF_PLACE + axis / beam.angle + cancelled / beam.cosine.powi(2)
+}
 
 /// A cone with what stands behind its numbers.
 pub(crate) struct Beam {
@@ -30,6 +41,9 @@ pub(crate) struct Beam {
     pub(crate) axis: DVec3,
     pub(crate) angle: f64,
     pub(crate) near: f64,
+    /// At the mirror, and whether that is curved.
+    cosine: f64,
+    is_curved: bool,
 }
 
 /// The cone of a pixel.
@@ -42,6 +56,8 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
             axis,
             angle: tangent.atan(),
             near: LEAST_NEAR,
+            cosine: 1.0,
+            is_curved: false,
         };
     };
     let t = eye.distance(at);
@@ -63,6 +79,8 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
         axis: mirrored,
         angle,
         near: behind,
+        cosine,
+        is_curved: camera.mirror == 1,
     }
 }
 
@@ -74,6 +92,8 @@ struct Part {
     colour: DVec3,
     bits: u64,
     is_thin: bool,
+    /// Directions so near an edge that f32 may see them on either side.
+    open: u32,
 }
 
 /// A pixel, with what f32 may be off.
@@ -160,7 +180,7 @@ impl Oracle<'_> {
         }
         let at = depth_at(middle);
         // A centroid is a quotient of sums.
-        let reach = OFF_PLACE / area.min(1.0) + 1e-7 / tangent;
+        let reach = OFF_PLACE / area.min(1.0) + reach_of(beam);
         let beside = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y];
         let off = beside.map(|d| (depth_at(middle + d * reach) - at).abs());
         let p = beam.apex + towards(middle) * at;
@@ -178,6 +198,7 @@ impl Oracle<'_> {
             off: off.iter().copied().fold(0.0, f64::max) + OFF_DEPTH * at,
             colour: (0..3).map(|k| colours[k] * parts[k]).sum(),
             is_thin: bits == 0,
+            open: self.open_bits(&polygon, reach_of(beam)),
             bits: if bits == 0 { nearest().map_or(1, |k| 1 << k) } else { bits },
         })
     }
@@ -206,6 +227,23 @@ impl Oracle<'_> {
         bits
     }
 
+    /// Directions within reach of an edge.
+    fn open_bits(&self, polygon: &[DVec2], reach: f64) -> u32 {
+        if self.given.blend == 0 {
+            return 0;
+        }
+        let is_near = |d: &&[f64; 2]| {
+            let d = DVec2::from(**d);
+            polygon.iter().enumerate().any(|(k, p)| {
+                let along = polygon[(k + 1) % polygon.len()] - *p;
+                let square = along.length_squared().max(f64::MIN_POSITIVE);
+                let t = ((d - *p).dot(along) / square).clamp(0.0, 1.0);
+                (*p + along * t).distance(d) < reach
+            })
+        };
+        self.directions.iter().filter(is_near).count() as u32
+    }
+
     /// The pixel of a cone.
     pub fn pixel(&self, pixel: u32) -> Expected {
         let beam = beam(&self.given.camera, &self.lens, pixel);
@@ -218,17 +256,17 @@ impl Oracle<'_> {
         let mut slack = OFF_COLOUR;
         let mut kept: Vec<Part> = Vec::new();
         for part in parts {
-            let off = OFF_SHARE + 3e-7 / beam.angle;
+            let off = OFF_SHARE + reach_of(&beam);
             if (part.share - least).abs() < off {
                 slack += 2.0 * part.share.max(least);
             }
-            slack += off.min(part.share);
+            slack += off.min(part.share) + OPEN_BIT * f64::from(part.open);
             if part.share > least {
                 kept.push(part);
             }
         }
         kept.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-        slack += open_order(&kept);
+        slack += open_order(&kept, self.given.most as usize);
         let met = kept.len() as u32;
         kept.truncate(self.given.most as usize);
         let (colour, covered) = self.blended(&kept);
@@ -267,13 +305,19 @@ impl Oracle<'_> {
 }
 
 /// What another order of layers that are as far away as f32 can tell may change.
-fn open_order(parts: &[Part]) -> f64 {
+///
+/// Of two layers that are both kept it is the lesser share; of two of which one is kept, the greater.
+fn open_order(parts: &[Part], most: usize) -> f64 {
     let mut slack = 0.0;
     for (k, a) in parts.iter().enumerate() {
-        for b in &parts[k + 1..] {
-            if b.depth - a.depth <= a.off + b.off {
-                slack += a.share.min(b.share);
+        for (j, b) in parts.iter().enumerate().skip(k + 1) {
+            if b.depth - a.depth > a.off + b.off {
+                continue;
             }
+            slack += match (k < most, j < most) {
+                (true, false) => a.share.max(b.share),
+                _ => a.share.min(b.share),
+            };
         }
     }
     slack

@@ -37,7 +37,7 @@ macro_rules! sources {
 }
 
 /// All experiments, in the order of the theses.
-pub static SOURCES: [Source; 19] = sources![
+pub static SOURCES: [Source; 20] = sources![
     "nilsson-table-5-2",
     "nilsson-table-5-3",
     "nilsson-table-5-4",
@@ -54,6 +54,7 @@ pub static SOURCES: [Source; 19] = sources![
     "dufay-fig-5-15",
     "dufay-fig-5-17",
     "micro-jitter-amplitude",
+    "roger-cones",
     "roger-ray-hierarchy",
     "roger-specular",
     "roger-stream-reduction",
