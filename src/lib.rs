@@ -22,6 +22,7 @@ pub use raystone_accel as accel;
 pub use raystone_accel::oracle;
 pub use raystone_advice as advice;
 pub use raystone_bench::{coherence, peers, run};
+pub use raystone_cones as cones;
 pub use raystone_config as config;
 pub use raystone_core::{
     __parameter, atomic, geometry, parameters, params, program, random, store, structure, text,
@@ -71,13 +72,14 @@ pub mod repro {
     }
 }
 
-/// Everything that can be named in this program: what the crates below register, the parts of the stress suite, and the measurements of media and of searches for points of reflection.
+/// Everything that can be named in this program: what the crates below register, the parts of the stress suite, and the measurements of media, of searches for points of reflection, and of cones.
 pub fn registries() -> run::Registries {
     let mut registries = run::Registries::default();
     // Their names are their own: a test of the suite adds them to the same registries.
     let added = stress::register(&mut registries)
         .and_then(|()| media::register(&mut registries))
-        .and_then(|()| specular::register(&mut registries));
+        .and_then(|()| specular::register(&mut registries))
+        .and_then(|()| cones::register(&mut registries));
     debug_assert_eq!(added, Ok(()));
     registries
 }

@@ -41,11 +41,11 @@ macro_rules! axes {
 
 axes! {
     /// Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory.
-    /// Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*`, `media:*`, `rays:*` or `specular:*`.
+    /// Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*`, `media:*`, `rays:*`, `specular:*` or `cones:*`.
     Scene = "scene";
-    /// Acceleration structures. Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*`, `media:*`, `rays:*` or `specular:*`.
+    /// Acceleration structures. Not needed if all integrators are `integrand:*`, `compaction:*`, `stress:*`, `media:*`, `rays:*`, `specular:*` or `cones:*`.
     Accel = "accel";
-    /// Sample sequences. Not needed if all integrators are `compaction:*`, `stress:*`, `media:*`, `rays:*` or `specular:*`.
+    /// Sample sequences. Not needed if all integrators are `compaction:*`, `stress:*`, `media:*`, `rays:*`, `specular:*` or `cones:*`.
     Sequence = "sequence";
     /// How the pixels' sample points are made different.
     Decorrelation = "decorrelation" or "none";

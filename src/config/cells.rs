@@ -34,8 +34,11 @@ pub const RAYS: &str = "rays:";
 /// Name prefix of integrators that search for points of reflection, which render nothing either.
 pub const SPECULAR: &str = "specular:";
 
+/// Name prefix of integrators that trace cones, against distributed rays, in scenes of their own.
+pub const CONES: &str = "cones:";
+
 /// Name prefixes of integrators that render nothing and need no scene.
-pub(super) const BENCHES: [&str; 5] = [COMPACTIONS, STRESS, MEDIA, RAYS, SPECULAR];
+pub(super) const BENCHES: [&str; 6] = [COMPACTIONS, STRESS, MEDIA, RAYS, SPECULAR, CONES];
 
 /// True if an integrator renders nothing and needs no scene: it names a measurement of something else.
 pub fn is_bench(integrator: &Variant) -> bool {

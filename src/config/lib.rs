@@ -27,7 +27,7 @@ mod variants;
 
 pub use axis::{Axis, AxisMap};
 pub use catalogue::Catalogue;
-pub use cells::{COMPACTIONS, Cell, MEDIA, NO_PEER, RAYS, SPECULAR, STRESS, is_bench};
+pub use cells::{COMPACTIONS, CONES, Cell, MEDIA, NO_PEER, RAYS, SPECULAR, STRESS, is_bench};
 pub use error::{ConfigError, Place};
 pub use experiment::{Axes, CellSet, Condition, Experiment, REFERENCE_PARTS, Seeds};
 pub use pattern::{Pattern, Selector};

@@ -30,6 +30,10 @@ const OTHER_FILE: &[(&str, &str)] = &[
 /// Kernel files and folders without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
     (
+        "cones/overlaps",
+        "a loop over disk_triangle, whose twin its answers are compared with",
+    ),
+    (
         "organisation/",
         "stages that hand paths on; tests/device/organisations.rs holds their images to that of one kernel",
     ),
@@ -387,6 +391,8 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ("media/march", "main", "the loop over paths"),
     ("media/segments", "main", "the loop over rays"),
     ("specular/solve", "main", "the loop over vertices"),
+    ("cones/trace", "main", "the loop over pixels"),
+    ("cones/trace", "triangle_at", "reads a buffer"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
     (
         "accel/bvh/short_stack",
@@ -428,6 +434,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
 
 /// Free functions of a twin that no kernel needs, with the reason.
 const RUST_ONLY: &[(&str, &str, &str)] = &[
+    ("cones/disk", "c", "a constant in f32 or f64"),
+    ("cones/disk", "xy", "a swizzle"),
+    ("cones/disk", "segment", "the thesis's formula, for tests"),
+    ("cones/cone", "offsets", "three lines of the kernel"),
+    ("cones/trace", "clamp", "a function of WGSL"),
     ("accel/bvh/pairs", "validate", "looks at what was built"),
     (
         "sampling/seeding",
@@ -663,8 +674,16 @@ fn values(constants: &BTreeMap<String, String>) -> BTreeMap<String, u32> {
             (!separator).then_some(c)
         };
         let value = value.replace("u32::MAX", "0xffffffffu");
-        let two_over_pi = format!("{:?}f", std::f32::consts::FRAC_2_PI);
-        let value = value.replace("std::f32::consts::FRAC_2_PI", &two_over_pi);
+        let mut value = value;
+        for (name, number) in [
+            ("FRAC_2_PI", std::f32::consts::FRAC_2_PI),
+            ("FRAC_1_PI", std::f32::consts::FRAC_1_PI),
+            ("FRAC_PI_2", std::f32::consts::FRAC_PI_2),
+            ("FRAC_PI_4", std::f32::consts::FRAC_PI_4),
+            ("PI", std::f32::consts::PI),
+        ] {
+            value = value.replace(&format!("std::f32::consts::{name};"), &format!("{number:?}f;"));
+        }
         let is_hex = value.contains("0x");
         let value: String = if is_hex {
             value.replace('_', "")

@@ -54,6 +54,7 @@ pub static SOURCES: [Source; 20] = sources![
     "dufay-fig-5-15",
     "dufay-fig-5-17",
     "micro-jitter-amplitude",
+    "roger-cones",
     "roger-ray-hierarchy",
     "roger-specular",
     "roger-stream-reduction",
