@@ -159,14 +159,7 @@ pub fn cone_of<T: Angle>(camera: &Camera<T>, pixel: u32) -> Cone<T> {
     if camera.mirror == PLANE && direction.x < c(-LEAST_COSINE) {
         let t = -eye.x / direction.x;
         let normal = V3::new(c(1.0), c(0.0), c(0.0));
-        return reflected(
-            camera,
-            eye + direction * t,
-            normal,
-            direction,
-            t,
-            tangent,
-        );
+        return reflected(camera, eye + direction * t, normal, direction, t, tangent);
     }
     framed(eye, direction, tangent, c(LEAST_NEAR))
 }
@@ -178,8 +171,8 @@ pub fn meets<T: Real>(cone: &Cone<T>, centre: V3<T>, radius: T) -> bool {
     let across = cross3(w, cone.axis);
     let beside = dot3(across, across).sqrt();
     let radius = radius + c::<T>(SLACK) * (along.abs() + beside);
-    let outside = (beside - along * cone.tangent)
-        / (c::<T>(1.0) + cone.tangent * cone.tangent).sqrt();
+    let outside =
+        (beside - along * cone.tangent) / (c::<T>(1.0) + cone.tangent * cone.tangent).sqrt();
     outside <= radius && along + radius >= cone.near
 }
 

@@ -122,7 +122,12 @@ pub fn overlaps(gpu: &Gpu, triangles: &[[V3<f32>; 3]]) -> Result<Vec<Overlap<f32
     let mut recording = Recording::new();
     recording
         .clear(&status)
-        .run("overlaps", &pipeline, &bindings, groups_for(words.len() as u32))
+        .run(
+            "overlaps",
+            &pipeline,
+            &bindings,
+            groups_for(words.len() as u32),
+        )
         .download("found", &found)
         .download("status", &status);
     let player = Player::new(gpu);

@@ -536,7 +536,8 @@ impl Prepared for Ready {
 
 impl Ready {
     fn crossing(&self, errors: &Errors) -> Option<Crossing> {
-        self.is_resolved().then(|| crossing(&errors.powers, self.floor))
+        self.is_resolved()
+            .then(|| crossing(&errors.powers, self.floor))
     }
 }
 

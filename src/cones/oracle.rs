@@ -30,7 +30,11 @@ const OPEN_BIT: f64 = 2.0 / 64.0;
 /// narrow cone has few. Off the sphere the discriminant, a difference of numbers up to 16, is known to 2⁻²⁰ and is the
 /// square of the cosine: the point and with it the axis are off by that over the cosine, the width by that over its square.
 fn reach_of(beam: &Beam) -> f64 {
-    let cancelled = if beam.is_curved { 2.0_f64.powi(-20) } else { 0.0 };
+    let cancelled = if beam.is_curved {
+        2.0_f64.powi(-20)
+    } else {
+        0.0
+    };
     let axis = 4e-7 + cancelled / beam.cosine;
     OFF_PLACE + axis / beam.angle + cancelled / beam.cosine.powi(2)
 }
@@ -171,7 +175,11 @@ impl Oracle<'_> {
         let towards = |at: DVec2| beam.axis + (x * at.x + y * at.y) * tangent;
         let depths = corners.map(depth);
         let (low, high) = (
-            depths.iter().copied().fold(f64::MAX, f64::min).max(beam.near),
+            depths
+                .iter()
+                .copied()
+                .fold(f64::MAX, f64::min)
+                .max(beam.near),
             depths.iter().copied().fold(f64::MIN, f64::max),
         );
         let depth_at = |at: DVec2| (height / n.dot(towards(at))).max(low).min(high);
@@ -199,7 +207,11 @@ impl Oracle<'_> {
             colour: (0..3).map(|k| colours[k] * parts[k]).sum(),
             is_thin: bits == 0,
             open: self.open_bits(&polygon, reach_of(beam)),
-            bits: if bits == 0 { nearest().map_or(1, |k| 1 << k) } else { bits },
+            bits: if bits == 0 {
+                nearest().map_or(1, |k| 1 << k)
+            } else {
+                bits
+            },
         })
     }
 
@@ -248,10 +260,17 @@ impl Oracle<'_> {
     pub fn pixel(&self, pixel: u32) -> Expected {
         let beam = beam(&self.given.camera, &self.lens, pixel);
         // The same frame as cones have, so that the 64 directions are the same.
-        let helper = if beam.axis.z.abs() > 0.9 { DVec3::X } else { DVec3::Z };
+        let helper = if beam.axis.z.abs() > 0.9 {
+            DVec3::X
+        } else {
+            DVec3::Z
+        };
         let x = helper.cross(beam.axis).normalize();
         let frame = [x, beam.axis.cross(x)];
-        let parts = self.patches.iter().filter_map(|patch| self.part(&beam, frame, patch));
+        let parts = self
+            .patches
+            .iter()
+            .filter_map(|patch| self.part(&beam, frame, patch));
         let least = self.given.cut.max(f64::from(LEAST_SHARE));
         let mut slack = OFF_COLOUR;
         let mut kept: Vec<Part> = Vec::new();

@@ -18,7 +18,11 @@ struct Box3 {
 enum Node {
     /// The node after it begins the first half; this one the second.
     Inner { bounds: Box3, second: usize },
-    Leaf { bounds: Box3, first: usize, end: usize },
+    Leaf {
+        bounds: Box3,
+        first: usize,
+        end: usize,
+    },
 }
 
 /// A triangle in f64.
@@ -113,7 +117,8 @@ impl Rays {
 
     /// What a ray sees.
     pub fn seen(&self, origin: DVec3, direction: DVec3) -> DVec3 {
-        self.closest(origin, direction).map_or(BACKGROUND, |hit| hit.1)
+        self.closest(origin, direction)
+            .map_or(BACKGROUND, |hit| hit.1)
     }
 }
 

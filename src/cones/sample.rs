@@ -3,9 +3,9 @@
 
 use crate::rays::Lens;
 use glam::DVec3;
+use rayon::prelude::*;
 use raystone_core::random::Pcg32;
 use raystone_sampling::{Coordinate, Sampler, to_unit};
-use rayon::prelude::*;
 
 /// Numbers that choose a ray.
 pub const DIMENSIONS: u32 = 4;
@@ -59,14 +59,20 @@ impl Truth {
 
     /// The mean square of a picture's error.
     pub fn error(&self, picture: &[DVec3]) -> f64 {
-        let each = picture.iter().enumerate().map(|(k, value)| self.square(k, *value));
+        let each = picture
+            .iter()
+            .enumerate()
+            .map(|(k, value)| self.square(k, *value));
         each.sum::<f64>() / picture.len() as f64
     }
 
     /// The mean square of the error of one half, from the difference of both.
     pub fn noise(&self) -> f64 {
         let [a, b] = &self.halves;
-        let each = a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared() / 6.0);
+        let each = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| (*a - *b).length_squared() / 6.0);
         each.sum::<f64>() / a.len() as f64
     }
 }
@@ -138,7 +144,12 @@ pub fn sampled(
 /// Samples of each pixel in proportion to a weight: at least one, at most [`MOST`], `mean` on average.
 pub fn budget(weights: &[f64], mean: u32) -> Vec<u32> {
     let total = f64::from(mean) * weights.len() as f64;
-    let sum_of = |scale: f64| weights.iter().map(|w| (w * scale).clamp(1.0, f64::from(MOST))).sum::<f64>();
+    let sum_of = |scale: f64| {
+        weights
+            .iter()
+            .map(|w| (w * scale).clamp(1.0, f64::from(MOST)))
+            .sum::<f64>()
+    };
     // The scale at which bounded samples are as many as there are to spend.
     let (mut low, mut high) = (0.0, 1.0);
     while sum_of(high) < total && high < 1e12 {

@@ -53,7 +53,11 @@ fn sphere_around(corners: [DVec3; 3]) -> (DVec3, f64) {
             longest = k;
         }
     }
-    let (a, b, c) = (corners[longest], corners[(longest + 1) % 3], corners[(longest + 2) % 3]);
+    let (a, b, c) = (
+        corners[longest],
+        corners[(longest + 1) % 3],
+        corners[(longest + 2) % 3],
+    );
     let (u, v) = (b - a, c - a);
     let n = u.cross(v);
     let is_acute = (a - c).dot(b - c) > 0.0 && n.length_squared() > 0.0;
@@ -65,7 +69,10 @@ fn sphere_around(corners: [DVec3; 3]) -> (DVec3, f64) {
         (a + b) * 0.5
     };
     let centre = centre.as_vec3().as_dvec3();
-    let radius = corners.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+    let radius = corners
+        .iter()
+        .map(|p| p.distance(centre))
+        .fold(0.0, f64::max);
     (centre, radius * (1.0 + 1e-6) + 1e-12)
 }
 
@@ -102,9 +109,17 @@ impl Builder {
     }
 
     /// A parallelogram in rows and columns; colours by row and column.
-    fn grid(&mut self, at: DVec3, [u, v]: [DVec3; 2], [n, m]: [u32; 2], of: impl Fn(u32, u32) -> DVec3) {
+    fn grid(
+        &mut self,
+        at: DVec3,
+        [u, v]: [DVec3; 2],
+        [n, m]: [u32; 2],
+        of: impl Fn(u32, u32) -> DVec3,
+    ) {
         let normals = [u.cross(v).normalize(); 3];
-        let p = |i: u32, j: u32| at + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(m));
+        let p = |i: u32, j: u32| {
+            at + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(m))
+        };
         for i in 0..n {
             for j in 0..m {
                 let (a, b, c, d) = (p(i, j), p(i + 1, j), p(i + 1, j + 1), p(i, j + 1));
@@ -115,11 +130,16 @@ impl Builder {
     }
 
     fn room(&mut self) {
-        let (x, y, z) = (DVec3::X * 2.0 * HALF, DVec3::Y * 2.0 * HALF, DVec3::Z * (CEILING - FLOOR));
+        let (x, y, z) = (
+            DVec3::X * 2.0 * HALF,
+            DVec3::Y * 2.0 * HALF,
+            DVec3::Z * (CEILING - FLOOR),
+        );
         let low = DVec3::new(-HALF, -HALF, FLOOR);
         let tile = |i: u32, j: u32| DVec3::splat(if (i + j) % 2 == 0 { 0.9 } else { 0.08 });
         self.grid(low, [x, y], [20, 20], tile);
-        let stripe = |colour: DVec3| move |i: u32, _: u32| colour * if i % 2 == 0 { 1.0 } else { 0.6 };
+        let stripe =
+            |colour: DVec3| move |i: u32, _: u32| colour * if i % 2 == 0 { 1.0 } else { 0.6 };
         self.grid(low + z, [y, x], [2, 2], stripe(DVec3::new(0.8, 0.8, 0.75)));
         self.grid(low, [y, z], [6, 2], stripe(DVec3::new(0.3, 0.45, 0.8)));
         self.grid(low + x, [z, y], [2, 6], stripe(DVec3::new(0.8, 0.5, 0.3)));
@@ -129,13 +149,26 @@ impl Builder {
 
     fn ball(&mut self, centre: DVec3, radius: f64, [n, m]: [u32; 2], colour: DVec3) {
         let normal = |i: u32, j: u32| {
-            let (polar, around) = (PI * f64::from(i) / f64::from(n), 2.0 * PI * f64::from(j % m) / f64::from(m));
-            DVec3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos())
+            let (polar, around) = (
+                PI * f64::from(i) / f64::from(n),
+                2.0 * PI * f64::from(j % m) / f64::from(m),
+            );
+            DVec3::new(
+                polar.sin() * around.cos(),
+                polar.sin() * around.sin(),
+                polar.cos(),
+            )
         };
         for i in 0..n {
             for j in 0..m {
-                let all = [normal(i, j), normal(i + 1, j), normal(i + 1, j + 1), normal(i, j + 1)];
-                let corners = |k: [usize; 3]| (k.map(|k| centre + all[k] * radius), k.map(|k| all[k]));
+                let all = [
+                    normal(i, j),
+                    normal(i + 1, j),
+                    normal(i + 1, j + 1),
+                    normal(i, j + 1),
+                ];
+                let corners =
+                    |k: [usize; 3]| (k.map(|k| centre + all[k] * radius), k.map(|k| all[k]));
                 if i + 1 < n {
                     let (p, n) = corners([0, 1, 2]);
                     self.triangle(p, n, colour);
@@ -156,7 +189,8 @@ impl Builder {
             let radius = 0.2 + 0.25 * random.uniform();
             let height = FLOOR + radius + 2.0 * random.uniform().powi(2);
             let centre = DVec3::new(distance * around.cos(), distance * around.sin(), height);
-            let colour = DVec3::new(random.uniform(), random.uniform(), random.uniform()) * 0.7 + 0.2;
+            let colour =
+                DVec3::new(random.uniform(), random.uniform(), random.uniform()) * 0.7 + 0.2;
             self.ball(centre, radius, [6, 10], colour);
         }
     }

@@ -243,7 +243,8 @@ impl<T: Angle> Tracing<'_, T> {
         let mut mask = [0_u32; 2];
         for layer in layers {
             let is_thin = layer.place & 1 == 1;
-            let ones = |bits: [u32; 2]| T::of(f64::from(bits[0].count_ones() + bits[1].count_ones()));
+            let ones =
+                |bits: [u32; 2]| T::of(f64::from(bits[0].count_ones() + bits[1].count_ones()));
             let left = ones([layer.bits[0] & !mask[0], layer.bits[1] & !mask[1]]);
             let mut weight = layer.share;
             if given.blend == MASK_AREA {

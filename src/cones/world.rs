@@ -12,10 +12,10 @@ use crate::scene::{BACKGROUND, Patch, Place, patches};
 use crate::trace::Tracing;
 use crate::trace::{Blend, DIRECTIONS, Found, Given};
 use glam::DVec3;
+use rayon::prelude::*;
 use raystone_bench::run::Absent;
 use raystone_gpu::Gpu;
 use raystone_specular::real::V3;
-use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -150,9 +150,8 @@ impl World {
     pub(crate) fn magnified(&self) -> Vec<f64> {
         let camera = double(&self.view.camera(false));
         let lens = self.lens();
-        let each = (0..self.pixels()).map(|pixel| {
-            cone_of(&camera, pixel).tangent / lens.pixel(pixel).1
-        });
+        let each =
+            (0..self.pixels()).map(|pixel| cone_of(&camera, pixel).tangent / lens.pixel(pixel).1);
         each.collect()
     }
 
@@ -195,8 +194,7 @@ impl World {
             blend: own.blend,
         };
         let patches: Vec<Patch<f64>> = self.patches.iter().map(Patch::double).collect();
-        let directions: Vec<[f64; 2]> =
-            directions().iter().map(|d| d.map(f64::from)).collect();
+        let directions: Vec<[f64; 2]> = directions().iter().map(|d| d.map(f64::from)).collect();
         let oracle = Oracle {
             given: &given,
             patches: &patches,

@@ -682,7 +682,10 @@ fn values(constants: &BTreeMap<String, String>) -> BTreeMap<String, u32> {
             ("FRAC_PI_4", std::f32::consts::FRAC_PI_4),
             ("PI", std::f32::consts::PI),
         ] {
-            value = value.replace(&format!("std::f32::consts::{name};"), &format!("{number:?}f;"));
+            value = value.replace(
+                &format!("std::f32::consts::{name};"),
+                &format!("{number:?}f;"),
+            );
         }
         let is_hex = value.contains("0x");
         let value: String = if is_hex {

@@ -28,12 +28,36 @@ fn by_quadrature(triangle: [[f64; 2]; 3]) -> (f64, DVec2) {
 
 /// Triangle, area and centroid: appendix A of the digest, which prints six digits.
 const VECTORS: [([[f64; 2]; 3], f64, [f64; 2]); 8] = [
-    ([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]], 0.785398, [0.424413, 0.424413]),
-    ([[-10.0, 0.5], [10.0, 0.5], [0.0, 20.0]], 0.614185, [0.0, 0.705020]),
-    ([[-0.5, 0.0], [0.5, 0.0], [0.0, 2.0]], 0.744472, [0.0, 0.440394]),
-    ([[-0.5, 0.0], [1.1, -0.9], [1.1, 0.9]], 1.104521, [0.439209, 0.0]),
-    ([[-3.0, -0.5], [3.0, -0.5], [0.0, 0.9]], 2.256030, [0.0, 0.096239]),
-    ([[-1.4, -0.9], [1.4, -0.9], [0.0, 1.5]], 2.644841, [0.0, -0.050438]),
+    (
+        [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]],
+        0.785398,
+        [0.424413, 0.424413],
+    ),
+    (
+        [[-10.0, 0.5], [10.0, 0.5], [0.0, 20.0]],
+        0.614185,
+        [0.0, 0.705020],
+    ),
+    (
+        [[-0.5, 0.0], [0.5, 0.0], [0.0, 2.0]],
+        0.744472,
+        [0.0, 0.440394],
+    ),
+    (
+        [[-0.5, 0.0], [1.1, -0.9], [1.1, 0.9]],
+        1.104521,
+        [0.439209, 0.0],
+    ),
+    (
+        [[-3.0, -0.5], [3.0, -0.5], [0.0, 0.9]],
+        2.256030,
+        [0.0, 0.096239],
+    ),
+    (
+        [[-1.4, -0.9], [1.4, -0.9], [0.0, 1.5]],
+        2.644841,
+        [0.0, -0.050438],
+    ),
     ([[-10.0, -5.0], [10.0, -5.0], [0.0, 20.0]], PI, [0.0, 0.0]),
     ([[2.0, 2.0], [3.0, 2.0], [2.0, 3.0]], 0.0, [0.0, 0.0]),
 ];
@@ -42,7 +66,9 @@ const VECTORS: [([[f64; 2]; 3], f64, [f64; 2]); 8] = [
 fn off(of: impl Fn([[f64; 2]; 3]) -> (f64, DVec2)) -> f64 {
     let each = VECTORS.iter().map(|(triangle, area, centroid)| {
         let (found, at) = of(*triangle);
-        (found - area).abs().max((at - DVec2::from(*centroid)).abs().max_element())
+        (found - area)
+            .abs()
+            .max((at - DVec2::from(*centroid)).abs().max_element())
     });
     each.fold(0.0, f64::max)
 }
@@ -73,16 +99,17 @@ fn segments_have_the_cube_of_the_sine_not_its_root() {
         assert!(found.centroid.x.abs() < 1e-10);
         // As printed it is another place, outside the disk for small segments.
         let printed = 2.0 / (3.0 * area) * (0.5 * angle).sin().abs().powf(1.5);
-        assert!(angle == PI || (printed - at).abs() > 1e-3, "{angle}: {printed}");
+        assert!(
+            angle == PI || (printed - at).abs() > 1e-3,
+            "{angle}: {printed}"
+        );
     }
 }
 
 /// Random triangles: of the disk's size, tiny, slivers, and far larger.
 fn triangles(count: usize) -> Vec<[[f64; 2]; 3]> {
     let mut random = Pcg32::new(7);
-    let mut of = |size: f64| {
-        [(); 2].map(|()| (2.0 * uniform(&mut random) - 1.0) * size)
-    };
+    let mut of = |size: f64| [(); 2].map(|()| (2.0 * uniform(&mut random) - 1.0) * size);
     let each = (0..count).map(|k| match k % 4 {
         0 => [of(2.0), of(2.0), of(2.0)],
         1 => {
@@ -124,11 +151,23 @@ fn all_eight_cases_agree_with_quadrature() {
         *cases.entry(case(triangle)).or_default() += 1;
         let found = exact(triangle);
         let (area, at) = by_quadrature(triangle);
-        assert!((found.area - area).abs() < 1e-10, "{triangle:?}: {found:?}, {area}");
+        assert!(
+            (found.area - area).abs() < 1e-10,
+            "{triangle:?}: {found:?}, {area}"
+        );
         let moment = DVec2::new(found.centroid.x, found.centroid.y) * found.area - at * area;
         assert!(moment.length() < 1e-10, "{triangle:?}: {found:?}, {at}");
     }
-    let eight = [(0, 0), (0, 2), (0, 4), (0, 6), (1, 2), (1, 4), (2, 2), (3, 0)];
+    let eight = [
+        (0, 0),
+        (0, 2),
+        (0, 4),
+        (0, 6),
+        (1, 2),
+        (1, 4),
+        (2, 2),
+        (3, 0),
+    ];
     let seen: Vec<(usize, usize)> = cases.keys().copied().collect();
     assert_eq!(seen, eight, "{cases:?}");
     assert!(cases.values().all(|count| *count >= 20), "{cases:?}");

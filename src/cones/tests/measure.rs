@@ -43,14 +43,26 @@ sampled = [true, false]
     assert_eq!((failed, skipped), (0, 0));
     let cells: Vec<_> = all_of::<MeasuredRecord>(&lines).collect();
     assert_eq!(cells.len(), 3);
-    let has = |id: &str| cells.iter().filter(|cell| cell.reading(id).is_some()).count();
+    let has = |id: &str| {
+        cells
+            .iter()
+            .filter(|cell| cell.reading(id).is_some())
+            .count()
+    };
     assert_eq!(has("cones-ns/v1"), 1);
     assert_eq!(has("cones-bias/v1"), 3);
     assert_eq!(has("cones-error-1/v1"), 2);
-    assert_eq!(has("cones-adaptive/v1"), 1, "Hammersley's points depend on their number");
+    assert_eq!(
+        has("cones-adaptive/v1"),
+        1,
+        "Hammersley's points depend on their number"
+    );
     for cell in &cells {
         let picture = cell.picture.as_deref().unwrap();
-        assert!(folder.path().join("run").join(picture).is_file(), "{picture}");
+        assert!(
+            folder.path().join("run").join(picture).is_file(),
+            "{picture}"
+        );
     }
 }
 
@@ -58,7 +70,10 @@ sampled = [true, false]
 fn parameters_that_contradict_each_other_are_left_out_with_a_reason() {
     let cases = [
         ("resolution = 16", "at least `side`"),
-        ("mirror = \"plane\"\nfootprint = \"mean\"", "leave `footprint` out"),
+        (
+            "mirror = \"plane\"\nfootprint = \"mean\"",
+            "leave `footprint` out",
+        ),
     ];
     for (keys, reason) in cases {
         let folder = tempfile::tempdir().unwrap();

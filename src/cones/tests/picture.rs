@@ -4,8 +4,8 @@
 use crate::check;
 use crate::cone::{Camera, Mirror, cone_of};
 use crate::device::{Tracer, overlaps};
-use crate::oracle::Expected;
 use crate::disk::disk_triangle;
+use crate::oracle::Expected;
 use crate::rays::{Lens, Rays};
 use crate::sample::{Crossing, Truth, budget, crossing};
 use crate::scene::{Place, patches};
@@ -100,29 +100,77 @@ type Fault = (&'static str, &'static str, &'static str);
 const FAULTS: [Fault; 26] = [
     ("disk", "0.5 * angle_of", "0.49 * angle_of"),
     ("disk", "to_b.y - from_a.y", "to_b.y + from_a.y"),
-    ("disk", "let half = sqrt(max(1.0 - h * h, 0.0));", "let half = max(1.0 - h * h, 0.0);"),
-    ("disk", "vec2<f32>(n.y, -n.x) / length", "vec2<f32>(-n.y, n.x) / length"),
-    ("disk", "let c = 0.5 * h * (high - low);", "let c = 0.5 * h * (end - begin);"),
+    (
+        "disk",
+        "let half = sqrt(max(1.0 - h * h, 0.0));",
+        "let half = max(1.0 - h * h, 0.0);",
+    ),
+    (
+        "disk",
+        "vec2<f32>(n.y, -n.x) / length",
+        "vec2<f32>(-n.y, n.x) / length",
+    ),
+    (
+        "disk",
+        "let c = 0.5 * h * (high - low);",
+        "let c = 0.5 * h * (end - begin);",
+    ),
     ("disk", "if (begin < -half) {", "if (false) {"),
     ("disk", "along * (low + high)", "along * (low - high)"),
     ("disk", "if (area > HALF_PI) {", "if (area > 10.0) {"),
     ("disk", "angle = QUARTER_PI;", "angle = 0.0;"),
-    ("cone", "sqrt(camera.distance * PART / far)", "sqrt(camera.distance / far)"),
-    ("cone", "wider = 1.0 + 2.0 * t / cosine;", "wider = 1.0 + 2.0 * t * cosine;"),
+    (
+        "cone",
+        "sqrt(camera.distance * PART / far)",
+        "sqrt(camera.distance / far)",
+    ),
+    (
+        "cone",
+        "wider = 1.0 + 2.0 * t / cosine;",
+        "wider = 1.0 + 2.0 * t * cosine;",
+    ),
     ("cone", "normal * (2.0 * cosine)", "normal * cosine"),
     ("cone", "(own + camera.gloss)", "max(own, camera.gloss)"),
-    ("cone", "let behind = tangent * t / sum;", "let behind = 0.0;"),
+    (
+        "cone",
+        "let behind = tangent * t / sum;",
+        "let behind = 0.0;",
+    ),
     ("cone", "outside <= radius", "outside <= 0.5 * radius"),
-    ("cone", "wider = sqrt(wider * (1.0 + 2.0 * t * cosine));", "wider = wider;"),
-    ("trace", "return a.depth < b.depth ||", "return a.depth > b.depth ||"),
+    (
+        "cone",
+        "wider = sqrt(wider * (1.0 + 2.0 * t * cosine));",
+        "wider = wider;",
+    ),
+    (
+        "trace",
+        "return a.depth < b.depth ||",
+        "return a.depth > b.depth ||",
+    ),
     ("trace", "while (at > 0u) {", "while (false) {"),
     ("trace", "weight = min(weight, 1.0 - covered);", ""),
     ("trace", "weight = weight * (left / bits);", ""),
-    ("trace", "let fresh = layer.bits & ~mask;", "let fresh = layer.bits;"),
+    (
+        "trace",
+        "let fresh = layer.bits & ~mask;",
+        "let fresh = layer.bits;",
+    ),
     ("trace", "leave = crossing(a, b, near);", "leave = a;"),
-    ("trace", "out.bits = covered.right;", "out.bits = covered.left;"),
-    ("trace", "colours[1].xyz * second + colours[2].xyz * third", "colours[2].xyz * second + colours[1].xyz * third"),
-    ("trace", "out.depth = clamp(dot3(n, a) / facing, low, high);", "out.depth = low;"),
+    (
+        "trace",
+        "out.bits = covered.right;",
+        "out.bits = covered.left;",
+    ),
+    (
+        "trace",
+        "colours[1].xyz * second + colours[2].xyz * third",
+        "colours[2].xyz * second + colours[1].xyz * third",
+    ),
+    (
+        "trace",
+        "out.depth = clamp(dot3(n, a) / facing, low, high);",
+        "out.depth = low;",
+    ),
     ("trace", "max(given.cut, LEAST_SHARE)", "LEAST_SHARE"),
 ];
 
@@ -156,7 +204,9 @@ fn faults_of_the_kernels_are_seen() {
     for (file, text, fault) in FAULTS {
         let library = KernelLibrary::default();
         let name = format!("cones/{file}");
-        let sound = library.text(&name).unwrap_or_else(|| panic!("there is no {name}"));
+        let sound = library
+            .text(&name)
+            .unwrap_or_else(|| panic!("there is no {name}"));
         assert_eq!(sound.matches(text).count(), 1, "{name}: `{text}`");
         let changed = sound.replace(text, fault);
         let faulty = gpu.with_kernels(library.with_sources(&[(&name, &changed)]));
@@ -178,7 +228,9 @@ const HOST_FAULTS: [HostFault; 6] = [
         all.pop();
     }),
     ("a pixel is no number", |all| all[7].colour.x = f32::NAN),
-    ("a pixel is brighter by a hundredth", |all| all[9].colour.y += 0.01),
+    ("a pixel is brighter by a hundredth", |all| {
+        all[9].colour.y += 0.01
+    }),
     ("a part is not covered", |all| all[11].covered -= 0.01),
     ("the picture is mirrored", |all| {
         for row in all.chunks_mut(12) {
@@ -244,7 +296,10 @@ fn rays_find_what_all_triangles_say() {
         for _ in 0..2000 {
             let origin = random.in_cube();
             let direction = random.direction();
-            let (a, b) = (rays.closest(origin, direction), rays.closest_of_all(origin, direction));
+            let (a, b) = (
+                rays.closest(origin, direction),
+                rays.closest_of_all(origin, direction),
+            );
             assert_eq!(a.map(|hit| hit.0), b.map(|hit| hit.0));
             assert!(a.is_some(), "the room is closed: {origin} {direction}");
         }
@@ -271,15 +326,25 @@ fn a_cone_of_tiles_alone_has_next_to_no_bias() {
 
 #[test]
 fn the_reference_has_no_noise_in_its_squares() {
-    let lens = (patches(Place::Thin), view(Place::Thin, Some(Mirror::Sphere), 0.1));
+    let lens = (
+        patches(Place::Thin),
+        view(Place::Thin, Some(Mirror::Sphere), 0.1),
+    );
     let rays = Rays::new(&lens.0);
     let camera = double(&World::new(lens.1, 1).given(&KEEP).camera);
     let lens = Lens::new(camera, &rays);
-    let (few, many) = (Truth::new(&lens, 144, 64, 1), Truth::new(&lens, 144, 16_384, 2));
+    let (few, many) = (
+        Truth::new(&lens, 144, 64, 1),
+        Truth::new(&lens, 144, 16_384, 2),
+    );
     // The mean of both halves, against others: what is left of the noise of 64 samples.
     let off = many.error(&few.mean());
     assert!(off > 0.0 && few.noise() > 0.0);
-    assert!((0.3..3.0).contains(&(off / (0.5 * few.noise()))), "{off} {}", few.noise());
+    assert!(
+        (0.3..3.0).contains(&(off / (0.5 * few.noise()))),
+        "{off} {}",
+        few.noise()
+    );
     // A picture 0.1 too bright is 0.1 off, by few samples too.
     let bright: Vec<DVec3> = many.mean().iter().map(|p| *p + 0.1).collect();
     assert!((few.error(&bright).sqrt() - 0.1).abs() < 0.01);
@@ -290,10 +355,14 @@ fn crossings_and_budgets_are_those_of_a_hand() {
     let errors: Vec<f64> = (0..9).map(|k| 0.5_f64.powi(k)).collect();
     assert_eq!(crossing(&errors, 2.0), Crossing::At(1.0));
     assert_eq!(crossing(&errors, 1e-9), Crossing::Beyond);
-    let Crossing::At(at) = crossing(&errors, 0.1) else { panic!() };
+    let Crossing::At(at) = crossing(&errors, 0.1) else {
+        panic!()
+    };
     assert!((at - 10.0).abs() < 1e-9, "{at}");
     // A curve that falls below and rises again counts where it falls for good.
-    let Crossing::At(at) = crossing(&[1.0, 0.1, 1.0, 0.25], 0.5) else { panic!() };
+    let Crossing::At(at) = crossing(&[1.0, 0.1, 1.0, 0.25], 0.5) else {
+        panic!()
+    };
     assert!((at - 4.0 * 2.0_f64.powf(0.5)).abs() < 1e-9, "{at}");
     let spent = budget(&[1.0, 1.0, 2.0, 4.0], 16);
     assert_eq!(spent, [8, 8, 16, 32]);
