@@ -139,8 +139,8 @@ fn of_rays(
 /// Weights w of these terms with the least Σ (y − w · x)² + `penalty` Σ (wᵢ σᵢ)², the constant term free.
 fn ridge(points: &[(Weights, f64)], terms: &[usize], penalty: f64) -> Weights {
     let count = points.len() as f64;
-    let mean_of =
-        |of: &dyn Fn(&([f64; TERMS], f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
+    type Point = (Weights, f64);
+    let mean_of = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / count;
     let means: [f64; TERMS] = std::array::from_fn(|i| mean_of(&|(x, _)| x[i]));
     let level = mean_of(&|(_, y)| *y);
     let scales: [f64; TERMS] = std::array::from_fn(|i| match terms.contains(&i) {
@@ -153,11 +153,12 @@ fn ridge(points: &[(Weights, f64)], terms: &[usize], penalty: f64) -> Weights {
     };
     let mut system = [[0.0; TERMS + 1]; TERMS];
     for (x, y) in points {
-        for row in 0..TERMS {
-            for column in 0..TERMS {
-                system[row][column] += normal(x, row) * normal(x, column);
+        let x: Weights = std::array::from_fn(|i| normal(x, i));
+        for (row, own) in system.iter_mut().zip(x) {
+            for (value, other) in row.iter_mut().zip(x) {
+                *value += own * other;
             }
-            system[row][TERMS] += normal(x, row) * (y - level);
+            row[TERMS] += own * (y - level);
         }
     }
     for (row, values) in system.iter_mut().enumerate() {

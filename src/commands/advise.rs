@@ -106,7 +106,7 @@ impl Advise {
         let flags = on_axis(Axis::Scene, [&scene.to_owned()]);
         let cell = one_cell(&of_flags(
             "advise",
-            flags.into_iter(),
+            flags,
             &self.values.set,
             &Registries::default(),
         )?)?;

@@ -47,7 +47,7 @@ impl Tracer {
             .uniform("given", uniform(given, patches.len() as u32))
             .buffer("triangles", &gpu.storage("triangles", &words)?)
             .buffer("directions", &gpu.storage("directions", directions)?)
-            .buffer("layers", &Storage::scratch("layers", layers))
+            .buffer("layers", Storage::scratch("layers", layers))
             .buffer("found", &found)
             .buffer("status", &status);
         let pipeline = gpu.pipeline(&Composition::new("cones/trace"), true)?;

@@ -224,7 +224,7 @@ impl Oracle<'_> {
         for (k, at) in self.directions.iter().enumerate() {
             let d = beam.axis + (x * at[0] + y * at[1]) * beam.angle.tan();
             let t = n.dot(corners[0] - beam.apex) / n.dot(d);
-            if !(t >= beam.near) {
+            if t.is_nan() || t < beam.near {
                 continue;
             }
             let p = beam.apex + d * t;

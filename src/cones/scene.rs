@@ -136,10 +136,12 @@ impl Builder {
             DVec3::Z * (CEILING - FLOOR),
         );
         let low = DVec3::new(-HALF, -HALF, FLOOR);
-        let tile = |i: u32, j: u32| DVec3::splat(if (i + j) % 2 == 0 { 0.9 } else { 0.08 });
+        let tile =
+            |i: u32, j: u32| DVec3::splat(if (i + j).is_multiple_of(2) { 0.9 } else { 0.08 });
         self.grid(low, [x, y], [20, 20], tile);
-        let stripe =
-            |colour: DVec3| move |i: u32, _: u32| colour * if i % 2 == 0 { 1.0 } else { 0.6 };
+        let stripe = |colour: DVec3| {
+            move |i: u32, _: u32| colour * if i.is_multiple_of(2) { 1.0 } else { 0.6 }
+        };
         self.grid(low + z, [y, x], [2, 2], stripe(DVec3::new(0.8, 0.8, 0.75)));
         self.grid(low, [y, z], [6, 2], stripe(DVec3::new(0.3, 0.45, 0.8)));
         self.grid(low + x, [z, y], [2, 6], stripe(DVec3::new(0.8, 0.5, 0.3)));

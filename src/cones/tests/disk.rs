@@ -27,6 +27,7 @@ fn by_quadrature(triangle: [[f64; 2]; 3]) -> (f64, DVec2) {
 }
 
 /// Triangle, area and centroid: appendix A of the digest, which prints six digits.
+#[expect(clippy::approx_constant, reason = "digits as printed")]
 const VECTORS: [([[f64; 2]; 3], f64, [f64; 2]); 8] = [
     (
         [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]],

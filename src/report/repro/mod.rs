@@ -37,7 +37,7 @@ macro_rules! sources {
 }
 
 /// All experiments, in the order of the theses.
-pub static SOURCES: [Source; 20] = sources![
+pub static SOURCES: [Source; 21] = sources![
     "nilsson-table-5-2",
     "nilsson-table-5-3",
     "nilsson-table-5-4",
