@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// Classes of rays whose times are predicted, in the order of [`Costs::rays`].
+/// Classes of rays whose times are predicted: the names in [`Costs::ns`].
 pub const CLASSES: [&str; 5] = ["primary", "shadow", "ambient occlusion", "bounce", "chord"];
 
 /// The tables that come with the program, most trusted first.
