@@ -73,7 +73,8 @@ fn every_fault_of_the_table_still_applies() {
         }
     }
     let structures = raystone::accel::AccelRegistry::default();
-    for kind in structures.iter() {
+    // `auto` is one of the others, with their kernels.
+    for kind in structures.iter().filter(|kind| kind.name() != "auto") {
         let has =
             |s: &Subject| matches!(s, Subject::Structure { name, .. } if *name == kind.name());
         assert!(
