@@ -2,7 +2,7 @@
 
 use super::registry::AccelRegistry;
 use super::structure::prelude::*;
-use super::tree::{Builder, TreeParameters};
+use super::tree::{Builder, LARGEST_OF_PLOC, TreeParameters};
 use raystone_advice::{AdviceTable, CLASSES, Demand, SceneFeatures};
 use raystone_core::clock::Instant;
 use raystone_core::params::{Choice, ParamValue};
@@ -60,7 +60,7 @@ impl Structure for Auto {
     fn build(soup: &TriangleSoup, options: &AutoParameters, log: &mut BuildLog) -> BuildResult {
         let start = Instant::now();
         let advised = table(log)?.advise(&features(soup), &options.demand());
-        let mut spent = start.elapsed().as_secs_f64() * 1e3;
+        let spent = start.elapsed().as_secs_f64() * 1e3;
         let registry = AccelRegistry::default();
         let mut refused = AccelError::Invalid("the table of advice has no choice".to_owned());
         for (prediction, _) in advised {
@@ -72,22 +72,13 @@ impl Structure for Auto {
                 let builder = ParamValue::Name(builder.clone());
                 params.0.insert("builder".to_owned(), builder);
             }
-            log.note(&format!("chosen: {}", choice.label()), spent);
             match kind.build(soup, &params, log) {
-                // What exceeds a limit here is passed over for the next best.
-                Err(AccelError::Limit {
-                    what,
-                    needed,
-                    limit,
-                }) => {
-                    refused = AccelError::Limit {
-                        what,
-                        needed,
-                        limit,
-                    };
-                    spent = 0.0;
+                Ok(built) => {
+                    log.note(&format!("chosen: {}", choice.label()), spent);
+                    return Ok(built);
                 }
-                built => return built,
+                // What this scene or adapter is too large for is passed over for the next best.
+                Err(error) => refused = error,
             }
         }
         Err(refused)
@@ -115,6 +106,10 @@ pub(super) fn with_builder<'a>(
     let best = (advised.into_iter()).find(|(p, _)| p.choice.structure == TREES_OF);
     let named = best.and_then(|(p, _)| p.choice.builder);
     let builder = match named {
+        // Clustering takes no coordinates beyond a limit.
+        Some(_) if !coordinates_are_within(soup, LARGEST_OF_PLOC) => {
+            TreeParameters::default().builder
+        }
         None => TreeParameters::default().builder,
         Some(name) => Builder::from_name(&name).ok_or_else(|| {
             let what = format!("the table of advice names a builder `{name}` that does not exist");
@@ -129,6 +124,11 @@ pub(super) fn with_builder<'a>(
         builder,
         ..settings.clone()
     }))
+}
+
+fn coordinates_are_within(soup: &TriangleSoup, limit: f32) -> bool {
+    let mut coordinates = soup.records.iter().flat_map(|r| r.vertices()).flatten();
+    coordinates.all(|x| x.abs() <= limit)
 }
 
 fn table(log: &BuildLog) -> Result<AdviceTable, AccelError> {

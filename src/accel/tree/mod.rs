@@ -21,6 +21,7 @@ mod sweep;
 pub use coverage::Coverage;
 pub(super) use leaves::distinct;
 pub use parameters::{Builder, TreeParameters};
+pub(crate) use ploc::LARGEST_COORDINATE as LARGEST_OF_PLOC;
 
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup, auto};

@@ -16,7 +16,7 @@ use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 
 /// Boxes with larger coordinates have infinite areas, and obvhs compares areas.
-const LARGEST_COORDINATE: f32 = 1e18;
+pub(crate) const LARGEST_COORDINATE: f32 = 1e18;
 
 impl Boundable for Reference {
     fn aabb(&self) -> Aabb {

@@ -8,10 +8,6 @@ const RED_AND_BLUE: &str = "newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.1 
 const OBJ: &[(&str, Outcome)] = &[
     ("mtllib m.mtl\nusemtl\tred\nf 1 2 3 4\n", Reads("rr", &[])),
     (
-        "mtllib m.mtl\nusemtl red\nf 1 2 3 4\n\0\0\0",
-        Reads("rr", &[]),
-    ),
-    (
         "mtllib\tm.mtl\nusemtl red\nf\t1\t2  3 4\n",
         Reads("rr", &[]),
     ),
@@ -184,6 +180,12 @@ fn obj_files_as_found_are_read() {
             check(text, load_files(&files), expected);
         }
     }
+}
+
+#[test]
+fn zeros_at_the_end_are_padding() {
+    let padded: &[u8] = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n\0\0\0";
+    check("zeros", load_files(&[("a.obj", padded)]), &Reads(".", &[]));
 }
 
 /// A library, and the material `a` that it defines.
