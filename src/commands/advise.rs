@@ -92,7 +92,7 @@ impl Advise {
         self.output.show("advise", fields, &text)
     }
 
-    /// The table that is used; a note where it is that of another adapter.
+    /// The table that is used: no adapter is opened, so that the program's own is the first of its tables.
     fn table(&self) -> Result<AdviceTable> {
         let Some(file) = &self.table else {
             return Ok(AdviceTable::built_in("")?.0);
