@@ -1,6 +1,5 @@
 //! Records sorted by subject: scene, integrator, sampler.
 
-use super::format;
 use super::names::Names;
 use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
@@ -466,39 +465,6 @@ impl<'a> RunData<'a> {
     pub(crate) fn measured_by(&self, name: &str) -> Vec<Recorded<'a, MeasuredRecord>> {
         let cells = self.measured.iter().filter(|cell| cell.measurement == name);
         cells.copied().collect()
-    }
-
-    /// Returns all failures, each with the reason: those recorded once for many cells, and cells by their last
-    /// outcome.
-    pub fn failures(&self) -> BTreeMap<&'a str, &'a str> {
-        let cells = self
-            .cells
-            .values()
-            .filter(|cell| cell.outcome == Outcome::Failed);
-        let cells = cells.map(|cell| (cell.unit.as_str(), cell.reason.as_str()));
-        let told = self.failed.iter();
-        let told = told.map(|failed| (failed.cell.as_str(), failed.reason.as_str()));
-        cells.chain(told).collect()
-    }
-
-    /// Returns [`RunData::failures`], one for each reason: the first that was recorded for many cells or else the first cell,
-    /// with the number of others.
-    pub fn failures_by_reason(&self) -> Vec<(String, &'a str)> {
-        let all = self.failures();
-        let shared = |name: &str| self.failed.iter().any(|failed| failed.cell == name);
-        let mut order: Vec<(&str, &str)> = all.into_iter().collect();
-        order.sort_by_key(|(name, _)| !shared(name));
-        let described = |group: (&'a str, Vec<&(&'a str, &'a str)>)| {
-            let (reason, cells) = group;
-            let first = cells[0].0.trim_end_matches(": failed");
-            let others = match cells.len() - 1 {
-                0 => String::new(),
-                others => format!(", and {}", format::plural(others, "cell")),
-            };
-            (format!("{first}{others}"), reason)
-        };
-        let groups = grouped(order.iter(), |(_, reason)| *reason);
-        groups.into_iter().map(described).collect()
     }
 
     /// Returns the starts of the runs in which times were measured: several after a run that was resumed, or merged

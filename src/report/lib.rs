@@ -11,6 +11,7 @@ pub mod compare;
 pub mod data;
 pub mod document;
 pub mod export;
+mod failures;
 pub mod format;
 pub mod gallery;
 pub mod history;
