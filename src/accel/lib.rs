@@ -364,6 +364,11 @@ pub trait BuiltAccel: Sync {
     fn refill(&self) -> RefillParameters {
         RefillParameters::NONE
     }
+    /// Rays at the margins of the structure's own tests, which other rays do not reach: kernels must do the work
+    /// that the twin counts for them.
+    fn marginal_rays(&self) -> Vec<Ray> {
+        Vec::new()
+    }
     /// Arrays that the kernel can read in several parts if the adapter's binding limit is smaller:
     /// see [`raystone_gpu::Bindings::parts`].
     fn divisible(&self) -> &'static [&'static str] {

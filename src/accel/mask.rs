@@ -11,6 +11,7 @@
 
 use super::triangle::TriangleRecord;
 use glam::DVec2;
+use raystone_core::geometry::Ray;
 use raystone_scene::{AlphaMask, SceneData, Texture, Wrap};
 use std::collections::BTreeMap;
 
@@ -18,6 +19,10 @@ use std::collections::BTreeMap;
 pub(crate) const MASKED: u32 = 0x8000_0000;
 const MIRRORED: u32 = 1;
 const CLAMPED: u32 = 2;
+/// Set beside the wrap modes where a surface exists with the probability of its alpha.
+const BLENDED: u32 = 16;
+/// The alpha 1, in units of 2⁻⁸/255.
+const OPAQUE: u32 = 65280;
 /// A corner's weight at the corner itself.
 const WHOLE: u32 = 1 << 24;
 /// Coordinate units per texel.
@@ -27,8 +32,8 @@ const GREATEST: f64 = 268_435_456.0;
 
 /// Words of the masks of a scene's triangles, stored after the records in the buffer `triangles`.
 ///
-/// First the images: a row with width, height, wrap modes (u plus 4 times v) and threshold, then
-/// alphas, sixteen per row. Then two rows per triangle: coordinates of the first corner, and the
+/// First the images: a row with width, height, wrap modes (u plus 4 times v) and threshold, or the
+/// factor in 2⁻¹⁶ of a blended mask; then alphas, sixteen per row. Then two rows per triangle: coordinates of the first corner, and the
 /// differences to the second and third, in 1/256 texel from the centre of the first texel; index of
 /// the image; the material.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,6 +42,8 @@ pub struct Masks {
     pub first: u32,
     /// Four words per row.
     pub rows: Vec<[u32; 4]>,
+    /// True if some surface exists with the probability of its alpha.
+    pub are_blended: bool,
 }
 
 impl Masks {
@@ -46,6 +53,7 @@ impl Masks {
         let mut masks = Self {
             first,
             rows: Vec::new(),
+            are_blended: false,
         };
         let mut images = BTreeMap::new();
         for (id, material) in (0_u32..).zip(&scene.materials) {
@@ -75,10 +83,17 @@ impl Masks {
     }
 
     fn append_image(&mut self, mask: &AlphaMask, textures: &[Texture]) {
-        let threshold = mask.threshold();
+        let (blended, limit) = match mask.threshold() {
+            Some(threshold) => (0, threshold),
+            None => (
+                BLENDED,
+                (f64::from(mask.factor) * 65536.0).clamp(0.0, 65536.0) as u32,
+            ),
+        };
+        self.are_blended |= blended != 0;
         let Some(used) = mask.texture else {
             let opaque = [u32::MAX, 0, 0, 0];
-            self.rows.extend([[1, 1, 0, threshold], opaque]);
+            self.rows.extend([[1, 1, blended, limit], opaque]);
             return;
         };
         let texture = &textures[used.texture as usize];
@@ -89,7 +104,7 @@ impl Masks {
         };
         let [u, v] = used.wrap.map(number);
         self.rows
-            .push([texture.width, texture.height, 4 * v + u, threshold]);
+            .push([texture.width, texture.height, blended + 4 * v + u, limit]);
         let alpha = |texel: &[u8; 4]| mask.channel.value(*texel);
         let alphas: Vec<u8> = texture.texels.iter().map(alpha).collect();
         let row = |bytes: &[u8]| {
@@ -127,7 +142,7 @@ impl Masks {
             let [a, b, c] = [a, b, c].map(within);
             [a, b - a, c - a].map(|x| x as u32)
         };
-        let ([x, x1, x2], [y, y1, y2]) = (axis(0, wraps & 3), axis(1, wraps >> 2));
+        let ([x, x1, x2], [y, y1, y2]) = (axis(0, wraps & 3), axis(1, (wraps >> 2) & 3));
         self.rows
             .extend([[x, y, x1, y1], [x2, y2, image, material]]);
     }
@@ -167,14 +182,39 @@ fn wrapped(at: i32, size: i32, wrap: u32) -> u32 {
 fn alpha_at(masks: &Masks, place: u32, image: [u32; 4], x: i32, y: i32) -> u32 {
     let [width, height, wraps, _] = image;
     let column = wrapped(x, width as i32, wraps & 3);
-    let row = wrapped(y, height as i32, wraps >> 2);
+    let row = wrapped(y, height as i32, (wraps >> 2) & 3);
     let at = row * width + column;
     let word = masks.row(place + 1 + (at >> 4))[((at >> 2) & 3) as usize];
     (word >> (8 * (at & 3))) & 255
 }
 
-/// True if there is no surface at these weights of a triangle's second and third corners.
-pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f32) -> bool {
+/// One round of the generator PCG over a number joined with the next (Jarzynski & Olano, "Hash
+/// functions for GPU rendering", JCGT 9 (3), 2020).
+fn mixed(number: u32, next: u32) -> u32 {
+    let state = (number ^ next)
+        .wrapping_mul(747_796_405)
+        .wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// A random number of a ray and a triangle's mask, of 16 bits: every structure draws the same, in
+/// any order of its tests.
+fn chance(ray: &Ray, place: u32) -> u32 {
+    // Compilers do not preserve the sign of 0.
+    let bits = |x: f32| if x == 0.0 { 0 } else { x.to_bits() };
+    let numbers = ray.origin.into_iter().chain(ray.direction).map(bits);
+    numbers.fold(place, mixed) >> 16
+}
+
+/// True if a ray finds no surface at these weights of a triangle's second and third corners. A ray
+/// is in the space in which its triangle is tested, with a raised direction.
+pub fn is_cut_out(
+    masks: Option<&Masks>,
+    triangle: &TriangleRecord,
+    ray: &Ray,
+    [u, v]: [f32; 2],
+) -> bool {
     let Some(masks) = masks.filter(|_| triangle.material >= MASKED) else {
         return false;
     };
@@ -191,7 +231,11 @@ pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f
     let alpha = |dx, dy| alpha_at(masks, place, image, column + dx, row + dy);
     let upper = alpha(0, 0) * (256 - fx) + alpha(1, 0) * fx;
     let lower = alpha(0, 1) * (256 - fx) + alpha(1, 1) * fx;
-    upper * (256 - fy) + lower * fy < image[3]
+    let alpha = upper * (256 - fy) + lower * fy;
+    if image[2] & BLENDED != 0 {
+        return (alpha >> 8) * image[3] <= chance(ray, own) * OPAQUE;
+    }
+    alpha < image[3]
 }
 
 /// The material of a triangle.

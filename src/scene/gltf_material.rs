@@ -116,16 +116,18 @@ fn textured<'a>(
     left_out
 }
 
-/// The mask of `alphaMode` `MASK`, from the alpha of the base colour and its texture, whose
-/// coordinate set comes first.
+/// The mask of `alphaMode` `MASK` or `BLEND`, from the alpha of the base colour and its texture,
+/// whose coordinate set comes first.
 fn mask<'a>(
     material: Item<'a>,
     images: &mut Images<'a>,
     set: &mut Option<u32>,
 ) -> Option<AlphaMask> {
-    if alpha_mode(material) != "MASK" {
-        return None;
-    }
+    let cutoff = match alpha_mode(material).as_str() {
+        "MASK" => Some(material.number("alphaCutoff").unwrap_or(AlphaMask::CUTOFF)),
+        "BLEND" => None,
+        _ => return None,
+    };
     let (factor, texture) = base_color(material);
     let texture = texture.map(|info| {
         let placed = images.place(info);
@@ -136,7 +138,7 @@ fn mask<'a>(
         texture,
         channel: AlphaChannel::Alpha,
         factor: factor.w,
-        cutoff: material.number("alphaCutoff").unwrap_or(AlphaMask::CUTOFF),
+        cutoff,
     })
 }
 
@@ -256,7 +258,6 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
         of(&|m, _| m.kind != &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0));
     let frosted =
         of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
-    let blended = of(&|_, original| alpha_mode(original) == "BLEND");
     // A texture may scale the metalness, so the factor alone decides nothing.
     let metal = of(&|m, original| {
         let varied = texture(original.get(METALLIC), "metallicRoughnessTexture");
@@ -279,7 +280,6 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
     [
         approximation_warning("transmissive", "diffuse", transmissive),
         approximation_warning("frosted glass", "clear glass", frosted),
-        approximation_warning("blended by alpha", "if it were opaque", blended),
         approximation_warning("rough metal", "diffuse", metal),
         approximation_warning("tinted by depth", "if it were not", tinted),
         approximation_warning(

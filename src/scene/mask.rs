@@ -1,4 +1,4 @@
-//! Alpha masks: rays pass where the alpha is below a threshold.
+//! Alpha masks: rays pass where the alpha is below a threshold, or by chance.
 
 use super::{Material, Texture, TextureUse};
 
@@ -46,7 +46,8 @@ impl AlphaChannel {
     }
 }
 
-/// Alpha and cutoff; the surface exists where alpha is not below the cutoff (glTF 2.0, 3.9.4).
+/// Alpha and cutoff: the surface exists where alpha is not below the cutoff, or with the probability
+/// alpha (glTF 2.0, 3.9.4: `MASK` and `BLEND`; Enderton et al., "Stochastic transparency", I3D 2010).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlphaMask {
     /// The image; without one, the factor is the alpha.
@@ -55,8 +56,8 @@ pub struct AlphaMask {
     pub channel: AlphaChannel,
     /// Multiplier of the image.
     pub factor: f32,
-    /// The lowest alpha at which the surface exists.
-    pub cutoff: f32,
+    /// The lowest alpha at which the surface exists; `None` if it exists with the probability alpha.
+    pub cutoff: Option<f32>,
 }
 
 impl AlphaMask {
@@ -64,7 +65,7 @@ impl AlphaMask {
     pub(crate) const CUTOFF: f32 = 0.5;
 
     /// The mask of an image, with this cutoff.
-    pub fn of(texture: TextureUse, channel: AlphaChannel, cutoff: f32) -> Self {
+    pub fn of(texture: TextureUse, channel: AlphaChannel, cutoff: Option<f32>) -> Self {
         Self {
             texture: Some(texture),
             channel,
@@ -73,9 +74,24 @@ impl AlphaMask {
         }
     }
 
+    /// A surface that exists everywhere with this probability.
+    pub(crate) fn even(factor: f32) -> Self {
+        Self {
+            texture: None,
+            channel: AlphaChannel::Alpha,
+            factor,
+            cutoff: None,
+        }
+    }
+
     /// The lowest image value of the surface, in units of 1/(255 · 65536); `u32::MAX` for none.
-    pub fn threshold(&self) -> u32 {
-        let (factor, cutoff) = (f64::from(self.factor), f64::from(self.cutoff));
+    /// `None` if chance decides.
+    pub fn threshold(&self) -> Option<u32> {
+        Some(self.least(self.cutoff?))
+    }
+
+    fn least(&self, cutoff: f32) -> u32 {
+        let (factor, cutoff) = (f64::from(self.factor), f64::from(cutoff));
         if cutoff <= 0.0 {
             return 0;
         }
@@ -90,7 +106,7 @@ impl AlphaMask {
 
     /// True if some point of the surface may be missing, given the images.
     fn cuts(&self, textures: &[Texture]) -> bool {
-        let threshold = self.threshold();
+        let threshold = self.least(self.cutoff.unwrap_or(1.0));
         let Some(used) = self.texture else {
             return threshold > 255 << 16;
         };
@@ -117,25 +133,24 @@ mod tests {
 
     fn mask(factor: f32, cutoff: f32) -> AlphaMask {
         AlphaMask {
-            texture: None,
-            channel: AlphaChannel::Alpha,
-            factor,
-            cutoff,
+            cutoff: Some(cutoff),
+            ..AlphaMask::even(factor)
         }
     }
 
     #[test]
     fn the_threshold_is_the_least_alpha_that_is_not_below_the_cutoff() {
         for (factor, cutoff, least) in [(1.0, 0.5, 128), (1.0, 1.0, 255), (0.5, 0.25, 128)] {
-            let threshold = mask(factor, cutoff).threshold();
+            let threshold = mask(factor, cutoff).threshold().unwrap();
             assert!(threshold <= least << 16, "{factor} {cutoff}");
             assert!(threshold > (least - 1) << 16, "{factor} {cutoff}");
         }
-        assert_eq!(mask(1.0, 0.0).threshold(), 0);
-        assert_eq!(mask(0.0, 0.0).threshold(), 0);
+        assert_eq!(mask(1.0, 0.0).threshold(), Some(0));
+        assert_eq!(mask(0.0, 0.0).threshold(), Some(0));
         for (factor, cutoff) in [(1.0, 1.01), (0.0, 0.5), (0.4, 0.5), (f32::NAN, 0.5)] {
-            assert_eq!(mask(factor, cutoff).threshold(), u32::MAX);
+            assert_eq!(mask(factor, cutoff).threshold(), Some(u32::MAX));
         }
+        assert_eq!(AlphaMask::even(0.5).threshold(), None);
     }
 
     #[test]
@@ -146,9 +161,23 @@ mod tests {
             height: 1,
             texels: vec![[255; 4], [255, 255, 255, alpha]],
         };
-        let textures = [texture(127), texture(128)];
-        let of = |id| AlphaMask::of(TextureUse::plain(id), AlphaChannel::Alpha, 0.5);
-        let masks = [of(0), of(1), mask(0.4, 0.5), mask(0.5, 0.5)];
+        let textures = [texture(127), texture(128), texture(255)];
+        let of = |id| AlphaMask::of(TextureUse::plain(id), AlphaChannel::Alpha, Some(0.5));
+        let blended = |id| AlphaMask {
+            cutoff: None,
+            ..of(id)
+        };
+        let even = AlphaMask::even;
+        let masks = [
+            of(0),
+            of(1),
+            mask(0.4, 0.5),
+            mask(0.5, 0.5),
+            blended(1),
+            blended(2),
+            even(0.99),
+            even(1.0),
+        ];
         let mut materials = masks.map(|mask| {
             let mut material = Material::diffuse("", glam::Vec3::ONE);
             material.mask = Some(mask);
@@ -156,7 +185,8 @@ mod tests {
         });
         settle(&mut materials, &textures);
         let kept = materials.map(|material| material.mask.is_some());
-        assert_eq!(kept, [true, false, true, false]);
+        let expected = [true, false, true, false, true, false, true, false];
+        assert_eq!(kept, expected);
     }
 
     #[test]

@@ -92,16 +92,9 @@ impl Library {
         contents.add_all(&normalised(bytes), &path, &self.options)
     }
 
-    /// All materials in library order, their textures, and a warning for deviations from the file.
+    /// All materials in library order, their textures, and warnings for deviations from the file.
     pub(crate) fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
-        let approximated = contents
-            .materials
-            .iter()
-            .filter(|m| m.kind != &DIELECTRIC && m.source.opacity.is_some_and(|d| d < 1.0));
-        let names = approximated.map(|m| m.name.as_str()).collect();
-        let text = super::approximation_warning("partly transparent", "diffuse", names);
-        contents.warnings.extend(text);
         for (what, names) in &contents.unused {
             let names = names.iter().map(String::as_str).collect();
             let text =
@@ -181,14 +174,18 @@ impl Contents {
         };
         let found =
             Material::described(name, &description, options.kinds, file, &mut self.warnings);
-        // A mask with cutoff one half, in place of MTL's blending.
-        let mask = map_d.map(|map| {
-            let found = self.texture(folder, &map, options, unread);
-            let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
-            let mask = AlphaMask::of(found.place, channel, AlphaMask::CUTOFF);
-            let factor = source.opacity.unwrap_or(1.0);
-            AlphaMask { factor, ..mask }
-        });
+        let factor = source.opacity.unwrap_or(1.0);
+        let mask = match map_d {
+            // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending.
+            Some(map) => {
+                let found = self.texture(folder, &map, options, unread);
+                let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
+                let mask = AlphaMask::of(found.place, channel, Some(AlphaMask::CUTOFF));
+                Some(AlphaMask { factor, ..mask })
+            }
+            None if found.kind != &DIELECTRIC => Some(AlphaMask::even(factor)),
+            None => None,
+        };
         let mut texture = |map: Option<Map>, is_used: bool| {
             let map = map.filter(|_| is_used && options.textures)?;
             Some(self.texture(folder, &map, options, unread).place)

@@ -35,11 +35,11 @@ impl<'a> SceneHoles<'a> {
         Self { first, ..self }
     }
 
-    /// True if there is no surface at the point of a triangle with these weights of its second and
-    /// third corners, shifted by `shift` texels.
-    pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
+    /// The surface at the point of a triangle with these weights of its second and third corners,
+    /// shifted by `shift` texels; open if it is there by chance.
+    pub(crate) fn at(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> Cut {
         let Some(mask) = self.mask(triangle) else {
-            return false;
+            return Cut::Surface;
         };
         let alpha = match mask.texture {
             Some(used) => {
@@ -49,7 +49,7 @@ impl<'a> SceneHoles<'a> {
             }
             None => 1.0,
         };
-        is_below(&mask, alpha)
+        said(&mask, [alpha, alpha])
     }
 
     fn mask(&self, triangle: u32) -> Option<AlphaMask> {
@@ -91,19 +91,23 @@ impl Holes for SceneHoles<'_> {
     }
 }
 
-fn is_below(mask: &AlphaMask, alpha: f64) -> bool {
-    let alpha = alpha * f64::from(mask.factor);
-    // A NaN factor cuts out everything.
-    (alpha < f64::from(mask.cutoff) || alpha.is_nan()) && mask.cutoff > 0.0
+/// The verdict where the image has this value.
+fn at_value(mask: &AlphaMask, value: f64) -> Cut {
+    let alpha = value * f64::from(mask.factor);
+    match mask.cutoff {
+        // A NaN factor cuts out everything.
+        Some(cutoff) if (alpha < f64::from(cutoff) || alpha.is_nan()) && cutoff > 0.0 => Cut::Hole,
+        Some(_) => Cut::Surface,
+        None if alpha >= 1.0 => Cut::Surface,
+        None if alpha > 0.0 => Cut::Open,
+        None => Cut::Hole,
+    }
 }
 
 /// The verdict for a region whose image values lie in this range.
 fn said(mask: &AlphaMask, range: [f64; 2]) -> Cut {
-    match range.map(|alpha| is_below(mask, alpha)) {
-        [false, false] => Cut::Surface,
-        [true, true] => Cut::Hole,
-        _ => Cut::Open,
-    }
+    let [least, most] = range.map(|value| at_value(mask, value));
+    if least == most { least } else { Cut::Open }
 }
 
 struct Image<'a> {

@@ -1,5 +1,5 @@
 //! Trial scenes for what small, plain scenes do not reach: masks that wrap in two ways and alphas equal to their
-//! cutoff, rooms a hundred thousand times as large and as small, every light on every material at once, and
+//! cutoff, surfaces that are partly transparent, rooms a hundred thousand times as large and as small, every light on every material at once, and
 //! surfaces within a luminous ball.
 
 use crate::kinds::KindChecks;
@@ -23,6 +23,10 @@ pub(super) fn scenes(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> 
         TrialScene {
             scene: fences()?,
             trials: vec![path(&[depth(3)]), primary()],
+        },
+        TrialScene {
+            scene: veils()?,
+            trials: vec![path(&[depth(2)]), path(&[depth(3)]), primary()],
         },
         TrialScene {
             scene: every_pair(kinds)?,
@@ -88,7 +92,7 @@ fn fences() -> Result<SceneData, SceneError> {
                 ..TextureUse::plain(texture)
             },
             AlphaChannel::Alpha,
-            cutoff,
+            Some(cutoff),
         )),
         ..Material::diffuse(name, color)
     };
@@ -130,6 +134,52 @@ fn fences() -> Result<SceneData, SceneError> {
         );
     }
     Ok(mesh.done(vec![alphas("fine", [3, 5]), alphas("coarse", [4, 2])]))
+}
+
+/// Surfaces that are there by chance before a wall: one with the same alpha everywhere, one with the alphas of an
+/// image and a factor, and a shining one.
+fn veils() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.6, 1.4, 3.3), vec3(0.0, 0.7, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("veils", camera, vec3(0.3, 0.5, 0.7))?;
+    let blended = |name, color, factor, texture| Material {
+        mask: Some(AlphaMask {
+            texture,
+            channel: AlphaChannel::Alpha,
+            factor,
+            cutoff: None,
+        }),
+        ..Material::diffuse(name, color)
+    };
+    let lace = TextureUse {
+        wrap: [Wrap::Mirrored, Wrap::Clamp],
+        ..TextureUse::plain(0)
+    };
+    let [even, lace, shining, ground, lamp] = [
+        blended("even", vec3(0.8, 0.3, 0.2), 0.6, None),
+        blended("lace", vec3(0.2, 0.4, 0.8), 0.8, Some(lace)),
+        blended("shining", Vec3::splat(0.2), 0.4, None).emitting(vec3(2.0, 3.0, 1.0)),
+        Material::diffuse("ground", vec3(0.7, 0.7, 0.6)),
+        Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(9.0, 8.0, 7.0)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        ground,
+    );
+    mesh.plain(
+        [vec3(-2.0, 0.0, -1.6), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        ground,
+    );
+    mesh.plain([vec3(-0.6, 2.6, -0.5), 1.2 * Vec3::X, 0.9 * Vec3::Z], lamp);
+    let uv = [vec2(-0.7, 0.1), vec2(1.9, 0.9)];
+    for (x, z, material) in [(-1.3, 0.4, even), (-0.3, 0.9, lace), (0.4, 0.1, shining)] {
+        mesh.quad(
+            [vec3(x, 0.0, z), 1.3 * Vec3::X, 1.3 * Vec3::Y],
+            uv,
+            material,
+        );
+    }
+    Ok(mesh.done(vec![alphas("lace", [4, 5])]))
 }
 
 /// Balls of every kind of material among lights of every kind, all of which are sampled at every vertex.

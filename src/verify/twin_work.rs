@@ -32,7 +32,10 @@ impl TwinWork {
         let step = set.rays.len().div_ceil(RAYS).max(1);
         let spread = set.rays.iter().step_by(step);
         let rays: Vec<Ray> = spread.chain(set.rays.last()).copied().collect();
-        let query = set.query();
+        Self::of_rays((set.class, set.query()), rays, twin)
+    }
+
+    fn of_rays((class, query): (RayClass, Query), rays: Vec<Ray>, twin: &dyn CpuTwin) -> Self {
         let count = |ray: &Ray| {
             let mut counters = Counters::default();
             match query {
@@ -42,14 +45,14 @@ impl TwinWork {
             counters
         };
         Self {
-            class: set.class,
+            class,
             query,
             counted: rays.par_iter().map(count).collect(),
             rays,
         }
     }
 
-    /// Counts for all classes that are timed; empty without a twin, or on an adapter without the host's arithmetic.
+    /// Counts for all classes that are timed, and for rays at the structure's own margins; empty without a twin, or on an adapter without the host's arithmetic.
     pub fn of_structure(
         built: &dyn BuiltAccel,
         soup: &TriangleSoup,
@@ -61,7 +64,13 @@ impl TwinWork {
         };
         let sets = reference.of(built.space()).sets.iter();
         let timed = sets.filter(|set| set.is_timed());
-        timed.map(|set| Self::of(set, &*twin)).collect()
+        let mut work: Vec<Self> = timed.map(|set| Self::of(set, &*twin)).collect();
+        let marginal = built.marginal_rays();
+        if !marginal.is_empty() {
+            let hard = (RayClass::Hard, Query::Closest);
+            work.push(Self::of_rays(hard, marginal, &*twin));
+        }
+        work
     }
 
     /// The first ray whose work kernels count otherwise; `None` if there is none.

@@ -56,6 +56,7 @@ fn the_page_of_the_tests_names_what_is_taken_in_part() {
         .collect();
     let mut found = BTreeSet::new();
     lists(&root.join("tests"), &mut found);
+    lists(&root.join("src"), &mut found);
     assert!(found.len() > 10, "{found:?}");
     assert_eq!(rows, found, "docs/testing.md, and what the tests call");
 }

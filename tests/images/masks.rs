@@ -1,5 +1,6 @@
 //! Alpha masks: closest and any hits of every structure and triangle test with masked surfaces, the
-//! correctness check with planted faults, masked lamps, and a known answer.
+//! correctness check with planted faults, masked lamps, and a known answer. Surfaces that exist by
+//! chance: the share of rays that each of a pile meets, against the product of alphas.
 
 use crate::support::*;
 use raystone::accel::{AccelRegistry, Intersection, NO_HIT, Ray, TriangleRegistry, TriangleSoup};
@@ -23,6 +24,15 @@ fn wrong(verdict: &GateVerdict) -> usize {
     verdict.classes.iter().map(|class| class.wrong).sum()
 }
 
+/// The same, with every masked surface there with the probability of its alpha.
+fn blended_plants() -> SceneData {
+    let mut scene = few_plants();
+    for mask in scene.materials.iter_mut().filter_map(|m| m.mask.as_mut()) {
+        (mask.factor, mask.cutoff) = (0.8, None);
+    }
+    scene
+}
+
 /// Rays down from above, whose hits depend on masks.
 fn rays_down(count: usize) -> Vec<Ray> {
     let mut rng = Pcg::new(3);
@@ -37,8 +47,16 @@ fn rays_down(count: usize) -> Vec<Ray> {
 
 #[test]
 fn every_structure_answers_as_brute_force_does_where_surfaces_are_cut_out() {
+    compare_structures(few_plants());
+}
+
+#[test]
+fn every_structure_answers_as_brute_force_does_where_chance_decides() {
+    compare_structures(blended_plants());
+}
+
+fn compare_structures(scene: SceneData) {
     let gpu = gpu();
-    let scene = few_plants();
     let rays = rays_down(4000);
     let soup = TriangleSoup::new(&scene);
     let whole = TriangleSoup {
@@ -111,6 +129,93 @@ fn the_gate_passes_what_is_right() {
     assert_eq!(unsound, None);
 }
 
+const ALPHAS: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
+
+/// Squares above each other, each there with its alpha, and rays down through all of them.
+fn pile(count: usize) -> (SceneData, Vec<Ray>) {
+    let square = |y: f32| {
+        format!("v -9 {y} -9\nv 9 {y} -9\nv 9 {y} 9\nv -9 {y} 9\nusemtl of{y}\nf -4 -3 -2 -1\n")
+    };
+    let levels = [3.0, 2.0, 1.0, 0.0];
+    let obj: String = levels.map(square).concat();
+    let material = |(y, alpha): (f32, f32)| format!("newmtl of{y}\nKd 1 1 1\nd {alpha}\n");
+    let mtl: String = levels.into_iter().zip(ALPHAS).map(material).collect();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("pile.obj");
+    std::fs::write(folder.path().join("m.mtl"), mtl).expect("a writable folder");
+    std::fs::write(&path, format!("mtllib m.mtl\n{obj}")).expect("a writable folder");
+    let scene = from_file(&path);
+    let mut rng = Pcg::new(11);
+    // Half from one point, half in one direction.
+    let ray = |turn| {
+        let [x, z] = [rng.signed(), rng.signed()];
+        let (origin, direction) = match turn % 2 {
+            0 => ([0.0, 4.0, 0.0], [x, -1.0, z]),
+            _ => ([x, 4.0, z], [0.0, -1.0, 0.0]),
+        };
+        Ray {
+            origin,
+            t_min: 0.0,
+            direction,
+            t_max: 100.0,
+        }
+    };
+    let rays = (0..count).map(ray).collect();
+    (scene, rays)
+}
+
+/// The share of rays that meet each square of the pile first, in standard errors from the closed form
+/// α_k Π (1 − α_i) over those above; and the share of those that meet nothing of the first two, by any hit.
+fn off_the_closed_form(gpu: &Gpu) -> Vec<f64> {
+    let (scene, rays) = pile(40_000);
+    let soup = TriangleSoup::new(&scene);
+    let kind = structure("bvh");
+    let built = build(kind, &soup, &default_params(&kind.parameters()));
+    let hits = trace(gpu, &*built, &soup, &rays, &[]).hits;
+    let n = rays.len() as f64;
+    let off = |share: f64, expected: f64| {
+        let error = (expected * (1.0 - expected) / n).sqrt();
+        (share - expected) / error.max(1.0 / n)
+    };
+    let mut left = 1.0;
+    let mut found = Vec::new();
+    for (level, alpha) in ALPHAS.map(f64::from).into_iter().enumerate() {
+        let met = hits.iter().filter(|h| h.triangle / 2 == level as u32);
+        found.push(off(met.count() as f64 / n, left * alpha));
+        left *= 1.0 - alpha;
+    }
+    let short: Vec<Ray> = rays.iter().map(|ray| Ray { t_max: 2.5, ..*ray }).collect();
+    let any = trace(gpu, &*built, &soup, &short, &["any"]).found();
+    let free = any.iter().filter(|found| !**found).count() as f64 / n;
+    found.push(off(free, (1.0 - 0.25) * (1.0 - 0.5)));
+    found
+}
+
+#[test]
+fn rays_meet_surfaces_as_often_as_their_alphas_say() {
+    let off = off_the_closed_form(gpu());
+    assert!(off.iter().all(|off| off.abs() < 4.5), "{off:?}");
+    // The same decision for all rays from a point, in a direction, for all surfaces; alphas that are not the probability.
+    for (from, to) in [
+        ("bitcast<vec3<u32>>(ray.direction);", "vec3<u32>();"),
+        (
+            "bitcast<vec3<u32>>(ray.origin) == zero);",
+            "vec3<bool>(true));",
+        ),
+        ("mixed(place, o.x)", "mixed(0u, o.x)"),
+        (
+            "<= chance(ray, own) * OPAQUE",
+            "> chance(ray, own) * OPAQUE",
+        ),
+        ("(alpha >> 8u) * image.w <=", "(alpha >> 9u) * image.w <="),
+        ("d.z) >> 16u;", "d.z) >> 17u;"),
+        ("(alpha >> 8u) * image.w", "(alpha >> 8u) * 65536u"),
+    ] {
+        let off = off_the_closed_form(&open(kernels_with("accel/mask", &[(from, to)])));
+        assert!(off.iter().any(|off| off.abs() > 20.0), "{from}: {off:?}");
+    }
+}
+
 /// Faults, each with the structure whose check must fail.
 const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
     (
@@ -123,8 +228,8 @@ const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
     (
         "cutoff inverted",
         "accel/mask",
-        "lower * fy < image.w;",
-        "lower * fy >= image.w;",
+        "return alpha < image.w;",
+        "return alpha >= image.w;",
         "bvh",
     ),
     (
@@ -234,11 +339,8 @@ fn all_strategies_find_the_same_light_of_a_lamp_that_is_cut_out() {
         );
     }
     // A light sample that shines where there is no lamp.
-    let fault = ("if (is_cut_out(record, u, v)) { return dark(); }", "");
-    let faulty = open(kernels_with(
-        "shading/light/flat",
-        &[(&format!("    @if(alpha_masks) {}\n", fault.0), fault.1)],
-    ));
+    let fault = (", u, v)) { return dark(); }", ", u, v)) { }");
+    let faulty = open(kernels_with("shading/light/flat", &[fault]));
     let ours = light_of(&faulty, "light", 128);
     assert!(!ours.minus(&both).agrees_with(0.0), "{ours:?} and {both:?}");
 }

@@ -218,6 +218,11 @@ impl Upper for Instances {
         }
     }
 
+    fn boxes(&self) -> Vec<Bounds> {
+        let children = self.top.nodes.iter().flat_map(Pair::children);
+        children.map(|(_, bounds)| bounds).collect()
+    }
+
     fn figures(&self, objects: &StructureStats) -> StructureStats {
         StructureStats {
             nodes: objects.nodes + self.top.nodes.len() as u64,

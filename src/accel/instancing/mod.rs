@@ -47,6 +47,8 @@ trait Upper: Send + Sync + 'static {
     /// The first violated invariant.
     fn validate(&self, base: &Base) -> Result<(), AccelError>;
     fn layout(&self, base: &Base) -> Layout<'_>;
+    /// The boxes that grow for a ray.
+    fn boxes(&self) -> Vec<Bounds>;
     /// Statistics of the whole structure, given those of the objects.
     fn figures(&self, objects: &StructureStats) -> StructureStats;
     fn trace(&self, base: &Base, walk: Walk) -> Hit;
@@ -65,6 +67,35 @@ struct Layout<'a> {
     first_entry: usize,
     growth: f32,
     stack_entries: u32,
+}
+
+/// Boxes that marginal rays pass.
+const MARGINAL_BOXES: usize = 32;
+/// Distances at which they pass, in growths of the box: well within it, next to its border, and beyond.
+const MARGINS: [f32; 3] = [0.5, 0.99, 1.01];
+/// Distance of their origins, in greatest coordinates of the box: a growth is then a thousand roundings of these.
+const AWAY: f32 = 64.0;
+
+/// Two rays along an axis that pass a box at a distance, below and above it on another axis.
+fn beside(bounds: &Bounds, turn: usize, growth: f32, margin: f32) -> [Ray; 2] {
+    let (along, across) = (turn % 3, (turn + 1) % 3);
+    let coordinates = bounds.min.into_iter().chain(bounds.max);
+    let greatest = coordinates.fold(f32::MIN_POSITIVE, |most, x| most.max(x.abs()));
+    let mut origin = [0, 1, 2].map(|axis| 0.5 * (bounds.min[axis] + bounds.max[axis]));
+    origin[along] = -AWAY * greatest;
+    let mut direction = [0.0; 3];
+    direction[along] = 1.0;
+    let away = margin * (growth * AWAY * greatest);
+    [bounds.min[across] - away, bounds.max[across] + away].map(|place| {
+        let mut origin = origin;
+        origin[across] = place;
+        Ray {
+            origin,
+            t_min: 0.0,
+            direction,
+            t_max: 2.0 * AWAY * greatest,
+        }
+    })
 }
 
 struct TwoLevel<U> {
@@ -96,6 +127,17 @@ impl<U: Upper> BuiltAccel for TwoLevel<U> {
         let nodes = vec![bytemuck::cast_slice(&forest.nodes), first, second];
         let triangles = vec![bytemuck::cast_slice(&forest.triangles)];
         vec![("nodes", nodes), ("leaf_triangles", triangles)]
+    }
+
+    fn marginal_rays(&self) -> Vec<Ray> {
+        let growth = self.upper.layout(&self.base).growth;
+        let boxes = self.upper.boxes();
+        let step = boxes.len().div_ceil(MARGINAL_BOXES).max(1);
+        let some = boxes.iter().step_by(step).filter(|_| growth > 0.0);
+        let beside = |(turn, bounds)| MARGINS.map(|margin| beside(bounds, turn, growth, margin));
+        some.enumerate()
+            .flat_map(|(turn, b)| beside((turn, b)).into_iter().flatten())
+            .collect()
     }
 
     fn divisible(&self) -> &'static [&'static str] {

@@ -112,6 +112,10 @@ impl Upper for List {
         }
     }
 
+    fn boxes(&self) -> Vec<Bounds> {
+        self.boxes.iter().map(BoxWords::bounds).collect()
+    }
+
     fn figures(&self, objects: &StructureStats) -> StructureStats {
         objects.clone()
     }

@@ -26,8 +26,11 @@ impl TriangleBuffers {
         let words = soup.words();
         let parts = gpu.storage_parts("triangles", words.as_flattened())?;
         bindings.parts("triangles", &parts);
-        if soup.masks.is_some() {
+        if let Some(masks) = &soup.masks {
             bindings.feature("alpha_masks");
+            if masks.are_blended {
+                bindings.feature("blended");
+            }
         }
         Ok(Self {
             bindings,

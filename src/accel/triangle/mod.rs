@@ -182,10 +182,11 @@ pub trait TriangleTest: Send + Sync {
         let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
         let within = t >= ray.t_min && t <= ray.t_max;
         if repaired && within && nearer && !is_along(triangle, ray.direction) {
-            let [u, v] = [found.u, found.v].map(|weight| weight.abs() / found.area);
-            if is_cut_out(masks, triangle, u, v) {
+            let weights = [found.u, found.v].map(|weight| weight.abs() / found.area);
+            if is_cut_out(masks, triangle, ray, weights) {
                 return;
             }
+            let [u, v] = weights;
             // None is negative, but any may be −0, whose sign compilers do not preserve.
             *hit = Hit {
                 t: t.abs(),

@@ -69,9 +69,19 @@ struct FilterArguments {
     valid: *mut c_int,
     user: *const c_void,
     context: *const c_void,
-    ray: *const c_void,
+    ray: *const FilteredRay,
     hit: *const FilteredHit,
     count: u32,
+}
+
+/// The beginning of `RTCRay`.
+#[repr(C)]
+struct FilteredRay {
+    origin: [f32; 3],
+    t_near: f32,
+    direction: [f32; 3],
+    time: f32,
+    t_far: f32,
 }
 
 /// `RTCHit` of a single ray.
@@ -91,7 +101,14 @@ unsafe extern "C" fn filter(arguments: *const FilterArguments) {
         let soup = &*arguments.user.cast::<TriangleSoup>();
         let hit = &*arguments.hit;
         let record = &soup.records[hit.primitive as usize];
-        if is_cut_out(soup.masks.as_deref(), record, hit.u, hit.v) {
+        let ray = &*arguments.ray;
+        let asked = soup.intersection.raised(&Ray {
+            origin: ray.origin,
+            t_min: ray.t_near,
+            direction: ray.direction,
+            t_max: ray.t_far,
+        });
+        if is_cut_out(soup.masks.as_deref(), record, &asked, [hit.u, hit.v]) {
             *arguments.valid = 0;
         }
     }

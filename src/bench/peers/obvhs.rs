@@ -91,7 +91,13 @@ impl Built<'_> {
         // Its weights belong to the second and third vertices.
         let weights = self.triangles[place].compute_barycentric(ray);
         let record = &self.soup.records[self.ids[place] as usize];
-        if is_cut_out(Some(masks), record, weights.x, weights.y) {
+        let asked = self.soup.intersection.raised(&Ray {
+            origin: ray.origin.into(),
+            t_min: ray.tmin,
+            direction: ray.direction.into(),
+            t_max: ray.tmax,
+        });
+        if is_cut_out(Some(masks), record, &asked, [weights.x, weights.y]) {
             f32::INFINITY
         } else {
             t

@@ -1,5 +1,6 @@
 //! The measurements in a run: planned, prepared, timed, written.
 
+use super::tier::in_turn;
 use crate::register;
 use raystone_bench::run::{Existing, Registries, RunOptions, run};
 use raystone_config::{Experiment, Plan};
@@ -374,7 +375,11 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
             format!("photons = 16\nmode = \"adaptive\"\npilot_cells = 5\nfilter = \"{filter}\""),
         )
     });
-    for (k, (file, text, fault, load)) in fixed.into_iter().chain(adaptive).enumerate() {
+    let faults = in_turn(
+        "faults of photons in a run",
+        fixed.into_iter().chain(adaptive),
+    );
+    for (k, (file, text, fault, load)) in faults.into_iter().enumerate() {
         let sound = library.text(&format!("media/{file}")).unwrap();
         assert_eq!(sound.matches(text).count(), 1, "{file}: `{text}`");
         let kernels = folder.path().join(format!("kernels-{k}"));

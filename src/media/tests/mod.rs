@@ -7,6 +7,9 @@ mod measure;
 mod pipeline;
 mod scatter;
 pub(crate) mod segments;
+#[allow(dead_code, unreachable_pub, reason = "other tests use the rest")]
+#[path = "../../../tests/support/tier.rs"]
+mod tier;
 mod tracking;
 
 use crate::medium::{Homogeneity, Key, Medium};

@@ -134,7 +134,7 @@ fn materials(masked: bool) -> Vec<Material> {
         offset: Vec2::splat(-0.06),
         ..tiled(LEAVES, 1.12, Wrap::Clamp)
     };
-    let mask = |used, channel, cutoff| masked.then_some(AlphaMask::of(used, channel, cutoff));
+    let mask = |used, channel, cutoff| masked.then_some(AlphaMask::of(used, channel, Some(cutoff)));
     let diffuse = |name, [r, g, b]: [f32; 3]| Material::diffuse(name, Vec3::new(r, g, b));
     let lattice = tiled(MESH, 3.0, Wrap::Repeat);
     vec![

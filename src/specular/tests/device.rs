@@ -1,5 +1,6 @@
 //! The kernel against its twin, to the bit, and faults planted into it.
 
+use super::tier::in_turn;
 use crate::device::Solver;
 use crate::newton::{Search, Solved};
 use crate::path::Form;
@@ -291,7 +292,7 @@ const FAULTS: [Fault; 22] = [
 fn faults_of_the_kernel_are_seen() {
     let Some(gpu) = adapter() else { return };
     let mut unseen = Vec::new();
-    for (shape, way, file, text, fault) in FAULTS {
+    for (shape, way, file, text, fault) in in_turn("faults of the specular search", FAULTS) {
         let library = KernelLibrary::default();
         let name = format!("specular/{file}");
         let sound = library

@@ -7,3 +7,6 @@ mod pseudo_code;
 mod reflectors;
 mod search;
 mod table;
+#[allow(dead_code, unreachable_pub, reason = "other tests use the rest")]
+#[path = "../../../tests/support/tier.rs"]
+mod tier;

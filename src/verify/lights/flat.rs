@@ -61,7 +61,7 @@ pub(crate) fn sample(
     // Parallelograms have neither texture nor mask.
     let root = u.sqrt();
     let weights = [root * (1.0 - v), root * v];
-    if hits.is_cut_out(id, weights, rounding.texel()) {
+    if hits.is_cut_out(id, weights, rounding) {
         return None;
     }
     let at = textures.coordinates(id, weights);

@@ -212,8 +212,8 @@ fn picture(texture: &Texture) -> Picture {
     }
 }
 
-/// White where the surface exists, with [`FINER`] texels per image texel in each direction:
-/// Mitsuba's masks have no cutoff.
+/// White where the surface exists, the alpha where that is its probability, with [`FINER`] texels
+/// per image texel in each direction: Mitsuba's masks have no cutoff.
 fn cut(mask: &AlphaMask, textures: &[Texture]) -> Picture {
     let texture = mask
         .texture
@@ -240,8 +240,11 @@ fn cut(mask: &AlphaMask, textures: &[Texture]) -> Picture {
         let (column, row) = (column as i64, row as i64);
         let line = |row| alpha(column, row) * (1.0 - fx) + alpha(column + 1, row) * fx;
         let found = line(row) * (1.0 - fy) + line(row + 1) * fy;
-        let there = found * f64::from(mask.factor) >= f64::from(mask.cutoff);
-        [if there { 255 } else { 0 }; 3]
+        let alpha = found * f64::from(mask.factor);
+        match mask.cutoff.map(f64::from) {
+            Some(cutoff) => [if alpha >= cutoff { 255 } else { 0 }; 3],
+            None => [(255.0 * alpha).round() as u8; 3],
+        }
     };
     Picture {
         width: size[0],

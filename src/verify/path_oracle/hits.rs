@@ -3,7 +3,7 @@
 use super::rounding::{EPSILON, MOST_ROUNDINGS, Rounding};
 use crate::holes::SceneHoles;
 use glam::{DVec2, DVec3};
-use raystone_accel::oracle::{Groups, Line};
+use raystone_accel::oracle::{Cut, Groups, Line};
 use raystone_core::geometry::Triangle;
 use raystone_scene::SceneData;
 
@@ -51,7 +51,8 @@ impl Hit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Blocked {
     No,
-    /// Only by a layer of the surface it leaves, which a kernel may have passed.
+    /// Only by a layer of the surface it leaves, or by surfaces that are there by chance: a kernel
+    /// may have passed.
     ByLayer,
     Yes,
 }
@@ -59,10 +60,11 @@ pub(crate) enum Blocked {
 /// The nearest hit after simulated rounding.
 pub(crate) struct Nearest {
     pub hit: Hit,
-    /// True if only rounding made it the nearest.
+    /// True if only rounding or chance made it the nearest.
     pub is_swapped: bool,
-    /// True if another surface is within [`LAYERED`] roundings.
-    pub is_layered: bool,
+    /// Surfaces that a kernel may meet instead: 1 for those within [`LAYERED`] roundings, and each
+    /// that is there by chance.
+    pub layers: usize,
 }
 
 /// A ray with a unit direction, and the triangles it ignores.
@@ -120,11 +122,14 @@ impl<'a> Hits<'a> {
 
     pub(crate) fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
         let mut found: Vec<(Hit, Blur)> = Vec::new();
+        let mut by_chance: Vec<Hit> = Vec::new();
         let mut end = f64::INFINITY;
-        self.visit(segment, |hit| {
+        self.visit(segment, |hit, cut| {
             let blur = self.blur(&hit, segment);
             // Hits behind a triangle count where a kernel may miss it.
-            if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
+            if cut == Cut::Open {
+                by_chance.push(hit);
+            } else if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
                 end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
             }
             found.push((hit, blur));
@@ -133,7 +138,10 @@ impl<'a> Hits<'a> {
         });
         // An order independent of the groups.
         found.sort_by_key(|(hit, _)| hit.triangle);
-        found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
+        found.retain(|(hit, blur)| {
+            let is_by_chance = by_chance.iter().any(|other| other.triangle == hit.triangle);
+            rounding.holds(hit.margin(), blur.of_weights) && (!is_by_chance || rounding.is_there())
+        });
         let before = |a: &Hit, b: &Hit| {
             if (a.distance - b.distance).abs() <= EQUAL * b.distance {
                 a.triangle < b.triangle
@@ -162,10 +170,14 @@ impl<'a> Hits<'a> {
         } else {
             first.0
         };
+        by_chance.retain(|hit| hit.distance <= end);
+        let is_by_chance = by_chance.iter().any(|hit| hit.distance <= met.distance);
+        let is_swapped = met.triangle != first.0.triangle || self.is_at_start(&met, segment);
+        let is_layered = is_layered || self.is_at_start(&first.0, segment);
         Some(Nearest {
             hit: met,
-            is_swapped: met.triangle != first.0.triangle || self.is_at_start(&met, segment),
-            is_layered: is_layered || self.is_at_start(&first.0, segment),
+            is_swapped: is_swapped || is_by_chance,
+            layers: usize::from(is_layered) + by_chance.len(),
         })
     }
 
@@ -197,11 +209,16 @@ impl<'a> Hits<'a> {
         meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
     }
 
-    /// The occlusion of a segment, which may be only by a layer of the surface that it leaves.
+    /// The occlusion of a segment, which may be only by a layer of the surface that it leaves, or
+    /// only by chance.
     pub(crate) fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
         let (mut by_layer, mut by_other) = (false, false);
-        self.visit(segment, |hit| {
+        self.visit(segment, |hit, cut| {
             if !rounding.holds(hit.margin(), self.blur(&hit, segment).of_weights) {
+                return f32::INFINITY;
+            }
+            if cut == Cut::Open {
+                by_layer |= rounding.is_there();
                 return f32::INFINITY;
             }
             if self.is_at_start(&hit, segment) {
@@ -224,13 +241,27 @@ impl<'a> Hits<'a> {
     }
 
     /// True if there is no surface at a point of a triangle.
-    pub(crate) fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
-        let holes = self.holes.as_ref();
-        holes.is_some_and(|holes| holes.is_cut_out(triangle, weights, shift))
+    pub(crate) fn is_cut_out(
+        &self,
+        triangle: u32,
+        weights: [f64; 2],
+        rounding: &mut Rounding,
+    ) -> bool {
+        match self.cut(triangle, weights, rounding.texel()) {
+            Cut::Surface => false,
+            Cut::Hole => true,
+            Cut::Open => !rounding.is_there(),
+        }
     }
 
-    /// Calls `found` with every hit; it returns the new end of the search interval.
-    fn visit(&self, segment: &Segment, mut found: impl FnMut(Hit) -> f32) {
+    fn cut(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> Cut {
+        let holes = self.holes.as_ref();
+        holes.map_or(Cut::Surface, |holes| holes.at(triangle, weights, shift))
+    }
+
+    /// Calls `found` with every hit, and whether its surface is there for certain; it returns the
+    /// new end of the search interval.
+    fn visit(&self, segment: &Segment, mut found: impl FnMut(Hit, Cut) -> f32) {
         let inverse = |d: f64| {
             let d = d as f32;
             1.0 / d.abs().max(1e-37).copysign(d)
@@ -246,9 +277,11 @@ impl<'a> Hits<'a> {
                 }
                 let hit = meet(&self.triangles[id as usize], id, segment);
                 let within = |h: &Hit| h.distance > self.start && h.distance < segment.length;
-                let hit = hit.filter(within);
-                if let Some(hit) = hit.filter(|h| !self.is_cut_out(id, h.weights, segment.shift)) {
-                    end = end.min(found(hit));
+                if let Some(hit) = hit.filter(within) {
+                    let cut = self.cut(id, hit.weights, segment.shift);
+                    if cut != Cut::Hole {
+                        end = end.min(found(hit, cut));
+                    }
                 }
             }
             end

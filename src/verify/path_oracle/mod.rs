@@ -123,7 +123,7 @@ pub struct Path {
     pub rays: Vec<PathRay>,
     /// All decisions: triangles, lobes, lights, occlusion, end. Otherwise paths differ by rounding.
     pub branch: Vec<Decision>,
-    /// Number of its surfaces that have another within rounding.
+    /// Number of its surfaces that have another within rounding, or that are there by chance.
     pub layers: usize,
 }
 
@@ -132,11 +132,12 @@ pub struct Path {
 pub enum Decision {
     /// The triangle that was hit.
     Met(u64),
-    /// The same, if only rounding put it before another.
+    /// The same, if only rounding or chance put it before another.
     MetBefore(u64),
     /// True if the ray is occluded.
     Blocked(bool),
-    /// Occluded, within rounding, by a layer of the surface that the ray leaves.
+    /// Occluded, within rounding or by chance, by a layer of the surface that the ray leaves or by a
+    /// surface that is partly transparent.
     BlockedByLayer,
     /// A number against a probability, a side, an index into a table.
     Other(u64),
@@ -355,7 +356,7 @@ impl Walk<'_> {
             Some(met) if met.is_swapped => Decision::MetBefore(triangle),
             _ => Decision::Met(triangle),
         });
-        self.layers += usize::from(met.is_some_and(|met| met.is_layered));
+        self.layers += met.map_or(0, |met| met.layers);
     }
 
     fn lens(&self) -> Lens {

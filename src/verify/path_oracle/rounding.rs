@@ -27,6 +27,9 @@ const MASKS: u64 = 2;
 /// Stream of the numbers that perturb hits.
 const HITS: u64 = 3;
 
+/// Stream of the choices whether a partly transparent surface is there.
+const CHANCE: u64 = 4;
+
 /// Perturbs quantities by f32 roundings, or leaves them unchanged.
 pub struct Rounding {
     random: Option<Pcg32>,
@@ -34,6 +37,8 @@ pub struct Rounding {
     texels: Option<Pcg32>,
     /// Perturbs hits: distances, and edges.
     hits: Option<Pcg32>,
+    /// Decides about surfaces that are there by chance.
+    chance: Option<Pcg32>,
     /// Number of roundings.
     scale: f64,
 }
@@ -45,6 +50,7 @@ impl Rounding {
             random: None,
             texels: None,
             hits: None,
+            chance: None,
             scale: 0.0,
         }
     }
@@ -55,6 +61,7 @@ impl Rounding {
             random: Some(Pcg32::new(trial)),
             texels: Some(Pcg32::with_stream(trial, MASKS)),
             hits: Some(Pcg32::with_stream(trial, HITS)),
+            chance: Some(Pcg32::with_stream(trial, CHANCE)),
             scale: roundings * EPSILON,
         }
     }
@@ -93,6 +100,12 @@ impl Rounding {
     pub(crate) fn holds(&mut self, margin: f64, error: f64) -> bool {
         let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
         margin.max(0.0) + signed * self.scale * error >= 0.0
+    }
+
+    /// True if a surface is there that chance decides about: always, or, while trials look for the
+    /// kernel's answer, every other time, whatever its alpha.
+    pub(crate) fn is_there(&mut self) -> bool {
+        (self.chance.as_mut()).is_none_or(|chance| chance.next_u32() >> 31 == 0)
     }
 
     /// Perturbs each component of a colour independently.

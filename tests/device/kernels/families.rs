@@ -308,6 +308,7 @@ pub fn batches() -> Family {
         "refill",
         "counted",
         "alpha_masks",
+        "blended",
         "texels",
         "sampled_texels",
         "loops_cut",
@@ -349,6 +350,7 @@ pub fn renderers() -> Family {
     factors.extend(intersections());
     factors.extend(flags(&[
         "alpha_masks",
+        "blended",
         "block_list",
         "texels",
         "sampled_texels",

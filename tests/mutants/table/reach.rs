@@ -39,8 +39,8 @@ pub const MUTANTS: &[Mutant] = &[
         "an alpha that equals the cutoff is no surface",
         text(
             "accel/mask",
-            "lower * fy < image.w",
-            "lower * fy <= image.w",
+            "return alpha < image.w",
+            "return alpha <= image.w",
         ),
     ),
     path(
