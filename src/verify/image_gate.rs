@@ -12,8 +12,9 @@
 //! * it is a *flip*: with that many roundings the oracle takes another decision somewhere and then
 //!   gives the kernel's answer. That decision had a margin below `MOST_ROUNDINGS` roundings. The
 //!   first differing decision gives its kind: *another surface* within rounding of the first
-//!   (two-layer walls), *an edge* of a hit or an occluder, or anything else, such as a random
-//!   number against a probability;
+//!   (two-layer walls) or behind one that is there by chance, *an edge* of a hit or an occluder, or
+//!   anything else, such as a random number against a probability. Among the last are paths with so
+//!   many surfaces by chance that the kernel's choices are not found;
 //! * otherwise it is *wrong*: a fault of the kernels or of the oracle.
 //!
 //! Means of a few samples summed in one dispatch are compared with those of single samples
@@ -56,6 +57,9 @@ pub(crate) const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
 /// take new branches (light passed on by many small facets), up to [`MOST_TRIALS`].
 const TRIALS: u64 = 24;
 const MOST_TRIALS: u64 = TRIALS << 5;
+/// So many times as many, at the first scale, for paths that meet surfaces which are there by chance: the kernel's
+/// choices are one of two for each of them.
+const BY_CHANCE: u64 = 8;
 /// Factor by which a kernel may differ more than the worst simulated path of its branch.
 const SPREAD: f64 = 3.0;
 /// A difference that the second of [`SCALES`] may excuse too: offsets add up in corners.
@@ -270,8 +274,10 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     for (index, scale) in (0..).zip(SCALES) {
         // Many roundings would excuse anything of a path that stays on its branch.
         let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
+        let is_first_by_chance = truth.by_chance > 0 && index == 0;
+        let most = MOST_TRIALS * if is_first_by_chance { BY_CHANCE } else { 1 };
         let (mut trial, mut since_new) = (0, 0);
-        while since_new < least && trial < MOST_TRIALS {
+        while since_new < least && trial < most {
             let rounding = Rounding::played(scale, MOST_TRIALS * index + trial);
             let played = oracle.trace(view, answer.id, rounding);
             trial += 1;
@@ -297,6 +303,10 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
         if let Some(parting) = parting.filter_map(|other| other.parting(truth)).min() {
             return Class::Flip(parting);
         }
+    }
+    // Too many choices to find all of the kernel's; so few as flips are allowed.
+    if truth.by_chance > 0 {
+        return Class::Flip(Parting::Decision);
     }
     Class::Wrong
 }

@@ -124,6 +124,7 @@ mod tests {
             ],
             branch: Vec::new(),
             layers: 0,
+            by_chance: 0,
         };
         vec![path; 100]
     }

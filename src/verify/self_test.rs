@@ -5,9 +5,10 @@ use crate::gate::{ReferenceTracer, compare, verdict};
 use crate::image_gate::{Answer, differing_sum, differs, judge};
 use crate::path_oracle::{PathOracle, View};
 use crate::rays::RaySet;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use raystone_accel::oracle::{Verdict, judge_closest_hits};
 use raystone_accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
+use raystone_core::geometry::Triangle;
 use raystone_gpu::KERNEL_ERRORS;
 use raystone_image::Image;
 use raystone_record::{ClassVerdict, ReferenceCheck};
@@ -129,17 +130,65 @@ fn in_reference(
     if wrong.brute_force.wrong != 1 || wrong.is_sound() {
         return Some("a wrong answer of the reference tracer".to_owned());
     }
-    // Of a small triangle far away rounding may explain much: one class of rays has a distance that it does not explain.
-    let questions: Vec<_> = hits
-        .iter()
-        .map(|(ray, hit)| {
-            let farther = (hit.triangle, 1.01 * hit.t + 0.01);
-            (soup.intersection.raised(ray), Some(farther))
-        })
-        .collect();
-    let judged = judge_closest_hits(&scene.triangles[..], &questions);
-    let is_seen = (judged.iter()).any(|verdict| matches!(verdict, Verdict::Wrong(_)));
+    let of_scene = refuted(&scene.triangles, soup, hits);
+    let is_seen = of_scene.is_some() && refuted(&[PLAIN], soup, &plain()) == Some(1);
     (!is_seen).then(|| "a distance that double precision refutes".to_owned())
+}
+
+/// A triangle that a ray meets in its middle: in some scenes, rounding explains every answer.
+const PLAIN: Triangle = Triangle {
+    vertices: [
+        Vec3::new(-1.0, -1.0, 0.0),
+        Vec3::new(2.0, -1.0, 0.0),
+        Vec3::new(-1.0, 2.0, 0.0),
+    ],
+};
+
+fn plain() -> [(Ray, Hit); 1] {
+    let ray = Ray {
+        origin: [0.0, 0.0, 1.0],
+        t_min: 0.0,
+        direction: [0.0, 0.0, -1.0],
+        t_max: 4.0,
+    };
+    let hit = Hit {
+        t: 1.0,
+        triangle: 0,
+        ..Hit::miss(&ray)
+    };
+    [(ray, hit)]
+}
+
+/// The number of right distances that double precision confirms, if it refutes a wrong one for each. That is wrong by
+/// the size of the scene: beside a triangle millions of times as large, rounding explains much.
+fn refuted(triangles: &[Triangle], soup: &TriangleSoup, hits: &[(Ray, Hit)]) -> Option<usize> {
+    let corners = triangles.iter().flat_map(|t| t.vertices);
+    let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
+        (low.min(corner), high.max(corner))
+    });
+    let asked = |farther: bool| {
+        let question = |(ray, hit): &(Ray, Hit)| {
+            let length = Vec3::from(ray.direction).length();
+            let wrong = (2.0 * hit.t + (high - low).length() / length).min(f32::MAX);
+            let ray = Ray {
+                t_max: ray.t_max.max(wrong),
+                ..soup.intersection.raised(ray)
+            };
+            (
+                ray,
+                Some((hit.triangle, if farther { wrong } else { hit.t })),
+            )
+        };
+        let questions: Vec<_> = hits.iter().map(question).collect();
+        judge_closest_hits(triangles, &questions)
+    };
+    let (right, wrong) = (asked(false), asked(true));
+    let pairs = right.iter().zip(&wrong);
+    let confirmed: Vec<&Verdict> = pairs
+        .filter_map(|(right, wrong)| (*right == Verdict::Agrees).then_some(wrong))
+        .collect();
+    let is_wrong = |verdict: &&&Verdict| matches!(verdict, Verdict::Wrong(_));
+    (confirmed.iter().filter(is_wrong).count() == confirmed.len()).then_some(confirmed.len())
 }
 
 /// Lit paths that are tried: rounding may explain what is planted in one of them.

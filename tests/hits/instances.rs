@@ -10,6 +10,7 @@ use raystone::accel::{
     Space, TriangleSoup, brute_force_hits, brute_force_instances,
 };
 use raystone::geometry::Triangle;
+use raystone::gpu::Gpu;
 use raystone::measure::gate::{Checks, compare};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
@@ -158,6 +159,39 @@ fn structures_equal_brute_force_over_instances_and_count_like_their_twins() {
         assert!(struck * 10 > rays.len(), "{what}: {struck} hits");
         for kind in KINDS {
             check(what, kind, &soup, &rays, &hits);
+        }
+    }
+}
+
+#[test]
+fn rays_at_the_margins_of_boxes_show_how_far_these_grow() {
+    if !support::is_exact(support::gpu()) {
+        return;
+    }
+    let mut rng = Pcg::new(77);
+    let soup = soup_of(&random_assembly(&mut rng, 30, wild_transform));
+    for (kind, module) in KINDS
+        .into_iter()
+        .zip(["accel/object_list", "accel/meta_bvh"])
+    {
+        let built = build(kind, &soup, &default_params(&kind.parameters()));
+        let rays = built.marginal_rays();
+        assert!(rays.len() > 100, "{} rays of {}", rays.len(), kind.name());
+        let twin = built.cpu_twin(&soup).expect("a twin");
+        let count = |ray: &Ray| {
+            let mut counters = Counters::default();
+            twin.closest_hit(ray, &mut counters);
+            counters
+        };
+        let expected: Vec<Counters> = rays.iter().map(count).collect();
+        let found = |gpu: &Gpu| trace(gpu, &*built, &soup, &rays, &["counters"]).work;
+        assert_eq!(found(support::gpu()), expected, "{}", kind.name());
+        for factor in ["0.0", "0.98", "1.02"] {
+            let growth = "level(ray, instancing.growth)";
+            let faulty = format!("level(ray, {factor} * instancing.growth)");
+            let kernels = support::kernels_with(module, &[(growth, &faulty)]);
+            let seen = found(&support::open(kernels)) != expected;
+            assert!(seen, "{}: growth times {factor} is not seen", kind.name());
         }
     }
 }

@@ -386,8 +386,12 @@ impl PathOracle<'_> {
         strategy: Strategy,
     ) -> DVec3 {
         walk.decide(chosen.light as u64);
+        let before = walk.rounding.by_chance();
         let (part, light) = self.light_sample(surface, &chosen, point, &mut walk.rounding);
         walk.decide(part as u64);
+        if walk.rounding.by_chance() > before {
+            walk.decide_shining(light.is_some());
+        }
         let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
             return DVec3::ZERO;
         };

@@ -125,6 +125,8 @@ pub struct Path {
     pub branch: Vec<Decision>,
     /// Number of its surfaces that have another within rounding, or that are there by chance.
     pub layers: usize,
+    /// Number of decisions about surfaces that are there by chance.
+    pub by_chance: usize,
 }
 
 /// A decision of a path, with its inputs.
@@ -267,6 +269,7 @@ impl<'a> PathOracle<'a> {
             rays: walk.rays,
             branch: walk.branch,
             layers: walk.layers,
+            by_chance: walk.rounding.by_chance(),
         }
     }
 }
@@ -348,6 +351,15 @@ impl Walk<'_> {
             _ => Decision::Blocked(blocked == Blocked::Yes),
         });
         self.layers += usize::from(blocked == Blocked::ByLayer);
+    }
+
+    /// Of a light that is there by chance.
+    fn decide_shining(&mut self, is_there: bool) {
+        self.branch.push(match is_there {
+            true => Decision::Blocked(false),
+            false => Decision::BlockedByLayer,
+        });
+        self.layers += 1;
     }
 
     fn decide_met(&mut self, met: Option<&Nearest>) {

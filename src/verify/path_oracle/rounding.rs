@@ -39,6 +39,8 @@ pub struct Rounding {
     hits: Option<Pcg32>,
     /// Decides about surfaces that are there by chance.
     chance: Option<Pcg32>,
+    /// Number of surfaces decided about.
+    by_chance: usize,
     /// Number of roundings.
     scale: f64,
 }
@@ -51,6 +53,7 @@ impl Rounding {
             texels: None,
             hits: None,
             chance: None,
+            by_chance: 0,
             scale: 0.0,
         }
     }
@@ -62,6 +65,7 @@ impl Rounding {
             texels: Some(Pcg32::with_stream(trial, MASKS)),
             hits: Some(Pcg32::with_stream(trial, HITS)),
             chance: Some(Pcg32::with_stream(trial, CHANCE)),
+            by_chance: 0,
             scale: roundings * EPSILON,
         }
     }
@@ -105,7 +109,13 @@ impl Rounding {
     /// True if a surface is there that chance decides about: always, or, while trials look for the
     /// kernel's answer, every other time, whatever its alpha.
     pub(crate) fn is_there(&mut self) -> bool {
+        self.by_chance += 1;
         (self.chance.as_mut()).is_none_or(|chance| chance.next_u32() >> 31 == 0)
+    }
+
+    /// Number of surfaces that [`Rounding::is_there`] has decided about.
+    pub(crate) fn by_chance(&self) -> usize {
+        self.by_chance
     }
 
     /// Perturbs each component of a colour independently.

@@ -105,6 +105,72 @@ fn what_a_loader_left_out_is_a_warning_of_verify_trace_and_run() {
     assert!(page.contains("no-such.mtl"));
 }
 
+/// Triangles of an OBJ file without shared vertices.
+fn triangles_of(corners: impl IntoIterator<Item = [[f32; 3]; 3]>) -> String {
+    let vertex = |[x, y, z]: [f32; 3]| format!("v {x:e} {y:e} {z:e}\n");
+    let mut count = 0;
+    let triangle = |corners: [[f32; 3]; 3]| {
+        count += 3;
+        let vertices = corners.map(vertex).concat();
+        format!("{vertices}f {} {} {}\n", count - 2, count - 1, count)
+    };
+    corners.into_iter().map(triangle).collect()
+}
+
+#[test]
+fn verify_passes_models_of_awkward_shapes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let unit = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let square = |k: u8| {
+        let [x, y] = [k % 16, k / 16].map(f32::from);
+        [
+            [[x, y, 0.0], [x + 1.0, y, 0.0], [x, y + 1.0, 0.0]],
+            [
+                [x, y + 1.0, 0.0],
+                [x + 1.0, y, 0.0],
+                [x + 1.0, y + 1.0, 0.0],
+            ],
+        ]
+    };
+    let needle = [[-1e6, 8.0, 0.001], [1e6, 8.0, 0.001], [0.0, 8.0001, 0.001]];
+    let flat = (0..=255).flat_map(square).chain([needle]);
+    let turned = |k: u8| {
+        let (sin, cos) = (0.1 * f32::from(k)).sin_cos();
+        // All have the same middle.
+        [[cos, sin, 0.0], [-cos, -sin, 1.0], [0.0, 0.0, -1.0]]
+    };
+    let sized = |size: f32| [[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];
+    for (name, model) in [
+        ("flat, and a needle of 2e6 units", triangles_of(flat)),
+        ("sixty times one triangle", triangles_of([unit; 60])),
+        ("one middle", triangles_of((0..60).map(turned))),
+        (
+            "1e-39 to 1e11",
+            triangles_of([1e-39, 1e-20, 1.0, 1e11].map(sized)),
+        ),
+        ("one", triangles_of([unit])),
+        ("a point", triangles_of([unit, [[0.5; 3]; 3]])),
+        (
+            "a line",
+            triangles_of([unit, [[0.5; 3], [2.0; 3], [3.0; 3]]]),
+        ),
+    ] {
+        let path = folder.path().join("model.obj");
+        std::fs::write(&path, model).expect("a writable folder");
+        let output = run(&[
+            "verify",
+            "--accel",
+            "bvh",
+            "--rays",
+            "256",
+            "--scene",
+            text(&path),
+        ]);
+        let words = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{name}: {words}");
+    }
+}
+
 #[test]
 fn a_dry_run_refuses_models_that_cannot_be_one() {
     let folder = tempfile::tempdir().expect("a temporary folder");
