@@ -222,6 +222,10 @@ impl SceneData {
         if let Some(sky) = &self.daylight {
             hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
         }
+        if let Some(medium) = &self.medium {
+            hash.bytes(b"medium");
+            hash.bytes(&medium.words());
+        }
         if let Some(assembly) = &self.assembly {
             for object in assembly.objects() {
                 hash.bytes(bytemuck::cast_slice::<Triangle, u8>(object));

@@ -477,8 +477,8 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "greatest",
         "an expression of the kernel",
     ),
-    ("media/medium", "pack_halves", "build"),
-    ("media/structure/cube_bvh", "append", "build"),
+    ("volume/medium", "pack_halves", "build"),
+    ("volume/structure/cube_bvh", "append", "build"),
     ("media/segments", "step_fuse", "a uniform of the kernel"),
     (
         "media/segments",
