@@ -264,7 +264,7 @@ fn floor(volume: Volume, structure: &str) -> SceneData {
     };
     let mut mesh = Mesh::new("floor", camera, Vec3::ZERO).unwrap();
     let grey = mesh.material(Material::diffuse("grey", Vec3::splat(0.5)));
-    mesh.plain([vec3(-30.0, -1.5, -60.0), 90.0 * Vec3::Z, 60.0 * Vec3::X], grey);
+    mesh.plain([vec3(-1.0, -1.5, -5.0), 10.0 * Vec3::Z, 2.0 * Vec3::X], grey);
     let mut scene = mesh.done(Vec::new());
     scene.medium = Some(SceneMedium::new(volume, structure).unwrap());
     scene
@@ -350,9 +350,9 @@ fn a_medium_that_absorbs_nothing_is_a_furnace() {
     let gpu = gpu();
     for structure in ["dda", "level-map"] {
         for anisotropy in [None, Some(0.7)] {
-            let constant = furnace(&gpu, placed(fog(1.2, 0.0), anisotropy), structure).unwrap();
+            let constant = furnace(&gpu, placed(fog(0.35, 0.0), anisotropy), structure).unwrap();
             assert_eq!(constant, 0.0);
-            let grid = furnace(&gpu, placed(clouds(3.0, 0.0), anisotropy), structure).unwrap();
+            let grid = furnace(&gpu, placed(clouds(0.9, 0.0), anisotropy), structure).unwrap();
             assert_eq!(grid, 0.0);
         }
     }
