@@ -13,7 +13,7 @@ use raystone_core::params::{ParamValue, Params, Variant};
 use raystone_gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary};
 use raystone_record::Verdict;
 use raystone_render::{
-    ConfiguredIntegrator, IntegratorRegistry, RayOffset, RenderJob, Renderer, Stage,
+    ConfiguredIntegrator, IntegratorRegistry, OrganisationRegistry, RayOffset, RenderJob, Renderer, Stage,
 };
 use raystone_sampling::{Sampler, SamplerRegistry};
 use raystone_scene::{Light, Material, SceneData, SceneMedium};
@@ -396,5 +396,27 @@ fn light_scattered_once_is_that_of_a_quadrature() {
     for (volume, light) in cases {
         let off = scattered_once(&gpu, &volume, light, "level-map").unwrap();
         assert!(off < 4.5, "{off} standard errors");
+    }
+}
+
+#[test]
+fn organisations_follow_the_same_paths_through_media() {
+    let gpu = gpu();
+    let registry = OrganisationRegistry::default();
+    let entries = registry.0.entries();
+    let entry = |name: &str| entries.iter().find(|e| e.name == name).unwrap();
+    let by_kind = ("shading", ParamValue::Name("by-kind".to_owned()));
+    let mut all: Vec<Variant> = entries.iter().map(|e| e.default_variant()).collect();
+    all.push(entry("wavefront").variant(&[by_kind]));
+    assert_eq!(all.len(), 6);
+    for trial in media(&KindChecks::default()).unwrap() {
+        let one = path(&[depth(4)]);
+        let truth = image(&gpu, &trial.scene, [40, 28], &one, 4).unwrap();
+        for variant in &all {
+            let by = registry.configured(variant).unwrap();
+            let organised = one.clone().organised(by).unwrap();
+            let found = image(&gpu, &trial.scene, [40, 28], &organised, 4).unwrap();
+            assert!(found == truth, "{} by {}", trial.scene.name, variant.label);
+        }
     }
 }

@@ -11,6 +11,7 @@ mod furnace;
 mod hairball;
 mod instances;
 mod lamps;
+mod media;
 pub(super) mod numeric;
 mod single_triangle;
 mod sphere;
@@ -51,7 +52,7 @@ impl Builtin {
     }
 }
 
-const BUILTINS: [Builtin; 15] = [
+const BUILTINS: [Builtin; 17] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -67,6 +68,8 @@ const BUILTINS: [Builtin; 15] = [
     Builtin::of::<foliage::Foliage>(),
     Builtin::of::<hairball::Hairball>(),
     Builtin::of::<city::City>(),
+    Builtin::of::<media::Fog>(),
+    Builtin::of::<media::Cloud>(),
 ];
 
 /// The built-in scenes and their parameters, for the parser, lists and docs.
