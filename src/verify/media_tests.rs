@@ -405,10 +405,12 @@ fn organisations_follow_the_same_paths_through_media() {
     let registry = OrganisationRegistry::default();
     let entries = registry.0.entries();
     let entry = |name: &str| entries.iter().find(|e| e.name == name).unwrap();
-    let by_kind = ("shading", ParamValue::Name("by-kind".to_owned()));
+    let by_kind = ("shading", ParamValue::Name("per-material".to_owned()));
+    let by_ray = ("sorting", ParamValue::Name("ray-key".to_owned()));
     let mut all: Vec<Variant> = entries.iter().map(|e| e.default_variant()).collect();
     all.push(entry("wavefront").variant(&[by_kind]));
-    assert_eq!(all.len(), 6);
+    all.push(entry("wavefront").variant(&[by_ray]));
+    println!("{} organisations", all.len());
     for trial in media(&KindChecks::default()).unwrap() {
         let one = path(&[depth(4)]);
         let truth = image(&gpu, &trial.scene, [40, 28], &one, 4).unwrap();
@@ -418,5 +420,64 @@ fn organisations_follow_the_same_paths_through_media() {
             let found = image(&gpu, &trial.scene, [40, 28], &organised, 4).unwrap();
             assert!(found == truth, "{} by {}", trial.scene.name, variant.label);
         }
+    }
+}
+
+const FAULTS: [(&str, &str, &str, &str, &str); 20] = [
+    ("medium-absorbs-nothing", "what is absorbed is scattered", "integrator/medium", "select(there.x / there.y, 1.0, there.x >= there.y), true", "1.0, true"),
+    ("medium-albedo-twice", "the albedo counts twice", "integrator/path", "(*path).throughput *= flight.albedo;", "(*path).throughput *= flight.albedo * flight.albedo;"),
+    ("medium-collides-by-scattering", "a collision is accepted by σ_s, not σ", "integrator/medium", "next_number() * bounds.y < there.y", "next_number() * bounds.y < there.x"),
+    ("medium-majorant-too-small", "flights go by half the greatest extinction", "integrator/medium", "let majorant = bounds.y * unit;", "let majorant = 0.5 * bounds.y * unit;"),
+    ("medium-depth-begins-anew", "what a region took of the optical depth is forgotten", "integrator/medium", "left = max(left - (segment.exit - t) * majorant, 0.0);", ""),
+    ("medium-first-number-squared", "the first free flight is too short", "integrator/medium", "var left = -log(1.0 - first);", "var left = -log(1.0 - first * first);"),
+    ("medium-behind-surfaces", "light is scattered behind what a ray meets", "integrator/path", "@if(!sphere_lights) let end = hit.t;", "@if(!sphere_lights) let end = FAR;"),
+    ("medium-behind-balls-of-light", "light is scattered behind a ball of light", "integrator/path", "@if(sphere_lights) let end = first_sphere(Ray(ray.origin, ray.t_min, ray.direction, hit.t)).t;", "@if(sphere_lights) let end = hit.t;"),
+    ("medium-ball-is-a-box", "a medium in a ball fills its box", "integrator/medium", "placed.is_ball == 1u", "placed.is_ball == 2u"),
+    ("medium-unit-of-shadow-rays", "shadow rays count as of length 1", "integrator/medium", "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density * length(ray.direction);", "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density;"),
+    ("medium-before-lights-forgotten", "light samples are not dimmed by the medium", "integrator/path", " * transmittance(light.shadow, index)", ""),
+    ("medium-control-forgotten", "what a region absorbs at least is left out for shadow rays", "integrator/medium", "result *= exp(-bounds.x * unit * (segment.exit - walk.t));", ""),
+    ("medium-shadow-majorant-too-small", "collisions of shadow rays are too rare", "integrator/medium", "let rest = (bounds.y - bounds.x) * unit;", "let rest = 0.5 * (bounds.y - bounds.x) * unit;"),
+    ("medium-shadow-by-scattering", "shadow rays lose σ_s alone", "integrator/medium", "saturate((bounds.y - there.y)", "saturate((bounds.y - there.x)"),
+    ("medium-phase-sign", "the phase function is evaluated backwards", "integrator/medium", "dot(surface.arriving, direction));", "-dot(surface.arriving, direction));"),
+    ("medium-phase-sampled-backwards", "directions are drawn around the way back", "integrator/medium", "surface.arriving, u);", "-surface.arriving, u);"),
+    ("medium-even-density", "directions in the medium have the density of even ones where light is found", "shading/bsdf", "vec3<f32>(1.0), scattered_pdf(surface, onward), false", "vec3<f32>(1.0), 0.07957747, false"),
+    ("medium-light-behind-nothing", "points in the medium choose lights of a tree as surfaces do", "shading/light/tree", "all(normal == vec3<f32>(0.0))", "false"),
+    ("medium-survival-by-flight", "paths survive by the number of their flight", "integrator/path", "@if(media) if (survival_number() >= survival)", "@if(media) if (sample_1d(sampler) >= survival)"),
+    ("medium-beyond-depth", "paths are scattered once more than allowed", "integrator/path", "depth == MAX_DEPTH || flight.albedo <= 0.0", "flight.albedo <= 0.0"),
+];
+
+#[test]
+fn zz_matrix() {
+    let sound = gpu();
+    let checks = |gpu: &Gpu| -> Vec<(&'static str, bool)> {
+        let mut seen = Vec::new();
+        let mut by_gate = false;
+        for trial in media(&KindChecks::default()).unwrap() {
+            for (_, changes) in &trial.trials {
+                if !by_gate && gate(gpu, &trial.scene, &path(changes)).is_some() { by_gate = true; }
+            }
+        }
+        seen.push(("oracle", by_gate));
+        let f = furnace(gpu, placed(clouds(0.9, 0.0), Some(0.7)), "dda");
+        seen.push(("furnace", f.map_or(true, |x| x != 0.0)));
+        let a = absorbed(gpu, &placed(clouds(0.0, 4.0), None), "bricks");
+        seen.push(("absorber", a.map_or(true, |x| !(x < 4.5))));
+        let s = shaded(gpu, &placed(fog(0.5, 0.3), None), "dda", 1);
+        let t = shaded(gpu, &placed(clouds(2.0, 1.0), None), "dda", 256);
+        seen.push(("shadow", s.map_or(true, |x| !(x < 2e-5)) || t.map_or(true, |x| !(x < 2e-3))));
+        let (inside, outside) = (DVec3::new(0.1, 0.2, 0.1), DVec3::new(2.0, 1.5, 1.0));
+        let o = scattered_once(gpu, &placed(fog(0.7, 0.3), Some(0.5)), inside, "level-map");
+        let p = scattered_once(gpu, &placed(clouds(3.0, 1.0), Some(0.5)), outside, "level-map");
+        seen.push(("single", o.map_or(true, |x| !(x < 4.5)) || p.map_or(true, |x| !(x < 4.5))));
+        seen
+    };
+    println!("MATRIX none {:?}", checks(&sound));
+    let library = KernelLibrary::default();
+    for (name, _, file, from, to) in FAULTS {
+        let text = library.text(file).unwrap();
+        assert_eq!(text.matches(from).count(), 1, "{name}");
+        let faulty = sound.with_kernels(library.clone().with_sources(&[(file, &text.replace(from, to))]));
+        let seen: Vec<&str> = checks(&faulty).into_iter().filter(|(_, s)| *s).map(|(n, _)| n).collect();
+        println!("MATRIX {name} {seen:?}");
     }
 }

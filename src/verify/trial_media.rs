@@ -17,7 +17,7 @@ fn path(changes: &[(&'static str, raystone_core::params::ParamValue)]) -> Trial 
 pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
     Ok(vec![
         TrialScene {
-            scene: in_medium(lamps()?, fog(), "dda")?,
+            scene: in_medium("fog", lamps()?, fog(), "dda")?,
             trials: vec![
                 path(&[depth(6)]),
                 path(&[depth(4), word("strategy", "mis-power"), word("roulette", "albedo")]),
@@ -26,7 +26,7 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
             ],
         },
         TrialScene {
-            scene: in_medium(points(&kinds.lights)?, cloud(), "level-map")?,
+            scene: in_medium("cloud", points(&kinds.lights)?, cloud(), "level-map")?,
             trials: vec![
                 path(&[depth(5)]),
                 path(&[depth(3), word("lights", "all"), word("light_choice", "uniform")]),
@@ -34,23 +34,25 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
             ],
         },
         TrialScene {
-            scene: in_medium(glowing()?, smoke(), "sparse-tree")?,
+            scene: in_medium("smoke", glowing()?, smoke(), "sparse-tree")?,
             trials: vec![path(&[depth(4)])],
         },
     ])
 }
 
-/// The scene with a medium.
+/// The scene with a medium, which it is named after.
 fn in_medium(
+    name: &str,
     mut scene: SceneData,
     volume: Result<Volume, MediaError>,
     structure: &str,
 ) -> Result<SceneData, SceneError> {
     let problem = |source| SceneError::Medium {
-        name: "a trial scene".to_owned(),
+        name: name.to_owned(),
         source,
     };
     let volume = volume.map_err(problem)?;
+    name.clone_into(&mut scene.name);
     scene.medium = Some(SceneMedium::new(volume, structure).map_err(problem)?);
     Ok(scene)
 }
