@@ -14,11 +14,7 @@ pub(crate) fn bindings(of: &Medium, gpu: &Gpu) -> Result<Bindings, GpuError> {
         .vec("spans", &of.spans.to_array())
         .u32("empty", of.empty)
         .u32("entries", of.index.len() as u32);
-    let index: &[u32] = if of.index.is_empty() {
-        &[0]
-    } else {
-        &of.index
-    };
+    let index: &[u32] = if of.index.is_empty() { &[0] } else { &of.index };
     let mut bindings = Bindings::new();
     bindings
         .uniform("medium", medium)
@@ -27,4 +23,3 @@ pub(crate) fn bindings(of: &Medium, gpu: &Gpu) -> Result<Bindings, GpuError> {
         .buffer("index", &gpu.storage("index", index)?);
     Ok(bindings)
 }
-

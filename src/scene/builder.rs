@@ -2,7 +2,8 @@
 
 use super::{
     Assembly, Daylight, Framing, GEOMETRIC, InstanceError, Light, LightList, LoadReport, Material,
-    SceneData, SceneError, SceneMedium, Texture, Transform, WHITE, decode_color, encode_color, mask, normals,
+    SceneData, SceneError, SceneMedium, Texture, Transform, WHITE, decode_color, encode_color,
+    mask, normals,
 };
 use glam::{Vec2, Vec3};
 use raystone_core::geometry::{Camera, Triangle};

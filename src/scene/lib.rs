@@ -81,8 +81,8 @@ pub use raystone_core::load::LoadReport;
 pub use texture_use::{TextureUse, Wrap};
 
 use glam::{Vec2, Vec3};
-use raystone_core::geometry::{Camera, Triangle};
 use medium::MediumParameters;
+use raystone_core::geometry::{Camera, Triangle};
 use raystone_core::params::{
     ParamRange, ParamValue, Parameter, ParameterSchema, Parameters as _, Params, Variant,
 };

@@ -189,7 +189,10 @@ mod tests {
         );
         let volume = scene.medium.unwrap().volume;
         assert_eq!(volume.resolution, [8; 3]);
-        assert_eq!([volume.low, volume.high], [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 7.0)]);
+        assert_eq!(
+            [volume.low, volume.high],
+            [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 7.0)]
+        );
         assert_eq!(volume.bounds, Bounds::Sphere);
         assert_eq!(volume.scattering.iter().copied().fold(0.0, f32::max), 0.25);
         let pairs = volume.scattering.iter().zip(&volume.absorption);
@@ -219,11 +222,20 @@ mod tests {
             try_load_with("cornell-box", &all).unwrap_err().to_string()
         };
         let unknown = refused(&[("medium", name("smoke"))]);
-        assert!(unknown.contains("`smoke`") && unknown.contains("cornell-box"), "{unknown}");
-        let flat = refused(&[("medium_box", List([0.0, 0.0, 0.0, 1.0, 0.0, 1.0].map(Number).to_vec()))]);
+        assert!(
+            unknown.contains("`smoke`") && unknown.contains("cornell-box"),
+            "{unknown}"
+        );
+        let flat = refused(&[(
+            "medium_box",
+            List([0.0, 0.0, 0.0, 1.0, 0.0, 1.0].map(Number).to_vec()),
+        )]);
         assert!(flat.contains("above zero"), "{flat}");
         let structure = refused(&[("medium_structure", name("bvh"))]);
-        assert!(structure.contains("`bvh`") && structure.contains("bricks"), "{structure}");
+        assert!(
+            structure.contains("`bvh`") && structure.contains("bricks"),
+            "{structure}"
+        );
         let grids = refused(&[("absorber", name("cloud"))]);
         assert!(grids.contains("absorption has"), "{grids}");
         let file = refused(&[("medium", name("missing.npy"))]);

@@ -20,7 +20,11 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
             scene: in_medium("fog", lamps()?, fog(), "dda")?,
             trials: vec![
                 path(&[depth(6)]),
-                path(&[depth(4), word("strategy", "mis-power"), word("roulette", "albedo")]),
+                path(&[
+                    depth(4),
+                    word("strategy", "mis-power"),
+                    word("roulette", "albedo"),
+                ]),
                 path(&[depth(3), word("light_choice", "tree")]),
                 path(&[depth(3), word("strategy", "bsdf"), word("roulette", "none")]),
             ],
@@ -29,8 +33,16 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
             scene: in_medium("cloud", points(&kinds.lights)?, cloud(), "level-map")?,
             trials: vec![
                 path(&[depth(5)]),
-                path(&[depth(3), word("lights", "all"), word("light_choice", "uniform")]),
-                path(&[depth(2), word("strategy", "light"), word("light_choice", "tree")]),
+                path(&[
+                    depth(3),
+                    word("lights", "all"),
+                    word("light_choice", "uniform"),
+                ]),
+                path(&[
+                    depth(2),
+                    word("strategy", "light"),
+                    word("light_choice", "tree"),
+                ]),
             ],
         },
         TrialScene {

@@ -294,6 +294,10 @@ impl Medium {
         self.index[place as usize]
     }
 
+    pub(crate) fn fetch_field(&self, place: u32) -> u32 {
+        self.field[place as usize]
+    }
+
     /// Byte `place` of the index.
     pub(crate) fn fetch_byte(&self, place: u32, fetches: &mut u32) -> u32 {
         (self.fetch_index(place >> 2, fetches) >> (8 * (place & 3))) & 255

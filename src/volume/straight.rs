@@ -124,8 +124,14 @@ mod tests {
         assert!(error.contains("straight"), "{error}");
         let fog = Volume::constant(1.0, 0.0, 1.0).unwrap();
         let error = Straight::new(&fog, "octree").err().unwrap().to_string();
-        assert!(error.contains("`octree`") && error.contains("level-map"), "{error}");
+        assert!(
+            error.contains("`octree`") && error.contains("level-map"),
+            "{error}"
+        );
         let error = grid("smoke", 8).unwrap_err().to_string();
-        assert!(error.contains("`smoke`") && error.contains("cloud"), "{error}");
+        assert!(
+            error.contains("`smoke`") && error.contains("cloud"),
+            "{error}"
+        );
     }
 }

@@ -138,7 +138,7 @@ fn mix_4(medium: &Medium, low: UVec3, high: UVec3, z: u32, w: Vec3) -> Vec2 {
 }
 
 fn voxel_value(medium: &Medium, voxel: UVec3) -> Vec2 {
-    unpack_halves(medium.field[medium.voxel_index(voxel) as usize])
+    unpack_halves(medium.fetch_field(medium.voxel_index(voxel)))
 }
 
 /// ∫ σ dt over [from, to], within the voxel: between the planes through voxels' middles σ is a cubic polynomial, which

@@ -95,7 +95,12 @@ impl BuiltinScene for Fog {
             push_column(&mut builder, place, high);
         }
         let lamp = |x: f32, z: f32| vec3(x, 3.2, z - 1.0);
-        let lamp = [lamp(-0.4, -0.4), lamp(0.4, -0.4), lamp(0.4, 0.4), lamp(-0.4, 0.4)];
+        let lamp = [
+            lamp(-0.4, -0.4),
+            lamp(0.4, -0.4),
+            lamp(0.4, 0.4),
+            lamp(-0.4, 0.4),
+        ];
         builder.push_quad(lamp, LAMP);
         let look = Look {
             materials: vec![
@@ -161,7 +166,10 @@ impl BuiltinScene for Cloud {
             let most = cloud.scattering.iter().copied().fold(0.0, f32::max);
             let shares = cloud.scattering.iter().map(|s| s / most);
             let shares: Vec<f32> = shares.collect();
-            cloud.scattering = shares.iter().map(|x| x * self.density * self.albedo).collect();
+            cloud.scattering = shares
+                .iter()
+                .map(|x| x * self.density * self.albedo)
+                .collect();
             cloud.absorption = (shares.iter().zip(&cloud.scattering))
                 .map(|(x, scattered)| (x * self.density - scattered).max(0.0))
                 .collect();

@@ -116,6 +116,7 @@ pub(super) fn hint(name: &str) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::medium::MediumParameters;
     use crate::{LoadOptions, SceneError, load};
     use raystone_core::params::{ParamRange, ParamValue};
     use std::collections::{BTreeMap, HashMap};
@@ -217,8 +218,17 @@ pub(crate) mod tests {
                 if least == parameter.default {
                     continue;
                 }
-                let scene = load_with(&entry.name, &[(parameter.name, least)]);
-                assert_ne!(scene.hash, load_default(&entry.name).hash);
+                // Those of the medium say nothing where there is none.
+                let of_medium = MediumParameters::schema();
+                let cloud = ("medium", ParamValue::Name("cloud".to_owned()));
+                let cloud = of_medium
+                    .iter()
+                    .any(|p| p.name == parameter.name)
+                    .then_some(cloud);
+                let base: Vec<_> = cloud.into_iter().collect();
+                let changed = [&base[..], &[(parameter.name, least)]].concat();
+                let scene = load_with(&entry.name, &changed);
+                assert_ne!(scene.hash, load_with(&entry.name, &base).hash);
                 parameters += 1;
             }
         }

@@ -100,7 +100,10 @@ impl Export<'_> {
         let extinction: Vec<f32> = pairs().map(|(s, a)| s + a).collect();
         let shares = pairs().map(|(s, a)| if s + a > 0.0 { s / (s + a) } else { 0.0 });
         let albedo: Vec<f32> = shares.collect();
-        let mut known = albedo.iter().zip(&extinction).filter(|(_, sigma)| **sigma > 0.0);
+        let mut known = albedo
+            .iter()
+            .zip(&extinction)
+            .filter(|(_, sigma)| **sigma > 0.0);
         let first = known.next().map_or(0.0, |(share, _)| *share);
         let is_even = known.all(|(share, _)| (share - first).abs() < 1e-4);
         let path = self.folder.join("medium");

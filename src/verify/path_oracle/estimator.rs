@@ -449,10 +449,7 @@ impl PathOracle<'_> {
             Some(own) => strategy.weight(chosen.share * own, density) / own,
             None => 1.0,
         };
-        Some((
-            value * light.radiance * (weight / chosen.share),
-            shadow,
-        ))
+        Some((value * light.radiance * (weight / chosen.share), shadow))
     }
 
     /// Continues a path to its next ray; false if it ends.

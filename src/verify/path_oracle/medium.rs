@@ -125,7 +125,13 @@ impl<'a> Medium<'a> {
             let corner = IVec3::new(k & 1, k >> 1 & 1, k >> 2);
             let voxel = (low.as_ivec3() + corner).clamp(IVec3::ZERO, size - 1);
             let place = voxel.x + size.x * (voxel.y + size.y * voxel.z);
-            let weight = [0, 1, 2].map(|a| if corner[a] == 1 { share[a] } else { 1.0 - share[a] });
+            let weight = [0, 1, 2].map(|a| {
+                if corner[a] == 1 {
+                    share[a]
+                } else {
+                    1.0 - share[a]
+                }
+            });
             sum += weight.into_iter().product::<f64>() * self.field[place as usize];
         }
         sum
@@ -148,9 +154,16 @@ impl<'a> Medium<'a> {
         let most = UVec3::from(self.volume.resolution) - 1;
         while t < last {
             let voxel = (origin + direction * (t + within)).max(DVec3::ZERO);
-            let region = self.straight.medium.region_of(voxel.as_uvec3().min(most), &mut 0);
+            let region = self
+                .straight
+                .medium
+                .region_of(voxel.as_uvec3().min(most), &mut 0);
             let exit = [0, 1, 2].map(|a| {
-                let plane = if direction[a] > 0.0 { region.high[a] } else { region.low[a] };
+                let plane = if direction[a] > 0.0 {
+                    region.high[a]
+                } else {
+                    region.low[a]
+                };
                 let border = if direction[a] > 0.0 { most[a] + 1 } else { 0 };
                 if direction[a] == 0.0 || plane == border {
                     f64::INFINITY
@@ -173,7 +186,10 @@ impl<'a> Medium<'a> {
     /// Least and greatest σ of a region, per scene unit.
     fn bounds(&self, region: &Region) -> [f64; 2] {
         let density = f64::from(self.straight.density);
-        region.sigma.to_array().map(|share| f64::from(share) * density)
+        region
+            .sigma
+            .to_array()
+            .map(|share| f64::from(share) * density)
     }
 }
 
@@ -278,7 +294,13 @@ impl PathOracle<'_> {
     }
 
     /// The point where a ray is scattered, noted in the place of the surface behind it.
-    pub(super) fn scattered(&self, walk: &mut Walk, ray: &Segment, depth: u32, at: &Flight) -> Surface<'_> {
+    pub(super) fn scattered(
+        &self,
+        walk: &mut Walk,
+        ray: &Segment,
+        depth: u32,
+        at: &Flight,
+    ) -> Surface<'_> {
         let position = ray.origin + ray.direction * at.distance;
         let terms = ray.origin.abs() + (ray.direction * at.distance).abs();
         let position = walk.rounding.point(position, terms);
