@@ -13,7 +13,8 @@ use raystone_core::params::{ParamValue, Params, Variant};
 use raystone_gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary};
 use raystone_record::Verdict;
 use raystone_render::{
-    ConfiguredIntegrator, IntegratorRegistry, OrganisationRegistry, RayOffset, RenderJob, Renderer, Stage,
+    ConfiguredIntegrator, IntegratorRegistry, OrganisationRegistry, RayOffset, RenderJob, Renderer,
+    Stage,
 };
 use raystone_sampling::{Sampler, SamplerRegistry};
 use raystone_scene::{Light, Material, SceneData, SceneMedium};
@@ -121,7 +122,9 @@ fn image(
     with_renderer(gpu, scene, size, integrator, |renderer, _| {
         let shots = renderer.render(&[samples], 5)?;
         let pixels = shots[0].image.pixels.iter();
-        Ok(pixels.map(|p| DVec3::from_array(p.map(f64::from))).collect())
+        Ok(pixels
+            .map(|p| DVec3::from_array(p.map(f64::from)))
+            .collect())
     })
 }
 
@@ -138,7 +141,11 @@ fn empty(volume: Volume, structure: &str) -> SceneData {
     let mut mesh = Mesh::new("empty", camera, Vec3::ONE).unwrap();
     let black = mesh.material(Material::diffuse("black", Vec3::ZERO));
     let corner = vec3(0.0, 0.0, 60.0);
-    mesh.triangle([corner, corner + Vec3::X, corner + Vec3::Y], [glam::Vec2::ZERO; 3], black);
+    mesh.triangle(
+        [corner, corner + Vec3::X, corner + Vec3::Y],
+        [glam::Vec2::ZERO; 3],
+        black,
+    );
     let mut scene = mesh.done(Vec::new());
     scene.medium = Some(SceneMedium::new(volume, structure).unwrap());
     scene
@@ -196,20 +203,29 @@ fn optical_depth(volume: &Volume, from: DVec3, to: DVec3) -> f64 {
     let leave = leave.min(way.length());
     let width = (leave - enter).max(0.0) / f64::from(STEPS);
     let at = |k: i32| from + way.normalize() * (enter + (f64::from(k) + 0.5) * width);
-    (0..STEPS).map(|k| coefficients(volume, at(k))[1]).sum::<f64>() * width
+    (0..STEPS)
+        .map(|k| coefficients(volume, at(k))[1])
+        .sum::<f64>()
+        * width
 }
 
 fn rays(scene: &SceneData, size: [u32; 2]) -> Vec<DVec3> {
     let lens = Lens::new(&scene.view(1.0), size);
     let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
-    pixels.map(|pixel| lens.direction(pixel, [0.5; 2])).collect()
+    pixels
+        .map(|pixel| lens.direction(pixel, [0.5; 2]))
+        .collect()
 }
 
 /// How many standard errors the number of rays that pass an absorber is from their transmittances.
 fn absorbed(gpu: &Gpu, volume: &Volume, structure: &str) -> Result<f64, GpuError> {
     const SAMPLES: u32 = 256;
     let (scene, size) = (empty(volume.clone(), structure), [24, 20]);
-    let integrator = path(&[depth(2), word("primary", "centre"), word("roulette", "none")]);
+    let integrator = path(&[
+        depth(2),
+        word("primary", "centre"),
+        word("roulette", "none"),
+    ]);
     let found = image(gpu, &scene, size, &integrator, SAMPLES)?;
     let eye = EYE.as_dvec3();
     let (mut excess, mut variance, mut wide) = (0.0, 0.0, 0.0);
@@ -238,7 +254,11 @@ fn shaded(gpu: &Gpu, volume: &Volume, structure: &str, samples: u32) -> Result<f
         intensity: Vec3::splat(7.0),
     }];
     let size = [16, 16];
-    let integrator = path(&[depth(1), word("primary", "centre"), word("roulette", "none")]);
+    let integrator = path(&[
+        depth(1),
+        word("primary", "centre"),
+        word("roulette", "none"),
+    ]);
     let found = image(gpu, &scene, size, &integrator, samples)?;
     let eye = scene.view(1.0).eye.as_dvec3();
     let (mut worst, mut sum) = (0.0_f64, 0.0);
@@ -264,14 +284,22 @@ fn floor(volume: Volume, structure: &str) -> SceneData {
     };
     let mut mesh = Mesh::new("floor", camera, Vec3::ZERO).unwrap();
     let grey = mesh.material(Material::diffuse("grey", Vec3::splat(0.5)));
-    mesh.plain([vec3(-1.0, -1.5, -5.0), 10.0 * Vec3::Z, 2.0 * Vec3::X], grey);
+    mesh.plain(
+        [vec3(-1.0, -1.5, -5.0), 10.0 * Vec3::Z, 2.0 * Vec3::X],
+        grey,
+    );
     let mut scene = mesh.done(Vec::new());
     scene.medium = Some(SceneMedium::new(volume, structure).unwrap());
     scene
 }
 
 /// How many standard errors the mean of an image of single scattering is from a quadrature.
-fn scattered_once(gpu: &Gpu, volume: &Volume, light: DVec3, structure: &str) -> Result<f64, GpuError> {
+fn scattered_once(
+    gpu: &Gpu,
+    volume: &Volume,
+    light: DVec3,
+    structure: &str,
+) -> Result<f64, GpuError> {
     const STEPS: i32 = 200;
     let mut scene = empty(volume.clone(), structure);
     scene.environment = Vec3::ZERO;
@@ -280,13 +308,19 @@ fn scattered_once(gpu: &Gpu, volume: &Volume, light: DVec3, structure: &str) -> 
         intensity: Vec3::splat(5.0),
     }];
     let size = [16, 12];
-    let integrator = path(&[depth(1), word("primary", "centre"), word("roulette", "none")]);
+    let integrator = path(&[
+        depth(1),
+        word("primary", "centre"),
+        word("roulette", "none"),
+    ]);
     let runs: Result<Vec<Vec<DVec3>>, GpuError> =
         with_renderer(gpu, &scene, size, &integrator, |renderer, _| {
             let run = |seed: u32| {
                 let shots = renderer.render(&[64], seed)?;
                 let pixels = shots[0].image.pixels.iter();
-                Ok(pixels.map(|p| DVec3::from_array(p.map(f64::from))).collect())
+                Ok(pixels
+                    .map(|p| DVec3::from_array(p.map(f64::from)))
+                    .collect())
             };
             Ok((0..16).map(run).collect())
         })?;
@@ -367,7 +401,10 @@ fn absorbers_let_pass_what_their_depth_says() {
         let constant = absorbed(&gpu, &placed(fog(0.0, 0.8), None), structure).unwrap();
         let grid = absorbed(&gpu, &placed(clouds(0.0, 4.0), None), structure).unwrap();
         println!("{structure}: {constant:.2} and {grid:.2} standard errors");
-        assert!(constant < 4.5 && grid < 4.5, "{structure}: {constant} {grid}");
+        assert!(
+            constant < 4.5 && grid < 4.5,
+            "{structure}: {constant} {grid}"
+        );
     }
 }
 
@@ -420,64 +457,5 @@ fn organisations_follow_the_same_paths_through_media() {
             let found = image(&gpu, &trial.scene, [40, 28], &organised, 4).unwrap();
             assert!(found == truth, "{} by {}", trial.scene.name, variant.label);
         }
-    }
-}
-
-const FAULTS: [(&str, &str, &str, &str, &str); 20] = [
-    ("medium-absorbs-nothing", "what is absorbed is scattered", "integrator/medium", "select(there.x / there.y, 1.0, there.x >= there.y), true", "1.0, true"),
-    ("medium-albedo-twice", "the albedo counts twice", "integrator/path", "(*path).throughput *= flight.albedo;", "(*path).throughput *= flight.albedo * flight.albedo;"),
-    ("medium-collides-by-scattering", "a collision is accepted by σ_s, not σ", "integrator/medium", "next_number() * bounds.y < there.y", "next_number() * bounds.y < there.x"),
-    ("medium-majorant-too-small", "flights go by half the greatest extinction", "integrator/medium", "let majorant = bounds.y * unit;", "let majorant = 0.5 * bounds.y * unit;"),
-    ("medium-depth-begins-anew", "what a region took of the optical depth is forgotten", "integrator/medium", "left = max(left - (segment.exit - t) * majorant, 0.0);", ""),
-    ("medium-first-number-squared", "the first free flight is too short", "integrator/medium", "var left = -log(1.0 - first);", "var left = -log(1.0 - first * first);"),
-    ("medium-behind-surfaces", "light is scattered behind what a ray meets", "integrator/path", "@if(!sphere_lights) let end = hit.t;", "@if(!sphere_lights) let end = FAR;"),
-    ("medium-behind-balls-of-light", "light is scattered behind a ball of light", "integrator/path", "@if(sphere_lights) let end = first_sphere(Ray(ray.origin, ray.t_min, ray.direction, hit.t)).t;", "@if(sphere_lights) let end = hit.t;"),
-    ("medium-ball-is-a-box", "a medium in a ball fills its box", "integrator/medium", "placed.is_ball == 1u", "placed.is_ball == 2u"),
-    ("medium-unit-of-shadow-rays", "shadow rays count as of length 1", "integrator/medium", "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density * length(ray.direction);", "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density;"),
-    ("medium-before-lights-forgotten", "light samples are not dimmed by the medium", "integrator/path", " * transmittance(light.shadow, index)", ""),
-    ("medium-control-forgotten", "what a region absorbs at least is left out for shadow rays", "integrator/medium", "result *= exp(-bounds.x * unit * (segment.exit - walk.t));", ""),
-    ("medium-shadow-majorant-too-small", "collisions of shadow rays are too rare", "integrator/medium", "let rest = (bounds.y - bounds.x) * unit;", "let rest = 0.5 * (bounds.y - bounds.x) * unit;"),
-    ("medium-shadow-by-scattering", "shadow rays lose σ_s alone", "integrator/medium", "saturate((bounds.y - there.y)", "saturate((bounds.y - there.x)"),
-    ("medium-phase-sign", "the phase function is evaluated backwards", "integrator/medium", "dot(surface.arriving, direction));", "-dot(surface.arriving, direction));"),
-    ("medium-phase-sampled-backwards", "directions are drawn around the way back", "integrator/medium", "surface.arriving, u);", "-surface.arriving, u);"),
-    ("medium-even-density", "directions in the medium have the density of even ones where light is found", "shading/bsdf", "vec3<f32>(1.0), scattered_pdf(surface, onward), false", "vec3<f32>(1.0), 0.07957747, false"),
-    ("medium-light-behind-nothing", "points in the medium choose lights of a tree as surfaces do", "shading/light/tree", "all(normal == vec3<f32>(0.0))", "false"),
-    ("medium-survival-by-flight", "paths survive by the number of their flight", "integrator/path", "@if(media) if (survival_number() >= survival)", "@if(media) if (sample_1d(sampler) >= survival)"),
-    ("medium-beyond-depth", "paths are scattered once more than allowed", "integrator/path", "depth == MAX_DEPTH || flight.albedo <= 0.0", "flight.albedo <= 0.0"),
-];
-
-#[test]
-fn zz_matrix() {
-    let sound = gpu();
-    let checks = |gpu: &Gpu| -> Vec<(&'static str, bool)> {
-        let mut seen = Vec::new();
-        let mut by_gate = false;
-        for trial in media(&KindChecks::default()).unwrap() {
-            for (_, changes) in &trial.trials {
-                if !by_gate && gate(gpu, &trial.scene, &path(changes)).is_some() { by_gate = true; }
-            }
-        }
-        seen.push(("oracle", by_gate));
-        let f = furnace(gpu, placed(clouds(0.9, 0.0), Some(0.7)), "dda");
-        seen.push(("furnace", f.map_or(true, |x| x != 0.0)));
-        let a = absorbed(gpu, &placed(clouds(0.0, 4.0), None), "bricks");
-        seen.push(("absorber", a.map_or(true, |x| !(x < 4.5))));
-        let s = shaded(gpu, &placed(fog(0.5, 0.3), None), "dda", 1);
-        let t = shaded(gpu, &placed(clouds(2.0, 1.0), None), "dda", 256);
-        seen.push(("shadow", s.map_or(true, |x| !(x < 2e-5)) || t.map_or(true, |x| !(x < 2e-3))));
-        let (inside, outside) = (DVec3::new(0.1, 0.2, 0.1), DVec3::new(2.0, 1.5, 1.0));
-        let o = scattered_once(gpu, &placed(fog(0.7, 0.3), Some(0.5)), inside, "level-map");
-        let p = scattered_once(gpu, &placed(clouds(3.0, 1.0), Some(0.5)), outside, "level-map");
-        seen.push(("single", o.map_or(true, |x| !(x < 4.5)) || p.map_or(true, |x| !(x < 4.5))));
-        seen
-    };
-    println!("MATRIX none {:?}", checks(&sound));
-    let library = KernelLibrary::default();
-    for (name, _, file, from, to) in FAULTS {
-        let text = library.text(file).unwrap();
-        assert_eq!(text.matches(from).count(), 1, "{name}");
-        let faulty = sound.with_kernels(library.clone().with_sources(&[(file, &text.replace(from, to))]));
-        let seen: Vec<&str> = checks(&faulty).into_iter().filter(|(_, s)| *s).map(|(n, _)| n).collect();
-        println!("MATRIX {name} {seen:?}");
     }
 }

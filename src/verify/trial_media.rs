@@ -103,7 +103,8 @@ fn cloud() -> Result<Volume, MediaError> {
     .checked()
 }
 
-/// Smoke that is empty in its middle, in boxes of unequal sides.
+/// Smoke that is empty in its middle, in boxes of unequal sides. No plane between voxels lies in a surface: on which side
+/// of it rays begin there, and so which numbers they draw, rounding decides.
 fn smoke() -> Result<Volume, MediaError> {
     let smoke = Volume::new([9, 5, 14], |p| {
         let far = (p - 0.5).length() > 0.25;
@@ -111,7 +112,7 @@ fn smoke() -> Result<Volume, MediaError> {
         [0.8 * density, 0.05, 1.0]
     })?;
     Volume {
-        low: DVec3::new(-1.9, 0.1, -1.8),
+        low: DVec3::new(-1.93, 0.13, -1.83),
         high: DVec3::new(1.9, 2.5, 2.2),
         ..smoke
     }

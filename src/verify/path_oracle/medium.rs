@@ -268,17 +268,18 @@ impl PathOracle<'_> {
             result *= (-least * (exit - enter)).exp();
             if most > least {
                 let rest = most - least;
-                let mut step = || depth_of(numbers.next(), &mut walk.rounding) / rest;
-                let mut t = enter + step();
+                let mut t = enter + depth_of(numbers.next(), &mut walk.rounding) / rest;
                 while t < exit {
                     collisions += 1;
                     let there = medium.at(medium.in_voxels(ray, t)).y;
-                    result *= if holds(there, [least, most]) {
+                    let is_bounded = holds(there, [least, most]);
+                    let there = walk.rounding.number(there);
+                    result *= if is_bounded {
                         ((most - there) / rest).clamp(0.0, 1.0)
                     } else {
                         f64::NAN
                     };
-                    t += step();
+                    t += depth_of(numbers.next(), &mut walk.rounding) / rest;
                 }
             }
             false
