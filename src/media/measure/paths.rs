@@ -1,11 +1,11 @@
 //! Curved paths: schemes for the ray equation × where steps end, through a lens of Luneburg and a ball of glass.
 
 use super::{cells_of, declare};
-use crate::measure::failed;
 use crate::march::{
     Ended, March, Marcher, Path, Rule, Scheme, angle_of, ball_deviation, focus_miss, march_path,
     parallel_rays,
 };
+use crate::measure::failed;
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::optics::Optical;
 use crate::{procedures, structure};

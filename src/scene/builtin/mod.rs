@@ -225,7 +225,11 @@ pub(crate) mod tests {
                     .iter()
                     .any(|p| p.name == parameter.name)
                     .then_some(cloud);
-                let base: Vec<_> = cloud.into_iter().collect();
+                // The box of a scene may be flat.
+                let corners = [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0].map(ParamValue::Number);
+                let corners = ("medium_box", ParamValue::List(corners.to_vec()));
+                let corners = cloud.as_ref().map(|_| corners);
+                let base: Vec<_> = cloud.into_iter().chain(corners).collect();
                 let changed = [&base[..], &[(parameter.name, least)]].concat();
                 let scene = load_with(&entry.name, &changed);
                 assert_ne!(scene.hash, load_with(&entry.name, &base).hash);

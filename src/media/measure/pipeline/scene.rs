@@ -2,8 +2,8 @@
 
 use super::checks::truth_of;
 use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
-use crate::measure::failed;
 use crate::adaptive::Smoothing;
+use crate::measure::failed;
 use crate::medium::{Homogeneity, Medium};
 use crate::photons::{Points, point_set};
 use crate::pipeline::{Pipeline, Source, camera};
