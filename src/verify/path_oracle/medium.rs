@@ -224,7 +224,10 @@ impl PathOracle<'_> {
         medium.regions(ray, end, |region, [enter, exit]| {
             let [least, most] = medium.bounds(region);
             let mut t = enter;
-            while most > 0.0 {
+            if most <= 0.0 {
+                return false;
+            }
+            loop {
                 let step = walk.rounding.number(left / most);
                 if t + step >= exit {
                     left = (left - (exit - t) * most).max(0.0);

@@ -103,7 +103,7 @@ pub const MUTANTS: &[Mutant] = &[
         "light samples are not dimmed by the medium",
         text(
             "integrator/path",
-            " * transmittance(light.shadow, index)",
+            "@if(media) light.radiance *= transmittance(light.shadow, index);",
             "",
         ),
     ),
