@@ -240,7 +240,7 @@ impl Marcher {
             composition = composition
                 .with("structure", medium.structure.module())
                 .feature("regions", true);
-            bindings = medium.bindings(gpu)?;
+            bindings = crate::upload::bindings(medium, gpu)?;
         }
         optical.bind(gpu, &mut bindings)?;
         let count = begins.len() as u32;

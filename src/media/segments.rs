@@ -111,7 +111,7 @@ impl Walker {
         let words: Vec<[f32; 8]> = rays.iter().map(SegmentRay::words).collect();
         let [walked, status] = [("walked", u64::from(count) * 16), ("status", 64)]
             .map(|(name, bytes)| Storage::scratch(name, bytes));
-        let mut bindings: Bindings = medium.bindings(gpu)?;
+        let mut bindings: Bindings = crate::upload::bindings(medium, gpu)?;
         let segments = UniformValues::new()
             .u32("count", count)
             .u32("step_fuse", step_fuse(medium));

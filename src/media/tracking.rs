@@ -122,7 +122,7 @@ impl Tracker {
             .u32("most_scatterings", most_scatterings);
         let [estimates, status] = [("estimates", u64::from(count) * 8), ("status", 64)]
             .map(|(name, bytes)| Storage::scratch(name, bytes));
-        let mut bindings = medium.bindings(gpu)?;
+        let mut bindings = crate::upload::bindings(medium, gpu)?;
         bindings
             .uniform("tracking", values)
             .buffer("estimates", &estimates)

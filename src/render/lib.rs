@@ -9,6 +9,7 @@ pub mod integrand;
 mod kind;
 mod light_tables;
 mod light_tree;
+mod medium;
 pub mod offset;
 pub mod order;
 pub mod organisation;

@@ -1,6 +1,7 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
 use super::light_tables::LightTables;
+use super::medium::{self, MediumTables};
 use super::offset::TransformError;
 use super::scene_kinds::{SceneKind as _, SceneKinds};
 use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
@@ -36,6 +37,9 @@ pub struct SceneFeatures {
     pub transforms: bool,
     /// A triangle is mirrored, with reversed orientation.
     pub mirrored: bool,
+    /// Kernel module of the structure over the scene's medium, if it has one. Kernels cannot carry it: a medium takes
+    /// numbers from the sampler.
+    pub medium: Option<&'static str>,
 }
 
 /// Groups of features that kernels can be made to include although a scene does not need them.
@@ -95,7 +99,8 @@ impl SceneFeatures {
 
     /// The kernel with the scene's external kinds.
     pub(super) fn activate(&self, kernel: Composition) -> Composition {
-        self.light_kinds.activate(self.materials.activate(kernel))
+        let kernel = self.light_kinds.activate(self.materials.activate(kernel));
+        medium::activate(kernel, self.medium)
     }
 
     /// Features omitted by a kernel for surfaces of only this kind, by its number, or only misses.
@@ -150,13 +155,17 @@ impl SceneBuffers {
         let surfaces = SurfaceFeatures::of(scene, |_| true);
         let materials = SceneKinds::of(scene.materials.iter().map(|material| material.kind));
         let mut lights = LightTables::of(scene, &LightList::of(scene));
-        let tables = Tables::of(scene, &materials, &mut lights, &surfaces);
+        let mut medium = MediumTables::of(scene)?;
+        let tables = Tables::of(scene, &materials, &mut lights, &surfaces, medium.as_mut());
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
             "shading_tables",
             &gpu.storage("shading_tables", &tables.words)?,
         );
+        if let Some(medium) = &medium {
+            medium.bind(&mut bindings);
+        }
         let transform_error = TransformError::of(soup);
         let has_map = lights.has_map();
         Ok(Self {
@@ -181,6 +190,7 @@ impl SceneBuffers {
                 materials,
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
                 mirrored: scene.mirrored.contains(&true),
+                medium: medium.as_ref().map(MediumTables::module),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
@@ -196,7 +206,7 @@ impl SceneBuffers {
 }
 
 /// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials,
-/// lights, and the data of [`surface_tables`](super::surface_tables).
+/// lights, the data of [`surface_tables`](super::surface_tables), and the medium.
 ///
 /// A material: base colour and kind number, with the highest bit set if it emits only from its
 /// front; emission and index of its parameters, in `vec4`; indices of its texture placements, 0 for
@@ -212,6 +222,7 @@ impl Tables {
         kinds: &SceneKinds<MaterialKind>,
         lights: &mut LightTables,
         surfaces: &SurfaceFeatures,
+        medium: Option<&mut MediumTables>,
     ) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
@@ -228,6 +239,9 @@ impl Tables {
         }
         lights.append(&mut words);
         let places = append(scene, surfaces, &mut words);
+        if let Some(medium) = medium {
+            medium.append(&mut words);
+        }
         words.resize(words.len().next_multiple_of(4), 0);
         Self { words, places }
     }

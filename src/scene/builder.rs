@@ -2,7 +2,8 @@
 
 use super::{
     Assembly, Daylight, Framing, GEOMETRIC, InstanceError, Light, LightList, LoadReport, Material,
-    SceneData, SceneError, Texture, Transform, WHITE, decode_color, encode_color, mask, normals,
+    SceneData, SceneError, SceneMedium, Texture, Transform, WHITE, decode_color, encode_color,
+    mask, normals,
 };
 use glam::{Vec2, Vec3};
 use raystone_core::geometry::{Camera, Triangle};
@@ -23,6 +24,7 @@ pub(super) struct Look {
     pub camera: Option<Camera>,
     pub environment: Vec3,
     pub lights: Vec<Light>,
+    pub medium: Option<SceneMedium>,
 }
 
 impl Look {
@@ -254,6 +256,7 @@ impl SceneBuilder {
             environment: look.environment,
             lights: look.lights,
             daylight: None,
+            medium: look.medium,
             framing: None,
             hash: String::new(),
             report: self.report,

@@ -126,7 +126,7 @@ impl SceneData {
         self
     }
 
-    /// Size of the scene's arrays in bytes: triangles, per-corner and per-triangle data, texels.
+    /// Size of the scene's arrays in bytes: triangles, per-corner and per-triangle data, texels, voxels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
@@ -139,6 +139,8 @@ impl SceneData {
                 .iter()
                 .map(|texture| size_of_val(&texture.texels[..]))
                 .sum::<usize>()
+            + (self.medium.as_ref())
+                .map_or(0, |medium| size_of_val(&medium.volume.scattering[..]) * 3)
     }
 
     /// Indices of emissive triangles with non-zero area, ascending.
@@ -221,6 +223,10 @@ impl SceneData {
         }
         if let Some(sky) = &self.daylight {
             hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
+        }
+        if let Some(medium) = &self.medium {
+            hash.bytes(b"medium");
+            hash.bytes(&medium.words());
         }
         if let Some(assembly) = &self.assembly {
             for object in assembly.objects() {

@@ -205,6 +205,7 @@ fn taken_apart(
             scene.environment
         },
         lights: scene.lights,
+        medium: scene.medium,
     };
     (scene.name, look)
 }

@@ -32,6 +32,14 @@ pub enum SceneError {
         /// The reason.
         source: std::io::Error,
     },
+    /// A medium that cannot be.
+    #[error("{name}: the medium of the scene: {source}")]
+    Medium {
+        /// The scene, as typed.
+        name: String,
+        /// The reason.
+        source: raystone_volume::MediaError,
+    },
     /// The file has no bytes.
     #[error("{}: the file is empty; export or copy the model again", path.display())]
     Empty {

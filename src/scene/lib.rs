@@ -38,6 +38,7 @@ pub mod known_figures;
 mod light;
 mod mask;
 mod material;
+mod medium;
 mod mtl;
 mod mtl_statements;
 mod mtl_texture;
@@ -74,13 +75,17 @@ pub use material::{
     Lobes, Look, MATERIAL_KINDS, MIRROR, Masking, Material, MaterialKind, MaterialSource, PHONG,
     PRINCIPLED, reflectance_of_ior,
 };
+pub use medium::SceneMedium;
 pub use normals::{GEOMETRIC, decode_normal, encode_normal};
 pub use raystone_core::load::LoadReport;
 pub use texture_use::{TextureUse, Wrap};
 
 use glam::{Vec2, Vec3};
+use medium::MediumParameters;
 use raystone_core::geometry::{Camera, Triangle};
-use raystone_core::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params, Variant};
+use raystone_core::params::{
+    ParamRange, ParamValue, Parameter, ParameterSchema, Parameters as _, Params, Variant,
+};
 use std::io::Read as _;
 use std::path::Path;
 
@@ -133,6 +138,8 @@ pub struct SceneData {
     pub lights: Vec<Light>,
     /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
     pub daylight: Option<Daylight>,
+    /// The medium that light is scattered and absorbed in, if there is one.
+    pub medium: Option<SceneMedium>,
     /// Automatic framing, if the scene has no camera.
     pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
@@ -209,6 +216,11 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
     for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS] {
         common.0.extend(variant.params.0.remove_entry(name));
     }
+    let mut medium = Params::default();
+    for parameter in MediumParameters::schema() {
+        (medium.0).extend(variant.params.0.remove_entry(parameter.name));
+    }
+    let medium = MediumParameters::from_params(&medium)?;
     let common = common.completed(&common_parameters())?;
     let mut scene = load_alone(&variant, options)?;
     let number = |name| match common.0.get(name) {
@@ -224,6 +236,7 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
     if let Some(lamps) = number(HUNG_LAMPS) {
         scene = hung_lamps::hang(scene, lamps as u32);
     }
+    scene = medium.applied(scene)?;
     match common.0.get(ENVIRONMENT) {
         Some(ParamValue::Name(file)) if !file.is_empty() => {
             scene.under(Path::new(file), options.table_bytes)
@@ -246,7 +259,7 @@ const COPIES: &str = "copies";
 
 /// Parameters of every scene, built-in or not.
 pub(crate) fn common_parameters() -> ParameterSchema {
-    vec![
+    let mut common = vec![
         Parameter {
             name: ENVIRONMENT,
             description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
@@ -277,7 +290,9 @@ pub(crate) fn common_parameters() -> ParameterSchema {
             default: ParamValue::Integer(0),
             range: ParamRange::Integer { min: 0, max: 4096 },
         },
-    ]
+    ];
+    common.extend(MediumParameters::schema());
+    common
 }
 
 /// Loads a variant's scene without its environment map.

@@ -12,6 +12,8 @@ pub mod kinds;
 pub mod known_images;
 pub mod lights;
 pub mod materials;
+#[cfg(test)]
+mod media_tests;
 mod mesh;
 pub mod mitsuba;
 pub mod path_oracle;
@@ -25,6 +27,7 @@ pub mod self_test;
 pub mod shadow_rays;
 pub mod strained_copies;
 mod trial_lights;
+mod trial_media;
 mod trial_reach;
 pub mod trial_scenes;
 mod trial_slivers;

@@ -49,7 +49,7 @@ pub(super) fn many() -> Result<TrialScene, SceneError> {
 }
 
 /// Trial scenes for features that a scene's own paths may exercise too little: its maps, its
-/// luminaires, and the light tree of an integrator. The integrator is checked as configured.
+/// luminaires, its medium, and the light tree of an integrator. The integrator is checked as configured.
 ///
 /// # Errors
 /// A built-in scene is missing.
@@ -66,6 +66,9 @@ pub fn trials_of(
         if scene.lights.iter().any(|light| light.kind() == kind.kind) {
             scenes.extend((kind.trials)()?);
         }
+    }
+    if scene.medium.is_some() {
+        scenes.extend(crate::trial_media::media(kinds)?);
     }
     let choice = integrator.params.0.get("light_choice");
     if choice.is_some_and(|by| by.to_string() == "tree") {

@@ -94,6 +94,7 @@ pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError
     scenes.extend(crate::trial_surfaces::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
     scenes.extend(crate::trial_reach::scenes(kinds)?);
+    scenes.extend(crate::trial_media::media(kinds)?);
     Ok(scenes)
 }
 
@@ -199,7 +200,7 @@ pub(super) fn lamps() -> Result<SceneData, SceneError> {
 }
 
 /// All kinds of lights without triangles except measured ones and maps, with a block and a lamp.
-fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
+pub(super) fn points(kinds: &LightRegistry) -> Result<SceneData, SceneError> {
     let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
     let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));

@@ -9,6 +9,7 @@ fn composition(structure: &str) -> Composition {
         .with("sequence", "sampling/sobol")
         .with("decorrelation", "sampling/cranley_patterson")
         .with("integrator", "integrator/path")
+        .with("structure", "volume/structure/level_map")
         .constant("STACK_ENTRIES", 32)
         .constant("SEQUENCE_SEEDING", 0)
         .constant("DECORRELATION_SEEDING", 0)
@@ -33,6 +34,7 @@ fn composition(structure: &str) -> Composition {
         "mirror",
         "dielectric",
         "daylight",
+        "media",
     ] {
         out = out.feature(feature, true);
     }
@@ -203,6 +205,7 @@ fn an_unknown_word_is_found_on_every_line_that_assigns() {
         ("accel/triangle", "accel/bvh/stack"),
         ("accel/bounds", "accel/bvh/stack"),
         ("integrator/path", "accel/bvh/stack"),
+        ("integrator/medium", "accel/bvh/stack"),
         ("integrator/frame", "accel/bvh/stack"),
         ("shading/texture", "accel/bvh/stack"),
         ("sampling/sobol", "accel/bvh/stack"),

@@ -3,7 +3,7 @@
 
 use crate::support::{Pcg, default_params, scenes};
 use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, BvhParameters, TriangleSoup};
-use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Step, Variant};
+use raystone::params::{Length, ParamRange, ParamValue, ParameterSchema, Params, Step, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
 
@@ -42,6 +42,12 @@ fn hostile(schema: &ParameterSchema) -> Vec<(Params, String)> {
             ParamRange::Flag => vec![ParamValue::Integer(1), text],
             ParamRange::Choice(_) => vec![ParamValue::Integer(1), text],
             ParamRange::Text => vec![ParamValue::Flag(false), ParamValue::Number(0.5)],
+            ParamRange::List(_, Length::Exactly(count)) => vec![
+                ParamValue::Number(0.5),
+                ParamValue::List(vec![ParamValue::Number(0.5); count + 1]),
+                ParamValue::List(vec![ParamValue::Flag(true); *count]),
+                text,
+            ],
             range => panic!("{}: {range} has no wrong values here yet", parameter.name),
         };
         let within = |value: &ParamValue| match (&parameter.range, value) {

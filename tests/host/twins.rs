@@ -30,6 +30,10 @@ const OTHER_FILE: &[(&str, &str)] = &[
 /// Kernel files and folders without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
     (
+        "integrator/medium",
+        "judged path by path by the oracle in f64 (src/verify/path_oracle/medium.rs), and in src/verify/media_tests.rs by closed forms and quadratures",
+    ),
+    (
         "cones/overlaps",
         "a loop over disk_triangle, whose twin its answers are compared with",
     ),
@@ -477,8 +481,8 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "greatest",
         "an expression of the kernel",
     ),
-    ("media/medium", "pack_halves", "build"),
-    ("media/structure/cube_bvh", "append", "build"),
+    ("volume/medium", "pack_halves", "build"),
+    ("volume/structure/cube_bvh", "append", "build"),
     ("media/segments", "step_fuse", "a uniform of the kernel"),
     (
         "media/segments",

@@ -31,6 +31,8 @@ pub enum Subject {
     Integrators,
     /// Single paths of the integrators, with the same.
     Paths,
+    /// Single paths through media, with the same.
+    Media,
     /// Images by an organisation of the path tracer, with the same.
     Organised(&'static str),
 }
@@ -51,6 +53,7 @@ impl Subject {
             } => format!("{} × {decorrelation}", with(sequence, changes)),
             Self::Integrators => "integrators".to_owned(),
             Self::Paths => "single paths".to_owned(),
+            Self::Media => "paths through media".to_owned(),
             Self::Organised(name) => format!("images, {name}"),
         }
     }
@@ -73,6 +76,7 @@ impl Subject {
                 Check::Bias,
             ],
             Self::Paths => &[Check::Paths],
+            Self::Media => &[Check::Media],
             Self::Organised(_) => &[Check::Frames, Check::Counts],
         }
     }

@@ -133,6 +133,7 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         environment: Vec3::ONE,
         lights: Vec::new(),
         daylight: None,
+        medium: None,
         framing: None,
         hash: String::new(),
         report: LoadReport::default(),

@@ -41,8 +41,9 @@ fn name_of(cell: &Cell) -> Option<&str> {
     cell[Axis::Integrator].name.strip_prefix(MEDIA)
 }
 
-impl From<crate::MediaError> for Absent {
-    fn from(error: crate::MediaError) -> Self {
-        Self::Failed(error.to_string())
-    }
+/// The failure of a cell whose volume cannot be made, or whose structure contradicts it.
+// By value: it is what `map_err` hands over.
+#[allow(clippy::needless_pass_by_value)]
+fn failed(error: crate::MediaError) -> Absent {
+    Absent::Failed(error.to_string())
 }

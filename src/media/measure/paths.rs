@@ -5,6 +5,7 @@ use crate::march::{
     Ended, March, Marcher, Path, Rule, Scheme, angle_of, ball_deviation, focus_miss, march_path,
     parallel_rays,
 };
+use crate::measure::failed;
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::optics::Optical;
 use crate::{procedures, structure};
@@ -157,7 +158,7 @@ impl Measurement for Paths {
                 _ if load.target == Target::Lens => None,
                 Some((_, ball)) => Some(Arc::clone(ball)),
                 None => {
-                    let volume = procedures::ball(load.side, BALL)?;
+                    let volume = procedures::ball(load.side, BALL).map_err(failed)?;
                     let optical = Optical::of(&volume);
                     let ball = Arc::new(Ball { volume, optical });
                     balls.push((load.side, Arc::clone(&ball)));

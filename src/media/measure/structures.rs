@@ -1,6 +1,7 @@
 //! Structures over volumes: each answer is checked, then rays are walked through all of them in the same rounds.
 
 use super::{cells_of, declare, name_of};
+use crate::measure::failed;
 use crate::medium::{Homogeneity, Medium};
 use crate::rays::{SegmentRay, random_and_hard};
 use crate::segments::{Walked, Walker, exact_depth, first_difference, wrong_segment};
@@ -163,7 +164,7 @@ impl Measurement for Structures {
                 Some((content, side, volume)) if (*content, *side) == (load.content, load.side) => {
                     Arc::clone(volume)
                 }
-                _ => Arc::new(load.content.volume(load.side)?),
+                _ => Arc::new(load.content.volume(load.side).map_err(failed)?),
             };
             last = Some((load.content, load.side, Arc::clone(&volume)));
             let ready = Ready::new(at, cell, &load, &volume)?;
@@ -199,7 +200,7 @@ impl Ready {
             _ => return Err(Absent::Failed("there is no such structure".to_owned())),
         };
         let medium = Medium::new(volume, structure, load.homogeneity);
-        medium.validate((medium.field.len() / CHECKED_VOXELS) | 1)?;
+        (medium.validate((medium.field.len() / CHECKED_VOXELS) | 1)).map_err(failed)?;
         let seed = u64::from(at.experiment.run.seed);
         let rays = random_and_hard(volume, &medium, load.rays as usize, seed);
         let (walked, _) = Walker::new(gpu, &medium, &rays, true)?.walk()?;

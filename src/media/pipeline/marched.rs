@@ -92,7 +92,7 @@ impl Marched {
             .map(|photon| photon.words(counting.marks(photon)))
             .collect();
         let status = Storage::scratch("status", 64);
-        let mut bindings = medium.bindings(gpu)?;
+        let mut bindings = crate::upload::bindings(medium, gpu)?;
         scatter.bind(&mut bindings);
         let count = photons.len() as u32;
         let cells = match counting {

@@ -438,7 +438,7 @@ impl Pipeline {
             );
         let [image, status] = [("image", u64::from(count) * 16), ("status", 64)]
             .map(|(name, bytes)| Storage::scratch(name, bytes));
-        let mut bindings: Bindings = self.medium.bindings(&gpu)?;
+        let mut bindings: Bindings = crate::upload::bindings(&self.medium, &gpu)?;
         bindings
             .uniform("gather", values)
             .buffer("rays", &gpu.storage("rays", &rays)?)

@@ -149,7 +149,13 @@ const PATHS: [(Scheme, &str, &str, &str); 7] = [
 /// A device whose kernel has a fault.
 fn with_fault(gpu: &Gpu, file: &str, text: &str, fault: &str) -> Gpu {
     let library = KernelLibrary::default();
-    let name = format!("media/{file}");
+    let of_volumes = ["walk", "medium", "structure/"];
+    let folder = if of_volumes.iter().any(|start| file.starts_with(start)) {
+        "volume"
+    } else {
+        "media"
+    };
+    let name = format!("{folder}/{file}");
     let sound = library
         .text(&name)
         .unwrap_or_else(|| panic!("there is no {name}"));

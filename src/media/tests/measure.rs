@@ -380,10 +380,14 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         fixed.into_iter().chain(adaptive),
     );
     for (k, (file, text, fault, load)) in faults.into_iter().enumerate() {
-        let sound = library.text(&format!("media/{file}")).unwrap();
+        let name = match file {
+            "phase" => "volume/phase".to_owned(),
+            _ => format!("media/{file}"),
+        };
+        let sound = library.text(&name).unwrap();
         assert_eq!(sound.matches(text).count(), 1, "{file}: `{text}`");
         let kernels = folder.path().join(format!("kernels-{k}"));
-        let path = kernels.join(format!("media/{file}.wesl"));
+        let path = kernels.join(format!("{name}.wesl"));
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, sound.replace(text, fault)).unwrap();
         let (failed, reason) = pipeline_run(folder.path(), kernels.to_str().unwrap(), &load);

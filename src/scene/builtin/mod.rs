@@ -11,6 +11,7 @@ mod furnace;
 mod hairball;
 mod instances;
 mod lamps;
+mod media;
 pub(super) mod numeric;
 mod single_triangle;
 mod sphere;
@@ -51,7 +52,7 @@ impl Builtin {
     }
 }
 
-const BUILTINS: [Builtin; 15] = [
+const BUILTINS: [Builtin; 17] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -67,6 +68,8 @@ const BUILTINS: [Builtin; 15] = [
     Builtin::of::<foliage::Foliage>(),
     Builtin::of::<hairball::Hairball>(),
     Builtin::of::<city::City>(),
+    Builtin::of::<media::Fog>(),
+    Builtin::of::<media::Cloud>(),
 ];
 
 /// The built-in scenes and their parameters, for the parser, lists and docs.
@@ -113,6 +116,7 @@ pub(super) fn hint(name: &str) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::medium::MediumParameters;
     use crate::{LoadOptions, SceneError, load};
     use raystone_core::params::{ParamRange, ParamValue};
     use std::collections::{BTreeMap, HashMap};
@@ -214,8 +218,21 @@ pub(crate) mod tests {
                 if least == parameter.default {
                     continue;
                 }
-                let scene = load_with(&entry.name, &[(parameter.name, least)]);
-                assert_ne!(scene.hash, load_default(&entry.name).hash);
+                // Those of the medium say nothing where there is none.
+                let of_medium = MediumParameters::schema();
+                let cloud = ("medium", ParamValue::Name("cloud".to_owned()));
+                let cloud = of_medium
+                    .iter()
+                    .any(|p| p.name == parameter.name)
+                    .then_some(cloud);
+                // The box of a scene may be flat.
+                let corners = [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0].map(ParamValue::Number);
+                let corners = ("medium_box", ParamValue::List(corners.to_vec()));
+                let corners = cloud.as_ref().map(|_| corners);
+                let base: Vec<_> = cloud.into_iter().chain(corners).collect();
+                let changed = [&base[..], &[(parameter.name, least)]].concat();
+                let scene = load_with(&entry.name, &changed);
+                assert_ne!(scene.hash, load_with(&entry.name, &base).hash);
                 parameters += 1;
             }
         }

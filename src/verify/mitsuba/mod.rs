@@ -7,6 +7,7 @@
 //! counterpart are approximated, and reported.
 
 mod look;
+mod medium;
 mod mesh;
 
 pub use look::{Color, by_formula};
@@ -56,6 +57,9 @@ pub enum ExportError {
         /// The reason, and how to avoid it.
         reason: &'static str,
     },
+    /// The medium has no counterpart.
+    #[error("the medium of the scene cannot be written for Mitsuba: {0}")]
+    Medium(&'static str),
     /// A texture or the sky could not be written.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -126,6 +130,7 @@ pub fn export_mitsuba_of(
     for id in 0..scene.materials.len() {
         export.material(scene, id)?;
     }
+    export.medium()?;
     export.lights()?;
     export.shapes(scene, settings.fronts_only)?;
     export.xml += "</scene>\n";
@@ -162,11 +167,13 @@ impl Export<'_> {
         let far = 2.0 * (bounds.center().distance(eye) + bounds.radius()).max(f32::MIN_POSITIVE);
         let near = 1e-4 * far;
         let (spp, depth) = (settings.spp, settings.bounces + 1);
+        let integrator = medium::integrator(scene.medium.as_ref());
+        let around = medium::around(scene.medium.as_ref(), eye);
         let _ = write!(
             self.xml,
             r#"    <default name="spp" value="{spp}"/>
     <default name="sampler" value="independent"/>
-    <integrator type="path">
+    <integrator type="{integrator}">
         <integer name="max_depth" value="{depth}"/>
     </integrator>
     <sensor type="perspective">
@@ -177,7 +184,7 @@ impl Export<'_> {
         <transform name="to_world">
             <lookat origin="{eye_text}" target="{target}" up="{up}"/>
         </transform>
-        <sampler type="$sampler">
+{around}        <sampler type="$sampler">
             <integer name="sample_count" value="$spp"/>
         </sampler>
         <film type="hdrfilm">

@@ -3,6 +3,7 @@
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
 use super::hits::{Blocked, SHORT, Segment};
 use super::light::{Choice, Chosen, moved};
+use super::medium::Flight;
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
 use glam::DVec3;
@@ -302,7 +303,16 @@ impl PathOracle<'_> {
                 .as_ref()
                 .map_or(f64::INFINITY, |(_, distance)| *distance);
             let ball = self.sphere_met(&state.ray, end, rules.choice, &mut walk.rounding);
-            if let Some((radiance, density)) = ball {
+            let until = ball.map_or(end, |(_, _, distance)| distance);
+            let first = (self.medium.is_some() && depth < rules.max_depth)
+                .then(|| walk.draw(at_bounce(depth, ROULETTE)));
+            if let Some(flight) = self.flight(walk, (&state.ray, until), depth, first) {
+                if !self.scatter(walk, &flight, depth, &mut state, rules) {
+                    break;
+                }
+                continue;
+            }
+            if let Some((radiance, density, _)) = ball {
                 walk.decide(4);
                 let found = radiance * rules.strategy.found(state.density, || density);
                 state.radiance += rules.clamped(depth, state.throughput * found);
@@ -339,6 +349,31 @@ impl PathOracle<'_> {
         walk.rounding.colour(state.radiance)
     }
 
+    /// Scatters a path in the medium; false if it ends.
+    fn scatter(
+        &self,
+        walk: &mut Walk,
+        flight: &Flight,
+        depth: u32,
+        state: &mut State,
+        rules: &PathRules,
+    ) -> bool {
+        let point = self.scattered(walk, &state.ray, depth, flight);
+        state.throughput *= walk.rounding.number(flight.albedo);
+        if depth == rules.max_depth || flight.albedo == 0.0 {
+            return false;
+        }
+        let phase = self.phase(&point);
+        if !(self.lights.are_none() || rules.strategy == Strategy::Material) {
+            let direct = self.direct(walk, &point, &phase, depth, rules);
+            state.radiance += rules.clamped(depth, state.throughput * direct);
+            if let Some(vertex) = walk.vertices.last_mut() {
+                vertex.direct = state.throughput * direct;
+            }
+        }
+        self.go_on(walk, &point, &phase, depth, state, rules)
+    }
+
     /// Reflected and weighted light from a sample of one light, or of all lights.
     fn direct(
         &self,
@@ -358,7 +393,11 @@ impl PathOracle<'_> {
                 Choice::All => moved(point, chosen.light),
                 _ => point,
             };
-            sum += self.of_light(walk, surface, bsdf, (chosen, point), rules.strategy);
+            let light = chosen.light;
+            let found = self.of_light(walk, surface, bsdf, (chosen, point), rules.strategy);
+            if let Some((found, shadow)) = found {
+                sum += found * self.passes(walk, &shadow, depth, light);
+            }
         }
         sum
     }
@@ -376,7 +415,7 @@ impl PathOracle<'_> {
         }
     }
 
-    /// Light from a sample of a chosen light.
+    /// Light from a sample of a chosen light, but for the medium before it, and its shadow ray; `None` if none arrives.
     fn of_light(
         &self,
         walk: &mut Walk,
@@ -384,7 +423,7 @@ impl PathOracle<'_> {
         bsdf: &dyn Bsdf,
         (chosen, point): (Chosen, [f64; 2]),
         strategy: Strategy,
-    ) -> DVec3 {
+    ) -> Option<(DVec3, Segment)> {
         walk.decide(chosen.light as u64);
         let before = walk.rounding.by_chance();
         let (part, light) = self.light_sample(surface, &chosen, point, &mut walk.rounding);
@@ -392,13 +431,9 @@ impl PathOracle<'_> {
         if walk.rounding.by_chance() > before {
             walk.decide_shining(light.is_some());
         }
-        let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
-            return DVec3::ZERO;
-        };
+        let light = light.filter(|l| l.density.is_none_or(f64::is_finite))?;
         let reflected = bsdf.reflect(light.direction, &mut walk.rounding);
-        let Some(Reflected { value, density }) = reflected else {
-            return DVec3::ZERO;
-        };
+        let Reflected { value, density } = reflected?;
         // Towards the light's point, wherever the ray starts.
         let left = surface.leave(light.direction, &mut walk.rounding);
         let towards = left.start + light.direction * light.distance - left.origin;
@@ -412,13 +447,13 @@ impl PathOracle<'_> {
         let blocked = self.shadowed(walk, &shadow, chosen.light);
         walk.decide_blocked(blocked);
         if blocked != Blocked::No {
-            return DVec3::ZERO;
+            return None;
         }
         let weight = match light.density {
             Some(own) => strategy.weight(chosen.share * own, density) / own,
             None => 1.0,
         };
-        value * light.radiance * (weight / chosen.share)
+        Some((value * light.radiance * (weight / chosen.share), shadow))
     }
 
     /// Continues a path to its next ray; false if it ends.
@@ -459,7 +494,9 @@ impl PathOracle<'_> {
         };
         if let Some(survival) = survival.filter(|_| depth >= rules.roulette_depth) {
             let survival = survival.min(SURVIVAL);
-            let ends = walk.draw(at_bounce(depth, ROULETTE)) >= walk.rounding.share(survival);
+            let number = self.survival(walk, depth);
+            let number = number.unwrap_or_else(|| walk.draw(at_bounce(depth, ROULETTE)));
+            let ends = number >= walk.rounding.share(survival);
             walk.decide(ends.into());
             if ends {
                 return false;

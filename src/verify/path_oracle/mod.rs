@@ -15,6 +15,7 @@ mod camera;
 mod estimator;
 pub(crate) mod hits;
 pub(crate) mod light;
+mod medium;
 mod rounding;
 mod surface;
 pub(crate) mod texture;
@@ -194,6 +195,7 @@ pub struct PathOracle<'a> {
     lights: Lights,
     textures: Textures<'a>,
     materials: Vec<&'static MaterialChecks>,
+    medium: Option<medium::Medium<'a>>,
     diagonal: f64,
 }
 
@@ -237,6 +239,9 @@ impl<'a> PathOracle<'a> {
             hits: Hits::new(scene),
             lights: Lights::new(scene, &kinds.lights)?,
             textures: Textures::new(scene),
+            medium: (scene.medium.as_ref())
+                .map(medium::Medium::new)
+                .transpose()?,
             diagonal: diagonal(scene),
         })
     }

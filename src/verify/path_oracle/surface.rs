@@ -67,6 +67,21 @@ impl<'a> Surface<'a> {
     }
 }
 
+impl<'a> Surface<'a> {
+    /// A point in the medium of a scene, which belongs to no surface.
+    pub(super) fn nowhere(oracle: &'a PathOracle, position: DVec3, out: DVec3) -> Self {
+        let material = &oracle.scene.materials[0];
+        Self {
+            triangle: u32::MAX,
+            position,
+            geometric: DVec3::ZERO,
+            normal: DVec3::ZERO,
+            side: 0.0,
+            ..Self::flat(oracle.materials[0], material, out)
+        }
+    }
+}
+
 impl Surface<'_> {
     pub(super) fn bsdf(&self) -> Box<dyn Bsdf + '_> {
         (self.checks.twin)(self)
@@ -75,12 +90,14 @@ impl Surface<'_> {
     /// The ray that leaves in this direction.
     pub(super) fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
         let side = direction.dot(self.geometric).signum();
+        // A point in a medium has no side.
+        let from = (self.side != 0.0).then_some(self.triangle);
         let off = self.geometric * (side * rounding.offset(self.offset));
         Segment {
             origin: self.position + off,
             normal: self.geometric,
             shift: rounding.texel(),
-            ..Segment::endless(self.position, direction, Some(self.triangle))
+            ..Segment::endless(self.position, direction, from)
         }
     }
 }

@@ -108,10 +108,10 @@ fn independent() -> Sampler {
     sampler_of("pixel-hash", "none", 100_000)
 }
 
-/// Checks the trial scenes in a range, split into six tests for their duration.
+/// Checks the trial scenes in a range, split into seven tests for their duration.
 fn check_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 21);
+    assert_eq!(scenes.len(), 24);
     for trial in &scenes[places] {
         for (name, changes) in in_turn("integrators path by path", &trial.trials) {
             let what = integrator_variant(name, changes);
@@ -150,6 +150,11 @@ fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_ora
 #[test]
 fn single_paths_of_fences_veils_every_pair_and_rooms_of_other_sizes_are_those_of_the_oracle() {
     check_trials(15..21);
+}
+
+#[test]
+fn single_paths_through_media_are_those_of_the_oracle() {
+    check_trials(21..24);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.

@@ -48,6 +48,8 @@ pub enum Check {
     Bias,
     /// Single paths are those of the oracle for images.
     Paths,
+    /// So are those through media.
+    Media,
     /// So are pixels of a large image, and paths in queues that are full; sums are those of single samples.
     Frames,
     /// Rays are counted as the oracle for images counts them.
@@ -72,6 +74,7 @@ impl Check {
             Self::ThinWalls => "thin-walls",
             Self::Bias => "bias",
             Self::Paths => "paths",
+            Self::Media => "media",
             Self::Frames => "frames",
             Self::Counts => "counts",
         }
@@ -148,6 +151,7 @@ impl<'a> Bench<'a> {
                 _ => Ok(None),
             },
             Subject::Paths => paths::paths(self),
+            Subject::Media => paths::media(self),
             Subject::Organised(organisation) => match check {
                 Check::Frames => frames::frames(self, organisation),
                 Check::Counts => frames::counts(self, organisation),

@@ -25,7 +25,22 @@ pub fn paths(bench: &Bench) -> Finding {
     let lamps = scenes.iter_mut().find(|s| s.scene.name == "lamps");
     let lamps = lamps.ok_or_else(|| CheckError::Stale("no trial scene of lamps".to_owned()))?;
     lamps.trials.push(("primary", Vec::new()));
-    for scene in &scenes {
+    scenes.retain(|s| s.scene.medium.is_none());
+    first_fault(bench, &scenes)
+}
+
+/// The same on the trial scenes with a medium.
+pub fn media(bench: &Bench) -> Finding {
+    let mut scenes = trial_scenes().map_err(|e| CheckError::Other(e.to_string()))?;
+    scenes.retain(|s| s.scene.medium.is_some());
+    if scenes.is_empty() {
+        return Err(CheckError::Stale("no trial scene has a medium".to_owned()));
+    }
+    first_fault(bench, &scenes)
+}
+
+fn first_fault(bench: &Bench, scenes: &[TrialScene]) -> Finding {
+    for scene in scenes {
         if let Some(found) = of_scene(bench, scene)? {
             return Ok(Some(format!("{}: {found}", scene.scene.name)));
         }

@@ -10,6 +10,7 @@ mod hard;
 mod image;
 mod instanced;
 mod late_samples;
+mod media;
 mod path_lights;
 mod paths;
 mod rays;
@@ -40,6 +41,7 @@ pub fn mutants() -> Vec<Mutant> {
         image::MUTANTS,
         paths::MUTANTS,
         path_lights::MUTANTS,
+        media::MUTANTS,
         frames::MUTANTS,
         counts::MUTANTS,
         rays::MUTANTS,

@@ -3,6 +3,7 @@
 use super::checks::truth_of;
 use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
 use crate::adaptive::Smoothing;
+use crate::measure::failed;
 use crate::medium::{Homogeneity, Medium};
 use crate::photons::{Points, point_set};
 use crate::pipeline::{Pipeline, Source, camera};
@@ -71,7 +72,7 @@ impl Scene {
 
     /// The volume with a level map over it, and its images.
     pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
-        let volume = load.content.volume(load.side)?;
+        let volume = load.content.volume(load.side).map_err(failed)?;
         let made = structure::registry()
             .find("level-map")
             .map(|kind| kind.make(&Default::default()));

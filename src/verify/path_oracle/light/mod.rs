@@ -254,22 +254,22 @@ impl PathOracle<'_> {
         })
     }
 
-    /// The nearest sphere before `end` on a ray: its radiance, and its light sampling density.
+    /// The nearest sphere before `end` on a ray: its radiance, its light sampling density, and its distance.
     pub(super) fn sphere_met(
         &self,
         ray: &Segment,
         end: f64,
         choice: Choice,
         rounding: &mut Rounding,
-    ) -> Option<(DVec3, f64)> {
+    ) -> Option<(DVec3, f64, f64)> {
         let met = self.lights.spheres.iter().filter_map(|(light, ball)| {
             let distance = ball.meet(ray)?;
             (distance < end).then_some((light, ball, distance))
         });
-        let (light, ball, _) = met.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let (light, ball, distance) = met.min_by(|a, b| a.2.total_cmp(&b.2))?;
         let density = ball.density(ray.start, ray.direction);
         let share = self.share(*light, choice, ray.place(), rounding);
-        Some((ball.radiance, share * density))
+        Some((ball.radiance, share * density, distance))
     }
 
     /// True if the way to a light is occluded.

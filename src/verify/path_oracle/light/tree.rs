@@ -115,6 +115,8 @@ impl Bounds {
             return 0.0;
         }
         let arrives = rest(normal.dot(direction).clamp(-1.0, 1.0).acos(), box_angle);
+        // A point in a medium has no normal: all light arrives.
+        let arrives = if normal == DVec3::ZERO { 0.0 } else { arrives };
         plain * emitted.cos().max(LEAST_COSINE) * arrives.cos().max(0.0)
     }
 }

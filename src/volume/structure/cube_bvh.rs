@@ -1,4 +1,4 @@
-//! A BVH over homogeneous cubes. Kernel: `kernels/media/structure/cube_bvh.wesl`.
+//! A BVH over homogeneous cubes. Kernel: `kernels/volume/structure/cube_bvh.wesl`.
 
 use super::{Parts, VolumeStructure, levels_of};
 use crate::medium::{Medium, Region};
@@ -58,7 +58,7 @@ fn append(cubes: &mut [Cube], index: &mut Vec<u32>) {
 
 impl VolumeStructure for CubeBvh {
     fn module(&self) -> &'static str {
-        "media/structure/cube_bvh"
+        "volume/structure/cube_bvh"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

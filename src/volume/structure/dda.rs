@@ -1,4 +1,4 @@
-//! One voxel a step. Kernel: `kernels/media/structure/dda.wesl`.
+//! One voxel a step. Kernel: `kernels/volume/structure/dda.wesl`.
 
 use super::{Parts, VolumeStructure};
 use crate::medium::{Medium, Region};
@@ -12,7 +12,7 @@ parameters! {
 
 impl VolumeStructure for Dda {
     fn module(&self) -> &'static str {
-        "media/structure/dda"
+        "volume/structure/dda"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

@@ -1,4 +1,4 @@
-//! Homogeneous cubes around every voxel. Kernel: `kernels/media/structure/chebyshev.wesl`.
+//! Homogeneous cubes around every voxel. Kernel: `kernels/volume/structure/chebyshev.wesl`.
 
 use super::{Parts, VolumeStructure, packed_bytes};
 use crate::medium::{Medium, Region};
@@ -15,7 +15,7 @@ const MOST_REACH: u8 = 15;
 
 impl VolumeStructure for Chebyshev {
     fn module(&self) -> &'static str {
-        "media/structure/chebyshev"
+        "volume/structure/chebyshev"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

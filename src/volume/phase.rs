@@ -1,5 +1,5 @@
 //! Phase functions: the density of directions after scattering, over the sphere, by the cosine of the angle between
-//! the directions of travel before and after. Kernel: `kernels/media/phase.wesl`.
+//! the directions of travel before and after. Kernel: `kernels/volume/phase.wesl`.
 
 use glam::Vec3;
 

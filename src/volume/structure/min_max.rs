@@ -1,4 +1,4 @@
-//! A pyramid of bounds, without a map. Kernel: `kernels/media/structure/min_max.wesl`.
+//! A pyramid of bounds, without a map. Kernel: `kernels/volume/structure/min_max.wesl`.
 
 use super::{Parts, VolumeStructure};
 use crate::medium::{Medium, Region};
@@ -12,7 +12,7 @@ parameters! {
 
 impl VolumeStructure for MinMax {
     fn module(&self) -> &'static str {
-        "media/structure/min_max"
+        "volume/structure/min_max"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

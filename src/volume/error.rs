@@ -55,6 +55,30 @@ pub enum MediaError {
         /// The reason.
         problem: String,
     },
+    /// A name that stands for nothing.
+    #[error("no {what} is called `{name}`; there are: {}", known.join(", "))]
+    Unknown {
+        /// What was asked for.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What could be.
+        known: Vec<String>,
+    },
+    /// Paths would bend.
+    #[error(
+        "the refractive index of voxel ({}, {}, {}) is {value}: paths through a scene's medium are straight, so it has to be 1 everywhere",
+        voxel[0], voxel[1], voxel[2]
+    )]
+    Refracts {
+        /// The first such voxel.
+        voxel: [u32; 3],
+        /// Its index.
+        value: f32,
+    },
+    /// Parameters that a structure does not have.
+    #[error("the structure over a volume: {0}")]
+    Structure(String),
     /// A structure that contradicts the volume under it.
     #[error("the structure says of voxel ({}, {}, {}) {problem}", voxel[0], voxel[1], voxel[2])]
     Invalid {

@@ -23,7 +23,10 @@ pub fn glass_ball(side: u32) -> Result<Volume, MediaError> {
 }
 
 /// The same with another radius.
-pub(crate) fn ball(side: u32, radius: f64) -> Result<Volume, MediaError> {
+///
+/// # Errors
+/// The resolution is not allowed.
+pub fn ball(side: u32, radius: f64) -> Result<Volume, MediaError> {
     let inside = |p: DVec3| (p - 0.5).length_squared() < radius * radius;
     solid(side, inside, |_| 1.0)
 }

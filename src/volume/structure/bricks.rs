@@ -1,4 +1,4 @@
-//! Bricks of voxels. Kernel: `kernels/media/structure/bricks.wesl`.
+//! Bricks of voxels. Kernel: `kernels/volume/structure/bricks.wesl`.
 
 use super::{Parts, VolumeStructure};
 use crate::medium::{Medium, Pair, Region};
@@ -22,7 +22,7 @@ fn brick_index(medium: &Medium, voxel: UVec3) -> u32 {
 
 impl VolumeStructure for Bricks {
     fn module(&self) -> &'static str {
-        "media/structure/bricks"
+        "volume/structure/bricks"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

@@ -1,13 +1,12 @@
-//! A medium on a grid, as structures over it see it. Kernel: `kernels/media/medium.wesl`.
+//! A medium on a grid, as structures over it see it. Kernel: `kernels/volume/medium.wesl`.
 
 use crate::volume::{to_half, voxel_at};
 use crate::{Volume, VolumeStructure};
 use glam::{BVec3, DVec3, UVec3, Vec2};
+use raystone_core::clock::Instant;
 use raystone_core::parameters;
-use raystone_gpu::{Bindings, Gpu, GpuError, UniformValues};
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::Instant;
 
 parameters! {
     /// What a homogeneous box is.
@@ -110,11 +109,21 @@ impl Medium {
         structure: Arc<dyn VolumeStructure>,
         homogeneity: Homogeneity,
     ) -> Self {
-        let resolution = UVec3::from(volume.resolution);
         let sigma = (volume.scattering.iter().zip(&volume.absorption)).map(|(s, a)| s + a);
         let field: Vec<u32> = (volume.refraction.iter().zip(sigma))
             .map(|(n, sigma)| pack_halves(Vec2::new(*n, sigma)))
             .collect();
+        Self::over(volume, field, structure, homogeneity)
+    }
+
+    /// Builds a structure over pairs of half floats, of each voxel of a volume.
+    pub(crate) fn over(
+        volume: &Volume,
+        field: Vec<u32>,
+        structure: Arc<dyn VolumeStructure>,
+        homogeneity: Homogeneity,
+    ) -> Self {
+        let resolution = UVec3::from(volume.resolution);
         let most = field
             .iter()
             .map(|v| unpack_halves(*v).y)
@@ -165,31 +174,6 @@ impl Medium {
     /// Size of a voxel in the world.
     pub fn size_of_voxel(&self) -> DVec3 {
         self.voxel
-    }
-
-    /// Uploads it for kernels that import `media/medium`.
-    ///
-    /// # Errors
-    /// An array exceeds what the adapter binds.
-    pub fn bindings(&self, gpu: &Gpu) -> Result<Bindings, GpuError> {
-        let medium = UniformValues::new()
-            .uvec("resolution", &self.resolution.to_array())
-            .u32("levels", self.levels)
-            .vec("spans", &self.spans.to_array())
-            .u32("empty", self.empty)
-            .u32("entries", self.index.len() as u32);
-        let index: &[u32] = if self.index.is_empty() {
-            &[0]
-        } else {
-            &self.index
-        };
-        let mut bindings = Bindings::new();
-        bindings
-            .uniform("medium", medium)
-            .buffer("field", &gpu.storage("field", &self.field)?)
-            .buffer("pairs", &gpu.storage("pairs", &self.pairs)?)
-            .buffer("index", &gpu.storage("index", index)?);
-        Ok(bindings)
     }
 
     /// The region of a structure around a voxel; `fetches` counts what is read.
@@ -308,6 +292,10 @@ impl Medium {
     pub(crate) fn fetch_index(&self, place: u32, fetches: &mut u32) -> u32 {
         *fetches += 1;
         self.index[place as usize]
+    }
+
+    pub(crate) fn fetch_field(&self, place: u32) -> u32 {
+        self.field[place as usize]
     }
 
     /// Byte `place` of the index.

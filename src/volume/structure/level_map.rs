@@ -1,4 +1,4 @@
-//! The level map of Pfeuti 2009, §3.3. Kernel: `kernels/media/structure/level_map.wesl`.
+//! The level map of Pfeuti 2009, §3.3. Kernel: `kernels/volume/structure/level_map.wesl`.
 
 use super::{Parts, VolumeStructure, levels_of, packed_bytes};
 use crate::medium::{Medium, Region};
@@ -12,7 +12,7 @@ parameters! {
 
 impl VolumeStructure for LevelMap {
     fn module(&self) -> &'static str {
-        "media/structure/level_map"
+        "volume/structure/level_map"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

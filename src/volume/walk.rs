@@ -1,5 +1,5 @@
 //! The walk of a straight ray through a medium, from region to region of a structure.
-//! Kernel: `kernels/media/walk.wesl`.
+//! Kernel: `kernels/volume/walk.wesl`.
 
 use crate::medium::{Medium, Region, unpack_halves};
 use glam::{BVec3, DVec3, IVec3, UVec3, Vec2, Vec3};
@@ -10,9 +10,12 @@ const LEAST_COMPONENT: f64 = 1e-12;
 /// A ray in voxels; distances are in the length that its direction had in the world.
 #[derive(Debug, Clone, Copy)]
 pub struct MediumRay {
-    pub(crate) origin: Vec3,
-    pub(crate) direction: Vec3,
-    pub(crate) inverse: Vec3,
+    /// Where it begins, in voxels.
+    pub origin: Vec3,
+    /// Its direction, in voxels.
+    pub direction: Vec3,
+    /// Reciprocals of the direction.
+    pub inverse: Vec3,
 }
 
 impl MediumRay {
@@ -135,7 +138,7 @@ fn mix_4(medium: &Medium, low: UVec3, high: UVec3, z: u32, w: Vec3) -> Vec2 {
 }
 
 fn voxel_value(medium: &Medium, voxel: UVec3) -> Vec2 {
-    unpack_halves(medium.field[medium.voxel_index(voxel) as usize])
+    unpack_halves(medium.fetch_field(medium.voxel_index(voxel)))
 }
 
 /// ∫ σ dt over [from, to], within the voxel: between the planes through voxels' middles σ is a cubic polynomial, which

@@ -1,4 +1,4 @@
-//! An octree without the parts below homogeneous cubes. Kernel: `kernels/media/structure/sparse_tree.wesl`.
+//! An octree without the parts below homogeneous cubes. Kernel: `kernels/volume/structure/sparse_tree.wesl`.
 
 use super::{Parts, VolumeStructure};
 use crate::medium::{Medium, Pair, Region};
@@ -20,7 +20,7 @@ fn octant(voxel: UVec3, level: u32) -> u32 {
 
 impl VolumeStructure for SparseTree {
     fn module(&self) -> &'static str {
-        "media/structure/sparse_tree"
+        "volume/structure/sparse_tree"
     }
 
     fn parts(&self, medium: &Medium) -> Parts {

@@ -1,0 +1,84 @@
+//! The medium of a scene in its tables. Kernel: `kernels/integrator/medium.wesl`.
+
+use glam::{DVec3, UVec3};
+use raystone_gpu::{Bindings, Composition, GpuError, UniformValues};
+use raystone_scene::{SceneData, SceneMedium};
+use raystone_volume::{Bounds, Straight};
+
+/// A medium with its structure, and where its arrays begin in `shading_tables`.
+pub(super) struct MediumTables {
+    straight: Straight,
+    placed: UniformValues,
+    /// Field, pairs and index, in words.
+    first: [u32; 3],
+}
+
+impl MediumTables {
+    /// The medium of a scene, if it has one.
+    ///
+    /// # Errors
+    /// The path tracer cannot follow paths through it: see [`SceneMedium::new`].
+    pub(super) fn of(scene: &SceneData) -> Result<Option<Self>, GpuError> {
+        let build = |medium: &SceneMedium| {
+            let volume = &medium.volume;
+            let straight = Straight::new(volume, &medium.structure)
+                .map_err(|e| GpuError::Kernel(format!("{}: {e}", scene.name)))?;
+            let voxels: DVec3 = UVec3::from(volume.resolution).as_dvec3();
+            let scale = voxels / (volume.high - volume.low);
+            let placed = UniformValues::new()
+                .vec("low", &volume.low.as_vec3().to_array())
+                .f32("density", straight.density)
+                .vec("scale", &scale.as_vec3().to_array())
+                .u32("is_ball", u32::from(volume.bounds == Bounds::Sphere))
+                .u32("phase_kind", volume.phase.kind)
+                .f32("anisotropy", volume.phase.anisotropy);
+            Ok(Self {
+                straight,
+                placed,
+                first: [0; 3],
+            })
+        };
+        scene.medium.as_ref().map(build).transpose()
+    }
+
+    /// Appends field, pairs and index to the words of a scene.
+    pub(super) fn append(&mut self, words: &mut Vec<u32>) {
+        let medium = &self.straight.medium;
+        let arrays = [&medium.field, medium.pairs.as_flattened(), &medium.index];
+        for (first, array) in self.first.iter_mut().zip(arrays) {
+            *first = words.len() as u32;
+            words.extend_from_slice(array);
+        }
+    }
+
+    /// Binds the uniforms of kernels with the feature `media`.
+    pub(super) fn bind(&self, bindings: &mut Bindings) {
+        let medium = &self.straight.medium;
+        let [field, pair, index] = self.first;
+        let values = UniformValues::new()
+            .uvec("resolution", &medium.resolution.to_array())
+            .u32("levels", medium.levels)
+            .vec("spans", &medium.spans.to_array())
+            .u32("empty", medium.empty)
+            .u32("entries", medium.index.len() as u32)
+            .u32("first_field", field)
+            .u32("first_pair", pair)
+            .u32("first_index", index);
+        bindings
+            .uniform("medium", values)
+            .uniform("placed", self.placed.clone());
+    }
+
+    /// The kernel module of its structure.
+    pub(super) fn module(&self) -> &'static str {
+        self.straight.medium.structure.module()
+    }
+}
+
+/// A kernel for scenes with a medium over which this module is the structure.
+pub(super) fn activate(kernel: Composition, module: Option<&str>) -> Composition {
+    match module {
+        Some(module) => kernel.feature("media", true).with("structure", module),
+        None => kernel,
+    }
+}

@@ -1,0 +1,135 @@
+//! Trial scenes with media: fog and a cloud, lamps inside and outside, surfaces in them, and every phase function.
+
+use crate::kinds::KindChecks;
+use crate::trial_scenes::{Trial, TrialScene, depth, lamps, points, word};
+use glam::{DVec3, vec3};
+use raystone_scene::{Light, SceneData, SceneError, SceneMedium};
+use raystone_volume::{Bounds, MediaError, Phase, Volume, phase, procedures};
+
+fn path(changes: &[(&'static str, raystone_core::params::ParamValue)]) -> Trial {
+    ("path", changes.to_vec())
+}
+
+/// The scenes with media.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
+    Ok(vec![
+        TrialScene {
+            scene: in_medium("fog", lamps()?, fog(), "dda")?,
+            trials: vec![
+                path(&[depth(6)]),
+                path(&[
+                    depth(4),
+                    word("strategy", "mis-power"),
+                    word("roulette", "albedo"),
+                ]),
+                path(&[depth(3), word("light_choice", "tree")]),
+                path(&[depth(3), word("strategy", "bsdf"), word("roulette", "none")]),
+            ],
+        },
+        TrialScene {
+            scene: in_medium("cloud", points(&kinds.lights)?, cloud(), "level-map")?,
+            trials: vec![
+                path(&[depth(5)]),
+                path(&[
+                    depth(3),
+                    word("lights", "all"),
+                    word("light_choice", "uniform"),
+                ]),
+                path(&[
+                    depth(2),
+                    word("strategy", "light"),
+                    word("light_choice", "tree"),
+                ]),
+            ],
+        },
+        TrialScene {
+            scene: in_medium("smoke", glowing()?, smoke(), "sparse-tree")?,
+            trials: vec![path(&[depth(4)])],
+        },
+    ])
+}
+
+/// The scene with a medium, which it is named after.
+fn in_medium(
+    name: &str,
+    mut scene: SceneData,
+    volume: Result<Volume, MediaError>,
+    structure: &str,
+) -> Result<SceneData, SceneError> {
+    let problem = |source| SceneError::Medium {
+        name: name.to_owned(),
+        source,
+    };
+    let volume = volume.map_err(problem)?;
+    name.clone_into(&mut scene.name);
+    scene.medium = Some(SceneMedium::new(volume, structure).map_err(problem)?);
+    Ok(scene)
+}
+
+/// Fog that is everywhere the same, around all lamps and half of the floor, thrown forward.
+fn fog() -> Result<Volume, MediaError> {
+    let fog = Volume::constant(0.3, 0.1, 1.0)?;
+    Volume {
+        low: DVec3::new(-2.5, 0.0, -3.0),
+        high: DVec3::new(2.0, 3.4, 2.0),
+        phase: Phase {
+            kind: phase::HENYEY_GREENSTEIN,
+            anisotropy: 0.6,
+        },
+        ..fog
+    }
+    .checked()
+}
+
+/// A cloud in an ellipsoid with the camera in it, whose albedo differs from place to place, thrown back.
+fn cloud() -> Result<Volume, MediaError> {
+    let mut cloud = procedures::cloud(12)?;
+    for (place, absorbed) in cloud.absorption.iter_mut().enumerate() {
+        *absorbed *= (place % 7) as f32;
+    }
+    Volume {
+        low: DVec3::new(-3.0, -0.5, -2.5),
+        high: DVec3::new(2.5, 3.0, 4.5),
+        bounds: Bounds::Sphere,
+        phase: Phase {
+            kind: phase::SCHLICK,
+            anisotropy: -0.5,
+        },
+        ..cloud
+    }
+    .checked()
+}
+
+/// Smoke that is empty in its middle, in boxes of unequal sides. No plane between voxels lies in a surface: on which side
+/// of it rays begin there, and so which numbers they draw, rounding decides.
+fn smoke() -> Result<Volume, MediaError> {
+    let smoke = Volume::new([9, 5, 14], |p| {
+        let far = (p - 0.5).length() > 0.25;
+        let density = if far { (0.5 + p.y) as f32 } else { 0.0 };
+        [0.8 * density, 0.05, 1.0]
+    })?;
+    Volume {
+        low: DVec3::new(-1.93, 0.13, -1.83),
+        high: DVec3::new(1.9, 2.5, 2.2),
+        ..smoke
+    }
+    .checked()
+}
+
+/// The scene of lamps with two balls of light, one of them in the smoke.
+fn glowing() -> Result<SceneData, SceneError> {
+    let mut scene = lamps()?;
+    let ball = |center, radius, radiance| Light::Sphere {
+        center,
+        radius,
+        radiance,
+    };
+    scene.lights = vec![
+        ball(vec3(-0.9, 1.6, 0.8), 0.2, vec3(9.0, 6.0, 3.0)),
+        ball(vec3(2.6, 2.4, -1.0), 0.3, vec3(1.0, 3.0, 6.0)),
+    ];
+    Ok(scene)
+}

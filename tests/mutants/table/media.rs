@@ -1,0 +1,191 @@
+//! Faults of the medium of a scene, on the trial scenes with one.
+
+use super::{row, text};
+use crate::{Check, Mutant, Plant, Subject};
+
+const fn fault(name: &'static str, what: &'static str, plant: Plant) -> Mutant {
+    row(name, what, plant, Subject::Media, Check::Media)
+}
+
+pub const MUTANTS: &[Mutant] = &[
+    fault(
+        "medium-absorbs-nothing",
+        "what is absorbed is scattered",
+        text(
+            "integrator/medium",
+            "select(there.x / there.y, 1.0, there.x >= there.y), true",
+            "1.0, true",
+        ),
+    ),
+    fault(
+        "medium-albedo-twice",
+        "the albedo counts twice",
+        text(
+            "integrator/path",
+            "(*path).throughput *= flight.albedo;",
+            "(*path).throughput *= flight.albedo * flight.albedo;",
+        ),
+    ),
+    fault(
+        "medium-collides-by-scattering",
+        "a collision is accepted by σ_s, not σ",
+        text(
+            "integrator/medium",
+            "next_number() * bounds.y < there.y",
+            "next_number() * bounds.y < there.x",
+        ),
+    ),
+    fault(
+        "medium-majorant-too-small",
+        "flights go by half the greatest extinction",
+        text(
+            "integrator/medium",
+            "let majorant = bounds.y * unit;",
+            "let majorant = 0.5 * bounds.y * unit;",
+        ),
+    ),
+    fault(
+        "medium-depth-begins-anew",
+        "what a region took of the optical depth is forgotten",
+        text(
+            "integrator/medium",
+            "left = max(left - (segment.exit - t) * majorant, 0.0);",
+            "",
+        ),
+    ),
+    fault(
+        "medium-first-number-squared",
+        "the first free flight is too short",
+        text(
+            "integrator/medium",
+            "var left = -log(1.0 - first);",
+            "var left = -log(1.0 - first * first);",
+        ),
+    ),
+    fault(
+        "medium-behind-surfaces",
+        "light is scattered behind what a ray meets",
+        text(
+            "integrator/path",
+            "@if(!sphere_lights) let end = hit.t;",
+            "@if(!sphere_lights) let end = FAR;",
+        ),
+    ),
+    fault(
+        "medium-behind-balls-of-light",
+        "light is scattered behind a ball of light",
+        text(
+            "integrator/path",
+            "@if(sphere_lights) let end = first_sphere(Ray(ray.origin, ray.t_min, ray.direction, hit.t)).t;",
+            "@if(sphere_lights) let end = hit.t;",
+        ),
+    ),
+    fault(
+        "medium-ball-is-a-box",
+        "a medium in a ball fills its box",
+        text(
+            "integrator/medium",
+            "placed.is_ball == 1u",
+            "placed.is_ball == 2u",
+        ),
+    ),
+    fault(
+        "medium-unit-of-shadow-rays",
+        "shadow rays count as of length 1",
+        text(
+            "integrator/medium",
+            "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density * length(ray.direction);",
+            "let way = way_inside(along, ray.t_min, ray.t_max);\n    let unit = placed.density;",
+        ),
+    ),
+    fault(
+        "medium-before-lights-forgotten",
+        "light samples are not dimmed by the medium",
+        text(
+            "integrator/path",
+            "@if(media) light.radiance *= transmittance(light.shadow, index);",
+            "",
+        ),
+    ),
+    fault(
+        "medium-control-forgotten",
+        "what a region absorbs at least is left out for shadow rays",
+        text(
+            "integrator/medium",
+            "result *= exp(-bounds.x * unit * (segment.exit - walk.t));",
+            "",
+        ),
+    ),
+    fault(
+        "medium-shadow-majorant-too-small",
+        "collisions of shadow rays are too rare",
+        text(
+            "integrator/medium",
+            "let rest = (bounds.y - bounds.x) * unit;",
+            "let rest = 0.5 * (bounds.y - bounds.x) * unit;",
+        ),
+    ),
+    fault(
+        "medium-shadow-by-scattering",
+        "shadow rays lose σ_s alone",
+        text(
+            "integrator/medium",
+            "saturate((bounds.y - there.y)",
+            "saturate((bounds.y - there.x)",
+        ),
+    ),
+    fault(
+        "medium-phase-sign",
+        "the phase function is evaluated backwards",
+        text(
+            "integrator/medium",
+            "dot(surface.arriving, direction));",
+            "-dot(surface.arriving, direction));",
+        ),
+    ),
+    fault(
+        "medium-phase-sampled-backwards",
+        "directions are drawn around the way back",
+        text(
+            "integrator/medium",
+            "surface.arriving, u);",
+            "-surface.arriving, u);",
+        ),
+    ),
+    fault(
+        "medium-even-density",
+        "directions in the medium have the density of even ones where light is found",
+        text(
+            "shading/bsdf",
+            "vec3<f32>(1.0), scattered_pdf(surface, onward), false",
+            "vec3<f32>(1.0), 0.07957747, false",
+        ),
+    ),
+    fault(
+        "medium-light-behind-nothing",
+        "points in the medium choose lights of a tree as surfaces do",
+        text(
+            "shading/light/tree",
+            "all(normal == vec3<f32>(0.0))",
+            "false",
+        ),
+    ),
+    fault(
+        "medium-survival-by-flight",
+        "paths survive by the number of their flight",
+        text(
+            "integrator/path",
+            "@if(media) if (survival_number() >= survival)",
+            "@if(media) if (sample_1d(sampler) >= survival)",
+        ),
+    ),
+    fault(
+        "medium-beyond-depth",
+        "paths are scattered once more than allowed",
+        text(
+            "integrator/path",
+            "depth == MAX_DEPTH || flight.albedo <= 0.0",
+            "flight.albedo <= 0.0",
+        ),
+    ),
+];
