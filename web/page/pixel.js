@@ -8,6 +8,8 @@ let send;
 let pixel = null;
 let size = [1, 1];
 let sides = 1;
+let samples = 1;
+let trail = [];
 let hasPath = false;
 // The image changed since the pixel was inspected.
 let isStale = false;
@@ -164,9 +166,13 @@ function drawPoints({ purpose, points, star }) {
 }
 
 // What is drawn over the image: a frame around the pixel, and the path.
-export function mark(next = size, trail = [], count = sides, samples = 1) {
-  if (count !== sides) at("pixel-side").parentElement.hidden = count < 2;
-  [size, sides] = [next, count];
+export function marks(known) {
+  ({ size, sides, samples, trail } = known);
+  at("pixel-side").parentElement.hidden = sides < 2;
+  mark();
+}
+
+function mark() {
   [at("pixel-x").max, at("pixel-y").max] = size.map((edge) => edge - 1);
   at("pixel-sample").max = samples - 1;
   const overlay = at("overlay");

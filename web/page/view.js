@@ -5,7 +5,7 @@ import { adopt, axisField, listModels, offer, overridesOf } from "./choices.js";
 import { visitorsFiles } from "./files.js";
 import { adoptMotion, motionFields, motionOverrides, showFrame } from "./motion.js";
 import { canvasMoves } from "./moves.js";
-import { inspect, mark, pixelPanel, refresh, screenChanged, takeFound, togglePath } from "./pixel.js";
+import { inspect, marks, pixelPanel, refresh, screenChanged, takeFound, togglePath } from "./pixel.js";
 
 const at = (id) => document.getElementById(id);
 const parameters = new URLSearchParams(location.search);
@@ -198,7 +198,7 @@ function draw({ figures: known, width, height, picture }) {
   at("faults").textContent = faults.filter(Boolean).join(" ");
   at("faults").hidden = !faults.some(Boolean);
   showFrame(known.frame);
-  mark([width, height], known.trail, sides.length, sides[0].of);
+  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: sides[0].of });
   const rows = [
     ...timesOf(known.times),
     ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],

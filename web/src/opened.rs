@@ -3,6 +3,7 @@
 use crate::memory::{Held, plain};
 use raystone_bench::run::Registries;
 use raystone_config::Catalogue;
+use raystone_scene::SceneError;
 use raystone_viewer::{START, Screen};
 use std::path::{Path, PathBuf};
 
@@ -67,6 +68,10 @@ impl Opened {
             let bytes = self.files.get(Path::new(name)).map_or(&[][..], |bytes| bytes);
             let text = std::str::from_utf8(bytes).map_err(|e| format!("{name}: no text: {e}"))?;
             return Screen::parse(text, name, &[], registries);
+        }
+        if rank(Path::new(name)).is_none() {
+            let path = PathBuf::from(name);
+            return Err(SceneError::UnknownFormat { path }.to_string());
         }
         let mut screen = match now {
             Some(screen) => screen.clone(),
@@ -137,7 +142,7 @@ mod tests {
         assert_eq!((study.spp, study.cells[0][Axis::Scene].name.as_str()), (3, "cornell-box"));
         for (wrong, says) in [
             (opened(&[]), "nothing was opened"),
-            (opened(&["notes.txt"]), "neither built in"),
+            (opened(&["notes.txt"]), "notes.txt: unknown model format"),
             (Opened::new(file("[axes]\nscene = 7\n")), "s.toml"),
             (Opened::new(vec![("s.toml".to_owned(), vec![0xff])]), "no text"),
         ] {
