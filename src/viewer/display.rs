@@ -141,7 +141,9 @@ mod tests {
     fn what_was_rendered_is_drawn_otherwise_without_rendering_it() {
         let mut display = Display {
             sides: vec![Rendered {
-                image: Some(Arc::new(Image::new(2, 1, vec![[0.1; 3], [0.4; 3]]).unwrap())),
+                image: Some(Arc::new(
+                    Image::new(2, 1, vec![[0.1; 3], [0.4; 3]]).unwrap(),
+                )),
                 map: None,
                 label: String::new(),
                 accel: "bvh".to_owned(),
@@ -161,9 +163,15 @@ mod tests {
             },
         );
         let [before, after] = [&plain, &brighter].map(|window| picture(&display, window).pixels);
-        assert!((0..2).all(|i| after[i][0] > before[i][0]), "{before:?} {after:?}");
+        assert!(
+            (0..2).all(|i| after[i][0] > before[i][0]),
+            "{before:?} {after:?}"
+        );
         // A map is there once it is counted.
-        assert_eq!([Map::None, Map::Nodes].map(|map| display.has(map)), [true, false]);
+        assert_eq!(
+            [Map::None, Map::Nodes].map(|map| display.has(map)),
+            [true, false]
+        );
         let counters = |nodes| Counters {
             nodes,
             ..Counters::default()
@@ -178,6 +186,9 @@ mod tests {
             ..plain
         };
         let frame = display.frame(&nodes);
-        assert_eq!((frame.scale, frame.sides[0].figures.map_mean), (Some(3.0), Some(2.0)));
+        assert_eq!(
+            (frame.scale, frame.sides[0].figures.map_mean),
+            (Some(3.0), Some(2.0))
+        );
     }
 }

@@ -91,7 +91,9 @@ impl Trail {
     /// out: it is everywhere.
     pub fn on(&self, camera: &Camera, size: [u32; 2]) -> Vec<Option<[f32; 2]>> {
         let points = self.points.iter().skip(1);
-        points.map(|point| projected(camera, size, *point)).collect()
+        points
+            .map(|point| projected(camera, size, *point))
+            .collect()
     }
 }
 
@@ -173,7 +175,9 @@ async fn seen(
     let traced = &structure.traced;
     let batch = stage.tracer(traced, Query::Closest)?.batch(&[*ray])?;
     batch.trace_async().await?;
-    stage.gpu.check_error_word(batch.error_word_async().await?)?;
+    stage
+        .gpu
+        .check_error_word(batch.error_word_async().await?)?;
     let hit = batch.hits_async().await?.first().copied();
     let hit = hit.filter(|hit| hit.triangle != NO_HIT);
     let work = stage

@@ -2,8 +2,8 @@
 
 mod steps;
 
-use super::done::{Done, Work, note};
 use super::display::{Display, Rendered};
+use super::done::{Done, Work, note};
 use super::frame::{Frame, encoded, figures, write_linear};
 use super::inspect::{self, Grasp, Inspection, Trail};
 use super::motion::{FrameClock, FrameTimes, Pose};

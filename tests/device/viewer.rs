@@ -232,7 +232,10 @@ fn a_pixel_tells_its_hit_its_path_and_its_points() {
     let path = viewer.path(0, pixel, 0).unwrap();
     let size = viewer.screen().unwrap().size;
     let drawn = path.on(&viewer.camera().unwrap(), size);
-    assert_eq!((drawn.len(), path.text.len()), (path.points.len() - 1, drawn.len()));
+    assert_eq!(
+        (drawn.len(), path.text.len()),
+        (path.points.len() - 1, drawn.len())
+    );
     let [x, y] = drawn[0].unwrap();
     assert_eq!([x as u32, y as u32], pixel, "the path begins in its pixel");
     // Sobol's points of one pixel are those of `points`, shifted: as even as before but for the shift.
@@ -269,7 +272,13 @@ fn another_exposure_is_drawn_within_a_step() {
     }
     let brighter = brighter.into_inner().unwrap();
     let sum = |picture: &raystone::image::Picture| -> u64 {
-        picture.pixels.as_flattened().iter().copied().map(u64::from).sum()
+        picture
+            .pixels
+            .as_flattened()
+            .iter()
+            .copied()
+            .map(u64::from)
+            .sum()
     };
     assert!(sum(&brighter) > sum(&before));
     assert!(display.has(Map::None) && !display.has(Map::Nodes));

@@ -307,7 +307,7 @@ impl Inside {
                 if is_other(|now, was| !now.restarts(was)) {
                     (found.inspection, found.explanation) = (None, None);
                 }
-                if is_other(|now, was| now.cells == was.cells && now.size == was.size) {
+                if is_other(Screen::has_paths_of) {
                     (found.path, found.points) = (None, None);
                 }
             }),

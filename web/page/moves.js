@@ -2,8 +2,8 @@
 
 const TURN = 0.12;
 const FLY = 0.1;
-// A pointer that moves no farther clicks, pixels.
-const STILL = 4;
+// A mouse and a finger that move no farther click, pixels.
+const STILL = { mouse: 4, touch: 12 };
 const KEYS = {
   ArrowLeft: { orbit: [-TURN, 0] },
   ArrowRight: { orbit: [TURN, 0] },
@@ -57,7 +57,7 @@ export function canvasMoves(canvas, send, others, click) {
   canvas.onpointermove = (event) => {
     const before = held.get(event.pointerId);
     if (!before) return;
-    if (pressed && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < STILL) return;
+    if (pressed && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < (STILL[event.pointerType] ?? STILL.mouse)) return;
     pressed = null;
     const height = canvas.clientHeight;
     const was = held.size === 2 ? spread() : before;

@@ -161,7 +161,7 @@ function drawPoints({ purpose, points, star }) {
     context.fill();
   }
   at("pixel-purpose").textContent = purpose;
-  at("pixel-star").textContent = `${points.length} points, D* ${star === null ? "–" : star.toFixed(5)}`;
+  at("pixel-star").textContent = `${points.length} ${points.length === 1 ? "point" : "points"}, D* ${star === null ? "–" : star.toFixed(5)}`;
   plot.ariaLabel = `${points.length} points of the sampler in dimensions ${number("pixel-first")} and ${number("pixel-second")}: ${purpose}`;
 }
 

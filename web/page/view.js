@@ -74,9 +74,9 @@ function take(news) {
     post({ trouble: news.trouble });
   } else if ("status" in news) {
     at("view-status").textContent = news.status || said;
-  } else if (news.done) {
+  } else if ("done" in news) {
     trouble("");
-    said = news.done.join("; ");
+    said = news.done?.join("; ") ?? said;
     at("view-status").textContent = said;
     // Controls say what a link asked for, and from then on have the last word.
     if (asked.set.length > 0) ask("adopt");
@@ -198,7 +198,7 @@ function draw({ figures: known, width, height, picture }) {
   at("faults").textContent = faults.filter(Boolean).join(" ");
   at("faults").hidden = !faults.some(Boolean);
   showFrame(known.frame);
-  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: sides[0].of });
+  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value) });
   const rows = [
     ...timesOf(known.times),
     ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],

@@ -99,7 +99,10 @@ mod tests {
 
     #[test]
     fn paths_lead_where_those_of_a_disk_do() {
-        let memory = Memory(Mutex::new(held(&[("a.obj", "x"), ("maps/wood/b.png", "yz")])));
+        let memory = Memory(Mutex::new(held(&[
+            ("a.obj", "x"),
+            ("maps/wood/b.png", "yz"),
+        ])));
         let read = |path: &str| {
             let (mut file, length) = memory.open(Path::new(path))?;
             let mut text = String::new();
@@ -117,7 +120,10 @@ mod tests {
         assert_eq!(names("maps"), [Path::new("maps/wood")]);
         assert!(memory.list(Path::new("a.obj")).is_err());
         assert!(memory.is_folder(Path::new("maps/wood")) && !memory.is_folder(Path::new("a.obj")));
-        assert_eq!(memory.real(Path::new("maps/../a.obj")).unwrap(), Path::new("a.obj"));
+        assert_eq!(
+            memory.real(Path::new("maps/../a.obj")).unwrap(),
+            Path::new("a.obj")
+        );
         assert!(memory.real(Path::new("no")).is_err());
     }
 
@@ -132,13 +138,22 @@ mod tests {
         ]));
         assert!(before.is_empty());
         let scene = raystone_scene::named("dir/a.obj").unwrap();
-        assert_eq!((scene.triangles.len(), scene.materials[0].name.as_str()), (1, "red"));
+        assert_eq!(
+            (scene.triangles.len(), scene.materials[0].name.as_str()),
+            (1, "red")
+        );
         MEMORY.replace(held(&[("dir/a.obj", obj)]));
         let scene = raystone_scene::named("dir/a.obj").unwrap();
         let notes = scene.report.lines().join(" ");
-        assert!(notes.contains("maps/a.mtl") && notes.contains("among the opened"), "{notes}");
+        assert!(
+            notes.contains("maps/a.mtl") && notes.contains("among the opened"),
+            "{notes}"
+        );
         let missing = raystone_scene::named("dir/b.obj").unwrap_err();
-        assert!(matches!(missing, SceneError::Read { .. } | SceneError::Unknown { .. }));
+        assert!(matches!(
+            missing,
+            SceneError::Read { .. } | SceneError::Unknown { .. }
+        ));
         assert!(missing.to_string().contains("b.obj"), "{missing}");
         MEMORY.replace(Held::new());
     }

@@ -23,7 +23,9 @@ impl Opened {
         let (names, contents): (Vec<String>, Vec<Vec<u8>>) = files.into_iter().unzip();
         let paths: Vec<PathBuf> = names.iter().map(|name| plain(Path::new(name))).collect();
         let above = common_folder(&paths);
-        let short = paths.iter().map(|path| path.strip_prefix(&above).unwrap_or(path));
+        let short = paths
+            .iter()
+            .map(|path| path.strip_prefix(&above).unwrap_or(path));
         let short: Vec<PathBuf> = short.map(Path::to_owned).collect();
         let mut ranked: Vec<(usize, usize, String)> = short
             .iter()
@@ -63,9 +65,15 @@ impl Opened {
         registries: &Registries,
         catalogue: &Catalogue,
     ) -> Result<Screen, String> {
-        let name = self.shown.first().ok_or("nothing was opened: it holds no file")?;
+        let name = self
+            .shown
+            .first()
+            .ok_or("nothing was opened: it holds no file")?;
         if self.is_experiment() {
-            let bytes = self.files.get(Path::new(name)).map_or(&[][..], |bytes| bytes);
+            let bytes = self
+                .files
+                .get(Path::new(name))
+                .map_or(&[][..], |bytes| bytes);
             let text = std::str::from_utf8(bytes).map_err(|e| format!("{name}: no text: {e}"))?;
             return Screen::parse(text, name, &[], registries);
         }
@@ -78,6 +86,8 @@ impl Opened {
             None => Screen::parse(START, "view", &[], registries)?,
         };
         screen.open(name, catalogue)?;
+        // It may have nothing that moves so.
+        (screen.animation, screen.window.play, screen.window.frame) = (None, false, 0);
         Ok(screen)
     }
 }
@@ -115,8 +125,14 @@ mod tests {
     #[test]
     fn the_model_of_a_folder_is_found_and_the_folder_left_out_of_its_name() {
         let of = |names: &[&str]| opened(names).shown;
-        assert_eq!(of(&["hall/maps/a.png", "hall/hall.mtl", "hall/hall.OBJ"]), ["hall.OBJ"]);
-        assert_eq!(of(&["a/x.bin", "b/c/x.gltf", "b/y.gltf"]), ["b/y.gltf", "b/c/x.gltf"]);
+        assert_eq!(
+            of(&["hall/maps/a.png", "hall/hall.mtl", "hall/hall.OBJ"]),
+            ["hall.OBJ"]
+        );
+        assert_eq!(
+            of(&["a/x.bin", "b/c/x.gltf", "b/y.gltf"]),
+            ["b/y.gltf", "b/c/x.gltf"]
+        );
         // What names others comes first: an experiment its models, Nori's XML its meshes.
         assert_eq!(of(&["m.obj", "s.xml"]), ["s.xml", "m.obj"]);
         let study = opened(&["m.ply", "s.toml"]);
@@ -126,7 +142,10 @@ mod tests {
         assert_eq!(of(&["notes.txt"]), ["notes.txt"]);
         assert!(of(&[]).is_empty());
         let held = opened(&["hall/maps/a.png", "hall/hall.obj"]).files;
-        assert_eq!(held.keys().collect::<Vec<_>>(), [Path::new("hall.obj"), Path::new("maps/a.png")]);
+        assert_eq!(
+            held.keys().collect::<Vec<_>>(),
+            [Path::new("hall.obj"), Path::new("maps/a.png")]
+        );
     }
 
     #[test]
@@ -139,12 +158,18 @@ mod tests {
         let text = "[run]\nspp = [3]\n[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"sobol\"]\n";
         let file = |text: &str| vec![("s.toml".to_owned(), text.as_bytes().to_vec())];
         let study = screen(&Opened::new(file(text)), Some(&model)).unwrap();
-        assert_eq!((study.spp, study.cells[0][Axis::Scene].name.as_str()), (3, "cornell-box"));
+        assert_eq!(
+            (study.spp, study.cells[0][Axis::Scene].name.as_str()),
+            (3, "cornell-box")
+        );
         for (wrong, says) in [
             (opened(&[]), "nothing was opened"),
             (opened(&["notes.txt"]), "notes.txt: unknown model format"),
             (Opened::new(file("[axes]\nscene = 7\n")), "s.toml"),
-            (Opened::new(vec![("s.toml".to_owned(), vec![0xff])]), "no text"),
+            (
+                Opened::new(vec![("s.toml".to_owned(), vec![0xff])]),
+                "no text",
+            ),
         ] {
             let said = screen(&wrong, Some(&model)).unwrap_err();
             assert!(said.contains(says), "{said}");

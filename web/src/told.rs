@@ -84,7 +84,9 @@ pub(crate) fn shown(screen: &Screen) -> Value {
         json!({ "name": variant.name, "params": Map::from_iter(params) })
     };
     let cells = screen.cells.iter().map(|cell| {
-        let chosen = AXES.into_iter().filter_map(|axis| Some((axis, cell.get(axis)?)));
+        let chosen = AXES
+            .into_iter()
+            .filter_map(|axis| Some((axis, cell.get(axis)?)));
         Map::from_iter(chosen.map(|(axis, chosen)| (axis.name().to_owned(), variant(chosen))))
     });
     let window = &screen.window;

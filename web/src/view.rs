@@ -8,7 +8,7 @@ use raystone_bench::run::{Registries, RunError};
 use raystone_config::{Axis, Catalogue, Window};
 use raystone_core::params::ParamValue;
 use raystone_gpu::{Gpu, GpuError, KernelLibrary};
-use raystone_viewer::{Display, Motion, START, Screen, Step, Trail, Viewer, moved};
+use raystone_viewer::{Display, Motion, START, Screen, Step, Trail, Viewer, Work, moved};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::cell::RefCell;
@@ -59,7 +59,10 @@ enum Ask {
     /// What is on screen: the overrides of each image (`section.key=value`), one or two.
     Show(Vec<Vec<String>>),
     /// Files of the visitor, by name; what moves by itself stands `still`.
-    Open { names: Vec<String>, still: bool },
+    Open {
+        names: Vec<String>,
+        still: bool,
+    },
     /// What is on screen is what the controls say from now on.
     Adopt,
     /// Moves of the camera, see [`Motion`].
@@ -294,7 +297,9 @@ async fn look(
                 status("following the path on the host");
             }
             let path = of.map(|(side, pixel, sample)| viewer.path(side, pixel, sample));
-            let path = path.transpose().map_err(|reason| format!("no path: {reason}"));
+            let path = path
+                .transpose()
+                .map_err(|reason| format!("no path: {reason}"));
             session.trail = path.as_ref().ok().cloned().flatten();
             publish(shell, viewer, session);
             path.map(|path| json!({ "path": path.map(|path| path.text) }))
@@ -324,14 +329,18 @@ async fn show(
     let was = viewer.screen().cloned();
     let mut tell = |what: &str| shell.tell(&json!({ "status": what }));
     let done = viewer.show_async(screen, &mut tell).await?;
-    let done: Vec<String> = done.iter().map(ToString::to_string).collect();
+    // What took nothing leaves what was said before.
+    let is_something = done.iter().any(|done| done.work != Work::Kept);
+    let done: Option<Vec<String>> =
+        is_something.then(|| done.iter().map(ToString::to_string).collect());
     let now = viewer.screen();
     // What was found at a pixel holds for what it was found in; a path is drawn with any camera.
     let is_same = |same: fn(&Screen, &Screen) -> bool| {
-        now.zip(was.as_ref()).is_some_and(|(now, was)| same(now, was))
+        now.zip(was.as_ref())
+            .is_some_and(|(now, was)| same(now, was))
     };
     let stays = is_same(|now, was| !now.restarts(was));
-    if !is_same(|now, was| now.cells == was.cells && now.size == was.size) {
+    if !is_same(Screen::has_paths_of) {
         session.trail = None;
     }
     let trail = session.trail.is_some();
@@ -382,7 +391,9 @@ impl Session {
 
     /// Draws what was rendered as the page wants it, without waiting for the samples at hand.
     fn draw_as_wanted(&self, shell: &impl Shell) {
-        let wanted = shell.glance().and_then(|ask| serde_json::from_str(&ask).ok());
+        let wanted = shell
+            .glance()
+            .and_then(|ask| serde_json::from_str(&ask).ok());
         let Some(Ask::Show(sides)) = wanted else {
             return;
         };
@@ -418,7 +429,9 @@ fn carry(screen: &mut Screen, base: &Screen, catalogue: &Catalogue) {
                         from.params.0.get(name).cloned()
                     };
                     let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
-                        .filter_map(|p| Some((p.name, value(p.name, told::parameter(p).is_some())?)))
+                        .filter_map(|p| {
+                            Some((p.name, value(p.name, told::parameter(p).is_some())?))
+                        })
                         .collect();
                     entry.variant(&set)
                 }

@@ -39,8 +39,17 @@ map = \"nodes\"
 
 /// A square of two triangles, red.
 fn glb() -> Vec<u8> {
-    let corners: [[f32; 3]; 4] = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [-1.0, 1.0, 0.5]];
-    let mut binary: Vec<u8> = corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+    let corners: [[f32; 3]; 4] = [
+        [-1.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.5],
+        [-1.0, 1.0, 0.5],
+    ];
+    let mut binary: Vec<u8> = corners
+        .as_flattened()
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
     binary.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|x| x.to_le_bytes()));
     let document = json!({
         "asset": { "version": "2.0" },
@@ -72,7 +81,11 @@ fn files(folder: &Path) -> Value {
     let checks = [[250, 250, 250], [30, 90, 200]];
     let pixels = (0..64).map(|i| checks[(i + i / 8) % 2]).collect();
     let (width, height) = (8, 8);
-    let picture = Picture { width, height, pixels };
+    let picture = Picture {
+        width,
+        height,
+        pixels,
+    };
     write_png(&folder.join("room/maps/wall.png"), &picture).expect("a picture");
     let missing = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "byteLength": 48, "uri": "away.bin" }],
         "bufferViews": [{ "buffer": 0, "byteLength": 48 }], "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
@@ -92,7 +105,14 @@ fn files(folder: &Path) -> Value {
     }
     let mut all = serde_json::Map::new();
     for name in [
-        "room/room.obj", "room/room.mtl", "room/maps/wall.png", "quad.glb", "broken.glb", "missing.gltf", "notes.txt", "study.toml",
+        "room/room.obj",
+        "room/room.mtl",
+        "room/maps/wall.png",
+        "quad.glb",
+        "broken.glb",
+        "missing.gltf",
+        "notes.txt",
+        "study.toml",
     ] {
         let bytes = std::fs::read(folder.join(name)).expect("a file");
         let engine = base64::engine::general_purpose::STANDARD;
@@ -103,7 +123,11 @@ fn files(folder: &Path) -> Value {
 
 fn settings(scene: &Path) -> Vec<String> {
     let scene = format!("axes.scene=[{:?}]", text(scene));
-    SETTINGS.map(str::to_owned).into_iter().chain([scene]).collect()
+    SETTINGS
+        .map(str::to_owned)
+        .into_iter()
+        .chain([scene])
+        .collect()
 }
 
 /// What the program says of a model that it cannot load, without the folder.
@@ -130,7 +154,11 @@ fn by_the_window(model: &Path) -> (Vec<(String, String)>, Vec<String>, String) {
     let points = viewer.points(0, pixel, dimensions, 1024).expect("points");
     let star = points.star.expect("points");
     let star = format!("{} points, D* {star:.5}", points.points.len());
-    (rows.map(|(name, value)| (name.to_owned(), value)).collect(), path.text, star)
+    (
+        rows.map(|(name, value)| (name.to_owned(), value)).collect(),
+        path.text,
+        star,
+    )
 }
 
 /// Holds what was seen of a pixel against the window, the program and the image.
@@ -142,17 +170,31 @@ fn check_pixel(seen: &Value, model: &Path, image: &Image) {
     }
     let ([x, y], ..) = PIXEL;
     let [r, g, b] = image.pixels[(y * image.width + x) as usize];
-    assert_eq!(seen["pixel"]["radiance"][0], format!("{r:.4} {g:.4} {b:.4}"));
+    assert_eq!(
+        seen["pixel"]["radiance"][0],
+        format!("{r:.4} {g:.4} {b:.4}")
+    );
     assert_eq!(seen["path"], json!(path));
     assert!(path.len() > 1, "{path:?}");
     assert_eq!(seen["dots"], path.len());
     assert_eq!(seen["star"], star.as_str());
     assert_eq!(seen["clicked"], true, "a click keeps the samples");
     let ray = seen["ray"].as_str().expect("a ray");
-    let trace = super::super::done(&["trace", "--scene", text(model), "--accel", "cwbvh", "--ray", ray]);
+    let trace = super::super::done(&[
+        "trace",
+        "--scene",
+        text(model),
+        "--accel",
+        "cwbvh",
+        "--ray",
+        ray,
+    ]);
     let told = seen["trace"].as_str().expect("a trace");
     let (_, told) = told.split_once('\n').expect("lines");
-    assert!(trace.contains(told) && told.contains("equal to the bit"), "{trace}\n{told}");
+    assert!(
+        trace.contains(told) && told.contains("equal to the bit"),
+        "{trace}\n{told}"
+    );
 }
 
 #[test]
@@ -160,7 +202,9 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
     let folder = tempfile::tempdir().expect("a folder");
     let files = files(folder.path());
     let script = format!("const FILES = {files};\n{SCRIPT}");
-    let query: String = SETTINGS.map(|s| format!("&set={}", s.replace('=', "%3D"))).concat();
+    let query: String = SETTINGS
+        .map(|s| format!("&set={}", s.replace('=', "%3D")))
+        .concat();
     let Some(seen) = told_with(&format!("view{query}"), &script) else {
         return;
     };
@@ -177,16 +221,25 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
     assert!(differing(&obj, &bare)[1] > 4 * MOST_TIES);
     // What cannot be loaded is the loader's sentence, and what was there stays.
     let [broken, missing, unknown] = ["broken", "missing", "unknown"].map(|name| {
-        assert_eq!([&seen[name][1], &seen[name][2]], ["2 triangles", "quad.glb"]);
+        assert_eq!(
+            [&seen[name][1], &seen[name][2]],
+            ["2 triangles", "quad.glb"]
+        );
         seen[name][0].as_str().expect("a sentence").to_owned()
     });
     let absent = "away.bin: No such file or directory (os error 2)";
     let missing = missing.replace("./away.bin: it is not among the opened files", absent);
     for (sentence, file) in [(broken, "broken.glb"), (missing, "missing.gltf")] {
         let native = said(&folder.path().join(file));
-        assert!(sentence.starts_with(file) && native.contains(&sentence), "{sentence}\n{native}");
+        assert!(
+            sentence.starts_with(file) && native.contains(&sentence),
+            "{sentence}\n{native}"
+        );
     }
-    assert!(unknown.starts_with("notes.txt: unknown model format"), "{unknown}");
+    assert!(
+        unknown.starts_with("notes.txt: unknown model format"),
+        "{unknown}"
+    );
     // A structure that follows the scene gives the image of one that is built over it.
     assert_eq!(differing(&still, &glb), [0, 0]);
     assert_eq!(differing(&refitted, &rebuilt), [0, 0]);
@@ -203,5 +256,8 @@ fn check_waits(seen: &Value) {
     let longest = waits.iter().copied().fold(0.0, f64::max);
     println!("exposure after {waits:.0?} ms, a sample takes {sample:.0} ms");
     // A fast adapter has nothing to wait for.
-    assert!(sample < 200.0 || longest < 0.5 * sample, "{waits:?} {sample}");
+    assert!(
+        sample < 200.0 || longest < 0.5 * sample,
+        "{waits:?} {sample}"
+    );
 }
