@@ -23,6 +23,8 @@ const QUERY: &str = "start&post=/records&only=scene%3Dcornell-box&set=timing.rou
 const VIEWED: [&str; 2] = ["run.resolution=[48,36]", "run.seed=7"];
 /// Pixels of 1728 in which a path may go another way on the browser's adapter: drivers round division, roots and sines otherwise.
 const MOST_TIES: usize = 17;
+/// The driver that the browser brings along.
+const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 /// How long a software adapter may take, with its compiler.
 const PATIENCE: Duration = Duration::from_secs(900);
 
@@ -337,7 +339,7 @@ fn left_image(bytes: &Value) -> Image {
 /// Holds an image of the page against that of `raystone render`.
 fn check_image(image: &Image, settings: &[String]) {
     // With the driver that the browser brings along, no bit is another one.
-    let driver = Path::new("/usr/lib/chromium/vk_swiftshader_icd.json");
+    let driver = Path::new(SWIFTSHADER);
     if driver.exists() {
         assert_eq!(differing(image, &rendered(settings, Some(driver))), [0, 0]);
     }
