@@ -1,7 +1,9 @@
 //! A visitor of the page: models of their own are shown as `raystone render` shows them, what is broken is a sentence, a pixel has
 //! the figures that the window finds, the scene moves, and an experiment sets the controls.
 
-use super::{MOST_TIES, SWIFTSHADER, check_image, differing, left_image, rendered, text, told_with};
+use super::{
+    MOST_TIES, SWIFTSHADER, check_image, differing, left_image, rendered, text, told_with,
+};
 use crate::support;
 use base64::Engine as _;
 use raystone::image::{Image, Picture, write_png};
@@ -270,6 +272,7 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
 /// Another exposure does not wait for the sample at hand.
 fn check_waits(seen: &Value) {
     let waits: Vec<f64> = serde_json::from_value(seen["waits"].clone()).expect("times");
+    let sample = seen["sample"].as_f64().expect("a time");
     let longest = waits.iter().copied().fold(0.0, f64::max);
     println!("exposure after {waits:.0?} ms, a sample takes {sample:.0} ms");
     // A fast adapter has nothing to wait for.
