@@ -252,7 +252,7 @@ fn a_pixel_tells_its_hit_its_path_and_its_points() {
 #[test]
 fn another_exposure_is_drawn_within_a_step() {
     let mut viewer = viewer();
-    let mut now = screen(&["run.spp=64"]);
+    let mut now = screen(&["run.spp=[4096]"]);
     show(&mut viewer, now.clone());
     while viewer.frame().sides[0].figures.spp == 0 {
         viewer.step(&|| false).unwrap();
@@ -268,7 +268,7 @@ fn another_exposure_is_drawn_within_a_step() {
         false
     };
     while brighter.borrow().is_none() {
-        viewer.step(&draw).unwrap();
+        assert_ne!(viewer.step(&draw).unwrap(), Step::Idle);
     }
     let brighter = brighter.into_inner().unwrap();
     let sum = |picture: &raystone::image::Picture| -> u64 {
