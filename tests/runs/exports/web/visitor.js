@@ -167,9 +167,9 @@ async function visit() {
   seen.missing = await refused(["missing.gltf"]);
   seen.unknown = await refused(["notes.txt"]);
   // What was shown before is still there, with its files.
-  type("spp", "1");
-  await finish(2, 1);
-  type("spp", "4");
+  type("scene", "single-triangle");
+  await finish(1);
+  type("scene", "quad.glb");
   await finish(2);
   await move();
   drop(["study.toml", "room/room.obj"]);
