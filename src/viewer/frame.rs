@@ -5,17 +5,12 @@ use super::reference::error_of;
 use super::side::Side;
 use raystone_accel::StructureStats;
 use raystone_bench::run::{RunError, attributes};
-use raystone_config::{Axis, Map, Window};
+use raystone_config::Axis;
 use raystone_core::program::Program;
 use raystone_core::structure::{RAY_COUNT_CLASSES, TRACED_CLASSES};
-use raystone_image::{
-    Attribute, FileFormat, Image, Picture, automatic_exposure, tone_map, viridis, write_png,
-};
+use raystone_image::{Attribute, FileFormat, Image, Picture, write_png};
 use raystone_stats::metrics::Reference;
 use std::path::Path;
-
-/// Share of pixels below the upper end of an automatic scale.
-const PERCENTILE: usize = 99;
 
 /// What is on screen now.
 #[derive(Debug, Clone, Default)]
@@ -80,72 +75,10 @@ pub struct RaysOfClass {
     pub mrays_s: f64,
 }
 
-/// Tone-maps, and draws maps, of all sides on one scale.
-pub(crate) struct Painter {
-    exposure: f32,
-    scale: f32,
-    map: Map,
-}
-
-impl Painter {
-    pub(crate) fn new(sides: &[Side], window: &Window) -> Self {
-        let first = sides.iter().find_map(|side| side.image.as_ref());
-        let automatic = first.map_or(1.0, automatic_exposure);
-        let values = |side: &Side| side.map.as_ref().map(|map| map.values(window.map));
-        let greatest = |side: &Side| values(side).map_or(0.0, |values| percentile(&values));
-        let scale = match window.scale {
-            0.0 if window.map != Map::None => sides.iter().map(greatest).fold(1.0, f32::max),
-            chosen => chosen,
-        };
-        Self {
-            exposure: automatic * window.exposure.exp2(),
-            scale,
-            map: window.map,
-        }
-    }
-
-    pub(crate) fn scale(&self) -> Option<f32> {
-        (self.map != Map::None).then_some(self.scale)
-    }
-
-    /// The picture of a side, and the mean of its map.
-    pub(crate) fn picture(&self, side: &Side) -> (Option<Picture>, Option<f64>) {
-        if self.map == Map::None {
-            let image = side.image.as_ref();
-            return (image.map(|image| tone_map(image, self.exposure)), None);
-        }
-        let Some(map) = &side.map else {
-            return (None, None);
-        };
-        let values = map.values(self.map);
-        if values.is_empty() {
-            return (None, None);
-        }
-        let sum: f64 = values.iter().copied().map(f64::from).sum();
-        let picture = Picture {
-            width: map.size[0],
-            height: map.size[1],
-            pixels: values.iter().map(|v| viridis(v / self.scale)).collect(),
-        };
-        (Some(picture), Some(sum / values.len() as f64))
-    }
-}
-
-fn percentile(values: &[f32]) -> f32 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f32::total_cmp);
-    let place = sorted.len() * PERCENTILE / 100;
-    sorted.get(place).copied().unwrap_or(0.0)
-}
-
-/// The figures of a side; its errors against this reference.
-pub(crate) fn figures(
-    side: &Side,
-    map_mean: Option<f64>,
-    reference: Option<&Reference>,
-) -> Figures {
+/// The figures of a side, but for its map; its errors against this reference.
+pub(crate) fn figures(side: &Side, reference: Option<&Reference>) -> Figures {
     let reference = reference.filter(|_| side.shown > 0);
-    let relmse = reference.and_then(|reference| error_of(side.image.as_ref()?, reference));
+    let relmse = reference.and_then(|reference| error_of(side.image.as_deref()?, reference));
     let flip = reference.and(side.flip.as_ref());
     let [width, height] = side.lens.size.map(f64::from);
     let samples = width * height * f64::from(side.shown);
@@ -174,7 +107,7 @@ pub(crate) fn figures(
             .structure
             .as_ref()
             .map_or_else(StructureStats::default, |s| s.stats.clone()),
-        map_mean,
+        map_mean: None,
     }
 }
 
@@ -222,7 +155,7 @@ fn linear<'s>(
     side: &'s Side,
     program: &Program,
 ) -> Result<(&'s Image, Vec<Attribute<'static>>), RunError> {
-    let image = side.image.as_ref().filter(|_| side.shown > 0);
+    let image = side.image.as_deref().filter(|_| side.shown > 0);
     let image =
         image.ok_or_else(|| RunError::Input("no sample of all pixels is done yet".to_owned()))?;
     let cell = &side.cell;
@@ -283,12 +216,5 @@ mod tests {
         assert_eq!(frame.picture([8, 6], 0.5), None);
         assert_eq!(Frame::default().picture([8, 6], 0.5), None);
         assert!(frame.write_png(Path::new("x.png"), [8, 6], 0.5).is_err());
-    }
-
-    #[test]
-    fn the_scale_ends_where_one_pixel_in_a_hundred_is_above() {
-        let values: Vec<f32> = (0..200).map(|i| i as f32).collect();
-        assert_eq!(percentile(&values), 198.0);
-        assert_eq!(percentile(&[]), 0.0);
     }
 }

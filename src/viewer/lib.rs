@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod display;
 mod done;
 mod experiment;
 mod frame;
@@ -19,9 +20,10 @@ mod viewer;
 mod world;
 
 pub use camera::{Motion, moved, projected};
+pub use display::Display;
 pub use done::{Done, Step, Work};
 pub use frame::{Figures, Frame, RaysOfClass, SideFrame};
-pub use inspect::{Grasp, Inspection, Seen};
+pub use inspect::{Grasp, Inspection, Seen, Trail};
 pub use motion::{FrameTimes, SideTimes};
 pub use points::SamplePoints;
 pub use screen::{SIDE_NAMES, START, Screen};

@@ -148,13 +148,18 @@ impl World {
         let Some(actor) = &self.followers[place].actor else {
             return Ok(None);
         };
-        let way = actor.ways()[0];
+        let mut log = BuildLog::with_gpu(&self.stage.gpu);
+        let (way, ways) = (actor.ways()[0], actor.ways());
+        // Without a device for builds, as in a browser, the host does the same, to the bit.
+        let way = match way {
+            Way::Device if log.gpu().is_none() && ways.contains(&Way::Host) => Way::Host,
+            way => way,
+        };
         let from = match objects {
             Some(objects) => Some(Taken::Built(objects)),
             // Objects are built over the scene as it was loaded; trees are there.
             None => actor.start(way, &self.still(soup)).map_err(text)?,
         };
-        let mut log = BuildLog::with_gpu(&self.stage.gpu);
         let taken = actor.take(way, from, soup, &mut log).map_err(text)?;
         actor.built(taken, soup).map(Some).map_err(text)
     }

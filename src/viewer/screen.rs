@@ -196,6 +196,11 @@ impl Screen {
         samples(self) != samples(other) || self.moves_on(other)
     }
 
+    /// True if a path that was followed on `other` is one of this screen, too, seen by any camera.
+    pub fn has_paths_of(&self, other: &Self) -> bool {
+        self.cells == other.cells && self.size == other.size && !self.moves_on(other)
+    }
+
     /// True if the scene stands otherwise than on `other`, or moves in another way.
     fn moves_on(&self, other: &Self) -> bool {
         let motion = |s: &Self| {

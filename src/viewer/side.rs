@@ -16,6 +16,7 @@ use raystone_render::Renderer;
 use raystone_stats::metrics::Reference;
 use raystone_verify::rays::{primary_pixels, primary_rays};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// Milliseconds of a slice: a window on the same device waits no longer.
 const SLICE_MS: f64 = 30.0;
@@ -134,8 +135,8 @@ pub(crate) struct Side<'g> {
     by: u32,
     /// Samples of the whole image were given up midway.
     is_torn: bool,
-    pub image: Option<Image>,
-    pub map: Option<MapOfWork>,
+    pub image: Option<Arc<Image>>,
+    pub map: Option<Arc<MapOfWork>>,
     pub flip: Option<Flip>,
     /// Samples per pixel of the whole image.
     pub done: u32,
@@ -328,7 +329,7 @@ impl<'g> Side<'g> {
             return Ok(false);
         }
         let (image, ms) = (renderer.image_async().await?, renderer.spent().ms());
-        self.image = Some(image);
+        self.image = Some(Arc::new(image));
         self.shown = 0;
         let [width, height] = lens.divided(by).map(f64::from);
         self.rate = Some(width * height / ms.max(0.1));
@@ -388,7 +389,7 @@ impl<'g> Side<'g> {
         let Some(renderer) = self.renderers.whole() else {
             return Ok(false);
         };
-        self.image = Some(renderer.image_async().await?);
+        self.image = Some(Arc::new(renderer.image_async().await?));
         let counts = renderer.ray_counts_async().await?;
         self.rays = std::array::from_fn(|class| counts[class]);
         self.rays_ms = renderer.spent().ms();
@@ -407,7 +408,7 @@ impl<'g> Side<'g> {
         let known = self.flip.as_ref();
         let is_last = is_last && self.is_finished();
         let is_due = self.shown > 0 && known.is_none_or(|flip| flip.is_due(of, is_last));
-        let Some(image) = self.image.as_ref().filter(|_| is_due) else {
+        let Some(image) = self.image.as_deref().filter(|_| is_due) else {
             return false;
         };
         self.flip = Some(Flip::new(image, reference, of));
@@ -432,7 +433,7 @@ impl<'g> Side<'g> {
             .stage
             .count_work_async(&structure.traced, Query::Closest, &rays)
             .await?;
-        self.map = Some(MapOfWork { size, work });
+        self.map = Some(Arc::new(MapOfWork { size, work }));
         Ok(true)
     }
 }

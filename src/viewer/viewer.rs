@@ -2,9 +2,10 @@
 
 mod steps;
 
+use super::display::{Display, Rendered};
 use super::done::{Done, Work, note};
-use super::frame::{Frame, Painter, SideFrame, encoded, figures, write_linear};
-use super::inspect::{self, Grasp, Inspection};
+use super::frame::{Frame, encoded, figures, write_linear};
+use super::inspect::{self, Grasp, Inspection, Trail};
 use super::motion::{FrameClock, FrameTimes, Pose};
 use super::points::SamplePoints;
 use super::reference::{Accumulated, judged};
@@ -12,14 +13,13 @@ use super::screen::{SIDE_NAMES, Screen};
 use super::side::{Lens, Side};
 use super::world::{Structure, World};
 use raystone_bench::run::{Estimator, Registries, RunError};
-use raystone_config::{Axis, Cell, Map};
+use raystone_config::{Axis, Cell};
 use raystone_core::clock::Instant;
 use raystone_core::geometry::Camera;
 use raystone_core::program::Program;
 use raystone_gpu::{Gpu, GpuError, wait_for};
 use raystone_scene::check_camera;
 use raystone_stats::metrics;
-use raystone_verify::path_oracle::Path;
 use std::path::Path as File;
 
 /// The viewer of one device.
@@ -39,6 +39,8 @@ pub struct Viewer<'g> {
     times: Option<FrameTimes>,
     /// Images of the screen that were not shown yet.
     unseen: usize,
+    /// The files of the scene may be others than those that were read.
+    is_stale: bool,
 }
 
 impl<'g> Viewer<'g> {
@@ -62,6 +64,7 @@ impl<'g> Viewer<'g> {
             clock: FrameClock::default(),
             times: None,
             unseen: 0,
+            is_stale: false,
         }
     }
 
@@ -92,6 +95,11 @@ impl<'g> Viewer<'g> {
         self.sides.first().map(|side| side.lens.camera)
     }
 
+    /// Has the next screen's scene loaded anew, or no longer: its files may be others, of the same name.
+    pub fn reload(&mut self, is_stale: bool) {
+        self.is_stale = is_stale;
+    }
+
     /// Changes what is on screen, and says what that took: what can be used further is. `tell` is called with what is being done
     /// before anything that may take long.
     ///
@@ -120,7 +128,7 @@ impl<'g> Viewer<'g> {
         let first = &screen.cells[0];
         let of_world = first.on(&Cell::WORLD);
         let loaded = match &self.world {
-            Some(world) if world.cell == of_world => None,
+            Some(world) if world.cell == of_world && !self.is_stale => None,
             _ => {
                 let scene = &first[Axis::Scene];
                 tell(&format!("loading {scene}"));
@@ -151,6 +159,7 @@ impl<'g> Viewer<'g> {
             Some(mut world) => {
                 world.take(&pose)?;
                 self.world = Some(world);
+                self.is_stale = false;
                 self.sides.clear();
                 self.reference = None;
             }
@@ -327,36 +336,35 @@ impl<'g> Viewer<'g> {
 
     /// What to draw now.
     pub fn frame(&self) -> Frame {
+        let window = self.screen.as_ref().map(|screen| &screen.window);
+        window.map_or_else(Frame::default, |window| self.display().frame(window))
+    }
+
+    /// What was rendered, to be drawn in other ways while this works on.
+    pub fn display(&self) -> Display {
         let Some(screen) = &self.screen else {
-            return Frame::default();
+            return Display::default();
         };
-        let painter = Painter::new(&self.sides, &screen.window);
-        let side = |side: &Side| {
-            let (picture, map_mean) = painter.picture(side);
-            let reference = self.judge.as_ref().map(|(reference, _)| reference);
-            let counts = side.map.as_ref().is_none_or(|map| map.work.is_some());
-            let uncounted = (screen.window.map != Map::None && !counts).then(|| {
-                format!(
-                    "{} does not count its work: there is no map",
-                    side.cell[Axis::Accel]
-                )
-            });
-            SideFrame {
-                picture,
-                label: side.cell.to_string(),
-                figures: figures(side, map_mean, reference),
-                fault: side.fault.clone().or(uncounted),
-            }
+        let reference = self.judge.as_ref().map(|(reference, _)| reference);
+        let side = |side: &Side| Rendered {
+            image: side.image.clone(),
+            map: side.map.clone(),
+            label: side.cell.to_string(),
+            accel: side.cell[Axis::Accel].to_string(),
+            figures: figures(side, reference),
+            fault: side.fault.clone(),
         };
-        Frame {
+        Display {
             sides: self.sides.iter().map(side).collect(),
-            scale: painter.scale(),
-            reference_spp: self.reference.as_ref().map(Accumulated::spp),
-            triangles: self
-                .world
-                .as_ref()
-                .map_or(0, |world| world.stage.scene.triangles.len()),
-            times: self.times.clone().filter(|_| screen.plays().is_some()),
+            frame: Frame {
+                reference_spp: self.reference.as_ref().map(Accumulated::spp),
+                triangles: self
+                    .world
+                    .as_ref()
+                    .map_or(0, |world| world.stage.scene.triangles.len()),
+                times: self.times.clone().filter(|_| screen.plays().is_some()),
+                ..Frame::default()
+            },
         }
     }
 
@@ -371,7 +379,7 @@ impl<'g> Viewer<'g> {
     /// The scene has no instances, or the device is lost; in words.
     pub fn grasp(&self, pixel: [u32; 2]) -> Result<Option<Grasp>, String> {
         let (world, side) = self.at(0)?;
-        inspect::grasp(world, side, pixel)
+        wait_for(inspect::grasp(world, side, pixel))
     }
 
     /// Writes the linear image of a side, in the format of the file's ending; or what is on screen, as PNG.
@@ -414,13 +422,21 @@ impl<'g> Viewer<'g> {
     /// # Errors
     /// The device is lost or hangs, or a kernel does not compile.
     pub fn inspect(&self, pixel: [u32; 2]) -> Result<Option<Inspection>, RunError> {
+        wait_for(self.inspect_async(pixel))
+    }
+
+    /// See [`Viewer::inspect`].
+    ///
+    /// # Errors
+    /// As [`Viewer::inspect`].
+    pub async fn inspect_async(&self, pixel: [u32; 2]) -> Result<Option<Inspection>, RunError> {
         let sound: Vec<&Side> = self
             .sides
             .iter()
             .filter(|side| side.fault.is_none())
             .collect();
         match &self.world {
-            Some(world) => Ok(inspect::inspect(world, &sound, pixel)?),
+            Some(world) => Ok(inspect::inspect(world, &sound, pixel).await?),
             None => Ok(None),
         }
     }
@@ -438,9 +454,10 @@ impl<'g> Viewer<'g> {
     ///
     /// # Errors
     /// The oracle does not support the integrator or the scene; in words.
-    pub fn path(&self, side: usize, pixel: [u32; 2], sample: u32) -> Result<Path, String> {
-        let (world, side) = self.at(side)?;
-        inspect::path(&self.registries, world, side, (pixel, sample))
+    pub fn path(&self, side: usize, pixel: [u32; 2], sample: u32) -> Result<Trail, String> {
+        let (world, seen) = self.at(side)?;
+        let path = inspect::path(&self.registries, world, seen, (pixel, sample))?;
+        Ok(Trail::new((side, pixel, sample), seen.lens.camera, &path))
     }
 
     /// The first `count` points that a side's sampler gives a pixel, in two dimensions.

@@ -231,8 +231,12 @@ fn a_pixel_tells_its_hit_its_path_and_its_points() {
     );
     let path = viewer.path(0, pixel, 0).unwrap();
     let size = viewer.screen().unwrap().size;
-    let first = path.vertices[0].position.as_vec3();
-    let [x, y] = raystone_viewer::projected(&viewer.camera().unwrap(), size, first).unwrap();
+    let drawn = path.on(&viewer.camera().unwrap(), size);
+    assert_eq!(
+        (drawn.len(), path.text.len()),
+        (path.points.len() - 1, drawn.len())
+    );
+    let [x, y] = drawn[0].unwrap();
     assert_eq!([x as u32, y as u32], pixel, "the path begins in its pixel");
     // Sobol's points of one pixel are those of `points`, shifted: as even as before but for the shift.
     let points = viewer.points(0, pixel, [0, 1], 1024).unwrap();
@@ -243,6 +247,64 @@ fn a_pixel_tells_its_hit_its_path_and_its_points() {
     assert!(points.star.unwrap() < 0.8);
     assert!(viewer.points(0, pixel, [0, 4096], 4).is_err());
     assert!(viewer.points(0, [40, 0], [0, 1], 4).is_err());
+}
+
+#[test]
+fn another_exposure_is_drawn_within_a_step() {
+    let mut viewer = viewer();
+    let mut now = screen(&["run.spp=[4096]"]);
+    show(&mut viewer, now.clone());
+    while viewer.frame().sides[0].figures.spp == 0 {
+        viewer.step(&|| false).unwrap();
+    }
+    let display = viewer.display();
+    let before = viewer.frame().sides[0].picture.clone().unwrap();
+    now.window.exposure = 2.0;
+    let brighter = std::cell::RefCell::new(None);
+    // Between slices, while the viewer works.
+    let draw = || {
+        let frame = display.frame(&now.window);
+        brighter.replace(frame.sides[0].picture.clone());
+        false
+    };
+    while brighter.borrow().is_none() {
+        assert_ne!(viewer.step(&draw).unwrap(), Step::Idle);
+    }
+    let brighter = brighter.into_inner().unwrap();
+    let sum = |picture: &raystone::image::Picture| -> u64 {
+        picture
+            .pixels
+            .as_flattened()
+            .iter()
+            .copied()
+            .map(u64::from)
+            .sum()
+    };
+    assert!(sum(&brighter) > sum(&before));
+    assert!(display.has(Map::None) && !display.has(Map::Nodes));
+}
+
+#[test]
+fn a_file_of_the_same_name_is_read_anew_if_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("one.obj");
+    let write = |faces: &str| {
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+        std::fs::write(&file, format!("{corners}{faces}")).unwrap();
+    };
+    write("f 1 2 3\n");
+    let mut viewer = viewer();
+    let model = screen(&[&format!("axes.scene=[{:?}]", file.to_str().unwrap())]);
+    show(&mut viewer, model.clone());
+    write("f 1 2 3\nf 2 4 3\n");
+    assert_eq!(works(&show(&mut viewer, model.clone())), [Work::Kept]);
+    assert_eq!(viewer.frame().triangles, 1);
+    viewer.reload(true);
+    let done = works(&show(&mut viewer, model.clone()));
+    assert_eq!(done, [Work::Loaded, Work::Built, Work::Compiled]);
+    assert_eq!(viewer.frame().triangles, 2);
+    // Once.
+    assert_eq!(works(&show(&mut viewer, model)), [Work::Kept]);
 }
 
 #[test]

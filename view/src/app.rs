@@ -292,7 +292,10 @@ impl App {
                 }
             });
         }
-        ui.checkbox(&mut window.error, "accumulate a reference, show relMSE and FLIP");
+        ui.checkbox(
+            &mut window.error,
+            "accumulate a reference, show relMSE and FLIP",
+        );
     }
 
     fn draw_help(&mut self, ui: &mut Ui) {

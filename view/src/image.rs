@@ -7,7 +7,7 @@ use egui::{
 };
 use raystone_core::geometry::Camera;
 use raystone_image::Picture;
-use raystone_viewer::{Frame, Motion, SIDE_NAMES, Screen, moved, projected};
+use raystone_viewer::{Frame, Motion, SIDE_NAMES, Screen, moved};
 use std::f32::consts::PI;
 
 /// Distance from the line at which a drag moves it, points.
@@ -335,12 +335,11 @@ fn draw_path(ui: &Ui, rect: Rect, found: &Found, size: [u32; 2]) {
         return;
     };
     let painter = ui.painter().with_clip_rect(rect);
-    let at = |camera: &Camera, point| {
-        let [x, y] = projected(camera, size, point)?;
-        Some(rect.min + Vec2::new(x / size[0] as f32, y / size[1] as f32) * rect.size())
+    let at = |[x, y]: [f32; 2]| {
+        rect.min + Vec2::new(x / size[0] as f32, y / size[1] as f32) * rect.size()
     };
-    // The first point is the eye, which is everywhere.
-    let points: Vec<Option<Pos2>> = path.points.iter().skip(1).map(|p| at(camera, *p)).collect();
+    let points = path.on(camera, size).into_iter();
+    let points: Vec<Option<Pos2>> = points.map(|point| point.map(at)).collect();
     for pair in points.windows(2) {
         if let [Some(from), Some(to)] = pair {
             for (width, color) in [(4.0, Color32::BLACK), (2.0, Color32::from_rgb(255, 220, 0))] {

@@ -1,9 +1,9 @@
 //! The pixel that was clicked: its value, hit, path and points.
 
-use crate::worker::{Ask, ShownPath, Worker};
+use crate::worker::{Ask, Worker};
 use eframe::egui;
 use egui::{Color32, DragValue, RichText, ScrollArea, Sense, Ui, Vec2};
-use raystone_viewer::{Inspection, SIDE_NAMES, SamplePoints, Screen, Seen};
+use raystone_viewer::{Inspection, SIDE_NAMES, SamplePoints, Screen, Seen, Trail};
 
 /// Height of the text of a trace, which may have hundreds of lines, points.
 const TRACE: f32 = 260.0;
@@ -183,7 +183,7 @@ impl PixelPanel {
 }
 
 /// What was asked for at the pixel: a path, and what the structure does with the ray.
-fn draw_findings(ui: &mut Ui, path: Option<ShownPath>, explanation: Option<String>) {
+fn draw_findings(ui: &mut Ui, path: Option<Trail>, explanation: Option<String>) {
     if let Some(path) = path {
         egui::CollapsingHeader::new("Path")
             .default_open(true)
@@ -233,29 +233,10 @@ fn draw_seen(ui: &mut Ui, name: &str, seen: &Seen) {
     egui::Grid::new(("seen", name))
         .num_columns(2)
         .show(ui, |ui| {
-            let mut row = |what: &str, value: String| {
+            for (what, value) in seen.rows() {
                 ui.label(what);
                 ui.label(RichText::new(value).monospace());
                 ui.end_row();
-            };
-            if let Some([r, g, b]) = seen.value {
-                row("radiance", format!("{r:.4} {g:.4} {b:.4}"));
-            }
-            match seen.hit {
-                Some(hit) => {
-                    row("triangle", hit.triangle.to_string());
-                    row("t, u, v", format!("{:.5} {:.4} {:.4}", hit.t, hit.u, hit.v));
-                }
-                None => row("hit", "none".to_owned()),
-            }
-            if let Some(material) = &seen.material {
-                row("material", material.clone());
-            }
-            if let Some(work) = seen.work {
-                row("nodes", work.nodes.to_string());
-                row("box tests", work.box_tests.to_string());
-                row("triangle tests", work.triangle_tests.to_string());
-                row("stack", work.stack_high_water.to_string());
             }
         });
 }

@@ -1,11 +1,14 @@
 //! The thread that renders: it owns the device, takes requests, and leaves what it found for the window.
 
 use raystone_bench::run::{Registries, RunError};
-use raystone_config::Catalogue;
+use raystone_config::{Catalogue, Window};
 use raystone_core::geometry::Camera;
 use raystone_core::program::Program;
 use raystone_gpu::{AdapterChoice, GpuError};
-use raystone_viewer::{Done, Frame, Grasp, Inspection, SamplePoints, Screen, Step, Viewer};
+use raystone_viewer::{
+    Display, Done, Frame, Grasp, Inspection, SamplePoints, Screen, Step, Trail, Viewer,
+};
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -39,17 +42,6 @@ pub enum Ask {
     Save(PathBuf, usize),
 }
 
-/// A path, for lists and lines.
-#[derive(Debug, Clone)]
-pub struct ShownPath {
-    /// Side, pixel and sample.
-    pub of: (usize, [u32; 2], u32),
-    /// The camera's eye and the vertices, scene units.
-    pub points: Vec<glam::Vec3>,
-    /// A line for each vertex.
-    pub text: Vec<String>,
-}
-
 /// What the thread found.
 #[derive(Default)]
 pub struct Found {
@@ -77,13 +69,15 @@ pub struct Found {
     pub grasp: Option<Grasp>,
     /// The frame of the animation that is shown.
     pub frame_number: u32,
-    pub path: Option<ShownPath>,
+    pub path: Option<Trail>,
     pub explanation: Option<String>,
     pub points: Option<SamplePoints>,
     /// Milliseconds from the start until the first picture.
     pub first_picture_ms: Option<f64>,
     /// True if there is nothing left to do.
     pub idle: bool,
+    /// How what is rendered is to be shown, if that was asked for since and needs no other samples.
+    wanted: Option<Window>,
 }
 
 /// A message to the user.
@@ -119,6 +113,7 @@ impl Worker {
             stop: Arc::clone(&stop),
             repaint: Box::new(repaint),
             start: Instant::now(),
+            display: RefCell::default(),
         };
         Self {
             asks: Some(asks),
@@ -134,12 +129,11 @@ impl Worker {
     /// Sends a request. A new screen ends the samples of the one before if they are not needed any more.
     pub fn ask(&self, ask: Ask) {
         if let Ask::Show(screen) = &ask {
-            let restarts = self
-                .found()
-                .screen
-                .as_ref()
-                .is_none_or(|old| screen.restarts(old));
+            let mut found = self.found();
+            let old = found.screen.as_ref();
+            let restarts = old.is_none_or(|old| screen.restarts(old));
             self.stop.fetch_or(restarts, Ordering::Relaxed);
+            found.wanted = (!restarts).then_some(screen.window);
         }
         if let Some(asks) = &self.asks {
             // A thread that has ended has left a message.
@@ -171,6 +165,8 @@ struct Inside {
     stop: Arc<AtomicBool>,
     repaint: Box<dyn Fn() + Send>,
     start: Instant,
+    /// What was rendered last.
+    display: RefCell<Display>,
 }
 
 /// Why the thread stops serving a device.
@@ -251,7 +247,10 @@ impl Inside {
             }
             // Each image is shown at least once, however quickly the next screen follows.
             let is_seen = viewer.is_seen();
-            let stop = || is_seen && self.stop.load(Ordering::Relaxed);
+            let stop = || {
+                self.draw_as_wanted();
+                is_seen && self.stop.load(Ordering::Relaxed)
+            };
             match viewer.step(&stop) {
                 Ok(step) => {
                     is_idle = step == Step::Idle;
@@ -308,7 +307,7 @@ impl Inside {
                 if is_other(|now, was| !now.restarts(was)) {
                     (found.inspection, found.explanation) = (None, None);
                 }
-                if is_other(|now, was| now.cells == was.cells && now.size == was.size) {
+                if is_other(Screen::has_paths_of) {
                     (found.path, found.points) = (None, None);
                 }
             }),
@@ -342,18 +341,9 @@ impl Inside {
                 });
                 let path = viewer.path(side, pixel, sample);
                 self.change(|found| found.status = None);
-                match (path, viewer.camera()) {
-                    (Ok(path), Some(camera)) => self.change(|found| {
-                        let vertices = path.vertices.iter();
-                        let points = vertices.clone().map(|vertex| vertex.position.as_vec3());
-                        found.path = Some(ShownPath {
-                            of: (side, pixel, sample),
-                            points: std::iter::once(camera.eye).chain(points).collect(),
-                            text: vertices.map(ToString::to_string).collect(),
-                        });
-                    }),
-                    (Err(reason), _) => self.say(format!("no path: {reason}"), true),
-                    _ => {}
+                match path {
+                    Ok(path) => self.change(|found| found.path = Some(path)),
+                    Err(reason) => self.say(format!("no path: {reason}"), true),
                 }
             }
             Ask::Explain(side, pixel) => {
@@ -395,17 +385,37 @@ impl Inside {
     }
 
     fn publish(&self, viewer: &Viewer) {
-        let frame = Arc::new(viewer.frame());
+        let window = viewer.screen().map(|screen| screen.window);
+        let display = viewer.display();
+        let frame = window.map_or_else(Frame::default, |window| display.frame(&window));
+        self.display.replace(display);
         let is_first = frame.sides.iter().any(|side| side.picture.is_some());
         let ms = self.start.elapsed().as_secs_f64() * 1e3;
         let frame_number = viewer.frame_number();
         self.change(|found| {
-            found.frame = frame;
+            found.frame = Arc::new(frame);
             found.frame_number = frame_number;
             found.number += 1;
             if is_first {
                 found.first_picture_ms.get_or_insert(ms);
             }
         });
+    }
+
+    /// Draws what was rendered as the window wants it, without waiting for the samples at hand.
+    fn draw_as_wanted(&self) {
+        let found = self.found.lock();
+        let wanted = found.unwrap_or_else(PoisonError::into_inner).wanted.take();
+        let Some(window) = wanted else {
+            return;
+        };
+        let display = self.display.borrow();
+        if display.has(window.map) {
+            let frame = Arc::new(display.frame(&window));
+            self.change(|found| {
+                found.frame = frame;
+                found.number += 1;
+            });
+        }
     }
 }

@@ -2,6 +2,9 @@
 
 const TITLES = { scene: "Scene", accel: "Structure", sequence: "Sequence", decorrelation: "Decorrelation", integrator: "Integrator", organisation: "Organisation" };
 
+// How the parameters of a field are drawn, by its id.
+const drawn = new Map();
+
 const idOf = (axis, side) => (side ? `${axis}-${side}` : axis);
 
 function element(name, attributes = {}, ...children) {
@@ -18,7 +21,8 @@ export function axisField(axis, side, { entries, first }, changed) {
   select.value = first;
   const details = element("details", { className: "parameters" });
   const draw = () => {
-    const entry = entries.find(({ name }) => name === select.value);
+    // A model has none that the page asks for.
+    const entry = entries.find(({ name }) => name === select.value) ?? { name: select.value, description: "", parameters: [] };
     select.title = entry.description;
     details.hidden = entry.parameters.length === 0;
     const fields = entry.parameters.map((parameter) => parameterField(id, parameter, changed));
@@ -28,6 +32,7 @@ export function axisField(axis, side, { entries, first }, changed) {
     draw();
     changed();
   };
+  drawn.set(id, draw);
   draw();
   return element("div", { className: "axis" }, element("label", { htmlFor: id, textContent: TITLES[axis] }), select, details);
 }
@@ -48,6 +53,34 @@ function parameterField(axis, { name, description, default: initial, range }, ch
   input.dataset.initial = String(initial);
   input.onchange = () => (input.reportValidity() ? changed() : undefined);
   return element("div", {}, element("label", { htmlFor: id, textContent: name.replaceAll("_", " ") }), input);
+}
+
+// Chooses what is on screen, without asking for it.
+export function adopt(axis, side, { name, params }) {
+  const id = idOf(axis, side);
+  const select = document.getElementById(id);
+  offer(select, name);
+  select.value = name;
+  drawn.get(id)();
+  for (const input of select.parentElement.querySelectorAll("[data-parameter]")) {
+    const value = params[input.dataset.parameter];
+    if (input.type === "checkbox") input.checked = value;
+    else if (value !== undefined) input.value = value;
+  }
+}
+
+// Makes sure that a list has a value.
+export function offer(select, value, text = value) {
+  if (![...select.options].some((option) => option.value === value)) select.append(element("option", { value, textContent: text }));
+}
+
+// Lists the models of the visitor in place of those of before.
+export function listModels(names) {
+  const select = document.getElementById(idOf("scene", ""));
+  select.querySelector("optgroup")?.remove();
+  if (names.length === 0) return;
+  const options = names.map((name) => element("option", { value: name, textContent: name }));
+  select.prepend(element("optgroup", { label: "Opened here" }, ...options));
 }
 
 // What is chosen on an axis, as settings of an experiment; parameters at their defaults need none.

@@ -2,6 +2,8 @@
 
 const TURN = 0.12;
 const FLY = 0.1;
+// A mouse and a finger that move no farther click, pixels.
+const STILL = { mouse: 4, touch: 12 };
 const KEYS = {
   ArrowLeft: { orbit: [-TURN, 0] },
   ArrowRight: { orbit: [TURN, 0] },
@@ -18,8 +20,8 @@ const KEYS = {
   Home: "home",
 };
 
-// `send` takes requests of the view; `others` are what further keys do.
-export function canvasMoves(canvas, send, others) {
+// `send` takes requests of the view; `others` are what further keys do; `click` takes a place, shares of the width and height.
+export function canvasMoves(canvas, send, others, click) {
   let pending = {};
   const add = (kind, by) => {
     if (Object.keys(pending).length === 0) requestAnimationFrame(flush);
@@ -37,14 +39,26 @@ export function canvasMoves(canvas, send, others) {
     return { x: (one.x + other.x) / 2, y: (one.y + other.y) / 2, far: Math.hypot(one.x - other.x, one.y - other.y) };
   };
   const place = ({ clientX: x, clientY: y }) => ({ x, y });
+  // Where a lone pointer went down, until it moves or another joins it.
+  let pressed = null;
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, place(event));
+    pressed = held.size === 1 && event.button === 0 ? place(event) : null;
   };
-  canvas.onpointerup = canvas.onpointercancel = (event) => held.delete(event.pointerId);
+  canvas.onpointercancel = (event) => held.delete(event.pointerId);
+  canvas.onpointerup = (event) => {
+    held.delete(event.pointerId);
+    if (!pressed) return;
+    pressed = null;
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    click([(event.clientX - left) / width, (event.clientY - top) / height]);
+  };
   canvas.onpointermove = (event) => {
     const before = held.get(event.pointerId);
     if (!before) return;
+    if (pressed && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < (STILL[event.pointerType] ?? STILL.mouse)) return;
+    pressed = null;
     const height = canvas.clientHeight;
     const was = held.size === 2 ? spread() : before;
     held.set(event.pointerId, place(event));

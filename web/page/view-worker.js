@@ -5,6 +5,7 @@ import { adapterName } from "./adapter.js";
 let paused = false;
 let wake = () => {};
 let asks = [];
+let taken;
 
 onmessage = ({ data }) => {
   if ("pause" in data) {
@@ -13,7 +14,7 @@ onmessage = ({ data }) => {
     // Of screens only the last counts.
     const others = data.ask.show ? asks.filter(({ ask }) => !ask.show) : asks;
     const restarts = data.restarts || asks.some((other) => other.restarts);
-    asks = [...others, { ask: data.ask, restarts }];
+    asks = [...others, { ask: data.ask, files: data.files, restarts }];
   }
   wake();
 };
@@ -27,9 +28,17 @@ try {
   await init();
   const canvas = {
     ask: () => {
-      const next = asks.shift();
-      return next && JSON.stringify(next.ask);
+      taken = asks.shift();
+      return taken && JSON.stringify(taken.ask);
     },
+    // A screen that leaves the samples, once: it is drawn at once, and answered later.
+    glance: () => {
+      const next = asks.find(({ ask }) => ask.show);
+      if (!next || next.glanced || asks.some(({ restarts }) => restarts)) return undefined;
+      next.glanced = true;
+      return JSON.stringify(next.ask);
+    },
+    file: (place) => new Uint8Array(taken.files[place]),
     overtaken: () => asks.some(({ restarts }) => restarts),
     allowed: async (idle) => {
       while (paused || (idle && asks.length === 0)) await new Promise((go) => { wake = go; });

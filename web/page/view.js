@@ -1,18 +1,24 @@
 // The view: sends what is chosen and how the camera moves to its worker, and draws what comes back.
 import { adapterTrouble } from "./adapter.js";
 import { isMeasuring } from "./app.js";
-import { axisField, overridesOf } from "./choices.js";
+import { adopt, axisField, listModels, offer, overridesOf } from "./choices.js";
+import { visitorsFiles } from "./files.js";
+import { adoptMotion, motionFields, motionOverrides, showFrame } from "./motion.js";
 import { canvasMoves } from "./moves.js";
+import { inspect, marks, pixelPanel, refresh, screenChanged, takeFound, togglePath } from "./pixel.js";
 
 const at = (id) => document.getElementById(id);
 const parameters = new URLSearchParams(location.search);
-// What a link or a test may ask for: settings with the last word, two images, and where on this server to leave what is finished.
-const asked = { set: parameters.getAll("set"), post: parameters.get("start") === null && parameters.get("post") };
+// What a link or a test may ask for: settings to begin with, two images, and where on this server to leave what is finished.
+const isStill = matchMedia("(prefers-reduced-motion: reduce)");
+const asked = { set: parameters.getAll("set").filter((set) => !isStill.matches || !set.startsWith("window.play")), post: parameters.get("start") === null && parameters.get("post") };
 const SIDES = ["a", "b"];
 const OF_SIDE = ["accel", "sequence", "decorrelation", "integrator", "organisation"];
 
 let worker = null;
 let figures = null;
+// What the last change took.
+let said = "";
 // Of a test, once it asks for them.
 let images = null;
 
@@ -40,34 +46,83 @@ function end(reason) {
   post({ trouble: reason });
 }
 
-function ask(request, restarts = false) {
-  worker?.postMessage({ ask: request, restarts });
+function ask(request, restarts = false, files = []) {
+  worker?.postMessage({ ask: request, restarts, files }, files);
+}
+
+// Files of the visitor: until they are shown or refused, nothing else can be chosen.
+function openFiles(names, files) {
+  if (!worker || !figures) return trouble("The view is not there yet: open the files again in a moment.");
+  trouble("");
+  at("view-status").textContent = `opening ${names.length === 1 ? names[0] : `${names.length} files`}`;
+  enable(false);
+  ask({ open: { names, still: isStill.matches } }, true, files);
+}
+
+function enable(is) {
+  for (const control of document.querySelectorAll("#view fieldset, #view button")) control.disabled = !is;
 }
 
 function take(news) {
   if (news.picture) return draw(news);
   if (news.opened) return opened(news.opened);
   if (news.ended) return end(news.ended);
+  if (news.shown) adoptScreen(news);
   if (news.trouble) {
     at("view-status").textContent = "";
     trouble(news.trouble);
     post({ trouble: news.trouble });
-  } else if (news.status) {
-    at("view-status").textContent = news.status;
-  } else if (news.done) {
+  } else if ("status" in news) {
+    at("view-status").textContent = news.status || said;
+  } else if ("done" in news) {
     trouble("");
-    at("view-status").textContent = news.done.join("; ");
+    said = news.done?.join("; ") ?? said;
+    at("view-status").textContent = said;
+    // Controls say what a link asked for, and from then on have the last word.
+    if (asked.set.length > 0) ask("adopt");
     at("notes").textContent = news.notes.join(" ");
+    if (!news.stays) finished.spp = null;
+    screenChanged(news);
+  } else if (takeFound(news)) {
+    return;
   } else if (news.experiment) {
     copy(news.experiment);
   } else if (news.bytes) {
     if (!asked.post) return download(news.name, new Blob([news.bytes]));
     images.push([...news.bytes]);
     if (images.length === figures.sides.length) post({ trouble: "", images, figures });
-  } else if (news.idle && asked.post && !images) {
-    images = [];
-    figures.sides.forEach((_, side) => ask({ save: [side, "pfm"] }));
+  } else if (news.idle) {
+    finished();
   }
+}
+
+function finished() {
+  const spp = figures?.sides[0]?.spp ?? 0;
+  refresh(finished.spp !== spp);
+  finished.spp = spp;
+  if (!asked.post || images) return;
+  images = [];
+  figures.sides.forEach((_, side) => ask({ save: [side, "pfm"] }));
+}
+
+// Controls say what is on screen: after a link or the visitor opened something, or something else was refused.
+function adoptScreen({ shown, models }) {
+  if (models) listModels(models);
+  asked.set = [];
+  const [first, second = first] = shown.sides;
+  adopt("scene", "", first.scene);
+  at("split").checked = shown.sides.length > 1;
+  for (const [side, of] of [["a", first], ["b", second]]) {
+    if (side === "b" && !at("split").checked) break;
+    for (const axis of OF_SIDE.filter((axis) => of[axis])) adopt(axis, side, of[axis]);
+  }
+  offer(at("size"), shown.size.join(), shown.size.join(" × "));
+  offer(at("spp"), String(shown.spp));
+  for (const [id, value] of [["size", shown.size.join()], ["spp", shown.spp], ["map", shown.map], ["exposure", shown.exposure], ["swipe", shown.swipe]]) at(id).value = value;
+  at("error").checked = shown.error;
+  adoptMotion(shown);
+  showSides();
+  enable(true);
 }
 
 // Only on this server, and once.
@@ -95,7 +150,7 @@ function opened({ adapter, software, axes }) {
     at("accel-b").onchange();
     showSides();
   }
-  for (const control of document.querySelectorAll("#view fieldset, #view button")) control.disabled = false;
+  enable(true);
 }
 
 function showSides() {
@@ -122,6 +177,7 @@ function screen() {
     `window.swipe=${Number(at("swipe").value).toFixed(3)}`,
     `window.error=${at("error").checked}`,
     ...overridesOf("scene", ""),
+    ...motionOverrides(),
   ];
   const sides = at("split").checked ? SIDES : SIDES.slice(0, 1);
   return sides.map((side) => [...common, ...OF_SIDE.flatMap((axis) => overridesOf(axis, side)), ...asked.set]);
@@ -141,7 +197,10 @@ function draw({ figures: known, width, height, picture }) {
   const faults = sides.map((side, index) => side.fault && `${sides.length > 1 ? `${"AB"[index]}: ` : ""}${side.fault}`);
   at("faults").textContent = faults.filter(Boolean).join(" ");
   at("faults").hidden = !faults.some(Boolean);
+  showFrame(known.frame);
+  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value) });
   const rows = [
+    ...timesOf(known.times),
     ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],
     ["ms a sample", (side) => digits(side.sample_ms)],
     ["Mrays/s", (side) => digits(side.mrays_s)],
@@ -152,7 +211,7 @@ function draw({ figures: known, width, height, picture }) {
     ["nodes or cells", (side) => (side.nodes ? side.nodes.toLocaleString("en") : "–")],
     ["SAH cost", (side) => digits(side.sah_cost)],
     ["structure, KiB", (side) => digits(side.bytes ? side.bytes / 1024 : null)],
-  ].map(([name, value]) => [name, ...sides.map(value)]);
+  ].map(([name, value]) => [name, ...sides.map((side, index) => value(side, index))]);
   const shown = rows.filter(([, ...values]) => values.some((value) => value !== "–"));
   const title = sides.length > 1 ? [["", "A", "B"]] : [];
   at("figures").replaceChildren(...[...title, ...shown].map((cells, row) => {
@@ -164,6 +223,20 @@ function draw({ figures: known, width, height, picture }) {
     }));
     return line;
   }));
+}
+
+// What the last frame took, while the scene moves.
+function timesOf(times) {
+  if (!times) return [];
+  const of = (part) => (_, index) => digits(times.sides[index]?.[part]);
+  const once = (value) => (_, index) => (index === 0 ? digits(value) : "–");
+  return [
+    ["frames a second", once(times.whole_ms && 1000 / times.whole_ms)],
+    ["scene moved, ms", once(times.scene_ms)],
+    ["structure updated, ms", of(0)],
+    ["samples, ms", of(1)],
+    ["rest, ms", once(times.rest_ms)],
+  ];
 }
 
 function raysOf(ofClass) {
@@ -220,12 +293,27 @@ at("home").onclick = () => ask("home", true);
 at("save-png").onclick = () => at("canvas").toBlob((blob) => download("raystone.png", blob));
 at("save-pfm").onclick = () => ask({ save: [0, "pfm"] });
 at("copy-experiment").onclick = () => ask("experiment");
+pixelPanel(ask);
+motionFields(show, () => figures?.frame ?? 0);
+visitorsFiles({ file: at("file"), folder: at("folder"), openFile: at("open-file"), openFolder: at("open-folder") }, openFiles, trouble);
 canvasMoves(at("canvas"), (request) => ask(request, true), {
+  o: () => at("open-file").click(),
+  i: () => at("pixel-x").focus(),
+  p: () => togglePath(),
+  " ": () => at("motion-play").click(),
+  "+": () => expose(0.5),
+  "=": () => expose(0.5),
+  "-": () => expose(-0.5),
   b: () => at("split").click(),
   m: () => step(at("map"), 1),
   "[": () => swipe(-0.05),
   "]": () => swipe(0.05),
-});
+}, ([x, y]) => figures && inspect([x * at("canvas").width, y * at("canvas").height]));
+
+function expose(stops) {
+  at("exposure").value = Number(at("exposure").value) + stops;
+  reshow();
+}
 
 function step(select, by) {
   select.selectedIndex = (select.selectedIndex + by) % select.options.length;

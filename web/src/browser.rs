@@ -61,6 +61,10 @@ extern "C" {
     #[wasm_bindgen(method)]
     fn ask(this: &Canvas) -> Option<String>;
     #[wasm_bindgen(method)]
+    fn glance(this: &Canvas) -> Option<String>;
+    #[wasm_bindgen(method)]
+    fn file(this: &Canvas, place: usize) -> Vec<u8>;
+    #[wasm_bindgen(method)]
     fn overtaken(this: &Canvas) -> bool;
     #[wasm_bindgen(method)]
     fn allowed(this: &Canvas, idle: bool) -> Promise;
@@ -86,6 +90,14 @@ impl Shell for Canvas {
 
     fn ask(&self) -> Option<String> {
         Canvas::ask(self)
+    }
+
+    fn glance(&self) -> Option<String> {
+        Canvas::glance(self)
+    }
+
+    fn file(&self, place: usize) -> Vec<u8> {
+        Canvas::file(self, place)
     }
 
     fn is_overtaken(&self) -> bool {

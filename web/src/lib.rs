@@ -6,9 +6,12 @@
 #![warn(missing_docs)]
 
 mod host;
+mod memory;
+mod opened;
 mod plan;
 mod rounds;
 mod run;
+mod told;
 mod view;
 mod world;
 

@@ -1,26 +1,23 @@
 //! A scene on screen: takes what the page asks for, steps the viewer between two looks at it, and hands pictures and figures out.
 
 use crate::PROGRAM;
+use crate::memory::MEMORY;
+use crate::opened::Opened;
+use crate::told::{self, AXES};
 use raystone_bench::run::{Registries, RunError};
-use raystone_config::Axis;
-use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter};
+use raystone_config::{Axis, Catalogue, Window};
+use raystone_core::params::ParamValue;
 use raystone_gpu::{Gpu, GpuError, KernelLibrary};
-use raystone_viewer::{Frame, Motion, START, Screen, SideFrame, Step, Viewer, moved};
+use raystone_viewer::{Display, Motion, START, Screen, Step, Trail, Viewer, Work, moved};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::cell::RefCell;
 use std::path::Path;
 
 /// Devices that are opened one after the other before it gives up.
 const MOST_DEVICES: usize = 3;
-/// Axes on which the page offers a choice.
-const AXES: [Axis; 6] = [
-    Axis::Scene,
-    Axis::Accel,
-    Axis::Sequence,
-    Axis::Decorrelation,
-    Axis::Integrator,
-    Axis::Organisation,
-];
+/// Points of a sampler that are drawn and measured.
+const MOST_POINTS: u32 = 1024;
 
 /// The page around a view, or a test.
 pub trait Shell {
@@ -35,6 +32,12 @@ pub trait Shell {
 
     /// The next request, as JSON.
     fn ask(&self) -> Option<String>;
+
+    /// The waiting request for a screen, once, if it leaves the samples at hand as they are. It stays to be answered.
+    fn glance(&self) -> Option<String>;
+
+    /// The contents of a file of the request that was taken last, by its place there.
+    fn file(&self, place: usize) -> Vec<u8>;
 
     /// True if a request waits that makes the samples at hand useless.
     fn is_overtaken(&self) -> bool;
@@ -55,6 +58,13 @@ pub trait Shell {
 enum Ask {
     /// What is on screen: the overrides of each image (`section.key=value`), one or two.
     Show(Vec<Vec<String>>),
+    /// Files of the visitor, by name; what moves by itself stands `still`.
+    Open {
+        names: Vec<String>,
+        still: bool,
+    },
+    /// What is on screen is what the controls say from now on.
+    Adopt,
     /// Moves of the camera, see [`Motion`].
     Orbit([f32; 2]),
     Turn([f32; 2]),
@@ -63,10 +73,38 @@ enum Ask {
     Fly([f32; 3]),
     /// The scene's own camera.
     Home,
+    /// What the images have at a pixel.
+    Inspect([u32; 2]),
+    /// The path of a sample of a side's pixel, or none any more.
+    Path(Option<(usize, [u32; 2], u32)>),
+    /// What a side's structure does with the ray of a pixel.
+    Explain(usize, [u32; 2]),
+    /// The points of a side's pixel in two dimensions.
+    Points(usize, [u32; 2], [u32; 2]),
     /// The linear image of a side, as a file of this ending.
     Save(usize, String),
     /// The experiment that reproduces what is on screen.
     Experiment,
+}
+
+/// What outlives a device.
+struct Session {
+    registries: Registries,
+    catalogue: Catalogue,
+    /// What was on screen when its controls were last set to it: what they cannot say is that of it.
+    base: Option<Screen>,
+    trail: Option<Trail>,
+    canvas: RefCell<Canvas>,
+}
+
+/// What was rendered last, to be drawn while the viewer works.
+#[derive(Default)]
+struct Canvas {
+    display: Display,
+    size: [u32; 2],
+    frame: u32,
+    /// Vertices of the path that is shown, pixels.
+    trail: Vec<Option<[f32; 2]>>,
 }
 
 /// A device that was lost, and what was on screen.
@@ -80,14 +118,23 @@ struct Lost {
 /// # Errors
 /// There is no device, or one after the other is lost.
 pub async fn view(shell: &impl Shell) -> Result<(), String> {
+    raystone_core::files::read_from(&MEMORY)?;
+    let registries = Registries::default();
+    let mut session = Session {
+        catalogue: registries.catalogue(),
+        registries,
+        base: None,
+        trail: None,
+        canvas: RefCell::default(),
+    };
     let mut screen = None;
     for _ in 0..MOST_DEVICES {
         let registries = Registries::default();
         let gpu = shell.open(registries.library()).await;
         let gpu = gpu.map_err(|e| e.to_string())?;
-        shell.tell(&json!({ "opened": opened(&gpu, &registries) }));
+        shell.tell(&json!({ "opened": told::opened(&gpu, &registries) }));
         let mut viewer = Viewer::new(&gpu, registries, PROGRAM, false);
-        let lost = serve(shell, &mut viewer, screen.take()).await;
+        let lost = serve(shell, &mut viewer, &mut session, screen.take()).await;
         let cause = lost.cause;
         shell.tell(
             &json!({ "trouble": format!("The device was lost ({cause}); it is opened anew.") }),
@@ -99,10 +146,15 @@ pub async fn view(shell: &impl Shell) -> Result<(), String> {
     ))
 }
 
-async fn serve(shell: &impl Shell, viewer: &mut Viewer<'_>, screen: Option<Screen>) -> Lost {
+async fn serve(
+    shell: &impl Shell,
+    viewer: &mut Viewer<'_>,
+    session: &mut Session,
+    screen: Option<Screen>,
+) -> Lost {
     let mut is_idle = screen.is_none();
     let mut ended = match screen {
-        Some(screen) => show(shell, viewer, screen).await,
+        Some(screen) => show(shell, viewer, session, screen).await,
         None => Ok(()),
     };
     loop {
@@ -111,21 +163,26 @@ async fn serve(shell: &impl Shell, viewer: &mut Viewer<'_>, screen: Option<Scree
                 let screen = viewer.screen().cloned();
                 return Lost { cause, screen };
             }
-            shell.tell(&json!({ "trouble": error.to_string() }));
+            // What was on screen is there still.
+            let shown = viewer.screen().map(told::shown);
+            shell.tell(&json!({ "trouble": error.to_string(), "shown": shown }));
         }
         shell.allowed(is_idle).await;
         if let Some(ask) = shell.ask() {
             is_idle = false;
-            ended = answer(shell, viewer, &ask).await;
+            ended = answer(shell, viewer, session, &ask).await;
             continue;
         }
         // Each image is shown at least once, however quickly the next request follows.
         let is_seen = viewer.is_seen();
-        let stop = || is_seen && shell.is_overtaken();
+        let stop = || {
+            session.draw_as_wanted(shell);
+            is_seen && shell.is_overtaken()
+        };
         ended = viewer.step_async(&stop).await.map(|step| {
             is_idle = step == Step::Idle;
             match step {
-                Step::Shown => publish(shell, viewer),
+                Step::Shown => publish(shell, viewer, session),
                 Step::Idle => shell.tell(&json!({ "idle": true })),
                 Step::Worked | Step::Stopped => {}
             }
@@ -134,23 +191,37 @@ async fn serve(shell: &impl Shell, viewer: &mut Viewer<'_>, screen: Option<Scree
     }
 }
 
-async fn answer(shell: &impl Shell, viewer: &mut Viewer<'_>, ask: &str) -> Result<(), RunError> {
+async fn answer(
+    shell: &impl Shell,
+    viewer: &mut Viewer<'_>,
+    session: &mut Session,
+    ask: &str,
+) -> Result<(), RunError> {
     let ask: Ask = serde_json::from_str(ask).map_err(|e| RunError::Input(e.to_string()))?;
     let motion = match ask {
         Ask::Show(sides) => {
-            let screen = Screen::parse_sides(START, "view", &sides, viewer.registries());
-            let mut screen = screen.map_err(RunError::Input)?;
+            let mut screen = session.screen(&sides).map_err(RunError::Input)?;
             let scene = |screen: &Screen| screen.cells[0].on(&[Axis::Scene]);
             let before = viewer.screen().filter(|old| scene(old) == scene(&screen));
             screen.camera = screen.camera.or(before.and_then(|old| old.camera));
-            return show(shell, viewer, screen).await;
+            return show(shell, viewer, session, screen).await;
+        }
+        Ask::Open { names, still } => {
+            let file = |(place, name): (usize, String)| (name, shell.file(place));
+            let files = names.into_iter().enumerate().map(file).collect();
+            return open(shell, viewer, session, (Opened::new(files), still)).await;
+        }
+        Ask::Adopt => {
+            session.base = viewer.screen().cloned();
+            shell.tell(&json!({ "shown": session.base.as_ref().map(told::shown) }));
+            return Ok(());
         }
         Ask::Home => {
             let Some(screen) = viewer.screen().cloned() else {
                 return Ok(());
             };
             let camera = None;
-            return show(shell, viewer, Screen { camera, ..screen }).await;
+            return show(shell, viewer, session, Screen { camera, ..screen }).await;
         }
         Ask::Save(side, ending) => {
             let name = format!("raystone.{ending}");
@@ -159,10 +230,14 @@ async fn answer(shell: &impl Shell, viewer: &mut Viewer<'_>, ask: &str) -> Resul
             return Ok(());
         }
         Ask::Experiment => {
-            let catalogue = viewer.registries().catalogue();
-            let text = viewer.screen().map(|screen| screen.to_toml(&catalogue));
+            let text = viewer
+                .screen()
+                .map(|screen| screen.to_toml(&session.catalogue));
             shell.tell(&json!({ "experiment": text }));
             return Ok(());
+        }
+        Ask::Inspect(_) | Ask::Path(_) | Ask::Explain(..) | Ask::Points(..) => {
+            return look(shell, viewer, session, ask).await;
         }
         Ask::Orbit(by) => Motion::Orbit(by),
         Ask::Turn(by) => Motion::Turn(by),
@@ -174,110 +249,194 @@ async fn answer(shell: &impl Shell, viewer: &mut Viewer<'_>, ask: &str) -> Resul
         return Ok(());
     };
     let camera = Some(moved(camera, motion));
-    show(shell, viewer, Screen { camera, ..screen }).await
+    show(shell, viewer, session, Screen { camera, ..screen }).await
 }
 
-async fn show(shell: &impl Shell, viewer: &mut Viewer<'_>, screen: Screen) -> Result<(), RunError> {
-    let mut tell = |what: &str| shell.tell(&json!({ "status": what }));
-    let done = viewer.show_async(screen, &mut tell).await?;
-    let done: Vec<String> = done.iter().map(ToString::to_string).collect();
-    shell.tell(&json!({ "done": done, "notes": viewer.notes() }));
-    publish(shell, viewer);
+/// Shows what the visitor opened. If it cannot be shown, the files of before are held again.
+async fn open(
+    shell: &impl Shell,
+    viewer: &mut Viewer<'_>,
+    session: &mut Session,
+    (opened, still): (Opened, bool),
+) -> Result<(), RunError> {
+    let (now, registries) = (viewer.screen(), &session.registries);
+    let screen = opened.screen(now, registries, &session.catalogue);
+    let mut screen = screen.map_err(RunError::Input)?;
+    screen.window.play &= !still;
+    let models = json!(opened.models());
+    let before = MEMORY.replace(opened.files);
+    viewer.reload(true);
+    let shown = show(shell, viewer, session, screen.clone()).await;
+    if shown.is_err() {
+        MEMORY.replace(before);
+        viewer.reload(false);
+    } else {
+        shell.tell(&json!({ "shown": told::shown(&screen), "models": models }));
+        session.base = Some(screen);
+    }
+    shown
+}
+
+/// Answers what is asked of a pixel. What cannot be said there is no trouble of the view.
+async fn look(
+    shell: &impl Shell,
+    viewer: &Viewer<'_>,
+    session: &mut Session,
+    ask: Ask,
+) -> Result<(), RunError> {
+    let status = |what: &str| shell.tell(&json!({ "status": what }));
+    let found = match ask {
+        Ask::Inspect(pixel) => {
+            let inspection = viewer.inspect_async(pixel).await?;
+            let outside = || format!("there is no pixel {}, {} to inspect", pixel[0], pixel[1]);
+            let inspection = inspection.ok_or_else(outside);
+            inspection.map(|found| json!({ "inspected": told::inspected(&found) }))
+        }
+        Ask::Path(of) => {
+            if of.is_some() {
+                status("following the path on the host");
+            }
+            let path = of.map(|(side, pixel, sample)| viewer.path(side, pixel, sample));
+            let path = path
+                .transpose()
+                .map_err(|reason| format!("no path: {reason}"));
+            session.trail = path.as_ref().ok().cloned().flatten();
+            publish(shell, viewer, session);
+            path.map(|path| json!({ "path": path.map(|path| path.text) }))
+        }
+        Ask::Explain(side, pixel) => {
+            status("tracing the ray on the host");
+            let text = viewer.explain(side, pixel);
+            text.map(|text| json!({ "explained": text }))
+        }
+        Ask::Points(side, pixel, dimensions) => {
+            let points = viewer.points(side, pixel, dimensions, MOST_POINTS);
+            points.map(|points| json!({ "points": told::points(&points) }))
+        }
+        _ => return Ok(()),
+    };
+    status("");
+    shell.tell(&found.unwrap_or_else(|reason| json!({ "refused": reason })));
     Ok(())
 }
 
-fn publish(shell: &impl Shell, viewer: &Viewer<'_>) {
-    let Some(screen) = viewer.screen() else {
+async fn show(
+    shell: &impl Shell,
+    viewer: &mut Viewer<'_>,
+    session: &mut Session,
+    screen: Screen,
+) -> Result<(), RunError> {
+    let was = viewer.screen().cloned();
+    let mut tell = |what: &str| shell.tell(&json!({ "status": what }));
+    let done = viewer.show_async(screen, &mut tell).await?;
+    // What took nothing leaves what was said before.
+    let is_something = done.iter().any(|done| done.work != Work::Kept);
+    let done: Option<Vec<String>> =
+        is_something.then(|| done.iter().map(ToString::to_string).collect());
+    let now = viewer.screen();
+    // What was found at a pixel holds for what it was found in; a path is drawn with any camera.
+    let is_same = |same: fn(&Screen, &Screen) -> bool| {
+        now.zip(was.as_ref())
+            .is_some_and(|(now, was)| same(now, was))
+    };
+    let stays = is_same(|now, was| !now.restarts(was));
+    if !is_same(Screen::has_paths_of) {
+        session.trail = None;
+    }
+    let trail = session.trail.is_some();
+    shell.tell(&json!({ "done": done, "notes": viewer.notes(), "stays": stays, "trail": trail }));
+    publish(shell, viewer, session);
+    Ok(())
+}
+
+fn publish(shell: &impl Shell, viewer: &Viewer<'_>, session: &Session) {
+    let (Some(screen), Some(camera)) = (viewer.screen(), viewer.camera()) else {
         return;
     };
-    let frame = viewer.frame();
-    let picture = frame.picture(screen.size, screen.window.swipe);
-    let bytes = picture.map_or(Vec::new(), |picture| {
-        let pixels = picture.pixels.iter();
-        pixels.flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect()
-    });
-    shell.draw(&figures(&frame), screen.size, &bytes);
+    let trail = session.trail.as_ref();
+    let canvas = Canvas {
+        display: viewer.display(),
+        size: screen.size,
+        frame: viewer.frame_number(),
+        trail: trail.map_or(Vec::new(), |trail| trail.on(&camera, screen.size)),
+    };
+    canvas.draw(shell, &screen.window);
+    session.canvas.replace(canvas);
 }
 
-fn figures(frame: &Frame) -> Value {
-    let side = |side: &SideFrame| {
-        let known = &side.figures;
-        json!({
-            "label": side.label,
-            "fault": side.fault,
-            "spp": known.spp,
-            "of": known.of,
-            "sample_ms": known.sample_ms.last(),
-            "mrays_s": known.mrays_s,
-            "rays": known.rays.iter().map(|r| (r.class, r.per_sample, r.mrays_s)).collect::<Vec<_>>(),
-            "relmse": known.relmse,
-            "flip": known.flip,
-            "map_mean": known.map_mean,
-            "nodes": known.structure.nodes,
-            "bytes": known.structure.bytes,
-            "sah_cost": known.structure.sah_cost,
-        })
-    };
-    json!({
-        "triangles": frame.triangles,
-        "scale": frame.scale,
-        "reference_spp": frame.reference_spp,
-        "sides": frame.sides.iter().map(side).collect::<Vec<_>>(),
-    })
+impl Canvas {
+    fn draw(&self, shell: &impl Shell, window: &Window) {
+        let frame = self.display.frame(window);
+        let picture = frame.picture(self.size, window.swipe);
+        let bytes = picture.map_or(Vec::new(), |picture| {
+            let pixels = picture.pixels.iter();
+            pixels.flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect()
+        });
+        let mut figures = told::figures(&frame);
+        figures["frame"] = json!(self.frame);
+        figures["trail"] = json!(self.trail);
+        shell.draw(&figures, self.size, &bytes);
+    }
 }
 
-/// The adapter, and what can be chosen.
-fn opened(gpu: &Gpu, registries: &Registries) -> Value {
-    let catalogue = registries.catalogue();
-    let is_rendered = |name: &str| registries.integrators.get(name).is_some();
-    let start = Screen::parse(START, "view", &[], registries).ok();
-    let first = |axis: Axis| {
-        let cell = start.as_ref().and_then(|screen| screen.cells[0].get(axis));
-        cell.map(|chosen| chosen.name.clone())
-            .or(axis.default_name().map(str::to_owned))
-    };
-    let entries = |axis: Axis| -> Value {
-        let entries = catalogue[axis].iter();
-        let shown = entries.filter(|entry| axis != Axis::Integrator || is_rendered(&entry.name));
-        json!({ "first": first(axis), "entries": shown.map(choice).collect::<Vec<_>>() })
-    };
-    let axes = AXES.map(|axis| (axis.name().to_owned(), entries(axis)));
-    json!({
-        "adapter": gpu.info.name,
-        "software": gpu.is_software(),
-        "axes": serde_json::Map::from_iter(axes),
-    })
+impl Session {
+    /// The screen of these overrides.
+    fn screen(&self, sides: &[Vec<String>]) -> Result<Screen, String> {
+        let mut screen = Screen::parse_sides(START, "view", sides, &self.registries)?;
+        if let Some(base) = &self.base {
+            carry(&mut screen, base, &self.catalogue);
+        }
+        Ok(screen)
+    }
+
+    /// Draws what was rendered as the page wants it, without waiting for the samples at hand.
+    fn draw_as_wanted(&self, shell: &impl Shell) {
+        let wanted = shell
+            .glance()
+            .and_then(|ask| serde_json::from_str(&ask).ok());
+        let Some(Ask::Show(sides)) = wanted else {
+            return;
+        };
+        let canvas = self.canvas.borrow();
+        // What is wrong with it is said when it is answered.
+        if let Ok(screen) = self.screen(&sides)
+            && canvas.display.has(screen.window.map)
+        {
+            canvas.draw(shell, &screen.window);
+        }
+    }
 }
 
-fn choice(entry: &Entry) -> Value {
-    let parameters: Vec<Value> = entry.schema.iter().filter_map(parameter).collect();
-    json!({
-        "name": entry.name,
-        "description": entry.description,
-        "parameters": parameters,
-    })
-}
-
-/// What the page needs to ask for a parameter; `None` if that takes more than a number, a switch or a list of names.
-fn parameter(known: &Parameter) -> Option<Value> {
-    let range = match &known.range {
-        ParamRange::Number { min, max } => json!({ "min": min, "max": max, "step": "any" }),
-        ParamRange::Integer { min, max } => json!({ "min": min, "max": max, "step": 1 }),
-        ParamRange::Choice(names) => json!({ "names": names }),
-        ParamRange::Flag => json!({}),
-        _ => return None,
-    };
-    let default = match known.default_written()? {
-        ParamValue::Number(x) => json!(x),
-        ParamValue::Integer(n) => json!(n),
-        ParamValue::Flag(is_on) => json!(is_on),
-        ParamValue::Name(name) => json!(name),
-        ParamValue::List(_) => return None,
-    };
-    Some(json!({
-        "name": known.name,
-        "description": known.description,
-        "default": default,
-        "range": range,
-    }))
+/// Takes what the page has no control for from what was opened.
+fn carry(screen: &mut Screen, base: &Screen, catalogue: &Catalogue) {
+    screen.seed = base.seed;
+    screen.reference = base.reference.clone();
+    (screen.window.scale, screen.window.pace) = (base.window.scale, base.window.pace);
+    for (cell, of_base) in screen.cells.iter_mut().zip(base.cells.iter().cycle()) {
+        for axis in Axis::ALL {
+            let (Some(before), Some(now)) = (of_base.get(axis), cell.get(axis)) else {
+                continue;
+            };
+            let entry = catalogue[axis].iter().find(|entry| entry.name == now.name);
+            let variant = match entry {
+                _ if !AXES.contains(&axis) => before.clone(),
+                _ if before.name != now.name => continue,
+                // Those of a model.
+                None => before.clone(),
+                Some(entry) => {
+                    let value = |name: &str, is_asked: bool| {
+                        let from = if is_asked { now } else { before };
+                        from.params.0.get(name).cloned()
+                    };
+                    let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
+                        .filter_map(|p| {
+                            Some((p.name, value(p.name, told::parameter(p).is_some())?))
+                        })
+                        .collect();
+                    entry.variant(&set)
+                }
+            };
+            *cell = cell.clone().with(axis, &variant);
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! The web page: what it measured once is read by every command; and, where it is built and there is a Chromium, it measures a
 //! small scene, every structure passes its gate, it shows the images that `raystone render` makes, and nothing is logged.
 
+mod visitor;
+
 use super::{done, folder_of, text, validator};
 use crate::support::{needs, tier};
 use raystone::export::record_schema;
@@ -21,6 +23,8 @@ const QUERY: &str = "start&post=/records&only=scene%3Dcornell-box&set=timing.rou
 const VIEWED: [&str; 2] = ["run.resolution=[48,36]", "run.seed=7"];
 /// Pixels of 1728 in which a path may go another way on the browser's adapter: drivers round division, roots and sines otherwise.
 const MOST_TIES: usize = 17;
+/// The driver that the browser brings along.
+const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 /// How long a software adapter may take, with its compiler.
 const PATIENCE: Duration = Duration::from_secs(900);
 
@@ -145,8 +149,12 @@ fn built() -> Option<PathBuf> {
     Some(dist)
 }
 
-/// Answers one request: a file of the page, or the records that it leaves.
-fn answer(mut stream: TcpStream, dist: &Path, records: &Sender<Value>) -> std::io::Result<()> {
+/// Answers one request: a file of the page, with a script in it, or what it leaves.
+fn answer(
+    mut stream: TcpStream,
+    (dist, script): (&Path, &str),
+    records: &Sender<Value>,
+) -> std::io::Result<()> {
     let (mut request, mut part) = (Vec::new(), [0; 1 << 16]);
     let end = loop {
         let count = stream.read(&mut part)?;
@@ -187,7 +195,12 @@ fn answer(mut stream: TcpStream, dist: &Path, records: &Sender<Value>) -> std::i
         Some("js") => "text/javascript",
         _ => "application/wasm",
     };
-    let body = std::fs::read(dist.join(name)).unwrap_or_default();
+    let mut body = std::fs::read(dist.join(name)).unwrap_or_default();
+    if name == "index.html" {
+        let page = String::from_utf8_lossy(&body);
+        let with = format!("<script>{script}</script></head>");
+        body = page.replacen("</head>", &with, 1).into_bytes();
+    }
     let head = format!(
         "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n",
         body.len()
@@ -234,14 +247,20 @@ fn start_browser(address: &str, profile: &Path) -> Option<Browser> {
 
 /// What the page leaves at the server when it is opened with this query, in a browser that logs nothing.
 fn told(query: &str) -> Option<Value> {
+    told_with(query, "")
+}
+
+/// The same of a page with a script in it.
+fn told_with(query: &str, script: &str) -> Option<Value> {
     let dist = built()?;
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = listener.local_addr().expect("an address").port();
     let (sender, left) = channel();
+    let script = script.to_owned();
     std::thread::spawn(move || {
         for stream in listener.incoming().flatten() {
-            let (dist, sender) = (dist.clone(), sender.clone());
-            std::thread::spawn(move || answer(stream, &dist, &sender));
+            let (dist, script, sender) = (dist.clone(), script.clone(), sender.clone());
+            std::thread::spawn(move || answer(stream, (&dist, &script), &sender));
         }
     });
     let profile = tempfile::tempdir().expect("a folder");
@@ -308,6 +327,29 @@ fn differing(image: &Image, other: &Image) -> [usize; 2] {
     ]
 }
 
+/// The image of bytes that the page left.
+fn left_image(bytes: &Value) -> Image {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bytes: Vec<u8> = serde_json::from_value(bytes.clone()).expect("bytes");
+    let file = folder.path().join("page.pfm");
+    std::fs::write(&file, bytes).expect("a writable folder");
+    read_linear(&file).expect("an image")
+}
+
+/// Holds an image of the page against that of `raystone render`.
+fn check_image(image: &Image, settings: &[String]) {
+    // With the driver that the browser brings along, no bit is another one.
+    let driver = Path::new(SWIFTSHADER);
+    if driver.exists() {
+        assert_eq!(differing(image, &rendered(settings, Some(driver))), [0, 0]);
+    }
+    let [bits, beyond] = differing(image, &rendered(settings, None));
+    assert!(
+        beyond <= MOST_TIES,
+        "{bits} pixels differ, {beyond} by more than rounding"
+    );
+}
+
 #[test]
 fn the_web_page_shows_the_images_of_raystone_render() {
     let settings = [
@@ -322,17 +364,11 @@ fn the_web_page_shows_the_images_of_raystone_render() {
     let Some(told) = told(&format!("view&split&post=/images{query}")) else {
         return;
     };
-    let folder = tempfile::tempdir().expect("a folder");
     let images: Vec<Image> = told["images"]
         .as_array()
         .expect("two images")
         .iter()
-        .map(|bytes| {
-            let bytes: Vec<u8> = serde_json::from_value(bytes.clone()).expect("bytes");
-            let file = folder.path().join("page.pfm");
-            std::fs::write(&file, bytes).expect("a writable folder");
-            read_linear(&file).expect("an image")
-        })
+        .map(left_image)
         .collect();
     for (side, figures) in told["figures"]["sides"]
         .as_array()
@@ -349,17 +385,7 @@ fn the_web_page_shows_the_images_of_raystone_render() {
         panic!("{} images", images.len())
     };
     assert_eq!(differing(first, second), [0, 0]);
-    // With the driver that the browser brings along, no bit is another one.
-    let driver = Path::new("/usr/lib/chromium/vk_swiftshader_icd.json");
-    if driver.exists() {
-        let native = rendered(&settings, Some(driver));
-        assert_eq!(differing(first, &native), [0, 0]);
-    }
-    let [bits, beyond] = differing(first, &rendered(&settings, None));
-    assert!(
-        beyond <= MOST_TIES,
-        "{bits} pixels differ, {beyond} by more than rounding"
-    );
+    check_image(first, &settings);
     // The check can fail: another seed is another image.
     let other = [settings, vec!["run.seed=8".to_owned()]].concat();
     assert!(differing(first, &rendered(&other, None))[1] > 10 * MOST_TIES);
