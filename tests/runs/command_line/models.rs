@@ -1,6 +1,7 @@
 //! Models and scenes that cannot be loaded, and the parts that a loader leaves out.
 
 use super::{ABSENT_BACKEND, error, output, program, run, stdout, text};
+use crate::support::in_turn;
 use std::path::Path;
 
 #[test]
@@ -140,7 +141,7 @@ fn verify_passes_models_of_awkward_shapes() {
         [[cos, sin, 0.0], [-cos, -sin, 1.0], [0.0, 0.0, -1.0]]
     };
     let sized = |size: f32| [[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];
-    for (name, model) in [
+    let models = [
         ("flat, and a needle of 2e6 units", triangles_of(flat)),
         ("sixty times one triangle", triangles_of([unit; 60])),
         ("one middle", triangles_of((0..60).map(turned))),
@@ -154,7 +155,8 @@ fn verify_passes_models_of_awkward_shapes() {
             "a line",
             triangles_of([unit, [[0.5; 3], [2.0; 3], [3.0; 3]]]),
         ),
-    ] {
+    ];
+    for (name, model) in in_turn("models of awkward shapes", models) {
         let path = folder.path().join("model.obj");
         std::fs::write(&path, model).expect("a writable folder");
         let output = run(&[
