@@ -33,9 +33,9 @@ const GREATEST: f64 = 268_435_456.0;
 /// Words of the masks of a scene's triangles, stored after the records in the buffer `triangles`.
 ///
 /// First the images: a row with width, height, wrap modes (u plus 4 times v) and threshold, or the
-/// factor in 2⁻¹⁶ of a blended mask; then alphas, sixteen per row. Then two rows per triangle: coordinates of the first corner, and the
-/// differences to the second and third, in 1/256 texel from the centre of the first texel; index of
-/// the image; the material.
+/// factor in 2⁻¹⁶ of a blended mask; then alphas, sixteen per row. Then two rows per triangle:
+/// coordinates of the first corner, and the differences to the second and third, in 1/256 texel
+/// from the centre of the first texel; index of the image; the material.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Masks {
     /// Start in the buffer, in `vec4`.

@@ -80,6 +80,22 @@ fn alphas(name: &str, [width, height]: [u32; 2]) -> Texture {
     }
 }
 
+/// The ground, a wall behind, and a lamp above.
+fn before_a_wall(mesh: &mut Mesh) {
+    let ground = mesh.material(Material::diffuse("ground", vec3(0.7, 0.7, 0.6)));
+    let lamp = Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(9.0, 8.0, 7.0));
+    let lamp = mesh.material(lamp);
+    mesh.plain(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        ground,
+    );
+    mesh.plain(
+        [vec3(-2.0, 0.0, -1.6), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        ground,
+    );
+    mesh.plain([vec3(-0.6, 2.6, -0.5), 1.2 * Vec3::X, 0.9 * Vec3::Z], lamp);
+}
+
 /// Fences before a wall, each cut out by another image that wraps differently in both directions; one of them is
 /// solid only where alpha is the cutoff itself.
 fn fences() -> Result<SceneData, SceneError> {
@@ -96,7 +112,7 @@ fn fences() -> Result<SceneData, SceneError> {
         )),
         ..Material::diffuse(name, color)
     };
-    let [first, second, third, ground, lamp] = [
+    let [first, second, third] = [
         fence(
             "first",
             vec3(0.8, 0.3, 0.2),
@@ -112,19 +128,9 @@ fn fences() -> Result<SceneData, SceneError> {
             vec3(0.3, 0.7, 0.3),
             (1, [Wrap::Repeat, Wrap::Mirrored], 0.7),
         ),
-        Material::diffuse("ground", vec3(0.7, 0.7, 0.6)),
-        Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(9.0, 8.0, 7.0)),
     ]
     .map(|m| mesh.material(m));
-    mesh.plain(
-        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
-        ground,
-    );
-    mesh.plain(
-        [vec3(-2.0, 0.0, -1.6), 4.0 * Vec3::X, 2.5 * Vec3::Y],
-        ground,
-    );
-    mesh.plain([vec3(-0.6, 2.6, -0.5), 1.2 * Vec3::X, 0.9 * Vec3::Z], lamp);
+    before_a_wall(&mut mesh);
     let uv = [vec2(-1.7, -2.2), vec2(2.9, 3.4)];
     for (x, z, material) in [(-1.6, 0.3, first), (-0.4, -0.4, second), (0.2, 0.9, third)] {
         mesh.quad(
@@ -154,23 +160,13 @@ fn veils() -> Result<SceneData, SceneError> {
         wrap: [Wrap::Mirrored, Wrap::Clamp],
         ..TextureUse::plain(0)
     };
-    let [even, lace, shining, ground, lamp] = [
+    let [even, lace, shining] = [
         blended("even", vec3(0.8, 0.3, 0.2), 0.6, None),
         blended("lace", vec3(0.2, 0.4, 0.8), 0.8, Some(lace)),
         blended("shining", Vec3::splat(0.2), 0.4, None).emitting(vec3(2.0, 3.0, 1.0)),
-        Material::diffuse("ground", vec3(0.7, 0.7, 0.6)),
-        Material::diffuse("lamp", Vec3::splat(0.2)).emitting(vec3(9.0, 8.0, 7.0)),
     ]
     .map(|m| mesh.material(m));
-    mesh.plain(
-        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
-        ground,
-    );
-    mesh.plain(
-        [vec3(-2.0, 0.0, -1.6), 4.0 * Vec3::X, 2.5 * Vec3::Y],
-        ground,
-    );
-    mesh.plain([vec3(-0.6, 2.6, -0.5), 1.2 * Vec3::X, 0.9 * Vec3::Z], lamp);
+    before_a_wall(&mut mesh);
     let uv = [vec2(-0.7, 0.1), vec2(1.9, 0.9)];
     for (x, z, material) in [(-1.3, 0.4, even), (-0.3, 0.9, lace), (0.4, 0.1, shining)] {
         mesh.quad(

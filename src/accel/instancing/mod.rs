@@ -131,12 +131,14 @@ impl<U: Upper> BuiltAccel for TwoLevel<U> {
 
     fn marginal_rays(&self) -> Vec<Ray> {
         let growth = self.upper.layout(&self.base).growth;
+        if growth == 0.0 {
+            return Vec::new();
+        }
         let boxes = self.upper.boxes();
         let step = boxes.len().div_ceil(MARGINAL_BOXES).max(1);
-        let some = boxes.iter().step_by(step).filter(|_| growth > 0.0);
-        let beside = |(turn, bounds)| MARGINS.map(|margin| beside(bounds, turn, growth, margin));
-        some.enumerate()
-            .flat_map(|(turn, b)| beside((turn, b)).into_iter().flatten())
+        let some = boxes.iter().step_by(step).enumerate();
+        some.flat_map(|(turn, b)| MARGINS.map(|margin| beside(b, turn, growth, margin)))
+            .flatten()
             .collect()
     }
 
