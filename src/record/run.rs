@@ -141,6 +141,15 @@ pub struct SkippedRecord {
     pub reason: String,
 }
 
+/// CPU time of the process, of all its threads.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CpuTime {
+    /// Of the whole run, seconds.
+    pub whole_s: f64,
+    /// Outside GPU work, builds, checks and loading, seconds.
+    pub overhead_s: f64,
+}
+
 /// Last line of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FinishedRecord {
@@ -150,6 +159,9 @@ pub struct FinishedRecord {
     pub parts_s: BTreeMap<String, f64>,
     /// Wall time outside GPU work, builds, checks and loading.
     pub overhead_s: f64,
+    /// The same as CPU time; absent where the system has no such clock, and in records of before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<CpuTime>,
     /// Cells that failed.
     pub failed: usize,
     /// Cells that were skipped.

@@ -5,16 +5,26 @@
 //! in triangle planes, along axes with zeros of both signs and components near zero, along the
 //! diagonals of the scene; from corners, triangle planes, box and cell planes, and far outside;
 //! with direction lengths from 1e-10 to 1e10. The other half are parts of these: they end or begin
-//! exactly at, just before or just behind the hit, are a point, or are empty.
+//! exactly at, just before or just behind the hit, are a point, or are empty. A few more see a triangle
+//! nearly edge-on, just above and just below the limit at which it is no longer hit.
 //!
 //! They depend only on the scene and a seed, and are never timed.
 
 use glam::Vec3;
+use raystone_accel::triangle::{TriangleRecord, edge_on_share};
 use raystone_accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
+use raystone_core::geometry::Triangle;
 use raystone_core::random::Pcg32;
 
+/// Whole rays and parts of them.
+const WHOLE_AND_PARTS: usize = 4100;
+/// Rays in the planes of triangles, near the limit of what is edge-on.
+const EDGE_ON: usize = 192;
 /// Number of hard rays; not a multiple of a workgroup.
-pub const HARD_RAYS: usize = 4100;
+pub const HARD_RAYS: usize = WHOLE_AND_PARTS + EDGE_ON;
+
+/// Rays tried for each of these: one in sixty is near the limit, and of flat rectangles none.
+const TRIES: usize = 1000;
 
 /// Origins outside the scene are up to this many diagonals away, as far as grid margins allow.
 const OUTSIDE: f32 = 15.0;
@@ -30,7 +40,9 @@ pub fn hard_rays(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Vec
         return Vec::new();
     }
     let mut maker = Maker::new(soup, seed);
-    let mut rays: Vec<Ray> = (0..HARD_RAYS / 2).map(|kind| maker.whole(kind)).collect();
+    let mut rays: Vec<Ray> = (0..WHOLE_AND_PARTS / 2)
+        .map(|kind| maker.whole(kind))
+        .collect();
     let parts: Vec<Ray> = rays
         .iter()
         .enumerate()
@@ -41,6 +53,7 @@ pub fn hard_rays(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Vec
         })
         .collect();
     rays.extend(parts);
+    rays.extend((0..EDGE_ON).map(|turn| maker.edge_on(turn)));
     rays
 }
 
@@ -226,6 +239,36 @@ impl<'a> Maker<'a> {
         }
     }
 
+    /// In the plane of a triangle and towards it, which it sees at half to twice the limit of what is edge-on, or anyhow
+    /// if no try does. Every other one ends soon behind the triangle and begins before it.
+    fn edge_on(&mut self, turn: usize) -> Ray {
+        let tests = self.soup.intersection;
+        let mut ray = Ray::new(Vec3::ZERO, Vec3::Y);
+        for _ in 0..TRIES {
+            let corners = self.triangle();
+            let [a, b, c] = corners;
+            let (e, f) = (b - a, c - a);
+            let [s, t] = [self.unit(), self.unit()].map(|x| 6.0 * x - 3.0);
+            let origin = (a + s * e + t * f).map(flushed);
+            let target = a + 0.5 * (self.unit() * e + self.unit() * f);
+            let direction = (target - origin).map(flushed);
+            if !direction.is_finite() || direction.abs().max_element() <= 1e-16 {
+                continue;
+            }
+            ray = Ray::new(origin, direction);
+            let raised = tests.raised(&ray);
+            let record = TriangleRecord::new(&Triangle { vertices: corners }, 0, 0);
+            let share = edge_on_share(&record, &raised, &tests.inverse(raised.direction));
+            if share.is_some_and(|share| (0.5..2.0).contains(&share)) {
+                break;
+            }
+        }
+        match turn % 2 {
+            0 => ray,
+            _ => ray.between(0.5, 1.5),
+        }
+    }
+
     /// Along a diagonal of the scene or of one of its faces, either way: passes many boxes.
     fn along_a_diagonal(&mut self) -> (Vec3, Vec3) {
         let pick = [(); 3].map(|()| self.random.below(2) == 0);
@@ -263,21 +306,52 @@ mod tests {
     use raystone_core::params::{Params, Variant};
     use raystone_scene::{LoadOptions, load};
 
-    #[test]
-    fn no_hard_ray_holds_a_denormal_number_and_some_end_beside_zero() {
+    fn of_scene(name: &str) -> (TriangleSoup, Vec<Ray>) {
         let variant = Variant {
-            name: "cornell-box".to_owned(),
+            name: name.to_owned(),
             params: Params::default(),
             label: String::new(),
         };
         let scene = load(&variant, &LoadOptions::default()).expect("a built-in scene");
         let soup = TriangleSoup::new(&scene);
         let registry = AccelRegistry::default();
-        let kind = registry.get("brute-force").expect("a structure");
+        let kind = registry.get("bvh").expect("a structure");
         let built = kind.build(&soup, &Params::default(), &mut BuildLog::default());
         let built = built.unwrap_or_else(|e| panic!("{e}"));
-        let twin = built.cpu_twin(&soup).expect("a twin");
-        let rays = hard_rays(&soup, &*twin, 1);
+        let rays = {
+            let twin = built.cpu_twin(&soup).expect("a twin");
+            hard_rays(&soup, &*twin, 1)
+        };
+        (soup, rays)
+    }
+
+    /// A limit of half or twice the size gives other hits.
+    #[test]
+    fn rays_see_triangles_on_both_sides_of_the_limit_of_what_is_edge_on() {
+        let (soup, rays) = of_scene("displaced-sphere");
+        let near = |ray: &Ray, shares: std::ops::Range<f32>| {
+            let inverse = soup.intersection.inverse(ray.direction);
+            let share = |record| edge_on_share(record, ray, &inverse);
+            let mut shares_of = soup.records.iter().filter_map(share);
+            shares_of.any(|share| shares.contains(&share))
+        };
+        let rays: Vec<Ray> = rays[WHOLE_AND_PARTS..]
+            .iter()
+            .map(|ray| soup.intersection.raised(ray))
+            .collect();
+        let count = |shares: std::ops::Range<f32>| {
+            rays.iter().filter(|ray| near(ray, shares.clone())).count()
+        };
+        let (below, above) = (count(0.5..1.0), count(1.0..2.0));
+        assert!(
+            below >= 40 && above >= 40,
+            "{below} below and {above} above the limit of {EDGE_ON}"
+        );
+    }
+
+    #[test]
+    fn no_hard_ray_holds_a_denormal_number_and_some_end_beside_zero() {
+        let (_, rays) = of_scene("cornell-box");
         assert_eq!(rays.len(), HARD_RAYS);
         let ends = |ray: &Ray| [ray.t_min, ray.t_max];
         for ray in &rays {

@@ -1,7 +1,7 @@
 //! What the images are made of: a choice for each axis, with the parameters that its registry declares.
 
 use eframe::egui;
-use egui::{ComboBox, DragValue, Ui};
+use egui::{ComboBox, DragValue, InnerResponse, TextEdit, Ui};
 use raystone_config::{Axis, COMPACTIONS, Catalogue, STRESS};
 use raystone_core::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone_viewer::{SIDE_NAMES, Screen};
@@ -106,6 +106,25 @@ fn changed(entry: &Entry, now: &Variant, name: &'static str, value: ParamValue) 
     entry.variant(&set)
 }
 
+/// A field for a text, and what was entered where that is another one: half a name is none yet.
+fn text_field(
+    ui: &mut Ui,
+    id: (&'static str, usize, &'static str),
+    now: &str,
+) -> InnerResponse<Option<String>> {
+    let id = ui.id().with(id);
+    let begun = ui.data(|kept| kept.get_temp::<String>(id));
+    let mut text = begun.unwrap_or_else(|| now.to_owned());
+    let widget = ui.add(TextEdit::singleline(&mut text).desired_width(110.0));
+    if widget.has_focus() {
+        ui.data_mut(|kept| kept.insert_temp(id, text));
+        return InnerResponse::new(None, widget);
+    }
+    ui.data_mut(|kept| kept.remove_temp::<String>(id));
+    let is_new = widget.lost_focus() && text != now;
+    InnerResponse::new(is_new.then_some(text), widget)
+}
+
 /// A widget for the parameter's range, and the value that the user gave.
 fn draw_parameter(
     ui: &mut Ui,
@@ -149,7 +168,12 @@ fn draw_parameter(
                 });
                 list.response
             }
-            // Lists, texts and steps are changed in an experiment.
+            (ParamRange::Text | ParamRange::Filled, ParamValue::Name(now)) => {
+                let widget = text_field(ui, (axis.name(), side, parameter.name), now);
+                given = widget.inner.map(ParamValue::Name);
+                widget.response
+            }
+            // Lists and steps are changed in an experiment.
             _ => ui.label(value.to_string()),
         };
         let label = ui.label(parameter.name);

@@ -45,6 +45,8 @@ function parameterField(axis, { name, description, default: initial, range }, ch
     input.value = initial;
   } else if (typeof initial === "boolean") {
     input = element("input", { id, type: "checkbox", checked: initial });
+  } else if (range.text) {
+    input = element("input", { id, type: "text", required: range.text === "filled", autocomplete: "off", spellcheck: false, value: initial });
   } else {
     input = element("input", { id, type: "number", min: range.min, max: range.max, step: range.step, value: initial });
   }

@@ -93,6 +93,7 @@ pub async fn run(host: &impl Host, overrides: &[String], only: &[String]) -> Res
         wall_s,
         parts_s: BTreeMap::new(),
         overhead_s: 0.0,
+        cpu: None,
         failed: run.failed.get(),
         skipped: run.skipped.get(),
         load: Default::default(),

@@ -49,13 +49,15 @@ fn choice(entry: &Entry) -> Value {
     })
 }
 
-/// What the page needs to ask for a parameter; `None` if that takes more than a number, a switch or a list of names.
+/// What the page needs to ask for a parameter; `None` if that takes more than a number, a switch, a text or a list of names.
 pub(crate) fn parameter(known: &Parameter) -> Option<Value> {
     let range = match &known.range {
         ParamRange::Number { min, max } => json!({ "min": min, "max": max, "step": "any" }),
         ParamRange::Integer { min, max } => json!({ "min": min, "max": max, "step": 1 }),
         ParamRange::Choice(names) => json!({ "names": names }),
         ParamRange::Flag => json!({}),
+        ParamRange::Text => json!({ "text": "any" }),
+        ParamRange::Filled => json!({ "text": "filled" }),
         _ => return None,
     };
     Some(json!({

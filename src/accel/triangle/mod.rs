@@ -27,7 +27,7 @@ pub use moeller_trumbore::MoellerTrumbore;
 pub(crate) use plane::DISTANCE_PAD;
 pub use plane::plane_error;
 pub(crate) use pluecker::Pluecker;
-pub use watertight::Watertight;
+pub use watertight::{Watertight, edge_on_share};
 
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;

@@ -84,6 +84,17 @@ pub(super) fn area_of(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
     }
 }
 
+/// Area of a triangle as a ray sees it over the limit at which it counts as edge-on: no hit up to 1. `None` where the
+/// ray's line passes it.
+pub fn edge_on_share(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Option<f32> {
+    let s = shear(ray, inverse);
+    let (p, q) = products(triangle.vertices().map(|v| sheared(&s, v)));
+    let passes = !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i]));
+    let sum = |term: fn(f32, f32) -> f32| (0..3).map(|i| term(p[i], q[i])).sum::<f32>();
+    let (area, terms) = (sum(|p, q| (p - q).abs()), sum(|p, q| p.abs() + q.abs()));
+    (!passes && terms > 0.0).then(|| area / (terms * EDGE_ON))
+}
+
 /// Both products of the edge functions opposite to the three vertices.
 pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     (

@@ -13,8 +13,8 @@ use raystone_config::Skipped;
 use raystone_core::atomic::write_atomic;
 use raystone_image::FileFormat;
 use raystone_record::{
-    Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Line, Outcome, Pictures,
-    RunRecord, SkippedRecord, records_file, text_of,
+    Body, CellRecord, CpuTime, FinishedRecord, InterruptedRecord, KernelSetRecord, Line, Outcome,
+    Pictures, RunRecord, SkippedRecord, records_file, text_of,
 };
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -348,15 +348,18 @@ impl<'a> Tally<'a> {
             wall_s: 0.0,
             parts_s: BTreeMap::new(),
             overhead_s: 0.0,
+            cpu: None,
             failed: self.failed.len(),
             skipped: self.left_out + skipped.iter().map(|s| s.cells).sum::<usize>(),
             load: Default::default(),
         };
+        let mut cpu = Vec::new();
         for line in parts.iter().flat_map(|part| part.lines()) {
             match &line.body {
                 Body::Finished(finished) => {
                     sum.wall_s += finished.wall_s;
                     sum.overhead_s += finished.overhead_s;
+                    cpu.push(finished.cpu);
                     sum.load = finished.load;
                     for (name, seconds) in &finished.parts_s {
                         *sum.parts_s.entry(name.clone()).or_default() += seconds;
@@ -366,6 +369,13 @@ impl<'a> Tally<'a> {
                 _ => {}
             }
         }
+        // Of the whole only where every part has it.
+        sum.cpu = (cpu.into_iter().collect::<Option<Vec<_>>>())
+            .filter(|parts| !parts.is_empty())
+            .map(|parts| CpuTime {
+                whole_s: parts.iter().map(|part| part.whole_s).sum(),
+                overhead_s: parts.iter().map(|part| part.overhead_s).sum(),
+            });
         if self.missing.is_empty() {
             return Body::Finished(sum);
         }

@@ -42,6 +42,10 @@ fn ends(text: &str) -> [Line; 2] {
         wall_s: 2.0,
         parts_s: BTreeMap::new(),
         overhead_s: 0.5,
+        cpu: Some(CpuTime {
+            whole_s: 3.0,
+            overhead_s: 0.25,
+        }),
         failed: 3,
         skipped: 5,
         load: Default::default(),
@@ -122,6 +126,8 @@ fn cells_are_counted_as_the_joined_records_hold_them() {
             "{number}"
         );
         assert_eq!(end.wall_s, 4.0);
+        let cpu = end.cpu.map(|cpu| [cpu.whole_s, cpu.overhead_s]);
+        assert_eq!(cpu, Some([6.0, 0.5]));
     }
 }
 

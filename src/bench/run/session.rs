@@ -17,43 +17,48 @@ use super::units::Unit;
 use crate::environment::{capture, machine_load};
 use raystone_config::{Cell, Experiment, Plan, Skipped};
 use raystone_core::text::cell_hash;
-use raystone_gpu::Gpu;
+use raystone_gpu::{Gpu, Stopwatch};
 use raystone_image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
 use raystone_record::Environment;
 use raystone_record::{
-    Body, CellRecord, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord, SkippedRecord,
+    Body, CellRecord, CpuTime, FinishedRecord, Inputs, KernelFolder, Line, Outcome, RunRecord,
+    SkippedRecord,
 };
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Images up to this many pixels store linear radiance by default: 1.5 MiB each.
 const MOST_KEPT_PIXELS: usize = 1 << 17;
 
 /// Accounts wall time to parts; unclaimed time is overhead of the program.
 pub(super) struct Clock {
-    start: Instant,
+    start: Stopwatch,
     /// Unix time of `start` in seconds.
     began_unix_s: u64,
     parts_s: BTreeMap<String, f64>,
+    /// CPU time of all parts, milliseconds.
+    parts_cpu_ms: f64,
 }
 
 impl Clock {
     fn new() -> Self {
         Self {
-            start: Instant::now(),
+            start: Stopwatch::start(),
             began_unix_s: raystone_core::clock::Instant::unix_s(),
             parts_s: BTreeMap::new(),
+            parts_cpu_ms: 0.0,
         }
     }
 
     /// Runs `work` and books its time under `part`.
     pub(super) fn time<T>(&mut self, part: &str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let result = work();
-        *self.parts_s.entry(part.to_owned()).or_default() += start.elapsed().as_secs_f64();
+        let spent = start.elapsed();
+        *self.parts_s.entry(part.to_owned()).or_default() += spent.wall_ms * 1e-3;
+        self.parts_cpu_ms += spent.cpu_ms.unwrap_or(0.0);
         result
     }
 }
@@ -372,13 +377,18 @@ impl<'a> Session<'a> {
 
     /// Writes the last record, moves the results to their folder, and reports it.
     pub(super) fn write_end(&mut self) -> Result<PathBuf, RunError> {
-        let wall_s = self.clock.start.elapsed().as_secs_f64();
+        let whole = self.clock.start.elapsed();
+        let wall_s = whole.wall_ms * 1e-3;
         let parts_s = self.clock.parts_s.clone();
         let overhead_s = (wall_s - parts_s.values().sum::<f64>()).max(0.0);
         let record = FinishedRecord {
             wall_s,
             parts_s,
             overhead_s,
+            cpu: whole.cpu_ms.map(|ms| CpuTime {
+                whole_s: ms * 1e-3,
+                overhead_s: (ms - self.clock.parts_cpu_ms).max(0.0) * 1e-3,
+            }),
             failed: self.ledger.failed,
             skipped: self.ledger.skipped,
             load: machine_load(),

@@ -37,7 +37,11 @@ fn time(data: &RunData) -> Option<Section> {
 /// slow disk or a tiny experiment is no fault of the results.
 pub(crate) fn overhead(data: &RunData) -> Option<String> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
-    let share = finished.overhead_s / finished.wall_s;
+    // Other programs on the machine lengthen wall time, most of all where threads wait for each other.
+    let (share, whose) = match finished.cpu {
+        Some(cpu) if cpu.whole_s > 0.0 => (cpu.overhead_s / cpu.whole_s, "CPU"),
+        _ => (finished.overhead_s / finished.wall_s, "wall"),
+    };
     let much = if share > OVERHEAD_TARGET {
         "more than"
     } else {
@@ -45,7 +49,7 @@ pub(crate) fn overhead(data: &RunData) -> Option<String> {
     };
     let [share, target] = [share, OVERHEAD_TARGET].map(percent);
     Some(format!(
-        "Harness overhead: {share} of the wall time is neither GPU work nor building, judging or loading ({much} the \
+        "Harness overhead: {share} of the {whose} time is neither GPU work nor building, judging or loading ({much} the \
          {target} that the harness is meant to take)."
     ))
 }

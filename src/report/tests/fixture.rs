@@ -294,7 +294,7 @@ fn cost(sampler: &Sampler) -> Line {
 
 fn finished() -> Line {
     let record = json!({
-        "kind": "finished", "wall_s": 72.0, "overhead_s": 3.3, "failed": 1, "skipped": 1,
+        "kind": "finished", "wall_s": 72.0, "overhead_s": 3.3, "cpu": { "whole_s": 120.0, "overhead_s": 3.6 }, "failed": 1, "skipped": 1,
         "parts_s": { "load": 0.4, "build": 1.1, "gate": 9.0, "gpu": 51.0, "judge": 6.0, "report": 1.2 },
     });
     line(&[], record)

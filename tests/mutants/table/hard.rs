@@ -23,6 +23,29 @@ const LIST: Subject = structure("object-list", &[]);
 const META: Subject = structure("meta-bvh", &[]);
 
 pub const MUTANTS: &[Mutant] = &[
+    // Triangles that are seen edge-on.
+    row(
+        "edge-on-too-soon",
+        "triangles are edge-on at twice the limit",
+        text(
+            "accel/triangle/watertight",
+            "const EDGE_ON: f32 = 5.9604645e-8;",
+            "const EDGE_ON: f32 = 1.1920929e-7;",
+        ),
+        BVH,
+        Check::Gate,
+    ),
+    row(
+        "edge-on-too-late",
+        "triangles are edge-on at half the limit",
+        text(
+            "accel/triangle/watertight",
+            "const EDGE_ON: f32 = 5.9604645e-8;",
+            "const EDGE_ON: f32 = 2.9802322e-8;",
+        ),
+        BVH,
+        Check::Gate,
+    ),
     // Zero components and −0.
     row(
         "grid-walks-back-at-zero",
