@@ -2,7 +2,8 @@
 //! two nodes.
 #![cfg(unix)]
 
-use crate::support::needs;
+use crate::support::{needs, tier};
+use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -265,4 +266,59 @@ fn what_is_required_is_not_skipped() {
     assert!(refused("files slurm", "slurm").contains("names slurm"));
     assert!(refused("slum", "files").contains("`slum`"));
     assert!(refused("", "slum").contains("`slum`"));
+}
+
+/// Every step of `scripts/gpu-run` once, the first experiment in little and the others planned. The full tier runs it: the kernels of
+/// forty variants are compiled.
+#[test]
+fn every_step_of_a_run_on_a_gpu_can_be_taken_and_its_records_are_read() {
+    if !tier::is_full() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (out, site) = (folder.path().join("out"), folder.path().join("site"));
+    let program = env!("CARGO_BIN_EXE_raystone");
+    let took = Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/gpu-run"))
+        .args(["--trial", "--budget", "1800", "--program", program, "--out"])
+        .arg(&out)
+        .output()
+        .expect("a script");
+    let steps = fs::read_to_string(out.join("steps.tsv")).expect("a list of steps");
+    let failed: Vec<&str> = (steps.lines().skip(1))
+        .filter(|step| step.split('\t').nth(1) != Some("0"))
+        .collect();
+    assert!(took.status.success() && failed.is_empty(), "{failed:?}");
+    let of_folder: Vec<String> =
+        fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/thesis"))
+            .expect("experiments")
+            .filter_map(|file| Some(file.ok()?.path().file_stem()?.to_str()?.to_owned()))
+            .collect();
+    for name in &of_folder {
+        assert!(
+            steps
+                .lines()
+                .any(|step| step.starts_with(&format!("{name}\t"))),
+            "{name}"
+        );
+    }
+    let first = out.join("gpu-first");
+    for arguments in [
+        vec![OsStr::new("compare"), first.as_os_str(), first.as_os_str()],
+        vec![
+            OsStr::new("gallery"),
+            first.as_os_str(),
+            OsStr::new("--out"),
+            site.as_os_str(),
+        ],
+    ] {
+        let read = Command::new(program)
+            .args(&arguments)
+            .output()
+            .expect("the program");
+        assert!(
+            read.status.success(),
+            "{arguments:?}: {}",
+            String::from_utf8_lossy(&read.stderr)
+        );
+    }
 }
