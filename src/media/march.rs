@@ -1,7 +1,8 @@
 //! Light along curved paths: the ray equation d/ds (n dx/ds) = ∇n with v = n dx/ds, step by step.
-//! Kernel: `kernels/media/march.wesl`.
+//! Kernels: `kernels/media/bend.wesl`, `kernels/media/march.wesl`.
 
 use crate::Medium;
+use crate::medium::Region;
 use crate::optics::Optical;
 use glam::{Vec2, Vec3};
 use raystone_core::parameters;
@@ -81,6 +82,17 @@ pub struct March {
     pub nudge: f32,
     /// A path that is longer is ended, and counted.
     pub most_steps: u32,
+}
+
+impl March {
+    /// What kernels read of it.
+    pub(crate) fn values(&self) -> UniformValues {
+        UniformValues::new()
+            .u32("scheme", self.scheme.word())
+            .u32("most_steps", self.most_steps)
+            .f32("step", self.step)
+            .f32("nudge", self.nudge)
+    }
 }
 
 /// Position, and direction times n.
@@ -174,9 +186,16 @@ fn step_length(march: &March, regions: Option<&Medium>, path: &Path) -> f32 {
     let Some(medium) = regions else {
         return march.step;
     };
+    step_in(march, &region_at(medium, path), path)
+}
+
+fn region_at(medium: &Medium, path: &Path) -> Region {
     let most = (medium.resolution - 1).as_vec3();
     let voxel = path.x.max(Vec3::ZERO).min(most).as_uvec3();
-    let region = medium.region_of(voxel, &mut 0);
+    medium.region_of(voxel, &mut 0)
+}
+
+fn step_in(march: &March, region: &Region, path: &Path) -> f32 {
     let forward = path.v.cmpgt(Vec3::ZERO);
     let planes = Vec3::select(forward, region.high.as_vec3(), region.low.as_vec3());
     let (along, speed) = (path.v.abs(), norm(path.v));
@@ -242,7 +261,7 @@ impl Marcher {
                 .feature("regions", true);
             bindings = crate::upload::bindings(medium, gpu)?;
         }
-        optical.bind(gpu, &mut bindings)?;
+        optical.bind(gpu, &mut bindings, 1.0)?;
         let count = begins.len() as u32;
         let words: Vec<[f32; 8]> = begins
             .iter()
@@ -250,14 +269,9 @@ impl Marcher {
             .collect();
         let [ends, status] = [("ends", u64::from(count) * 48), ("status", 64)]
             .map(|(name, bytes)| Storage::scratch(name, bytes));
-        let values = UniformValues::new()
-            .u32("count", count)
-            .u32("scheme", march.scheme.word())
-            .u32("most_steps", march.most_steps)
-            .f32("step", march.step)
-            .f32("nudge", march.nudge);
         bindings
-            .uniform("march", values)
+            .uniform("march", march.values())
+            .uniform("paths", UniformValues::new().u32("count", count))
             .buffer("begins", &gpu.storage("begins", &words)?)
             .buffer("ends", &ends)
             .buffer("status", &status);

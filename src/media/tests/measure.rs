@@ -317,10 +317,24 @@ const ADAPTIVE_FAULTS: [(&str, &str, &str, &str); 14] = [
 ];
 
 /// A run of one pipeline with these kernels: how many cells failed, and why.
-fn pipeline_run(folder: &std::path::Path, kernels: &str, load: &str) -> (usize, String) {
+pub(super) fn pipeline_run(
+    folder: &std::path::Path,
+    kernels: &str,
+    load: &str,
+) -> (usize, String) {
+    pipeline_run_of(folder, kernels, 12, load)
+}
+
+/// The same with so many voxels along each axis.
+pub(super) fn pipeline_run_of(
+    folder: &std::path::Path,
+    kernels: &str,
+    side: u32,
+    load: &str,
+) -> (usize, String) {
     let text = format!(
         "[run]\nname = \"faults\"\n[axes]\nintegrator = [\"media:pipeline\"]\nkernels = [\"{kernels}\"]\n\
-         [[integrator.\"media:pipeline\"]]\nside = 12\n{load}\n\
+         [[integrator.\"media:pipeline\"]]\nside = {side}\n{load}\n\
          [timing]\nrounds = 3\nmin_warmup_ms = 0\nmax_warmup_ms = 1\n"
     );
     let mut registries = Registries::default();

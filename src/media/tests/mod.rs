@@ -1,6 +1,7 @@
 //! Tests of structures and walks: answers of every structure against the field, in f64, and against the device.
 
 mod adaptive;
+mod curved;
 mod faults;
 mod march;
 mod measure;

@@ -50,6 +50,12 @@ parameters! {
         Shadow = "shadow",
         /// a cloud in nothing
         Cloud = "cloud",
+        /// a ball of clear glass in fog, with its caustic
+        Ball = "ball",
+        /// a cube of clear glass in fog, which noise disturbs
+        Cube = "cube",
+        /// a lens of Luneburg in fog that is the same everywhere
+        Lens = "lens",
     }
 
     /// photons of a lamp through a medium into a grid of radiance, evenly or by a map of importance, by one strategy of scatter, and an image of it (Pfeuti 2009)

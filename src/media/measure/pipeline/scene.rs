@@ -1,10 +1,10 @@
 //! What the lamp shines into, with the images that others are compared with.
 
-use super::checks::truth_of;
+use super::checks::{refracted_truth, truth_of};
 use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
 use crate::adaptive::Smoothing;
 use crate::measure::failed;
-use crate::medium::{Homogeneity, Medium};
+use crate::medium::{Homogeneity, Key, Medium};
 use crate::photons::{Points, point_set};
 use crate::pipeline::{Pipeline, Source, camera};
 use crate::scatter::{Adding, Strategy};
@@ -20,6 +20,15 @@ const ENLARGED: u32 = 6;
 const BALL: DVec3 = DVec3::new(0.45, 0.6, 0.5);
 const RADIUS: f64 = 0.15;
 const DENSE: f32 = 40.0;
+/// Glass, its middle, radius of the ball or half the side of the cube, and the part of the fog's σ that it has.
+const GLASS: f32 = 1.5;
+const MIDDLE: DVec3 = DVec3::new(0.5, 0.62, 0.5);
+const SIZE: f64 = 0.18;
+const CLEAR: f32 = 0.25;
+/// What noise adds to the cube's index, at most about.
+const NOISE: f32 = 0.1;
+/// Photons along each axis for each voxel along an axis that stand for the exact light where it is refracted.
+const TRUE_PHOTONS: u32 = 6;
 /// Photons along each axis of the image that has next to no noise.
 const MANY: u32 = 1024;
 
@@ -34,9 +43,36 @@ impl Content {
                 let depth = (RADIUS - (p - BALL).length()) * f64::from(side) + 0.5;
                 fog(1.0 + (DENSE - 1.0) * depth.clamp(0.0, 1.0) as f32)
             }),
+            Self::Ball => {
+                let inside = |p: DVec3| (p - MIDDLE).length() < SIZE;
+                let part = |p| procedures::coverage_of(side, p, inside);
+                let [scattering, absorption, _] = fog(CLEAR);
+                procedures::covered(side, part, fog(1.0), |_| [scattering, absorption, GLASS])
+            }
+            Self::Cube => {
+                let inside = |p: DVec3| (p - MIDDLE).abs().max_element() < SIZE;
+                let part = |p| procedures::coverage_of(side, p, inside);
+                let noise = procedures::cube_noise();
+                procedures::covered(side, part, fog(1.0), |p| {
+                    let noise = noise(p);
+                    let [scattering, absorption, _] = fog(CLEAR * (1.0 + 0.2 * noise));
+                    [scattering, absorption, GLASS + NOISE * noise]
+                })
+            }
+            Self::Lens => Volume::new([side; 3], |p| {
+                // n² = 2 - (r / R)² (Luneburg 1944).
+                let square = (p - MIDDLE).length_squared() / (SIZE * SIZE);
+                let [scattering, absorption, _] = fog(1.0);
+                [scattering, absorption, (2.0 - square.min(1.0)).sqrt() as f32]
+            }),
         }?;
         volume.phase = PHASE;
         Ok(volume)
+    }
+
+    /// Whether light is refracted in it.
+    pub(super) fn is_refractive(self) -> bool {
+        matches!(self, Self::Ball | Self::Cube | Self::Lens)
     }
 
     /// What the grid blurs: RMSE of an image, relative, at most. It falls as the square of a voxel's side in fog, and as the
@@ -47,6 +83,8 @@ impl Content {
             Self::Fog => 6.0 / (side * side),
             Self::Cloud => 1.6 / side,
             Self::Shadow => (8.0 / (side * side)).max(0.8 / side),
+            // Both images have the same grid: what ways of longer steps move.
+            Self::Ball | Self::Cube | Self::Lens => 0.8 / side,
         }
     }
 }
@@ -79,9 +117,22 @@ impl Scene {
         let Some(Ok(structure)) = made else {
             return Err(Absent::Failed("there is no level map".to_owned()));
         };
-        let medium = Medium::new(&volume, structure, Homogeneity::default());
+        let homogeneity = if load.content.is_refractive() {
+            // As in the thesis; where n is the same, steps are long.
+            Homogeneity {
+                key: Key::Refraction,
+                epsilon: 0.0,
+            }
+        } else {
+            Homogeneity::default()
+        };
+        let medium = Medium::new(&volume, structure, homogeneity);
         let rays = view();
-        let truth = truth_of(&volume, &medium, LAMP, &rays);
+        let truth = if load.content.is_refractive() {
+            refracted_truth(&volume, &medium, &rays, TRUE_PHOTONS * load.side)?
+        } else {
+            truth_of(&volume, &medium, LAMP, &rays)
+        };
         if truth.iter().all(|light| *light <= 0.0) {
             let side = load.side;
             return Err(Absent::Refused(format!(
