@@ -16,6 +16,7 @@ pub mod scatter;
 pub mod segments;
 pub mod tracking;
 mod upload;
+pub mod voxels;
 
 pub use measure::register;
 pub use raystone_volume::{

@@ -95,7 +95,12 @@ fn solid(
         let factor = factor(p);
         [0.5 * factor, 0.0, 1.0 + (GLASS - 1.0) * factor]
     };
-    covered(side, |p| coverage_of(side, p, &inside), [FOG[0], FOG[1], 1.0], glass)
+    covered(
+        side,
+        |p| coverage_of(side, p, &inside),
+        [FOG[0], FOG[1], 1.0],
+        glass,
+    )
 }
 
 /// The part of a voxel, of `side` along an axis, that is inside: of 4³ points around its centre.

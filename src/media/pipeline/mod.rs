@@ -21,8 +21,7 @@ use bending::Bending;
 use glam::{DVec3, Vec3};
 use marched::{Counting, Marched, Through};
 use raystone_gpu::{
-    Bindings, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues,
-    groups_for,
+    Bindings, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues, groups_for,
 };
 
 /// Reasons why photons give no image.
@@ -41,7 +40,9 @@ pub enum PipelineError {
     #[error(transparent)]
     Scatter(#[from] ScatterError),
     /// A medium that bends light has voxels that are no cubes.
-    #[error("voxels of a refractive medium have to be cubes, and these are {0}: give its box sides like its resolution")]
+    #[error(
+        "voxels of a refractive medium have to be cubes, and these are {0}: give its box sides like its resolution"
+    )]
     Voxels(DVec3),
     /// A number of the map of importance is not allowed.
     #[error("{0}")]
@@ -325,13 +326,7 @@ impl Pipeline {
         } else {
             Counting::None
         };
-        let marched = Marched::record(
-            &gpu,
-            self.through(),
-            self.adding,
-            &photons,
-            counting,
-        )?;
+        let marched = Marched::record(&gpu, self.through(), self.adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let smooth = match self.smoothing.filter {
@@ -381,13 +376,7 @@ impl Pipeline {
         // Their grid is small, so that a strategy of few collisions would count for little.
         let adding = Adding::new(Strategy::Fixed64, 0);
         let gpu = self.player.gpu();
-        let marched = Marched::record(
-            gpu,
-            self.through(),
-            adding,
-            &photons,
-            counting,
-        )?;
+        let marched = Marched::record(gpu, self.through(), adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let radiance: Vec<[f32; 8]> = self.downloaded(&marched.scatter.radiance)?;

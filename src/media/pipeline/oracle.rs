@@ -13,7 +13,7 @@ const ROUNDING: f64 = 4e-7;
 /// A photon that passes an edge may leave a sliver of its way in a voxel beside: so many of them in one voxel.
 const SLIVERS: f64 = 16.0;
 /// How far rounding may move a curved way, in voxels.
-const WANDER: f64 = 1e-3;
+const WANDER: f64 = 2e-4;
 /// Photons whose ways are kept at a time.
 const CHUNK: usize = 4096;
 
@@ -298,7 +298,9 @@ pub(crate) fn crossed_by(
         let [x, y] = photon.cell_of(map).map(u64::from);
         let mut last = None;
         let legs = legs_of(medium, ways, photon);
-        let pieces = legs.iter().flat_map(|leg| pieces(medium.resolution, leg.line, leg.span));
+        let pieces = legs
+            .iter()
+            .flat_map(|leg| pieces(medium.resolution, leg.line, leg.span));
         for piece in pieces {
             let place = cell_place(medium, piece.voxel, cells);
             if last != Some(place) {
@@ -331,7 +333,7 @@ fn density(phase: Phase, cosine: f64) -> f64 {
 }
 
 /// What rays of a view see of a grid of radiance: in each voxel on their way, the light at the middle of their piece that is
-/// scattered into them, times the transmittance up to the eye, over n².
+/// scattered into them, times the transmittance up to the eye and the square of n where the ray enters over n there.
 pub(crate) fn seen_by(
     fields: &Fields,
     ways: Option<&Ways>,
@@ -358,19 +360,21 @@ pub(crate) fn seen_by(
                 direction: *direction,
             }],
         };
+        let n_at = |position| ways.map_or(1.0, |ways| ways.n_at(position));
+        let outside = legs.first().map_or(1.0, |leg| n_at(leg.line.0));
         let (mut light, mut through) = (DVec3::ZERO, 1.0);
         for leg in legs {
             for piece in pieces(medium.resolution, leg.line, leg.span) {
                 let middle = leg.line.0 + leg.line.1 * (0.5 * (piece.span[0] + piece.span[1]));
                 let (energy, flow) = radiance_at(medium, radiance, middle);
                 let after = (-fields.depth(leg.line, &piece)).exp();
-                let n = ways.map_or(1.0, |ways| ways.n_at(middle));
+                let share = (outside / n_at(middle)).powi(2);
                 let mean = energy.element_sum() / 3.0;
                 if mean > 0.0 {
                     // Light goes on against the ray.
                     let cosine = -flow.dot(leg.direction) / mean;
                     let scattered = density(volume.phase, cosine) * per_volume * albedo;
-                    light += energy * (scattered * through * (1.0 - after) / (n * n));
+                    light += energy * (scattered * through * (1.0 - after) * share);
                 }
                 through *= after;
             }

@@ -76,17 +76,26 @@ impl<'a> Ways<'a> {
         [0, 1, 2, 3, 4, 5, 6, 7].map(|k: u32| {
             let offset = UVec3::new(k & 1, k >> 1 & 1, k >> 2);
             let weight = DVec3::select(offset.cmpeq(UVec3::ONE), w, 1.0 - w).element_product();
-            (self.medium.voxel_index((low + offset).min(most)) as usize, weight)
+            (
+                self.medium.voxel_index((low + offset).min(most)) as usize,
+                weight,
+            )
         })
     }
 
     /// n at a position in voxels.
     pub(crate) fn n_at(&self, position: DVec3) -> f64 {
-        self.around(position).iter().map(|(at, w)| self.n[*at] * w).sum()
+        self.around(position)
+            .iter()
+            .map(|(at, w)| self.n[*at] * w)
+            .sum()
     }
 
     fn gradient_at(&self, position: DVec3) -> DVec3 {
-        self.around(position).iter().map(|(at, w)| self.gradient[*at] * *w).sum()
+        self.around(position)
+            .iter()
+            .map(|(at, w)| self.gradient[*at] * *w)
+            .sum()
     }
 
     /// The way of light from a place in the grid along a unit direction, until it leaves the grid.
@@ -121,12 +130,18 @@ impl<'a> Ways<'a> {
     /// other half.
     fn to_border(&self, x: DVec3, v: DVec3) -> (DVec3, DVec3) {
         let most = (self.medium.resolution - 1).as_dvec3();
-        let region = self.medium.region_of(x.max(DVec3::ZERO).min(most).as_uvec3(), &mut 0);
+        let region = self
+            .medium
+            .region_of(x.max(DVec3::ZERO).min(most).as_uvec3(), &mut 0);
         let mut h = f64::INFINITY;
         for axis in 0..3 {
             let along = v[axis] / v.length();
             if along.abs() >= STRAIGHT {
-                let plane = if along > 0.0 { region.high[axis] } else { region.low[axis] };
+                let plane = if along > 0.0 {
+                    region.high[axis]
+                } else {
+                    region.low[axis]
+                };
                 h = h.min((f64::from(plane) - x[axis]).abs() / along.abs());
             }
         }

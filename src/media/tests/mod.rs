@@ -12,6 +12,7 @@ pub(crate) mod segments;
 #[path = "../../../tests/support/tier.rs"]
 mod tier;
 mod tracking;
+mod voxels;
 
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::{Volume, procedures, structure};
