@@ -80,7 +80,10 @@ impl Ready {
             rays: &scene.rays,
             truth: &scene.truth,
             side: load.side,
-            blur: load.content.blur(load.side),
+            blur: match load.filter {
+                Filter::None => load.content.blur(load.side),
+                _ => load.content.blur_of_smooth(load.side),
+            },
             even: load.points != Points::Random,
             unit: pipeline.unit(),
             smoothing: load.smoothing(),

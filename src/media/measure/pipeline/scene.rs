@@ -89,6 +89,12 @@ impl Content {
         Ok(volume)
     }
 
+    /// The same of a grid that is smoothed: a caustic is as narrow as a voxel.
+    pub(super) fn blur_of_smooth(self, side: u32) -> f64 {
+        let times = if self.is_refractive() { 4.0 } else { 1.0 };
+        self.blur(side) * times
+    }
+
     /// Whether light is refracted in it.
     pub(super) fn is_refractive(self) -> bool {
         matches!(self, Self::Ball | Self::Cube | Self::Lens | Self::Torus)
