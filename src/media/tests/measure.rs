@@ -343,11 +343,11 @@ const CURVED_FAULTS: [(&str, &str, &str, &str); 18] = [
         "v - optics_at(middle)",
         "ball",
     ),
-    // A direction without n, and regions that count as even where they are not.
+    // A way that begins beside its photon, and regions that count as even where they are not.
     (
         "curved/way",
-        "direction * optics_at(x).n",
-        "direction",
+        "let x = clamp(origin,",
+        "let x = clamp(origin + 0.5,",
         "lens",
     ),
     (
@@ -498,7 +498,9 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         "faults of photons in a run",
         fixed.into_iter().chain(adaptive).chain(curved),
     );
-    for (k, (file, text, fault, load)) in faults.into_iter().enumerate() {
+    let mut unseen = Vec::new();
+    let skip: usize = std::env::var("RS_SKIP").map_or(0, |s| s.parse().unwrap());
+    for (k, (file, text, fault, load)) in faults.into_iter().enumerate().skip(skip) {
         let name = match file {
             "phase" => "volume/phase".to_owned(),
             _ => format!("media/{file}"),
@@ -511,6 +513,9 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         std::fs::write(path, sound.replace(text, fault)).unwrap();
         let (failed, reason) = pipeline_run(folder.path(), kernels.to_str().unwrap(), &load);
         println!("{file}: `{text}` as `{fault}`: {reason}");
-        assert_eq!(failed, 1, "{file}: `{text}` as `{fault}` was not seen");
+        if failed != 1 {
+            unseen.push(format!("{file}: `{text}` as `{fault}`"));
+        }
     }
+    assert!(unseen.is_empty(), "not seen: {unseen:#?}");
 }
