@@ -278,32 +278,3 @@ fn a_refractive_medium_of_voxels_that_are_no_cubes_is_refused() {
     let over = medium_of(&even);
     assert!(Pipeline::new(&gpu, (&even, &over), adding, super::pipeline::LAMP, some).is_ok());
 }
-
-// TEMPORARY
-#[test]
-fn temporary_measure() {
-    let Ok(path) = std::env::var("RS_TOML") else {
-        return;
-    };
-    let sets: Vec<String> = std::env::var("RS_SET").map(|s| vec![s]).unwrap_or_default();
-    let mut registries = raystone_bench::run::Registries::default();
-    crate::register(&mut registries).unwrap();
-    let text = std::fs::read_to_string(path).unwrap();
-    let experiment = raystone_config::Experiment::parse(&text, "x", &sets, &registries.catalogue());
-    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
-    let plan = raystone_config::Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))
-        .unwrap();
-    let options = raystone_bench::run::RunOptions {
-        out: std::env::var("RS_OUT").unwrap().into(),
-        existing: raystone_bench::run::Existing::Replace,
-        ..Default::default()
-    };
-    let start = std::time::Instant::now();
-    let summary = raystone_bench::run::run(&experiment, &plan, &registries, &options).unwrap();
-    println!(
-        "failed {} skipped {} in {:?}",
-        summary.failed,
-        summary.skipped,
-        start.elapsed()
-    );
-}
