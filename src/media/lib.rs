@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod adaptive;
+mod bend;
 pub mod march;
 mod measure;
 pub mod optics;
