@@ -390,7 +390,7 @@ const CURVED_FAULTS: [(&str, &str, &str, &str); 18] = [
         "energy, photon[2].xyz",
         "ball",
     ),
-    // Transmittance that begins anew at each chord, and a region that is kept beyond its border.
+    // Transmittance that begins anew at each chord, and one whose least σ stands for all.
     (
         "curved/photons",
         "var through = begun;",
@@ -399,7 +399,7 @@ const CURVED_FAULTS: [(&str, &str, &str, &str); 18] = [
     ),
     (
         "curved/photons",
-        "if (!is_in(walk, region)) {",
+        "if (!is_even(region)) {",
         "if (false) {",
         "ball",
     ),
