@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod adaptive;
+mod bend;
 pub mod march;
 mod measure;
 pub mod optics;
@@ -16,6 +17,7 @@ pub mod scatter;
 pub mod segments;
 pub mod tracking;
 mod upload;
+pub mod voxels;
 
 pub use measure::register;
 pub use raystone_volume::{

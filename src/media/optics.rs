@@ -102,11 +102,16 @@ impl Optical {
         composition.feature("lens", matches!(self, Self::Lens { .. }))
     }
 
-    /// Adds what kernels read of it.
+    /// Adds what kernels read of it, with the side of a voxel in the world.
     ///
     /// # Errors
     /// The grid exceeds what the adapter binds.
-    pub(crate) fn bind(&self, gpu: &Gpu, bindings: &mut Bindings) -> Result<(), GpuError> {
+    pub(crate) fn bind(
+        &self,
+        gpu: &Gpu,
+        bindings: &mut Bindings,
+        voxel: f64,
+    ) -> Result<(), GpuError> {
         let (size, radius) = match self {
             Self::Grid { size, optics } => {
                 bindings.buffer("optics", &gpu.storage("optics", optics)?);
@@ -116,7 +121,8 @@ impl Optical {
         };
         let optical = UniformValues::new()
             .uvec("size", &size.to_array())
-            .f32("radius", radius);
+            .f32("radius", radius)
+            .f32("voxel", voxel as f32);
         bindings.uniform("optical", optical);
         Ok(())
     }

@@ -50,11 +50,15 @@ pub fn gyroid(side: u32) -> Result<Volume, MediaError> {
 /// # Errors
 /// The resolution is not allowed.
 pub fn noisy_cube(side: u32) -> Result<Volume, MediaError> {
-    let noise = Perlin::new(1);
     let inside = |p: DVec3| (p - 0.5).abs().max_element() < 0.25;
-    solid(side, inside, |p| {
-        1.0 + 0.2 * noise.turbulence(p * 6.0, 3) as f32
-    })
+    let noise = cube_noise();
+    solid(side, inside, move |p| 1.0 + 0.2 * noise(p))
+}
+
+/// The noise of [`noisy_cube`], about ±1.
+pub fn cube_noise() -> impl Fn(DVec3) -> f32 {
+    let noise = Perlin::new(1);
+    move |p| noise.turbulence(p * 6.0, 3) as f32
 }
 
 /// A cloud: Perlin noise above a level, in nothing. Its index is 1.
@@ -87,27 +91,49 @@ fn solid(
     inside: impl Fn(DVec3) -> bool + Sync,
     factor: impl Fn(DVec3) -> f32 + Sync,
 ) -> Result<Volume, MediaError> {
+    let glass = |p: DVec3| {
+        let factor = factor(p);
+        [0.5 * factor, 0.0, 1.0 + (GLASS - 1.0) * factor]
+    };
+    covered(
+        side,
+        |p| coverage_of(side, p, &inside),
+        [FOG[0], FOG[1], 1.0],
+        glass,
+    )
+}
+
+/// The part of a voxel, of `side` along an axis, that is inside: of 4³ points around its centre.
+pub fn coverage_of(side: u32, centre: DVec3, inside: impl Fn(DVec3) -> bool) -> f32 {
     let sub = 1.0 / f64::from(side * COVERAGE);
+    let corner = centre - f64::from(COVERAGE) / 2.0 * sub;
+    let is_covered = |i: &u32| {
+        let [x, y, z] = [
+            i % COVERAGE,
+            i / COVERAGE % COVERAGE,
+            i / (COVERAGE * COVERAGE),
+        ];
+        let at = DVec3::new(x.into(), y.into(), z.into()) + 0.5;
+        inside(corner + at * sub)
+    };
+    let all = COVERAGE.pow(3);
+    (0..all).filter(is_covered).count() as f32 / all as f32
+}
+
+/// A solid in a medium of `side`³ voxels, by the part of each voxel that it covers: σ_s, σ_a and n of both are mixed by that part, and
+/// n is blurred (Pfeuti 2009, §3.2).
+///
+/// # Errors
+/// The resolution is not allowed, or a value is none that a medium has.
+pub fn covered(
+    side: u32,
+    coverage: impl Fn(DVec3) -> f32 + Sync,
+    outside: [f32; 3],
+    inside: impl Fn(DVec3) -> [f32; 3] + Sync,
+) -> Result<Volume, MediaError> {
     let mut volume = Volume::new([side; 3], |centre| {
-        let corner = centre - f64::from(COVERAGE) / 2.0 * sub;
-        let covered = |i: u32| {
-            let [x, y, z] = [
-                i % COVERAGE,
-                i / COVERAGE % COVERAGE,
-                i / (COVERAGE * COVERAGE),
-            ];
-            let at = DVec3::new(x.into(), y.into(), z.into()) + 0.5;
-            inside(corner + at * sub)
-        };
-        let all = COVERAGE.pow(3);
-        let covered = (0..all).filter(|i| covered(*i)).count() as f32 / all as f32;
-        let factor = factor(centre);
-        let mixed = |outside: f32, inside: f32| outside + covered * (inside - outside);
-        [
-            mixed(FOG[0], 0.5 * factor),
-            mixed(FOG[1], 0.0),
-            mixed(1.0, 1.0 + (GLASS - 1.0) * factor),
-        ]
+        let (part, inside) = (coverage(centre), inside(centre));
+        [0, 1, 2].map(|k| outside[k] + part * (inside[k] - outside[k]))
     })?;
     volume.refraction = blurred(&volume.refraction, side as usize);
     volume.checked()

@@ -280,6 +280,14 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged in f64 by every run of media:pipeline (src/media/measure/pipeline/checks.rs), whose faults src/media/tests/measure.rs plants",
     ),
     (
+        "media/curved/",
+        "judged in f64 by every run of media:pipeline (src/media/pipeline/ways.rs), whose faults src/media/tests/measure.rs plants",
+    ),
+    (
+        "media/voxels/",
+        "judged by winding numbers in f64 in src/media/tests/voxels.rs",
+    ),
+    (
         "media/scatter/",
         "judged by sums in f64 in src/media/tests/scatter.rs",
     ),

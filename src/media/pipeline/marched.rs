@@ -1,9 +1,10 @@
 //! The pass of photons through a medium to a grid.
 
+use super::bending::{Bending, kernel};
 use super::{Photon, PipelineError};
 use crate::Medium;
 use crate::scatter::{Adding, Scatter};
-use raystone_gpu::{Composition, Gpu, Recording, Storage, UniformValues, groups_for};
+use raystone_gpu::{Gpu, Recording, Storage, UniformValues, groups_for};
 
 /// What is counted of photons beside their energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +49,17 @@ impl Counting {
     }
 }
 
+/// What photons go through.
+#[derive(Clone, Copy)]
+pub(super) struct Through<'a> {
+    /// The medium.
+    pub(super) medium: &'a Medium,
+    /// What bends light in it.
+    pub(super) bending: Option<&'a Bending>,
+    /// True to read σ where it is known to be the same, too.
+    pub(super) general: bool,
+}
+
 /// Photons with what they leave.
 pub(super) struct Marched {
     /// The grid.
@@ -61,23 +73,28 @@ pub(super) struct Marched {
 }
 
 impl Marched {
-    /// Records photons to a grid; if `general`, σ is read where it is known to be the same, too.
+    /// Records photons to a grid.
     ///
     /// # Errors
     /// They carry no power, an array exceeds what the adapter binds, or a kernel does not compile.
     pub(super) fn record(
         gpu: &Gpu,
-        (medium, general): (&Medium, bool),
+        through: Through,
         adding: Adding,
         photons: &[Photon],
         counting: Counting,
     ) -> Result<Self, PipelineError> {
+        let Through {
+            medium,
+            bending,
+            general,
+        } = through;
         let brightest = photons.iter().map(|p| p.energy.max_element());
         let brightest = brightest.fold(0.0, f32::max);
         if brightest <= 0.0 {
             return Err(PipelineError::Dark(photons.len()));
         }
-        // No way through a voxel is longer than its diagonal; rounding may make it a little so.
+        // No piece within a voxel is longer than its diagonal; rounding may make it a little so.
         let longest = medium.size_of_voxel().length() * 1.001;
         let places = match counting {
             Counting::Origins { cells, .. } => cells.pow(3),
@@ -94,6 +111,9 @@ impl Marched {
         let status = Storage::scratch("status", 64);
         let mut bindings = crate::upload::bindings(medium, gpu)?;
         scatter.bind(&mut bindings);
+        if let Some(bending) = bending {
+            bending.bind(gpu, &mut bindings)?;
+        }
         let count = photons.len() as u32;
         let cells = match counting {
             Counting::Origins { cells, .. } => cells,
@@ -104,7 +124,7 @@ impl Marched {
             .uniform("photons", values)
             .buffer("list", &gpu.storage("photons", &words)?)
             .buffer("status", &status);
-        let mut kernel = Composition::new("media/photons")
+        let mut kernel = kernel("photons", bending)
             .with("structure", medium.structure.module())
             .feature("coarse", cells > 0)
             .feature("general", general);

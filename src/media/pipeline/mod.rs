@@ -1,11 +1,13 @@
 //! Light that is scattered once, by photons: marched by a structure, added to a grid of radiance, and gathered along the
-//! rays of a view (the reference pipeline of Pfeuti 2009). Kernels: `kernels/media/photons.wesl`, `kernels/media/gather.wesl`
-//! and those of [`crate::scatter`].
+//! rays of a view (the reference pipeline of Pfeuti 2009). Kernels: `kernels/media/photons.wesl`, `kernels/media/gather.wesl`,
+//! those of `kernels/media/curved/` where an index bends light, and those of [`crate::scatter`].
 
+mod bending;
 mod left;
 mod light;
 mod marched;
 pub(crate) mod oracle;
+pub(crate) mod ways;
 
 pub use light::{Photon, Source, photons};
 
@@ -15,11 +17,11 @@ use crate::rays::SegmentRay;
 use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
 use crate::tracking::{TrackingError, albedo};
 use crate::{Bounds, Medium, Phase, Volume};
+use bending::Bending;
 use glam::{DVec3, Vec3};
-use marched::{Counting, Marched};
+use marched::{Counting, Marched, Through};
 use raystone_gpu::{
-    Bindings, Composition, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues,
-    groups_for,
+    Bindings, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues, groups_for,
 };
 
 /// Reasons why photons give no image.
@@ -37,6 +39,11 @@ pub enum PipelineError {
     /// Energy cannot be added.
     #[error(transparent)]
     Scatter(#[from] ScatterError),
+    /// A medium that bends light has voxels that are no cubes.
+    #[error(
+        "voxels of a refractive medium have to be cubes, and these are {0}: give its box sides like its resolution"
+    )]
+    Voxels(DVec3),
     /// A number of the map of importance is not allowed.
     #[error("{0}")]
     Importance(String),
@@ -105,6 +112,7 @@ pub struct Pipeline {
     player: Player,
     volume: Volume,
     medium: Medium,
+    bending: Option<Bending>,
     adding: Adding,
     source: Source,
     points: Vec<([f64; 2], f64)>,
@@ -132,10 +140,11 @@ pub struct Rendered {
 }
 
 impl Pipeline {
-    /// Photons of a light through a medium, from points of the unit square with their densities; no view yet.
+    /// Photons of a light through a medium, from points of the unit square with their densities; no view yet. Where the index
+    /// of the volume is not the same everywhere, photons and rays of the view are refracted.
     ///
     /// # Errors
-    /// The volume is bounded by a sphere or has no albedo of its own.
+    /// The volume is bounded by a sphere or has no albedo of its own, or it is refractive and its voxels are no cubes.
     pub fn new(
         gpu: &Gpu,
         (volume, medium): (&Volume, &Medium),
@@ -148,6 +157,7 @@ impl Pipeline {
             player: Player::new(gpu),
             volume: volume.clone(),
             medium: medium.clone(),
+            bending: Bending::of(volume, medium)?,
             adding,
             source,
             points,
@@ -198,6 +208,7 @@ impl Pipeline {
     /// As [`Pipeline::new`].
     pub fn set_medium(&mut self, volume: &Volume, medium: &Medium) -> Result<(), PipelineError> {
         fits(volume)?;
+        self.bending = Bending::of(volume, medium)?;
         (self.volume, self.medium) = (volume.clone(), medium.clone());
         self.view.clear();
         self.touch(Dirty::Photons);
@@ -315,13 +326,7 @@ impl Pipeline {
         } else {
             Counting::None
         };
-        let marched = Marched::record(
-            &gpu,
-            (&self.medium, self.general),
-            self.adding,
-            &photons,
-            counting,
-        )?;
+        let marched = Marched::record(&gpu, self.through(), self.adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let smooth = match self.smoothing.filter {
@@ -336,6 +341,14 @@ impl Pipeline {
             pilots,
         });
         Ok(played.elapsed())
+    }
+
+    fn through(&self) -> Through<'_> {
+        Through {
+            medium: &self.medium,
+            bending: self.bending.as_ref(),
+            general: self.general,
+        }
     }
 
     fn photons_of(&self, points: &[([f64; 2], f64)]) -> Result<Vec<Photon>, PipelineError> {
@@ -363,13 +376,7 @@ impl Pipeline {
         // Their grid is small, so that a strategy of few collisions would count for little.
         let adding = Adding::new(Strategy::Fixed64, 0);
         let gpu = self.player.gpu();
-        let marched = Marched::record(
-            gpu,
-            (&self.medium, self.general),
-            adding,
-            &photons,
-            counting,
-        )?;
+        let marched = Marched::record(gpu, self.through(), adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let radiance: Vec<[f32; 8]> = self.downloaded(&marched.scatter.radiance)?;
@@ -445,7 +452,10 @@ impl Pipeline {
             .buffer("radiance", grid.gathered())
             .buffer("image", &image)
             .buffer("status", &status);
-        let kernel = Composition::new("media/gather")
+        if let Some(bending) = &self.bending {
+            bending.bind(&gpu, &mut bindings)?;
+        }
+        let kernel = bending::kernel("gather", self.bending.as_ref())
             .with("structure", self.medium.structure.module())
             .feature("general", self.general);
         let mut recording = Recording::new();

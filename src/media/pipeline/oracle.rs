@@ -1,9 +1,9 @@
 //! What photons leave in a grid and what a view sees of it, in f64 and without a structure: judges of the kernels.
 //! Written from the definitions in `docs/media.md`, not from `kernels/media/`.
 
+use super::ways::Ways;
 use super::{Photon, Source};
 use crate::phase::{HENYEY_GREENSTEIN, SCHLICK};
-use crate::rays::SegmentRay;
 use crate::{Medium, Phase, Volume};
 use glam::{DVec3, UVec3};
 use std::f64::consts::PI;
@@ -12,6 +12,10 @@ use std::f64::consts::PI;
 const ROUNDING: f64 = 4e-7;
 /// A photon that passes an edge may leave a sliver of its way in a voxel beside: so many of them in one voxel.
 const SLIVERS: f64 = 16.0;
+/// How far rounding may move a curved way, in voxels.
+const WANDER: f64 = 2e-4;
+/// Photons whose ways are kept at a time.
+const CHUNK: usize = 4096;
 
 /// A piece of a line within one voxel.
 #[derive(Debug, Clone, Copy)]
@@ -62,9 +66,45 @@ fn pieces(resolution: UVec3, (o, d): (DVec3, DVec3), [from, to]: [f64; 2]) -> Ve
     pieces
 }
 
-fn pieces_of(medium: &Medium, ray: &SegmentRay) -> Vec<Piece> {
-    let line = (ray.ray.origin.as_dvec3(), ray.ray.direction.as_dvec3());
-    pieces(medium.resolution, line, [ray.from, ray.to].map(f64::from))
+/// A straight part of a way.
+struct Leg {
+    /// Position and direction in voxels.
+    line: (DVec3, DVec3),
+    /// Where it begins and ends, in the world's length.
+    span: [f64; 2],
+    /// Its direction in the world.
+    direction: DVec3,
+}
+
+/// The legs of a way from a place in the grid along a unit direction, if it is curved.
+fn curved(medium: &Medium, ways: &Ways, origin: DVec3, direction: DVec3) -> Vec<Leg> {
+    let side = medium.size_of_voxel().x;
+    let leg = |chord: super::ways::Chord| Leg {
+        line: (chord.from, raised(chord.direction / side)),
+        span: [0.0, (chord.to - chord.from).length() * side],
+        direction: chord.direction,
+    };
+    ways.way(origin, direction).into_iter().map(leg).collect()
+}
+
+/// The legs of a photon.
+fn legs_of(medium: &Medium, ways: Option<&Ways>, photon: &Photon) -> Vec<Leg> {
+    let of = &photon.ray.ray;
+    let (origin, direction) = (of.origin.as_dvec3(), photon.direction.as_dvec3());
+    match ways {
+        Some(ways) => curved(medium, ways, origin, direction.normalize()),
+        None => vec![Leg {
+            line: (origin, of.direction.as_dvec3()),
+            span: [photon.ray.from, photon.ray.to].map(f64::from),
+            direction,
+        }],
+    }
+}
+
+/// A direction in voxels, none of its components 0.
+fn raised(along: DVec3) -> DVec3 {
+    let tiny = along.cmplt(DVec3::splat(1e-12)) & along.cmpgt(DVec3::splat(-1e-12));
+    DVec3::select(tiny, DVec3::splat(1e-12), along)
 }
 
 /// A medium with what σ is where it is the same in a voxel and around it.
@@ -128,9 +168,7 @@ impl<'a> Fields<'a> {
     /// A line of the world in voxels, none of its components 0.
     fn line(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let along = self.medium.difference_in_voxels(direction);
-        let tiny = along.cmplt(DVec3::splat(1e-12)) & along.cmpgt(DVec3::splat(-1e-12));
-        let along = DVec3::select(tiny, DVec3::splat(1e-12), along);
-        (self.medium.in_voxels(origin), along)
+        (self.medium.in_voxels(origin), raised(along))
     }
 }
 
@@ -151,51 +189,95 @@ pub(crate) struct Left {
     pub(crate) slack: Vec<f64>,
     /// Deposits in each voxel.
     pub(crate) counts: Vec<u32>,
-    /// The sum of their photons' weights.
+    /// How often a photon came into each voxel.
+    pub(crate) visits: Vec<u32>,
+    /// The sum of these photons' weights.
     pub(crate) weights: Vec<f64>,
     /// Energy of red, green and blue that is scattered or absorbed: of each photon Φ (1 − exp(−∫ σ)).
     pub(crate) lost: f64,
 }
 
+/// What a photon leaves in a voxel.
+struct Share {
+    place: usize,
+    energy: DVec3,
+    direction: DVec3,
+    /// How far rounding may move it.
+    slack: f64,
+}
+
+/// What a photon leaves, with the part of it that is left of it.
+fn shares_of(fields: &Fields, ways: Option<&Ways>, photon: &Photon) -> (Vec<Share>, f64) {
+    let medium = fields.medium;
+    let power = photon.energy.as_dvec3();
+    let wander = match ways {
+        Some(_) => WANDER * medium.size_of_voxel().max_element(),
+        None => 0.0,
+    };
+    let (mut through, mut shares) = (1.0, Vec::new());
+    for leg in legs_of(medium, ways, photon) {
+        for piece in pieces(medium.resolution, leg.line, leg.span) {
+            let depth = fields.depth(leg.line, &piece);
+            let way = piece.span[1] - piece.span[0];
+            let energy = power * (through * way * mean_transmittance(depth));
+            // Of a way that is nearly along a plane no more is moved than there is.
+            let moved = piece.slack.min(way);
+            shares.push(Share {
+                place: medium.voxel_index(piece.voxel) as usize,
+                energy,
+                direction: leg.direction * (energy.element_sum() / 3.0),
+                slack: power.max_element() * through * (moved + ROUNDING * way + wander),
+            });
+            through *= (-depth).exp();
+        }
+    }
+    (shares, through)
+}
+
 /// Sums of what photons leave in each voxel, from the planes between voxels alone.
-pub(crate) fn left_by(fields: &Fields, photons: &[Photon]) -> Left {
+pub(crate) fn left_by(fields: &Fields, ways: Option<&Ways>, photons: &[Photon]) -> Left {
+    use rayon::prelude::*;
     let medium = fields.medium;
     let count = medium.field.len();
     let mut left = Left {
         sums: vec![[0.0; 6]; count],
         slack: vec![0.0; count],
         counts: vec![0; count],
+        visits: vec![0; count],
         weights: vec![0.0; count],
         lost: 0.0,
     };
     let mut longest = 0.0_f64;
-    for photon in photons {
-        let ray = &photon.ray.ray;
-        let line = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let power = photon.energy.as_dvec3();
-        let mut through = 1.0;
-        for piece in pieces_of(medium, &photon.ray) {
-            let depth = fields.depth(line, &piece);
-            let way = piece.span[1] - piece.span[0];
-            let energy = power * (through * way * mean_transmittance(depth));
-            let mean = energy.element_sum() / 3.0;
-            let direction = photon.direction.as_dvec3() * mean;
-            let place = medium.voxel_index(piece.voxel) as usize;
-            let both = [energy.to_array(), direction.to_array()];
-            for (sum, value) in left.sums[place].iter_mut().zip(both.as_flattened()) {
-                *sum += value;
+    for chunk in photons.chunks(CHUNK) {
+        let of_all: Vec<_> = (chunk.par_iter())
+            .map(|photon| shares_of(fields, ways, photon))
+            .collect();
+        for (photon, (shares, through)) in chunk.iter().zip(of_all) {
+            let mut last = None;
+            for share in shares {
+                let place = share.place;
+                let both = [share.energy.to_array(), share.direction.to_array()];
+                for (sum, value) in left.sums[place].iter_mut().zip(both.as_flattened()) {
+                    *sum += value;
+                }
+                left.slack[place] += share.slack;
+                left.counts[place] += 1;
+                if last != Some(place) {
+                    left.visits[place] += 1;
+                    left.weights[place] += photon.weight;
+                }
+                last = Some(place);
             }
-            // Of a way that is nearly along a plane no more is moved than there is.
-            let moved = piece.slack.min(way);
-            left.slack[place] += power.max_element() * through * (moved + ROUNDING * way);
-            left.counts[place] += 1;
-            left.weights[place] += photon.weight;
-            through *= (-depth).exp();
+            let power = photon.energy.as_dvec3();
+            left.lost += power.element_sum() * (1.0 - through);
+            let along = f64::from(photon.ray.ray.direction.abs().max_element());
+            longest = longest.max(power.max_element() / along);
         }
-        left.lost += power.element_sum() * (1.0 - through);
-        longest = longest.max(power.max_element() / ray.direction.abs().max_element() as f64);
     }
-    let sliver = SLIVERS * longest * ROUNDING * medium.resolution.max_element() as f64;
+    let mut sliver = SLIVERS * longest * ROUNDING * medium.resolution.max_element() as f64;
+    if ways.is_some() {
+        sliver = SLIVERS * longest * WANDER;
+    }
     for slack in &mut left.slack {
         *slack += sliver;
     }
@@ -206,6 +288,7 @@ pub(crate) fn left_by(fields: &Fields, photons: &[Photon]) -> Left {
 /// squares: five sums for each cell.
 pub(crate) fn crossed_by(
     medium: &Medium,
+    ways: Option<&Ways>,
     photons: &[Photon],
     cells: u32,
     map: u32,
@@ -214,7 +297,11 @@ pub(crate) fn crossed_by(
     for photon in photons {
         let [x, y] = photon.cell_of(map).map(u64::from);
         let mut last = None;
-        for piece in pieces_of(medium, &photon.ray) {
+        let legs = legs_of(medium, ways, photon);
+        let pieces = legs
+            .iter()
+            .flat_map(|leg| pieces(medium.resolution, leg.line, leg.span));
+        for piece in pieces {
             let place = cell_place(medium, piece.voxel, cells);
             if last != Some(place) {
                 let one = [1, x, y, x * x, y * y];
@@ -246,39 +333,55 @@ fn density(phase: Phase, cosine: f64) -> f64 {
 }
 
 /// What rays of a view see of a grid of radiance: in each voxel on their way, the light at the middle of their piece that is
-/// scattered into them, times the transmittance up to the eye.
+/// scattered into them, times the transmittance up to the eye and the square of n where the ray enters over n there.
 pub(crate) fn seen_by(
     fields: &Fields,
+    ways: Option<&Ways>,
     volume: &Volume,
-    albedo: f64,
     radiance: &[[f32; 6]],
     rays: &[(DVec3, DVec3)],
-) -> Vec<DVec3> {
+) -> Result<Vec<DVec3>, crate::tracking::TrackingError> {
     use rayon::prelude::*;
     let medium = fields.medium;
+    let albedo = f64::from(crate::tracking::albedo(volume)?);
     let per_volume = medium.size_of_voxel().element_product().recip();
     let seen = |(origin, direction): &(DVec3, DVec3)| {
         let Some(span) = volume.clip(*origin, *direction) else {
             return DVec3::ZERO;
         };
-        let line = fields.line(*origin, *direction);
-        let (mut light, mut through) = (DVec3::ZERO, 1.0);
-        for piece in pieces(medium.resolution, line, span) {
-            let middle = line.0 + line.1 * (0.5 * (piece.span[0] + piece.span[1]));
-            let (energy, flow) = radiance_at(medium, radiance, middle);
-            let after = (-fields.depth(line, &piece)).exp();
-            let mean = energy.element_sum() / 3.0;
-            if mean > 0.0 {
-                // Light goes on against the ray.
-                let cosine = -flow.dot(*direction) / mean;
-                let scattered = density(volume.phase, cosine) * per_volume * albedo;
-                light += energy * (scattered * through * (1.0 - after));
+        let legs = match ways {
+            Some(ways) => {
+                let enter = medium.in_voxels(*origin + *direction * span[0]);
+                curved(medium, ways, enter, *direction)
             }
-            through *= after;
+            None => vec![Leg {
+                line: fields.line(*origin, *direction),
+                span,
+                direction: *direction,
+            }],
+        };
+        let n_at = |position| ways.map_or(1.0, |ways| ways.n_at(position));
+        let outside = legs.first().map_or(1.0, |leg| n_at(leg.line.0));
+        let (mut light, mut through) = (DVec3::ZERO, 1.0);
+        for leg in legs {
+            for piece in pieces(medium.resolution, leg.line, leg.span) {
+                let middle = leg.line.0 + leg.line.1 * (0.5 * (piece.span[0] + piece.span[1]));
+                let (energy, flow) = radiance_at(medium, radiance, middle);
+                let after = (-fields.depth(leg.line, &piece)).exp();
+                let share = (outside / n_at(middle)).powi(2);
+                let mean = energy.element_sum() / 3.0;
+                if mean > 0.0 {
+                    // Light goes on against the ray.
+                    let cosine = -flow.dot(leg.direction) / mean;
+                    let scattered = density(volume.phase, cosine) * per_volume * albedo;
+                    light += energy * (scattered * through * (1.0 - after) * share);
+                }
+                through *= after;
+            }
         }
         light
     };
-    rays.par_iter().map(seen).collect()
+    Ok(rays.par_iter().map(seen).collect())
 }
 
 /// Sums of a grid, trilinearly between the middles of voxels.

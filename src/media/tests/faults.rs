@@ -114,26 +114,26 @@ const WALKS: [Fault; 22] = [
 const PATHS: [(Scheme, &str, &str, &str); 7] = [
     (
         Scheme::Euler,
-        "march",
+        "bend",
         "v * (h / here.n)",
         "v * (h / norm(v))",
     ),
-    (Scheme::Printed, "march", "(h * here.n)", "h"),
+    (Scheme::Printed, "bend", "(h * here.n)", "h"),
     (
         Scheme::SemiImplicit,
-        "march",
+        "bend",
         "x + kicked * (h / norm(kicked))",
         "x + v * (h / norm(v))",
     ),
     (
         Scheme::DriftKickDrift,
-        "march",
+        "bend",
         "optics_at(middle).gradient",
         "optics_at(x).gradient",
     ),
     (
         Scheme::RungeKutta,
-        "march",
+        "bend",
         "(b.v + c.v) * 2.0",
         "(b.v + c.v)",
     ),

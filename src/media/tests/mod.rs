@@ -1,6 +1,7 @@
 //! Tests of structures and walks: answers of every structure against the field, in f64, and against the device.
 
 mod adaptive;
+mod curved;
 mod faults;
 mod march;
 mod measure;
@@ -11,6 +12,7 @@ pub(crate) mod segments;
 #[path = "../../../tests/support/tier.rs"]
 mod tier;
 mod tracking;
+mod voxels;
 
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::{Volume, procedures, structure};

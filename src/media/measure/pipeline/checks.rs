@@ -2,12 +2,16 @@
 //! photons, what they leave in each voxel, the energy that is lost on their way, the image of that grid, and the image
 //! against a quadrature of single scattering.
 
+use super::LAMP;
 use crate::adaptive::{Adaptive, Filter, Pilots, SmoothCell, Smoothed, Smoothing};
+use crate::photons::{Points, point_set};
 use crate::pipeline::oracle::{Fields, Left, cell_place, crossed_by, left_by, power_into, seen_by};
+use crate::pipeline::ways::{Steps, Ways};
 use crate::pipeline::{Pipeline, Rendered, Source};
-use crate::tracking::{Light, albedo, single_scattering};
+use crate::tracking::{Light, single_scattering};
 use crate::{Medium, Volume};
 use glam::{DVec3, Vec3};
+use raystone_bench::run::Absent;
 
 /// Intervals of the quadrature along a ray in a uniform medium; in others so many for each voxel along an axis.
 const STEPS: u32 = 512;
@@ -26,6 +30,12 @@ const ENERGY: f64 = 2e-5;
 const PIXEL: f64 = 1e-4;
 /// The power of a set of m² photons may be off by so many of the m on its border.
 const BORDER: f64 = 6.0;
+/// Steps of ways that stand for the exact ones, in voxels …
+const SHORT: f64 = 0.125;
+/// … and how much of all energy may be in other voxels by the pipeline's own.
+const BENT: f64 = 0.02;
+/// Of the points of photons in f64.
+const SEED: u64 = 77;
 /// RMSE of an image, relative: beside what the grid blurs, so much over the root of the photons that go through a voxel's
 /// cross-section, of random points and of others, …
 const NOISE: [f64; 2] = [0.6, 0.2];
@@ -97,6 +107,34 @@ pub(super) fn truth_of(
     rays.par_iter().map(radiance).collect()
 }
 
+/// Radiance along each ray of a lamp of intensity 1 where light is refracted: photons of a jittered set, so many along each axis,
+/// by short steps to a grid, and rays by such steps through it, all in f64.
+pub(super) fn refracted_truth(
+    volume: &Volume,
+    medium: &Medium,
+    rays: &[(DVec3, DVec3)],
+    photons: u32,
+) -> Result<Vec<f64>, Absent> {
+    let source = Source::Point {
+        position: LAMP,
+        intensity: Vec3::ONE,
+    };
+    let points = point_set(Points::Jitter, photons, SEED).map_err(Absent::Failed)?;
+    let points: Vec<_> = points.into_iter().map(|point| (point, 1.0)).collect();
+    let photons = crate::pipeline::photons((volume, medium), &source, &points)?;
+    let fields = Fields::new(medium);
+    let ways = Ways::of(volume, medium, Steps::Short(SHORT));
+    let left = left_by(&fields, ways.as_ref(), &photons);
+    let radiance: Vec<_> = left
+        .sums
+        .iter()
+        .map(|sums| sums.map(|v| v as f32))
+        .collect();
+    let seen = seen_by(&fields, ways.as_ref(), volume, &radiance, rays);
+    let seen = seen.map_err(|error| Absent::Failed(error.to_string()))?;
+    Ok(seen.into_iter().map(|light| light.x).collect())
+}
+
 impl Judge<'_> {
     /// Runs all checks.
     ///
@@ -104,8 +142,10 @@ impl Judge<'_> {
     /// The first thing that is wrong: what, where, by how much.
     pub(super) fn check(&self, pipeline: &Pipeline, found: &Rendered) -> Result<Judged, String> {
         let fields = Fields::new(self.medium);
-        let left = left_by(&fields, pipeline.photons());
-        self.check_pilots(&fields, pipeline)?;
+        let ways = Ways::of(self.volume, self.medium, Steps::Regions);
+        let ways = ways.as_ref();
+        let left = left_by(&fields, ways, pipeline.photons());
+        self.check_pilots((&fields, ways), pipeline)?;
         self.check_power(pipeline)?;
         let radiance = pipeline.radiance().map_err(|error| error.to_string())?;
         self.check_voxels(&left, &radiance, found.tallies.drops > 0)?;
@@ -114,7 +154,10 @@ impl Judge<'_> {
         self.check_counts(pipeline, &left)?;
         let gathered = pipeline.gathered().map_err(|error| error.to_string())?;
         self.check_smooth(pipeline, &radiance, &gathered)?;
-        self.check_view(&fields, &gathered, &found.image)?;
+        self.check_view((&fields, ways), &gathered, &found.image)?;
+        if found.tallies.drops == 0 {
+            self.check_ways(&fields, pipeline, &radiance)?;
+        }
         let dropped = found.tallies.dropped / (kept + found.tallies.dropped);
         self.check_image(pipeline, &found.image, dropped)
     }
@@ -211,12 +254,16 @@ impl Judge<'_> {
     }
 
     /// Pilots in each of their cells, with the places they came from and the energy they left, against f64.
-    fn check_pilots(&self, fields: &Fields, pipeline: &Pipeline) -> Result<(), String> {
+    fn check_pilots(
+        &self,
+        (fields, ways): (&Fields, Option<&Ways>),
+        pipeline: &Pipeline,
+    ) -> Result<(), String> {
         let (Some(adaptive), Some((photons, cells, _))) = (&self.adaptive, pipeline.pilots())
         else {
             return Ok(());
         };
-        let exact = crossed_by(self.medium, photons, adaptive.cells, adaptive.pilots);
+        let exact = crossed_by(self.medium, ways, photons, adaptive.cells, adaptive.pilots);
         let map = f64::from(adaptive.pilots);
         let sums = [
             ("number", 1.0),
@@ -241,7 +288,7 @@ impl Judge<'_> {
                 ));
             }
         }
-        let left = left_by(fields, photons);
+        let left = left_by(fields, ways, photons);
         let mut energies = vec![0.0; cells.len()];
         for (place, sums) in left.sums.iter().enumerate() {
             let voxel = crate::volume::voxel_at(self.volume.resolution, place).into();
@@ -266,7 +313,7 @@ impl Judge<'_> {
         let counts = pipeline.counts().map_err(|error| error.to_string())?;
         let mut all = [0.0; 4];
         for (place, (count, weight)) in counts.iter().enumerate() {
-            let exact = [f64::from(left.counts[place]), left.weights[place]];
+            let exact = [f64::from(left.visits[place]), left.weights[place]];
             all[0] += (f64::from(*count) - exact[0]).abs();
             all[1] += exact[0];
             all[2] += (weight - exact[1]).abs();
@@ -338,13 +385,13 @@ impl Judge<'_> {
     /// The image of the grid that the device has, against the same in f64.
     fn check_view(
         &self,
-        fields: &Fields,
+        (fields, ways): (&Fields, Option<&Ways>),
         gathered: &[([f32; 6], u32)],
         image: &[Vec3],
     ) -> Result<(), String> {
         let radiance: Vec<[f32; 6]> = gathered.iter().copied().map(|(sums, _)| sums).collect();
-        let albedo = f64::from(albedo(self.volume).map_err(|error| error.to_string())?);
-        let exact = seen_by(fields, self.volume, albedo, &radiance, self.rays);
+        let exact = seen_by(fields, ways, self.volume, &radiance, self.rays);
+        let exact = exact.map_err(|error| error.to_string())?;
         let brightest = exact.iter().fold(0.0, |a: f64, b| a.max(b.max_element()));
         let slack = PIXEL * brightest;
         let is_off = |(_, (found, exact)): &(usize, (&Vec3, &DVec3))| {
@@ -359,6 +406,34 @@ impl Judge<'_> {
         Err(format!(
             "pixel {pixel} of the view is {found} where the grid in f64 gives {wanted:.6}, {:.2e} of the brightest beside a slack of {PIXEL:.0e}",
             off / brightest
+        ))
+    }
+
+    /// What photons left along curved ways against the same by short steps without a structure: of all energy, how much is in
+    /// other voxels.
+    fn check_ways(
+        &self,
+        fields: &Fields,
+        pipeline: &Pipeline,
+        radiance: &[[f32; 6]],
+    ) -> Result<(), String> {
+        let Some(ways) = Ways::of(self.volume, self.medium, Steps::Short(SHORT)) else {
+            return Ok(());
+        };
+        let left = left_by(fields, Some(&ways), pipeline.photons());
+        let (mut off, mut all) = (0.0, 0.0);
+        for (exact, found) in left.sums.iter().zip(radiance) {
+            for (exact, found) in exact[..3].iter().zip(found) {
+                off += (f64::from(*found) - exact).abs();
+                all += exact;
+            }
+        }
+        if off <= BENT * all {
+            return Ok(());
+        }
+        Err(format!(
+            "{:.2e} of all energy is in other voxels than by steps of {SHORT} voxels in f64, beside a slack of {BENT:.0e}",
+            off / all
         ))
     }
 

@@ -11,6 +11,7 @@ use crate::adaptive::{Adaptive, Filter, Mode, Smoothing};
 use crate::photons::{Order, Points, Warp, ordered, point_set};
 use crate::pipeline::PipelineError;
 use crate::scatter::{ScatterError, Strategy};
+use crate::voxels::VoxelError;
 use crate::{Phase, phase};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
@@ -50,6 +51,14 @@ parameters! {
         Shadow = "shadow",
         /// a cloud in nothing
         Cloud = "cloud",
+        /// a ball of clear glass in fog, with its caustic
+        Ball = "ball",
+        /// a cube of clear glass in fog, which noise disturbs
+        Cube = "cube",
+        /// a lens of Luneburg in fog that is the same everywhere
+        Lens = "lens",
+        /// a torus of clear glass in fog, from a mesh
+        Torus = "torus",
     }
 
     /// photons of a lamp through a medium into a grid of radiance, evenly or by a map of importance, by one strategy of scatter, and an image of it (Pfeuti 2009)
@@ -132,7 +141,7 @@ impl Load {
     }
 }
 
-static FIGURES: [Figure; 18] = [
+static FIGURES: [Figure; 21] = [
     Figure::new(
         "scatter-deposit-ns/v1",
         "photons to grid",
@@ -277,6 +286,30 @@ static FIGURES: [Figure; 18] = [
         Shown::Count,
         Spread::Single,
     ),
+    Figure::new(
+        "scatter-noise-caustic/v1",
+        "the same of pixels that refraction lights",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-noise-shadow/v1",
+        "of those that it darkens",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-noise-even/v1",
+        "and of the others",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
 ];
 
 pub(super) struct Photons;
@@ -345,6 +378,15 @@ impl Measurement for Photons {
             let ready = Ready::new(at, cell, &load, &scene)?;
             Ok(Box::new(ready) as Box<dyn Prepared>)
         }))
+    }
+}
+
+impl From<VoxelError> for Absent {
+    fn from(error: VoxelError) -> Self {
+        match error {
+            VoxelError::Gpu(error) => error.into(),
+            error => Self::Failed(error.to_string()),
+        }
     }
 }
 

@@ -40,6 +40,8 @@ pub(super) struct Ready {
     tallies: Tallies,
     judged: Judged,
     noise: f64,
+    /// Of pixels that refraction lights, darkens and leaves, where it does.
+    parts: Option<[f64; 3]>,
     photons: usize,
     pilots: Option<Piloted>,
 }
@@ -78,7 +80,10 @@ impl Ready {
             rays: &scene.rays,
             truth: &scene.truth,
             side: load.side,
-            blur: load.content.blur(load.side),
+            blur: match load.filter {
+                Filter::None => load.content.blur(load.side),
+                _ => load.content.blur_of_smooth(load.side),
+            },
             even: load.points != Points::Random,
             unit: pipeline.unit(),
             smoothing: load.smoothing(),
@@ -114,6 +119,7 @@ impl Ready {
             tallies: rendered.tallies,
             judged,
             noise: scene.noise(&rendered.image),
+            parts: scene.noise_of_parts(&rendered.image),
             photons,
             pilots,
         })
@@ -248,6 +254,7 @@ impl Prepared for Ready {
             photons_ms,
             frame_ms,
             conflicts,
+            parts @ ..,
         ] = rest;
         let deposits = self.tallies.deposits as f64;
         let mut readings = vec![
@@ -275,6 +282,9 @@ impl Prepared for Ready {
                 Part::Smooth => readings.push(ms(smooth_ms)?),
                 Part::All => readings.push(ms(frame_ms)?),
             }
+        }
+        for (figure, noise) in parts.iter().zip(self.parts.into_iter().flatten()) {
+            readings.push(Reading::exact(figure, noise));
         }
         if let Some(of) = &self.pilots {
             readings.extend([

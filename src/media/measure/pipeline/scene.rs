@@ -1,18 +1,22 @@
 //! What the lamp shines into, with the images that others are compared with.
 
-use super::checks::truth_of;
+use super::checks::{refracted_truth, truth_of};
 use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
 use crate::adaptive::Smoothing;
 use crate::measure::failed;
-use crate::medium::{Homogeneity, Medium};
+use crate::medium::{Homogeneity, Key, Medium};
 use crate::photons::{Points, point_set};
-use crate::pipeline::{Pipeline, Source, camera};
+use crate::pipeline::oracle::{Fields, seen_by};
+use crate::pipeline::ways::{Steps, Ways};
+use crate::pipeline::{Pipeline, PipelineError, Source, camera};
 use crate::scatter::{Adding, Strategy};
+use crate::voxels::{Mesh, coverage};
 use crate::{MediaError, Volume, procedures, structure};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::Absent;
 use raystone_gpu::Gpu;
 use raystone_image::{Image, Picture, automatic_exposure, tone_map};
+use std::f64::consts::PI;
 
 /// Pixels of the page along each axis of a pixel of the image.
 const ENLARGED: u32 = 6;
@@ -20,23 +24,80 @@ const ENLARGED: u32 = 6;
 const BALL: DVec3 = DVec3::new(0.45, 0.6, 0.5);
 const RADIUS: f64 = 0.15;
 const DENSE: f32 = 40.0;
+/// Glass, its middle, radius of the ball or half the side of the cube, and the part of the fog's σ that it has.
+const GLASS: f32 = 1.5;
+const MIDDLE: DVec3 = DVec3::new(0.5, 0.62, 0.5);
+const SIZE: f64 = 0.18;
+const CLEAR: f32 = 0.25;
+/// The line around which the torus is, and both of its radii.
+const AXIS: DVec3 = DVec3::new(0.3, 1.0, 0.2);
+const TORUS: [f64; 2] = [0.18, 0.08];
+/// What noise adds to the cube's index, at most about.
+const NOISE: f32 = 0.1;
+/// Photons along each axis for each voxel along an axis that stand for the exact light where it is refracted.
+const TRUE_PHOTONS: u32 = 6;
 /// Photons along each axis of the image that has next to no noise.
 const MANY: u32 = 1024;
 
 impl Content {
-    fn volume(self, side: u32) -> Result<Volume, MediaError> {
+    fn volume(self, gpu: &Gpu, side: u32) -> Result<Volume, Absent> {
+        if self == Self::Torus {
+            return torus(gpu, side);
+        }
+        self.by_procedure(side).map_err(failed)
+    }
+
+    /// All but those of meshes.
+    fn by_procedure(self, side: u32) -> Result<Volume, MediaError> {
         let fog = |density: f32| [FOG[0] * density, FOG[1] * density, 1.0];
         let mut volume = match self {
-            Self::Fog => Volume::new([side; 3], |_| fog(1.0)),
+            Self::Fog | Self::Torus => Volume::new([side; 3], |_| fog(1.0)),
             Self::Cloud => procedures::cloud(side),
             Self::Shadow => Volume::new([side; 3], |p| {
                 // A border of one voxel.
                 let depth = (RADIUS - (p - BALL).length()) * f64::from(side) + 0.5;
                 fog(1.0 + (DENSE - 1.0) * depth.clamp(0.0, 1.0) as f32)
             }),
+            Self::Ball => {
+                let inside = |p: DVec3| (p - MIDDLE).length() < SIZE;
+                let part = |p| procedures::coverage_of(side, p, inside);
+                let [scattering, absorption, _] = fog(CLEAR);
+                procedures::covered(side, part, fog(1.0), |_| [scattering, absorption, GLASS])
+            }
+            Self::Cube => {
+                let inside = |p: DVec3| (p - MIDDLE).abs().max_element() < SIZE;
+                let part = |p| procedures::coverage_of(side, p, inside);
+                let noise = procedures::cube_noise();
+                procedures::covered(side, part, fog(1.0), |p| {
+                    let noise = noise(p);
+                    let [scattering, absorption, _] = fog(CLEAR * (1.0 + 0.2 * noise));
+                    [scattering, absorption, GLASS + NOISE * noise]
+                })
+            }
+            Self::Lens => Volume::new([side; 3], |p| {
+                // n² = 2 - (r / R)² (Luneburg 1944).
+                let square = (p - MIDDLE).length_squared() / (SIZE * SIZE);
+                let [scattering, absorption, _] = fog(1.0);
+                [
+                    scattering,
+                    absorption,
+                    (2.0 - square.min(1.0)).sqrt() as f32,
+                ]
+            }),
         }?;
         volume.phase = PHASE;
         Ok(volume)
+    }
+
+    /// The same of a grid that is smoothed: a caustic is as narrow as a voxel.
+    pub(super) fn blur_of_smooth(self, side: u32) -> f64 {
+        let times = if self.is_refractive() { 4.0 } else { 1.0 };
+        self.blur(side) * times
+    }
+
+    /// Whether light is refracted in it.
+    pub(super) fn is_refractive(self) -> bool {
+        matches!(self, Self::Ball | Self::Cube | Self::Lens | Self::Torus)
     }
 
     /// What the grid blurs: RMSE of an image, relative, at most. It falls as the square of a voxel's side in fog, and as the
@@ -47,8 +108,77 @@ impl Content {
             Self::Fog => 6.0 / (side * side),
             Self::Cloud => 1.6 / side,
             Self::Shadow => (8.0 / (side * side)).max(0.8 / side),
+            // Both images have the same grid: what ways of longer steps move.
+            Self::Ball | Self::Cube | Self::Lens | Self::Torus => 0.4 / side,
         }
     }
+}
+
+/// A torus of glass in fog, from a mesh of 64 by 32 quads.
+fn torus(gpu: &Gpu, side: u32) -> Result<Volume, Absent> {
+    let mesh = Mesh::torus(MIDDLE, AXIS.normalize(), TORUS, 64);
+    let parts = coverage(gpu, &mesh, side)?;
+    let found = parts.iter().map(|part| f64::from(*part)).sum::<f64>() / f64::from(side).powi(3);
+    // Middles of cells: a half of one at most along all of its surface.
+    let surface = 4.0 * PI * PI * TORUS[0] * TORUS[1];
+    let slack = surface / f64::from(8 * side);
+    if (found - mesh.volume()).abs() > slack {
+        return Err(Absent::Failed(format!(
+            "voxels of a torus enclose {found:.4} where its mesh does {:.4}, beside a slack of {slack:.4}",
+            mesh.volume()
+        )));
+    }
+    let at = |p: DVec3| {
+        let voxel = (p * f64::from(side))
+            .as_uvec3()
+            .min(glam::UVec3::splat(side - 1));
+        parts[(voxel.x + side * (voxel.y + side * voxel.z)) as usize]
+    };
+    let glass = [FOG[0] * CLEAR, FOG[1] * CLEAR, GLASS];
+    let volume = procedures::covered(side, at, [FOG[0], FOG[1], 1.0], |_| glass);
+    let mut volume = volume.map_err(failed)?;
+    volume.phase = PHASE;
+    Ok(volume)
+}
+
+/// The parts of an image: what refraction lights, what it darkens, and the rest. True where a pixel is of the part.
+type Parts = [Vec<bool>; 3];
+
+/// By how much refraction has to change a pixel.
+const CHANGED: f64 = 0.15;
+
+/// Pixels that the light of many photons meets otherwise than that of as many that go straight on, both seen along the same ways.
+fn parts_of(
+    gpu: &Gpu,
+    (volume, medium): (&Volume, &Medium),
+    rays: &[(DVec3, DVec3)],
+    many: &[Vec3],
+    points: Vec<([f64; 2], f64)>,
+) -> Result<Parts, Absent> {
+    let mut straight = volume.clone();
+    straight.refraction.fill(1.0);
+    let straight = straight.checked().map_err(failed)?;
+    let homogeneity = Homogeneity::default();
+    let over = Medium::new(&straight, medium.structure.clone(), homogeneity);
+    let adding = Adding::new(Strategy::Fixed64, 0);
+    let mut pipeline = Pipeline::new(gpu, (&straight, &over), adding, lamp(), points)?;
+    pipeline.set_view(rays);
+    pipeline.render()?;
+    let radiance = pipeline.radiance()?;
+    let ways = Ways::of(volume, medium, Steps::Regions);
+    let seen = seen_by(&Fields::new(medium), ways.as_ref(), volume, &radiance, rays);
+    let seen = seen.map_err(PipelineError::from)?;
+    let changes: Vec<f64> = (many.iter().zip(seen))
+        .map(|(with, without)| {
+            f64::from(with.element_sum()) / without.element_sum().max(1e-9) - 1.0
+        })
+        .collect();
+    let part = |is_of: &dyn Fn(f64) -> bool| changes.iter().map(|change| is_of(*change)).collect();
+    Ok([
+        part(&|change| change > CHANGED),
+        part(&|change| change < -CHANGED),
+        part(&|change| change.abs() <= CHANGED),
+    ])
 }
 
 /// A medium under the lamp.
@@ -63,6 +193,8 @@ pub(super) struct Scene {
     pub(super) truth: Vec<f64>,
     /// The image of 2²⁰ even photons, not smoothed.
     pub(super) many: Vec<Vec3>,
+    /// Its parts, where light is refracted.
+    parts: Option<Parts>,
 }
 
 impl Scene {
@@ -72,16 +204,29 @@ impl Scene {
 
     /// The volume with a level map over it, and its images.
     pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
-        let volume = load.content.volume(load.side).map_err(failed)?;
+        let volume = load.content.volume(gpu, load.side)?;
         let made = structure::registry()
             .find("level-map")
             .map(|kind| kind.make(&Default::default()));
         let Some(Ok(structure)) = made else {
             return Err(Absent::Failed("there is no level map".to_owned()));
         };
-        let medium = Medium::new(&volume, structure, Homogeneity::default());
+        let homogeneity = if load.content.is_refractive() {
+            // As in the thesis; where n is the same, steps are long.
+            Homogeneity {
+                key: Key::Refraction,
+                epsilon: 0.0,
+            }
+        } else {
+            Homogeneity::default()
+        };
+        let medium = Medium::new(&volume, structure, homogeneity);
         let rays = view();
-        let truth = truth_of(&volume, &medium, LAMP, &rays);
+        let truth = if load.content.is_refractive() {
+            refracted_truth(&volume, &medium, &rays, TRUE_PHOTONS * load.side)?
+        } else {
+            truth_of(&volume, &medium, LAMP, &rays)
+        };
         if truth.iter().all(|light| *light <= 0.0) {
             let side = load.side;
             return Err(Absent::Refused(format!(
@@ -89,12 +234,16 @@ impl Scene {
             )));
         }
         let points = point_set(Points::Hammersley, MANY, 0).map_err(Absent::Failed)?;
-        let points = points.into_iter().map(|point| (point, 1.0)).collect();
+        let points: Vec<_> = points.into_iter().map(|point| (point, 1.0)).collect();
         let adding = Adding::new(Strategy::Fixed64, 0);
-        let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, lamp(), points)?;
+        let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, lamp(), points.clone())?;
         pipeline.set_smoothing(Smoothing::default());
         pipeline.set_view(&rays);
         let many = pipeline.render()?.image;
+        let parts = match load.content.is_refractive() {
+            true => Some(parts_of(gpu, (&volume, &medium), &rays, &many, points)?),
+            false => None,
+        };
         Ok(Self {
             content: load.content,
             side: load.side,
@@ -104,18 +253,33 @@ impl Scene {
             rays,
             truth,
             many,
+            parts,
         })
     }
 
     /// RMSE of an image from that of many photons, as a part of its mean.
     pub(super) fn noise(&self, image: &[Vec3]) -> f64 {
-        let (mut square, mut mean) = (0.0, 0.0);
-        for (found, exact) in image.iter().zip(&self.many) {
-            square += f64::from((*found - *exact).length_squared());
+        self.noise_where(image, |_| true)
+    }
+
+    /// The same of the pixels that refraction lights, of those that it darkens and of the rest, as parts of the whole image's mean.
+    pub(super) fn noise_of_parts(&self, image: &[Vec3]) -> Option<[f64; 3]> {
+        let parts = self.parts.as_ref()?;
+        Some([0, 1, 2].map(|k| self.noise_where(image, |pixel| parts[k][pixel])))
+    }
+
+    /// 0 where there is no such pixel.
+    fn noise_where(&self, image: &[Vec3], is_of: impl Fn(usize) -> bool) -> f64 {
+        let (mut square, mut count, mut mean) = (0.0, 0.0, 0.0);
+        for (pixel, (found, exact)) in image.iter().zip(&self.many).enumerate() {
             mean += f64::from(exact.element_sum());
+            if is_of(pixel) {
+                square += f64::from((*found - *exact).length_squared());
+                count += 3.0;
+            }
         }
-        let count = 3.0 * image.len() as f64;
-        (square / count).sqrt() * count / mean
+        let mean = mean / (3.0 * image.len() as f64);
+        (square / f64::max(count, 1.0)).sqrt() / mean
     }
 }
 

@@ -1,0 +1,65 @@
+//! What bends photons and rays of a view. Kernels: `kernels/media/curved/`.
+
+use super::PipelineError;
+use crate::march::{March, Scheme};
+use crate::optics::Optical;
+use crate::{Medium, Volume};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
+
+/// How far beyond the border of a region a step ends, in voxels.
+pub(crate) const NUDGE: f32 = 1e-3;
+/// A way of more steps than so many for each voxel along the axes is caught.
+const STEPS_PER_VOXEL: u32 = 16;
+
+/// A medium whose index is not the same everywhere: its index and gradient, and how ways are marched.
+#[derive(Debug, Clone)]
+pub(super) struct Bending {
+    optical: Optical,
+    march: March,
+    voxel: f64,
+}
+
+impl Bending {
+    /// `None` where nothing bends light.
+    ///
+    /// # Errors
+    /// Its voxels are no cubes.
+    pub(super) fn of(volume: &Volume, medium: &Medium) -> Result<Option<Self>, PipelineError> {
+        if volume.refraction.iter().all(|n| *n == volume.refraction[0]) {
+            return Ok(None);
+        }
+        let size = medium.size_of_voxel();
+        if (size.max_element() - size.min_element()) > 1e-9 * size.max_element() {
+            return Err(PipelineError::Voxels(size));
+        }
+        let march = March {
+            scheme: Scheme::DriftKickDrift,
+            step: 0.0,
+            nudge: NUDGE,
+            most_steps: STEPS_PER_VOXEL * medium.resolution.element_sum(),
+        };
+        Ok(Some(Self {
+            optical: Optical::of(volume),
+            march,
+            voxel: size.x,
+        }))
+    }
+
+    /// Adds what kernels read of it.
+    ///
+    /// # Errors
+    /// The grid exceeds what the adapter binds.
+    pub(super) fn bind(&self, gpu: &Gpu, bindings: &mut Bindings) -> Result<(), GpuError> {
+        self.optical.bind(gpu, bindings, self.voxel)?;
+        bindings.uniform("march", self.march.values());
+        Ok(())
+    }
+}
+
+/// The kernel of that name, along straight or curved ways.
+pub(super) fn kernel(name: &str, bending: Option<&Bending>) -> Composition {
+    match bending {
+        None => Composition::new(&format!("media/{name}")),
+        Some(_) => Composition::new(&format!("media/curved/{name}")).feature("regions", true),
+    }
+}
