@@ -1,0 +1,171 @@
+//! A tree over the perfect mirrors of a scene, in which connections of the path tracer look for the triangles that may reflect one point to
+//! another: balls about triangles and cones about their normals, as in B. Walter, S. Zhao, N. Holzschuch, K. Bala, "Single scattering in
+//! refractive media with triangle mesh boundaries", 2009, 4.1. The test is in `kernels/integrator/connection.wesl`.
+
+use glam::DVec3;
+use raystone_scene::{Material, SceneData, decode_normal};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Written as the triangle of a node that has two below it.
+const INNER_NODE: u32 = u32::MAX;
+/// `vec4`s per node: ball; axis and half angle of the cone; the last node below it and its triangle.
+const NODE_ROWS: usize = 3;
+
+/// The tree and the materials in it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct MirrorTree {
+    /// Rows of the nodes, each before those below it.
+    pub rows: Vec<[u32; 4]>,
+    /// One bit per material.
+    pub connecting: Vec<u32>,
+}
+
+/// Where a tree is in `shading_tables`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MirrorPlaces {
+    /// First row of its nodes, in `vec4`.
+    pub first_mirror: u32,
+    /// Number of nodes.
+    pub mirror_nodes: u32,
+    /// Start of the bits of materials, in words.
+    pub first_connecting: u32,
+}
+
+/// A triangle that reflects.
+struct Facet {
+    id: u32,
+    corners: [DVec3; 3],
+    /// Unit axis of the cone of its corners' normals, and its half angle, radians; interpolated normals are in it, too.
+    axis: DVec3,
+    angle: f64,
+}
+
+/// True if connections go over surfaces of this material: perfect mirrors that are whole and not bent by a texture.
+fn connects(material: &Material, is_mapped: bool) -> bool {
+    let is_bent = is_mapped && material.normal_texture.is_some();
+    material.kind.name == "mirror" && material.mask.is_none() && !is_bent
+}
+
+impl MirrorTree {
+    /// The tree over the mirrors of a scene; empty if it has none.
+    pub(crate) fn of(scene: &SceneData) -> Self {
+        let is_mapped = scene.uvs.len() == scene.triangles.len();
+        let connecting: Vec<bool> = (scene.materials.iter())
+            .map(|material| connects(material, is_mapped))
+            .collect();
+        if !connecting.contains(&true) {
+            return Self::default();
+        }
+        let of_mirrors = (0..scene.triangles.len())
+            .filter(|&triangle| connecting[scene.material_ids[triangle] as usize]);
+        let mut facets: Vec<Facet> = of_mirrors.filter_map(|id| facet(scene, id)).collect();
+        let mut rows = Vec::with_capacity(2 * NODE_ROWS * facets.len());
+        if !facets.is_empty() {
+            append(&mut facets, &mut rows);
+        }
+        let word = |bits: &[bool]| -> u32 {
+            let set = (0..).zip(bits);
+            set.map(|(place, bit)| u32::from(*bit) << place).sum()
+        };
+        Self {
+            rows,
+            connecting: connecting.chunks(32).map(word).collect(),
+        }
+    }
+
+    /// Appends it to `shading_tables`.
+    pub(crate) fn append(&self, words: &mut Vec<u32>) -> MirrorPlaces {
+        if self.connecting.is_empty() {
+            return MirrorPlaces::default();
+        }
+        let first_connecting = words.len() as u32;
+        words.extend_from_slice(&self.connecting);
+        words.resize(words.len().next_multiple_of(4), 0);
+        let first_mirror = words.len() as u32 / 4;
+        words.extend_from_slice(self.rows.as_flattened());
+        MirrorPlaces {
+            first_mirror,
+            mirror_nodes: (self.rows.len() / NODE_ROWS) as u32,
+            first_connecting,
+        }
+    }
+}
+
+/// `None` if the triangle has no area.
+fn facet(scene: &SceneData, id: usize) -> Option<Facet> {
+    let corners = scene.triangles[id].vertices.map(|v| v.as_dvec3());
+    let [a, b, c] = corners;
+    let across = (b - a).cross(c - a).try_normalize()?;
+    let is_mirrored = scene.mirrored.get(id).copied().unwrap_or_default();
+    let face = if is_mirrored { -across } else { across };
+    let normals = match scene.normals.get(id) {
+        Some(words) => words.map(|word| decode_normal(word).unwrap_or(face)),
+        None => [face; 3],
+    };
+    let (axis, angle) = cone(normals.map(|normal| (normal, 0.0)));
+    Some(Facet {
+        id: id as u32,
+        corners,
+        axis,
+        angle,
+    })
+}
+
+/// A cone about cones, each an axis and a half angle.
+fn cone(of: impl IntoIterator<Item = (DVec3, f64)> + Clone) -> (DVec3, f64) {
+    let sum: DVec3 = of.clone().into_iter().map(|(axis, _)| axis).sum();
+    let Some(axis) = sum.try_normalize() else {
+        return (DVec3::Z, PI);
+    };
+    let reach = |(other, angle): (DVec3, f64)| axis.angle_between(other) + angle;
+    let angle = of.into_iter().map(reach).fold(0.0, f64::max);
+    // Normals between those of the corners leave cones wider than this.
+    (axis, if angle < FRAC_PI_2 { angle } else { PI })
+}
+
+/// Axes count on either side: a mirror reflects on both.
+fn cone_of(facets: &[Facet]) -> (DVec3, f64) {
+    let first = facets[0].axis;
+    let turned = facets.iter().map(|facet| {
+        let axis = facet.axis;
+        (
+            if first.dot(axis) < 0.0 { -axis } else { axis },
+            facet.angle,
+        )
+    });
+    cone(turned.collect::<Vec<_>>())
+}
+
+/// Appends the nodes over these facets, of which there is one at least.
+fn append(facets: &mut [Facet], rows: &mut Vec<[u32; 4]>) {
+    let corners = || facets.iter().flat_map(|facet| facet.corners);
+    let low = corners().fold(DVec3::INFINITY, DVec3::min);
+    let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let center = 0.5 * (low + high);
+    let radius = corners().map(|corner| corner.distance(center));
+    let radius = radius.fold(0.0, f64::max);
+    let (axis, angle) = cone_of(facets);
+    // In f32 they hold all that they did.
+    let row = |v: DVec3, w: f64| {
+        [v.x, v.y, v.z, w * (1.0 + 1e-6) + 1e-6 * v.length()].map(|x| (x as f32).to_bits())
+    };
+    let own = rows.len();
+    rows.extend([row(center, radius), row(axis, angle), [0; 4]]);
+    let triangle = match facets {
+        [one] => one.id,
+        several => {
+            let axis = (high - low).max_position();
+            let middle = several.len() / 2;
+            several.select_nth_unstable_by(middle, |a, b| {
+                let at = |facet: &Facet| facet.corners.iter().map(|v| v[axis]).sum::<f64>();
+                at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id))
+            });
+            let (left, right) = several.split_at_mut(middle);
+            append(left, rows);
+            append(right, rows);
+            INNER_NODE
+        }
+    };
+    let last = rows.len() / NODE_ROWS - 1;
+    rows[own + NODE_ROWS - 1] = [last as u32, triangle, 0, 0];
+}
