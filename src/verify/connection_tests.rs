@@ -45,13 +45,13 @@ fn so_are_those_over_mirrored_triangles() {
 
 const FLOOR: f32 = 0.5;
 
-/// A floor seen from the side, from x = -1 to 1.
+/// A floor seen from above within 0.5 of the origin.
 fn floor(name: &str, half: f32) -> (Mesh, u32) {
     let camera = Camera {
-        eye: vec3(0.0, 0.5, 3.0),
+        eye: vec3(0.0, 1.2, 1.2),
         target: Vec3::ZERO,
         up: Vec3::Y,
-        vertical_fov_degrees: 12.0,
+        vertical_fov_degrees: 22.0,
     };
     let mut mesh = Mesh::new(name, camera, Vec3::ZERO).unwrap();
     let grey = mesh.material(Material::diffuse("grey", Vec3::splat(FLOOR)));
@@ -161,7 +161,7 @@ fn curved(gpu: &Gpu, is_hollow: bool) -> f64 {
         &mut mesh,
         (centre, radius),
         (axis, angle),
-        [24, 150],
+        [10, 60],
         mirror,
     );
     let scene = with_point_light(mesh.done(Vec::new()));
@@ -252,7 +252,7 @@ fn apart(gpu: &Gpu, faulty: &Gpu, scene: &SceneData, strategy: &str) -> [f64; 2]
         word("strategy", strategy),
         connected(),
     ]);
-    let [a, e] = mean(gpu, scene, &without, (16, 2048));
+    let [a, e] = mean(gpu, scene, &without, (16, 8192));
     let [b, f] = mean(faulty, scene, &with, (16, 64));
     let error = e.hypot(f);
     println!(
@@ -357,14 +357,14 @@ const FAULTS: &[Fault] = &[
     Fault {
         name: "specular-spread-two-percent",
         file: "integrator/connection",
-        from: "let spread = abs(across) *",
-        to: "let spread = 1.02 * abs(across) *",
+        from: "let spread = abs(across_of(shot)) *",
+        to: "let spread = 1.02 * abs(across_of(shot)) *",
     },
     Fault {
         name: "specular-spread-half-percent",
         file: "integrator/connection",
-        from: "let spread = abs(across) *",
-        to: "let spread = 0.995 * abs(across) *",
+        from: "let spread = abs(across_of(shot)) *",
+        to: "let spread = 0.995 * abs(across_of(shot)) *",
     },
     Fault {
         name: "specular-spread-without-distance",
@@ -465,7 +465,7 @@ const FAULTS: &[Fault] = &[
     Fault {
         name: "specular-one-step",
         file: "integrator/connection",
-        from: "const STEPS: u32 = 12u;",
+        from: "const STEPS: u32 = 16u;",
         to: "const STEPS: u32 = 1u;",
     },
     Fault {

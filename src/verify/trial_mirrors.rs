@@ -129,15 +129,15 @@ pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
     let faces = vec3(0.0, -0.05, 0.3);
     mesh.plain([vec3(-0.4, 2.1, -0.3), 0.3 * Vec3::X, faces], lamp);
     let corners = [
-        vec3(1.3, 0.9, -0.3),
-        vec3(1.4, 1.2, -0.2),
-        vec3(1.35, 1.0, 0.0),
+        vec3(-0.9, 1.5, -1.5),
+        vec3(-0.6, 1.7, -1.4),
+        vec3(-0.8, 1.9, -1.2),
     ];
     mesh.triangle(corners, [Vec2::ZERO; 3], shard);
     let sphere = (vec3(0.5, 0.0, -0.5), 0.6);
-    cap(&mut mesh, sphere, (Vec3::Y, 1.4), [4, 9], ball);
+    cap(&mut mesh, sphere, (Vec3::Y, 1.4), [5, 12], ball);
     let hollow = (vec3(0.9, 0.9, 0.3), 1.0);
-    cap(&mut mesh, hollow, (vec3(1.0, 0.1, 0.0), 0.6), [3, 7], dish);
+    cap(&mut mesh, hollow, (vec3(1.0, 0.1, 0.0), 0.6), [3, 9], dish);
     let mut scene = mesh.done(vec![alphas("holes", [4, 3]), leaning()]);
     let toward = vec3(-1.0, -0.5, -0.1);
     scene.lights = vec![

@@ -62,6 +62,14 @@ impl Mirror {
         a.distance(b).max(a.distance(c))
     }
 
+    /// Weights of the second and third corner at a point of the triangle's plane.
+    fn weights(&self, point: DVec3) -> [f64; 2] {
+        let [a, b, c] = self.corners;
+        let (across, rest) = (self.across(), point - a);
+        let scale = across.length_squared();
+        [rest.cross(c - a), (b - a).cross(rest)].map(|part| part.dot(across) / scale)
+    }
+
     /// The half vector's parts across the normal.
     fn bent(&self, weights: [f64; 2], ends: [DVec3; 2]) -> DVec2 {
         let (position, normal) = self.at(weights);
@@ -72,20 +80,15 @@ impl Mirror {
 
     /// Where a ray over it ends in the plane about `end` across `away`; `None` if it misses the triangle's plane.
     fn shot(&self, from: DVec3, direction: DVec3, (end, away): (DVec3, DVec3)) -> Option<DVec3> {
-        let [a, b, c] = self.corners;
         let across = self.across();
-        let t = across.dot(a - from) / across.dot(direction);
-        let rest = from + t * direction - a;
-        let scale = across.length_squared();
-        let u = rest.cross(c - a).dot(across) / scale;
-        let v = (b - a).cross(rest).dot(across) / scale;
-        let (position, normal) = self.at([u, v]);
+        let t = across.dot(self.corners[0] - from) / across.dot(direction);
+        let (position, normal) = self.at(self.weights(from + t * direction));
         let gone = direction - 2.0 * direction.dot(normal) * normal;
         let far = away.dot(end - position) / away.dot(gone);
         far.is_finite().then(|| position + far * gone)
     }
 
-    /// The point that reflects one end to the other, searched from the middle and the corners.
+    /// The point that reflects one end to the other, searched from where the flat triangle has it, the middle and the corners.
     fn crossing(&self, ends: [DVec3; 2]) -> Option<Crossing> {
         let [from, end] = ends;
         let across = self.across();
@@ -93,13 +96,13 @@ impl Mirror {
         if heights[0] * heights[1] <= 0.0 {
             return None;
         }
+        // Of the flat triangle first.
+        let feet = [0, 1].map(|k| ends[k] - across * (heights[k] / across.length_squared()));
+        let flat = (feet[0] * heights[1] + feet[1] * heights[0]) / (heights[0] + heights[1]);
         let third = 1.0 / 3.0;
-        let starts = [[third, third], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        let weights = starts.iter().find_map(|start| self.search(*start, ends))?;
-        let [u, v] = weights;
-        if u < 0.0 || v < 0.0 || u + v > 1.0 {
-            return None;
-        }
+        let starts = [self.weights(flat), [third; 2], [0.0; 2], [1.0, 0.0], [0.0, 1.0]];
+        let mut found = starts.iter().filter_map(|start| self.search(*start, ends));
+        let weights = found.find(|[u, v]| *u >= 0.0 && *v >= 0.0 && u + v <= 1.0)?;
         let (position, normal) = self.at(weights);
         let direction = (position - from).normalize();
         let facing = across * heights[0].signum();

@@ -13,8 +13,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the area that a solid angle lights over a mirror is a fiftieth too large",
         text(
             "integrator/connection",
-            "let spread = abs(across) *",
-            "let spread = 1.02 * abs(across) *",
+            "let spread = abs(across_of(shot)) *",
+            "let spread = 1.02 * abs(across_of(shot)) *",
         ),
     ),
     fault(
@@ -22,8 +22,8 @@ pub const MUTANTS: &[Mutant] = &[
         "that area is half a percent too small",
         text(
             "integrator/connection",
-            "let spread = abs(across) *",
-            "let spread = 0.995 * abs(across) *",
+            "let spread = abs(across_of(shot)) *",
+            "let spread = 0.995 * abs(across_of(shot)) *",
         ),
     ),
     fault(
@@ -172,7 +172,7 @@ pub const MUTANTS: &[Mutant] = &[
         "the search for a point of reflection ends after one step",
         text(
             "integrator/connection",
-            "const STEPS: u32 = 12u;",
+            "const STEPS: u32 = 16u;",
             "const STEPS: u32 = 1u;",
         ),
     ),
