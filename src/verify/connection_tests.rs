@@ -157,13 +157,7 @@ fn curved(gpu: &Gpu, is_hollow: bool) -> f64 {
     };
     let axis = if is_hollow { Vec3::Y } else { -Vec3::Y };
     let angle = if is_hollow { 0.5 } else { 0.7 };
-    cap(
-        &mut mesh,
-        (centre, radius),
-        (axis, angle),
-        [10, 60],
-        mirror,
-    );
+    cap(&mut mesh, (centre, radius), (axis, angle), [10, 60], mirror);
     let scene = with_point_light(mesh.done(Vec::new()));
     let r = f64::from(radius) * if is_hollow { -1.0 } else { 1.0 };
     off(gpu, &scene, |point| {

@@ -100,7 +100,18 @@ impl Mirror {
         let feet = [0, 1].map(|k| ends[k] - across * (heights[k] / across.length_squared()));
         let flat = (feet[0] * heights[1] + feet[1] * heights[0]) / (heights[0] + heights[1]);
         let third = 1.0 / 3.0;
-        let starts = [self.weights(flat), [third; 2], [0.0; 2], [1.0, 0.0], [0.0, 1.0]];
+        // And where an end is close.
+        let [near, far] = ends.map(|end| self.weights(end));
+        let flat = self.weights(flat);
+        let starts = [
+            flat,
+            near,
+            far,
+            [third; 2],
+            [0.0; 2],
+            [1.0, 0.0],
+            [0.0, 1.0],
+        ];
         let mut found = starts.iter().filter_map(|start| self.search(*start, ends));
         let weights = found.find(|[u, v]| *u >= 0.0 && *v >= 0.0 && u + v <= 1.0)?;
         let (position, normal) = self.at(weights);
