@@ -1,8 +1,10 @@
 //! Connections over mirrors against other sources: the oracle path by path, closed forms, and path tracing without them. Then faults in
 //! kernels, each seen by one of these.
 
+use crate::image_gate::{Choice as Pick, Pixels, answers};
 use crate::media_tests::{depth, gate, gpu, image, path, rays, with_renderer, word};
 use crate::mesh::Mesh;
+use crate::path_oracle::{Estimator, PathOracle, Rounding, View};
 use crate::trial_mirrors::{cap, connected, mirrors};
 use crate::trial_scenes::{TrialScene, trial_scenes};
 use glam::{DVec3, Vec3, vec3};
@@ -27,6 +29,47 @@ fn fault_of(gpu: &Gpu) -> Option<String> {
             Some(format!("{} {changes:?}: {fault}", trial.scene.name))
         })
     })
+}
+
+/// Paths of all trials that differ from the oracle's by a thousandth; a few may, by their rounding. Where many do, the others are left out.
+fn differing(gpu: &Gpu) -> usize {
+    const SIZE: [u32; 2] = [26, 19];
+    const ENOUGH: usize = 50;
+    let pixels = Pixels {
+        size: SIZE,
+        choice: Pick::Every(1),
+        samples: vec![1],
+        seed: 90_001,
+    };
+    let mut count = 0;
+    for trial in trials() {
+        let oracle = PathOracle::new(&trial.scene).unwrap();
+        for (_, changes) in &trial.trials {
+            let integrator = path(changes);
+            let of_trial =
+                with_renderer(gpu, &trial.scene, SIZE, &integrator, |renderer, sampler| {
+                    let view = View {
+                        estimator: Estimator::of(&integrator).unwrap(),
+                        camera: trial.scene.view(1.0),
+                        size: SIZE,
+                        sampler,
+                    };
+                    let differs = answers(renderer, &pixels)?.into_iter().filter(|answer| {
+                        let truth = oracle.trace(&view, answer.id, Rounding::none()).radiance;
+                        let most = truth.max_element().max(1e-2);
+                        // NaN differs.
+                        let agrees = (answer.radiance - truth).abs().max_element() <= 1e-3 * most;
+                        !agrees
+                    });
+                    Ok(differs.count())
+                });
+            count += of_trial.unwrap();
+            if count > ENOUGH {
+                return count;
+            }
+        }
+    }
+    count
 }
 
 #[test]
@@ -474,16 +517,25 @@ const FAULTS: &[Fault] = &[
         from: "found.spread / (area * max(cosine, 1e-6))",
         to: "found.spread / area",
     },
+    Fault {
+        name: "specular-fog-before-the-mirror-clear",
+        file: "integrator/connection",
+        from: "transmittance(leg, frame.lights + 2u * index) * ",
+        to: "",
+    },
 ];
 
 #[test]
 fn the_oracle_sees_faults_of_connections() {
     let gpu = gpu();
+    let sound = differing(&gpu);
+    println!("sound: {sound}");
+    assert!(sound <= 3, "{sound}");
     let mut unseen = Vec::new();
     for fault in FAULTS {
-        let seen = fault_of(&fault.planted(&gpu));
-        println!("{}: {}", fault.name, seen.as_deref().unwrap_or("not seen"));
-        unseen.extend(seen.is_none().then_some(fault.name));
+        let count = differing(&fault.planted(&gpu));
+        println!("{}: {count}", fault.name);
+        unseen.extend((count <= 2 * sound + 6).then_some(fault.name));
     }
     assert!(unseen.is_empty(), "not seen: {unseen:?}");
 }

@@ -194,4 +194,15 @@ pub const MUTANTS: &[Mutant] = &[
             "found.spread / area",
         ),
     ),
+    row(
+        "specular-fog-before-the-mirror-clear",
+        "connections lose no light in the medium on the way to the mirror",
+        text(
+            "integrator/connection",
+            "transmittance(leg, frame.lights + 2u * index) * ",
+            "",
+        ),
+        Subject::Media,
+        Check::Media,
+    ),
 ];
