@@ -169,3 +169,114 @@ fn append(facets: &mut [Facet], rows: &mut Vec<[u32; 4]>) {
     let last = rows.len() / NODE_ROWS - 1;
     rows[own + NODE_ROWS - 1] = [last as u32, triangle, 0, 0];
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, vec3};
+    use raystone_core::geometry::Triangle;
+    use raystone_scene::{encode_normal, named};
+
+    /// Triangles of a mirror, of another mirror and of something else, in turn, with normals that lean.
+    fn scene(count: usize) -> SceneData {
+        let corner = |i: usize, k: usize| {
+            let x = (i * 7 + k * 5) as f32;
+            vec3(
+                (x * 0.7).sin() * 3.0,
+                (x * 1.3).cos(),
+                (x * 0.4).sin() * 2.0,
+            )
+        };
+        let triangles = (0..count).map(|i| Triangle {
+            vertices: [0, 1, 2].map(|k| corner(i, k)),
+        });
+        let normal =
+            |i: usize| [0, 1, 2].map(|k| encode_normal(corner(i, k) + vec3(0.0, 5.0, 0.0)));
+        SceneData {
+            triangles: triangles.collect(),
+            normals: (0..count).map(normal).collect(),
+            material_ids: (0..count as u32).map(|i| i % 3).collect(),
+            materials: vec![
+                Material::mirror("one", Vec3::ONE),
+                Material::diffuse("other", Vec3::ONE),
+                Material::mirror("two", Vec3::ONE),
+            ],
+            ..named("single-triangle").unwrap()
+        }
+    }
+
+    fn numbers(row: [u32; 4]) -> (DVec3, f64) {
+        let [x, y, z, w] = row.map(|word| f64::from(f32::from_bits(word)));
+        (DVec3::new(x, y, z), w)
+    }
+
+    /// Triangles below a node, each of which it holds.
+    fn below(tree: &MirrorTree, scene: &SceneData, node: usize) -> Vec<u32> {
+        let [ball, cone, links] = [0, 1, 2].map(|k| tree.rows[NODE_ROWS * node + k]);
+        let last = links[0] as usize;
+        let found: Vec<u32> = if links[1] == INNER_NODE {
+            let left = node + 1;
+            let right = tree.rows[NODE_ROWS * left + 2][0] as usize + 1;
+            assert_eq!(tree.rows[NODE_ROWS * right + 2][0] as usize, last);
+            [below(tree, scene, left), below(tree, scene, right)].concat()
+        } else {
+            assert_eq!(last, node);
+            vec![links[1]]
+        };
+        let ((center, radius), (axis, angle)) = (numbers(ball), numbers(cone));
+        for &id in &found {
+            for v in scene.triangles[id as usize].vertices {
+                assert!(v.as_dvec3().distance(center) <= radius);
+            }
+            let normals = scene.normals[id as usize].map(|word| decode_normal(word).unwrap());
+            let within = |side: f64| {
+                let angles = normals.map(|n| (side * axis).angle_between(n));
+                angles.into_iter().all(|a| a <= angle + 1e-6)
+            };
+            assert!(within(1.0) || within(-1.0), "{id}");
+        }
+        found
+    }
+
+    #[test]
+    fn nodes_hold_their_triangles_and_each_mirror_is_below_the_root_once() {
+        for count in [1, 3, 4, 97] {
+            let scene = scene(count);
+            let tree = MirrorTree::of(&scene);
+            let mut found = below(&tree, &scene, 0);
+            found.sort_unstable();
+            let mirrors: Vec<u32> = (0..count as u32).filter(|i| i % 3 != 1).collect();
+            assert_eq!(found, mirrors);
+            assert_eq!(tree.rows.len(), NODE_ROWS * (2 * mirrors.len() - 1));
+            assert_eq!(tree.connecting, [0b101]);
+        }
+    }
+
+    #[test]
+    fn cones_about_opposite_normals_hold_them_and_wide_ones_hold_all() {
+        let (axis, angle) = cone([(DVec3::X, 0.1), (DVec3::Y, 0.2)]);
+        assert!(
+            (angle - (PI / 4.0 + 0.2)).abs() < 1e-12
+                && axis.distance(DVec3::new(1.0, 1.0, 0.0).normalize()) < 1e-12
+        );
+        assert_eq!(cone([(DVec3::X, 0.0), (-DVec3::X, 0.0)]).1, PI);
+        assert_eq!(cone([(DVec3::X, 1.0), (DVec3::Y, 1.0)]).1, PI);
+    }
+
+    #[test]
+    fn what_is_no_whole_and_straight_mirror_is_left_out() {
+        let mut scene = scene(9);
+        let used = raystone_scene::TextureUse::plain(0);
+        scene.materials[0].normal_texture = Some(used);
+        // Without coordinates, a map bends nothing.
+        assert_eq!(MirrorTree::of(&scene).connecting, [0b101]);
+        scene.uvs = vec![[glam::Vec2::ZERO; 3]; 9];
+        assert_eq!(MirrorTree::of(&scene).connecting, [0b100]);
+        scene.materials[2] = Material::diffuse("other", Vec3::ONE);
+        let tree = MirrorTree::of(&scene);
+        assert_eq!(tree, MirrorTree::default());
+        let mut words = vec![1, 2, 3];
+        assert_eq!(tree.append(&mut words), MirrorPlaces::default());
+        assert_eq!(words, [1, 2, 3]);
+    }
+}
