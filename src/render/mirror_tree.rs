@@ -2,12 +2,15 @@
 //! another: balls about triangles and cones about their normals, as in B. Walter, S. Zhao, N. Holzschuch, K. Bala, "Single scattering in
 //! refractive media with triangle mesh boundaries", 2009, 4.1. The test is in `kernels/integrator/connection.wesl`.
 
+use super::ConfiguredIntegrator;
 use glam::DVec3;
 use raystone_scene::{Material, SceneData, decode_normal};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Written as the triangle of a node that has two below it.
 const INNER_NODE: u32 = u32::MAX;
+/// The most triangles of mirrors that a scene is searched for: their nodes have 96 bytes each, and tables may be full of textures.
+pub(super) const MOST_FACETS: usize = 1 << 15;
 /// `vec4`s per node: ball; axis and half angle of the cone; the last node below it and its triangle.
 const NODE_ROWS: usize = 3;
 
@@ -18,6 +21,8 @@ pub(super) struct MirrorTree {
     pub rows: Vec<[u32; 4]>,
     /// One bit per material.
     pub connecting: Vec<u32>,
+    /// Triangles of mirrors, if they are more than [`MOST_FACETS`]: then there is no tree.
+    pub left_out: u32,
 }
 
 /// Where a tree is in `shading_tables`.
@@ -29,6 +34,8 @@ pub struct MirrorPlaces {
     pub mirror_nodes: u32,
     /// Start of the bits of materials, in words.
     pub first_connecting: u32,
+    /// Number of triangles of mirrors, if they are too many for a tree, which then has no nodes.
+    pub left_out: u32,
 }
 
 /// A triangle that reflects.
@@ -59,6 +66,12 @@ impl MirrorTree {
         let of_mirrors = (0..scene.triangles.len())
             .filter(|&triangle| connecting[scene.material_ids[triangle] as usize]);
         let mut facets: Vec<Facet> = of_mirrors.filter_map(|id| facet(scene, id)).collect();
+        if facets.len() > MOST_FACETS {
+            return Self {
+                left_out: facets.len() as u32,
+                ..Self::default()
+            };
+        }
         let mut rows = Vec::with_capacity(2 * NODE_ROWS * facets.len());
         if !facets.is_empty() {
             append(&mut facets, &mut rows);
@@ -70,13 +83,17 @@ impl MirrorTree {
         Self {
             rows,
             connecting: connecting.chunks(32).map(word).collect(),
+            left_out: 0,
         }
     }
 
     /// Appends it to `shading_tables`.
     pub(crate) fn append(&self, words: &mut Vec<u32>) -> MirrorPlaces {
         if self.connecting.is_empty() {
-            return MirrorPlaces::default();
+            return MirrorPlaces {
+                left_out: self.left_out,
+                ..MirrorPlaces::default()
+            };
         }
         let first_connecting = words.len() as u32;
         words.extend_from_slice(&self.connecting);
@@ -87,7 +104,22 @@ impl MirrorTree {
             first_mirror,
             mirror_nodes: (self.rows.len() / NODE_ROWS) as u32,
             first_connecting,
+            left_out: 0,
         }
+    }
+}
+
+impl MirrorPlaces {
+    /// The reason why this integrator cannot render the scene, if any.
+    pub(super) fn refusal(&self, integrator: &ConfiguredIntegrator) -> Option<String> {
+        let features = integrator.kind.features(&integrator.params);
+        (self.left_out > 0 && features.contains(&("mirror_connections", true))).then(|| {
+            format!(
+                "{} with connection = specular searches at most {MOST_FACETS} triangles of mirrors, and the scene has {}: take connection = none",
+                integrator.kind.name(),
+                self.left_out
+            )
+        })
     }
 }
 
@@ -175,6 +207,7 @@ mod tests {
     use super::*;
     use glam::{Vec3, vec3};
     use raystone_core::geometry::Triangle;
+    use raystone_core::params::{ParamValue, Params, Variant};
     use raystone_scene::{encode_normal, named};
 
     /// Triangles of a mirror, of another mirror and of something else, in turn, with normals that lean.
@@ -261,6 +294,37 @@ mod tests {
         );
         assert_eq!(cone([(DVec3::X, 0.0), (-DVec3::X, 0.0)]).1, PI);
         assert_eq!(cone([(DVec3::X, 1.0), (DVec3::Y, 1.0)]).1, PI);
+    }
+
+    #[test]
+    fn too_many_mirrors_have_no_tree_and_are_refused() {
+        let count = 3 * MOST_FACETS / 2;
+        assert_eq!(MirrorTree::of(&scene(count)).left_out, 0);
+        let places = MirrorTree::of(&scene(count + 3)).append(&mut Vec::new());
+        assert_eq!(
+            (places.mirror_nodes, places.left_out as usize),
+            (0, MOST_FACETS + 2)
+        );
+        let path = |connection: &str| {
+            let changes = [("connection", connection)];
+            let changes = changes.map(|(k, v)| (k.to_owned(), ParamValue::Name(v.to_owned())));
+            let variant = Variant {
+                name: "path".to_owned(),
+                params: Params(changes.into_iter().collect()),
+                label: "path".to_owned(),
+            };
+            crate::IntegratorRegistry::default()
+                .configured(&variant)
+                .unwrap()
+        };
+        let reason = places.refusal(&path("specular")).unwrap();
+        assert!(
+            reason.contains(&format!("{}", MOST_FACETS + 2))
+                && reason.contains("connection = none"),
+            "{reason}"
+        );
+        assert_eq!(places.refusal(&path("none")), None);
+        assert_eq!(MirrorPlaces::default().refusal(&path("specular")), None);
     }
 
     #[test]
