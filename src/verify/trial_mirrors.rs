@@ -110,7 +110,7 @@ pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
             normal_texture: Some(TextureUse::plain(1)),
             ..mirror("wavy")
         },
-        Material::diffuse("lamp", Vec3::splat(0.2)).emitting_from_front(vec3(30.0, 25.0, 20.0)),
+        Material::diffuse("lamp", Vec3::splat(0.2)).emitting_from_front(vec3(4.0, 3.5, 3.0)),
         Material::diffuse("shard", Vec3::splat(0.1)).emitting(vec3(6.0, 9.0, 7.0)),
     ]
     .map(|material| mesh.material(material));
@@ -126,8 +126,9 @@ pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
         [vec3(0.9, 0.1, 1.3), 0.6 * Vec3::X, vec3(0.1, 0.6, 0.2)],
         wavy,
     );
-    let faces = vec3(0.0, -0.05, 0.3);
-    mesh.plain([vec3(-0.4, 2.1, -0.3), 0.3 * Vec3::X, faces], lamp);
+    // So large that paths find it over mirrors.
+    let faces = vec3(0.0, -0.1, 1.6);
+    mesh.plain([vec3(-0.9, 2.2, -0.9), 1.8 * Vec3::X, faces], lamp);
     let corners = [
         vec3(-0.9, 1.5, -1.5),
         vec3(-0.6, 1.7, -1.4),

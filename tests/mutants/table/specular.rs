@@ -123,11 +123,11 @@ pub const MUTANTS: &[Mutant] = &[
     ),
     fault(
         "specular-tree-prunes-too-much",
-        "cones of mirrors are an eighth of a radian too narrow",
+        "bounds of mirrors leave out how large they are",
         text(
             "integrator/connection",
             "+ HALF_PI * change / size + MARGIN",
-            "+ HALF_PI * change / size - 0.125",
+            "+ MARGIN",
         ),
     ),
     fault(
