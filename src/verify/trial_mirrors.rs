@@ -128,7 +128,7 @@ pub(crate) fn mirrors() -> Result<SceneData, SceneError> {
     );
     // So large that paths find it over mirrors.
     let faces = vec3(0.0, -0.1, 1.6);
-    mesh.plain([vec3(-0.9, 2.2, -0.9), 1.8 * Vec3::X, faces], lamp);
+    mesh.plain([vec3(-1.3, 2.2, -0.9), 1.6 * Vec3::X, faces], lamp);
     let corners = [
         vec3(-0.9, 1.5, -1.5),
         vec3(-0.6, 1.7, -1.4),

@@ -124,11 +124,7 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "specular-tree-prunes-too-much",
         "bounds of mirrors leave out how large they are",
-        text(
-            "integrator/connection",
-            "+ HALF_PI * change / size + MARGIN",
-            "+ MARGIN",
-        ),
+        text("integrator/connection", "+ arc + MARGIN", "+ MARGIN"),
     ),
     fault(
         "specular-tree-skips-one",
@@ -172,7 +168,7 @@ pub const MUTANTS: &[Mutant] = &[
         "the search for a point of reflection ends after one step",
         text(
             "integrator/connection",
-            "const STEPS: u32 = 16u;",
+            "const STEPS: u32 = 10u;",
             "const STEPS: u32 = 1u;",
         ),
     ),
