@@ -185,7 +185,7 @@ impl ConfiguredIntegrator {
         }
         if !by.is_inline() && self.facts.has_many_shadow_rays {
             return Err(format!(
-                "{name} with lights = all sends several shadow rays from one point, and there is one place in the queues for each path: take lights = one, or an organisation of one kernel"
+                "{name} with lights = all or connection = specular sends several shadow rays from one point, and there is one place in the queues for each path: take lights = one and connection = none, or an organisation of one kernel"
             ));
         }
         self.facts.needs_inline &= by.is_inline();

@@ -10,6 +10,7 @@ mod kind;
 mod light_tables;
 mod light_tree;
 mod medium;
+mod mirror_tree;
 pub mod offset;
 pub mod order;
 pub mod organisation;
@@ -32,6 +33,7 @@ pub use kind::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, I
 pub use light_tables::LightTables;
 pub use light_tables::light_branches;
 pub use light_tree::TreeNode;
+pub use mirror_tree::MirrorPlaces;
 pub use offset::{OffsetRegistry, RayOffset};
 pub use order::Order;
 pub use organisation::{Organisation, OrganisationRegistry};

@@ -57,6 +57,14 @@ parameters! {
         All = "all",
     }
 
+    /// Further estimators of light at a vertex.
+    pub(crate) enum Connection {
+        /// None.
+        Nothing = "none",
+        /// Light that arrives over one perfect mirror: docs/specular.md.
+        Specular = "specular",
+    }
+
     /// Groups of features that a kernel includes although the scene does not need them.
     pub(crate) enum Carry {
         /// Nothing.
@@ -88,6 +96,9 @@ parameters! {
         light_choice: LightChoice = LightChoice::Power;
         /// how many lights are sampled at each vertex
         lights: Lights = Lights::One;
+        /// how else vertices are connected with the sampled light: over the points at which perfect mirrors reflect it to them, which needs
+        /// an organisation of one kernel; nothing with strategy = bsdf
+        connection: Connection = Connection::Nothing;
         /// what Russian roulette goes by
         roulette: Roulette = Roulette::Throughput;
         /// bounces before roulette
@@ -105,6 +116,11 @@ parameters! {
 }
 
 impl PathParameters {
+    /// True if vertices are connected with lights over mirrors.
+    fn connects(&self) -> bool {
+        self.connection == Connection::Specular && self.strategy != Strategy::Bsdf
+    }
+
     /// Features of the kernel, and whether they are enabled.
     fn features(&self) -> Vec<(&'static str, bool)> {
         let mut features = vec![
@@ -113,6 +129,7 @@ impl PathParameters {
             ("uniform_lights", self.light_choice == LightChoice::Uniform),
             ("light_tree", self.light_choice == LightChoice::Tree),
             ("all_lights", self.lights == Lights::All),
+            ("mirror_connections", self.connects()),
             ("power_heuristic", self.strategy == Strategy::MisPower),
             ("roulette", self.roulette != Roulette::Never),
             ("roulette_by_albedo", self.roulette == Roulette::Albedo),
@@ -208,7 +225,8 @@ impl Integrator for Path {
             rays,
             needs_inline: true,
             has_stages: true,
-            has_many_shadow_rays: params.lights == Lights::All && params.strategy != Strategy::Bsdf,
+            has_many_shadow_rays: params.connects()
+                || params.lights == Lights::All && params.strategy != Strategy::Bsdf,
             is_biased: params.clamp > 0.0 || params.primary != Primary::Traced,
             is_rasterised: params.primary == Primary::Raster,
             ..Default::default()

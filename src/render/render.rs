@@ -189,7 +189,8 @@ impl<'a> Renderer<'a> {
         job: &RenderJob,
         [ray_counts, by_blocks]: [bool; 2],
     ) -> Result<Self, GpuError> {
-        if let Some(reason) = job.integrator.refusal(traced) {
+        let refusal = job.integrator.refusal(traced);
+        if let Some(reason) = refusal.or_else(|| scene.mirrors.refusal(job.integrator)) {
             return Err(GpuError::Kernel(reason));
         }
         let status = gpu.zeroed("status", STATUS_BYTES)?;

@@ -2,6 +2,7 @@
 
 use super::light_tables::LightTables;
 use super::medium::{self, MediumTables};
+use super::mirror_tree::{MirrorPlaces, MirrorTree};
 use super::offset::TransformError;
 use super::scene_kinds::{SceneKind as _, SceneKinds};
 use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
@@ -140,6 +141,8 @@ pub struct SceneBuffers {
     pub first_color: u32,
     /// Start of the bits of mirrored triangles in `shading_tables`, in words.
     pub first_mirrored: u32,
+    /// Where the tree over mirrors is in `shading_tables`.
+    pub mirrors: MirrorPlaces,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
     /// Corners of that box.
@@ -199,6 +202,7 @@ impl SceneBuffers {
             first_normal: tables.places.first_normal,
             first_color: tables.places.first_color,
             first_mirrored: tables.places.first_mirrored,
+            mirrors: tables.mirrors,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
             bounds: [scene.bounds().min, scene.bounds().max].map(|corner| corner.to_array()),
         })
@@ -206,7 +210,7 @@ impl SceneBuffers {
 }
 
 /// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials,
-/// lights, the data of [`surface_tables`](super::surface_tables), and the medium.
+/// lights, the data of [`surface_tables`](super::surface_tables), the medium, and the tree over mirrors.
 ///
 /// A material: base colour and kind number, with the highest bit set if it emits only from its
 /// front; emission and index of its parameters, in `vec4`; indices of its texture placements, 0 for
@@ -214,6 +218,7 @@ impl SceneBuffers {
 struct Tables {
     words: Vec<u32>,
     places: Places,
+    mirrors: MirrorPlaces,
 }
 
 impl Tables {
@@ -242,8 +247,13 @@ impl Tables {
         if let Some(medium) = medium {
             medium.append(&mut words);
         }
+        let mirrors = MirrorTree::of(scene).append(&mut words);
         words.resize(words.len().next_multiple_of(4), 0);
-        Self { words, places }
+        Self {
+            words,
+            places,
+            mirrors,
+        }
     }
 }
 

@@ -1,6 +1,8 @@
 //! Checks of hits and images: the gate, the path oracle, closed-form images, Mitsuba.
 #![warn(missing_docs)]
 
+#[cfg(test)]
+mod connection_tests;
 pub mod full_stacks;
 pub mod gate;
 pub mod hard_rays;
@@ -28,6 +30,7 @@ pub mod shadow_rays;
 pub mod strained_copies;
 mod trial_lights;
 mod trial_media;
+mod trial_mirrors;
 mod trial_reach;
 pub mod trial_scenes;
 mod trial_slivers;

@@ -21,12 +21,12 @@ use raystone_scene::{Light, Material, SceneData, SceneMedium};
 use raystone_volume::{Phase, Volume, phase, procedures};
 use std::f64::consts::PI;
 
-fn gpu() -> Gpu {
+pub(crate) fn gpu() -> Gpu {
     raystone_gpu::open(&AdapterChoice::Best, KernelLibrary::default())
         .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
 }
 
-fn path(changes: &[(&str, ParamValue)]) -> ConfiguredIntegrator {
+pub(crate) fn path(changes: &[(&str, ParamValue)]) -> ConfiguredIntegrator {
     let changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone()));
     let variant = Variant {
         name: "path".to_owned(),
@@ -36,11 +36,11 @@ fn path(changes: &[(&str, ParamValue)]) -> ConfiguredIntegrator {
     IntegratorRegistry::default().configured(&variant).unwrap()
 }
 
-fn depth(depth: i64) -> (&'static str, ParamValue) {
+pub(crate) fn depth(depth: i64) -> (&'static str, ParamValue) {
     ("max_depth", ParamValue::Integer(depth))
 }
 
-fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
+pub(crate) fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
     (key, ParamValue::Name(value.to_owned()))
 }
 
@@ -59,7 +59,7 @@ fn independent(integrator: &ConfiguredIntegrator, width: u32) -> Sampler {
 }
 
 /// A renderer of a scene through a plain BVH, for `use_it`.
-fn with_renderer<T>(
+pub(crate) fn with_renderer<T>(
     gpu: &Gpu,
     scene: &SceneData,
     size: [u32; 2],
@@ -82,7 +82,11 @@ fn with_renderer<T>(
 }
 
 /// What the gate says of single paths: `None` if all are those of the oracle.
-fn gate(gpu: &Gpu, scene: &SceneData, integrator: &ConfiguredIntegrator) -> Option<String> {
+pub(crate) fn gate(
+    gpu: &Gpu,
+    scene: &SceneData,
+    integrator: &ConfiguredIntegrator,
+) -> Option<String> {
     const SIZE: [u32; 2] = [26, 19];
     let pixels = Pixels {
         size: SIZE,
@@ -112,7 +116,7 @@ fn gate(gpu: &Gpu, scene: &SceneData, integrator: &ConfiguredIntegrator) -> Opti
 }
 
 /// The mean image of some samples, row by row.
-fn image(
+pub(crate) fn image(
     gpu: &Gpu,
     scene: &SceneData,
     size: [u32; 2],
@@ -209,7 +213,7 @@ fn optical_depth(volume: &Volume, from: DVec3, to: DVec3) -> f64 {
         * width
 }
 
-fn rays(scene: &SceneData, size: [u32; 2]) -> Vec<DVec3> {
+pub(crate) fn rays(scene: &SceneData, size: [u32; 2]) -> Vec<DVec3> {
     let lens = Lens::new(&scene.view(1.0), size);
     let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
     pixels

@@ -1,6 +1,7 @@
 //! Trial scenes with media: fog and a cloud, lamps inside and outside, surfaces in them, and every phase function.
 
 use crate::kinds::KindChecks;
+use crate::trial_mirrors::{connected, mirrors};
 use crate::trial_scenes::{Trial, TrialScene, depth, lamps, points, word};
 use glam::{DVec3, vec3};
 use raystone_scene::{Light, SceneData, SceneError, SceneMedium};
@@ -44,6 +45,10 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
                     word("light_choice", "tree"),
                 ]),
             ],
+        },
+        TrialScene {
+            scene: in_medium("mist", mirrors()?, fog(), "dda")?,
+            trials: vec![path(&[depth(3), connected()])],
         },
         TrialScene {
             scene: in_medium("smoke", glowing()?, smoke(), "sparse-tree")?,

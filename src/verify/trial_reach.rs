@@ -67,7 +67,7 @@ fn scaled(mut scene: SceneData, name: &str, factor: f32) -> SceneData {
 }
 
 /// An image of alphas of which whole rows and columns at the border are opaque.
-fn alphas(name: &str, [width, height]: [u32; 2]) -> Texture {
+pub(super) fn alphas(name: &str, [width, height]: [u32; 2]) -> Texture {
     let alpha = |at: u32| match (at % width, at / width) {
         (column, row) if column + 1 == width || row == 0 => 255,
         _ => [0, 90, 200, 255][(at * 7 % 5 % 4) as usize],

@@ -92,6 +92,7 @@ pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError
     }
     scenes.push(crate::trial_lights::many()?);
     scenes.extend(crate::trial_surfaces::scenes()?);
+    scenes.extend(crate::trial_mirrors::scenes()?);
     scenes.extend(crate::trial_slivers::scenes()?);
     scenes.extend(crate::trial_reach::scenes(kinds)?);
     scenes.extend(crate::trial_media::media(kinds)?);

@@ -21,6 +21,7 @@ fn composition(structure: &str) -> Composition {
         "found_emission",
         "power_heuristic",
         "clamped",
+        "mirror_connections",
         "sphere_lights",
         "roulette",
         "textures",

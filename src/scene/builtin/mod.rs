@@ -2,6 +2,7 @@
 //!
 //! A new scene is one file here and one line in `BUILTINS`.
 
+mod caustics;
 mod city;
 mod cornell_box;
 mod displaced_sphere;
@@ -52,7 +53,7 @@ impl Builtin {
     }
 }
 
-const BUILTINS: [Builtin; 17] = [
+const BUILTINS: [Builtin; 18] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -70,6 +71,7 @@ const BUILTINS: [Builtin; 17] = [
     Builtin::of::<city::City>(),
     Builtin::of::<media::Fog>(),
     Builtin::of::<media::Cloud>(),
+    Builtin::of::<caustics::Caustics>(),
 ];
 
 /// The built-in scenes and their parameters, for the parser, lists and docs.

@@ -134,6 +134,11 @@ impl Ball {
         })
     }
 
+    /// Cosine of a direction to the normal at a point of the sphere.
+    pub(crate) fn cosine(&self, point: DVec3, direction: DVec3) -> f64 {
+        (point - self.centre).dot(direction).abs() / self.radius
+    }
+
     /// Density with which [`Ball::sample`] finds this direction.
     pub(crate) fn density(&self, from: DVec3, direction: DVec3) -> f64 {
         if let Some(cap) = self.cap(from) {

@@ -1,6 +1,7 @@
 //! The estimators: primary visibility, ambient occlusion, path tracing.
 
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
+use super::connection::Before;
 use super::hits::{Blocked, SHORT, Segment};
 use super::light::{Choice, Chosen, moved};
 use super::medium::Flight;
@@ -42,7 +43,9 @@ pub enum Estimator {
 pub struct PathRules {
     max_depth: u32,
     /// The weighting of light samples and found emission.
-    strategy: Strategy,
+    pub(super) strategy: Strategy,
+    /// True for `connection = "specular"`.
+    pub(super) is_connected: bool,
     roulette: Roulette,
     /// First bounce with Russian roulette.
     roulette_depth: u32,
@@ -54,7 +57,7 @@ pub struct PathRules {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Strategy {
+pub(super) enum Strategy {
     /// Both, weighted by densities to this power.
     Both(i32),
     Material,
@@ -156,6 +159,7 @@ impl Estimator {
                         ("light", Strategy::Light),
                     ],
                 )?,
+                is_connected: read.choice("connection", &[("none", false), ("specular", true)])?,
                 roulette: read.choice(
                     "roulette",
                     &[
@@ -178,7 +182,7 @@ impl Estimator {
 
 impl Strategy {
     /// Weight of a sample with density `own` that the other strategy finds with density `other`.
-    fn weight(self, own: f64, other: f64) -> f64 {
+    pub(super) fn weight(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both(power) => 1.0 / (1.0 + (other / own).powi(power)),
             Self::Material | Self::Light => 1.0,
@@ -188,7 +192,7 @@ impl Strategy {
 
 impl Strategy {
     /// Weight of emission found by a direction of this density; `other` is that of light sampling.
-    fn found(self, density: Option<f64>, other: impl FnOnce() -> f64) -> f64 {
+    pub(super) fn found(self, density: Option<f64>, other: impl FnOnce() -> f64) -> f64 {
         match (density, self) {
             (None, _) => 1.0,
             (Some(_), Self::Light) => 0.0,
@@ -214,6 +218,8 @@ struct State {
     radiance: DVec3,
     /// Density of the last direction, if light sampling could have found it.
     density: Option<f64>,
+    /// The vertex before the mirror that the ray comes from, if connections may know of it.
+    before: Option<Before>,
     medium: f64,
 }
 
@@ -295,6 +301,7 @@ impl PathOracle<'_> {
             throughput: DVec3::ONE,
             radiance: DVec3::ZERO,
             density: None,
+            before: None,
             medium: 1.0,
         };
         for depth in 0..=rules.max_depth {
@@ -303,7 +310,7 @@ impl PathOracle<'_> {
                 .as_ref()
                 .map_or(f64::INFINITY, |(_, distance)| *distance);
             let ball = self.sphere_met(&state.ray, end, rules.choice, &mut walk.rounding);
-            let until = ball.map_or(end, |(_, _, distance)| distance);
+            let until = ball.as_ref().map_or(end, |ball| ball.distance);
             let first = (self.medium.is_some() && depth < rules.max_depth)
                 .then(|| walk.draw(at_bounce(depth, ROULETTE)));
             if let Some(flight) = self.flight(walk, (&state.ray, until), depth, first) {
@@ -312,9 +319,17 @@ impl PathOracle<'_> {
                 }
                 continue;
             }
-            if let Some((radiance, density, _)) = ball {
+            if let Some(ball) = ball {
                 walk.decide(4);
-                let found = radiance * rules.strategy.found(state.density, || density);
+                let weight = match state.before {
+                    Some(before) => {
+                        let end = state.ray.start + ball.distance * state.ray.direction;
+                        let point = (ball.light, end, ball.cosine);
+                        self.found_over_mirror(walk, &before, point, rules)
+                    }
+                    None => rules.strategy.found(state.density, || ball.density),
+                };
+                let found = ball.radiance * weight;
                 state.radiance += rules.clamped(depth, state.throughput * found);
                 break;
             }
@@ -326,9 +341,7 @@ impl PathOracle<'_> {
                 state.radiance += rules.clamped(depth, state.throughput * found);
                 break;
             };
-            let rounding = &mut walk.rounding;
-            let other = || self.light_density(&surface, &state.ray, rules.choice, rounding);
-            let found = surface.emission * rules.strategy.found(state.density, other);
+            let found = surface.emission * self.emission_weight(walk, &surface, &state, rules);
             state.radiance += rules.clamped(depth, state.throughput * found);
             if depth == rules.max_depth {
                 break;
@@ -342,11 +355,37 @@ impl PathOracle<'_> {
                     vertex.direct = state.throughput * direct;
                 }
             }
+            let before = (rules.connects() && state.density.is_some())
+                .then(|| self.before(walk, (&state.ray, state.density), &surface));
             if !self.go_on(walk, &surface, &*bsdf, depth, &mut state, rules) {
                 break;
             }
+            state.before = before.flatten();
         }
         walk.rounding.colour(state.radiance)
+    }
+
+    /// Weight of the emission of a surface that the path has met.
+    fn emission_weight(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        state: &State,
+        rules: &PathRules,
+    ) -> f64 {
+        let Some(before) = state.before else {
+            let rounding = &mut walk.rounding;
+            let other = || self.light_density(surface, &state.ray, rules.choice, rounding);
+            return rules.strategy.found(state.density, other);
+        };
+        let owner = self.lights.owner(surface.triangle);
+        owner
+            .filter(|_| surface.emission != DVec3::ZERO)
+            .map_or(1.0, |light| {
+                let cosine = surface.geometric.dot(surface.out);
+                let point = (light, surface.position, cosine);
+                self.found_over_mirror(walk, &before, point, rules)
+            })
     }
 
     /// Scatters a path in the medium; false if it ends.
@@ -364,6 +403,7 @@ impl PathOracle<'_> {
             return false;
         }
         let phase = self.phase(&point);
+        state.before = None;
         if !(self.lights.are_none() || rules.strategy == Strategy::Material) {
             let direct = self.direct(walk, &point, &phase, depth, rules);
             state.radiance += rules.clamped(depth, state.throughput * direct);
@@ -394,6 +434,11 @@ impl PathOracle<'_> {
                 _ => point,
             };
             let light = chosen.light;
+            let over = rules.connects() && depth + 2 <= rules.max_depth;
+            if over {
+                let light = (&chosen, point);
+                sum += self.over_mirrors(walk, (surface, bsdf), depth, light, rules);
+            }
             let found = self.of_light(walk, surface, bsdf, (chosen, point), rules.strategy);
             if let Some((found, shadow)) = found {
                 sum += found * self.passes(walk, &shadow, depth, light);
@@ -444,7 +489,7 @@ impl PathOracle<'_> {
             direction: towards / distance,
             ..left
         };
-        let blocked = self.shadowed(walk, &shadow, chosen.light);
+        let blocked = self.shadowed(walk, &shadow, (chosen.light, true));
         walk.decide_blocked(blocked);
         if blocked != Blocked::No {
             return None;

@@ -378,9 +378,11 @@ pub fn queued() -> Family {
     ];
     const OF_QUEUES: [&str; 4] = ["regenerated", "by_kind", "sorted_hits", "nothing_met"];
     let (mut integrator, staged) = integrators();
-    integrator
-        .levels
-        .retain(|parts| staged.contains(&text_of(&parts[0])));
+    // Connections send several shadow rays from one point, and are refused.
+    integrator.levels.retain(|parts| {
+        let connects = parts[0].features.contains("mirror_connections");
+        !connects && staged.contains(&text_of(&parts[0]))
+    });
     let (samplers, pairs) = samplers();
     let module = |name: &&str| format!("organisation/{name}");
     let compacted: BTreeSet<String> = COMPACTED.iter().map(module).collect();

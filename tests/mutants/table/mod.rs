@@ -17,6 +17,7 @@ mod rays;
 mod reach;
 mod samplers;
 mod shared;
+mod specular;
 mod stacks;
 mod wide;
 mod words;
@@ -40,6 +41,7 @@ pub fn mutants() -> Vec<Mutant> {
         reach::MUTANTS,
         image::MUTANTS,
         paths::MUTANTS,
+        specular::MUTANTS,
         path_lights::MUTANTS,
         media::MUTANTS,
         frames::MUTANTS,

@@ -60,6 +60,17 @@ pub struct LightSample {
     pub triangles: Option<[u32; 2]>,
 }
 
+/// A luminous sphere that a ray has met.
+pub(super) struct Met {
+    pub light: usize,
+    pub radiance: DVec3,
+    /// Density with which light samples find the point, over solid angle.
+    pub density: f64,
+    pub distance: f64,
+    /// Of the ray to the sphere's normal, positive.
+    pub cosine: f64,
+}
+
 impl Lights {
     /// The lights of a scene.
     ///
@@ -98,6 +109,26 @@ impl Lights {
     /// True if there is nothing to sample.
     pub(super) fn are_none(&self) -> bool {
         self.list.lights.is_empty()
+    }
+
+    /// Number of lights.
+    pub(super) fn count(&self) -> usize {
+        self.list.lights.len()
+    }
+
+    /// Where a light is.
+    pub(super) fn source(&self, light: usize) -> Source {
+        self.list.lights[light].source
+    }
+
+    /// Area of a triangle or parallelogram.
+    pub(super) fn flat_area(&self, light: usize) -> f64 {
+        self.list.lights[light].area
+    }
+
+    /// The light that a triangle belongs to.
+    pub(super) fn owner(&self, triangle: u32) -> Option<usize> {
+        self.owners.get(&triangle).copied()
     }
 
     /// True if there is an environment map.
@@ -147,7 +178,13 @@ pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
 }
 
 impl PathOracle<'_> {
-    fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
+    pub(super) fn share(
+        &self,
+        light: usize,
+        choice: Choice,
+        at: Place,
+        rounding: &mut Rounding,
+    ) -> f64 {
         let lights = &self.lights;
         match choice {
             Choice::Power => {
@@ -254,14 +291,14 @@ impl PathOracle<'_> {
         })
     }
 
-    /// The nearest sphere before `end` on a ray: its radiance, its light sampling density, and its distance.
+    /// The nearest sphere before `end` on a ray.
     pub(super) fn sphere_met(
         &self,
         ray: &Segment,
         end: f64,
         choice: Choice,
         rounding: &mut Rounding,
-    ) -> Option<(DVec3, f64, f64)> {
+    ) -> Option<Met> {
         let met = self.lights.spheres.iter().filter_map(|(light, ball)| {
             let distance = ball.meet(ray)?;
             (distance < end).then_some((light, ball, distance))
@@ -269,13 +306,24 @@ impl PathOracle<'_> {
         let (light, ball, distance) = met.min_by(|a, b| a.2.total_cmp(&b.2))?;
         let density = ball.density(ray.start, ray.direction);
         let share = self.share(*light, choice, ray.place(), rounding);
-        Some((ball.radiance, share * density, distance))
+        Some(Met {
+            light: *light,
+            radiance: ball.radiance,
+            density: share * density,
+            distance,
+            cosine: ball.cosine(ray.start + distance * ray.direction, ray.direction),
+        })
     }
 
-    /// True if the way to a light is occluded.
-    pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> Blocked {
+    /// True if a way for a light, which may end at it, is occluded.
+    pub(super) fn shadowed(
+        &self,
+        walk: &mut Walk,
+        shadow: &Segment,
+        (light, ends_there): (usize, bool),
+    ) -> Blocked {
         let balls = self.lights.spheres.iter();
-        let mut others = balls.filter(|(place, _)| *place != light);
+        let mut others = balls.filter(|(place, _)| !ends_there || *place != light);
         if others.any(|(_, ball)| ball.meet(shadow).is_some_and(|d| d < shadow.length)) {
             return Blocked::Yes;
         }
