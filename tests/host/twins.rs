@@ -30,6 +30,10 @@ const OTHER_FILE: &[(&str, &str)] = &[
 /// Kernel files and folders without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
     (
+        "integrator/connection",
+        "checked path by path by the oracle in f64 (src/verify/path_oracle/connection.rs), and in src/verify/connection_tests.rs by closed forms",
+    ),
+    (
         "integrator/medium",
         "judged path by path by the oracle in f64 (src/verify/path_oracle/medium.rs), and in src/verify/media_tests.rs by closed forms and quadratures",
     ),
@@ -452,6 +456,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("cones/cone", "offsets", "three lines of the kernel"),
     ("cones/trace", "clamp", "a function of WGSL"),
     ("accel/bvh/pairs", "validate", "looks at what was built"),
+    (
+        "accel/triangle/watertight",
+        "edge_on_share",
+        "how near a ray is to the limit, for the choice of hard rays",
+    ),
     (
         "sampling/seeding",
         "paired",
