@@ -11,9 +11,8 @@
 //! They depend only on the scene and a seed, and are never timed.
 
 use glam::Vec3;
-use raystone_accel::triangle::{TriangleRecord, edge_on_share};
+use raystone_accel::triangle::edge_on_share;
 use raystone_accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
-use raystone_core::geometry::Triangle;
 use raystone_core::random::Pcg32;
 
 /// Whole rays and parts of them.
@@ -243,21 +242,27 @@ impl<'a> Maker<'a> {
     /// if no try does. Every other one ends soon behind the triangle and begins before it.
     fn edge_on(&mut self, turn: usize) -> Ray {
         let tests = self.soup.intersection;
-        let mut ray = Ray::new(Vec3::ZERO, Vec3::Y);
+        let (mut ray, mut reach) = (Ray::new(Vec3::ZERO, Vec3::Y), 1.0);
         for _ in 0..TRIES {
-            let corners = self.triangle();
+            let record = self.soup.records[self.random.below(self.soup.records.len())];
+            let mut corners = record.triangle().vertices;
+            corners.rotate_left(self.random.below(3));
             let [a, b, c] = corners;
             let (e, f) = (b - a, c - a);
-            let [s, t] = [self.unit(), self.unit()].map(|x| 6.0 * x - 3.0);
+            // Few edges away, and towards a point at whole parts of them: of small triangles rounding leaves such rays in the plane.
+            let mut below = |n: usize| self.random.below(n) as f32;
+            let [s, t] = [below(7) - 3.0, below(7) - 3.0];
+            let parts = 3.0 + below(4);
+            let along = 1.0 + below(parts as usize - 2);
+            let beside = 1.0 + below((parts - along) as usize);
             let origin = (a + s * e + t * f).map(flushed);
-            let target = a + 0.5 * (self.unit() * e + self.unit() * f);
-            let direction = (target - origin).map(flushed);
+            let direction = (along - parts * s) * e + (beside - parts * t) * f;
+            let direction = direction.map(flushed);
             if !direction.is_finite() || direction.abs().max_element() <= 1e-16 {
                 continue;
             }
-            ray = Ray::new(origin, direction);
+            (ray, reach) = (Ray::new(origin, direction), 1.0 / parts);
             let raised = tests.raised(&ray);
-            let record = TriangleRecord::new(&Triangle { vertices: corners }, 0, 0);
             let share = edge_on_share(&record, &raised, &tests.inverse(raised.direction));
             if share.is_some_and(|share| (0.5..2.0).contains(&share)) {
                 break;
@@ -265,7 +270,7 @@ impl<'a> Maker<'a> {
         }
         match turn % 2 {
             0 => ray,
-            _ => ray.between(0.5, 1.5),
+            _ => ray.between(0.5 * reach, 1.5 * reach),
         }
     }
 
@@ -344,7 +349,7 @@ mod tests {
         };
         let (below, above) = (count(0.5..1.0), count(1.0..2.0));
         assert!(
-            below >= 5 && above >= 20,
+            below >= 40 && above >= 40,
             "{below} below and {above} above the limit of {EDGE_ON}"
         );
     }

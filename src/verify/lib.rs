@@ -28,6 +28,10 @@ pub mod scene_record;
 pub mod self_test;
 pub mod shadow_rays;
 pub mod strained_copies;
+#[cfg(test)]
+#[allow(dead_code, unreachable_pub, reason = "other tests use the rest")]
+#[path = "../../tests/support/tier.rs"]
+mod tier;
 mod trial_lights;
 mod trial_media;
 mod trial_mirrors;

@@ -159,8 +159,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the area of a sphere light is taken for half of it",
         text(
             "integrator/connection",
-            "let pdf = distance * distance / (FOUR_PI",
-            "let pdf = distance * distance / (0.5 * FOUR_PI",
+            "let pdf = distance * distance / (2.0 * TWO_PI",
+            "let pdf = distance * distance / (TWO_PI",
         ),
     ),
     fault(
