@@ -120,6 +120,18 @@ impl Intersection {
         padded && self.triangle.is_watertight()
     }
 
+    /// The tests of the reference tracer: these, or where the triangle test is not exact, the default one.
+    #[must_use]
+    pub fn exact(self) -> Self {
+        match self.triangle.is_exact() {
+            true => self,
+            false => Self {
+                triangle: Self::default().triangle,
+                ..self
+            },
+        }
+    }
+
     /// Checks that an adapter supports this choice.
     ///
     /// # Errors
@@ -139,7 +151,9 @@ impl Intersection {
     #[must_use]
     pub fn activate(&self, mut composition: Composition) -> Composition {
         if !composition.active.contains_key(TRIANGLE) {
-            composition = composition.with(TRIANGLE, self.triangle.kernel());
+            composition = composition
+                .with(TRIANGLE, self.triangle.kernel())
+                .feature(BARE, !self.triangle.is_exact());
         }
         if !composition.constants.contains_key(PAD_CONSTANT) {
             composition = composition
@@ -170,6 +184,8 @@ impl Intersection {
 
 /// Role of the triangle test in a composition.
 const TRIANGLE: &str = "triangle";
+/// Feature of `kernels/accel/triangle.wesl`: the test alone.
+const BARE: &str = "bare_triangles";
 const PAD_CONSTANT: &str = "BOX_PAD_ULPS";
 
 /// The reciprocal of a ray's direction, which it dereferences to, and the tests to use with it.

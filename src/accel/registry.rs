@@ -2,7 +2,7 @@
 
 use super::intersection::BoxTest;
 use super::triangle::{
-    BaldwinWeber, Compensated, MoellerTrumbore, Pluecker, TriangleTest, Watertight,
+    BaldwinWeber, Bare, Compensated, MoellerTrumbore, Pluecker, TriangleTest, Watertight,
 };
 use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
 use raystone_core::params::{Kinds, Named, ParameterSchema, Sources};
@@ -60,6 +60,7 @@ impl Named for dyn TriangleTest {
             &Pluecker,
             &Watertight,
             &Compensated,
+            &Bare,
         ]
     }
 

@@ -205,17 +205,6 @@ impl Plan {
         cells.filter(|cell| known.insert(cell.identity())).collect()
     }
 
-    /// All cells on these axes of `part`, left out for this reason.
-    pub fn all_on(&self, part: &Cell, reason: String) -> Skipped {
-        let cells = [&self.structures, &self.samplers, &self.times];
-        let on = cells.into_iter().flatten().filter(|c| c.is_on(part));
-        Skipped {
-            cell: format!("{part}: all structures, samplers and times"),
-            reason,
-            cells: on.count(),
-        }
-    }
-
     /// Description of the plan for `--dry-run`.
     pub fn describe(&self) -> String {
         let mut text = String::new();

@@ -143,6 +143,7 @@ figures! {
     // External ray casters, and structures beside them.
     CPU_NS_PER_RAY = "cpu-ns-per-ray/v1", "time of the processors", "ns per ray", Lower, THREE, Median;
     CPU_OVER_PEER = "cpu-over-peer/v1", "time of the processors over a peer's", "", Lower, THREE, Median;
+    PRICE_OF_EXACTNESS = "price-of-exactness/v1", "time over that with a test that is not exact", "", Lower, THREE, Median;
     PEER_MRAYS_PER_S = "peer-mrays-per-s/v1", "speed of a peer", "Mrays/s", Higher, THREE, Median;
     UNLIKE_JUDGE = "unlike-judge/v1", "unlike the reference tracer", "per million", Neither, THREE, Exact;
     FARTHEST_DISTANCE = "farthest-distance/v1", "farthest distance", "", Neither, THREE, Exact;

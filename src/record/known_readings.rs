@@ -121,6 +121,7 @@ fn structure() -> StructureRecord {
             work: None,
             structural: None,
             elsewhere: None,
+            inexact: false,
         }),
         ..StructureRecord::default()
     }

@@ -74,7 +74,8 @@ pub struct ClassVerdict {
     pub rays: usize,
     /// Rays whose answer differs and is not a tie.
     pub wrong: usize,
-    /// Rays whose id or t differs but both triangles lie within 4 ulp of the same distance.
+    /// Rays whose id or t differs but both triangles lie within 4 ulp of the same distance; for a triangle test that is not
+    /// exact, rays with another triangle that rounding explains.
     pub ties: usize,
     /// The first wrong ray, replayable, with both answers.
     pub first_wrong: Option<String>,
@@ -121,6 +122,9 @@ pub struct GateVerdict {
     /// The fault on one of the gate's further scenes.
     #[serde(default)]
     pub elsewhere: Option<String>,
+    /// True if answers were compared up to rounding, for a triangle test that is not exact: the structure is not ranked.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub inexact: bool,
 }
 
 /// Work counted per ray, means over a class.
@@ -403,6 +407,13 @@ pub fn fault_text(verdict: &GateVerdict) -> String {
     parts.extend(verdict.elsewhere.clone());
     parts.extend(verdict.reference_fault());
     parts.join("; ")
+}
+
+impl StructureRecord {
+    /// True if its triangle test is not exact, so that it is not ranked.
+    pub fn is_inexact(&self) -> bool {
+        self.gate.as_ref().is_some_and(|gate| gate.inexact)
+    }
 }
 
 impl GateVerdict {

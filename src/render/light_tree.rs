@@ -119,8 +119,8 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     };
     let mut nodes = vec![none; 2];
     let mut leaves = vec![0; lights.len()];
-    let mut todo = vec![(ROOT, (0..lights.len() as u32).collect::<Vec<u32>>())];
-    while let Some((node, members)) = todo.pop() {
+    let mut open = vec![(ROOT, (0..lights.len() as u32).collect::<Vec<u32>>())];
+    while let Some((node, members)) = open.pop() {
         let of = |light: &u32| lights[*light as usize];
         let all = members.iter().map(of).reduce(|a, b| a.union(&b));
         nodes[node].bounds = all.unwrap_or(*first);
@@ -139,7 +139,7 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
                 ..none
             }; 2],
         );
-        todo.extend([(child + 1, right), (child, left)]);
+        open.extend([(child + 1, right), (child, left)]);
     }
     (nodes, leaves)
 }

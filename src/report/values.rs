@@ -5,7 +5,7 @@ use super::document::TableCell;
 use super::format;
 use super::samplers::{HEAVY_TAILED, MeasuredSampler, Metric};
 use super::sections::{
-    animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
+    animation, compactions, kernels, organisations, peers, structures, trade_off, verdict::Race,
 };
 use raystone_core::text::escape::visible;
 use raystone_record::figure::{self, Figure};
@@ -196,6 +196,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
         values.extend(of_structures(data, scene));
         values.extend(animation::values(data, scene));
         values.extend(peers::values(scene));
+        values.extend(structures::prices(scene));
         values.extend((scene.views.iter()).flat_map(|view| of_view(data, scene, view)));
         values.extend(of_references(data, scene));
     }

@@ -15,7 +15,7 @@ const MOST_JUDGED: usize = 256;
 /// Relative difference of the distance that single precision explains. The distance counts as at
 /// least a hundredth of the origin's largest coordinate, whose rounding dominates short rays. Plain
 /// Möller–Trumbore tests of distant and thin triangles lose three digits.
-const EXPLAINED: f64 = 1e-3;
+pub(super) const EXPLAINED: f64 = 1e-3;
 
 /// Differences of the answers for one class from the reference.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -74,7 +74,7 @@ pub fn differences(
 
 /// Difference of a distance from another, relative to that or to a hundredth of the largest
 /// coordinate of the ray's origin.
-fn off_by(ray: &Ray, found: f32, t: f64) -> f64 {
+pub(super) fn off_by(ray: &Ray, found: f32, t: f64) -> f64 {
     let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let reach = 0.01 * vector(ray.origin).abs().max_element() / vector(ray.direction).length();
     (f64::from(found) - t).abs() / t.abs().max(reach)

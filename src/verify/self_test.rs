@@ -58,6 +58,7 @@ pub fn unseen_hit(
         .sets
         .iter()
         .find_map(|set| Some((set, hit(set)?)))?;
+    let exact = exact && soup.intersection.triangle.is_exact();
     let unseen = in_class(set, first, exact, &|(hits, found)| {
         compare(set, hits, found, soup, Space::World, exact).wrong
     });

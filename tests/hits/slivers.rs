@@ -151,7 +151,7 @@ fn seen(test: AnyTriangleTest, aspect: f64) -> Seen {
 /// triangle with long edges it is a difference of large numbers, and the plane is off by length
 /// over height. See `docs/design.md`.
 fn has_plane_by_edges(test: AnyTriangleTest) -> bool {
-    ["moeller-trumbore", "pluecker"].contains(&test.name())
+    ["moeller-trumbore", "pluecker", "bare"].contains(&test.name())
 }
 
 #[test]

@@ -89,7 +89,8 @@ fn every_triangle_test_has_the_same_masks() {
     let gpu = gpu();
     let scene = few_plants();
     let rays = rays_down(2000);
-    let tests: Vec<_> = TriangleRegistry::default().iter().collect();
+    let mut tests: Vec<_> = TriangleRegistry::default().iter().collect();
+    tests.retain(|test| test.is_exact());
     assert_eq!(tests.len(), 5);
     for triangle in in_turn("triangle tests with masks", tests) {
         let tests = Intersection {

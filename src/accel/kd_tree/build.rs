@@ -45,7 +45,10 @@ pub(super) fn build(
             0 => default_depth(soup.records.len()),
             depth => depth,
         },
-        margin: options.clip.then(|| Margin::new(&bounds)),
+        margins: options.clip.then(|| {
+            let margin = Margin::new(&bounds);
+            soup.records.par_iter().map(|r| margin.of(r)).collect()
+        }),
         soup,
         references: AtomicU64::new(0),
     };
@@ -75,8 +78,8 @@ struct Settings<'a> {
     /// Remaining fraction of a split's cost if it cuts off empty space.
     kept_if_empty: f32,
     max_depth: u32,
-    /// Set if triangles are clipped.
-    margin: Option<Margin>,
+    /// By triangle, scene units; set if they are clipped.
+    margins: Option<Vec<f64>>,
     soup: &'a TriangleSoup,
     /// References so far; beyond the limit nothing is split any more.
     references: AtomicU64,
@@ -361,11 +364,11 @@ impl Item {
     fn part_within(&self, half: &Bounds, settings: &Settings) -> Option<Item> {
         let by_box = self.bounds.intersection(half);
         let within = |bounds| Item { bounds, ..*self };
-        let Some(margin) = &settings.margin else {
+        let Some(margins) = &settings.margins else {
             return Some(within(by_box));
         };
         let record = &settings.soup.records[self.id as usize];
-        let part = clip(record, half, margin.of(record))?;
+        let part = clip(record, half, margins[self.id as usize])?;
         let clipped = by_box.intersection(&part);
         let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
         Some(within(if overlaps { clipped } else { by_box }))

@@ -3,6 +3,7 @@
 use super::{INNER_SHIFT, LAST, LEAF, Options, RootCell};
 use crate::bounds::Bounds;
 use crate::spatial::{Margin, Overlap, corners};
+use crate::triangle::TriangleRecord;
 use crate::{AccelError, TriangleSoup};
 use rayon::prelude::*;
 
@@ -77,8 +78,8 @@ struct Settings<'a> {
     space: &'a RootCell,
     options: &'a Options,
     max_depth: u32,
-    /// Set if triangles are clipped.
-    margin: Option<Margin>,
+    /// By triangle, scene units; set if they are clipped.
+    margins: Option<Vec<f64>>,
     boxes: Vec<Bounds>,
 }
 
@@ -92,7 +93,10 @@ impl<'a> Settings<'a> {
                 depth => depth,
             },
             options,
-            margin: options.clip.then(|| Margin::new(&soup.bounds())),
+            margins: options.clip.then(|| {
+                let margin = Margin::new(&soup.bounds());
+                soup.records.par_iter().map(|r| margin.of(r)).collect()
+            }),
             boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
         }
     }
@@ -122,9 +126,10 @@ impl<'a> Settings<'a> {
         if triangles.len() <= self.options.leaf_size {
             return None;
         }
+        let cell = Divided::new(self.space, position, depth);
         let octants: Vec<u8> = triangles
             .iter()
-            .map(|&id| self.octants(id, position, depth))
+            .map(|&id| self.octants(id, &cell))
             .collect();
         let listed: u32 = octants.iter().map(|mask| mask.count_ones()).sum();
         // Every child has a quarter of the area of its parent.
@@ -145,24 +150,56 @@ impl<'a> Settings<'a> {
         Some(children)
     }
 
-    /// The children of the cell at `position` that list a triangle, one bit each.
-    fn octants(&self, id: u32, position: [u32; 3], depth: u32) -> u8 {
-        let middle = self.space.middle(position, depth);
-        let mut mask = by_box(&self.boxes[id as usize], middle);
-        let Some(margin) = self.margin.as_ref().filter(|_| !mask.is_power_of_two()) else {
+    /// The children of a cell that list a triangle, one bit each.
+    fn octants(&self, id: u32, cell: &Divided) -> u8 {
+        let mask = by_box(&self.boxes[id as usize], cell.middle);
+        let Some(margins) = self.margins.as_ref().filter(|_| !mask.is_power_of_two()) else {
             return mask;
         };
         let record = &self.soup.records[id as usize];
-        let margin = margin.of(record);
-        let half = self.space.half(depth + 1).map(|h| h + margin);
-        let overlap = Overlap::new(&corners(record), half);
-        for octant in 0..8_u32 {
-            let child = RootCell::child(position, octant);
-            if mask >> octant & 1 == 1 && !overlap.touches(self.space.centre(child, depth + 1)) {
-                mask &= !(1 << octant);
-            }
+        // A child that holds a corner is touched, and most triangles have corners in all children that they touch.
+        let open = mask & !cell.with_corner(record);
+        if open == 0 {
+            return mask;
         }
-        mask
+        let margin = margins[id as usize];
+        let overlap = Overlap::new(&corners(record), cell.half.map(|h| h + margin));
+        let is_missed =
+            |octant: &usize| open >> octant & 1 == 1 && !overlap.touches(cell.centres[*octant]);
+        (0..8)
+            .filter(is_missed)
+            .fold(mask, |mask, octant| mask & !(1 << octant))
+    }
+}
+
+/// A cell that may be split.
+struct Divided {
+    bounds: Bounds,
+    middle: [f32; 3],
+    /// Half extent and centres of its children.
+    half: [f64; 3],
+    centres: [[f64; 3]; 8],
+}
+
+impl Divided {
+    fn new(space: &RootCell, position: [u32; 3], depth: u32) -> Self {
+        let centre = |octant| space.centre(RootCell::child(position, octant as u32), depth + 1);
+        Self {
+            bounds: space.cell(position, depth),
+            middle: space.middle(position, depth),
+            half: space.half(depth + 1),
+            centres: std::array::from_fn(centre),
+        }
+    }
+
+    /// The children in which a triangle has a corner.
+    fn with_corner(&self, record: &TriangleRecord) -> u8 {
+        record.vertices().iter().fold(0, |mask, corner| {
+            let within = |a: usize| (self.bounds.min[a]..=self.bounds.max[a]).contains(&corner[a]);
+            let above = |a: usize| u8::from(corner[a] > self.middle[a]) << a;
+            let is_here = within(0) && within(1) && within(2);
+            mask | u8::from(is_here) << (above(0) | above(1) | above(2))
+        })
     }
 }
 

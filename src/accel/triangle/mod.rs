@@ -15,6 +15,7 @@
 //! farther outside, the ray only grazed an edge of the triangle: no hit.
 
 mod baldwin_weber;
+mod bare;
 mod compensated;
 mod moeller_trumbore;
 mod plane;
@@ -22,6 +23,7 @@ mod pluecker;
 pub(super) mod watertight;
 
 pub use baldwin_weber::BaldwinWeber;
+pub(crate) use bare::Bare;
 pub use compensated::Compensated;
 pub use moeller_trumbore::MoellerTrumbore;
 pub(crate) use plane::DISTANCE_PAD;
@@ -123,6 +125,11 @@ pub trait TriangleTest: Send + Sync {
     /// edges; the correctness check then includes such rays.
     fn is_watertight(&self) -> bool {
         false
+    }
+    /// True if the hits of all structures are equal to the bit. Structures with another one are timed on recorded rays: their
+    /// answers are compared up to rounding, and they are neither ranked nor rendered with.
+    fn is_exact(&self) -> bool {
+        true
     }
     /// True if it becomes a different test on adapters without exact two-products.
     fn needs_exact_products(&self) -> bool {

@@ -283,6 +283,9 @@ fn run_world(
         }
     };
     session.progress.add(session.cost.world(cell).seconds());
+    if !world.soup.intersection.triangle.is_exact() {
+        session.leave_out_images(cell)?;
+    }
     let gated = structures::run(session, &world)?;
     let at = At {
         experiment: session.experiment,
@@ -339,6 +342,9 @@ pub fn render_references(
         };
         for cell in plan.worlds(scene) {
             let world = World::new(&mut session, &device, &loaded, &cell)?;
+            if !world.soup.intersection.triangle.is_exact() {
+                continue;
+            }
             for wanted in references_of(plan, &cell) {
                 let own: Vec<usize> = (0..REFERENCE_PARTS as usize)
                     .filter(|number| (part + number) % shard.of == shard.number - 1)
@@ -432,7 +438,12 @@ fn verify_cell(
         }
         Ok(world) => {
             let candidate = structures::build_and_gate(session, world, cell)?;
-            if let Some(traced) = candidate.traced.as_ref().filter(|t| t.is_inline()) {
+            let renders = world.soup.intersection.triangle.is_exact();
+            if let Some(traced) = candidate
+                .traced
+                .as_ref()
+                .filter(|t| renders && t.is_inline())
+            {
                 verified.paths = words::verify(session, world, cell)?;
                 verified
                     .paths

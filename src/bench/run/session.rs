@@ -15,7 +15,7 @@ use super::resume::{Earlier, Kept};
 use super::shard::shards;
 use super::units::Unit;
 use crate::environment::{capture, machine_load};
-use raystone_config::{Cell, Experiment, Plan, Skipped};
+use raystone_config::{Axis, Cell, Experiment, Plan, Skipped};
 use raystone_core::text::cell_hash;
 use raystone_gpu::{Gpu, Stopwatch};
 use raystone_image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
@@ -184,10 +184,37 @@ impl<'a> Session<'a> {
 
     /// Skips all open units of a world for one reason, reported once.
     pub(super) fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
-        let skipped = self.plan.all_on(world, reason.clone());
-        self.ledger.skipped += skipped.cells;
-        let hash = self.write_left_out(&skipped.cell, &reason)?;
-        for name in self.ledger.open_names(|unit| unit.cell.is_on(world)) {
+        let cell = format!("{world}: all structures, samplers and times");
+        self.leave_out_units(&cell, reason, |unit| unit.cell.is_on(world))
+    }
+
+    /// Skips all open units of a world that render, since the triangle test is not exact.
+    pub(super) fn leave_out_images(&mut self, world: &Cell) -> Result<(), RunError> {
+        let reason = format!(
+            "the triangle test {} is not exact: structures are timed with it on recorded rays, and nothing is rendered",
+            world[Axis::Triangle]
+        );
+        let renders = |unit: &Unit| unit.cell.get(Axis::Integrator).is_some();
+        self.leave_out_units(
+            &format!("{world}: all samplers and times"),
+            reason,
+            |unit| unit.cell.is_on(world) && renders(unit),
+        )
+    }
+
+    fn leave_out_units(
+        &mut self,
+        cell: &str,
+        reason: String,
+        is_one: impl Fn(&Unit) -> bool,
+    ) -> Result<(), RunError> {
+        let names = self.ledger.open_names(is_one);
+        if names.is_empty() {
+            return Ok(());
+        }
+        self.ledger.skipped += names.len();
+        let hash = self.write_left_out(cell, &reason)?;
+        for name in names {
             let lines = vec![hash.clone()];
             self.close(&name, (Outcome::LeftOut, &reason), lines, &[])?;
         }

@@ -78,7 +78,7 @@ fn identity(key: &Key, figure: &Figure) -> Identity {
 }
 
 /// Figures that follow from others, or other times of the same subject: reports show them, verdicts ignore them.
-const DERIVED: [&Figure; 24] = [
+const DERIVED: [&Figure; 25] = [
     &figure::BUILD_RATE,
     &figure::BYTES_PER_TRIANGLE,
     &figure::REFERENCES_PER_TRIANGLE,
@@ -98,6 +98,7 @@ const DERIVED: [&Figure; 24] = [
     &figure::COMPACTION_RATIO,
     &figure::CPU_NS_PER_RAY,
     &figure::CPU_OVER_PEER,
+    &figure::PRICE_OF_EXACTNESS,
     &figure::PEER_MRAYS_PER_S,
     &figure::FRAME_TIME_RATIO,
     &figure::FRAME_BREAK_EVEN,

@@ -1,11 +1,11 @@
 //! Structures of a scene: speed, build, size, work per ray, heat maps.
 
 use super::file_stem;
-use super::specs::{BUILD, LEAF_SIZES, OUTSIDE, RECORDED_RAYS, SHAPE, SPEED, WORK};
+use super::specs::{BUILD, EXACTNESS, LEAF_SIZES, OUTSIDE, RECORDED_RAYS, SHAPE, SPEED, WORK};
 use super::trade_off;
 use super::verdict::ray_classes;
 use crate::advice;
-use crate::data::{Measured, RunData, SceneGroup};
+use crate::data::{Measured, RunData, STRUCTURE_AXES, SceneGroup};
 use crate::document::*;
 use crate::names::Names;
 use crate::plot::rates::{Bar, RatePlot};
@@ -14,8 +14,9 @@ use crate::values::{Value, of_structures};
 use crate::{format, pictures};
 use raystone_core::structure::{Phase, Space};
 use raystone_image::viridis_css;
-use raystone_record::figure::Figure;
-use raystone_record::{RayClass, StructureRecord};
+use raystone_record::figure::{self, Figure};
+use raystone_record::{ClassTiming, RayClass, StructureRecord, axis};
+use raystone_stats::comparison::LogFigure;
 use std::path::Path;
 
 /// Returns everything on the structures of the scene with this index.
@@ -45,7 +46,10 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     let folds = [
         (
             "Speeds as numbers",
-            vec![speed_table(names, scene, &values)],
+            vec![
+                speed_table(names, scene, &values),
+                EXACTNESS.table(names, &prices(scene), &[]),
+            ],
         ),
         (
             "What a build costs and when it pays",
@@ -114,6 +118,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
 pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let gate = |s: &StructureRecord| {
         let (verdict, tone) = match s.fault() {
+            None if s.is_inexact() => ("passed up to rounding", Tone::Note),
             None => ("passed", Tone::Good),
             Some(_) => ("FAILED", Tone::Bad),
         };
@@ -129,6 +134,44 @@ pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -
         .map(|s| (s.key.clone(), vec![gate(s.body)]));
     let words = [scene.name, &speed_bounds(scene)];
     SPEED.beside(names, values, &words, &[":gate"], rows)
+}
+
+/// Returns what exactness costs each structure that was also timed with a triangle test that is not exact: the ratio of times of
+/// the processors where they trace, else of those by the clock.
+pub(crate) fn prices(scene: &SceneGroup) -> Vec<Value<'static>> {
+    let timed = || scene.structures.iter().filter(|s| s.fault().is_none());
+    let price = |exact: &ClassTiming, bare: &ClassTiming| {
+        let of = |t: &ClassTiming| match t.cpu_ms.is_empty() {
+            true => LogFigure::of_times(&t.ms),
+            false => LogFigure::of_times(&t.cpu_ms),
+        };
+        Some(of(exact)?.compared_with(&of(bare)?).ratio)
+    };
+    let of_pair = |exact: &Measured<StructureRecord>, bare: &Measured<StructureRecord>| {
+        let pairs = exact.timings.iter().filter_map(|of| {
+            let same = |other: &&ClassTiming| other.class == of.class && other.rays == of.rays;
+            Some((of, bare.timings.iter().find(same)?))
+        });
+        let values = pairs.flat_map(|(exact_rays, bare_rays)| {
+            let key = (exact.key.clone()).with(axis::RAYS, exact_rays.class.name());
+            Value::known(
+                &key,
+                [(&figure::PRICE_OF_EXACTNESS, price(exact_rays, bare_rays))],
+            )
+        });
+        values.collect::<Vec<_>>()
+    };
+    let bare = || timed().filter(|s| s.is_inexact());
+    let but_for_the_test = STRUCTURE_AXES
+        .iter()
+        .filter(|axis| **axis != axis::TRIANGLE);
+    let axes: Vec<&str> = but_for_the_test.copied().collect();
+    (timed().filter(|s| !s.is_inexact()))
+        .flat_map(|exact| {
+            let rival = bare().find(|s| s.key.agrees(&exact.key, &axes));
+            rival.map_or_else(Vec::new, |rival| of_pair(exact, rival))
+        })
+        .collect()
 }
 
 /// Returns the table of the cost of builds.

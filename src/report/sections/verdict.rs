@@ -464,11 +464,12 @@ pub(crate) fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     classes
 }
 
-/// Returns the speed in a class, Mrays/s, of a structure that passed the gate and was timed often enough.
+/// Returns the speed in a class, Mrays/s, of a structure that passed the gate with exact hits and was timed often enough.
 pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
     let timing = s.timings.iter().find(|timing| timing.class == class)?;
     let often = timing.ms.len() >= LEAST_FOR_MEDIAN && s.fault().is_none();
-    let ms = s.rounds(RAYS, &timing.ms).filter(|_| often)?;
+    let ranked = often && !s.is_inexact();
+    let ms = s.rounds(RAYS, &timing.ms).filter(|_| ranked)?;
     Some(ms.inverse().scaled(1e-3 * timing.rays as f64))
 }
 
@@ -476,7 +477,7 @@ pub(crate) fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Opt
 pub(crate) fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let is_fair = s.fault().is_none() && !is_repeat(s, &scene.structures);
+        let is_fair = s.fault().is_none() && !s.is_inexact() && !is_repeat(s, &scene.structures);
         is_fair.then_some(Contender {
             name: s.structure.clone(),
             figure: timing.mrays_s,

@@ -181,7 +181,9 @@ fn intersections() -> [Factor; 2] {
             triangle,
             ..default
         };
-        part().with("triangle", &chosen.activate(part()).active["triangle"])
+        part()
+            .with("triangle", &chosen.activate(part()).active["triangle"])
+            .feature("bare_triangles", !triangle.is_exact())
     });
     let boxes = BoxTest::ALL.map(|box_test| {
         let chosen = Intersection {

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use raystone::accel::triangle::TriangleRecord;
-use raystone::accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
+use raystone::accel::{Hit, Intersection, NO_HIT, Ray, Space, TriangleRegistry, TriangleSoup};
 use raystone::geometry::Triangle;
 use raystone::measure::gate::compare;
 use raystone::measure::rays::RaySet;
@@ -153,4 +153,80 @@ fn missing_answers_are_wrong() {
         false,
     );
     assert_eq!(wrong_and_ties(&verdict), [1, 0]);
+}
+
+/// Wrong rays and ties of one answer with the test `bare`, to a ray along z through this place: closest hit, and any hit.
+fn by_bare(x: f32, hit: Hit, any: bool) -> [usize; 2] {
+    let mut set = set();
+    set.rays.truncate(1);
+    set.rays[0].origin[0] = x;
+    set.truth = raystone::accel::brute_force_hits(&soup(), &set.rays);
+    let soup = soup().intersecting(Intersection {
+        triangle: TriangleRegistry::default().get("bare").expect("a test"),
+        ..Intersection::default()
+    });
+    let verdict = compare(&set, &[hit], &[Some(any)], &soup, Space::World, true);
+    [verdict.wrong, verdict.ties]
+}
+
+#[test]
+fn a_test_that_is_not_exact_may_answer_otherwise_where_rounding_explains_it() {
+    let hit = |triangle: u32, t: f32| Hit {
+        t,
+        triangle,
+        u: 0.25,
+        v: 0.25,
+    };
+    let miss = Hit {
+        t: 1e30,
+        triangle: NO_HIT,
+        u: 0.0,
+        v: 0.0,
+    };
+    // In the middle of 0 and its copy 1: either, and nothing else.
+    assert_eq!(by_bare(0.0, hit(0, 1.0), true), [0, 0]);
+    assert_eq!(by_bare(0.0, hit(1, 1.0), true), [0, 1]);
+    assert_eq!(by_bare(0.0, hit(0, ulps_up(1.0, 30)), true), [0, 0]);
+    let wrong = [
+        (hit(0, 1.01), true),
+        (hit(1, 0.99), true),
+        (hit(2, 1.0), true),
+        (hit(3, 9.0), true),
+        (hit(4, 1.0), true),
+        (miss, false),
+        (miss, true),
+        (hit(0, 1.0), false),
+        (
+            Hit {
+                u: 0.3,
+                ..hit(0, 1.0)
+            },
+            true,
+        ),
+        (
+            Hit {
+                v: 0.2,
+                ..hit(1, 1.0)
+            },
+            true,
+        ),
+        (
+            Hit {
+                u: f32::NAN,
+                ..hit(0, 1.0)
+            },
+            true,
+        ),
+    ];
+    for (answer, any) in wrong {
+        assert_eq!(by_bare(0.0, answer, any), [1, 0], "{answer}, {any}");
+    }
+    // Along their edge, and along that of 3 behind them: a miss, too, but no hit on 3 that another distance has.
+    let at_edge = |hit: Hit| Hit { u: 0.0, ..hit };
+    assert_eq!(by_bare(-1.0, miss, false), [0, 1]);
+    assert_eq!(by_bare(-1.0, at_edge(hit(3, 9.0)), true), [0, 1]);
+    assert_eq!(by_bare(-1.0, at_edge(hit(3, 8.0)), true), [1, 0]);
+    assert_eq!(by_bare(-1.0, miss, true), [1, 0]);
+    // Beside them all nothing may be hit.
+    assert_eq!(by_bare(-1.1, at_edge(hit(0, 1.0)), true), [1, 0]);
 }

@@ -1,5 +1,6 @@
 //! The correctness check: right structures pass, planted faults fail with a replayable ray.
 
+mod bare;
 mod compare;
 mod faults;
 mod faulty;

@@ -210,13 +210,14 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
 }
 
 #[test]
-fn every_structure_equals_brute_force_with_every_test() {
+fn every_structure_equals_brute_force_with_every_exact_test() {
     let gpu = gpu();
     let exact = support::is_exact(gpu);
     let mut rng = Pcg::new(3);
     let lattice = scenes::lattice_soup(&mut rng, 60, 6);
     let rays = scenes::lattice_rays(&mut rng, 400, 6);
-    for triangle in TriangleRegistry::default().iter() {
+    let tests = TriangleRegistry::default();
+    for triangle in tests.iter().filter(|test| test.is_exact()) {
         let soup = lattice.clone().intersecting(tests_of(triangle));
         let expected = support::brute_force(&soup, &rays);
         assert!(expected.iter().any(|h| h.triangle != NO_HIT));
