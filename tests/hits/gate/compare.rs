@@ -155,12 +155,16 @@ fn missing_answers_are_wrong() {
     assert_eq!(wrong_and_ties(&verdict), [1, 0]);
 }
 
-/// Wrong rays and ties of one answer with the test `bare`, to a ray along z through this place: closest hit, and any hit.
-fn by_bare(x: f32, hit: Hit, any: bool) -> [usize; 2] {
+/// Wrong rays and ties of one answer with the test `bare` to a ray through `(x, 0.1, 1)`: closest hit, made of the reference's,
+/// and any hit.
+fn by_bare(x: f32, answer: impl Fn(Hit) -> Hit, any: bool) -> [usize; 2] {
     let mut set = set();
     set.rays.truncate(1);
-    set.rays[0].origin[0] = x;
+    let origin = [0.37, 0.21, -0.77];
+    set.rays[0].origin = origin;
+    set.rays[0].direction = [x - origin[0], 0.1 - origin[1], 1.0 - origin[2]];
     set.truth = raystone::accel::brute_force_hits(&soup(), &set.rays);
+    let hit = answer(set.truth[0]);
     let soup = soup().intersecting(Intersection {
         triangle: TriangleRegistry::default().get("bare").expect("a test"),
         ..Intersection::default()
@@ -171,62 +175,67 @@ fn by_bare(x: f32, hit: Hit, any: bool) -> [usize; 2] {
 
 #[test]
 fn a_test_that_is_not_exact_may_answer_otherwise_where_rounding_explains_it() {
-    let hit = |triangle: u32, t: f32| Hit {
-        t,
-        triangle,
-        u: 0.25,
-        v: 0.25,
-    };
-    let miss = Hit {
+    type Change = fn(Hit) -> Hit;
+    let miss: Change = |_| Hit {
         t: 1e30,
         triangle: NO_HIT,
         u: 0.0,
         v: 0.0,
     };
+    let copy: Change = |hit| Hit { triangle: 1, ..hit };
+    let longer: Change = |hit| Hit {
+        t: ulps_up(hit.t, 30),
+        ..hit
+    };
     // In the middle of 0 and its copy 1: either, and nothing else.
-    assert_eq!(by_bare(0.0, hit(0, 1.0), true), [0, 0]);
-    assert_eq!(by_bare(0.0, hit(1, 1.0), true), [0, 1]);
-    assert_eq!(by_bare(0.0, hit(0, ulps_up(1.0, 30)), true), [0, 0]);
-    let wrong = [
-        (hit(0, 1.01), true),
-        (hit(1, 0.99), true),
-        (hit(2, 1.0), true),
-        (hit(3, 9.0), true),
-        (hit(4, 1.0), true),
+    assert_eq!(by_bare(0.0, |hit| hit, true), [0, 0]);
+    assert_eq!(by_bare(0.0, copy, true), [0, 1]);
+    assert_eq!(by_bare(0.0, longer, true), [0, 0]);
+    let wrong: [(Change, bool); 11] = [
+        (
+            |hit| Hit {
+                t: 1.01 * hit.t,
+                ..hit
+            },
+            true,
+        ),
+        (
+            |hit| Hit {
+                t: 0.99 * hit.t,
+                triangle: 1,
+                ..hit
+            },
+            true,
+        ),
+        (|hit| Hit { triangle: 2, ..hit }, true),
+        (|hit| Hit { triangle: 3, ..hit }, true),
+        (|hit| Hit { triangle: 4, ..hit }, true),
         (miss, false),
         (miss, true),
-        (hit(0, 1.0), false),
+        (|hit| hit, false),
         (
-            Hit {
-                u: 0.3,
-                ..hit(0, 1.0)
+            |hit| Hit {
+                u: hit.u + 0.05,
+                ..hit
             },
             true,
         ),
         (
-            Hit {
-                v: 0.2,
-                ..hit(1, 1.0)
+            |hit| Hit {
+                v: hit.v - 0.05,
+                triangle: 1,
+                ..hit
             },
             true,
         ),
-        (
-            Hit {
-                u: f32::NAN,
-                ..hit(0, 1.0)
-            },
-            true,
-        ),
+        (|hit| Hit { u: f32::NAN, ..hit }, true),
     ];
-    for (answer, any) in wrong {
-        assert_eq!(by_bare(0.0, answer, any), [1, 0], "{answer}, {any}");
+    for (place, (answer, any)) in wrong.into_iter().enumerate() {
+        assert_eq!(by_bare(0.0, answer, any), [1, 0], "{place}");
     }
-    // Along their edge, and along that of 3 behind them: a miss, too, but no hit on 3 that another distance has.
-    let at_edge = |hit: Hit| Hit { u: 0.0, ..hit };
-    assert_eq!(by_bare(-1.0, miss, false), [0, 1]);
-    assert_eq!(by_bare(-1.0, at_edge(hit(3, 9.0)), true), [0, 1]);
-    assert_eq!(by_bare(-1.0, at_edge(hit(3, 8.0)), true), [1, 0]);
-    assert_eq!(by_bare(-1.0, miss, true), [1, 0]);
-    // Beside them all nothing may be hit.
-    assert_eq!(by_bare(-1.1, at_edge(hit(0, 1.0)), true), [1, 0]);
+    // A ray along their edge may miss both, one beside it may not.
+    let at_edge = (0..16).map(|i| by_bare(-1.0 + 1e-8 * i as f32, miss, false));
+    assert!(at_edge.into_iter().any(|found| found == [0, 1]));
+    assert_eq!(by_bare(-0.999, miss, false), [1, 0]);
+    assert_eq!(by_bare(-0.999, miss, true), [1, 0]);
 }
