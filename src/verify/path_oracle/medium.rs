@@ -147,7 +147,12 @@ impl<'a> Medium<'a> {
 
     /// Calls `visit` with each region that a ray passes before `end`, and where it enters and leaves it, until it returns
     /// true.
-    pub(super) fn regions(&self, ray: &Segment, end: f64, mut visit: impl FnMut(&Region, [f64; 2]) -> bool) {
+    pub(super) fn regions(
+        &self,
+        ray: &Segment,
+        end: f64,
+        mut visit: impl FnMut(&Region, [f64; 2]) -> bool,
+    ) {
         let Some([mut t, last]) = self.volume.clip(ray.origin, ray.direction) else {
             return;
         };
