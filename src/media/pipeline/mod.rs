@@ -101,6 +101,8 @@ pub struct Generality {
     pub curves: bool,
     /// Rays of the view step through voxels in which nothing scatters, and do not cross regions of them at once.
     pub empty: bool,
+    /// Photons that miss the medium are in the list as well, where ways are straight.
+    pub missed: bool,
     /// Directions of light are summed where the phase function is isotropic, and so does not ask for them.
     pub directions: bool,
 }
@@ -366,7 +368,11 @@ impl Pipeline {
             directed: self.is_directed(),
             ..self.adding
         };
-        let marched = Marched::record(&gpu, self.through(), adding, &photons, counting)?;
+        let through = Through {
+            missed: (self.generality.missed && self.bending.is_none()).then_some(&points),
+            ..self.through()
+        };
+        let marched = Marched::record(&gpu, through, adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let smooth = match self.smoothing.filter {
@@ -388,6 +394,7 @@ impl Pipeline {
             medium: &self.medium,
             bending: self.bending.as_ref(),
             general: self.generality.extinction,
+            missed: None,
         }
     }
 

@@ -129,3 +129,15 @@ fn ways_as_if_light_were_bent_are_straight_where_it_is_not() {
         assert!(off > 0.0 && off < 1e-3, "{off}");
     }
 }
+
+#[test]
+fn photons_that_miss_the_medium_add_nothing() {
+    let Some(gpu) = adapter() else { return };
+    let all = Generality {
+        missed: true,
+        ..Generality::default()
+    };
+    let volume = fog([SIDE; 3]);
+    let [few, all] = [Generality::default(), all].map(|of| rendered(&gpu, &volume, of));
+    assert_eq!((few.0, few.3), (all.0, all.3));
+}

@@ -450,8 +450,8 @@ const SWITCH_FAULTS: [(&str, &str, &str, &str); 7] = [
     ),
     (
         "scatter/resolve",
-        "@if(undirected) vec4<f32>(0.0)",
-        "@if(undirected) vec4<f32>(1.0)",
+        "var direction = vec4<f32>(0.0);",
+        "var direction = vec4<f32>(1.0);",
         EVEN,
     ),
     // Straight ways as curved ones: half a step, and n² where there is none.
@@ -519,6 +519,7 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         "photons = 48\ngeneral = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
         "photons = 48\nscatters = \"isotropic\"\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
         "photons = 48\nscatters = \"isotropic\"\ngeneral_directions = true",
+        "photons = 48\ngeneral_list = true\nmode = [\"reference\", \"adaptive\"]",
         "photons = 48\ngeneral_steps = true\ncontent = [\"fog\", \"cloud\"]",
         "photons = 48\ngeneral_ways = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",

@@ -62,7 +62,6 @@ parameters! {
     }
 
     /// How a medium scatters.
-    #[derive(Copy)]
     enum Scatters {
         /// by Henyey and Greenstein's function
         Forward = "forward",
@@ -118,6 +117,8 @@ parameters! {
         general_ways: bool = false;
         /// true to have rays of the view step through voxels in which nothing scatters
         general_steps: bool = false;
+        /// true to have photons that miss the medium in the list, too, where ways are straight
+        general_list: bool = false;
         /// true to sum directions of light even where the phase function is isotropic
         general_directions: bool = false;
         /// how the medium scatters: forward, by Henyey and Greenstein's function with 0.4, or the same in all directions
@@ -138,6 +139,7 @@ impl Load {
             extinction: self.general,
             curves: self.general_ways,
             empty: self.general_steps,
+            missed: self.general_list,
             directions: self.general_directions,
         }
     }

@@ -86,7 +86,6 @@ impl Content {
                 ]
             }),
         }
-        Ok(volume)
     }
 
     /// The same of a grid that is smoothed: a caustic is as narrow as a voxel.
