@@ -152,7 +152,8 @@ impl SceneMedium {
         let mut are_none = [false; 2];
         for ((tint, is_none), values) in tints.iter_mut().zip(&mut are_none).zip(grids) {
             let most = tint.max_element();
-            if !(tint.min_element() >= 0.0 && most <= 1.0) {
+            let allowed = 0.0..=1.0;
+            if !tint.to_array().iter().all(|part| allowed.contains(part)) {
                 return Err(MediaError::Tint(tint.to_array()));
             }
             if most < 1.0 {

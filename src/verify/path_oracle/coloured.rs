@@ -138,7 +138,8 @@ impl PathOracle<'_> {
             let rate = (bounds.most - bounds.least).max_element();
             let mut way = depth_of(numbers.next(), &mut walk.rounding);
             let mut t = enter;
-            while rate > 0.0 {
+            loop {
+                // Without a rest, no collision comes before the end.
                 t += way / rate;
                 if t >= exit {
                     break;
