@@ -460,24 +460,3 @@ fn faults_of_coloured_media_are_seen_by_single_paths() {
         assert!(seen, "not seen: {fault} for {text}");
     }
 }
-
-#[test]
-fn scratch_texts_are_the_same() {
-    let new = gpu();
-    let library = KernelLibrary::default().with_folder(std::path::Path::new("/tmp/oldk")).unwrap();
-    let old = raystone_gpu::open(&AdapterChoice::Best, library).unwrap();
-    let scenes = crate::trial_scenes::trial_scenes().unwrap();
-    let mut count = 0;
-    for trial in scenes {
-        if trial.scene.medium.as_ref().is_some_and(SceneMedium::is_coloured) { continue; }
-        for (name, changes) in &trial.trials {
-            if *name != "path" { continue; }
-            let integrator = path(changes);
-            let text = |gpu: &Gpu| with_renderer(gpu, &trial.scene, [8, 8], &integrator, |r, _| Ok(r.kernel_text())).unwrap();
-            let (a, b) = (text(&new), text(&old));
-            println!("{} {} {}", trial.scene.name, a.len(), a == b);
-            count += usize::from(a != b);
-        }
-    }
-    assert_eq!(count, 0);
-}

@@ -137,9 +137,11 @@ impl PathOracle<'_> {
             }
             let rate = (bounds.most - bounds.least).max_element();
             let mut way = depth_of(numbers.next(), &mut walk.rounding);
+            if rate <= 0.0 {
+                return false;
+            }
             let mut t = enter;
             loop {
-                // Without a rest, no collision comes before the end.
                 t += way / rate;
                 if t >= exit {
                     break;
