@@ -339,3 +339,33 @@ pub(super) fn drawn(image: &[Vec3]) -> Option<Picture> {
     let image = Image::new(side, side, pixels).ok()?;
     Some(tone_map(&image, automatic_exposure(&image)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::segments::adapter;
+
+    #[test]
+    fn flip_of_an_image_is_the_mean_of_its_parts() {
+        let Some(gpu) = adapter() else { return };
+        let load = Load {
+            content: Content::Ball,
+            side: 12,
+            ..Load::default()
+        };
+        let scene = Scene::new(&gpu, &load, "").unwrap_or_else(|_| panic!("no scene"));
+        assert_eq!(scene.flip(&scene.many), 0.0);
+        assert_eq!(scene.flip_of_parts(&scene.many), Some([0.0; 3]));
+        let dimmed: Vec<Vec3> = scene.many.iter().map(|pixel| *pixel * 0.5).collect();
+        let whole = scene.flip(&dimmed);
+        let parts = scene.flip_of_parts(&dimmed).unwrap();
+        let sizes = scene.parts.as_ref().unwrap();
+        let sizes = [0, 1, 2].map(|k| sizes[k].iter().filter(|is_of| **is_of).count() as f64);
+        let mean = (0..3).map(|k| sizes[k] * parts[k]).sum::<f64>() / sizes.iter().sum::<f64>();
+        assert!(sizes.iter().all(|size| *size > 0.0), "{sizes:?}");
+        assert!(
+            (mean - whole).abs() < 1e-12 && whole > 0.05,
+            "{mean} {whole}"
+        );
+    }
+}
