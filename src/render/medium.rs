@@ -11,6 +11,8 @@ pub(super) struct MediumTables {
     placed: UniformValues,
     /// Field, pairs and index, in words.
     first: [u32; 3],
+    /// True if coefficients differ by channel.
+    pub(super) is_coloured: bool,
 }
 
 impl MediumTables {
@@ -25,17 +27,21 @@ impl MediumTables {
                 .map_err(|e| GpuError::Kernel(format!("{}: {e}", scene.name)))?;
             let voxels: DVec3 = UVec3::from(volume.resolution).as_dvec3();
             let scale = voxels / (volume.high - volume.low);
+            let [scattering_tint, absorption_tint] = medium.tints;
             let placed = UniformValues::new()
                 .vec("low", &volume.low.as_vec3().to_array())
                 .f32("density", straight.density)
                 .vec("scale", &scale.as_vec3().to_array())
                 .u32("is_ball", u32::from(volume.bounds == Bounds::Sphere))
                 .u32("phase_kind", volume.phase.kind)
-                .f32("anisotropy", volume.phase.anisotropy);
+                .f32("anisotropy", volume.phase.anisotropy)
+                .vec("scattering_tint", &scattering_tint.to_array())
+                .vec("absorption_tint", &absorption_tint.to_array());
             Ok(Self {
                 straight,
                 placed,
                 first: [0; 3],
+                is_coloured: medium.is_coloured(),
             })
         };
         scene.medium.as_ref().map(build).transpose()
@@ -76,9 +82,16 @@ impl MediumTables {
 }
 
 /// A kernel for scenes with a medium over which this module is the structure.
-pub(super) fn activate(kernel: Composition, module: Option<&str>) -> Composition {
+pub(super) fn activate(
+    kernel: Composition,
+    module: Option<&str>,
+    is_coloured: bool,
+) -> Composition {
     match module {
-        Some(module) => kernel.feature("media", true).with("structure", module),
+        Some(module) => kernel
+            .feature("media", true)
+            .feature("media_colours", is_coloured)
+            .with("structure", module),
         None => kernel,
     }
 }

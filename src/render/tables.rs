@@ -41,6 +41,8 @@ pub struct SceneFeatures {
     /// Kernel module of the structure over the scene's medium, if it has one. Kernels cannot carry it: a medium takes
     /// numbers from the sampler.
     pub medium: Option<&'static str>,
+    /// The medium's coefficients differ by channel.
+    pub medium_colours: bool,
 }
 
 /// Groups of features that kernels can be made to include although a scene does not need them.
@@ -101,7 +103,7 @@ impl SceneFeatures {
     /// The kernel with the scene's external kinds.
     pub(super) fn activate(&self, kernel: Composition) -> Composition {
         let kernel = self.light_kinds.activate(self.materials.activate(kernel));
-        medium::activate(kernel, self.medium)
+        medium::activate(kernel, self.medium, self.medium_colours)
     }
 
     /// Features omitted by a kernel for surfaces of only this kind, by its number, or only misses.
@@ -194,6 +196,7 @@ impl SceneBuffers {
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
                 mirrored: scene.mirrored.contains(&true),
                 medium: medium.as_ref().map(MediumTables::module),
+                medium_colours: medium.as_ref().is_some_and(|medium| medium.is_coloured),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),

@@ -1,7 +1,7 @@
 //! The medium of a scene: fog, smoke or a cloud in a box or a ball.
 
 use super::{SceneData, SceneError};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use raystone_core::parameters;
 use raystone_volume::files::Grid;
 use raystone_volume::volume::voxels;
@@ -12,6 +12,8 @@ use raystone_volume::{Bounds, MediaError, Phase, Volume, grid, phase};
 pub struct SceneMedium {
     /// Scattering and absorption, per scene unit; its refractive index is 1.
     pub volume: Volume,
+    /// What scattering and absorption of each channel are multiplied by: in [0, 1], 1 in some channel.
+    pub tints: [Vec3; 2],
     /// The structure whose bounds free flights go by: a name of `raystone_volume::structure`.
     pub structure: String,
 }
@@ -50,6 +52,10 @@ parameters! {
         scattering: f64 = 1.0, in 0.0..=6e4;
         /// absorption coefficient where the density is 1, per scene unit
         absorption: f64 = 0.0, in 0.0..=6e4;
+        /// what the scattering coefficient of red, green and blue is multiplied by
+        scattering_tint: [f64; 3] = [1.0; 3], in 0.0..=1.0;
+        /// what the absorption coefficient of red, green and blue is multiplied by
+        absorption_tint: [f64; 3] = [1.0; 3], in 0.0..=1.0;
         /// phase function
         phase: PhaseFunction = PhaseFunction::Isotropic;
         /// its anisotropy, k of Schlick or g of Henyey and Greenstein: above 0 is forward
@@ -106,7 +112,9 @@ impl MediumParameters {
                 anisotropy: self.anisotropy as f32,
             },
         };
-        SceneMedium::new(volume, &self.medium_structure)
+        let tints = [self.scattering_tint, self.absorption_tint]
+            .map(|tint| Vec3::from_array(tint.map(|x| x as f32)));
+        SceneMedium::tinted(volume, tints, &self.medium_structure)
     }
 
     /// The medium's box: as given, or as the file of its grid has it, or that of the scene.
@@ -126,13 +134,53 @@ impl SceneMedium {
     /// # Errors
     /// The volume is not [sound](Volume::checked), refracts, or there is no such structure.
     pub fn new(volume: Volume, structure: &str) -> Result<Self, MediaError> {
+        Self::tinted(volume, [Vec3::ONE; 2], structure)
+    }
+
+    /// The same with coefficients that differ by channel: those of the volume times a tint each. What is the same in
+    /// all channels becomes part of the volume, so that a grey tint is none; a coefficient that is 0 everywhere takes the
+    /// other's.
+    ///
+    /// # Errors
+    /// As [`SceneMedium::new`], and a tint beyond [0, 1].
+    pub fn tinted(
+        mut volume: Volume,
+        mut tints: [Vec3; 2],
+        structure: &str,
+    ) -> Result<Self, MediaError> {
+        let grids = [&mut volume.scattering, &mut volume.absorption];
+        let mut are_none = [false; 2];
+        for ((tint, is_none), values) in tints.iter_mut().zip(&mut are_none).zip(grids) {
+            let most = tint.max_element();
+            let allowed = 0.0..=1.0;
+            if !tint.to_array().iter().all(|part| allowed.contains(part)) {
+                return Err(MediaError::Tint(tint.to_array()));
+            }
+            if most < 1.0 {
+                values.iter_mut().for_each(|value| *value *= most);
+            }
+            *is_none = values.iter().all(|value| *value == 0.0);
+            *tint = if *is_none { Vec3::ONE } else { *tint / most };
+        }
+        // With the tint of the other, bounds of σ are bounds of each channel.
+        tints = match are_none {
+            [true, false] => [tints[1]; 2],
+            [false, true] => [tints[0]; 2],
+            _ => tints,
+        };
         let volume = volume.checked()?;
         let medium = Self {
             volume,
+            tints,
             structure: structure.to_owned(),
         };
         medium.check()?;
         Ok(medium)
+    }
+
+    /// True if some coefficient differs by channel.
+    pub fn is_coloured(&self) -> bool {
+        self.tints != [Vec3::ONE; 2]
     }
 
     /// An error where paths would bend, or nothing is known of the structure.
@@ -157,6 +205,9 @@ impl SceneMedium {
         );
         let grids = [&volume.scattering, &volume.absorption];
         let values = grids.into_iter().flatten().flat_map(|x| x.to_le_bytes());
+        let tints = self.is_coloured().then_some(self.tints);
+        let tints = tints.into_iter().flatten().flat_map(|tint| tint.to_array());
+        let values = values.chain(tints.flat_map(f32::to_le_bytes));
         head.into_bytes().into_iter().chain(values).collect()
     }
 }
@@ -212,6 +263,43 @@ mod tests {
             &[("medium", name("constant")), ("anisotropy", Number(0.5))],
         );
         assert_ne!(other.hash, fog.hash);
+    }
+
+    #[test]
+    fn what_is_the_same_in_all_channels_is_no_tint() {
+        let tinted = |scattering: [f64; 3], absorption: [f64; 3]| {
+            let tint = |t: [f64; 3]| List(t.map(Number).to_vec());
+            let changes = [
+                ("medium", name("constant")),
+                ("scattering", Number(2.0)),
+                ("absorption", Number(0.0)),
+                ("scattering_tint", tint(scattering)),
+                ("absorption_tint", tint(absorption)),
+            ];
+            load_with("cornell-box", &changes)
+        };
+        let grey = tinted([0.5; 3], [0.1, 0.2, 0.3]);
+        let plain = load_with(
+            "cornell-box",
+            &[("medium", name("constant")), ("scattering", Number(1.0))],
+        );
+        assert_eq!(grey.hash, plain.hash);
+        let grey = grey.medium.unwrap();
+        assert!(!grey.is_coloured());
+        let coloured = tinted([0.25, 0.5, 0.0], [1.0; 3]);
+        assert_ne!(coloured.hash, plain.hash);
+        let coloured = coloured.medium.unwrap();
+        assert!(coloured.is_coloured());
+        assert_eq!(coloured.volume.scattering, [1.0]);
+        assert_eq!(coloured.tints[0].to_array(), [0.5, 1.0, 0.0]);
+        let nothing = tinted([0.0; 3], [1.0; 3]).medium.unwrap();
+        assert!(!nothing.is_coloured() && nothing.volume.scattering == [0.0]);
+        let fog = raystone_volume::Volume::constant(1.0, 0.0, 1.0).unwrap();
+        for wrong in [[-0.1, 1.0, 1.0], [1.1, 1.0, 1.0], [f32::NAN, 1.0, 1.0]] {
+            let tints = [glam::Vec3::ONE, glam::Vec3::from_array(wrong)];
+            let refused = crate::SceneMedium::tinted(fog.clone(), tints, "dda").unwrap_err();
+            assert!(refused.to_string().contains("tint"), "{refused}");
+        }
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub mod known_images;
 pub mod lights;
 pub mod materials;
 #[cfg(test)]
+mod media_colour_tests;
+#[cfg(test)]
 mod media_tests;
 mod mesh;
 pub mod mitsuba;

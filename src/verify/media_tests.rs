@@ -132,10 +132,10 @@ pub(crate) fn image(
     })
 }
 
-const EYE: Vec3 = vec3(0.2, 0.4, 4.0);
+pub(crate) const EYE: Vec3 = vec3(0.2, 0.4, 4.0);
 
 /// Nothing but a triangle behind the camera, and a sky of radiance 1.
-fn empty(volume: Volume, structure: &str) -> SceneData {
+pub(crate) fn empty(volume: Volume, structure: &str) -> SceneData {
     let camera = Camera {
         eye: EYE,
         target: Vec3::ZERO,
@@ -155,7 +155,7 @@ fn empty(volume: Volume, structure: &str) -> SceneData {
     scene
 }
 
-fn placed(volume: Volume, anisotropy: Option<f32>) -> Volume {
+pub(crate) fn placed(volume: Volume, anisotropy: Option<f32>) -> Volume {
     Volume {
         low: DVec3::new(-0.9, -0.7, -1.0),
         high: DVec3::new(1.0, 0.8, 0.6),
@@ -170,7 +170,7 @@ fn placed(volume: Volume, anisotropy: Option<f32>) -> Volume {
 }
 
 /// A cloud with coefficients of this size.
-fn clouds(scattering: f32, absorption: f32) -> Volume {
+pub(crate) fn clouds(scattering: f32, absorption: f32) -> Volume {
     let mut cloud = procedures::cloud(14).unwrap();
     let most = cloud.scattering.iter().copied().fold(0.0, f32::max);
     let share: Vec<f32> = cloud.scattering.iter().map(|s| s / most).collect();
@@ -180,7 +180,7 @@ fn clouds(scattering: f32, absorption: f32) -> Volume {
 }
 
 /// σ_s and σ, trilinear between the middles of voxels: of the volume as it is, not as kernels read it.
-fn coefficients(volume: &Volume, position: DVec3) -> [f64; 2] {
+pub(crate) fn coefficients(volume: &Volume, position: DVec3) -> [f64; 2] {
     let size = UVec3::from(volume.resolution);
     let local = (position - volume.low) / (volume.high - volume.low) * size.as_dvec3() - 0.5;
     let local = local.clamp(DVec3::ZERO, (size - 1).as_dvec3());
@@ -198,7 +198,7 @@ fn coefficients(volume: &Volume, position: DVec3) -> [f64; 2] {
 }
 
 /// ∫ σ between two points, by the midpoint rule within the medium.
-fn optical_depth(volume: &Volume, from: DVec3, to: DVec3) -> f64 {
+pub(crate) fn optical_depth(volume: &Volume, from: DVec3, to: DVec3) -> f64 {
     const STEPS: i32 = 400;
     let way = to - from;
     let Some([enter, leave]) = volume.clip(from, way.normalize()) else {
@@ -279,7 +279,7 @@ fn shaded(gpu: &Gpu, volume: &Volume, structure: &str, samples: u32) -> Result<f
 }
 
 /// A floor of albedo 0.5 seen from the side, below the medium; no ray of the camera meets the medium.
-fn floor(volume: Volume, structure: &str) -> SceneData {
+pub(crate) fn floor(volume: Volume, structure: &str) -> SceneData {
     let camera = Camera {
         eye: vec3(0.0, -1.0, 4.0),
         target: vec3(0.0, -1.5, 0.0),
@@ -367,7 +367,7 @@ fn furnace(gpu: &Gpu, volume: Volume, structure: &str) -> Result<f64, GpuError> 
     Ok(worst.fold(0.0, f64::max))
 }
 
-fn fog(scattering: f32, absorption: f32) -> Volume {
+pub(crate) fn fog(scattering: f32, absorption: f32) -> Volume {
     Volume::constant(scattering, absorption, 1.0).unwrap()
 }
 

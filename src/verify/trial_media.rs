@@ -1,10 +1,12 @@
-//! Trial scenes with media: fog and a cloud, lamps inside and outside, surfaces in them, and every phase function.
+//! Trial scenes with media: fog and a cloud, lamps inside and outside, surfaces in them and around them, every phase function, and
+//! coefficients that differ by channel.
 
 use crate::kinds::KindChecks;
+use crate::mesh::Mesh;
 use crate::trial_mirrors::{connected, mirrors};
 use crate::trial_scenes::{Trial, TrialScene, depth, lamps, points, word};
-use glam::{DVec3, vec3};
-use raystone_scene::{Light, SceneData, SceneError, SceneMedium};
+use glam::{DVec3, Vec3, vec3};
+use raystone_scene::{Light, Material, SceneData, SceneError, SceneMedium};
 use raystone_volume::{Bounds, MediaError, Phase, Volume, phase, procedures};
 
 fn path(changes: &[(&'static str, raystone_core::params::ParamValue)]) -> Trial {
@@ -54,14 +56,43 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
             scene: in_medium("smoke", glowing()?, smoke(), "sparse-tree")?,
             trials: vec![path(&[depth(4)])],
         },
+        TrialScene {
+            scene: in_colours("haze", points(&kinds.lights)?, cloud(), HAZE, "bricks")?,
+            trials: vec![
+                path(&[depth(5)]),
+                path(&[depth(2), word("lights", "all"), word("roulette", "albedo")]),
+            ],
+        },
+        TrialScene {
+            scene: in_colours("amber", glazed()?, amber(), AMBER, "dda")?,
+            trials: vec![
+                path(&[depth(9)]),
+                path(&[depth(5), word("roulette", "none")]),
+            ],
+        },
     ])
 }
+
+/// Tints of scattering and absorption. One channel of the haze scatters nothing.
+const HAZE: [Vec3; 2] = [vec3(1.0, 0.4, 0.0), vec3(0.3, 0.0, 1.0)];
+const AMBER: [Vec3; 2] = [vec3(1.0, 0.7, 0.3), vec3(0.1, 0.5, 1.0)];
 
 /// The scene with a medium, which it is named after.
 fn in_medium(
     name: &str,
+    scene: SceneData,
+    volume: Result<Volume, MediaError>,
+    structure: &str,
+) -> Result<SceneData, SceneError> {
+    in_colours(name, scene, volume, [Vec3::ONE; 2], structure)
+}
+
+/// The same with tints of scattering and absorption.
+fn in_colours(
+    name: &str,
     mut scene: SceneData,
     volume: Result<Volume, MediaError>,
+    tints: [Vec3; 2],
     structure: &str,
 ) -> Result<SceneData, SceneError> {
     let problem = |source| SceneError::Medium {
@@ -70,7 +101,7 @@ fn in_medium(
     };
     let volume = volume.map_err(problem)?;
     name.clone_into(&mut scene.name);
-    scene.medium = Some(SceneMedium::new(volume, structure).map_err(problem)?);
+    scene.medium = Some(SceneMedium::tinted(volume, tints, structure).map_err(problem)?);
     Ok(scene)
 }
 
@@ -137,4 +168,32 @@ fn glowing() -> Result<SceneData, SceneError> {
         ball(vec3(2.6, 2.4, -1.0), 0.3, vec3(1.0, 3.0, 6.0)),
     ];
     Ok(scene)
+}
+
+/// Low corner and size of a block of glass.
+const GLASS: [Vec3; 2] = [vec3(0.15, 0.5, 1.4), vec3(0.8, 0.9, 0.7)];
+
+/// What fills the block up to its surfaces.
+fn amber() -> Result<Volume, MediaError> {
+    let amber = Volume::constant(2.0, 1.5, 1.0)?;
+    let [low, size] = GLASS;
+    Volume {
+        low: low.as_dvec3(),
+        high: (low + size).as_dvec3(),
+        phase: Phase {
+            kind: phase::HENYEY_GREENSTEIN,
+            anisotropy: 0.3,
+        },
+        ..amber
+    }
+    .checked()
+}
+
+/// The scene of lamps with a block of glass before them.
+fn glazed() -> Result<SceneData, SceneError> {
+    let mut mesh = Mesh { scene: lamps()? };
+    let glass = mesh.material(Material::dielectric("glass", vec3(0.9, 1.0, 0.95), 1.5));
+    let [low, size] = GLASS;
+    mesh.block(low, size, glass);
+    Ok(mesh.done(Vec::new()))
 }

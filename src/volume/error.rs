@@ -76,6 +76,12 @@ pub enum MediaError {
         /// Its index.
         value: f32,
     },
+    /// A tint that no channel can have.
+    #[error(
+        "the tint of a medium is ({}, {}, {}): each channel takes 0 to 1, larger coefficients those of the medium",
+        .0[0], .0[1], .0[2]
+    )]
+    Tint([f32; 3]),
     /// Parameters that a structure does not have.
     #[error("the structure over a volume: {0}")]
     Structure(String),

@@ -34,6 +34,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "checked path by path by the oracle in f64 (src/verify/path_oracle/connection.rs), and in src/verify/connection_tests.rs by closed forms",
     ),
     (
+        "integrator/coloured_medium",
+        "judged path by path by the oracle in f64 (src/verify/path_oracle/coloured.rs), and in src/verify/media_colour_tests.rs by closed forms and quadratures",
+    ),
+    (
         "integrator/medium",
         "judged path by path by the oracle in f64 (src/verify/path_oracle/medium.rs), and in src/verify/media_tests.rs by closed forms and quadratures",
     ),

@@ -160,6 +160,9 @@ impl Measurement for Structures {
         Box::new(cells.iter().map(move |cell| {
             at.say(cell.to_string());
             let load = Load::of(&cell[Axis::Integrator]);
+            // Before minutes are spent on what the device cannot bind.
+            at.gpu(cell)?
+                .zeroed("field", 4 * u64::from(load.side).pow(3))?;
             let volume = match &last {
                 Some((content, side, volume)) if (*content, *side) == (load.content, load.side) => {
                     Arc::clone(volume)

@@ -20,12 +20,16 @@ pub(super) struct Bending {
 }
 
 impl Bending {
-    /// `None` where nothing bends light.
+    /// `None` where nothing bends light, unless it is to be asked for everywhere.
     ///
     /// # Errors
     /// Its voxels are no cubes.
-    pub(super) fn of(volume: &Volume, medium: &Medium) -> Result<Option<Self>, PipelineError> {
-        if volume.refraction.iter().all(|n| *n == volume.refraction[0]) {
+    pub(super) fn of(
+        volume: &Volume,
+        medium: &Medium,
+        always: bool,
+    ) -> Result<Option<Self>, PipelineError> {
+        if !always && volume.refraction.iter().all(|n| *n == volume.refraction[0]) {
             return Ok(None);
         }
         let size = medium.size_of_voxel();

@@ -93,6 +93,11 @@ impl Pipeline {
         }
     }
 
+    /// Steps of all rays of the view when it last ran.
+    pub fn view_steps(&self) -> u64 {
+        self.view_steps
+    }
+
     /// Bytes of what photons write to and what is made of it, without the grid of sums.
     pub fn bytes(&self) -> u64 {
         self.grid.as_ref().map_or(0, |grid| {

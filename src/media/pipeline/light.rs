@@ -49,6 +49,14 @@ impl Photon {
         self.point.map(|c| crate::photons::cell_of(c, map))
     }
 
+    /// The words of a photon that meets nothing.
+    pub(super) const MISSED: [[f32; 4]; 4] = [
+        [0.0, 0.0, 0.0, -1.0],
+        [1.0, 1.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0; 4],
+    ];
+
     /// The words that the kernel reads; `marks` is what it counts of the photon.
     pub(super) fn words(&self, marks: [f32; 2]) -> [[f32; 4]; 4] {
         let ray = &self.ray.ray;

@@ -58,6 +58,8 @@ pub(super) struct Through<'a> {
     pub(super) bending: Option<&'a Bending>,
     /// True to read σ where it is known to be the same, too.
     pub(super) general: bool,
+    /// All points of the light, to have those whose photons miss the medium in the list, too.
+    pub(super) missed: Option<&'a [([f64; 2], f64)]>,
 }
 
 /// Photons with what they leave.
@@ -88,6 +90,7 @@ impl Marched {
             medium,
             bending,
             general,
+            missed,
         } = through;
         let brightest = photons.iter().map(|p| p.energy.max_element());
         let brightest = brightest.fold(0.0, f32::max);
@@ -104,17 +107,25 @@ impl Marched {
         // A power of two with which all weights together stay below 2³¹.
         let all: f64 = photons.iter().map(|p| p.weight).sum();
         let units = (30.0 - all.max(1.0).log2().ceil()).exp2();
-        let words: Vec<_> = photons
-            .iter()
-            .map(|photon| photon.words(counting.marks(photon)))
-            .collect();
+        let words = |photon: &Photon| photon.words(counting.marks(photon));
+        let words: Vec<_> = match missed {
+            None => photons.iter().map(words).collect(),
+            Some(points) => {
+                let mut left = photons.iter().peekable();
+                let meets = |(point, _): &([f64; 2], f64)| {
+                    let photon = left.next_if(|photon| photon.point == *point);
+                    photon.map_or(Photon::MISSED, words)
+                };
+                points.iter().map(meets).collect()
+            }
+        };
         let status = Storage::scratch("status", 64);
         let mut bindings = crate::upload::bindings(medium, gpu)?;
         scatter.bind(&mut bindings);
         if let Some(bending) = bending {
             bending.bind(gpu, &mut bindings)?;
         }
-        let count = photons.len() as u32;
+        let count = words.len() as u32;
         let cells = match counting {
             Counting::Origins { cells, .. } => cells,
             _ => 0,

@@ -16,7 +16,7 @@ use crate::photons::{ImportanceMap, Points, point_set};
 use crate::rays::SegmentRay;
 use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
 use crate::tracking::{TrackingError, albedo};
-use crate::{Bounds, Medium, Phase, Volume};
+use crate::{Bounds, Medium, Phase, Volume, phase};
 use bending::Bending;
 use glam::{DVec3, Vec3};
 use marched::{Counting, Marched, Through};
@@ -92,6 +92,21 @@ impl Grid {
     }
 }
 
+/// What is done though the medium does not ask for it: what generality costs. By default nothing of it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Generality {
+    /// σ is read where it is known to be the same.
+    pub extinction: bool,
+    /// Ways are those of a medium that bends light.
+    pub curves: bool,
+    /// Rays of the view step through voxels in which nothing scatters, and do not cross regions of them at once.
+    pub empty: bool,
+    /// Photons that miss the medium are in the list as well, where ways are straight.
+    pub missed: bool,
+    /// Directions of light are summed where the phase function is isotropic, and so does not ask for them.
+    pub directions: bool,
+}
+
 /// Passes that can be timed on their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
@@ -118,11 +133,13 @@ pub struct Pipeline {
     points: Vec<([f64; 2], f64)>,
     adaptive: Option<Adaptive>,
     smoothing: Smoothing,
-    general: bool,
+    generality: Generality,
     view: Vec<ViewRay>,
     grid: Option<Grid>,
     view_passes: Recording,
     image: Vec<Vec3>,
+    /// Steps of all rays of the view.
+    view_steps: u64,
     dirty: Dirty,
 }
 
@@ -157,17 +174,21 @@ impl Pipeline {
             player: Player::new(gpu),
             volume: volume.clone(),
             medium: medium.clone(),
-            bending: Bending::of(volume, medium)?,
+            bending: Bending::of(volume, medium, false)?,
             adding,
             source,
             points,
             adaptive: None,
             smoothing: Smoothing::default(),
-            general: false,
+            generality: Generality {
+                directions: true,
+                ..Generality::default()
+            },
             view: Vec::new(),
             grid: None,
             view_passes: Recording::new(),
             image: Vec::new(),
+            view_steps: 0,
             dirty: Dirty::Photons,
         })
     }
@@ -196,10 +217,21 @@ impl Pipeline {
         self.touch(Dirty::Photons);
     }
 
-    /// Whether σ is read where it is known to be the same, too: what generality costs. Photons run again.
-    pub fn set_general(&mut self, general: bool) {
-        self.general = general;
+    /// What is done though the medium does not ask for it. Photons run again. Before, directions are summed whatever the phase function
+    /// is, so that another one needs the view alone.
+    ///
+    /// # Errors
+    /// Ways are to be curved, and voxels are no cubes.
+    pub fn set_generality(&mut self, generality: Generality) -> Result<(), PipelineError> {
+        self.bending = Bending::of(&self.volume, &self.medium, generality.curves)?;
+        self.generality = generality;
         self.touch(Dirty::Photons);
+        Ok(())
+    }
+
+    /// Whether photons leave directions, which a phase function that is not isotropic asks for.
+    pub fn is_directed(&self) -> bool {
+        self.generality.directions || self.volume.phase.kind != phase::ISOTROPIC
     }
 
     /// Another medium, in which photons run again; rays of the view are those of the old box, so it needs a new one.
@@ -208,17 +240,23 @@ impl Pipeline {
     /// As [`Pipeline::new`].
     pub fn set_medium(&mut self, volume: &Volume, medium: &Medium) -> Result<(), PipelineError> {
         fits(volume)?;
-        self.bending = Bending::of(volume, medium)?;
+        self.bending = Bending::of(volume, medium, self.generality.curves)?;
         (self.volume, self.medium) = (volume.clone(), medium.clone());
         self.view.clear();
         self.touch(Dirty::Photons);
         Ok(())
     }
 
-    /// Another phase function: photons do not turn, so that the view alone runs again.
+    /// Another phase function: photons do not turn, so that the view alone runs again, unless it asks for directions that
+    /// were left out.
     pub fn set_phase(&mut self, phase: Phase) {
+        let was_directed = self.is_directed();
         self.volume.phase = phase;
-        self.touch(Dirty::View);
+        self.touch(if self.is_directed() && !was_directed {
+            Dirty::Photons
+        } else {
+            Dirty::View
+        });
     }
 
     /// Rays of a view: origins and directions of length 1.
@@ -326,7 +364,15 @@ impl Pipeline {
         } else {
             Counting::None
         };
-        let marched = Marched::record(&gpu, self.through(), self.adding, &photons, counting)?;
+        let adding = Adding {
+            directed: self.is_directed(),
+            ..self.adding
+        };
+        let through = Through {
+            missed: (self.generality.missed && self.bending.is_none()).then_some(&points),
+            ..self.through()
+        };
+        let marched = Marched::record(&gpu, through, adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
         let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let smooth = match self.smoothing.filter {
@@ -347,7 +393,8 @@ impl Pipeline {
         Through {
             medium: &self.medium,
             bending: self.bending.as_ref(),
-            general: self.general,
+            general: self.generality.extinction,
+            missed: None,
         }
     }
 
@@ -432,6 +479,7 @@ impl Pipeline {
         let count = rays.len() as u32;
         if rays.is_empty() {
             self.image = vec![Vec3::ZERO; self.view.len()];
+            self.view_steps = 0;
             return Ok(Elapsed::default());
         }
         let values = UniformValues::new()
@@ -457,7 +505,8 @@ impl Pipeline {
         }
         let kernel = bending::kernel("gather", self.bending.as_ref())
             .with("structure", self.medium.structure.module())
-            .feature("general", self.general);
+            .feature("general", self.generality.extinction)
+            .feature("step_empty", self.generality.empty);
         let mut recording = Recording::new();
         recording
             .clear(&status)
@@ -470,7 +519,9 @@ impl Pipeline {
             .download("image", &image)
             .download("status", &status);
         let played = self.play(&recording, passes)?;
-        let mut found = played.download::<[f32; 4]>("image")?.into_iter();
+        let found: Vec<[f32; 4]> = played.download("image")?;
+        self.view_steps = found.iter().map(|[.., steps]| *steps as u64).sum();
+        let mut found = found.into_iter();
         let pixel = |ray: &ViewRay| match ray {
             // A ray beside the medium sees nothing.
             None => Vec3::ZERO,

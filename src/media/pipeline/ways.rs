@@ -42,10 +42,13 @@ pub(crate) struct Chord {
 impl<'a> Ways<'a> {
     /// Of a volume, if its index is not the same everywhere.
     pub(crate) fn of(volume: &Volume, medium: &'a Medium, steps: Steps) -> Option<Self> {
+        let is_straight = volume.refraction.iter().all(|n| *n == volume.refraction[0]);
+        (!is_straight).then(|| Self::through(volume, medium, steps))
+    }
+
+    /// Of any volume.
+    pub(crate) fn through(volume: &Volume, medium: &'a Medium, steps: Steps) -> Self {
         let n: Vec<f64> = volume.refraction.iter().map(|n| f64::from(*n)).collect();
-        if n.iter().all(|value| *value == n[0]) {
-            return None;
-        }
         let size = medium.resolution;
         let gradient = |place: usize| {
             let voxel = UVec3::from(crate::volume::voxel_at(volume.resolution, place));
@@ -59,12 +62,12 @@ impl<'a> Ways<'a> {
             DVec3::from(along)
         };
         let gradient = (0..n.len()).map(gradient).collect();
-        Some(Self {
+        Self {
             medium,
             n,
             gradient,
             steps,
-        })
+        }
     }
 
     /// Weights of the eight voxels around a position.

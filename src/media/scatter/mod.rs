@@ -1,8 +1,8 @@
 //! Energy of photons added to a grid of radiance, by strategies (Pfeuti 2009, §3.5.3 and §3.5.4).
 //! Kernels: `kernels/media/scatter/`.
 //!
-//! A voxel has six sums: energy in red, green and blue, and direction times the mean of the three. They come out as
-//! floats whatever the strategy adds.
+//! A voxel has six sums: energy in red, green and blue, and direction times the mean of the three, which may be left out. They come
+//! out as floats whatever the strategy adds.
 
 mod record;
 
@@ -28,12 +28,12 @@ parameters! {
 }
 
 impl Strategy {
-    /// Words of a voxel in the grid that is added to; 0 for none.
+    /// Words of a sum in the grid that is added to; 0 for none.
     const fn words(self) -> u64 {
         match self {
-            Self::Fixed64 | Self::Tiles => 12,
+            Self::Fixed64 | Self::Tiles => 2,
             Self::Sort => 0,
-            _ => 6,
+            _ => 1,
         }
     }
 
@@ -59,9 +59,17 @@ pub struct Adding {
     pub attempts: u32,
     /// Deposits that a list has room for.
     pub capacity: u32,
+    /// False to leave out the three sums of directions, which come out as 0.
+    pub directed: bool,
 }
 
 impl Adding {
+    /// Words of a voxel in the grid that is added to.
+    const fn words(&self) -> u64 {
+        let sums = if self.directed { 6 } else { 3 };
+        sums * self.strategy.words()
+    }
+
     /// A strategy with the numbers that suit it: 2^12 units for one word, which leaves room for 2^20 of the largest
     /// deposits, and 2^24 for two; as many attempts as it takes.
     pub fn new(strategy: Strategy, capacity: u32) -> Self {
@@ -75,6 +83,7 @@ impl Adding {
             bits,
             attempts: 0,
             capacity,
+            directed: true,
         }
     }
 }

@@ -52,7 +52,10 @@ impl Scatter {
         let module = adding.strategy.module();
         let after = match adding.strategy {
             Strategy::Sort => {
-                let kernel = |name: &str| gpu.pipeline(&Composition::new(name), true);
+                let kernel = |name: &str| {
+                    let kernel = Composition::new(name).feature("undirected", !adding.directed);
+                    gpu.pipeline(&kernel, true)
+                };
                 let sum = kernel("media/scatter/sum")?;
                 let passes = (RadixSort::new(gpu)?, kernel("media/scatter/keys")?, sum);
                 After::Sum(Box::new(passes))
@@ -63,13 +66,15 @@ impl Scatter {
                     Strategy::Swap => "floats",
                     _ => "wide",
                 };
-                let kernel = Composition::new("media/scatter/resolve").feature(form, true);
+                let kernel = Composition::new("media/scatter/resolve")
+                    .feature(form, true)
+                    .feature("undirected", !adding.directed);
                 After::Resolve(gpu.pipeline(&kernel, true)?)
             }
         };
         let target = match adding.strategy {
             Strategy::Sort => ("deposits", u64::from(adding.capacity) * 32),
-            strategy => ("grid", u64::from(cells) * strategy.words() * 4),
+            _ => ("grid", u64::from(cells) * adding.words() * 4),
         };
         let own = |name: &str, bytes: u64| -> Result<Storage, GpuError> {
             Ok(Storage::from(&gpu.zeroed(name, bytes)?))
@@ -94,7 +99,7 @@ impl Scatter {
                 let count = self.adding.capacity;
                 u64::from(count) * (32 + 8) + RadixSort::scratch_bytes(count)
             }
-            strategy => u64::from(self.cells) * strategy.words() * 4,
+            _ => u64::from(self.cells) * self.adding.words() * 4,
         }
     }
 
@@ -105,7 +110,9 @@ impl Scatter {
 
     /// The kernel with this strategy as its module `scatter`.
     pub(crate) fn compose(&self, composition: Composition) -> Composition {
-        composition.with("scatter", self.module)
+        composition
+            .with("scatter", self.module)
+            .feature("undirected", !self.adding.directed)
     }
 
     /// Binds what is added to.

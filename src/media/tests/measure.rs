@@ -420,6 +420,58 @@ const CURVED_FAULTS: [(&str, &str, &str, &str); 18] = [
     ("curved/gather", "through *= after;", "", "torus"),
 ];
 
+/// The same where something is left out that the medium does not ask for; the last word is what is loaded.
+const SWITCH_FAULTS: [(&str, &str, &str, &str); 7] = [
+    // Voxels that scatter are crossed, and more than a region.
+    (
+        "gather",
+        "region.sigma.y <= 0.0",
+        "region.sigma.x <= 0.0",
+        CLOUD,
+    ),
+    (
+        "gather",
+        "leave(ray, walk, region.low, region.high)",
+        "leave(ray, walk, max(region.low, vec3<u32>(2u)) - 2u, min(region.high + 2u, medium.resolution))",
+        CLOUD,
+    ),
+    // Two sums, the third from another place, and directions that nothing has added.
+    (
+        "scatter/tallies",
+        "CHANNELS: u32 = 3u;",
+        "CHANNELS: u32 = 2u;",
+        EVEN,
+    ),
+    (
+        "scatter/resolve",
+        "value_of(at + 2u, false)",
+        "value_of(at + 1u, false)",
+        EVEN,
+    ),
+    (
+        "scatter/resolve",
+        "var direction = vec4<f32>(0.0);",
+        "var direction = vec4<f32>(1.0);",
+        EVEN,
+    ),
+    // Straight ways as curved ones: half a step, and n² where there is none.
+    (
+        "curved/way",
+        "(h / norm(path.v))",
+        "(0.5 * h / norm(path.v))",
+        WAYS,
+    ),
+    (
+        "curved/gather",
+        "let share = outside / n;",
+        "let share = outside / (n + 0.1);",
+        WAYS,
+    ),
+];
+const CLOUD: &str = "content = \"cloud\"";
+const EVEN: &str = "scatters = \"isotropic\"";
+const WAYS: &str = "content = \"shadow\"\ngeneral_ways = true";
+
 /// A run of one pipeline with these kernels: how many cells failed, and why.
 pub(super) fn pipeline_run(folder: &std::path::Path, kernels: &str, load: &str) -> (usize, String) {
     pipeline_run_of(folder, kernels, 12, load)
@@ -465,6 +517,11 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
     let all = [
         "photons = 48\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
         "photons = 48\ngeneral = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
+        "photons = 48\nscatters = \"isotropic\"\nstrategy = [\"fixed-32\", \"fixed-64\", \"swap\", \"sort\", \"tiles\"]",
+        "photons = 48\nscatters = \"isotropic\"\ngeneral_directions = true",
+        "photons = 48\ngeneral_list = true\nmode = [\"reference\", \"adaptive\"]",
+        "photons = 48\ngeneral_steps = true\ncontent = [\"fog\", \"cloud\"]",
+        "photons = 48\ngeneral_ways = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
         "photons = 48\ncontent = [\"ball\", \"cube\", \"lens\", \"torus\"]",
         "photons = 32\nmode = \"adaptive\"\ncontent = \"ball\"\nfilter = \"both\"",
@@ -495,9 +552,13 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         let load = format!("photons = 48\nstrategy = \"fixed-64\"\ncontent = \"{content}\"");
         (file, text, fault, load)
     });
+    let switched = SWITCH_FAULTS.map(|(file, text, fault, content)| {
+        let load = format!("photons = 48\nstrategy = \"fixed-64\"\n{content}");
+        (file, text, fault, load)
+    });
     let faults = in_turn(
         "faults of photons in a run",
-        fixed.into_iter().chain(adaptive).chain(curved),
+        (fixed.into_iter().chain(adaptive)).chain(curved.into_iter().chain(switched)),
     );
     let mut unseen = Vec::new();
     for (k, (file, text, fault, load)) in faults.into_iter().enumerate() {

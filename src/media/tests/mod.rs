@@ -3,6 +3,7 @@
 mod adaptive;
 mod curved;
 mod faults;
+mod generality;
 mod march;
 mod measure;
 mod pipeline;

@@ -1,4 +1,4 @@
-//! The medium of a scene for Mitsuba's `volpath`.
+//! The medium of a scene for Mitsuba's `volpath`, and for `volpathmis` where its coefficients differ by channel.
 
 use super::{Export, ExportError, vector};
 use glam::{DVec3, Vec3};
@@ -12,7 +12,11 @@ const FILES: [&str; 2] = ["medium/extinction.vol", "medium/albedo.vol"];
 
 /// The integrator that knows media, or that does not.
 pub(super) fn integrator(medium: Option<&SceneMedium>) -> &'static str {
-    if medium.is_some() { "volpath" } else { "path" }
+    match medium {
+        Some(medium) if medium.is_coloured() => "volpathmis",
+        Some(_) => "volpath",
+        None => "path",
+    }
 }
 
 /// What a sensor in the medium says of it.
@@ -37,9 +41,10 @@ pub(super) fn around(medium: Option<&SceneMedium>, eye: Vec3) -> String {
 impl Export<'_> {
     /// Writes the medium, its grids and its border.
     pub(super) fn medium(&mut self) -> Result<(), ExportError> {
-        let Some(SceneMedium { volume, .. }) = &self.scene.medium else {
+        let Some(medium) = &self.scene.medium else {
             return Ok(());
         };
+        let volume = &medium.volume;
         let size = volume.high - volume.low;
         let spread = size.max_element() - size.min_element();
         if volume.bounds == Bounds::Sphere && spread > 1e-9 * size.max_element() {
@@ -60,7 +65,11 @@ impl Export<'_> {
             }
         };
         let (kind, coefficients) = if volume.scattering.len() == 1 {
-            ("homogeneous", one_voxel(volume))
+            ("homogeneous", one_voxel(medium))
+        } else if medium.is_coloured() {
+            return Err(ExportError::Medium(
+                "its coefficients differ from voxel to voxel and by channel: take a constant one or leave out its tints",
+            ));
         } else {
             ("heterogeneous", self.grids(volume)?)
         };
@@ -132,10 +141,24 @@ impl Export<'_> {
     }
 }
 
-fn one_voxel(volume: &Volume) -> String {
+fn one_voxel(medium: &SceneMedium) -> String {
+    let volume = &medium.volume;
     let [scattering, absorption] = [volume.scattering[0], volume.absorption[0]].map(f64::from);
+    let albedo_of = |scattering: f64, sigma: f64| {
+        if sigma > 0.0 { scattering / sigma } else { 0.0 }
+    };
+    if medium.is_coloured() {
+        let [scatters, absorbs] = medium.tints.map(|tint| tint.as_dvec3().to_array());
+        let scattered = scatters.map(|tint| tint * scattering);
+        let sigma = [0, 1, 2].map(|k| scattered[k] + absorbs[k] * absorption);
+        let [x, y, z] = sigma;
+        let [r, g, b] = [0, 1, 2].map(|k| albedo_of(scattered[k], sigma[k]));
+        return format!(
+            "        <rgb name=\"sigma_t\" value=\"{x} {y} {z}\"/>\n        <rgb name=\"albedo\" value=\"{r} {g} {b}\"/>\n"
+        );
+    }
     let sigma = scattering + absorption;
-    let albedo = if sigma > 0.0 { scattering / sigma } else { 0.0 };
+    let albedo = albedo_of(scattering, sigma);
     format!(
         "        <float name=\"sigma_t\" value=\"{sigma}\"/>\n        <float name=\"albedo\" value=\"{albedo}\"/>\n"
     )

@@ -313,7 +313,9 @@ impl PathOracle<'_> {
             let until = ball.as_ref().map_or(end, |ball| ball.distance);
             let first = (self.medium.is_some() && depth < rules.max_depth)
                 .then(|| walk.draw(at_bounce(depth, ROULETTE)));
-            if let Some(flight) = self.flight(walk, (&state.ray, until), depth, first) {
+            let way = (&state.ray, until);
+            let flight = self.flight(walk, way, depth, first, &mut state.throughput);
+            if let Some(flight) = flight {
                 if !self.scatter(walk, &flight, depth, &mut state, rules) {
                     break;
                 }
@@ -398,8 +400,8 @@ impl PathOracle<'_> {
         rules: &PathRules,
     ) -> bool {
         let point = self.scattered(walk, &state.ray, depth, flight);
-        state.throughput *= walk.rounding.number(flight.albedo);
-        if depth == rules.max_depth || flight.albedo == 0.0 {
+        state.throughput *= walk.rounding.colour(flight.albedo);
+        if depth == rules.max_depth || flight.albedo == DVec3::ZERO {
             return false;
         }
         let phase = self.phase(&point);

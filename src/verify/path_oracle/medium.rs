@@ -16,10 +16,10 @@ use raystone_volume::{Phase, Straight, Volume, phase};
 use std::f64::consts::TAU;
 
 // Purposes of numbers beside the sampler's.
-const FLIGHT: u32 = 0;
+pub(super) const FLIGHT: u32 = 0;
 const SURVIVAL: u32 = 1;
-const LAST_FLIGHT: u32 = 2;
-const TO_LIGHT: u32 = 3;
+pub(super) const LAST_FLIGHT: u32 = 2;
+pub(super) const TO_LIGHT: u32 = 3;
 
 /// How far a region is entered before it is asked for, in voxels.
 const WITHIN: f64 = 1e-9;
@@ -31,19 +31,22 @@ const LEAST_HALF: f64 = 1.0 / 16384.0;
 /// A volume with the structure whose regions kernels ask for.
 pub(super) struct Medium<'a> {
     volume: &'a Volume,
-    straight: Straight,
+    pub(super) straight: Straight,
     /// σ_s and σ of each voxel, as kernels read them, per scene unit.
     field: Vec<DVec2>,
+    /// What σ_s and σ_a of each channel are multiplied by, where these differ.
+    tints: Option<[DVec3; 2]>,
 }
 
 /// Where a ray is scattered.
 pub(super) struct Flight {
-    distance: f64,
-    pub(super) albedo: f64,
+    pub(super) distance: f64,
+    /// What it multiplies the throughput by.
+    pub(super) albedo: DVec3,
 }
 
 /// Numbers of a purpose at a vertex of a path: a hash of all that they depend on.
-struct Numbers {
+pub(super) struct Numbers {
     key: u32,
     drawn: u32,
 }
@@ -62,7 +65,7 @@ fn keyed(key: u32, x: u32) -> u32 {
 }
 
 impl Numbers {
-    fn new(walk: &Walk, depth: u32, purpose: u32) -> Self {
+    pub(super) fn new(walk: &Walk, depth: u32, purpose: u32) -> Self {
         let [x, y] = walk.id.pixel;
         let seed = permuted(walk.id.seed ^ 0x6d65_6469);
         let pixel = y * walk.view.size[0] + x;
@@ -73,14 +76,14 @@ impl Numbers {
         }
     }
 
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.drawn += 1;
         to_unit(keyed(self.key, self.drawn)).into()
     }
 }
 
 /// Mean free paths up to a collision. A device's logarithm errs absolutely near 1.
-fn depth_of(number: f64, rounding: &mut Rounding) -> f64 {
+pub(super) fn depth_of(number: f64, rounding: &mut Rounding) -> f64 {
     let depth = -(1.0 - number).ln();
     let moved = rounding.number(depth) + 8.0 * rounding.share(0.0);
     moved.max(0.0)
@@ -112,11 +115,12 @@ impl<'a> Medium<'a> {
             volume,
             straight,
             field,
+            tints: (of.is_coloured()).then(|| of.tints.map(|tint| tint.as_dvec3())),
         })
     }
 
     /// σ_s and σ at a position in voxels, trilinearly between their middles.
-    fn at(&self, position: DVec3) -> DVec2 {
+    pub(super) fn at(&self, position: DVec3) -> DVec2 {
         let size = UVec3::from(self.volume.resolution).as_ivec3();
         let low = (position - 0.5).floor();
         let share = position - 0.5 - low;
@@ -143,7 +147,12 @@ impl<'a> Medium<'a> {
 
     /// Calls `visit` with each region that a ray passes before `end`, and where it enters and leaves it, until it returns
     /// true.
-    fn regions(&self, ray: &Segment, end: f64, mut visit: impl FnMut(&Region, [f64; 2]) -> bool) {
+    pub(super) fn regions(
+        &self,
+        ray: &Segment,
+        end: f64,
+        mut visit: impl FnMut(&Region, [f64; 2]) -> bool,
+    ) {
         let Some([mut t, last]) = self.volume.clip(ray.origin, ray.direction) else {
             return;
         };
@@ -179,7 +188,7 @@ impl<'a> Medium<'a> {
         }
     }
 
-    fn in_voxels(&self, ray: &Segment, t: f64) -> DVec3 {
+    pub(super) fn in_voxels(&self, ray: &Segment, t: f64) -> DVec3 {
         (ray.origin + ray.direction * t - self.volume.low) * self.voxels()
     }
 
@@ -208,15 +217,19 @@ fn holds(value: f64, [least, most]: [f64; 2]) -> bool {
 
 impl PathOracle<'_> {
     /// Where a ray is scattered first before `end`, by delta tracking: `first` is the number of the first collision that
-    /// there may be.
+    /// there may be. In colours, the throughput changes on the way.
     pub(super) fn flight(
         &self,
         walk: &mut Walk,
         (ray, end): (&Segment, f64),
         depth: u32,
         first: Option<f64>,
+        throughput: &mut DVec3,
     ) -> Option<Flight> {
         let medium = self.medium.as_ref()?;
+        if let Some(tints) = medium.tints {
+            return self.coloured_flight(walk, (ray, end), depth, first, (tints, throughput));
+        }
         let first = first.unwrap_or_else(|| Numbers::new(walk, depth, LAST_FLIGHT).next());
         let mut numbers = Numbers::new(walk, depth, FLIGHT);
         let mut left = depth_of(first, &mut walk.rounding);
@@ -246,7 +259,7 @@ impl PathOracle<'_> {
                     };
                     found = Some(Flight {
                         distance: t,
-                        albedo,
+                        albedo: DVec3::splat(albedo),
                     });
                     return true;
                 }
@@ -259,10 +272,13 @@ impl PathOracle<'_> {
     }
 
     /// What passes along the shadow ray to a light, by residual-ratio tracking.
-    pub(super) fn passes(&self, walk: &mut Walk, ray: &Segment, depth: u32, light: usize) -> f64 {
+    pub(super) fn passes(&self, walk: &mut Walk, ray: &Segment, depth: u32, light: usize) -> DVec3 {
         let Some(medium) = &self.medium else {
-            return 1.0;
+            return DVec3::ONE;
         };
+        if let Some(tints) = medium.tints {
+            return self.coloured_passes(walk, ray, depth, light, tints);
+        }
         let mut numbers = Numbers::new(walk, depth, TO_LIGHT + light as u32);
         let mut result = 1.0;
         let mut collisions = 0;
@@ -288,7 +304,7 @@ impl PathOracle<'_> {
             false
         });
         walk.decide(collisions);
-        walk.rounding.number(result)
+        DVec3::splat(walk.rounding.number(result))
     }
 
     /// The number that decides whether a path survives, where flights have that of the sampler.

@@ -12,6 +12,7 @@
 
 pub(crate) mod bsdf;
 mod camera;
+mod coloured;
 mod connection;
 mod estimator;
 pub(crate) mod hits;

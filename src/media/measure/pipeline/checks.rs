@@ -65,6 +65,8 @@ pub(super) struct Judge<'a> {
     pub(super) smoothing: Smoothing,
     /// How pilots make a map, if they do.
     pub(super) adaptive: Option<Adaptive>,
+    /// True if ways are those of a medium that bends light, whether it does or not.
+    pub(super) curved: bool,
 }
 
 /// What the checks found.
@@ -142,9 +144,16 @@ impl Judge<'_> {
     /// The first thing that is wrong: what, where, by how much.
     pub(super) fn check(&self, pipeline: &Pipeline, found: &Rendered) -> Result<Judged, String> {
         let fields = Fields::new(self.medium);
-        let ways = Ways::of(self.volume, self.medium, Steps::Regions);
+        let ways = if self.curved {
+            Some(Ways::through(self.volume, self.medium, Steps::Regions))
+        } else {
+            Ways::of(self.volume, self.medium, Steps::Regions)
+        };
         let ways = ways.as_ref();
-        let left = left_by(&fields, ways, pipeline.photons());
+        let mut left = left_by(&fields, ways, pipeline.photons());
+        if !pipeline.is_directed() {
+            left.sums.iter_mut().for_each(|sums| sums[3..].fill(0.0));
+        }
         self.check_pilots((&fields, ways), pipeline)?;
         self.check_power(pipeline)?;
         let radiance = pipeline.radiance().map_err(|error| error.to_string())?;

@@ -9,7 +9,7 @@ mod tests;
 use super::{cells_of, declare};
 use crate::adaptive::{Adaptive, Filter, Mode, Smoothing};
 use crate::photons::{Order, Points, Warp, ordered, point_set};
-use crate::pipeline::PipelineError;
+use crate::pipeline::{Generality, PipelineError};
 use crate::scatter::{ScatterError, Strategy};
 use crate::voxels::VoxelError;
 use crate::{Phase, phase};
@@ -61,6 +61,14 @@ parameters! {
         Torus = "torus",
     }
 
+    /// How a medium scatters.
+    enum Scatters {
+        /// by Henyey and Greenstein's function
+        Forward = "forward",
+        /// the same in all directions
+        Isotropic = "isotropic",
+    }
+
     /// photons of a lamp through a medium into a grid of radiance, evenly or by a map of importance, by one strategy of scatter, and an image of it (Pfeuti 2009)
     struct Load {
         /// how energy is added to the grid
@@ -105,10 +113,37 @@ parameters! {
         weight_step: f64 = 1.0, in 0.01..=1000.0;
         /// true to read σ even where it is known to be the same: what generality costs
         general: bool = false;
+        /// true to follow ways as in a medium that bends light, even where none does
+        general_ways: bool = false;
+        /// true to have rays of the view step through voxels in which nothing scatters
+        general_steps: bool = false;
+        /// true to have photons that miss the medium in the list, too, where ways are straight
+        general_list: bool = false;
+        /// true to sum directions of light even where the phase function is isotropic
+        general_directions: bool = false;
+        /// how the medium scatters: forward, by Henyey and Greenstein's function with 0.4, or the same in all directions
+        scatters: Scatters = Scatters::Forward;
     }
 }
 
 impl Load {
+    fn phase(&self) -> Phase {
+        match self.scatters {
+            Scatters::Forward => PHASE,
+            Scatters::Isotropic => Phase::ISOTROPIC,
+        }
+    }
+
+    fn generality(&self) -> Generality {
+        Generality {
+            extinction: self.general,
+            curves: self.general_ways,
+            empty: self.general_steps,
+            missed: self.general_list,
+            directions: self.general_directions,
+        }
+    }
+
     fn adaptive(&self, seed: u64) -> Option<Adaptive> {
         (self.mode == Mode::Adaptive).then_some(Adaptive {
             pilots: self.pilots,
@@ -141,7 +176,7 @@ impl Load {
     }
 }
 
-static FIGURES: [Figure; 21] = [
+static FIGURES: [Figure; 26] = [
     Figure::new(
         "scatter-deposit-ns/v1",
         "photons to grid",
@@ -304,6 +339,46 @@ static FIGURES: [Figure; 21] = [
     ),
     Figure::new(
         "scatter-noise-even/v1",
+        "and of the others",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-view-steps/v1",
+        "steps of a ray of the view",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-flip/v1",
+        "mean FLIP of the image from that of 2²⁰ photons",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-flip-caustic/v1",
+        "the same of pixels that refraction lights",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-flip-shadow/v1",
+        "of those that it darkens",
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    ),
+    Figure::new(
+        "scatter-flip-even/v1",
         "and of the others",
         "",
         Better::Lower,

@@ -2,12 +2,12 @@
 
 use super::checks::{Judge, Judged};
 use super::scene::{Scene, drawn, lamp};
-use super::{FIGURES, IMAGE, Load, PHASE, REACH};
+use super::{FIGURES, IMAGE, Load, REACH};
 use crate::adaptive::{Filter, Smoothing};
 use crate::photons::Points;
 use crate::pipeline::{Part, Pipeline, PipelineError, Rendered, Source, camera};
 use crate::scatter::{Adding, Strategy, Tallies};
-use crate::{Medium, Phase, Volume};
+use crate::{Medium, Phase, Volume, phase};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::{Absent, At, Prepared};
 use raystone_bench::timing::{Measured, Samples};
@@ -42,6 +42,11 @@ pub(super) struct Ready {
     noise: f64,
     /// Of pixels that refraction lights, darkens and leaves, where it does.
     parts: Option<[f64; 3]>,
+    /// FLIP, and of these parts.
+    flip: f64,
+    flips: Option<[f64; 3]>,
+    /// Steps of a ray of the view.
+    steps: f64,
     photons: usize,
     pilots: Option<Piloted>,
 }
@@ -63,12 +68,12 @@ impl Ready {
         let adding = adding(load);
         let source = lamp();
         let mut pipeline = begun(gpu, medium, adding)?;
-        turn_to(&mut pipeline, source, &scene.rays)?;
+        turn_to(&mut pipeline, source, load.phase(), &scene.rays)?;
         let adaptive = load.adaptive(seed);
         // Before points: those few find too little for a map.
         pipeline.set_points(load.points(load.photons, seed)?);
         pipeline.set_smoothing(load.smoothing());
-        pipeline.set_general(load.general);
+        pipeline.set_generality(load.generality())?;
         ran("other points", &pipeline.render()?, true)?;
         pipeline.set_adaptive(adaptive);
         let rendered = pipeline.render()?;
@@ -88,6 +93,7 @@ impl Ready {
             unit: pipeline.unit(),
             smoothing: load.smoothing(),
             adaptive,
+            curved: load.general_ways,
         };
         let judged = judge.check(&pipeline, &rendered).map_err(Absent::Failed)?;
         let photons = pipeline.photons().len();
@@ -100,6 +106,7 @@ impl Ready {
             }),
         };
         let bytes = pipeline.bytes() as f64;
+        let steps = pipeline.view_steps() as f64 / f64::from(IMAGE * IMAGE);
         let mut parts = vec![Part::Photons, Part::View, Part::All];
         if pilots.is_some() {
             parts.push(Part::Pilots);
@@ -120,6 +127,9 @@ impl Ready {
             judged,
             noise: scene.noise(&rendered.image),
             parts: scene.noise_of_parts(&rendered.image),
+            flip: scene.flip(&rendered.image),
+            flips: scene.flip_of_parts(&rendered.image),
+            steps,
             photons,
             pilots,
         })
@@ -180,7 +190,10 @@ pub(super) fn begun(
     };
     let few = [[0.2, 0.3], [0.7, 0.6]].map(|point| (point, 1.0)).to_vec();
     let mut of_volume = volume.clone();
-    of_volume.phase = Phase::ISOTROPIC;
+    of_volume.phase = Phase {
+        kind: phase::SCHLICK,
+        anisotropy: -0.2,
+    };
     let mut pipeline = Pipeline::new(gpu, (&of_volume, medium), adding, beam, few)?;
     pipeline.set_view(&camera(
         DVec3::new(0.5, 0.9, -2.0),
@@ -196,11 +209,12 @@ pub(super) fn begun(
 pub(super) fn turn_to(
     pipeline: &mut Pipeline,
     source: Source,
+    phase: Phase,
     rays: &[(DVec3, DVec3)],
 ) -> Result<(), Absent> {
     pipeline.set_source(source);
     ran("another light", &pipeline.render()?, true)?;
-    pipeline.set_phase(PHASE);
+    pipeline.set_phase(phase);
     ran("another phase function", &pipeline.render()?, false)?;
     pipeline.set_view(rays);
     ran("another view", &pipeline.render()?, false)
@@ -256,6 +270,10 @@ impl Prepared for Ready {
             conflicts,
             parts @ ..,
         ] = rest;
+        let (parts, after) = parts.split_at(3);
+        let [view_steps, flip, flips @ ..] = after else {
+            return Err("figures are missing".to_owned());
+        };
         let deposits = self.tallies.deposits as f64;
         let mut readings = vec![
             Reading::exact(dropped, self.judged.dropped),
@@ -266,6 +284,8 @@ impl Prepared for Ready {
             Reading::exact(noise, self.noise),
             Reading::exact(count, self.photons as f64),
             Reading::exact(conflicts, self.tallies.retries as f64),
+            Reading::exact(view_steps, self.steps),
+            Reading::exact(flip, self.flip),
         ];
         for (passes, samples) in self.passes.iter().zip(samples) {
             // Nanoseconds to milliseconds.
@@ -285,6 +305,9 @@ impl Prepared for Ready {
         }
         for (figure, noise) in parts.iter().zip(self.parts.into_iter().flatten()) {
             readings.push(Reading::exact(figure, noise));
+        }
+        for (figure, flip) in flips.iter().zip(self.flips.into_iter().flatten()) {
+            readings.push(Reading::exact(figure, flip));
         }
         if let Some(of) = &self.pilots {
             readings.extend([

@@ -1,7 +1,7 @@
 //! What the lamp shines into, with the images that others are compared with.
 
 use super::checks::{refracted_truth, truth_of};
-use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load, PHASE};
+use super::{Content, FOG, IMAGE, INTENSITY, LAMP, Load};
 use crate::adaptive::Smoothing;
 use crate::measure::failed;
 use crate::medium::{Homogeneity, Key, Medium};
@@ -15,7 +15,8 @@ use crate::{MediaError, Volume, procedures, structure};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::Absent;
 use raystone_gpu::Gpu;
-use raystone_image::{Image, Picture, automatic_exposure, tone_map};
+use raystone_image::{Image, Picture, automatic_exposure, displayed, tone_map};
+use raystone_stats::flip::Seen;
 use std::f64::consts::PI;
 
 /// Pixels of the page along each axis of a pixel of the image.
@@ -50,7 +51,7 @@ impl Content {
     /// All but those of meshes.
     fn by_procedure(self, side: u32) -> Result<Volume, MediaError> {
         let fog = |density: f32| [FOG[0] * density, FOG[1] * density, 1.0];
-        let mut volume = match self {
+        match self {
             Self::Fog | Self::Torus => Volume::new([side; 3], |_| fog(1.0)),
             Self::Cloud => procedures::cloud(side),
             Self::Shadow => Volume::new([side; 3], |p| {
@@ -84,9 +85,7 @@ impl Content {
                     (2.0 - square.min(1.0)).sqrt() as f32,
                 ]
             }),
-        }?;
-        volume.phase = PHASE;
-        Ok(volume)
+        }
     }
 
     /// The same of a grid that is smoothed: a caustic is as narrow as a voxel.
@@ -136,9 +135,7 @@ fn torus(gpu: &Gpu, side: u32) -> Result<Volume, Absent> {
     };
     let glass = [FOG[0] * CLEAR, FOG[1] * CLEAR, GLASS];
     let volume = procedures::covered(side, at, [FOG[0], FOG[1], 1.0], |_| glass);
-    let mut volume = volume.map_err(failed)?;
-    volume.phase = PHASE;
-    Ok(volume)
+    volume.map_err(failed)
 }
 
 /// The parts of an image: what refraction lights, what it darkens, and the rest. True where a pixel is of the part.
@@ -199,12 +196,16 @@ pub(super) struct Scene {
 
 impl Scene {
     pub(super) fn is_of(&self, load: &Load, kernels: &str) -> bool {
-        self.content == load.content && self.side == load.side && self.kernels == kernels
+        self.content == load.content
+            && self.side == load.side
+            && self.volume.phase == load.phase()
+            && self.kernels == kernels
     }
 
     /// The volume with a level map over it, and its images.
     pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
-        let volume = load.content.volume(gpu, load.side)?;
+        let mut volume = load.content.volume(gpu, load.side)?;
+        volume.phase = load.phase();
         let made = structure::registry()
             .find("level-map")
             .map(|kind| kind.make(&Default::default()));
@@ -268,6 +269,31 @@ impl Scene {
         Some([0, 1, 2].map(|k| self.noise_where(image, |pixel| parts[k][pixel])))
     }
 
+    /// Mean FLIP of an image from that of many photons, at the exposure of the latter, each pixel as one of a display.
+    pub(super) fn flip(&self, image: &[Vec3]) -> f64 {
+        mean_where(&self.flips(image), |_| true)
+    }
+
+    /// The same of the parts of [`Self::noise_of_parts`].
+    pub(super) fn flip_of_parts(&self, image: &[Vec3]) -> Option<[f64; 3]> {
+        let parts = self.parts.as_ref()?;
+        let flips = self.flips(image);
+        Some([0, 1, 2].map(|k| mean_where(&flips, |pixel| parts[k][pixel])))
+    }
+
+    fn flips(&self, image: &[Vec3]) -> Vec<f64> {
+        let pixels = self.many.iter().map(|pixel| pixel.to_array()).collect();
+        let exposure =
+            Image::new(IMAGE, IMAGE, pixels).map_or(1.0, |many| automatic_exposure(&many));
+        let seen = |image: &[Vec3]| {
+            let pixels: Vec<[f64; 3]> = (image.iter())
+                .map(|pixel| displayed(&pixel.to_array(), exposure))
+                .collect();
+            Seen::new(&pixels, IMAGE as usize)
+        };
+        seen(image).difference(&seen(&self.many))
+    }
+
     /// 0 where there is no such pixel.
     fn noise_where(&self, image: &[Vec3], is_of: impl Fn(usize) -> bool) -> f64 {
         let (mut square, mut count, mut mean) = (0.0, 0.0, 0.0);
@@ -281,6 +307,12 @@ impl Scene {
         let mean = mean / (3.0 * image.len() as f64);
         (square / f64::max(count, 1.0)).sqrt() / mean
     }
+}
+
+/// 0 where there is no such pixel.
+fn mean_where(values: &[f64], is_of: impl Fn(usize) -> bool) -> f64 {
+    let of = || values.iter().enumerate().filter(|(pixel, _)| is_of(*pixel));
+    of().map(|(_, value)| value).sum::<f64>() / of().count().max(1) as f64
 }
 
 /// The lamp, whose colours differ.
@@ -306,4 +338,34 @@ pub(super) fn drawn(image: &[Vec3]) -> Option<Picture> {
     let pixels = (0..side * side).map(pixel).collect();
     let image = Image::new(side, side, pixels).ok()?;
     Some(tone_map(&image, automatic_exposure(&image)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::segments::adapter;
+
+    #[test]
+    fn flip_of_an_image_is_the_mean_of_its_parts() {
+        let Some(gpu) = adapter() else { return };
+        let load = Load {
+            content: Content::Ball,
+            side: 12,
+            ..Load::default()
+        };
+        let scene = Scene::new(&gpu, &load, "").unwrap_or_else(|_| panic!("no scene"));
+        assert_eq!(scene.flip(&scene.many), 0.0);
+        assert_eq!(scene.flip_of_parts(&scene.many), Some([0.0; 3]));
+        let dimmed: Vec<Vec3> = scene.many.iter().map(|pixel| *pixel * 0.5).collect();
+        let whole = scene.flip(&dimmed);
+        let parts = scene.flip_of_parts(&dimmed).unwrap();
+        let sizes = scene.parts.as_ref().unwrap();
+        let sizes = [0, 1, 2].map(|k| sizes[k].iter().filter(|is_of| **is_of).count() as f64);
+        let mean = (0..3).map(|k| sizes[k] * parts[k]).sum::<f64>() / sizes.iter().sum::<f64>();
+        assert!(sizes.iter().all(|size| *size > 0.0), "{sizes:?}");
+        assert!(
+            (mean - whole).abs() < 1e-12 && whole > 0.05,
+            "{mean} {whole}"
+        );
+    }
 }

@@ -63,7 +63,7 @@ fn another_light_or_medium_than_the_one_judged_fails_the_cell() {
     let adding = Adding::new(Strategy::Fixed64, 0);
     let rays = view();
     let mut pipeline = begun(&gpu, (&volume, &medium), adding).unwrap();
-    turn_to(&mut pipeline, lamp(), &rays).unwrap();
+    turn_to(&mut pipeline, lamp(), PHASE, &rays).unwrap();
     let set = point_set(Points::Hammersley, 96, 0).unwrap();
     pipeline.set_points(set.into_iter().map(|point| (point, 1.0)).collect());
     let rendered = pipeline.render().unwrap();
@@ -87,6 +87,7 @@ fn another_light_or_medium_than_the_one_judged_fails_the_cell() {
         unit: pipeline.unit(),
         smoothing: Default::default(),
         adaptive: None,
+        curved: false,
     };
     let judged = judge.check(&pipeline, &rendered).unwrap();
     assert!(judged.rmse < 0.05 && judged.dropped == 0.0, "{judged:?}");
