@@ -1,5 +1,6 @@
 //! What is on screen.
 
+use super::inspect::Grasp;
 use glam::Vec3;
 use raystone_bench::run::Registries;
 use raystone_config::{
@@ -175,6 +176,16 @@ impl Screen {
             self.choose(0, Axis::Scene, scene);
         }
         Ok(())
+    }
+
+    /// Moves the instance that is grasped along the image, by shares of its width to the right and of its height down: what is
+    /// grasped stays under the pointer.
+    pub fn drag(&mut self, grasp: &Grasp, camera: &Camera, [x, y]: [f32; 2]) {
+        let [forward, right, up] = camera.basis(self.size);
+        let depth = (grasp.point - camera.eye).dot(forward);
+        let way = self.dragged.entry(grasp.instance).or_default();
+        // The vectors reach from the middle of the image to its edges, at distance 1.
+        *way += 2.0 * depth * (x * right - y * up);
     }
 
     /// Shows a second image, at first equal to the first; or no longer.

@@ -159,7 +159,13 @@ fn draw_scale(ui: &mut Ui, map: Map, most: f32) {
     ui.horizontal(|ui| {
         ui.label("0");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(format!("{most:.0} {} of a pixel's first ray", map.name()));
+            let what = match map {
+                Map::Bounces => "bounces of a path, the mean of a pixel".to_owned(),
+                Map::Cycles => "modelled cycles of a first ray, the mean of its warp".to_owned(),
+                map => format!("{} of a pixel's first ray", map.name()),
+            };
+            let digits = usize::from(most < 10.0 && most.fract() != 0.0);
+            ui.label(format!("{most:.digits$} {what}"));
         });
     });
 }
