@@ -102,7 +102,7 @@ fn text_field(
     id: (&'static str, usize, &'static str),
     now: &str,
 ) -> InnerResponse<Option<String>> {
-    let id = ui.id().with(id);
+    let id = ui.scope_id().with(id);
     let begun = ui.data(|kept| kept.get_temp::<String>(id));
     let mut text = begun.unwrap_or_else(|| now.to_owned());
     let widget = ui.add(TextEdit::singleline(&mut text).desired_width(110.0));

@@ -128,8 +128,9 @@ async function maps() {
 
 // A model has the parameters of every scene; a wrong one is a sentence, and the controls go back.
 async function parameters() {
+  // They stand on a ground of two.
   type("scene-copies", 3);
-  await finish(6);
+  await finish(8);
   type("scene-environment", "sky.hdr");
   const sentence = await wait("a sentence on the environment", () => at("view-trouble").textContent);
   await wait("the controls", () => at("scene-environment").value === "");

@@ -200,7 +200,7 @@ fn check_choices(seen: &Value, model: &Path) {
     let parameters = &seen["parameters"];
     let sentence = parameters[0].as_str().expect("a sentence");
     assert!(sentence.contains("sky.hdr"), "{sentence}");
-    let stays = json!(["quad.glb", "3", "6 triangles"]);
+    let stays = json!(["quad.glb", "3", "8 triangles"]);
     assert_eq!(json!(&parameters.as_array().expect("a list")[1..]), stays);
     let objects = &seen["objects"];
     assert!(objects["count"].as_u64() > Some(1), "{}", objects["count"]);
