@@ -227,3 +227,30 @@ impl Screen {
         plays.then_some(self.window.frame_spp)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::projected;
+    use raystone_bench::run::Registries;
+
+    #[test]
+    fn what_is_dragged_stays_under_the_pointer() {
+        let mut screen = Screen::parse(START, "x", &[], &Registries::default()).unwrap();
+        screen.size = [400, 300];
+        let camera = Camera::upright(Vec3::new(3.0, 1.0, 2.0), Vec3::new(0.5, 0.2, -0.1), 50.0);
+        let (instance, point) = (7, Vec3::new(0.9, 0.1, 0.4));
+        let at = |point| projected(&camera, [400, 300], point).unwrap();
+        let [x, y] = at(point);
+        let grasp = Grasp { instance, point };
+        // Two steps of a pointer, a tenth of the width to the right and a fifth of the height down in all.
+        screen.drag(&grasp, &camera, [0.04, 0.2]);
+        screen.drag(&grasp, &camera, [0.06, 0.0]);
+        let [to_x, to_y] = at(point + screen.dragged[&7]);
+        assert!(
+            (to_x - x - 40.0).abs() < 1e-2 && (to_y - y - 60.0).abs() < 1e-2,
+            "{to_x} {to_y}"
+        );
+        assert_eq!(screen.dragged.len(), 1);
+    }
+}
