@@ -272,7 +272,7 @@ mod tests {
             catalogue.with_parameter(Axis::Scene, now, name, value)
         };
         for (name, value) in [
-            ("copies", 3.value()),
+            ("copies", ParamValue::Integer(3)),
             ("environment", ParamValue::Name("maps/sky.hdr".to_owned())),
         ] {
             let variant = set(&screen, name, &value).unwrap();
@@ -281,7 +281,7 @@ mod tests {
         }
         let label = &screen.cells[0][Axis::Scene].label;
         assert_eq!(label, "a b.obj(environment=maps/sky.hdr,copies=3)");
-        assert_eq!(set(&screen, "copies", &(-1).value()), None);
-        assert_eq!(set(&screen, "no such", &3.value()), None);
+        assert_eq!(set(&screen, "copies", &ParamValue::Integer(-1)), None);
+        assert_eq!(set(&screen, "no such", &ParamValue::Integer(3)), None);
     }
 }
