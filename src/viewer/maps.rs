@@ -23,10 +23,13 @@ pub(crate) struct MapOfWork {
     pub work: Option<Vec<Counters>>,
 }
 
-/// A value of every pixel, row by row, of an image of this size; or why there is none.
+/// A value of every pixel, row by row; or why there are none.
+pub(crate) type Values = Result<Vec<f32>, String>;
+
+/// The values of an image of this size.
 pub(crate) struct PixelMap {
     pub size: [u32; 2],
-    pub values: Result<Vec<f32>, String>,
+    pub values: Values,
     /// Samples per pixel that are counted.
     pub spp: u32,
 }
@@ -53,7 +56,7 @@ impl MapOfWork {
 }
 
 impl PixelMap {
-    fn of(size: [u32; 2], values: Result<Vec<f32>, String>, spp: u32) -> Arc<Self> {
+    fn of(size: [u32; 2], values: Values, spp: u32) -> Arc<Self> {
         Arc::new(Self { size, values, spp })
     }
 }
@@ -70,7 +73,7 @@ impl Maps {
     }
 
     /// Size and values, row by row, or why there are none; `None` until it is counted.
-    pub(crate) fn values(&self, map: Map) -> Option<([u32; 2], Result<Vec<f32>, String>)> {
+    pub(crate) fn values(&self, map: Map) -> Option<([u32; 2], Values)> {
         let of_pixels = |map: &Arc<PixelMap>| (map.size, map.values.clone());
         let value: fn(&Counters) -> u32 = match map {
             Map::None => return None,
