@@ -1,11 +1,13 @@
 //! Everything an experiment may contain: the entries of each axis, and sections of settings.
 
 use super::axis::{Axis, AxisMap};
+use super::error::Place;
 use super::sections::{
     Animation, Coherence, Discrepancy, Gate, Reference, Run, StopRule, Timing, View, Window,
 };
 use super::settings::{Section, Settings};
-use raystone_core::params::{Entry, ParamValue, Parameter};
+use super::variants;
+use raystone_core::params::{Entry, ParamValue, Parameter, Variant};
 use std::fmt::Write as _;
 use std::ops::{Index, IndexMut};
 
@@ -56,6 +58,40 @@ impl Catalogue {
     /// All sections of settings.
     pub fn sections(&self) -> &[Section] {
         &self.sections
+    }
+
+    /// The entry of a name on an axis: a built-in one, or that of the path of a model or of a folder of kernels, which has the
+    /// parameters that all of the axis share. `None` if there is neither.
+    pub fn entry(&self, axis: Axis, name: &str) -> Option<Entry> {
+        variants::resolve(axis, &Place::Default, name, self).ok()
+    }
+
+    /// A variant with another value of one parameter, as an experiment with this variant alone has it; `None` if there is no such
+    /// entry or parameter, or the value is not allowed.
+    pub fn with_parameter(
+        &self,
+        axis: Axis,
+        now: &Variant,
+        name: &str,
+        value: &ParamValue,
+    ) -> Option<Variant> {
+        let entry = self.entry(axis, &now.name)?;
+        let changed = entry.schema.iter().find(|known| known.name == name)?;
+        if !changed.range.allows(value) {
+            return None;
+        }
+        let value_of = |known: &Parameter| match known.name == name {
+            true => Some(value.clone()),
+            false => now.params.0.get(known.name).cloned(),
+        };
+        let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
+            .filter_map(|known| Some((known.name, value_of(known)?)))
+            .collect();
+        let mut variant = entry.variant(&set);
+        if matches!(axis, Axis::Scene | Axis::Kernels) {
+            variants::shorten_labels(std::slice::from_mut(&mut variant));
+        }
+        Some(variant)
     }
 
     /// Adds a section of settings, for [`Experiment::settings`](super::Experiment::settings).

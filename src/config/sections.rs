@@ -229,7 +229,8 @@ parameters! {
     pub struct Window {
         /// Exposure in stops, over the automatic one.
         exposure: f32 = 0.0, in -20.0..=20.0;
-        /// What is shown: the image, or the work of every pixel's first ray.
+        /// What is shown: the image, the work of every pixel's first ray, how often its paths bounce, or the cycles that a model
+        /// of a GPU gives its first ray.
         map: Map = Map::None;
         /// Work at the upper end of the scale of colours; 0: the 99th percentile of all pixels.
         scale: f32 = 0.0, in 0.0..=1e9;
@@ -257,7 +258,7 @@ parameters! {
         Rebuild = "rebuild",
     }
 
-    /// Work of a pixel's first ray through a structure.
+    /// What a map shows of a pixel: work of its first ray through a structure, but for bounces and cycles.
     pub enum Map {
         /// None is shown.
         None = "none",
@@ -271,6 +272,10 @@ parameters! {
         Steps = "steps",
         /// Deepest stack, entries.
         Stack = "stack",
+        /// Bounces of its paths, the mean over some samples.
+        Bounces = "bounces",
+        /// Modelled cycles of its warp for first rays, over the warp's rays.
+        Cycles = "cycles",
     }
 
     /// What two images have the same of.

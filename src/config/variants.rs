@@ -149,12 +149,15 @@ pub(super) fn shorten_labels(scenes: &mut [Variant]) {
     let short: Vec<String> = scenes
         .iter()
         .map(|scene| {
-            let mut parts = scene.label.split(['/', '\\']);
+            // Parameters may be paths, too, and stay as they are.
+            let set = scene.label.strip_prefix(&scene.name).unwrap_or_default();
+            let path = scene.label.strip_suffix(set).unwrap_or(&scene.label);
+            let mut parts = path.split(['/', '\\']);
             let last = parts.rfind(|part| !part.is_empty());
             if scene.label.is_empty() {
                 EMBEDDED.to_owned()
             } else {
-                last.unwrap_or(&scene.label).to_owned()
+                format!("{}{set}", last.unwrap_or(path))
             }
         })
         .collect();

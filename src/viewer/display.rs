@@ -1,8 +1,8 @@
 //! What was rendered, apart from how it is shown.
 
 use super::frame::{Figures, Frame, SideFrame};
-use super::side::MapOfWork;
-use raystone_config::{Map, Window};
+use super::maps::{Maps, absence};
+use raystone_config::{Cell, Map, Window};
 use raystone_image::{Image, Picture, automatic_exposure, tone_map, viridis};
 use std::sync::Arc;
 
@@ -22,10 +22,9 @@ pub struct Display {
 #[derive(Clone)]
 pub(crate) struct Rendered {
     pub image: Option<Arc<Image>>,
-    pub map: Option<Arc<MapOfWork>>,
+    pub maps: Maps,
     pub label: String,
-    /// The structure's name.
-    pub accel: String,
+    pub cell: Cell,
     pub figures: Figures,
     pub fault: Option<String>,
 }
@@ -36,9 +35,9 @@ impl Display {
         let painter = Painter::new(&self.sides, window);
         let side = |side: &Rendered| {
             let (picture, map_mean) = painter.picture(side);
-            let counts = side.map.as_ref().is_none_or(|map| map.work.is_some());
-            let uncounted = (window.map != Map::None && !counts)
-                .then(|| format!("{} does not count its work: there is no map", side.accel));
+            let counted = side.maps.values(window.map);
+            let reason = counted.and_then(|(_, values)| values.err());
+            let uncounted = reason.map(|reason| absence(&side.cell, &reason));
             SideFrame {
                 picture,
                 label: side.label.clone(),
@@ -62,7 +61,7 @@ impl Display {
         !self.sides.is_empty()
             && match map {
                 Map::None => sides.all(|side| side.image.is_some()),
-                _ => sides.all(|side| side.map.is_some()),
+                map => sides.all(|side| side.maps.has(map)),
             }
     }
 }
@@ -78,7 +77,7 @@ impl Painter {
     fn new(sides: &[Rendered], window: &Window) -> Self {
         let first = sides.iter().find_map(|side| side.image.as_deref());
         let automatic = first.map_or(1.0, automatic_exposure);
-        let values = |side: &Rendered| side.map.as_ref().map(|map| map.values(window.map));
+        let values = |side: &Rendered| side.maps.values(window.map)?.1.ok();
         let greatest = |side: &Rendered| values(side).map_or(0.0, |values| percentile(&values));
         let scale = match window.scale {
             0.0 if window.map != Map::None => sides.iter().map(greatest).fold(1.0, f32::max),
@@ -101,17 +100,16 @@ impl Painter {
             let image = side.image.as_deref();
             return (image.map(|image| tone_map(image, self.exposure)), None);
         }
-        let Some(map) = &side.map else {
+        let Some((size, Ok(values))) = side.maps.values(self.map) else {
             return (None, None);
         };
-        let values = map.values(self.map);
         if values.is_empty() {
             return (None, None);
         }
         let sum: f64 = values.iter().copied().map(f64::from).sum();
         let picture = Picture {
-            width: map.size[0],
-            height: map.size[1],
+            width: size[0],
+            height: size[1],
             pixels: values.iter().map(|v| viridis(v / self.scale)).collect(),
         };
         (Some(picture), Some(sum / values.len() as f64))
@@ -128,6 +126,7 @@ fn percentile(values: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::maps::MapOfWork;
     use raystone_accel::Counters;
 
     #[test]
@@ -144,9 +143,9 @@ mod tests {
                 image: Some(Arc::new(
                     Image::new(2, 1, vec![[0.1; 3], [0.4; 3]]).unwrap(),
                 )),
-                map: None,
+                maps: Maps::default(),
                 label: String::new(),
-                accel: "bvh".to_owned(),
+                cell: Cell::default(),
                 figures: Figures::default(),
                 fault: None,
             }],
@@ -176,7 +175,7 @@ mod tests {
             nodes,
             ..Counters::default()
         };
-        display.sides[0].map = Some(Arc::new(MapOfWork {
+        display.sides[0].maps.work = Some(Arc::new(MapOfWork {
             size: [2, 1],
             work: Some(vec![counters(1), counters(3)]),
         }));

@@ -3,7 +3,7 @@
 use super::screen::Screen;
 use raystone_config::{Animation, Axis, Catalogue, Window};
 use raystone_core::geometry::Camera;
-use raystone_core::params::{Entry, ParamValue, ParameterType, Variant};
+use raystone_core::params::{ParamValue, ParameterType, Variant};
 use std::fmt::Write as _;
 
 impl Screen {
@@ -74,7 +74,7 @@ impl Screen {
         for (axis, all) in &written {
             let is_same_entry = all.len() == 2 && all[0].name == all[1].name;
             for variant in all {
-                let keys = changed(variant, &catalogue[*axis]);
+                let keys = changed(variant, *axis, catalogue);
                 if keys.is_empty() && !is_same_entry {
                     continue;
                 }
@@ -101,12 +101,14 @@ impl Screen {
     }
 }
 
-/// The parameters of a variant that differ from the defaults; those that models have are those that all scenes share.
-fn changed<'v>(variant: &'v Variant, entries: &[Entry]) -> Vec<(&'v str, ParamValue)> {
-    let entry = entries.iter().find(|entry| entry.name == variant.name);
-    let schema = entry
-        .or(entries.first())
-        .map_or(&[][..], |entry| &entry.schema);
+/// The parameters of a variant that differ from the defaults.
+fn changed<'v>(
+    variant: &'v Variant,
+    axis: Axis,
+    catalogue: &Catalogue,
+) -> Vec<(&'v str, ParamValue)> {
+    let entry = catalogue.entry(axis, &variant.name);
+    let schema = entry.as_ref().map_or(&[][..], |entry| &entry.schema);
     let is_default =
         |key: &str, value: &ParamValue| schema.iter().any(|p| p.name == key && p.default == *value);
     let keys = variant.params.0.iter();
@@ -264,5 +266,22 @@ mod tests {
         let before = screen.clone();
         assert!(screen.open("notes.txt", &catalogue).is_err());
         assert_eq!(screen, before);
+        // With the parameters that every scene has.
+        let set = |screen: &Screen, name: &str, value: &ParamValue| {
+            let now = &screen.cells[0][Axis::Scene];
+            catalogue.with_parameter(Axis::Scene, now, name, value)
+        };
+        for (name, value) in [
+            ("copies", ParamValue::Integer(3)),
+            ("environment", ParamValue::Name("maps/sky.hdr".to_owned())),
+        ] {
+            let variant = set(&screen, name, &value).unwrap();
+            screen.choose(0, Axis::Scene, &variant);
+            assert_eq!(read_back(&screen), screen);
+        }
+        let label = &screen.cells[0][Axis::Scene].label;
+        assert_eq!(label, "a b.obj(environment=maps/sky.hdr,copies=3)");
+        assert_eq!(set(&screen, "copies", &ParamValue::Integer(-1)), None);
+        assert_eq!(set(&screen, "no such", &ParamValue::Integer(3)), None);
     }
 }

@@ -23,6 +23,8 @@ pub struct Frame {
     pub reference_spp: Option<u32>,
     /// Triangles of the scene.
     pub triangles: usize,
+    /// Objects that can be dragged.
+    pub objects: usize,
     /// What the last frame took, of a scene that moves.
     pub times: Option<FrameTimes>,
 }

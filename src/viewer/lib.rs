@@ -6,11 +6,13 @@
 #![warn(missing_docs)]
 
 mod camera;
+mod cycles;
 mod display;
 mod done;
 mod experiment;
 mod frame;
 mod inspect;
+mod maps;
 mod motion;
 mod points;
 mod reference;

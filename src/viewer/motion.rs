@@ -42,6 +42,11 @@ impl Pose {
         }
     }
 
+    /// Whether the scene stands otherwise than it was loaded, so that structures had to follow it.
+    pub(crate) fn is_moved(&self) -> bool {
+        self.animation.is_some() || !self.dragged.is_empty()
+    }
+
     fn motion(&self) -> Motion {
         self.animation
             .map_or(Motion::Instances, |animation| animation.motion)

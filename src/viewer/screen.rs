@@ -1,5 +1,6 @@
 //! What is on screen.
 
+use super::inspect::Grasp;
 use glam::Vec3;
 use raystone_bench::run::Registries;
 use raystone_config::{
@@ -177,6 +178,16 @@ impl Screen {
         Ok(())
     }
 
+    /// Moves the instance that is grasped along the image, by shares of its width to the right and of its height down: what is
+    /// grasped stays under the pointer.
+    pub fn drag(&mut self, grasp: &Grasp, camera: &Camera, [x, y]: [f32; 2]) {
+        let [forward, right, up] = camera.basis(self.size);
+        let depth = (grasp.point - camera.eye).dot(forward);
+        let way = self.dragged.entry(grasp.instance).or_default();
+        // The vectors reach from the middle of the image to its edges, at distance 1.
+        *way += 2.0 * depth * (x * right - y * up);
+    }
+
     /// Shows a second image, at first equal to the first; or no longer.
     pub fn split(&mut self, is_split: bool) {
         self.cells.truncate(1);
@@ -214,5 +225,32 @@ impl Screen {
     pub(crate) fn plays(&self) -> Option<u32> {
         let plays = self.window.play && self.animation.is_some();
         plays.then_some(self.window.frame_spp)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::projected;
+    use raystone_bench::run::Registries;
+
+    #[test]
+    fn what_is_dragged_stays_under_the_pointer() {
+        let mut screen = Screen::parse(START, "x", &[], &Registries::default()).unwrap();
+        screen.size = [400, 300];
+        let camera = Camera::upright(Vec3::new(3.0, 1.0, 2.0), Vec3::new(0.5, 0.2, -0.1), 50.0);
+        let (instance, point) = (7, Vec3::new(0.9, 0.1, 0.4));
+        let at = |point| projected(&camera, [400, 300], point).unwrap();
+        let [x, y] = at(point);
+        let grasp = Grasp { instance, point };
+        // Two steps of a pointer, a tenth of the width to the right and a fifth of the height down in all.
+        screen.drag(&grasp, &camera, [0.04, 0.2]);
+        screen.drag(&grasp, &camera, [0.06, 0.0]);
+        let [to_x, to_y] = at(point + screen.dragged[&7]);
+        assert!(
+            (to_x - x - 40.0).abs() < 1e-2 && (to_y - y - 60.0).abs() < 1e-2,
+            "{to_x} {to_y}"
+        );
+        assert_eq!(screen.dragged.len(), 1);
     }
 }

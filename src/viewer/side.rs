@@ -1,12 +1,12 @@
 //! One of the images on screen: first coarse, then sample by sample.
 
 use super::done::Step;
+use super::maps::{Counted, Counting};
 use super::motion::SideTimes;
 use super::reference::Flip;
 use super::world::{Structure, World};
-use raystone_accel::{Counters, Query};
 use raystone_bench::run::{Estimator, Registries};
-use raystone_config::{Axis, Cell, Map};
+use raystone_config::{Axis, Cell, Follow, Map};
 use raystone_core::clock::Instant;
 use raystone_core::geometry::Camera;
 use raystone_core::structure::{RAY_QUERIES, TRACED_CLASSES};
@@ -14,7 +14,6 @@ use raystone_gpu::{Gpu, GpuError};
 use raystone_image::Image;
 use raystone_render::Renderer;
 use raystone_stats::metrics::Reference;
-use raystone_verify::rays::{primary_pixels, primary_rays};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -42,7 +41,7 @@ pub(crate) struct Lens {
 
 impl Lens {
     /// The size of an image that is this many times coarser.
-    fn divided(&self, by: u32) -> [u32; 2] {
+    pub(crate) fn divided(&self, by: u32) -> [u32; 2] {
         self.size.map(|edge| edge.div_ceil(by))
     }
 }
@@ -53,6 +52,8 @@ pub(crate) struct Renderers<'g> {
     cell: Cell,
     /// By width over that of the renderer.
     by_size: BTreeMap<u32, Renderer<'g>>,
+    /// Images are how often paths bounce.
+    counts_bounces: bool,
 }
 
 impl<'g> Renderers<'g> {
@@ -61,6 +62,15 @@ impl<'g> Renderers<'g> {
             gpu,
             cell,
             by_size: BTreeMap::new(),
+            counts_bounces: false,
+        }
+    }
+
+    /// Renderers whose images are the mean number of bounces of each pixel's paths.
+    pub(crate) fn counting_bounces(gpu: &'g Gpu, cell: Cell) -> Self {
+        Self {
+            counts_bounces: true,
+            ..Self::new(gpu, cell)
         }
     }
 
@@ -73,7 +83,10 @@ impl<'g> Renderers<'g> {
     ) -> Result<&mut Renderer<'g>, String> {
         if !self.by_size.contains_key(&by) {
             let size = lens.divided(by);
-            let estimator = Estimator::of(registries, &self.cell, lens.spp, size[0])?;
+            let mut estimator = Estimator::of(registries, &self.cell, lens.spp, size[0])?;
+            if self.counts_bounces {
+                estimator.integrator = estimator.integrator.counting_bounces();
+            }
             if let Some(reason) = estimator.integrator.refusal(&structure.traced) {
                 return Err(format!("{}: {reason}", self.cell[Axis::Accel]));
             }
@@ -97,33 +110,6 @@ impl<'g> Renderers<'g> {
     }
 }
 
-/// The work of the first ray of every pixel, of an image of this size; `None` if the structure does not count.
-pub(crate) struct MapOfWork {
-    pub size: [u32; 2],
-    pub work: Option<Vec<Counters>>,
-}
-
-impl MapOfWork {
-    /// The work of every pixel, row by row; empty if it is not counted.
-    pub(crate) fn values(&self, map: Map) -> Vec<f32> {
-        let value = |c: &Counters| match map {
-            Map::None => 0,
-            Map::Nodes => c.nodes,
-            Map::BoxTests => c.box_tests,
-            Map::Triangles => c.triangle_tests,
-            Map::Steps => c.nodes + c.triangle_tests,
-            Map::Stack => c.stack_high_water,
-        };
-        let pixels = primary_pixels(self.size[0], self.size[1]);
-        let work = self.work.iter().flatten();
-        let mut values = vec![0.0; self.work.iter().flatten().count()];
-        for (pixel, counters) in pixels.into_iter().zip(work) {
-            values[pixel as usize] = value(counters) as f32;
-        }
-        values
-    }
-}
-
 /// An image on screen.
 pub(crate) struct Side<'g> {
     pub cell: Cell,
@@ -136,7 +122,7 @@ pub(crate) struct Side<'g> {
     /// Samples of the whole image were given up midway.
     is_torn: bool,
     pub image: Option<Arc<Image>>,
-    pub map: Option<Arc<MapOfWork>>,
+    pub counting: Counting<'g>,
     pub flip: Option<Flip>,
     /// Samples per pixel of the whole image.
     pub done: u32,
@@ -176,7 +162,7 @@ impl<'g> Side<'g> {
             by: COARSEST,
             is_torn: true,
             image: None,
-            map: None,
+            counting: Counting::new(gpu, cell.clone()),
             flip: None,
             done: 0,
             shown: 0,
@@ -195,7 +181,8 @@ impl<'g> Side<'g> {
         self.lens = lens;
         self.by = self.first_coarse();
         self.is_torn = true;
-        (self.map, self.flip) = (None, None);
+        self.counting.restart();
+        self.flip = None;
         (self.done, self.shown) = (0, 0);
         self.rays = [0; TRACED_CLASSES];
         self.rays_ms = 0.0;
@@ -203,7 +190,9 @@ impl<'g> Side<'g> {
 
     /// Begins anew over a scene that moved, with the structure that took so long to follow it. What was shown stays until then.
     pub(crate) fn follow(&mut self, structure: Result<Structure, String>, update_ms: f64) {
-        self.renderers = Renderers::new(self.renderers.gpu, self.cell.clone());
+        let gpu = self.renderers.gpu;
+        self.renderers = Renderers::new(gpu, self.cell.clone());
+        self.counting = Counting::new(gpu, self.cell.clone());
         self.restart(self.lens);
         self.update_ms = update_ms;
         match structure {
@@ -282,15 +271,15 @@ impl<'g> Side<'g> {
     /// A coarse image, and the map that is wanted.
     pub(crate) async fn refine(
         &mut self,
-        (registries, world): (&Registries, &World),
-        map: Map,
+        with: (&Registries, &World),
+        (map, follow): (Map, Follow),
         stop: &dyn Fn() -> bool,
     ) -> Result<Step, GpuError> {
-        if !self.coarse((registries, world), stop).await? {
+        if !self.coarse(with, stop).await? {
             return Ok(Step::Stopped);
         }
-        if map != Map::None && self.fault.is_none() {
-            self.count(world).await?;
+        if self.fault.is_none() {
+            while let Some(Step::Worked) = self.count(with, (map, follow), stop).await? {}
         }
         Ok(Step::Shown)
     }
@@ -415,25 +404,30 @@ impl<'g> Side<'g> {
         true
     }
 
-    /// Counts the work of every pixel's first ray, for an image as coarse as the one that is shown; `true` if there is a new map.
-    pub(crate) async fn count(&mut self, world: &World) -> Result<bool, GpuError> {
+    /// Does a piece of the map that is wanted, for an image as coarse as the one that is shown; `None` if it is there.
+    pub(crate) async fn count(
+        &mut self,
+        (registries, world): (&Registries, &World),
+        (map, follow): (Map, Follow),
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Step>, GpuError> {
+        let Some(structure) = &self.structure else {
+            return Ok(None);
+        };
         let by = match self.is_coarse() {
             true => self.by * 4,
             false => 1,
         };
-        let size = self.lens.divided(by);
-        if self.map.as_ref().is_some_and(|map| map.size == size) {
-            return Ok(false);
-        }
-        let Some(structure) = &self.structure else {
-            return Ok(false);
+        let of = Counted {
+            registries,
+            world,
+            cell: &self.cell,
+            structure,
+            lens: &self.lens,
+            by,
+            map,
+            follow,
         };
-        let rays = primary_rays(self.lens.camera, size[0], size[1]);
-        let work = world
-            .stage
-            .count_work_async(&structure.traced, Query::Closest, &rays)
-            .await?;
-        self.map = Some(Arc::new(MapOfWork { size, work }));
-        Ok(true)
+        self.counting.count(of, stop).await
     }
 }

@@ -348,9 +348,9 @@ impl<'g> Viewer<'g> {
         let reference = self.judge.as_ref().map(|(reference, _)| reference);
         let side = |side: &Side| Rendered {
             image: side.image.clone(),
-            map: side.map.clone(),
+            maps: side.counting.maps.clone(),
             label: side.cell.to_string(),
-            accel: side.cell[Axis::Accel].to_string(),
+            cell: side.cell.clone(),
             figures: figures(side, reference),
             fault: side.fault.clone(),
         };
@@ -362,6 +362,7 @@ impl<'g> Viewer<'g> {
                     .world
                     .as_ref()
                     .map_or(0, |world| world.stage.scene.triangles.len()),
+                objects: self.world.as_ref().map_or(0, World::objects),
                 times: self.times.clone().filter(|_| screen.plays().is_some()),
                 ..Frame::default()
             },
@@ -378,8 +379,16 @@ impl<'g> Viewer<'g> {
     /// # Errors
     /// The scene has no instances, or the device is lost; in words.
     pub fn grasp(&self, pixel: [u32; 2]) -> Result<Option<Grasp>, String> {
+        wait_for(self.grasp_async(pixel))
+    }
+
+    /// See [`Viewer::grasp`].
+    ///
+    /// # Errors
+    /// As [`Viewer::grasp`].
+    pub async fn grasp_async(&self, pixel: [u32; 2]) -> Result<Option<Grasp>, String> {
         let (world, side) = self.at(0)?;
-        wait_for(inspect::grasp(world, side, pixel))
+        inspect::grasp(world, side, pixel).await
     }
 
     /// Writes the linear image of a side, in the format of the file's ending; or what is on screen, as PNG.

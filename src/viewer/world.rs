@@ -62,17 +62,35 @@ impl World {
         TriangleSoup::new(&self.stage.scene).intersecting(self.stage.soup.intersection)
     }
 
+    /// Objects that can be dragged: instances, if there are several.
+    pub(crate) fn objects(&self) -> usize {
+        let assembly = self.still.assembly.as_ref();
+        let instances = assembly.map_or(0, |assembly| assembly.instances().len());
+        if instances > 1 { instances } else { 0 }
+    }
+
     /// Builds and uploads the structure of a cell.
     pub(crate) fn build(&self, registries: &Registries, cell: &Cell) -> Result<Structure, String> {
+        let soup = self.soup();
+        let built = self.built(registries, cell, &soup)?;
+        self.upload(registries, cell, &*built)
+    }
+
+    /// Builds the structure of a cell over these triangles.
+    pub(crate) fn built(
+        &self,
+        registries: &Registries,
+        cell: &Cell,
+        soup: &TriangleSoup,
+    ) -> Result<Box<dyn BuiltAccel>, String> {
         let accel = &cell[Axis::Accel];
         let kind = registries.accel.named("structure", &accel.name)?;
         let gpu = &self.stage.gpu;
-        let soup = self.soup();
-        let built = kind.build(&soup, &accel.params, &mut BuildLog::with_gpu(gpu));
+        let built = kind.build(soup, &accel.params, &mut BuildLog::with_gpu(gpu));
         let built = built.map_err(|e| e.to_string())?;
-        let valid = built.validate(&soup);
+        let valid = built.validate(soup);
         valid.map_err(|fault| format!("{accel} is not valid: {fault}"))?;
-        self.upload(registries, cell, &*built)
+        Ok(built)
     }
 
     /// Uploads the structure of a cell.

@@ -1,5 +1,6 @@
 //! The core of the window: its images are those of `raystone render`, and a change begins no more anew than it has to.
 
+mod maps;
 mod motion;
 
 use crate::support;

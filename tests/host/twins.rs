@@ -269,6 +269,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged by tests/device/compaction, against what flags say",
     ),
     ("integrator/ao", "judged by images, not by a twin"),
+    (
+        "integrator/bounces",
+        "counts; tests/device/viewer.rs compares them with the path oracle",
+    ),
     ("integrator/frame", "judged by images, not by a twin"),
     ("integrator/path", "judged by images, not by a twin"),
     ("integrator/primary", "judged by images, not by a twin"),

@@ -52,6 +52,8 @@ pub struct App {
     asked: Screen,
     image: ImageView,
     pixel: PixelPanel,
+    /// The object that is moved by numbers.
+    object: u32,
     /// The path that is typed.
     path: String,
     file: String,
@@ -73,6 +75,7 @@ impl App {
             screen,
             image: ImageView::default(),
             pixel: PixelPanel::default(),
+            object: 0,
             path: String::new(),
             file: "view.png".to_owned(),
             message: None,
@@ -262,8 +265,17 @@ impl App {
         });
         ui.separator();
         ui.strong("Motion");
-        let frame = self.worker.found().frame_number;
-        motion::draw(ui, &mut self.screen, frame);
+        let (frame, objects) = {
+            let found = self.worker.found();
+            (found.frame_number, found.frame.objects)
+        };
+        let moves = motion::Moves {
+            frame,
+            objects,
+            drags: &mut self.image.drags_objects,
+            object: &mut self.object,
+        };
+        motion::draw(ui, &mut self.screen, moves);
         ui.separator();
         ui.strong("Shown");
         self.draw_shown(ui);
@@ -273,7 +285,7 @@ impl App {
         let is_split = self.screen.cells.len() > 1;
         let window = &mut self.screen.window;
         ui.add(egui::Slider::new(&mut window.exposure, -8.0..=8.0).text("exposure, stops"));
-        egui::ComboBox::from_label("map of the first rays")
+        egui::ComboBox::from_label("map of the pixels")
             .selected_text(window.map.name())
             .show_ui(ui, |ui| {
                 for map in Map::ALL {

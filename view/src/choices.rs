@@ -37,8 +37,7 @@ fn draw_axes(ui: &mut Ui, screen: &mut Screen, catalogue: &Catalogue, side: usiz
         let Some(now) = screen.cells[side].get(*axis).cloned() else {
             continue;
         };
-        let entries = &catalogue[*axis];
-        if let Some(chosen) = draw_axis(ui, (*axis, side), &now, entries) {
+        if let Some(chosen) = draw_axis(ui, (*axis, side), &now, catalogue) {
             screen.choose(side, *axis, &chosen);
         }
     }
@@ -49,8 +48,9 @@ fn draw_axis(
     ui: &mut Ui,
     (axis, side): (Axis, usize),
     now: &Variant,
-    entries: &[Entry],
+    catalogue: &Catalogue,
 ) -> Option<Variant> {
+    let entries = &catalogue[axis];
     let mut chosen = None;
     ui.horizontal(|ui| {
         let list = ComboBox::from_id_salt((axis.name(), side))
@@ -71,8 +71,8 @@ fn draw_axis(
         let label = ui.label(axis.name());
         list.response.labelled_by(label.id);
     });
-    // Those of a model are changed in an experiment.
-    let entry = entries.iter().find(|entry| entry.name == now.name);
+    // A model has those that every scene has.
+    let entry = catalogue.entry(axis, &now.name);
     let schema: Vec<&Parameter> = entry.iter().flat_map(|entry| &entry.schema).collect();
     if schema.is_empty() {
         return chosen;
@@ -88,22 +88,12 @@ fn draw_axis(
                         .get(parameter.name)
                         .unwrap_or(&parameter.default);
                     if let Some(value) = draw_parameter(ui, (axis, side), parameter, value) {
-                        chosen = entry.map(|entry| changed(entry, now, parameter.name, value));
+                        chosen = catalogue.with_parameter(axis, now, parameter.name, &value);
                     }
                 }
             });
     });
     chosen
-}
-
-/// A variant with another value of one parameter.
-fn changed(entry: &Entry, now: &Variant, name: &'static str, value: ParamValue) -> Variant {
-    let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
-        .filter_map(|p| Some((p.name, now.params.0.get(p.name)?.clone())))
-        .filter(|(other, _)| *other != name)
-        .chain([(name, value.clone())])
-        .collect();
-    entry.variant(&set)
 }
 
 /// A field for a text, and what was entered where that is another one: half a name is none yet.
@@ -112,7 +102,7 @@ fn text_field(
     id: (&'static str, usize, &'static str),
     now: &str,
 ) -> InnerResponse<Option<String>> {
-    let id = ui.id().with(id);
+    let id = ui.scope_id().with(id);
     let begun = ui.data(|kept| kept.get_temp::<String>(id));
     let mut text = begun.unwrap_or_else(|| now.to_owned());
     let widget = ui.add(TextEdit::singleline(&mut text).desired_width(110.0));

@@ -67,7 +67,8 @@ fn draw_side(ui: &mut Ui, name: &str, figures: &Figures, reference_spp: Option<u
             row("reference, spp", spp.to_string());
         }
         if let Some(mean) = figures.map_mean {
-            row("map, mean", format!("{mean:.1}"));
+            let digits = if mean < 10.0 { 3 } else { 1 };
+            row("map, mean", format!("{mean:.digits$}"));
         }
         let structure = &figures.structure;
         if structure.nodes > 0 {
@@ -159,7 +160,13 @@ fn draw_scale(ui: &mut Ui, map: Map, most: f32) {
     ui.horizontal(|ui| {
         ui.label("0");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(format!("{most:.0} {} of a pixel's first ray", map.name()));
+            let what = match map {
+                Map::Bounces => "bounces of a path, mean of a pixel".to_owned(),
+                Map::Cycles => "modelled cycles of a first ray".to_owned(),
+                map => format!("{} of a pixel's first ray", map.name()),
+            };
+            let digits = usize::from(most < 10.0 && most.fract() != 0.0);
+            ui.label(format!("{most:.digits$} {what}"));
         });
     });
 }

@@ -29,6 +29,8 @@ pub struct ImageView {
     is_grasped: bool,
     /// True while an object is dragged.
     is_moving: bool,
+    /// Whether a drag without Alt moves objects, too.
+    pub drags_objects: bool,
 }
 
 impl ImageView {
@@ -173,7 +175,8 @@ impl ImageView {
         rect: Rect,
         (screen, camera): (&mut Screen, &Camera),
     ) {
-        if response.drag_started() && !self.is_grasped && ui.input(|i| i.modifiers.alt) {
+        let is_asked = ui.input(|i| i.modifiers.alt) || self.drags_objects;
+        if response.drag_started() && !self.is_grasped && is_asked {
             let pressed = ui.input(|i| i.pointer.press_origin());
             if let Some(at) = pressed.filter(|at| rect.contains(*at)) {
                 self.is_moving = true;
@@ -184,7 +187,7 @@ impl ImageView {
         if response.drag_stopped() {
             self.is_moving = false;
         }
-        let by = response.drag_delta() / rect.size() * 2.0;
+        let by = response.drag_delta() / rect.size();
         if !self.is_moving || by == Vec2::ZERO {
             return;
         }
@@ -192,10 +195,7 @@ impl ImageView {
         let Some(grasp) = worker.found().grasp else {
             return;
         };
-        let [forward, right, up] = camera.basis(screen.size);
-        let depth = (grasp.point - camera.eye).dot(forward);
-        let way = screen.dragged.entry(grasp.instance).or_default();
-        *way += depth * (by.x * right - by.y * up);
+        screen.drag(&grasp, camera, by.into());
     }
 
     /// The moves of the camera that mouse, touch and keys ask for.

@@ -25,7 +25,19 @@ pub fn play(screen: &mut Screen, frame: u32) {
     screen.window.frame = frame;
 }
 
-pub fn draw(ui: &mut Ui, screen: &mut Screen, frame: u32) {
+/// What the panel moves: an animation at a frame, and objects.
+pub struct Moves<'a> {
+    pub frame: u32,
+    /// Objects that can be dragged.
+    pub objects: usize,
+    /// Whether a drag moves them.
+    pub drags: &'a mut bool,
+    /// The object that is typed.
+    pub object: &'a mut u32,
+}
+
+pub fn draw(ui: &mut Ui, screen: &mut Screen, moves: Moves) {
+    let frame = moves.frame;
     let mut is_animated = screen.animation.is_some();
     if ui.checkbox(&mut is_animated, "animation").changed() {
         screen.animation = is_animated.then(animation);
@@ -34,7 +46,7 @@ pub fn draw(ui: &mut Ui, screen: &mut Screen, frame: u32) {
     if screen.animation.is_some() {
         draw_animation(ui, screen, frame);
     }
-    draw_dragged(ui, screen);
+    draw_dragged(ui, screen, moves);
     if screen.animation.is_some() || !screen.dragged.is_empty() {
         let follow = &mut screen.window.follow;
         choice(ui, "structures are", follow);
@@ -74,12 +86,23 @@ fn draw_animation(ui: &mut Ui, screen: &mut Screen, frame: u32) {
     });
 }
 
-/// The ways of objects that were dragged.
-fn draw_dragged(ui: &mut Ui, screen: &mut Screen) {
-    if screen.dragged.is_empty() {
-        ui.label("Alt + drag moves an object.");
+/// The ways of objects that were dragged, or are moved here.
+fn draw_dragged(ui: &mut Ui, screen: &mut Screen, moves: Moves) {
+    if moves.objects == 0 {
         return;
     }
+    ui.checkbox(moves.drags, "a drag moves objects")
+        .on_hover_text("as Alt + drag does");
+    ui.horizontal(|ui| {
+        let label = ui.label("object");
+        let number = DragValue::new(moves.object).range(0..=moves.objects - 1);
+        ui.add(number.speed(0.1)).labelled_by(label.id);
+        let is_new = !screen.dragged.contains_key(moves.object);
+        let add = ui.add_enabled(is_new, egui::Button::new("move it"));
+        if add.on_hover_text("by numbers that are typed").clicked() {
+            screen.dragged.insert(*moves.object, Default::default());
+        }
+    });
     for (instance, way) in &mut screen.dragged {
         ui.horizontal(|ui| {
             let label = ui.label(format!("object {instance} by"));
@@ -90,7 +113,7 @@ fn draw_dragged(ui: &mut Ui, screen: &mut Screen) {
             }
         });
     }
-    if ui.button("put objects back").clicked() {
+    if !screen.dragged.is_empty() && ui.button("put objects back").clicked() {
         screen.dragged.clear();
     }
 }

@@ -5,6 +5,7 @@ use egui::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use raystone_config::{Axis, Map};
+use raystone_core::params::Choice as _;
 use raystone_viewer::Work;
 use screenshot::{settled, wait};
 
@@ -34,6 +35,23 @@ fn settle(harness: &mut Harness<'_, App>) {
     let app = harness.state();
     wait(&app.worker, &app.screen, 4).unwrap();
     harness.run_steps(3);
+}
+
+/// Draws until what was asked for is there, and nothing is left to do.
+fn rest(harness: &mut Harness<'_, App>) {
+    for _ in 0..1500 {
+        harness.run_steps(1);
+        let app = harness.state();
+        let found = app.worker.found();
+        if found.idle && found.screen.as_ref() == Some(&app.screen) {
+            drop(found);
+            harness.run_steps(2);
+            return;
+        }
+        drop(found);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    panic!("there is no end to it");
 }
 
 /// Draws until a text is on screen.
@@ -89,6 +107,90 @@ fn keys_split_the_image_choose_a_map_and_move_the_line() {
         "the structure is shared: {:?}",
         found.done
     );
+}
+
+#[test]
+fn bounces_and_cycles_have_maps_with_a_scale() {
+    let mut harness = window(&["--accel", "bvh,brute-force"], 1);
+    let mut means = Vec::new();
+    for map in Map::ALL.iter().skip(1) {
+        harness.key_press(egui::Key::M);
+        rest(&mut harness);
+        assert_eq!(harness.state().screen.window.map, *map);
+        let found = harness.state().worker.found();
+        let sides = found.frame.sides.iter();
+        means = sides.map(|side| side.figures.map_mean).collect();
+        drop(found);
+        match map {
+            Map::Bounces => {
+                assert!(has(&harness, "bounces of a path"));
+                // Paths are the same through any structure.
+                assert!(means[0] == means[1] && means[0] > Some(0.5), "{means:?}");
+            }
+            Map::Cycles => assert!(has(&harness, "modelled cycles of a first ray")),
+            map => {
+                assert!(has(
+                    &harness,
+                    &format!("{} of a pixel's first ray", map.name())
+                ));
+            }
+        }
+    }
+    assert!(means[1] > means[0] && means[0] > Some(1.0), "{means:?}");
+}
+
+/// Enters a number into the field of this name.
+fn enter(harness: &mut Harness<'_, App>, field: &str, number: f64) {
+    let field = harness.get_by_role_and_label(Role::SpinButton, field);
+    field.set_value_accesskit(number);
+    settle(harness);
+}
+
+#[test]
+fn a_model_has_the_parameters_of_every_scene_and_a_wrong_text_is_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("one.obj");
+    std::fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut harness = window(&["--scene", model.to_str().unwrap()], 1);
+    assert!(has(&harness, "1 triangles") && !has(&harness, "copies"));
+    // The first of the list is that of the scene.
+    harness
+        .get_all_by_label("parameters")
+        .next()
+        .unwrap()
+        .click();
+    expect(&mut harness, "copies");
+    enter(&mut harness, "copies", 3.0);
+    // They stand on a ground of two.
+    expect(&mut harness, "5 triangles");
+    let before = harness.state().screen.cells[0][Axis::Scene].clone();
+    assert_eq!(before.label, "one.obj(copies=3)");
+    harness
+        .get_by_role_and_label(Role::TextInput, "environment")
+        .focus();
+    harness.run_steps(2);
+    harness.event(egui::Event::Text("no/such.hdr".to_owned()));
+    harness.run_steps(2);
+    // Half a name is none yet.
+    assert_eq!(harness.state().screen.cells[0][Axis::Scene], before);
+    harness.key_press(egui::Key::Enter);
+    expect(&mut harness, "cannot read");
+    harness.run_steps(5);
+    assert_eq!(harness.state().screen.cells[0][Axis::Scene], before);
+}
+
+#[test]
+fn an_object_is_moved_by_numbers() {
+    let mut harness = window(&["--scene", "instances", "--accel", "meta-bvh"], 1);
+    enter(&mut harness, "object", 2.0);
+    harness.get_by_label("move it").click();
+    settle(&mut harness);
+    let moved: Vec<u32> = harness.state().screen.dragged.keys().copied().collect();
+    assert_eq!(moved, [2]);
+    assert!(has(&harness, "object 2 by"));
+    harness.get_by_label("put objects back").click();
+    settle(&mut harness);
+    assert!(harness.state().screen.dragged.is_empty());
 }
 
 /// A file that is let go over the window.

@@ -13,16 +13,15 @@ function element(name, attributes = {}, ...children) {
   return made;
 }
 
-// The field of an axis; `changed` is called when something else is chosen.
-export function axisField(axis, side, { entries, first }, changed) {
+// The field of an axis; `changed` is called when something else is chosen; `model` is what any file has that is not among the entries.
+export function axisField(axis, side, { entries, first }, changed, model = {}) {
   const id = idOf(axis, side);
   const options = entries.map(({ name, description }) => element("option", { value: name, textContent: name, title: description }));
   const select = element("select", { id }, ...options);
   select.value = first;
   const details = element("details", { className: "parameters" });
   const draw = () => {
-    // A model has none that the page asks for.
-    const entry = entries.find(({ name }) => name === select.value) ?? { name: select.value, description: "", parameters: [] };
+    const entry = entries.find(({ name }) => name === select.value) ?? { description: "", parameters: [], ...model, name: select.value };
     select.title = entry.description;
     details.hidden = entry.parameters.length === 0;
     const fields = entry.parameters.map((parameter) => parameterField(id, parameter, changed));
@@ -95,8 +94,10 @@ export function overridesOf(axis, side) {
   };
   const isChanged = (input) => String(input.type === "checkbox" ? input.checked : input.value) !== input.dataset.initial;
   const changed = inputs.filter((input) => isChanged(input) && input.checkValidity());
+  // The name of a file has a point.
+  const name = /^[\w-]+$/.test(select.value) ? select.value : JSON.stringify(select.value);
   return [
     `axes.${axis}=[${JSON.stringify(select.value)}]`,
-    ...changed.map((input) => `${axis}.${select.value}.${input.dataset.parameter}=${value(input)}`),
+    ...changed.map((input) => `${axis}.${name}.${input.dataset.parameter}=${value(input)}`),
   ];
 }

@@ -1,12 +1,17 @@
-// How the scene moves: an animation that plays, or stands at a frame.
+// How the scene moves: an animation that plays, or stands at a frame, and objects that are dragged.
 
 const at = (id) => document.getElementById(id);
 const FIELDS = ["amplitude", "wavelength", "frames", "frame-spp", "follow"];
 
-let plays = false;
+const WAY = ["x", "y", "z"];
 
-// `changed` is called when something else is chosen; `frame` tells the one that is shown.
-export function motionFields(changed, frame) {
+let plays = false;
+// Ways of the objects that were moved, by number.
+let dragged = new Map();
+
+// `changed` is called when something else is chosen; `frame` tells the one that is shown; `send` takes requests of the view.
+export function motionFields(changed, frame, send) {
+  objectFields(send);
   at("motion-of").onchange = () => {
     at("motion-frame").value = 0;
     plays &&= at("motion-of").value !== "";
@@ -35,18 +40,60 @@ export function motionFields(changed, frame) {
   draw();
 }
 
+function objectFields(send) {
+  at("objects-drag").onclick = () => { at("objects-drag").ariaPressed = String(!dragsObjects()); };
+  at("objects-back").onclick = () => send("put-back");
+  at("object").onchange = () => at("object").reportValidity() && showWay();
+  for (const axis of WAY) {
+    at(`object-${axis}`).onchange = () => {
+      const inputs = [at("object"), ...WAY.map((name) => at(`object-${name}`))];
+      if (!inputs.every((input) => input.reportValidity())) return;
+      const [object, ...way] = inputs.map((input) => Number(input.value));
+      send({ place: [object, way] });
+    };
+  }
+}
+
+// Whether a drag without Alt moves objects.
+export const dragsObjects = () => at("objects-drag").ariaPressed === "true" && !at("objects").hidden;
+
+function showWay() {
+  const way = dragged.get(Number(at("object").value)) ?? [0, 0, 0];
+  WAY.forEach((axis, place) => { at(`object-${axis}`).value = Number(way[place].toPrecision(6)); });
+}
+
+// Takes what the view says of an object that is to be dragged; true if it was that.
+export function takeObject(news) {
+  const refused = news["refused-drag"];
+  if (refused === undefined && news.grasped === undefined) return false;
+  at("object-trouble").hidden = refused === undefined;
+  at("object-trouble").textContent = refused ?? "";
+  if (refused === undefined) at("object").value = news.grasped;
+  return true;
+}
+
 function draw() {
   const of = at("motion-of").value;
   at("motion-more").hidden = of === "";
   at("motion-wavelength").parentElement.hidden = of !== "deform";
   at("motion-frame").max = Number(at("motion-frames").value) - 1;
   at("motion-play").textContent = plays ? "Stop" : "Play";
-  showFrame(Number(at("motion-frame").value));
+  showNumber();
 }
 
-// The frame that is shown, while frames follow one another.
-export function showFrame(frame) {
+// The frame that is shown, while frames follow one another, and the objects.
+export function showFrame({ frame, objects, dragged: ways }) {
   if (plays) at("motion-frame").value = frame;
+  showNumber();
+  at("objects").hidden = objects === 0;
+  at("object").max = Math.max(objects - 1, 0);
+  at("objects-back").hidden = ways.length === 0;
+  const isOther = JSON.stringify(ways) !== JSON.stringify([...dragged]);
+  dragged = new Map(ways);
+  if (isOther) showWay();
+}
+
+function showNumber() {
   at("motion-number").textContent = `${at("motion-frame").value} of ${at("motion-frames").value}`;
 }
 

@@ -20,8 +20,9 @@ const KEYS = {
   Home: "home",
 };
 
-// `send` takes requests of the view; `others` are what further keys do; `click` takes a place, shares of the width and height.
-export function canvasMoves(canvas, send, others, click) {
+// `send` takes requests of the view; `others` are what further keys do; `click` and `grasp` take a place, shares of the width and
+// height; `drags` says whether a drag without Alt moves objects, too.
+export function canvasMoves(canvas, send, others, { click, drags, grasp }) {
   let pending = {};
   const add = (kind, by) => {
     if (Object.keys(pending).length === 0) requestAnimationFrame(flush);
@@ -41,25 +42,32 @@ export function canvasMoves(canvas, send, others, click) {
   const place = ({ clientX: x, clientY: y }) => ({ x, y });
   // Where a lone pointer went down, until it moves or another joins it.
   let pressed = null;
+  // An object is dragged, not the camera.
+  let isObject = false;
+  const share = ({ x, y }) => {
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    return [(x - left) / width, (y - top) / height];
+  };
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, place(event));
     pressed = held.size === 1 && event.button === 0 ? place(event) : null;
+    isObject = pressed !== null && (event.altKey || drags());
   };
   canvas.onpointercancel = (event) => held.delete(event.pointerId);
   canvas.onpointerup = (event) => {
     held.delete(event.pointerId);
     if (!pressed) return;
     pressed = null;
-    const { left, top, width, height } = canvas.getBoundingClientRect();
-    click([(event.clientX - left) / width, (event.clientY - top) / height]);
+    click(share(place(event)));
   };
   canvas.onpointermove = (event) => {
     const before = held.get(event.pointerId);
     if (!before) return;
     if (pressed && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < (STILL[event.pointerType] ?? STILL.mouse)) return;
+    if (pressed && isObject) grasp(share(pressed));
     pressed = null;
-    const height = canvas.clientHeight;
+    const { clientWidth: width, clientHeight: height } = canvas;
     const was = held.size === 2 ? spread() : before;
     held.set(event.pointerId, place(event));
     const now = held.size === 2 ? spread() : place(event);
@@ -67,6 +75,8 @@ export function canvasMoves(canvas, send, others, click) {
     if (held.size === 2) {
       add("pan", [-x, y]);
       add("near", [Math.log(was.far / Math.max(now.far, 1)), 0]);
+    } else if (isObject) {
+      add("drag", [(now.x - was.x) / width, y]);
     } else if (event.shiftKey || event.buttons === 2) {
       add("pan", [-x, y]);
     } else if (event.ctrlKey || event.metaKey || event.buttons === 4) {

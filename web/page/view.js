@@ -3,7 +3,7 @@ import { adapterTrouble } from "./adapter.js";
 import { isMeasuring } from "./app.js";
 import { adopt, axisField, listModels, offer, overridesOf } from "./choices.js";
 import { visitorsFiles } from "./files.js";
-import { adoptMotion, motionFields, motionOverrides, showFrame } from "./motion.js";
+import { adoptMotion, dragsObjects, motionFields, motionOverrides, showFrame, takeObject } from "./motion.js";
 import { canvasMoves } from "./moves.js";
 import { inspect, marks, pixelPanel, refresh, screenChanged, takeFound, togglePath } from "./pixel.js";
 
@@ -83,7 +83,7 @@ function take(news) {
     at("notes").textContent = news.notes.join(" ");
     if (!news.stays) finished.spp = null;
     screenChanged(news);
-  } else if (takeFound(news)) {
+  } else if (takeFound(news) || takeObject(news)) {
     return;
   } else if (news.experiment) {
     copy(news.experiment);
@@ -134,11 +134,11 @@ async function post(told) {
 }
 
 // The choices are those of the program: the page knows none by heart.
-function opened({ adapter, software, axes }) {
+function opened({ adapter, software, axes, model }) {
   at("view-adapter").textContent = adapter || "an adapter that the browser does not name";
   at("view-software").hidden = !software;
   if (!at("scene-field").firstChild) {
-    at("scene-field").append(axisField("scene", "", axes.scene, show));
+    at("scene-field").append(axisField("scene", "", axes.scene, show, model));
     for (const side of SIDES) {
       at(`side-${side}`).append(...OF_SIDE.map((axis) => axisField(axis, side, axes[axis], show)));
     }
@@ -197,7 +197,7 @@ function draw({ figures: known, width, height, picture }) {
   const faults = sides.map((side, index) => side.fault && `${sides.length > 1 ? `${"AB"[index]}: ` : ""}${side.fault}`);
   at("faults").textContent = faults.filter(Boolean).join(" ");
   at("faults").hidden = !faults.some(Boolean);
-  showFrame(known.frame);
+  showFrame(known);
   marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value) });
   const rows = [
     ...timesOf(known.times),
@@ -294,12 +294,13 @@ at("save-png").onclick = () => at("canvas").toBlob((blob) => download("raystone.
 at("save-pfm").onclick = () => ask({ save: [0, "pfm"] });
 at("copy-experiment").onclick = () => ask("experiment");
 pixelPanel(ask);
-motionFields(show, () => figures?.frame ?? 0);
+motionFields(show, () => figures?.frame ?? 0, (request) => ask(request, true));
 visitorsFiles({ file: at("file"), folder: at("folder"), openFile: at("open-file"), openFolder: at("open-folder") }, openFiles, trouble);
 canvasMoves(at("canvas"), (request) => ask(request, true), {
   o: () => at("open-file").click(),
   i: () => at("pixel-x").focus(),
   p: () => togglePath(),
+  g: () => at("objects-drag").click(),
   " ": () => at("motion-play").click(),
   "+": () => expose(0.5),
   "=": () => expose(0.5),
@@ -308,7 +309,14 @@ canvasMoves(at("canvas"), (request) => ask(request, true), {
   m: () => step(at("map"), 1),
   "[": () => swipe(-0.05),
   "]": () => swipe(0.05),
-}, ([x, y]) => figures && inspect([x * at("canvas").width, y * at("canvas").height]));
+}, {
+  click: ([x, y]) => figures && inspect([x * at("canvas").width, y * at("canvas").height]),
+  drags: dragsObjects,
+  grasp: (place) => {
+    const { width, height } = at("canvas");
+    ask({ grasp: [width, height].map((edge, axis) => Math.min(Math.max(Math.floor(place[axis] * edge), 0), edge - 1)) });
+  },
+});
 
 function expose(stops) {
   at("exposure").value = Number(at("exposure").value) + stops;

@@ -33,10 +33,13 @@ pub(crate) fn opened(gpu: &Gpu, registries: &Registries) -> Value {
         json!({ "first": first(axis), "entries": shown.map(choice).collect::<Vec<_>>() })
     };
     let axes = AXES.map(|axis| (axis.name().to_owned(), entries(axis)));
+    // Any model has what every scene has.
+    let model = catalogue.entry(Axis::Scene, "model.obj");
     json!({
         "adapter": gpu.info.name,
         "software": gpu.is_software(),
         "axes": Map::from_iter(axes),
+        "model": model.as_ref().map(choice),
     })
 }
 
@@ -143,6 +146,7 @@ pub(crate) fn figures(frame: &Frame) -> Value {
     });
     json!({
         "triangles": frame.triangles,
+        "objects": frame.objects,
         "scale": frame.scale,
         "reference_spp": frame.reference_spp,
         "times": times,

@@ -6,12 +6,12 @@ use crate::opened::Opened;
 use crate::told::{self, AXES};
 use raystone_bench::run::{Registries, RunError};
 use raystone_config::{Axis, Catalogue, Window};
-use raystone_core::params::ParamValue;
 use raystone_gpu::{Gpu, GpuError, KernelLibrary};
-use raystone_viewer::{Display, Motion, START, Screen, Step, Trail, Viewer, Work, moved};
+use raystone_viewer::{Display, Grasp, Motion, START, Screen, Step, Trail, Viewer, Work, moved};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Devices that are opened one after the other before it gives up.
@@ -73,6 +73,14 @@ enum Ask {
     Fly([f32; 3]),
     /// The scene's own camera.
     Home,
+    /// Grasps the object that is seen at a pixel.
+    Grasp([u32; 2]),
+    /// Moves it along the image, by shares of its width and height.
+    Drag([f32; 2]),
+    /// Puts an object so far from its place, scene units.
+    Place(u32, [f32; 3]),
+    /// Puts all objects back.
+    PutBack,
     /// What the images have at a pixel.
     Inspect([u32; 2]),
     /// The path of a sample of a side's pixel, or none any more.
@@ -93,6 +101,8 @@ struct Session {
     catalogue: Catalogue,
     /// What was on screen when its controls were last set to it: what they cannot say is that of it.
     base: Option<Screen>,
+    /// What is dragged.
+    grasp: Option<Grasp>,
     trail: Option<Trail>,
     canvas: RefCell<Canvas>,
 }
@@ -105,6 +115,8 @@ struct Canvas {
     frame: u32,
     /// Vertices of the path that is shown, pixels.
     trail: Vec<Option<[f32; 2]>>,
+    /// Objects that were moved, and how far, scene units.
+    dragged: Vec<(u32, [f32; 3])>,
 }
 
 /// A device that was lost, and what was on screen.
@@ -124,6 +136,7 @@ pub async fn view(shell: &impl Shell) -> Result<(), String> {
         catalogue: registries.catalogue(),
         registries,
         base: None,
+        grasp: None,
         trail: None,
         canvas: RefCell::default(),
     };
@@ -204,6 +217,7 @@ async fn answer(
             let scene = |screen: &Screen| screen.cells[0].on(&[Axis::Scene]);
             let before = viewer.screen().filter(|old| scene(old) == scene(&screen));
             screen.camera = screen.camera.or(before.and_then(|old| old.camera));
+            screen.dragged = before.map_or_else(BTreeMap::new, |old| old.dragged.clone());
             return show(shell, viewer, session, screen).await;
         }
         Ask::Open { names, still } => {
@@ -222,6 +236,9 @@ async fn answer(
             };
             let camera = None;
             return show(shell, viewer, session, Screen { camera, ..screen }).await;
+        }
+        Ask::Grasp(_) | Ask::Drag(_) | Ask::Place(..) | Ask::PutBack => {
+            return move_object(shell, viewer, session, ask).await;
         }
         Ask::Save(side, ending) => {
             let name = format!("raystone.{ending}");
@@ -250,6 +267,40 @@ async fn answer(
     };
     let camera = Some(moved(camera, motion));
     show(shell, viewer, session, Screen { camera, ..screen }).await
+}
+
+/// Moves an object. What cannot be grasped is no trouble of the view.
+async fn move_object(
+    shell: &impl Shell,
+    viewer: &mut Viewer<'_>,
+    session: &mut Session,
+    ask: Ask,
+) -> Result<(), RunError> {
+    let (Some(mut screen), Some(camera)) = (viewer.screen().cloned(), viewer.camera()) else {
+        return Ok(());
+    };
+    match (ask, session.grasp) {
+        (Ask::Grasp(pixel), _) => {
+            let grasp = viewer.grasp_async(pixel).await;
+            let told = match &grasp {
+                Ok(Some(grasp)) => json!({ "grasped": grasp.instance }),
+                Ok(None) => {
+                    json!({ "refused-drag": "nothing is seen there that could be dragged" })
+                }
+                Err(reason) => json!({ "refused-drag": reason }),
+            };
+            session.grasp = grasp.ok().flatten();
+            shell.tell(&told);
+            return Ok(());
+        }
+        (Ask::Drag(by), Some(grasp)) => screen.drag(&grasp, &camera, by),
+        (Ask::Place(instance, way), _) => {
+            screen.dragged.insert(instance, way.into());
+        }
+        (Ask::PutBack, _) => screen.dragged.clear(),
+        _ => return Ok(()),
+    }
+    show(shell, viewer, session, screen).await
 }
 
 /// Shows what the visitor opened. If it cannot be shown, the files of before are held again.
@@ -359,6 +410,9 @@ fn publish(shell: &impl Shell, viewer: &Viewer<'_>, session: &Session) {
         size: screen.size,
         frame: viewer.frame_number(),
         trail: trail.map_or(Vec::new(), |trail| trail.on(&camera, screen.size)),
+        dragged: (screen.dragged.iter())
+            .map(|(instance, way)| (*instance, way.to_array()))
+            .collect(),
     };
     canvas.draw(shell, &screen.window);
     session.canvas.replace(canvas);
@@ -375,6 +429,7 @@ impl Canvas {
         let mut figures = told::figures(&frame);
         figures["frame"] = json!(self.frame);
         figures["trail"] = json!(self.trail);
+        figures["dragged"] = json!(self.dragged);
         shell.draw(&figures, self.size, &bytes);
     }
 }
@@ -417,24 +472,19 @@ fn carry(screen: &mut Screen, base: &Screen, catalogue: &Catalogue) {
             let (Some(before), Some(now)) = (of_base.get(axis), cell.get(axis)) else {
                 continue;
             };
-            let entry = catalogue[axis].iter().find(|entry| entry.name == now.name);
+            let entry = catalogue.entry(axis, &now.name);
             let variant = match entry {
                 _ if !AXES.contains(&axis) => before.clone(),
                 _ if before.name != now.name => continue,
-                // Those of a model.
                 None => before.clone(),
-                Some(entry) => {
-                    let value = |name: &str, is_asked: bool| {
-                        let from = if is_asked { now } else { before };
-                        from.params.0.get(name).cloned()
-                    };
-                    let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
-                        .filter_map(|p| {
-                            Some((p.name, value(p.name, told::parameter(p).is_some())?))
-                        })
-                        .collect();
-                    entry.variant(&set)
-                }
+                // What the page does not ask for.
+                Some(entry) => (entry.schema.iter())
+                    .filter(|known| told::parameter(known).is_none())
+                    .filter_map(|known| Some((known.name, before.params.0.get(known.name)?)))
+                    .fold(now.clone(), |now, (name, value)| {
+                        let set = catalogue.with_parameter(axis, &now, name, value);
+                        set.unwrap_or(now)
+                    }),
             };
             *cell = cell.clone().with(axis, &variant);
         }

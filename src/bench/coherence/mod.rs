@@ -21,7 +21,7 @@ pub mod trace;
 pub use cache::CacheShape;
 pub use memory::{Fetch, Memory};
 pub(crate) use model::run_groups;
-pub use model::{Machine, Pass, Warp, run, together};
+pub use model::{Machine, Pass, Running, Warp, run, together};
 pub use organisation::Organisation;
 pub use paths::{RayClass, Rays, View, groups_of};
 pub use sets::of_rays;

@@ -102,35 +102,55 @@ pub fn together(groups: &[Tallies]) -> Tallies {
 
 /// Runs all groups of warps on a machine; returns the tallies of each.
 pub(crate) fn run_groups(machine: &Machine, groups: &[Vec<Warp>]) -> Vec<Tallies> {
-    let queue = |warp: &Warp| Queue::new(warp, machine);
-    let of_group = |warps: &Vec<Warp>| warps.par_iter().map(queue).collect::<Vec<_>>();
-    let queues: Vec<_> = groups.par_iter().map(of_group).collect();
-    let mut groups: Vec<(Cache, VecDeque<Queue>, Tallies)> = Vec::new();
-    for of_group in queues {
-        let (queues, tallies): (VecDeque<_>, Vec<_>) = of_group.into_iter().unzip();
-        groups.push((Cache::new(machine.l1), queues, together(&tallies)));
-    }
-    let mut l2 = Cache::new(machine.l2);
-    while groups.iter().any(|(_, warps, _)| !warps.is_empty()) {
-        for (l1, warps, tallies) in &mut groups {
-            let Some((warp, (class, issue))) = next(warps) else {
-                continue;
-            };
-            let tally = tallies.entry(class).or_default();
-            tally.issues += 1;
-            tally.active += u64::from(issue.active);
-            tally.lanes += warp.lanes;
-            tally.bytes += issue.bytes;
-            tally.lines += issue.lines.len() as u64;
-            for line in issue.lines {
-                let is_near = l1.access(line);
-                tally.l1_hits += u64::from(is_near);
-                tally.l2_hits += u64::from(!is_near && l2.access(line));
-            }
-            warps.push_back(warp);
+    Running::new(machine).then(groups)
+}
+
+/// A machine that runs groups after groups, those of one call side by side: its L2 keeps what earlier ones left.
+pub struct Running {
+    machine: Machine,
+    l2: Cache,
+}
+
+impl Running {
+    /// A machine with an empty L2.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            machine: *machine,
+            l2: Cache::new(machine.l2),
         }
     }
-    groups.into_iter().map(|(_, _, tallies)| tallies).collect()
+
+    /// Runs these groups of warps; returns the tallies of each.
+    pub fn then(&mut self, groups: &[Vec<Warp>]) -> Vec<Tallies> {
+        let queue = |warp: &Warp| Queue::new(warp, &self.machine);
+        let of_group = |warps: &Vec<Warp>| warps.par_iter().map(queue).collect::<Vec<_>>();
+        let queues: Vec<_> = groups.par_iter().map(of_group).collect();
+        let mut groups: Vec<(Cache, VecDeque<Queue>, Tallies)> = Vec::new();
+        for of_group in queues {
+            let (queues, tallies): (VecDeque<_>, Vec<_>) = of_group.into_iter().unzip();
+            groups.push((Cache::new(self.machine.l1), queues, together(&tallies)));
+        }
+        while groups.iter().any(|(_, warps, _)| !warps.is_empty()) {
+            for (l1, warps, tallies) in &mut groups {
+                let Some((warp, (class, issue))) = next(warps) else {
+                    continue;
+                };
+                let tally = tallies.entry(class).or_default();
+                tally.issues += 1;
+                tally.active += u64::from(issue.active);
+                tally.lanes += warp.lanes;
+                tally.bytes += issue.bytes;
+                tally.lines += issue.lines.len() as u64;
+                for line in issue.lines {
+                    let is_near = l1.access(line);
+                    tally.l1_hits += u64::from(is_near);
+                    tally.l2_hits += u64::from(!is_near && self.l2.access(line));
+                }
+                warps.push_back(warp);
+            }
+        }
+        groups.into_iter().map(|(_, _, tallies)| tallies).collect()
+    }
 }
 
 /// The next warp of a group and its issue; drops finished warps.

@@ -3,6 +3,7 @@
 //! same numbers, adds its contributions in the same order, and samples are added in order. See
 //! `docs/organisations.md`.
 
+mod bounces;
 mod queued;
 mod registry;
 mod shading;

@@ -6,7 +6,7 @@ use crate::motion::{FrameTimes, Pose};
 use crate::reference::Accumulated;
 use crate::side::Side;
 use raystone_bench::run::RunError;
-use raystone_config::{Map, Pace};
+use raystone_config::Pace;
 use raystone_core::clock::Instant;
 use raystone_gpu::{Gpu, GpuError, wait_for};
 
@@ -40,7 +40,8 @@ impl Viewer<'_> {
             return Ok(Step::Idle);
         };
         let with = (&self.registries, world);
-        let (map, pace) = (screen.window.map, screen.window.pace);
+        let window = screen.window;
+        let (map, pace) = ((window.map, window.follow), window.pace);
         let plays = screen.plays().is_some();
         if let Some(side) = self
             .sides
@@ -50,13 +51,11 @@ impl Viewer<'_> {
             let step = side.refine(with, map, stop).await;
             return keep(step, side, self.gpu);
         }
-        if map != Map::None {
-            for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
-                match side.count(world).await {
-                    Ok(false) => {}
-                    Ok(true) => return Ok(Step::Shown),
-                    Err(error) => return keep(Err(error), side, self.gpu),
-                }
+        for side in self.sides.iter_mut().filter(|side| side.fault.is_none()) {
+            match side.count(with, map, stop).await {
+                Ok(None) => {}
+                Ok(Some(step)) => return Ok(step),
+                Err(error) => return keep(Err(error), side, self.gpu),
             }
         }
         if let Some(judge) = &self.judge {

@@ -111,6 +111,68 @@ async function inspect() {
   press("p");
 }
 
+// Maps of the model at hand: their means, and that of the counted rays, which that of bounces comes to with its last sample.
+async function maps() {
+  seen.maps = { counted: figure("bounce rays a sample").split(" ")[0] };
+  for (const map of ["bounces", "cycles"]) {
+    at("map").value = map;
+    at("map").dispatchEvent(new Event("input"));
+    const words = at("map").selectedOptions[0].textContent;
+    await wait(`the map of ${map}`, () => at("scale").textContent.endsWith(words) && figure("mean of the map") && isFinished(4));
+    if (map === "bounces") await wait("all of its samples", () => figure("mean of the map") === seen.maps.counted);
+    seen.maps[map] = figure("mean of the map");
+  }
+  type("map", "none");
+  at("map").dispatchEvent(new Event("input"));
+}
+
+// A model has the parameters of every scene; a wrong one is a sentence, and the controls go back.
+async function parameters() {
+  // They stand on a ground of two.
+  type("scene-copies", 3);
+  await finish(8);
+  type("scene-environment", "sky.hdr");
+  const sentence = await wait("a sentence on the environment", () => at("view-trouble").textContent);
+  await wait("the controls", () => at("scene-environment").value === "");
+  seen.parameters = [sentence, at("scene").value, at("scene-copies").value, at("triangles").textContent];
+  type("scene-copies", 0);
+  await finish(2);
+}
+
+// An object follows the pointer, stands where it is typed, and goes back.
+async function drag() {
+  type("scene", "instances");
+  await finish("20,480");
+  type("accel-a", "meta-bvh");
+  await wait("the structure", () => at("view-status").textContent.includes("meta-bvh") && isFinished(4));
+  seen.objects = { still: await image(), count: Number(at("object").max) + 1 };
+  const { left, top, width, height } = at("canvas").getBoundingClientRect();
+  at("canvas").setPointerCapture = () => {};
+  at("objects-drag").click();
+  const point = (kind, x, y) => at("canvas").dispatchEvent(new PointerEvent(kind, { clientX: left + x * width, clientY: top + y * height, button: 0, pointerId: 1 }));
+  point("pointerdown", 0.5, 0.5);
+  point("pointermove", 0.6, 0.45);
+  point("pointermove", 0.7, 0.4);
+  await wait("a way", () => !at("objects-back").hidden && Number(at("object-x").value) !== 0);
+  point("pointerup", 0.7, 0.4);
+  await wait("the image", () => isFinished(4));
+  const way = ["x", "y", "z"].map((axis) => Number(at(`object-${axis}`).value));
+  Object.assign(seen.objects, { way, moved: await image() });
+  at("objects-drag").click();
+  at("objects-back").click();
+  await wait("all objects back", () => at("objects-back").hidden && isFinished(4));
+  seen.objects.back = await image();
+  // By numbers: the way that the pointer took.
+  ["x", "y", "z"].forEach((axis, place) => { at(`object-${axis}`).value = way[place]; });
+  type("object-z", way[2]);
+  await wait("a typed way", () => !at("objects-back").hidden && isFinished(4));
+  seen.objects.typed = await image();
+  type("scene", "quad.glb");
+  type("accel-a", "cwbvh");
+  await finish(2);
+  seen.objects.gone = at("objects").hidden;
+}
+
 async function move() {
   seen.still = await image();
   at("canvas").focus();
@@ -171,7 +233,10 @@ async function visit() {
   await finish(1);
   type("scene", "quad.glb");
   await finish(2);
+  await maps();
+  await parameters();
   await move();
+  await drag();
   drop(["study.toml", "room/room.obj"]);
   await wait("the experiment", () => at("split").checked && isFinished(2));
   seen.controls = ["scene", "accel-a", "accel-a-leaf_size", "accel-b", "size", "spp", "map"].map((id) => at(id)?.value);

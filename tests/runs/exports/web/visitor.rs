@@ -6,6 +6,7 @@ use super::{
 };
 use crate::support;
 use base64::Engine as _;
+use raystone::config::Map;
 use raystone::image::{Image, Picture, write_png};
 use raystone::program::Program;
 use raystone::run::Registries;
@@ -170,6 +171,49 @@ fn by_the_window(model: &Path) -> (Vec<(String, String)>, Vec<String>, String) {
     )
 }
 
+/// Means of the maps of bounces and of cycles, by the core of the window.
+fn means_by_the_window(model: &Path) -> [f64; 2] {
+    let registries = Registries::default();
+    let screen = Screen::parse(START, "view", &settings(model), &registries).expect("a screen");
+    let mut viewer = Viewer::new(support::gpu(), registries, Program::default(), false);
+    [Map::Bounces, Map::Cycles].map(|map| {
+        let mut screen = screen.clone();
+        screen.window.map = map;
+        viewer.show(screen, &mut |_| ()).expect("a view");
+        while viewer.step(&|| false).expect("a step") != Step::Idle {}
+        viewer.frame().sides[0].figures.map_mean.expect("a map")
+    })
+}
+
+/// Holds maps against the counted rays and the window, parameters of a model and dragged objects against what must be.
+fn check_choices(seen: &Value, model: &Path) {
+    let number = |text: &Value| -> f64 {
+        let text = text.as_str().expect("a number").replace(',', "");
+        text.parse().expect("a number")
+    };
+    let found = ["bounces", "cycles"].map(|map| number(&seen["maps"][map]));
+    for (found, expected) in found.iter().zip(means_by_the_window(model)) {
+        // Three digits, and what drivers round.
+        assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+    }
+    assert_eq!(seen["maps"]["bounces"], seen["maps"]["counted"]);
+    let parameters = &seen["parameters"];
+    let sentence = parameters[0].as_str().expect("a sentence");
+    assert!(sentence.contains("sky.hdr"), "{sentence}");
+    let stays = json!(["quad.glb", "3", "8 triangles"]);
+    assert_eq!(json!(&parameters.as_array().expect("a list")[1..]), stays);
+    let objects = &seen["objects"];
+    assert!(objects["count"].as_u64() > Some(1), "{}", objects["count"]);
+    assert!(objects["way"] != json!([0, 0, 0]));
+    let [still, moved, back, typed] =
+        ["still", "moved", "back", "typed"].map(|name| left_image(&objects[name]));
+    assert_eq!(differing(&still, &back), [0, 0]);
+    assert!(differing(&still, &moved)[1] > 20, "nothing moved");
+    // Numbers on the page have six digits.
+    assert!(differing(&moved, &typed)[1] <= MOST_TIES);
+    assert_eq!(objects["gone"], true);
+}
+
 /// Holds an image that the host framed and lit against that of the program: sines of WebAssembly are rounded otherwise than those of
 /// the machine, and the camera and the daylight with them.
 fn check_framed(image: &Image, settings: &[String]) {
@@ -266,6 +310,7 @@ fn the_web_page_shows_what_a_visitor_opens_and_inspects() {
     let controls = json!(["room.obj", "bvh", "3", "kd-tree", "40,30", "2", "nodes"]);
     assert_eq!(seen["controls"], controls);
     assert_eq!(seen["faults"], "");
+    check_choices(&seen, &folder.path().join("quad.glb"));
     check_waits(&seen);
 }
 
