@@ -111,7 +111,7 @@ fn independent() -> Sampler {
 /// Checks the trial scenes in a range, split into seven tests for their duration.
 fn check_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 26);
+    assert_eq!(scenes.len(), 28);
     for trial in &scenes[places] {
         for (name, changes) in in_turn("integrators path by path", &trial.trials) {
             let what = integrator_variant(name, changes);
@@ -154,7 +154,7 @@ fn single_paths_of_fences_veils_every_pair_and_rooms_of_other_sizes_are_those_of
 
 #[test]
 fn single_paths_through_media_are_those_of_the_oracle() {
-    check_trials(22..26);
+    check_trials(22..28);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.
