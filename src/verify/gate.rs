@@ -462,7 +462,7 @@ fn is_explained(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup, space: S
     let is_near = |t: f64| off_by(ray, hit.t, t) <= EXPLAINED;
     let (same, beside) = (hit.triangle == truth.triangle, is_near(f64::from(truth.t)));
     let is_right = match &found {
-        None => hit.triangle == NO_HIT,
+        None => hit.same_bits(&Hit::miss(ray)),
         Some(found) => {
             let plane = found.plane_distance();
             found.is_at(hit) && (same && beside || is_near(plane) && found.may_hit(plane as f32))

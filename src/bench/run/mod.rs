@@ -283,8 +283,8 @@ fn run_world(
         }
     };
     session.progress.add(session.cost.world(cell).seconds());
-    if !world.soup.intersection.triangle.is_exact() {
-        session.leave_out_images(cell)?;
+    if let Ok(Some(reason)) = session.registries.unfit_for_images(cell) {
+        session.leave_out_images(cell, reason)?;
     }
     let gated = structures::run(session, &world)?;
     let at = At {

@@ -116,11 +116,31 @@ impl Registries {
         }
     }
 
+    /// Why nothing is rendered with the triangle test of a cell, if so.
+    ///
+    /// # Errors
+    /// The test is not registered.
+    pub(super) fn unfit_for_images(&self, cell: &Cell) -> Result<Option<String>, String> {
+        let Some(test) = cell.get(Axis::Triangle) else {
+            return Ok(None);
+        };
+        let is_exact = self
+            .triangles
+            .named("triangle test", &test.name)?
+            .is_exact();
+        Ok((!is_exact).then(|| {
+            format!("the triangle test {test} is not exact: structures are timed with it on recorded rays, and nothing is rendered")
+        }))
+    }
+
     /// The integrator of a cell in its organisation; a single kernel if that does not matter.
     ///
     /// # Errors
-    /// A name or parameter is unknown, or the integrator does not support the organisation.
+    /// A name or parameter is unknown, the integrator does not support the organisation, or the triangle test is not exact.
     pub fn integrator(&self, cell: &Cell) -> Result<ConfiguredIntegrator, String> {
+        if let Some(reason) = self.unfit_for_images(cell)? {
+            return Err(reason);
+        }
         let integrator = self.integrators.configured(&cell[Axis::Integrator]);
         let integrator = integrator.map_err(|e| e.to_string())?;
         match cell.get(Axis::Organisation) {

@@ -188,12 +188,12 @@ impl<'a> Session<'a> {
         self.leave_out_units(&cell, reason, |unit| unit.cell.is_on(world))
     }
 
-    /// Skips all open units of a world that render, since the triangle test is not exact.
-    pub(super) fn leave_out_images(&mut self, world: &Cell) -> Result<(), RunError> {
-        let reason = format!(
-            "the triangle test {} is not exact: structures are timed with it on recorded rays, and nothing is rendered",
-            world[Axis::Triangle]
-        );
+    /// Skips all open units of a world that render, for one reason.
+    pub(super) fn leave_out_images(
+        &mut self,
+        world: &Cell,
+        reason: String,
+    ) -> Result<(), RunError> {
         let renders = |unit: &Unit| unit.cell.get(Axis::Integrator).is_some();
         self.leave_out_units(
             &format!("{world}: all samplers and times"),

@@ -233,6 +233,9 @@ fn a_test_that_is_not_exact_may_answer_otherwise_where_rounding_explains_it() {
     for (place, (answer, any)) in wrong.into_iter().enumerate() {
         assert_eq!(by_bare(0.0, answer, any), [1, 0], "{place}");
     }
+    // A miss has the distance of one.
+    assert_eq!(by_bare(-5.0, |hit| hit, false), [0, 0]);
+    assert_eq!(by_bare(-5.0, |hit| Hit { t: 9.0, ..hit }, false), [1, 0]);
     // A ray along their edge may miss both, one beside it may not.
     let at_edge = (0..16).map(|i| by_bare(-1.0 + 1e-8 * i as f32, miss, false));
     assert!(at_edge.into_iter().any(|found| found == [0, 1]));

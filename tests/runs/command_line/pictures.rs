@@ -1,6 +1,6 @@
 //! `raystone render`: pictures, their formats, and the messages about them.
 
-use super::{ABSENT_BACKEND, error, output, program, stdout, text};
+use super::{ABSENT_BACKEND, changed_experiment, error, output, program, run, stdout, text};
 
 #[test]
 fn render_writes_a_picture_of_the_size_asked_for() {
@@ -86,4 +86,44 @@ fn render_says_what_was_approximated_and_how_long_it_took() {
     ] {
         assert!(said.contains(part), "{part}: {said}");
     }
+}
+
+#[test]
+fn a_test_that_is_not_exact_is_timed_and_neither_ranked_nor_rendered_with() {
+    let (folder, file) = changed_experiment(
+        "sequence =",
+        "triangle = [\"bare\", \"watertight\"]\nsequence =",
+    );
+    let out = folder.path().join("out");
+    let ran = run(&["run", text(&file), "--quiet", "--out", text(&out)]);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect("a file of the run");
+    // The reference is too noisy for so few samples; nothing else is wrong.
+    assert!(ran.status.code().is_some_and(|code| code < 2), "{ran:?}");
+    let summary = read("summary.md");
+    for part in [
+        "What exactness costs",
+        "the triangle test bare is not exact",
+        "passed up to rounding",
+        "0 cells failed",
+    ] {
+        assert!(summary.contains(part), "no {part} in {summary}");
+    }
+    let ranked = summary.lines().filter(|line| line.contains("fastest"));
+    assert!(
+        !ranked.clone().any(|line| line.contains("bare")),
+        "{summary}"
+    );
+    let records = read("records.jsonl");
+    let of_bare = records
+        .lines()
+        .filter(|line| line.contains("\"inexact\":true"));
+    assert_eq!(of_bare.count(), 2);
+    let rendered = run(&[
+        "render",
+        "--set",
+        "axes.triangle=[\"bare\"]",
+        "-o",
+        text(&folder.path().join("x.png")),
+    ]);
+    assert!(error(&rendered, 2).contains("is not exact"));
 }
