@@ -77,7 +77,8 @@ fn check(title: impl Into<String>, tested: bool, wrong: bool, detail: String) ->
 
 fn gate(scene: &SceneGroup) -> Check {
     let title = format!("Hits equal to the bit: {}", scene.name);
-    let gates = scene.structures.iter().filter_map(|s| s.gate.as_ref());
+    let all = || scene.structures.iter().filter_map(|s| s.gate.as_ref());
+    let gates = all().filter(|gate| !gate.inexact);
     let classes = || gates.clone().flat_map(|gate| &gate.classes);
     let rays: usize = classes().map(|class| class.rays).sum();
     let wrong: usize = classes().map(|class| class.wrong).sum();
@@ -89,6 +90,15 @@ fn gate(scene: &SceneGroup) -> Check {
         count(wrong as u64),
         plural(ties, "tie"),
     );
+    let inexact: Vec<_> = all().filter(|gate| gate.inexact).collect();
+    if !inexact.is_empty() {
+        let others = inexact.iter().flat_map(|gate| &gate.classes);
+        detail += &format!(
+            " Up to rounding, with a triangle test that is not exact: {}, {} on another triangle.",
+            plural(inexact.len(), "structure"),
+            plural(others.map(|class| class.ties).sum(), "ray"),
+        );
+    }
     let faulty = scene
         .structures
         .iter()

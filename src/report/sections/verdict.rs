@@ -108,7 +108,15 @@ fn question(data: &RunData) -> String {
         names => Some(format!("which of {} {many}", named(names, noun)?)),
     };
     let fast = "answers rays and renders fastest";
-    parts.extend(of(&data.structures, "structure", "how fast is", fast));
+    let gated = data.scenes.iter().flat_map(|scene| &scene.structures);
+    let ranked = gated
+        .filter(|s| !s.is_inexact())
+        .map(|s| s.structure.clone());
+    let mut structures = without_repeats(ranked.collect());
+    if structures.is_empty() {
+        structures.clone_from(&data.structures);
+    }
+    parts.extend(of(&structures, "structure", "how fast is", fast));
     let exact = "errs least per sample and per second";
     parts.extend(of(&data.samplers, "sampler", "how exact is", exact));
     let mut methods: Vec<String> = { data.measured_by(compactions::NAME).into_iter() }
