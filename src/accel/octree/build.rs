@@ -157,7 +157,7 @@ impl<'a> Settings<'a> {
             return mask;
         };
         let record = &self.soup.records[id as usize];
-        // A child that holds a corner is touched, and most triangles have corners in all children that they touch.
+        // A child that holds a corner is touched; margins are wider than planes are rounded.
         let open = mask & !cell.with_corner(record);
         if open == 0 {
             return mask;

@@ -283,7 +283,8 @@ fn run_world(
         }
     };
     session.progress.add(session.cost.world(cell).seconds());
-    if let Ok(Some(reason)) = session.registries.unfit_for_images(cell) {
+    let unfit = session.registries.unfit_for_images(cell);
+    if let Some(reason) = unfit.map_err(RunError::Input)? {
         session.leave_out_images(cell, reason)?;
     }
     let gated = structures::run(session, &world)?;

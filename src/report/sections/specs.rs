@@ -20,8 +20,8 @@ pub(crate) const SPEED: TableSpec = TableSpec {
     caption: "Speed on {}, Mrays/s: median [{}]", rows: &[Structure], figures: &[&MRAYS_PER_S], across: BY_RAYS,
 };
 pub(crate) const EXACTNESS: TableSpec = TableSpec {
-    caption: "What exactness costs: time over that with `bare`, whose hits differ by rounding and which is not ranked (of the \
-              processors where they trace, else by the clock; not in the same rounds)",
+    caption: "What exactness costs: time over that with the triangle test that is not exact, whose hits differ by rounding and \
+              which is not ranked (of the processors where they trace, else by the clock; not in the same rounds)",
     rows: &[Structure], figures: &[&PRICE_OF_EXACTNESS], across: BY_RAYS,
 };
 pub(crate) const BUILD: TableSpec = TableSpec {

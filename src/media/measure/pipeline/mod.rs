@@ -176,6 +176,18 @@ impl Load {
     }
 }
 
+/// A figure that is counted or computed, without a unit; less is better.
+const fn exact(id: &'static str, title: &'static str) -> Figure {
+    Figure::new(
+        id,
+        title,
+        "",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Exact,
+    )
+}
+
 static FIGURES: [Figure; 26] = [
     Figure::new(
         "scatter-deposit-ns/v1",
@@ -193,14 +205,7 @@ static FIGURES: [Figure; 26] = [
         Shown::Digits(3),
         Spread::Median,
     ),
-    Figure::new(
-        "scatter-dropped/v1",
-        "energy dropped",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
+    exact("scatter-dropped/v1", "energy dropped"),
     Figure::new(
         "scatter-retries/v1",
         "retries",
@@ -209,22 +214,8 @@ static FIGURES: [Figure; 26] = [
         Shown::Digits(3),
         Spread::Single,
     ),
-    Figure::new(
-        "scatter-rmse/v1",
-        "RMSE of the image, relative to its mean",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
-    Figure::new(
-        "scatter-bias/v1",
-        "mean error of the image, relative",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
+    exact("scatter-rmse/v1", "RMSE of the image, relative to its mean"),
+    exact("scatter-bias/v1", "mean error of the image, relative"),
     Figure::new(
         "scatter-bytes/v1",
         "written by photons",
@@ -233,13 +224,9 @@ static FIGURES: [Figure; 26] = [
         Shown::Bytes,
         Spread::Exact,
     ),
-    Figure::new(
+    exact(
         "scatter-noise/v1",
         "RMSE of the image from that of 2²⁰ photons, relative",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
     ),
     Figure::new(
         "photon-count/v1",
@@ -265,22 +252,11 @@ static FIGURES: [Figure; 26] = [
         Shown::Digits(3),
         Spread::Exact,
     ),
-    Figure::new(
+    exact(
         "photon-equal/v1",
         "photons for the error of the reference pipeline, as a part of its own",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
     ),
-    Figure::new(
-        "photon-equal-all/v1",
-        "the same with pilots",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
+    exact("photon-equal-all/v1", "the same with pilots"),
     Figure::new(
         "photon-pilots-ms/v1",
         "pilots to their grid",
@@ -321,70 +297,23 @@ static FIGURES: [Figure; 26] = [
         Shown::Count,
         Spread::Single,
     ),
-    Figure::new(
+    exact(
         "scatter-noise-caustic/v1",
         "the same of pixels that refraction lights",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
     ),
-    Figure::new(
-        "scatter-noise-shadow/v1",
-        "of those that it darkens",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
-    Figure::new(
-        "scatter-noise-even/v1",
-        "and of the others",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
-    Figure::new(
-        "scatter-view-steps/v1",
-        "steps of a ray of the view",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
-    Figure::new(
+    exact("scatter-noise-shadow/v1", "of those that it darkens"),
+    exact("scatter-noise-even/v1", "and of the others"),
+    exact("scatter-view-steps/v1", "steps of a ray of the view"),
+    exact(
         "scatter-flip/v1",
         "mean FLIP of the image from that of 2²⁰ photons",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
     ),
-    Figure::new(
+    exact(
         "scatter-flip-caustic/v1",
         "the same of pixels that refraction lights",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
     ),
-    Figure::new(
-        "scatter-flip-shadow/v1",
-        "of those that it darkens",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
-    Figure::new(
-        "scatter-flip-even/v1",
-        "and of the others",
-        "",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Exact,
-    ),
+    exact("scatter-flip-shadow/v1", "of those that it darkens"),
+    exact("scatter-flip-even/v1", "and of the others"),
 ];
 
 pub(super) struct Photons;
