@@ -195,6 +195,8 @@ pub struct RawDevice {
     pub queue: wgpu::Queue,
     /// Name of the adapter.
     pub adapter: String,
+    /// Nanoseconds per timestamp tick; `None` where there are no timestamps.
+    pub timestamp_period: Option<f32>,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -407,12 +409,13 @@ impl Gpu {
         if !adapter.features().contains(features) {
             return Err(refused(format!("it lacks {features:?}")));
         }
+        let timestamps = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
         let limits = adapter.limits();
         // SAFETY: experimental features are requested by name, and used as wgpu documents.
         let experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("raystone, beside"),
-            required_features: features,
+            required_features: features | timestamps,
             required_limits: limits,
             experimental_features,
             ..Default::default()
@@ -427,10 +430,12 @@ impl Gpu {
             }
         }));
         let adapter = self.info.name.clone();
+        let timestamp_period = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
         Ok(RawDevice {
             device,
             queue,
             adapter,
+            timestamp_period,
             fault,
         })
     }

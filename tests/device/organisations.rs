@@ -368,7 +368,7 @@ fn planted_faults_are_seen() {
             "values[place] = place / 2u;",
         ),
     ];
-    for (by, module, from, to) in in_turn("faults of organisations", faults) {
+    for (by, module, from, to) in faults_in_turn("faults of organisations", faults) {
         let found = fault(by, &format!("organisation/{module}"), from, to);
         println!("{module}: {from}: {found:?}");
         if found.is_none() {

@@ -3,7 +3,8 @@
 
 use crate::support;
 use crate::support::{
-    Pcg, assert_same_hits, build, default_params, in_turn, is_exact, kernels_with, open, scenes,
+    Pcg, assert_same_hits, build, default_params, faults_in_turn, in_turn, is_exact, kernels_with,
+    open, scenes,
 };
 use raystone::accel::{AccelKind, AccelRegistry, Counters, Hit, Ray, TriangleSoup};
 use raystone::gpu::Gpu;
@@ -174,7 +175,7 @@ fn what_goes_wrong_between_two_rays_is_seen() {
     ] {
         faults.push(("accel/bvh/stack", left_over, "\n"));
     }
-    let faults = in_turn("faults between two rays of an invocation", faults);
+    let faults = faults_in_turn("faults between two rays of an invocation", faults);
     let unseen: Vec<_> = faults
         .iter()
         .filter(|fault| !is_seen(&subject, **fault))

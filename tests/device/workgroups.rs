@@ -342,7 +342,7 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             "always",
         ),
     ];
-    for (size, fault, refill) in in_turn("faults of workgroups of rays", of_rays) {
+    for (size, fault, refill) in faults_in_turn("faults of workgroups of rays", of_rays) {
         if !rays_show(size, fault, refill) {
             unseen.push(format!("{size}: {fault:?}"));
         }
@@ -416,7 +416,9 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             several,
         ),
     ];
-    for (shape, module, from, to, case) in in_turn("faults of workgroups of pixels", of_pixels) {
+    for (shape, module, from, to, case) in
+        faults_in_turn("faults of workgroups of pixels", of_pixels)
+    {
         if !pixels_show(shape, (module, from, to), case) {
             unseen.push(format!("{shape}: {module}: {to}"));
         }

@@ -296,7 +296,7 @@ fn planted_faults_turn_the_gate_red() {
     let right = Stage::new(gpu(), few_plants());
     let reference = judge(&right);
     assert!(reference.is_sound(), "{:?}", reference.first_wrong());
-    for (what, module, from, to, name) in in_turn("faults of masks", FAULTS) {
+    for (what, module, from, to, name) in faults_in_turn("faults of masks", FAULTS) {
         let gpu = open(kernels_with(module, &[(from, to)]));
         let stage = Stage::new(&gpu, few_plants());
         let verdict = stage.verdict(&gpu, &stage.traced(&gpu, structure(name)), &reference);

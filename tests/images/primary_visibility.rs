@@ -278,7 +278,7 @@ fn planted_faults_are_seen() {
             "    return Hit(hit.t, hit.triangle, hit.v, hit.u);\n",
         ),
     ];
-    let mut unseen = in_turn("faults of rasterised paths", faults);
+    let mut unseen = faults_in_turn("faults of rasterised paths", faults);
     unseen.retain(|fault| !is_seen(*fault));
     assert!(unseen.is_empty(), "not seen: {unseen:#?}");
     assert!(!is_seen((

@@ -27,7 +27,7 @@ use subject::Subject;
 use table::mutants;
 
 /// One fault of so many is planted by an ordinary run of the tests.
-const PARTS: usize = 6;
+const PARTS: usize = 11;
 
 fn run(names: &[&str]) -> (Report, Vec<String>) {
     let folder = tempfile::tempdir().expect("a temporary folder");

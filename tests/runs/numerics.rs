@@ -1,6 +1,6 @@
 //! Accumulation and sampling on this machine's adapter.
 
-use crate::support::{gpu, in_turn, kernels_with, open};
+use crate::support::{faults_in_turn, gpu, kernels_with, open};
 use raystone::stress::numerics::{Gauge, run};
 use std::sync::OnceLock;
 
@@ -82,7 +82,7 @@ fn a_planted_fault_in_each_kernel_raises_an_alarm() {
             "Kahan behind barriers",
         ),
     ];
-    for (module, from, to, expected) in in_turn("faults of numerics", faults) {
+    for (module, from, to, expected) in faults_in_turn("faults of numerics", faults) {
         let figures = with_fault(module, from, to);
         let alarms = alarms(&figures);
         assert!(

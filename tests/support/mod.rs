@@ -9,7 +9,7 @@ pub mod scenes;
 pub mod tier;
 
 pub use hits::*;
-pub use tier::{in_turn, is_full, one_of, so_many};
+pub use tier::{faults_in_turn, in_turn, is_full, one_of, so_many};
 
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, Access, BuildLog, BuiltAccel, Intersection, Traced,

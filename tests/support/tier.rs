@@ -7,6 +7,8 @@ use std::sync::OnceLock;
 
 /// Number of parts where a test names no other.
 const PARTS: usize = 3;
+/// Of lists of planted faults. They test the tests, which change more rarely than what these check.
+const PARTS_OF_FAULTS: usize = 9;
 
 /// Returns `true` if this run covers everything; a table is always rewritten as a whole.
 pub fn is_full() -> bool {
@@ -47,6 +49,11 @@ pub fn places(list: &str, count: usize, parts: usize, turn: usize) -> Vec<usize>
 /// A third of `all`, or all of it: see the head of this module.
 pub fn in_turn<T>(list: &str, all: impl IntoIterator<Item = T>) -> Vec<T> {
     one_of(PARTS, list, all)
+}
+
+/// A ninth of a list of planted faults, or all of it.
+pub fn faults_in_turn<T>(list: &str, all: impl IntoIterator<Item = T>) -> Vec<T> {
+    one_of(PARTS_OF_FAULTS, list, all)
 }
 
 /// One of so many parts of `all`, or all of it.

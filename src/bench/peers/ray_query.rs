@@ -32,7 +32,79 @@ struct Batch<'a> {
     slices: Vec<(wgpu::BindGroup, u32)>,
     answers: wgpu::Buffer,
     staging: wgpu::Buffer,
+    clock: Option<Clock>,
     hits: RefCell<Vec<Hit>>,
+}
+
+/// Two timestamps per slice, as structures are timed.
+struct Clock {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    mapped: wgpu::Buffer,
+    /// Nanoseconds per tick.
+    period: f32,
+}
+
+impl Clock {
+    /// `None` without timestamps.
+    fn new(raw: &RawDevice, slices: usize) -> Option<Self> {
+        let period = raw.timestamp_period.filter(|_| slices > 0)?;
+        let buffer = |usage| {
+            raw.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: 16 * slices as u64,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let queries = raw.device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("timestamps"),
+            ty: wgpu::QueryType::Timestamp,
+            count: 2 * slices as u32,
+        });
+        Some(Self {
+            queries,
+            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+            mapped: buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ),
+            period,
+        })
+    }
+
+    /// Timestamps around a slice.
+    fn around(&self, slice: usize) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(2 * slice as u32),
+            end_of_pass_write_index: Some(2 * slice as u32 + 1),
+        }
+    }
+
+    /// Milliseconds of all slices; `None` if the clock ran backwards.
+    fn read(&self, raw: &RawDevice) -> Result<Option<f64>, GpuError> {
+        let mut commands = raw
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        commands.resolve_query_set(&self.queries, 0..self.queries.count(), &self.resolved, 0);
+        commands.copy_buffer_to_buffer(&self.resolved, 0, &self.mapped, 0, None);
+        raw.queue.submit([commands.finish()]);
+        let ticks: Vec<[u64; 2]> = read(raw, &self.mapped)?;
+        let spans = ticks.iter().map(|[from, to]| to.checked_sub(*from));
+        let ticks: Option<u64> = spans.sum();
+        Ok(ticks.map(|ticks| ticks as f64 * f64::from(self.period) * 1e-6))
+    }
+}
+
+/// The content of a buffer to which commands were submitted.
+fn read<T: bytemuck::Pod>(raw: &RawDevice, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+    buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+    raw.wait()?;
+    let view = buffer
+        .get_mapped_range(..)
+        .map_err(|e| GpuError::Driver(e.to_string()))?;
+    let words = bytemuck::pod_collect_to_vec(&view);
+    drop(view);
+    buffer.unmap();
+    Ok(words)
 }
 
 impl Peer for RayQuery {
@@ -225,8 +297,9 @@ impl BuiltPeer for Built {
             });
             (group, count as u32)
         };
-        let slices = (0..rays.len()).step_by(SLICE).map(bind).collect();
+        let slices: Vec<_> = (0..rays.len()).step_by(SLICE).map(bind).collect();
         Ok(Box::new(Batch {
+            clock: Clock::new(&self.raw, slices.len()),
             built: self,
             rays,
             pipeline,
@@ -250,10 +323,13 @@ impl PeerBatch for Batch<'_> {
         raw.queue.submit([wipe.finish()]);
         raw.wait()?;
         let watch = Stopwatch::start();
-        for (group, rays) in &self.slices {
+        for (slice, (group, rays)) in self.slices.iter().enumerate() {
             let mut commands = encoder();
             {
-                let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: None,
+                    timestamp_writes: self.clock.as_ref().map(|clock| clock.around(slice)),
+                });
                 pass.set_pipeline(self.pipeline);
                 pass.set_bind_group(0, group, &[]);
                 pass.dispatch_workgroups(rays.div_ceil(LANES), 1, 1);
@@ -261,7 +337,11 @@ impl PeerBatch for Batch<'_> {
             raw.queue.submit([commands.finish()]);
             raw.wait()?;
         }
-        let elapsed = watch.elapsed();
+        let mut elapsed = watch.elapsed();
+        if let Some(clock) = &self.clock {
+            elapsed.gpu_ms = clock.read(raw)?;
+            elapsed.backwards |= elapsed.gpu_ms.is_none();
+        }
         let words = self.answers()?;
         let hit = |(ray, [kind, t, id, _]): (&Ray, &[u32; 4])| match kind {
             // The kernel writes 1 for a miss; 0 means it wrote nothing, and is no answer.
@@ -289,15 +369,6 @@ impl Batch<'_> {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         commands.copy_buffer_to_buffer(&self.answers, 0, &self.staging, 0, None);
         raw.queue.submit([commands.finish()]);
-        self.staging.map_async(wgpu::MapMode::Read, .., |_| {});
-        raw.wait()?;
-        let read = self
-            .staging
-            .get_mapped_range(..)
-            .map_err(|e| GpuError::Driver(e.to_string()))?;
-        let words = bytemuck::pod_collect_to_vec(&read);
-        drop(read);
-        self.staging.unmap();
-        Ok(words)
+        read(raw, &self.staging)
     }
 }

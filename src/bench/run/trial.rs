@@ -39,8 +39,10 @@ const GATE: Gate = Gate {
     offset: 0.0,
     shadow_orders: false,
 };
-/// Brute force checks one ray in this many.
+/// Of rays through structures that test most triangles here, one in this many is checked: brute force, and a
+/// grid of equal cells, one of which has all that is small.
 const EVERY: usize = 8;
+const SLOW: [&str; 2] = ["brute-force", "uniform-grid"];
 
 /// The scenes with their reference tracers, prepared once per run, and their results.
 #[derive(Default)]
@@ -203,7 +205,8 @@ impl CheckedScene {
             Err(_) => return Ok(None),
         };
         let traced = as_in(registries, gpu, cell, traced)?;
-        let thinned = (accel.name == "brute-force").then(|| self.reference.thinned(EVERY));
+        let is_slow = SLOW.contains(&&*accel.name);
+        let thinned = is_slow.then(|| self.reference.thinned(EVERY));
         let reference = thinned.as_ref().unwrap_or(&self.reference);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);
         let verdict = gate(gpu, triangles, &stage.soup, &traced, reference, probe, true)?;

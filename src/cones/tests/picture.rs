@@ -1,7 +1,7 @@
 //! Pictures by cones: twin and kernel against the oracle, faults that this sees, cones against closed forms, and rays against
 //! all triangles.
 
-use super::tier::in_turn;
+use super::tier::faults_in_turn;
 use crate::check;
 use crate::cone::{Camera, Mirror, cone_of};
 use crate::device::{Tracer, overlaps};
@@ -202,7 +202,7 @@ fn faults_of_the_kernels_are_seen() {
         .collect();
     assert_eq!(seen_by(&gpu, &cases), [false; 2], "sound kernels");
     let mut unseen = Vec::new();
-    for (file, text, fault) in in_turn("faults of cones", FAULTS) {
+    for (file, text, fault) in faults_in_turn("faults of cones", FAULTS) {
         let library = KernelLibrary::default();
         let name = format!("cones/{file}");
         let sound = library

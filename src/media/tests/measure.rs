@@ -1,6 +1,6 @@
 //! The measurements in a run: planned, prepared, timed, written.
 
-use super::tier::in_turn;
+use super::tier::faults_in_turn;
 use crate::register;
 use raystone_bench::run::{Existing, Registries, RunOptions, run};
 use raystone_config::{Experiment, Plan};
@@ -556,7 +556,7 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         let load = format!("photons = 48\nstrategy = \"fixed-64\"\n{content}");
         (file, text, fault, load)
     });
-    let faults = in_turn(
+    let faults = faults_in_turn(
         "faults of photons in a run",
         (fixed.into_iter().chain(adaptive)).chain(curved.into_iter().chain(switched)),
     );

@@ -1,7 +1,7 @@
 //! Closed meshes as voxels, against generalised winding numbers in f64 (Jacobson et al. 2013) and closed forms.
 
 use super::segments::adapter;
-use super::tier::in_turn;
+use super::tier::faults_in_turn;
 use crate::voxels::{Mesh, VoxelError, coverage, covered};
 use glam::{DVec3, UVec3};
 use raystone_core::random::Pcg32;
@@ -203,7 +203,7 @@ const FAULTS: [(&str, &str, &str); 8] = [
 #[test]
 fn faults_of_voxels_are_seen() {
     let Some(gpu) = adapter() else { return };
-    for (file, text, fault) in in_turn("faults of voxels", FAULTS) {
+    for (file, text, fault) in faults_in_turn("faults of voxels", FAULTS) {
         let library = KernelLibrary::default();
         let name = format!("media/voxels/{file}");
         let sound = library.text(&name).unwrap();

@@ -1,6 +1,6 @@
 //! The kernel against its twin, to the bit, and faults planted into it.
 
-use super::tier::in_turn;
+use super::tier::faults_in_turn;
 use crate::device::Solver;
 use crate::newton::{Search, Solved};
 use crate::path::Form;
@@ -292,7 +292,7 @@ const FAULTS: [Fault; 22] = [
 fn faults_of_the_kernel_are_seen() {
     let Some(gpu) = adapter() else { return };
     let mut unseen = Vec::new();
-    for (shape, way, file, text, fault) in in_turn("faults of the specular search", FAULTS) {
+    for (shape, way, file, text, fault) in faults_in_turn("faults of the specular search", FAULTS) {
         let library = KernelLibrary::default();
         let name = format!("specular/{file}");
         let sound = library

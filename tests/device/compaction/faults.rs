@@ -1,7 +1,7 @@
 //! Faults planted in the kernels of compactions, and in their recording: each must be detected.
 
 use super::methods::{drawn, fault, method};
-use crate::support::{gpu, in_turn, kernels_with, open};
+use crate::support::{faults_in_turn, gpu, kernels_with, open};
 use raystone::compaction::{Compaction, Order, Passes};
 use raystone::gpu::{Bindings, Composition, GpuError};
 use std::sync::Arc;
@@ -54,7 +54,7 @@ const FAULTS: [Fault; 24] = [
 #[test]
 fn planted_faults_are_seen() {
     let mut unseen = Vec::new();
-    for (module, [from, to], name, params) in in_turn("faults of compactions", FAULTS) {
+    for (module, [from, to], name, params) in faults_in_turn("faults of compactions", FAULTS) {
         let gpu = open(kernels_with(&format!("compaction/{module}"), &[(from, to)]));
         let method = method(name, params);
         let flags = drawn(70_000, 0.5, &*method);

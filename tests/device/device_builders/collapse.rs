@@ -3,7 +3,7 @@
 use super::soups::{clusters, equal_positions, shrinking};
 use super::{METHODS, SPONZA, with_builder};
 use crate::support::scenes::{degenerate_cases, lattice_soup};
-use crate::support::{self, Pcg, gpu, in_turn, is_exact, kernels_with, open};
+use crate::support::{self, Pcg, faults_in_turn, gpu, in_turn, is_exact, kernels_with, open};
 use raystone::accel::{AccelKind, BuildLog, Bvh4, Cwbvh, StructureStats, TriangleSoup};
 use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
@@ -268,7 +268,7 @@ fn faults_in_the_collapse_are_seen() {
             .map(|soup| words(gpu(), kind, soup, "host-ploc", &[]))
     };
     let expected = WIDE.map(host);
-    for (module, what, from, to) in in_turn("faults of the collapse", FAULTS) {
+    for (module, what, from, to) in faults_in_turn("faults of the collapse", FAULTS) {
         let module = format!("accel/wide/{module}");
         let faulty = open(kernels_with(&module, &[(from, to)]));
         let seen = [0, 1].map(|which| {

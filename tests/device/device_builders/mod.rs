@@ -7,7 +7,8 @@ mod soups;
 use crate::support;
 use crate::support::scenes::{self, lattice_soup};
 use crate::support::{
-    Pcg, Stage, default_params, gpu, in_turn, is_exact, kernels_with, open, structures,
+    Pcg, Stage, default_params, faults_in_turn, gpu, in_turn, is_exact, kernels_with, open,
+    structures,
 };
 use raystone::accel::bounds::Bounds;
 use raystone::accel::tree::parallel::{LEAF, LinkedTree, Method, Settings, build, device};
@@ -379,7 +380,7 @@ fn faults_in_the_passes_are_seen() {
         clusters(&mut Pcg::new(11), 3000),
         lattice_soup(&mut Pcg::new(12), 3000, 4),
     ];
-    for (module, what, from, to) in in_turn("faults of device builders", faults) {
+    for (module, what, from, to) in faults_in_turn("faults of device builders", faults) {
         let module = format!("accel/tree/parallel/{module}");
         let gpu = open(kernels_with(&module, &[(from, to)]));
         let differs = |soup: &TriangleSoup, settings: &Settings| {

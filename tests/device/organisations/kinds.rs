@@ -231,7 +231,7 @@ fn planted_faults_are_seen() {
         // Sums of all queues persist.
         (&by, "organisation/plan", "atomicStore(&counts[QUEUED], 0u);", ""),
     ];
-    for (by, module, from, to) in in_turn("faults of organisations by kinds", faults) {
+    for (by, module, from, to) in faults_in_turn("faults of organisations by kinds", faults) {
         let found = fault_on(all_kinds(), &path(4), by, (module, from, to));
         println!("{module}: {to}: {found:?}");
         if found.is_none() {

@@ -2,7 +2,9 @@
 
 use super::{grid, slanted, with};
 use crate::support::scenes;
-use crate::support::{self, Pcg, brute_force, build, default_params, in_turn, kernels_with, trace};
+use crate::support::{
+    self, Pcg, brute_force, build, default_params, faults_in_turn, kernels_with, trace,
+};
 use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
 
@@ -109,7 +111,7 @@ fn planted_faults_turn_the_comparison_red() {
     let soup = slanted(&mut rng, 600);
     let rays = scenes::aimed_rays(&mut rng, &soup, 4000);
     let expected = brute_force(&soup, &rays);
-    for fault in in_turn("faults of grids", FAULTS) {
+    for fault in faults_in_turn("faults of grids", FAULTS) {
         let kind = grid(fault.grid);
         let skip = ParamValue::Name("chebyshev".into());
         let params = if fault.skip {

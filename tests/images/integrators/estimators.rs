@@ -92,7 +92,7 @@ fn a_fault_in_a_heuristic_or_a_roulette_moves_the_mean() {
     ];
     let exact = chosen(Strategy::MisBalance, Roulette::Never, 0.0);
     let exact = estimate(gpu(), &exact, 256);
-    for (strategy, roulette, right, wrong) in in_turn("faults of estimators", faults) {
+    for (strategy, roulette, right, wrong) in faults_in_turn("faults of estimators", faults) {
         let faulty = open(kernels_with("integrator/path", &[(right, wrong)]));
         let found = estimate(&faulty, &chosen(strategy, roulette, 0.0), spp(strategy));
         let difference = found.minus(&exact);

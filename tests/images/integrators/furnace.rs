@@ -203,7 +203,7 @@ fn faults_of_glass_show_in_the_white_furnace() {
             "outside",
         ),
     ];
-    for (file, from, to, expected) in in_turn("faults of glass", faults) {
+    for (file, from, to, expected) in faults_in_turn("faults of glass", faults) {
         let gpu = open(kernels_with(file, &[(from, to)]));
         let fault = glass_fault(&gpu).unwrap_or_default();
         assert_eq!(fault, expected, "`{to}` for `{from}`");

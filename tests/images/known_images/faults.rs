@@ -1,7 +1,7 @@
 //! Faults planted in kernels, and the image that reveals each.
 
 use super::seen;
-use crate::support::in_turn;
+use crate::support::faults_in_turn;
 use raystone::gpu::KernelLibrary;
 
 /// File, texts with replacements, and the image that reveals it.
@@ -349,7 +349,7 @@ fn missed<'a>(faults: impl IntoIterator<Item = &'a Fault>) -> Vec<&'static str> 
 
 #[test]
 fn some_planted_faults_show_in_their_images() {
-    let some = in_turn("faults of known images", &SOME);
+    let some = faults_in_turn("faults of known images", &SOME);
     assert_eq!(missed(some), [] as [&str; 0]);
 }
 

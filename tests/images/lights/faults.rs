@@ -285,7 +285,7 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
 fn every_planted_fault_is_seen() {
     let right = means::right();
     let mut missed = Vec::new();
-    for (file, from, to, seen) in in_turn("faults of lights", FAULTS) {
+    for (file, from, to, seen) in faults_in_turn("faults of lights", FAULTS) {
         let gpu = probing(kernels_with(
             &format!("shading/light/{file}"),
             &[(from, to)],
