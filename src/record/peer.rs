@@ -10,13 +10,17 @@ pub struct PeerTiming {
     pub class: RayClass,
     /// Number of rays.
     pub rays: usize,
-    /// Every sample by the wall clock after warm-up, milliseconds, a round of all structures and peers each, in
-    /// order.
+    /// Every sample after warm-up, milliseconds, a round of all structures and peers each, in order: by the clock
+    /// of the adapter, by the wall clock where the peer runs on the host or there are no timestamps. Empty in
+    /// records of before, which have the wall clock alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ms: Vec<f64>,
+    /// The same by the wall clock.
     pub wall_ms: Vec<f64>,
     /// The same in time of the processors, all threads together; empty where there is no such clock.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cpu_ms: Vec<f64>,
-    /// Million rays per second by the wall clock, median with interval.
+    /// Million rays per second by the first clock that there is, median with interval.
     pub mrays_s: Interval,
     /// Rays whose triangle (for any hits: whose answer) differs from the reference tracer's.
     pub unlike: usize,

@@ -28,7 +28,7 @@ impl Sound for Body {
             Self::Peer(record) => {
                 not_negative("build_ms", [&record.build_ms], &mut faults);
                 for timing in &record.timings {
-                    rounds(&timing.wall_ms, [&[], &timing.cpu_ms], &mut faults);
+                    rounds(&timing.wall_ms, [&timing.ms, &timing.cpu_ms], &mut faults);
                 }
             }
             Self::Error(record) => record

@@ -248,7 +248,8 @@ fn run(out: &TempDir, changes: &[&str]) -> Output {
     command.output().expect("the program starts")
 }
 
-/// A tracer that answers like obvhs for a number of queries, then misses everything.
+/// A tracer that answers like obvhs for a number of queries, then misses everything. By its own clock it takes half the
+/// time.
 struct Tired(u32);
 
 struct TiredBuilt<'a>(Box<dyn BuiltPeer + 'a>, u32);
@@ -305,7 +306,9 @@ impl PeerBatch for TiredBatch<'_> {
         if self.3.get() > self.2 {
             Ok(Stopwatch::start().elapsed())
         } else {
-            self.0.trace()
+            let elapsed = self.0.trace()?;
+            let gpu_ms = Some(0.5 * elapsed.wall_ms);
+            Ok(Elapsed { gpu_ms, ..elapsed })
         }
     }
 
@@ -318,27 +321,50 @@ impl PeerBatch for TiredBatch<'_> {
     }
 }
 
+/// The records of both peers of a run, obvhs and another.
+fn with(peer: &'static Tired) -> [PeerRecord; 2] {
+    let mut registries = Registries::default();
+    registries.peers.register(peer);
+    let out = TempDir::new().expect("a folder");
+    let text = EXPERIMENT.replace("\"embree\"", "\"tired\"");
+    let (_, lines) = support::run(&text, &registries, out.path(), None);
+    ["obvhs-bvh2", "tired"].map(|name| {
+        let mut found = lines.iter().filter(|line| line.key.label("peer") == name);
+        match found.next().map(|line| &line.body) {
+            Some(Body::Peer(record)) => record.clone(),
+            other => panic!("{name}: {other:?}"),
+        }
+    })
+}
+
 #[test]
 fn a_peer_that_is_wrong_from_the_beginning_or_later_gets_no_figures() {
     for peer in [&Tired(0), &Tired(4)] {
-        let mut registries = Registries::default();
-        registries.peers.register(peer);
-        let out = TempDir::new().expect("a folder");
-        let text = EXPERIMENT.replace("\"embree\"", "\"tired\"");
-        let (_, lines) = support::run(&text, &registries, out.path(), None);
-        let of = |name: &str| -> PeerRecord {
-            let mut found = lines.iter().filter(|line| line.key.label("peer") == name);
-            match found.next().map(|line| &line.body) {
-                Some(Body::Peer(record)) => record.clone(),
-                other => panic!("{name}: {other:?}"),
-            }
-        };
-        let (honest, tired) = (of("obvhs-bvh2"), of("tired"));
+        let [honest, tired] = with(peer);
         assert!(honest.failure.is_none() && honest.timings.len() >= 4);
         assert!(
             tired.failure.is_some() && tired.timings.is_empty(),
             "{tired:?}"
         );
+    }
+}
+
+#[test]
+fn the_speed_of_a_peer_is_by_its_own_clock_where_it_has_one() {
+    for (record, share) in with(&Tired(u32::MAX)).iter().zip([1.0, 0.5]) {
+        assert!(record.timings.len() >= 4, "{record:?}");
+        for timing in &record.timings {
+            let halves = timing.wall_ms.iter().map(|ms| share * ms);
+            assert_eq!(timing.ms, halves.collect::<Vec<_>>());
+            let mut sorted = timing.ms.clone();
+            sorted.sort_by(f64::total_cmp);
+            let [.., low, high, _, _] = sorted[..] else {
+                panic!("six rounds");
+            };
+            let rate = |ms: f64| timing.rays as f64 / ms * 1e-3;
+            let speed = timing.mrays_s.value;
+            assert!(rate(high) <= speed && speed <= rate(low), "{timing:?}");
+        }
     }
 }
 

@@ -146,6 +146,8 @@ struct Split {
     position: f32,
     /// True if planar items go below.
     planar_below: bool,
+    /// Items above, those that are cut among them, if nothing is clipped away.
+    above: u32,
     cost: f32,
 }
 
@@ -276,6 +278,7 @@ impl Region {
                             axis,
                             position,
                             planar_below,
+                            above,
                             cost,
                         });
                     }
@@ -298,7 +301,7 @@ impl Region {
         bounds[1].min[split.axis] = split.position;
         let mut places = Vec::with_capacity(self.items.len());
         let mut cut = [Vec::new(), Vec::new()];
-        let (mut kept, mut above) = (0, Vec::new());
+        let (mut kept, mut above) = (0, Vec::with_capacity(split.above as usize));
         for index in 0..self.items.len() {
             let item = self.items[index];
             let [here, there] = match split.side(&item.bounds) {
@@ -328,7 +331,8 @@ impl Region {
         self.items.truncate(kept);
         let below = self.items;
         let divide_events = |(axis, events): (usize, &mut Vec<Event>)| {
-            let mut others = distribute(events, &places);
+            let mut others = Vec::with_capacity(2 * split.above as usize);
+            distribute(events, &places, &mut others);
             merge(events, new_events(&below, &cut[0], axis));
             merge(&mut others, new_events(&above, &cut[1], axis));
             others
@@ -385,9 +389,9 @@ fn new_events(items: &[Item], places: &[u32], axis: usize) -> Vec<Event> {
     events
 }
 
-/// Keeps the events of items below, and returns those of items above; both stay sorted.
-fn distribute(events: &mut Vec<Event>, places: &[u32]) -> Vec<Event> {
-    let (mut kept, mut above) = (0, Vec::new());
+/// Keeps the events of items below, and moves those of items above; both stay sorted.
+fn distribute(events: &mut Vec<Event>, places: &[u32], above: &mut Vec<Event>) {
+    let mut kept = 0;
     for index in 0..events.len() {
         let event = events[index];
         let place = places[event.item()];
@@ -399,7 +403,6 @@ fn distribute(events: &mut Vec<Event>, places: &[u32]) -> Vec<Event> {
         }
     }
     events.truncate(kept);
-    above
 }
 
 /// Merges sorted events into a sorted list, from its end, so that each is moved once.

@@ -143,10 +143,11 @@ fn timing(
     let samples = samples.map_err(text)?;
     let hits = timed.batch.hits().map_err(text)?;
     let found = differences(&world.scene, &world.soup, set, &hits).map_err(wrong)?;
-    let rate = millions_per_second(&samples.wall_ms, set.rays.len() as f64);
+    let rate = millions_per_second(&samples.ms, set.rays.len() as f64);
     Ok(rate.map(|mrays_s| PeerTiming {
         class: set.class,
         rays: set.rays.len(),
+        ms: samples.ms,
         wall_ms: samples.wall_ms,
         cpu_ms: samples.cpu_ms,
         mrays_s,

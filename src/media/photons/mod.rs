@@ -4,6 +4,7 @@
 //! device is counted by a model: which photons that run together write to the same voxels, and to how many segments of
 //! memory (Pfeuti 2009, §4.2, where point set and order are one choice).
 
+mod blue_noise;
 mod count;
 mod order;
 mod points;

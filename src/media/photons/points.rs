@@ -1,5 +1,6 @@
 //! Point sets.
 
+use super::blue_noise::best_candidates;
 use raystone_core::parameters;
 use raystone_core::params::{Choice as _, Entry, Variant};
 use raystone_core::random::Pcg32;
@@ -26,6 +27,8 @@ parameters! {
         OwenSobol = "owen-sobol",
         /// Roberts' R2
         R2 = "r2",
+        /// best of sixteen candidates each
+        BlueNoise = "blue-noise",
     }
 }
 
@@ -53,6 +56,7 @@ pub fn point_set(points: Points, m: u32, seed: u64) -> Result<Vec<[f64; 2]>, Str
             .collect(),
         Points::Hammersley => all.map(hammersley).collect(),
         Points::HammersleyTransposed => all.map(hammersley).map(|[x, y]| [y, x]).collect(),
+        Points::BlueNoise => best_candidates(count as usize, &mut random),
         Points::Sobol | Points::OwenSobol | Points::R2 => of_sequence(points.name(), count, seed)?,
     })
 }
