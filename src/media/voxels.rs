@@ -1,9 +1,10 @@
 //! Closed meshes as volumes: the part of each voxel that is inside (Pfeuti 2009, §3.2). Kernels: `kernels/media/voxels/`.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Player, Recording, Storage, UniformValues, groups_for,
 };
+use raystone_scene::SceneData;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -173,6 +174,36 @@ impl Mesh {
             a.dot(b.cross(c)) / 6.0
         };
         self.triangles.iter().map(part).sum::<f64>().abs()
+    }
+
+    /// The area of all triangles.
+    pub fn area(&self) -> f64 {
+        let part = |triangle: &[u32; 3]| {
+            let [a, b, c] = self.corners(*triangle);
+            (b - a).cross(c - a).length() / 2.0
+        };
+        self.triangles.iter().map(part).sum()
+    }
+
+    /// The triangles of a scene, moved so that the middle of their box is at `middle`, and scaled so that the greatest side of
+    /// the box is `extent`. Triangles of which two corners are one have no inside, and are left out.
+    pub fn of_scene(scene: &SceneData, middle: DVec3, extent: f64) -> Self {
+        let corners = || scene.triangles.iter().flat_map(|t| t.vertices);
+        let low = corners().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
+        let high = corners().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
+        let scale = extent / (high - low).max_element().max(f64::MIN_POSITIVE);
+        let mut mesh = Self::default();
+        for triangle in &scene.triangles {
+            let corners = triangle.vertices;
+            if (0..3).any(|k| corners[k] == corners[(k + 1) % 3]) {
+                continue;
+            }
+            let first = mesh.positions.len() as u32;
+            let place = |p: Vec3| middle + scale * (p.as_dvec3() - 0.5 * (low + high));
+            mesh.positions.extend(corners.map(place));
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        mesh
     }
 
     /// # Errors

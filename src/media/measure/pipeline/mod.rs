@@ -59,6 +59,8 @@ parameters! {
         Lens = "lens",
         /// a torus of clear glass in fog, from a mesh
         Torus = "torus",
+        /// a closed mesh of clear glass in fog
+        Mesh = "mesh",
     }
 
     /// How a medium scatters.
@@ -77,6 +79,8 @@ parameters! {
         attempts: u32 = 10, in 0..=1000;
         /// what the lamp shines into
         content: Content = Content::Fog;
+        /// the mesh: a built-in scene or a file, whose materials are not read
+        mesh: String = String::new();
         /// points of the lamp's square
         points: Points = Points::Hammersley;
         /// order of the list of points

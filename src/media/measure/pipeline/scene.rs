@@ -16,8 +16,8 @@ use glam::{DVec3, Vec3};
 use raystone_bench::run::Absent;
 use raystone_gpu::Gpu;
 use raystone_image::{Image, Picture, automatic_exposure, displayed, tone_map};
+use raystone_scene::named;
 use raystone_stats::flip::Seen;
-use std::f64::consts::PI;
 
 /// Pixels of the page along each axis of a pixel of the image.
 const ENLARGED: u32 = 6;
@@ -41,18 +41,38 @@ const TRUE_PHOTONS: u32 = 6;
 const MANY: u32 = 1024;
 
 impl Content {
-    fn volume(self, gpu: &Gpu, side: u32) -> Result<Volume, Absent> {
-        if self == Self::Torus {
-            return torus(gpu, side);
+    /// With a mesh, the name of a scene or of a file.
+    fn volume(self, gpu: &Gpu, mesh: &str, side: u32) -> Result<Volume, Absent> {
+        if (self == Self::Mesh) == mesh.is_empty() {
+            return Err(Absent::Refused(
+                "`mesh` names the mesh of content = \"mesh\": a scene or a file, and nothing of other contents".to_owned(),
+            ));
         }
-        self.by_procedure(side).map_err(failed)
+        match self {
+            // 64 by 32 quads.
+            Self::Torus => {
+                let torus = Mesh::torus(MIDDLE, AXIS.normalize(), TORUS, 64);
+                of_glass(gpu, &torus, side)
+            }
+            Self::Mesh => {
+                let refused = |reason: String| Absent::Refused(format!("{mesh}: {reason}"));
+                let scene = named(mesh).map_err(|error| Absent::Refused(error.to_string()))?;
+                let mesh = Mesh::of_scene(&scene, MIDDLE, 2.0 * SIZE);
+                of_glass(gpu, &mesh, side).map_err(|absent| match absent {
+                    // The file's fault.
+                    Absent::Failed(reason) => refused(reason),
+                    absent => absent,
+                })
+            }
+            _ => self.by_procedure(side).map_err(failed),
+        }
     }
 
     /// All but those of meshes.
     fn by_procedure(self, side: u32) -> Result<Volume, MediaError> {
         let fog = |density: f32| [FOG[0] * density, FOG[1] * density, 1.0];
         match self {
-            Self::Fog | Self::Torus => Volume::new([side; 3], |_| fog(1.0)),
+            Self::Fog | Self::Torus | Self::Mesh => Volume::new([side; 3], |_| fog(1.0)),
             Self::Cloud => procedures::cloud(side),
             Self::Shadow => Volume::new([side; 3], |p| {
                 // A border of one voxel.
@@ -96,7 +116,10 @@ impl Content {
 
     /// Whether light is refracted in it.
     pub(super) fn is_refractive(self) -> bool {
-        matches!(self, Self::Ball | Self::Cube | Self::Lens | Self::Torus)
+        matches!(
+            self,
+            Self::Ball | Self::Cube | Self::Lens | Self::Torus | Self::Mesh
+        )
     }
 
     /// What the grid blurs: RMSE of an image, relative, at most. It falls as the square of a voxel's side in fog, and as the
@@ -108,22 +131,20 @@ impl Content {
             Self::Cloud => 1.6 / side,
             Self::Shadow => (8.0 / (side * side)).max(0.8 / side),
             // Both images have the same grid: what ways of longer steps move.
-            Self::Ball | Self::Cube | Self::Lens | Self::Torus => 0.4 / side,
+            Self::Ball | Self::Cube | Self::Lens | Self::Torus | Self::Mesh => 0.4 / side,
         }
     }
 }
 
-/// A torus of glass in fog, from a mesh of 64 by 32 quads.
-fn torus(gpu: &Gpu, side: u32) -> Result<Volume, Absent> {
-    let mesh = Mesh::torus(MIDDLE, AXIS.normalize(), TORUS, 64);
-    let parts = coverage(gpu, &mesh, side)?;
+/// A closed mesh of glass in fog.
+fn of_glass(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Volume, Absent> {
+    let parts = coverage(gpu, mesh, side)?;
     let found = parts.iter().map(|part| f64::from(*part)).sum::<f64>() / f64::from(side).powi(3);
     // Middles of cells: a half of one at most along all of its surface.
-    let surface = 4.0 * PI * PI * TORUS[0] * TORUS[1];
-    let slack = surface / f64::from(8 * side);
+    let slack = mesh.area() / f64::from(8 * side);
     if (found - mesh.volume()).abs() > slack {
         return Err(Absent::Failed(format!(
-            "voxels of a torus enclose {found:.4} where its mesh does {:.4}, beside a slack of {slack:.4}",
+            "voxels of the mesh enclose {found:.4} where its triangles do {:.4}, beside a slack of {slack:.4}: parts of it overlap, or are inside out",
             mesh.volume()
         )));
     }
@@ -181,6 +202,7 @@ fn parts_of(
 /// A medium under the lamp.
 pub(super) struct Scene {
     content: Content,
+    mesh: String,
     side: u32,
     kernels: String,
     pub(super) volume: Volume,
@@ -197,6 +219,7 @@ pub(super) struct Scene {
 impl Scene {
     pub(super) fn is_of(&self, load: &Load, kernels: &str) -> bool {
         self.content == load.content
+            && self.mesh == load.mesh
             && self.side == load.side
             && self.volume.phase == load.phase()
             && self.kernels == kernels
@@ -204,7 +227,7 @@ impl Scene {
 
     /// The volume with a level map over it, and its images.
     pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
-        let mut volume = load.content.volume(gpu, load.side)?;
+        let mut volume = load.content.volume(gpu, &load.mesh, load.side)?;
         volume.phase = load.phase();
         let made = structure::registry()
             .find("level-map")
@@ -247,6 +270,7 @@ impl Scene {
         };
         Ok(Self {
             content: load.content,
+            mesh: load.mesh.clone(),
             side: load.side,
             kernels: kernels.to_owned(),
             volume,
@@ -344,6 +368,69 @@ pub(super) fn drawn(image: &[Vec3]) -> Option<Picture> {
 mod tests {
     use super::*;
     use crate::tests::segments::adapter;
+
+    /// The faces of a cube of side 2 around a point on the x-axis, which turn outwards.
+    fn cube(first: usize, x: f32) -> String {
+        let mut text = String::new();
+        for k in 0..8 {
+            let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let [dx, dy, dz] = [0, 1, 2].map(sign);
+            text += &format!("v {} {dy} {dz}\n", x + dx);
+        }
+        for face in [
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+        ] {
+            let [a, b, c, d] = face.map(|corner| corner + 1 + first);
+            text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        }
+        text
+    }
+
+    #[test]
+    fn a_cube_from_a_file_is_the_cube_of_a_formula_and_others_than_closed_meshes_are_refused() {
+        let Some(gpu) = adapter() else { return };
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path.to_str().unwrap().to_owned()
+        };
+        let side = 20;
+        let sound = file("cube.obj", &cube(0, 5.0));
+        let Ok(found) = Content::Mesh.volume(&gpu, &sound, side) else {
+            panic!("refused");
+        };
+        let inside = |p: DVec3| (p - MIDDLE).abs().max_element() < SIZE;
+        let part = |p| procedures::coverage_of(side, p, inside);
+        let glass = [FOG[0] * CLEAR, FOG[1] * CLEAR, GLASS];
+        let expected = procedures::covered(side, part, [FOG[0], FOG[1], 1.0], |_| glass).unwrap();
+        assert_eq!(found.refraction, expected.refraction);
+        assert_eq!(found.scattering, expected.scattering);
+
+        let open: String = (cube(0, 0.0).lines().take(19))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        let open = file("open.obj", &open);
+        let two = file("two.obj", &(cube(0, 0.0) + &cube(8, 0.5)));
+        let missing = folder.path().join("no.obj").to_str().unwrap().to_owned();
+        for (content, mesh, reason) in [
+            (Content::Mesh, &*open, "the mesh is open: 3 edges"),
+            (Content::Mesh, &two, "parts of it overlap"),
+            (Content::Mesh, &missing, "no.obj"),
+            (Content::Mesh, "", "names the mesh"),
+            (Content::Ball, &sound, "names the mesh"),
+        ] {
+            let Err(Absent::Refused(found)) = content.volume(&gpu, mesh, side) else {
+                panic!("{mesh} is not refused");
+            };
+            assert!(found.contains(reason), "{found}");
+        }
+    }
 
     #[test]
     fn flip_of_an_image_is_the_mean_of_its_parts() {
