@@ -295,7 +295,13 @@ impl SceneBuilder {
                     "it lists no faces of three or more corners; {}",
                     self.report.warnings.join("; ")
                 ),
-                n => format!("all {n} have a NaN or infinite vertex"),
+                n => {
+                    let told = self.report.warnings.iter().map(|line| format!("; {line}"));
+                    format!(
+                        "all {n} have a NaN or infinite vertex{}",
+                        told.collect::<String>()
+                    )
+                }
             };
             let name = owned();
             return Err(SceneError::NoTriangles { name, reason });

@@ -278,7 +278,7 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
         approximation_warning(&format!("extended by {name}"), "if it were not", names)
     });
     [
-        approximation_warning("transmissive", "diffuse", transmissive),
+        approximation_warning("transmissive", "if it were not", transmissive),
         approximation_warning("frosted glass", "clear glass", frosted),
         approximation_warning("rough metal", "diffuse", metal),
         approximation_warning("tinted by depth", "if it were not", tinted),

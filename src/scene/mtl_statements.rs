@@ -133,10 +133,11 @@ fn set<T>(place: &mut Option<T>, value: Option<T>) -> bool {
     is_some
 }
 
-/// The numbers at the beginning of a statement, behind `-halo`, which `d` may have.
+/// The finite numbers at the beginning of a statement, behind `-halo`, which `d` may have.
 fn numbers(text: &str) -> Vec<f32> {
     let words = text.split_whitespace().skip_while(|word| *word == "-halo");
-    words.map_while(number).take(3).collect()
+    let finite = |word| number(word).filter(|x: &f32| x.is_finite());
+    words.map_while(finite).take(3).collect()
 }
 
 /// An illumination model, a small integer.

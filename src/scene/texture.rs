@@ -2,7 +2,8 @@
 
 use super::reduce::{Texels, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
-use image::ImageReader;
+use image::error::UnsupportedErrorKind;
+use image::{ImageError, ImageReader};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -135,11 +136,21 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
     limit
 }
 
+fn said(error: ImageError) -> String {
+    let formats = match &error {
+        ImageError::Unsupported(what) if matches!(what.kind(), UnsupportedErrorKind::Format(_)) => {
+            " (PNG, JPEG and WebP are read)"
+        }
+        _ => "",
+    };
+    format!("{error}{formats}")
+}
+
 /// The size of an image, refused before allocation if its bytes cannot hold so many texels.
 fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|e| e.to_string())?;
-    let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
+    let (width, height) = reader.into_dimensions().map_err(said)?;
     let needed = 4 * u64::from(width) * u64::from(height);
     let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);
     if needed > most {
@@ -170,7 +181,7 @@ fn decode(
     max_size: u32,
     kind: Texels,
 ) -> Result<(Texture, Option<Size>), String> {
-    let image = image::load_from_memory(bytes).map_err(|e| e.to_string())?;
+    let image = image::load_from_memory(bytes).map_err(said)?;
     let image = image.into_rgba8();
     let size = image.dimensions();
     let texels = image.as_raw().as_chunks::<4>().0;

@@ -240,6 +240,7 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
     }
     let ballast = numbers.number("the ballast factor")?;
     let third = numbers.number("the number behind the ballast factor")?;
+    let third_line = numbers.line();
     let ballast_lamp = if year < NO_LAMP_FACTOR { third } else { 1.0 };
     let factor = multiplier * ballast * ballast_lamp;
     if factor <= 0.0 {
@@ -269,7 +270,7 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
     let mut warnings = Vec::new();
     if (NO_LAMP_FACTOR..GENERATION_TYPE).contains(&year) && third != 1.0 {
         warnings.push(format!(
-            "{file}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
+            "{file}, line {third_line}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
         ));
     }
     if let Some((line, word)) = numbers.words.get(numbers.next) {
@@ -287,7 +288,7 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
         input_watts,
         warnings,
     };
-    out.unfold()
+    out.unfold(last_angle)
         .map_err(|problem| numbers.error(last_angle, problem))?;
     Ok(out)
 }
