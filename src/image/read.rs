@@ -74,7 +74,12 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     let [width, height] = checked_size(header.width.into(), header.height.into())?;
     let mut values = vec![0.0_f32; 3 * width as usize * height as usize];
     let target = bytemuck::cast_slice_mut(&mut values);
-    decoder.read_image(target).map_err(|e| e.to_string())?;
+    decoder.read_image(target).map_err(|error| match error {
+        ::image::ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
+            "it ends before its last pixel".to_owned()
+        }
+        error => error.to_string(),
+    })?;
     let exposure = header.exposure.unwrap_or(1.0);
     let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));
     let scale = [r, g, b].map(|correction| exposure * correction);
