@@ -53,6 +53,18 @@ impl Faults {
             }
             _ => true,
         });
+        // What else is wrong with a misspelt section follows from its name.
+        let mut before: Vec<Place> = Vec::new();
+        all.retain(|fault| {
+            let follows = matches!(
+                fault,
+                ConfigError::NotOnAxis { .. } | ConfigError::WrongType { .. }
+            );
+            let place = fault.place();
+            let is_known = place.is_some_and(|place| before.contains(place));
+            before.extend(place.cloned());
+            !(follows && is_known)
+        });
         all.sort_by_key(line);
         match all.pop() {
             Some(only) if all.is_empty() => only,
