@@ -283,9 +283,10 @@ impl<'a> Geometry<'a> {
                 }
             }
         }
-        let Some(index) = node.index("mesh") else {
+        let Some(named) = node.get("mesh").given() else {
             return Ok(());
         };
+        let index = named.as_index().unwrap_or(usize::MAX);
         let Some(mesh) = self.document.at("meshes", index) else {
             let what = "nodes show a mesh that is not there";
             self.notes.tell(what, place);

@@ -72,6 +72,11 @@ impl Notes {
                 "nodes have a matrix besides a translation, rotation or scale: the matrix counts";
             self.tell(what, &place);
         }
+        let is_odd = |key: &&str| node.lacks_list(key);
+        if parts.iter().chain(&["matrix"]).any(is_odd) {
+            let what = "nodes have a transform that is no list of numbers, which is left out";
+            self.tell(what, &place);
+        }
         if !own.is_finite() {
             let what = "nodes have a transform with numbers missing: what they show is dropped";
             self.tell(what, place);
@@ -103,6 +108,11 @@ impl Notes {
             }
         }
         // Those that no element has are the document's own, or only declared.
+        let own = document.get("extensions").members().map(|(name, _)| name);
+        let own: Vec<&str> = own.filter(|name| !is_read(name)).collect();
+        for name in own {
+            self.unread(format!("the extension `{name}`"), String::new);
+        }
         for key in ["extensionsUsed", "extensionsRequired"] {
             for name in document.list(key).filter_map(Item::as_text) {
                 let what = format!("the extension `{name}`");

@@ -36,6 +36,10 @@ impl<'a> Geometry<'a> {
         let local = self.data.accessor(positions);
         let local = local.and_then(|values| values.vectors::<3>());
         let mut local = local.map_err(|problem| format!("its positions {problem}"))?;
+        if local.as_flattened().iter().any(|x| !x.is_finite()) {
+            let what = "vertices are not finite: triangles with such a corner are dropped";
+            self.notes.tell(what, place);
+        }
         self.morph(primitive, ("POSITION", &mut local), pose, place);
         let moved = self.moved(attributes, (pose, world), local.len(), place);
         let positions: Vec<Vec3> = (local.iter().enumerate())
@@ -48,6 +52,16 @@ impl<'a> Geometry<'a> {
         self.see_attributes(attributes, set, matches!(moved, Moved::Each(_)), place);
         let uvs = self.read_uvs(attributes, set, place);
         let normals = self.read_normals(primitive, pose, &moved, place);
+        for (name, count) in [
+            ("colour", colors.len()),
+            ("normal", normals.len()),
+            ("texture coordinate", uvs.len()),
+        ] {
+            if (1..positions.len()).contains(&count) {
+                let what = format!("vertices beyond the last {name} are drawn without");
+                self.notes.tell(what, place);
+            }
+        }
         let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
         let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
         let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);

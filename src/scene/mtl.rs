@@ -8,7 +8,9 @@ use super::obj_statements::without_comment;
 use super::tally::{Tally, Unread};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{AlphaChannel, AlphaMask, DIELECTRIC, LoadOptions, MIRROR, Material, TextureUse};
+use super::{
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, TextureUse,
+};
 use glam::Vec3;
 use raystone_core::files::files;
 use std::cell::RefCell;
@@ -182,6 +184,16 @@ impl Contents {
         let folder = file.parent().unwrap_or(Path::new(""));
         // The standard shows textures unscaled by default.
         let unstated = map_kd.as_ref().map_or(DEFAULT_ALBEDO, |_| 1.0);
+        // No light is better than light everywhere.
+        let unstated_light = map_ke.as_ref().map_or(0.0, |_| 1.0) * f32::from(options.textures);
+        for (map, color, what) in [
+            (&map_kd, diffuse, "`map_Kd` where `Kd` is 0"),
+            (&map_ke, emission, "`map_Ke` where `Ke` is 0"),
+        ] {
+            if let (Some(map), Some([0.0, 0.0, 0.0])) = (map, color) {
+                unread.see(what, map.line);
+            }
+        }
         let description = Description {
             format: Format::Mtl,
             base_color: Vec3::from(diffuse.unwrap_or([unstated; 3])),
@@ -209,7 +221,7 @@ impl Contents {
             Some(self.texture(folder, &map, options, unread).place)
         };
         let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
-        let emission = emitted(emission.unwrap_or_default());
+        let emission = emitted(emission.unwrap_or([unstated_light; 3]));
         let is_lamp = emission != Vec3::ZERO;
         let textured = Material {
             base_color_texture: texture(map_kd, is_rough),
@@ -219,7 +231,11 @@ impl Contents {
             mask,
             ..found
         };
-        for what in definition.unused {
+        let shines = source.specular.is_some_and(|ks| ks != [0.0; 3]);
+        // The models 0 and 1 have no highlights.
+        let is_shown = textured.kind != &DIFFUSE || matches!(source.illum, Some(0 | 1));
+        let specular = (shines && !is_shown).then_some("a specular colour (`Ks`)");
+        for what in definition.unused.into_iter().chain(specular) {
             let names = self.unused.entry(what).or_default();
             names.push(textured.name.clone());
         }

@@ -140,9 +140,9 @@ fn numbers(text: &str) -> Vec<f32> {
     words.map_while(finite).take(3).collect()
 }
 
-/// An illumination model, a small integer.
+/// An illumination model.
 fn model(value: f32) -> Option<u8> {
-    ((0.0..=255.0).contains(&value) && value.fract() == 0.0).then_some(value as u8)
+    ((0.0..=10.0).contains(&value) && value.fract() == 0.0).then_some(value as u8)
 }
 
 #[cfg(test)]

@@ -276,7 +276,7 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
             ],
         );
     case("a strange mode")
-        .material(json!({"alphaMode": "GLOW"}))
+        .material(json!({"name": "lava", "alphaMode": "GLOW"}))
         .load()
-        .whole(2);
+        .but(2, &["unknown alpha mode", "drawn as opaque: lava"]);
 }

@@ -159,6 +159,13 @@ fn transforms_may_be_rounded_flat_or_broken() {
     with("a short translation", "translation", json!([1, 2]))
         .load()
         .fails(&["all 2 have a NaN", "numbers missing", "node 0"]);
+    with("a scale of one number", "scale", json!(2))
+        .load()
+        .but(2, &["no list of numbers", "node 0"])
+        .corner([1.0, 1.0, 0.0]);
+    with("a mesh by its name", "mesh", json!("square"))
+        .load()
+        .fails(&["a mesh that is not there", "node 0"]);
     with("a matrix and a scale", "matrix", json!(identity))
         .set("/nodes/0/scale", json!([9, 9, 9]))
         .load()
@@ -441,6 +448,13 @@ fn extensions_that_are_not_read_refuse_nothing_and_are_named() {
         )
         .load()
         .but(2, &["nearest texel", "sampler 1"]);
+    case("of the document")
+        .set(
+            "/extensions",
+            json!({"X_own": {}, "KHR_lights_punctual": {}}),
+        )
+        .load()
+        .but(2, &["the extension `X_own`"]);
     case("a later reader")
         .set("/asset/minVersion", json!("2.1"))
         .load()

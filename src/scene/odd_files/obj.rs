@@ -281,6 +281,25 @@ const MTL: &[(&str, Outcome)] = &[
         ),
     ),
     (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 9\nillum 3",
+        Reads(
+            "r",
+            &["1 material is shaped by a specular colour (`Ks`), which is not rendered yet"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 9\nillum 1",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 0 0 0\nmap_Kd t.png",
+        Reads(".", &["`map_Kd` where `Kd` is 0 (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 11",
+        Reads("r", &["the value of `illum` (line 3)"]),
+    ),
+    (
         "newmtl a\nKd 1 0 0\nTr 1",
         Reads(
             "r",
