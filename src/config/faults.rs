@@ -2,6 +2,7 @@
 
 use super::check::key_in;
 use super::error::{ConfigError, Place};
+use raystone_core::text::nearest;
 
 /// The mistakes found so far.
 #[derive(Default)]
@@ -37,15 +38,11 @@ impl Faults {
         }
     }
 
-    /// All mistakes in the order of the file. What is missing from a section with an unknown key is
-    /// most likely that key, and is not named.
+    /// All mistakes in the order of the file. What is missing from a section with an unknown key, or
+    /// from one whose name is misspelt, is most likely there, and is not named.
     fn error(self) -> ConfigError {
         let mut all = self.0;
-        let unknown: Vec<String> = all
-            .iter()
-            .filter_map(of_unknown)
-            .map(str::to_owned)
-            .collect();
+        let unknown: Vec<String> = all.iter().filter_map(misspelt).collect();
         all.retain(|fault| match fault {
             ConfigError::Missing { key, .. } => {
                 let section = key.rsplit_once('.').map_or("", |(section, _)| section);
@@ -100,11 +97,17 @@ pub(super) fn both<A, B>(
     }
 }
 
-/// What an unknown name was taken for.
-fn of_unknown(fault: &ConfigError) -> Option<&str> {
-    match fault {
-        ConfigError::Unknown { what, .. } => Some(what),
-        _ => None,
+/// Where an unknown key stands, or the keys of the section that an unknown one stands for.
+fn misspelt(fault: &ConfigError) -> Option<String> {
+    let ConfigError::Unknown {
+        what, name, known, ..
+    } = fault
+    else {
+        return None;
+    };
+    match what.as_str() {
+        "section" => nearest(name, known.iter().map(String::as_str)).map(key_in),
+        _ => Some(what.clone()),
     }
 }
 

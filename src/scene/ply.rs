@@ -27,6 +27,7 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     let mut body = Body::new(source, header.encoding, header.lines);
     let mut model = Model::default();
     model.read(&header, &mut body, bytes).map_err(broken)?;
+    model.builder.note_far();
     model.tell(&header);
     let is_colored = !model.colors.is_empty();
     let builder = std::mem::take(&mut model.builder);
