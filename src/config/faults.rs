@@ -4,6 +4,9 @@ use super::check::key_in;
 use super::error::{ConfigError, Place};
 use raystone_core::text::nearest;
 
+/// Mistakes named at most: a file of another kind has any number.
+const MOST: usize = 20;
+
 /// The mistakes found so far.
 #[derive(Default)]
 pub(super) struct Faults(Vec<ConfigError>);
@@ -21,6 +24,9 @@ impl Faults {
 
     /// Adds a mistake, unless it was found already.
     fn add(&mut self, fault: ConfigError) {
+        if self.0.len() >= MOST {
+            return;
+        }
         let text = fault.to_string();
         if self.0.iter().all(|other| other.to_string() != text) {
             self.0.push(fault);

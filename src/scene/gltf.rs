@@ -14,7 +14,10 @@ use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, 
 use super::{gltf_container, gltf_instancing, gltf_lights, gltf_material};
 use glam::{Mat4, Quat, Vec3, Vec4};
 use raystone_core::geometry::{Camera, Triangle};
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 /// Triangle limit for a node's instances: all are stored, and a small file can list many.
 const MOST_TRIANGLES: usize = 100_000_000;
@@ -107,6 +110,8 @@ fn build(
         copies: Copies::new(document),
         white: None,
         notes,
+        worlds: OnceCell::new(),
+        skins: BTreeMap::new(),
     };
     geometry.read_scene()?;
     let Geometry {
@@ -154,6 +159,10 @@ pub(super) struct Geometry<'a> {
     /// Material of primitives that have colours but name no material, once there is one.
     pub white: Option<usize>,
     pub notes: Notes,
+    /// Transforms of all nodes, once a skin asks for them.
+    pub worlds: OnceCell<Vec<Mat4>>,
+    /// Transforms of the joints of skins that were asked for, if they can be read.
+    pub skins: BTreeMap<usize, Option<Rc<[Mat4]>>>,
 }
 
 struct Copies {

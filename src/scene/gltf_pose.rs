@@ -4,13 +4,14 @@
 use super::gltf::{AT_REST, Geometry, Place, transform};
 use super::gltf_document::Item;
 use glam::{Mat4, Vec3};
+use std::rc::Rc;
 
 /// How a node shows its mesh.
 pub(super) struct Pose {
     /// Weights of morph targets; missing ones are 0.
     weights: Vec<f32>,
     /// Transforms of the skin's joints, from mesh to world space.
-    joints: Option<Vec<Mat4>>,
+    joints: Option<Rc<[Mat4]>>,
     /// True if other nodes may show the mesh in another shape.
     pub is_own: bool,
 }
@@ -43,6 +44,37 @@ impl Pose {
     }
 }
 
+/// The transforms of all nodes to world space, each below the last parent that names it.
+fn worlds(document: Item<'_>) -> Vec<Mat4> {
+    let nodes: Vec<Item<'_>> = document.list("nodes").collect();
+    let mut parents = vec![None; nodes.len()];
+    for (index, node) in nodes.iter().enumerate() {
+        for child in node.list("children").filter_map(Item::as_index) {
+            if let Some(parent) = parents.get_mut(child) {
+                *parent = Some(index);
+            }
+        }
+    }
+    let mut worlds: Vec<Option<Mat4>> = vec![None; nodes.len()];
+    let mut is_open = vec![false; nodes.len()];
+    for index in 0..nodes.len() {
+        // Up to a node that is known, the first, or one that is below itself; then down again.
+        let mut path = vec![index];
+        while let Some(parent) = parents[path[path.len() - 1]]
+            && worlds[path[path.len() - 1]].is_none()
+            && !std::mem::replace(&mut is_open[parent], true)
+        {
+            path.push(parent);
+        }
+        let mut above = Mat4::IDENTITY;
+        for at in path.into_iter().rev() {
+            is_open[at] = false;
+            above = *worlds[at].get_or_insert_with(|| above * transform(nodes[at]));
+        }
+    }
+    worlds.into_iter().map(Option::unwrap_or_default).collect()
+}
+
 impl<'a> Geometry<'a> {
     /// The pose of a node's mesh, which stands at rest if its skin cannot be read.
     pub(super) fn pose(&mut self, node: Item<'a>, mesh: Item<'a>, place: Place<'_>) -> Pose {
@@ -65,28 +97,22 @@ impl<'a> Geometry<'a> {
     }
 
     /// The transforms of a node's joints; `None` if some cannot be read.
-    fn joints(&self, node: Item<'a>) -> Option<Vec<Mat4>> {
-        let skin = self.document.at("skins", node.index("skin")?)?;
-        let nodes: Vec<Item<'a>> = self.document.list("nodes").collect();
-        let mut parents = vec![None; nodes.len()];
-        for (index, node) in nodes.iter().enumerate() {
-            for child in node.list("children").filter_map(Item::as_index) {
-                if let Some(parent) = parents.get_mut(child) {
-                    *parent = Some(index);
-                }
-            }
+    fn joints(&mut self, node: Item<'a>) -> Option<Rc<[Mat4]>> {
+        let skin = node.index("skin")?;
+        if let Some(known) = self.skins.get(&skin) {
+            return known.clone();
         }
-        let world = |joint: Item<'a>| -> Option<Mat4> {
-            let mut at = joint.as_index()?;
-            let mut world = transform(*nodes.get(at)?);
-            // As many steps as there are nodes: they may be children of themselves.
-            for _ in 0..nodes.len() {
-                let Some(parent) = parents[at] else { break };
-                world = transform(nodes[parent]) * world;
-                at = parent;
-            }
-            Some(world)
-        };
+        let read = self
+            .document
+            .at("skins", skin)
+            .and_then(|s| self.read_skin(s));
+        self.skins.insert(skin, read.clone());
+        read
+    }
+
+    fn read_skin(&self, skin: Item<'a>) -> Option<Rc<[Mat4]>> {
+        let worlds = self.worlds.get_or_init(|| worlds(self.document));
+        let world = |joint: Item<'_>| worlds.get(joint.as_index()?).copied();
         let mut joints = skin.list("joints").map(world).collect::<Option<Vec<_>>>()?;
         if let Some(inverse) = skin.get("inverseBindMatrices").given() {
             let inverse = self.data.accessor(inverse.as_index()?).ok()?;
@@ -98,7 +124,7 @@ impl<'a> Geometry<'a> {
                 *joint *= Mat4::from_cols_array(inverse);
             }
         }
-        (!joints.is_empty()).then_some(joints)
+        (!joints.is_empty()).then(|| joints.into())
     }
 
     /// What moves a primitive's vertices: the node, or the joints of its skin.
@@ -123,7 +149,7 @@ impl<'a> Geometry<'a> {
 
     /// The weighted mean of each vertex's joints.
     fn blended(&self, attributes: Item<'a>, joints: &[Mat4], vertices: usize) -> Option<Vec<Mat4>> {
-        let mut sums = vec![(Mat4::ZERO, 0.0); vertices];
+        let mut sums = vec![Mat4::ZERO; vertices];
         for set in 0.. {
             let accessor = |name: &str| attributes.index(&format!("{name}_{set}"));
             let Some(indices) = accessor("JOINTS") else {
@@ -135,18 +161,18 @@ impl<'a> Geometry<'a> {
             if indices.len().min(weights.len()) < vertices {
                 return None;
             }
-            for ((sum, total), (indices, weights)) in
-                sums.iter_mut().zip(indices.iter().zip(&weights))
-            {
+            for (sum, (indices, weights)) in sums.iter_mut().zip(indices.iter().zip(&weights)) {
                 for (index, weight) in indices.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
                     *sum += *joints.get(*index as usize)? * *weight;
-                    *total += *weight;
                 }
             }
         }
-        // Rounded weights do not add to one.
-        let mean = |(sum, total): (Mat4, f32)| (total > 0.0).then(|| sum * total.recip());
-        sums.into_iter().map(mean).collect()
+        // The last element is the sum of weights, which are rounded.
+        for sum in &mut sums {
+            let total = Some(sum.w_axis.w).filter(|total| *total > 0.0)?;
+            *sum *= total.recip();
+        }
+        Some(sums)
     }
 
     /// Adds the weighted morph targets to the values of an attribute.
