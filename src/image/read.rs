@@ -235,8 +235,11 @@ pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
     Ok((sizes, values))
 }
 
+/// A value from its little-endian bytes, the first of eight.
+type Value = fn([u8; 8]) -> f32;
+
 /// Bytes of a value of NumPy's type, and the value of little-endian bytes.
-fn number_of(kind: &str) -> Option<(u64, fn([u8; 8]) -> f32)> {
+fn number_of(kind: &str) -> Option<(u64, Value)> {
     fn of<const N: usize>(word: [u8; 8]) -> [u8; N] {
         std::array::from_fn(|k| word[k])
     }

@@ -236,7 +236,7 @@ impl<'a> Geometry<'a> {
                 return Err(self.error(&place(), problem));
             }
             let own = transform(node);
-            self.notes.see_transform(node, own, &place);
+            self.notes.see_transform(node, own, place);
             let world = parent * own;
             let shown = shown && gltf_instancing::is_visible(node);
             self.read_camera_of(node, world);
