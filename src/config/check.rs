@@ -4,6 +4,7 @@
 use super::axis::Axis;
 use super::error::{ConfigError, Place};
 use super::experiment::Axes;
+use super::faults::Faults;
 use super::pattern::Pattern;
 use super::settings::Section;
 use super::tree::{Item, Table, Value};
@@ -15,27 +16,33 @@ const CELL_SETS: [&str; 2] = ["exclude", "include"];
 
 /// Checks that every section, key and entry is known.
 pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), ConfigError> {
-    let axes = Axis::ALL.map(Axis::name);
+    let mut faults = Faults::default();
     for (name, item) in tree {
-        if let Some(axis) = Axis::from_name(name) {
-            let section = item.table(name, "sections [NAME] of parameters")?;
-            for (entry, item) in section {
-                variants::resolve(axis, &item.at, entry, catalogue)?;
-                parameter_tables(axis, entry, item)?;
-            }
-        } else if CELL_SETS.contains(&name.as_str()) {
-            for (_, table) in cell_tables(name, item)? {
-                check_keys(&key_in(name), table, &axes)?;
-            }
-        } else if name == AXES {
-            check_keys(&key_in(name), item.table(name, "a section")?, &axes)?;
-        } else if catalogue.keys_of(name).is_empty() {
-            return Err(unknown_section(name, item, catalogue));
-        } else {
-            check_settings(name, item, catalogue)?;
-        }
+        faults.keep(check_section(name, item, catalogue));
     }
-    Ok(())
+    faults.end()
+}
+
+fn check_section(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), ConfigError> {
+    let axes = Axis::ALL.map(Axis::name);
+    let mut faults = Faults::default();
+    if let Some(axis) = Axis::from_name(name) {
+        for (entry, item) in item.table(name, "sections [NAME] of parameters")? {
+            faults.keep(variants::resolve(axis, &item.at, entry, catalogue));
+            faults.keep(parameter_tables(axis, entry, item));
+        }
+    } else if CELL_SETS.contains(&name) {
+        for (_, table) in cell_tables(name, item)? {
+            faults.keep(check_keys(&key_in(name), table, &axes));
+        }
+    } else if name == AXES {
+        check_keys(&key_in(name), item.table(name, "a section")?, &axes)?;
+    } else if catalogue.keys_of(name).is_empty() {
+        return Err(unknown_section(name, item, catalogue));
+    } else {
+        check_settings(name, item, catalogue)?;
+    }
+    faults.end()
 }
 
 /// Checks the keys of a section of settings, and of the tables within it.
@@ -47,14 +54,15 @@ fn check_settings(name: &str, item: &Item, catalogue: &Catalogue) -> Result<(), 
         "a section".to_owned()
     };
     let table = item.table(name, &expected)?;
-    check_keys(&key_in(name), table, &keys)?;
+    let mut faults = Faults::default();
+    faults.keep(check_keys(&key_in(name), table, &keys));
     for (key, item) in table {
         let within = format!("{name}.{key}");
         if !catalogue.keys_of(&within).is_empty() {
-            check_settings(&within, item, catalogue)?;
+            faults.keep(check_settings(&within, item, catalogue));
         }
     }
-    Ok(())
+    faults.end()
 }
 
 fn unknown_section(name: &str, item: &Item, catalogue: &Catalogue) -> ConfigError {
@@ -86,14 +94,14 @@ pub(super) fn key_in(section: &str) -> String {
 
 /// Checks that keys are among those known; `what` describes them in messages.
 pub(super) fn check_keys(what: &str, table: &Table, known: &[&str]) -> Result<(), ConfigError> {
-    let is_known = |name: &String| known.contains(&name.as_str());
-    match table.iter().find(|(name, _)| !is_known(name)) {
-        None => Ok(()),
-        Some((name, item)) => {
-            let known = known.iter().copied();
-            Err(ConfigError::unknown(&item.at, what, name, known))
+    let mut faults = Faults::default();
+    for (name, item) in table {
+        let known = known.iter().copied();
+        if !known.clone().any(|key| key == name) {
+            faults.keep::<()>(Err(ConfigError::unknown(&item.at, what, name, known)));
         }
     }
+    faults.end()
 }
 
 pub(super) fn cell_tables<'t>(

@@ -199,6 +199,9 @@ pub enum ConfigError {
         /// The pair and the reason.
         reason: String,
     },
+    /// Several mistakes, one a line.
+    #[error("{}", lines(.0))]
+    Several(Vec<ConfigError>),
     /// Excludes and filters remove every cell.
     #[error("{file}: nothing is left to run: {reason}")]
     NothingLeft {
@@ -210,6 +213,23 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
+    /// Where the mistake was written.
+    pub(super) fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Syntax { at, .. }
+            | Self::Unknown { at, .. }
+            | Self::WrongType { at, .. }
+            | Self::OutOfRange { at, .. }
+            | Self::Missing { at, .. }
+            | Self::Empty { at, .. }
+            | Self::Duplicate { at, .. }
+            | Self::TooMany { at, .. }
+            | Self::NotOnAxis { at, .. }
+            | Self::UselessExclude { at, .. } => Some(at),
+            _ => None,
+        }
+    }
+
     /// The error for an unknown name.
     pub(super) fn unknown<'n>(
         at: &Place,
@@ -224,6 +244,11 @@ impl ConfigError {
             known: known.into_iter().map(str::to_owned).collect(),
         }
     }
+}
+
+fn lines(faults: &[ConfigError]) -> String {
+    let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    lines.join("\n")
 }
 
 /// Maximum number of known names in an error message.

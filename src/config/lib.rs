@@ -13,6 +13,7 @@ mod check;
 mod error;
 pub mod expect;
 mod experiment;
+mod faults;
 mod parse;
 mod pattern;
 mod plan;

@@ -8,6 +8,7 @@ use super::check::{
 };
 use super::error::{ConfigError, Place};
 use super::experiment::{Axes, CellSet, Condition, Experiment};
+use super::faults::{Faults, both};
 use super::plot::PlotRequest;
 use super::sections::{Coherence, Reference, Run, View};
 use super::settings::{find, not_allowed, read_all, take};
@@ -26,15 +27,25 @@ pub(super) fn parse(
     catalogue: &Catalogue,
 ) -> Result<Experiment, ConfigError> {
     let tree = layers(text, file, overrides)?;
-    check_sections(&tree, catalogue)?;
-    let mut read = read_all(catalogue.sections(), &tree)?;
-    let reader = Reader::new(&tree, file, catalogue)?;
-    let axes = Axes::try_new(|axis| reader.axis(axis))?;
+    let settings = both(
+        check_sections(&tree, catalogue),
+        read_all(catalogue.sections(), &tree),
+    );
+    let reader = Reader::new(&tree, file, catalogue);
+    let axes = reader.and_then(|reader| Ok((reader.axes()?, reader)));
+    let (((), mut read), (axes, reader)) = both(settings, axes)?;
     let run: Run = take(&mut read).unwrap_or_default();
     let mut coherence: Option<Coherence> = take(&mut read);
     if let Some(coherence) = &mut coherence {
         coherence.complete(&run);
     }
+    let sets = both(
+        reader.cell_sets("exclude", &axes),
+        reader.cell_sets("include", &axes),
+    );
+    let reference = reader.reference(take(&mut read).unwrap_or_default(), &axes);
+    let others = both(reader.conditions(&axes), reference);
+    let ((excludes, includes), (conditions, reference)) = both(sets, others)?;
     let experiment = Experiment {
         name: run.name.clone().unwrap_or_else(|| file_stem(file)),
         source: file.to_owned(),
@@ -43,10 +54,10 @@ pub(super) fn parse(
         run,
         stop: take(&mut read),
         camera: take(&mut read).map(|view: View| Camera::from(view)),
-        excludes: reader.cell_sets("exclude", &axes)?,
-        includes: reader.cell_sets("include", &axes)?,
-        conditions: reader.conditions(&axes)?,
-        reference: reader.reference(take(&mut read).unwrap_or_default(), &axes)?,
+        excludes,
+        includes,
+        conditions,
+        reference,
         axes,
         timing: take(&mut read).unwrap_or_default(),
         gate: take(&mut read).unwrap_or_default(),
@@ -153,6 +164,14 @@ impl<'t> Reader<'t> {
         self.axes.get(axis.name()).ok_or_else(missing)
     }
 
+    /// The variants of all axes.
+    fn axes(&self) -> Result<Axes, ConfigError> {
+        let mut faults = Faults::default();
+        let mut variants = |axis| Ok(faults.keep(self.axis(axis)).unwrap_or_default());
+        let axes = Axes::try_new(&mut variants)?;
+        faults.or(axes)
+    }
+
     /// The variants of one axis, in file order.
     fn axis(&self, axis: Axis) -> Result<Vec<Variant>, ConfigError> {
         let key = format!("{AXES}.{axis}");
@@ -161,20 +180,25 @@ impl<'t> Reader<'t> {
         variants::check_count(axis, list, names.len())?;
         let empty = Table::new();
         let parameters = self.parameters(axis)?.unwrap_or(&empty);
-        let mut variants = Vec::new();
+        let (mut variants, mut faults) = (Vec::new(), Faults::default());
         let mut used: Vec<String> = Vec::new();
         for (item, name) in names {
             if used.iter().any(|other| other == name) {
-                return Err(item.duplicate(&key));
+                faults.keep::<()>(Err(item.duplicate(&key)));
+                continue;
             }
             used.push(name.to_owned());
-            let entry = variants::resolve(axis, &item.at, name, self.catalogue)?;
+            let entry = variants::resolve(axis, &item.at, name, self.catalogue);
             let tables = match parameters.get(name) {
-                Some(item) => parameter_tables(axis, name, item)?,
-                None => vec![&empty],
+                Some(item) => parameter_tables(axis, name, item),
+                None => Ok(vec![&empty]),
+            };
+            let Some((entry, tables)) = faults.keep(both(entry, tables)) else {
+                continue;
             };
             for table in tables {
-                for variant in variants::expand(axis, &entry, table)? {
+                let expanded = faults.keep(variants::expand(axis, &entry, table));
+                for variant in expanded.into_iter().flatten() {
                     // Tables may overlap, most often in the defaults.
                     if !variants.contains(&variant) {
                         variants.push(variant);
@@ -183,6 +207,7 @@ impl<'t> Reader<'t> {
                 variants::check_count(axis, item, variants.len())?;
             }
         }
+        faults.end()?;
         let replaced = matches!(list.at, Place::Override(_));
         check_on_axis(axis, parameters, &used, replaced)?;
         if matches!(axis, Axis::Scene | Axis::Kernels) {

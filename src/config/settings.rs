@@ -1,6 +1,7 @@
 //! Sections of settings, declared as structs, and their reading.
 
 use super::error::{ConfigError, Place};
+use super::faults::Faults;
 use super::tree::{Item, Table, Value};
 use super::values;
 use raystone_core::params::{Entry, ParamError, Parameters, Params};
@@ -59,24 +60,26 @@ impl Section {
         };
         let table = item.table(name, "a section")?;
         let key = |key: &str| format!("{name}.{key}");
-        let mut params = Params::default();
+        let (mut params, mut faults) = (Params::default(), Faults::default());
         for parameter in &self.entry.schema {
             let name = parameter.name;
             match table.get(name) {
                 Some(item) => {
-                    let value = values::value(&key(name), item, &parameter.range)?;
-                    params.0.insert(name.to_owned(), value);
+                    let value = values::value(&key(name), item, &parameter.range);
+                    let value = faults.keep(value).map(|value| (name.to_owned(), value));
+                    params.0.extend(value);
                 }
                 None if self.required.contains(&name) => {
-                    return Err(ConfigError::Missing {
+                    faults.keep::<()>(Err(ConfigError::Missing {
                         at: item.at.clone(),
                         key: key(name),
                         expected: parameter.range.to_string(),
-                    });
+                    }));
                 }
                 None => {}
             }
         }
+        faults.end()?;
         match (self.check)(&params) {
             Ok(None) => Ok(Some(params)),
             Ok(Some((name, expected))) => {
@@ -124,11 +127,12 @@ pub(super) fn find<'t>(tree: &'t Table, name: &str) -> Option<&'t Item> {
 pub(super) type Read = BTreeMap<String, Params>;
 
 pub(super) fn read_all(sections: &[Section], tree: &Table) -> Result<Read, ConfigError> {
-    let read = sections.iter().filter_map(|section| {
-        let params = section.read(tree).transpose()?;
-        Some(params.map(|params| (section.name().to_owned(), params)))
-    });
-    read.collect()
+    let (mut read, mut faults) = (Read::new(), Faults::default());
+    for section in sections {
+        let params = faults.keep(section.read(tree)).flatten();
+        read.extend(params.map(|params| (section.name().to_owned(), params)));
+    }
+    faults.or(read)
 }
 
 /// Removes and returns the checked settings of a section.

@@ -3,6 +3,7 @@
 use super::Catalogue;
 use super::axis::Axis;
 use super::error::{ConfigError, Place};
+use super::faults::Faults;
 use super::tree::{Item, Table, Value};
 use super::values::value;
 use raystone_core::params::{
@@ -75,14 +76,13 @@ pub(super) fn expand(
     entry: &Entry,
     section: &Table,
 ) -> Result<Vec<Variant>, ConfigError> {
-    if let Some((name, item)) = section
-        .iter()
-        .filter(|(name, _)| name.as_str() != WHEN)
-        .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
-    {
-        let what = format!("parameter of {axis} {}", entry.name);
+    let mut faults = Faults::default();
+    for (name, item) in section.iter().filter(|(name, _)| name.as_str() != WHEN) {
         let known = entry.schema.iter().map(|p| p.name);
-        return Err(ConfigError::unknown(&item.at, what, name, known));
+        if !known.clone().any(|key| key == name) {
+            let what = format!("parameter of {axis} {}", entry.name);
+            faults.keep::<()>(Err(ConfigError::unknown(&item.at, what, name, known)));
+        }
     }
     let mut products = vec![Vec::new()];
     for parameter in &entry.schema {
@@ -90,7 +90,9 @@ pub(super) fn expand(
             continue;
         };
         let key = format!("{axis}.{}.{}", entry.name, parameter.name);
-        let values = listed(&key, item, &parameter.range)?;
+        let Some(values) = faults.keep(listed(&key, item, &parameter.range)) else {
+            continue;
+        };
         check_count(axis, item, products.len().saturating_mul(values.len()))?;
         products = products
             .iter()
@@ -103,10 +105,8 @@ pub(super) fn expand(
             })
             .collect();
     }
-    Ok(products
-        .into_iter()
-        .map(|set| entry.variant(&set))
-        .collect())
+    let variants = products.into_iter().map(|set| entry.variant(&set));
+    faults.or(variants.collect())
 }
 
 const MAX_VARIANTS: usize = 1024;

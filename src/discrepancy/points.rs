@@ -59,6 +59,11 @@ impl PointSet {
             };
             let before = coordinates.len();
             let content = content.split('#').next().unwrap_or_default();
+            if has_decimal_commas(content) {
+                let reason =
+                    "commas within and blanks between numbers: write decimals with a point";
+                return Err(refuse(reason.to_owned()));
+            }
             for word in words(content) {
                 coordinates.push(coordinate(word).map_err(refuse)?);
             }
@@ -134,6 +139,17 @@ fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split([' ', '\t', ',']).filter(|word| !word.is_empty())
 }
 
+/// True if all numbers of a line look like `0,5`: coordinates would part at the comma unnoticed.
+fn has_decimal_commas(line: &str) -> bool {
+    let mut words = line.split_ascii_whitespace();
+    let is_one = |word: &str| {
+        let parts = word.split_once(',');
+        let is_whole = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+        parts.is_some_and(|(whole, decimals)| is_whole(whole) && is_whole(decimals))
+    };
+    line.trim().contains([' ', '\t']) && words.all(is_one)
+}
+
 fn coordinate(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -152,6 +168,19 @@ mod tests {
         let points = PointSet::parse(text).unwrap();
         let expected = PointSet::from_points(&[[0.25, 0.5], [1.0, 0.0], [0.125, 0.001]]);
         assert_eq!(Ok(points), expected);
+    }
+
+    #[test]
+    fn decimals_with_commas_are_refused_and_lists_with_commas_are_not() {
+        for text in ["0,5 0,25\n", "0,1\t1,0 # corner\n"] {
+            let refused = PointSet::parse(text).unwrap_err().to_string();
+            assert!(refused.contains("with a point"), "{refused}");
+            let advised = PointSet::parse(&text.replace(',', ".")).unwrap();
+            assert_eq!(advised.dim(), 2);
+        }
+        for text in ["0,1\n", "0, 1\n", "0,1 \n", "0,1 0.5\n", "0.5,1 1,0\n"] {
+            assert!(PointSet::parse(text).is_ok(), "{text}");
+        }
     }
 
     #[test]

@@ -7,12 +7,14 @@ mod exr_file;
 mod exr_read;
 mod formats;
 mod picture;
+mod primaries;
 mod read;
 
 pub use color::*;
 pub use exr_file::Attribute;
 pub use formats::*;
 pub use picture::*;
+pub use primaries::other_primaries;
 pub use read::{read_linear, read_npy_array};
 
 use std::io;

@@ -74,7 +74,12 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     let [width, height] = checked_size(header.width.into(), header.height.into())?;
     let mut values = vec![0.0_f32; 3 * width as usize * height as usize];
     let target = bytemuck::cast_slice_mut(&mut values);
-    decoder.read_image(target).map_err(|e| e.to_string())?;
+    decoder.read_image(target).map_err(|error| match error {
+        ::image::ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
+            "it ends before its last pixel".to_owned()
+        }
+        error => error.to_string(),
+    })?;
     let exposure = header.exposure.unwrap_or(1.0);
     let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));
     let scale = [r, g, b].map(|correction| exposure * correction);
@@ -158,48 +163,53 @@ fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     Some(rest.trim_start())
 }
 
-/// Reads an array of NumPy, of 16-, 32- or 64-bit floats in C order: its shape and its values.
+/// The header and the values of an NPY file.
+fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let (version, rest) = rest.split_at_checked(2)?;
+    // The header length has two bytes in version 1 and four since.
+    let (length, rest) = rest.split_at_checked(if version[0] == 1 { 2 } else { 4 })?;
+    let length = length
+        .iter()
+        .rev()
+        .fold(0, |n, byte| n << 8 | usize::from(*byte));
+    let (header, data) = rest.split_at_checked(length)?;
+    Some((std::str::from_utf8(header).ok()?, data))
+}
+
+/// The type of an NPY file's values, such as `<f4`.
+fn kind_of(bytes: &[u8]) -> Option<&str> {
+    let (header, _) = npy_parts(bytes)?;
+    entry(header, "descr").and_then(|rest| rest.split('\'').nth(1))
+}
+
+/// Reads an array of NumPy, of floats, integers or flags: its shape, and its values in C order.
+/// Integers keep their values; those beyond 24 bits are rounded.
 ///
 /// # Errors
 /// A description of what is not so.
 pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
-    let parts = || {
-        let rest = bytes.strip_prefix(b"\x93NUMPY")?;
-        let (version, rest) = rest.split_at_checked(2)?;
-        // The header length has two bytes in version 1 and four since.
-        let (length, rest) = rest.split_at_checked(if version[0] == 1 { 2 } else { 4 })?;
-        let length = length
-            .iter()
-            .rev()
-            .fold(0, |n, byte| n << 8 | usize::from(*byte));
-        let (header, data) = rest.split_at_checked(length)?;
-        Some((std::str::from_utf8(header).ok()?, data))
-    };
-    let (header, data) = parts().ok_or("it does not begin with a header of NumPy")?;
-    let kind = entry(header, "descr").and_then(|rest| rest.split('\'').nth(1));
+    let (header, data) = npy_parts(bytes).ok_or("it does not begin with a header of NumPy")?;
+    let kind = kind_of(bytes);
     let shape = entry(header, "shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next());
     let (Some(kind), Some(shape)) = (kind, shape) else {
         return Err("its header has no `descr` or no `shape`".to_owned());
     };
-    if entry(header, "fortran_order").is_some_and(|rest| rest.starts_with("True")) {
-        return Err("its array is in Fortran order; save numpy.ascontiguousarray of it".to_owned());
-    }
+    let is_fortran = entry(header, "fortran_order").is_some_and(|rest| rest.starts_with("True"));
     let sizes: Option<Vec<u64>> = shape
         .split(',')
-        .map(str::trim)
+        // Python 2 writes `3L`.
+        .map(|size| size.trim().trim_end_matches('L'))
         .filter(|size| !size.is_empty())
         .map(|size| size.parse().ok())
         .collect();
     let sizes = sizes.ok_or_else(|| format!("its shape is ({shape})"))?;
-    let width = match kind {
-        "<f2" | ">f2" => 2,
-        "<f4" | ">f4" => 4,
-        "<f8" | ">f8" => 8,
-        _ => {
-            return Err(format!(
-                "its values are `{kind}`, not floats of 16, 32 or 64 bits"
-            ));
-        }
+    let (order, kind) = kind.split_at_checked(1).unwrap_or(("", kind));
+    let Some((width, value)) = number_of(kind).filter(|_| ["<", ">", "|", "="].contains(&order))
+    else {
+        return Err(format!(
+            "its values are `{order}{kind}`, which are neither floats, integers nor flags"
+        ));
     };
     let product = |bytes: Option<u64>, size: &u64| bytes?.checked_mul(*size);
     let expected = sizes.iter().fold(Some(width), product);
@@ -209,18 +219,71 @@ pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
             data.len()
         ));
     }
-    let values = match kind {
-        "<f2" => values(data, |b| f16::from_le_bytes(b).to_f32()),
-        ">f2" => values(data, |b| f16::from_be_bytes(b).to_f32()),
-        "<f4" => values(data, f32::from_le_bytes),
-        ">f4" => values(data, f32::from_be_bytes),
-        "<f8" => values(data, |b| f64::from_le_bytes(b) as f32),
-        _ => values(data, |b| f64::from_be_bytes(b) as f32),
+    let number = |bytes: &[u8]| {
+        let mut word = [0; 8];
+        word[..bytes.len()].copy_from_slice(bytes);
+        if order == ">" {
+            word[..bytes.len()].reverse();
+        }
+        value(word)
+    };
+    let values: Vec<f32> = data.chunks_exact(width as usize).map(number).collect();
+    let values = match is_fortran {
+        true => in_c_order(&sizes, &values),
+        false => values,
     };
     Ok((sizes, values))
 }
 
+/// A value from its little-endian bytes, the first of eight.
+type Value = fn([u8; 8]) -> f32;
+
+/// Bytes of a value of NumPy's type, and the value of little-endian bytes.
+fn number_of(kind: &str) -> Option<(u64, Value)> {
+    fn of<const N: usize>(word: [u8; 8]) -> [u8; N] {
+        std::array::from_fn(|k| word[k])
+    }
+    Some(match kind {
+        "b1" | "u1" => (1, |w| f32::from(w[0])),
+        "i1" => (1, |w| f32::from(i8::from_le_bytes(of(w)))),
+        "u2" => (2, |w| f32::from(u16::from_le_bytes(of(w)))),
+        "i2" => (2, |w| f32::from(i16::from_le_bytes(of(w)))),
+        "f2" => (2, |w| f16::from_le_bytes(of(w)).to_f32()),
+        "u4" => (4, |w| u32::from_le_bytes(of(w)) as f32),
+        "i4" => (4, |w| i32::from_le_bytes(of(w)) as f32),
+        "f4" => (4, |w| f32::from_le_bytes(of(w))),
+        "u8" => (8, |w| u64::from_le_bytes(w) as f32),
+        "i8" => (8, |w| i64::from_le_bytes(w) as f32),
+        "f8" => (8, |w| f64::from_le_bytes(w) as f32),
+        _ => return None,
+    })
+}
+
+/// The values of an array whose first index runs fastest, with the last one fastest.
+fn in_c_order(sizes: &[u64], values: &[f32]) -> Vec<f32> {
+    let mut place = vec![0; sizes.len()];
+    let next = |_| {
+        let at = (sizes.iter().zip(&place)).rfold(0, |at, (size, k)| at * size + k);
+        for (size, k) in sizes.iter().zip(&mut place).rev() {
+            *k += 1;
+            if *k < *size {
+                break;
+            }
+            *k = 0;
+        }
+        values[at as usize]
+    };
+    (0..values.len()).map(next).collect()
+}
+
 pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
+    // Integers of an image would be codes of a display, not radiance.
+    let is_float = |kind: &str| kind[1.min(kind.len())..].starts_with('f');
+    if let Some(kind) = kind_of(bytes).filter(|kind| !is_float(kind)) {
+        return Err(format!(
+            "its values are `{kind}`, not floats of 16, 32 or 64 bits"
+        ));
+    }
     let (sizes, values) = read_npy_array(bytes)?;
     let (size, channels) = match sizes.as_slice() {
         [height, width] => (checked_size(*width, *height)?, 1),
@@ -348,8 +411,28 @@ mod tests {
             let message = refused("a.npy", &npy(1, &header(kind, shape), &[0; 4]));
             assert!(message.contains(says), "{message}");
         }
-        let turned = header("<f4", "1, 1").replace("False", "True");
-        assert!(refused("a.npy", &npy(1, &turned, &[0; 4])).contains("Fortran"));
+        // The first index runs fastest: columns 1, 2 and 3, 9 of two rows.
+        let turned = header(">f8", "2, 2").replace("False", "True");
+        let turned = read("a.npy", &npy(1, &turned, &doubles)).unwrap();
+        assert_eq!(turned.pixels, [[1.0; 3], [3.0; 3], [2.0; 3], [9.0; 3]]);
+        let long = read("a.npy", &npy(1, &header("<f4", "1L, 1L"), &[0; 4])).unwrap();
+        assert_eq!((long.width, long.height), (1, 1));
+        let values = |kind: &str, data: &[u8]| {
+            let bytes = npy(1, &header(kind, "2"), data);
+            read_npy_array(&bytes).map(|(_, values)| values)
+        };
+        for (kind, data) in [
+            ("|b1", &[1, 0][..]),
+            ("|u1", &[1, 0]),
+            ("|i1", &[1, 0]),
+            (">u2", &[0, 1, 0, 0]),
+            ("<i4", &[1, 0, 0, 0, 0, 0, 0, 0]),
+            (">i8", &[0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0]),
+        ] {
+            assert_eq!(values(kind, data).as_deref(), Ok(&[1.0, 0.0][..]), "{kind}");
+        }
+        assert_eq!(values("<i2", &[0xff, 0xff, 1, 1]), Ok(vec![-1.0, 257.0]));
+        assert!(values("<c8", &[0; 16]).unwrap_err().contains("`<c8`"));
         assert!(refused("a.npy", b"\x93NUMPY\x01").contains("NumPy"));
     }
 

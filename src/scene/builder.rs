@@ -60,6 +60,9 @@ pub(super) struct SceneBuilder {
     pub report: LoadReport,
 }
 
+/// Rounding of coordinates that shows, as a fraction of the model's size.
+const NOTICEABLE: f32 = 1e-4;
+
 impl SceneBuilder {
     /// `keep_uvs` is true if texture coordinates will be used.
     pub(crate) fn new(keep_uvs: bool, capacity: usize) -> Self {
@@ -218,6 +221,22 @@ impl SceneBuilder {
         self.triangles.len()
     }
 
+    /// Says that f32 has rounded the coordinates of a text noticeably, if the model lies so far from
+    /// the origin, as those of surveyors do.
+    pub(crate) fn note_far(&mut self) {
+        let corners = || self.triangles.iter().flat_map(|t| t.vertices);
+        let all = |f: fn(Vec3, Vec3) -> Vec3| corners().reduce(f).unwrap_or_default();
+        let (low, high) = (all(Vec3::min), all(Vec3::max));
+        let largest = low.abs().max(high.abs()).max_element();
+        let size = (high - low).max_element();
+        let step = largest.next_up() - largest;
+        if step > NOTICEABLE * size && size > 0.0 {
+            self.report.warnings.push(format!(
+                "coordinates of up to {largest} are rounded to steps of {step}, and the model is {size} large: subtract an offset from all of them"
+            ));
+        }
+    }
+
     /// The assembly, if it covers every triangle.
     fn take_assembly(&mut self) -> Option<Assembly> {
         let assembly = std::mem::take(&mut self.assembly);
@@ -295,7 +314,13 @@ impl SceneBuilder {
                     "it lists no faces of three or more corners; {}",
                     self.report.warnings.join("; ")
                 ),
-                n => format!("all {n} have a NaN or infinite vertex"),
+                n => {
+                    let told = self.report.warnings.iter().map(|line| format!("; {line}"));
+                    format!(
+                        "all {n} have a NaN or infinite vertex{}",
+                        told.collect::<String>()
+                    )
+                }
             };
             let name = owned();
             return Err(SceneError::NoTriangles { name, reason });

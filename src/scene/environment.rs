@@ -41,7 +41,17 @@ impl EnvironmentMap {
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
         let malformed = |problem: String| SceneError::malformed(path, "", problem);
         super::error::open(path)?;
-        let map = raystone_image::read_linear(path).map_err(|e| malformed(e.to_string()))?;
+        let map = raystone_image::read_linear(path).map_err(|error| match error {
+            raystone_image::ImageError::Decode { reason, .. } => malformed(reason),
+            error => malformed(error.to_string()),
+        })?;
+        if let Some([rx, ry, gx, gy, bx, by, wx, wy]) = raystone_image::other_primaries(path) {
+            warnings.push(format!(
+                "{}: its colours have the primaries ({rx}, {ry}), ({gx}, {gy}), ({bx}, {by}) and the white ({wx}, {wy}); \
+                 they are taken for those of Rec. 709",
+                path.display()
+            ));
+        }
         let (width, height) = (map.width, map.height);
         let texels = map.pixels.into_iter().map(Vec3::from).collect();
         Self::new(

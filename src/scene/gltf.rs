@@ -7,13 +7,17 @@ use super::gltf_data::Data;
 use super::gltf_document::{self, Item};
 use super::gltf_files::Files;
 use super::gltf_notes::Notes;
+use super::gltf_pose::Pose;
 use super::gltf_roots::roots;
 use super::texture::decode_all;
 use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, Transform};
 use super::{gltf_container, gltf_instancing, gltf_lights, gltf_material};
 use glam::{Mat4, Quat, Vec3, Vec4};
 use raystone_core::geometry::{Camera, Triangle};
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 /// Triangle limit for a node's instances: all are stored, and a small file can list many.
 const MOST_TRIANGLES: usize = 100_000_000;
@@ -45,6 +49,10 @@ pub(super) fn load(
         let files = Files::new(path, options);
         let data = Data::new(&files, document, file_bytes, chunk);
         let mut notes = Notes::default();
+        if let Some(version) = later(document) {
+            let what = format!("the file is for readers of glTF {version}, and read as 2.0");
+            notes.tell(what, String::new);
+        }
         if let Some(fault) = fault {
             notes.tell("the text is not JSON, and was read as if it were", || fault);
         }
@@ -73,6 +81,13 @@ fn check_version(path: &Path, document: Item<'_>) -> Result<(), SceneError> {
     }
 }
 
+/// The version that the file asks for, if it is a later 2.x.
+fn later(document: Item<'_>) -> Option<String> {
+    let least = document.get("asset").get("minVersion").as_written()?;
+    let (major, minor) = least.split_once('.')?;
+    (major == "2" && minor != "0").then_some(least)
+}
+
 fn build(
     path: &Path,
     name: &str,
@@ -95,6 +110,8 @@ fn build(
         copies: Copies::new(document),
         white: None,
         notes,
+        worlds: OnceCell::new(),
+        skins: BTreeMap::new(),
     };
     geometry.read_scene()?;
     let Geometry {
@@ -142,6 +159,10 @@ pub(super) struct Geometry<'a> {
     /// Material of primitives that have colours but name no material, once there is one.
     pub white: Option<usize>,
     pub notes: Notes,
+    /// Transforms of all nodes, once a skin asks for them.
+    pub worlds: OnceCell<Vec<Mat4>>,
+    /// Transforms of the joints of skins that were asked for, if they can be read.
+    pub skins: BTreeMap<usize, Option<Rc<[Mat4]>>>,
 }
 
 struct Copies {
@@ -214,7 +235,9 @@ impl<'a> Geometry<'a> {
                     format!("with the nodes below several others, more than {MOST_NODES}");
                 return Err(self.error(&place(), problem));
             }
-            let world = parent * transform(node);
+            let own = transform(node);
+            self.notes.see_transform(node, own, place);
+            let world = parent * own;
             let shown = shown && gltf_instancing::is_visible(node);
             self.read_camera_of(node, world);
             if shown {
@@ -236,9 +259,16 @@ impl<'a> Geometry<'a> {
 
     /// Reads the node's camera; hidden nodes count too.
     fn read_camera_of(&mut self, node: Item<'a>, world: Mat4) {
-        if let (None, Some(index)) = (self.camera, node.index("camera")) {
-            let camera = self.document.at("cameras", index);
+        let Some(index) = node.index("camera") else {
+            return;
+        };
+        let camera = self.document.at("cameras", index);
+        if self.camera.is_none() {
             self.camera = self.read_camera(camera, index, world);
+        } else {
+            let what = "cameras behind the first are ignored";
+            let place = || camera.map_or(format!("camera {index}"), |c| c.place("camera", index));
+            self.notes.tell(what, place);
         }
     }
 
@@ -250,24 +280,28 @@ impl<'a> Geometry<'a> {
     ) -> Result<(), SceneError> {
         if let Some(index) = gltf_lights::of_node(node) {
             match gltf_lights::read(self.document, index, world) {
-                Some(light) => self.lights.push(light),
+                Some(light) => {
+                    self.lights.push(light);
+                    if gltf_lights::has_range(self.document, index) {
+                        self.notes.unread("`range` of lights", place);
+                    }
+                }
                 None => {
                     let what = "lights that are missing or of an unknown type are left out";
                     self.notes.tell(what, place);
                 }
             }
         }
-        let Some(index) = node.index("mesh") else {
+        let Some(named) = node.get("mesh").given() else {
             return Ok(());
         };
+        let index = named.as_index().unwrap_or(usize::MAX);
         let Some(mesh) = self.document.at("meshes", index) else {
             let what = "nodes show a mesh that is not there";
             self.notes.tell(what, place);
             return Ok(());
         };
-        if node.get("skin").is_given() {
-            self.notes.tell(AT_REST, || mesh.place("mesh", index));
-        }
+        let pose = self.pose(node, mesh, &|| mesh.place("mesh", index));
         let places = gltf_instancing::places(node, self.data);
         let (places, others) = places.map_err(|problem| self.error(&place(), problem))?;
         for name in others {
@@ -275,7 +309,7 @@ impl<'a> Geometry<'a> {
         }
         for instance in &places {
             let before = self.builder.len();
-            self.read_mesh(place, mesh, index, world * *instance)?;
+            self.read_mesh(place, (mesh, index), &pose, world * *instance)?;
             let each = self.builder.len() - before;
             if each.saturating_mul(places.len()) > MOST_TRIANGLES {
                 let problem = format!(
@@ -292,8 +326,8 @@ impl<'a> Geometry<'a> {
     fn read_mesh(
         &mut self,
         node: Place<'_>,
-        mesh: Item<'a>,
-        index: usize,
+        (mesh, index): (Item<'a>, usize),
+        pose: &Pose,
         world: Mat4,
     ) -> Result<(), SceneError> {
         let before = self.builder.len();
@@ -309,14 +343,15 @@ impl<'a> Geometry<'a> {
                     advice: "decode it first: `npx @gltf-transform/cli copy IN OUT`",
                 });
             }
-            self.read_primitive(primitive, &place, world, list.as_deref_mut())
+            self.read_primitive(primitive, &place, (pose, world), list.as_deref_mut())
                 .map_err(|problem| self.error(&place(), problem))?;
         }
-        if Transform::from_matrix(world).is_mirrored() {
+        if Transform::from_matrix(pose.sides(world)).is_mirrored() {
             self.builder.mirror_from(before);
         }
         if self.builder.len() > before {
-            self.place(node, index, own, world, before);
+            let shared = (!pose.is_own).then_some(own);
+            self.place(node, index, shared, world, before);
         }
         Ok(())
     }
@@ -330,19 +365,20 @@ impl<'a> Geometry<'a> {
     }
 
     /// Makes the node an instance of its mesh with triangles `own`, whose world-space copies begin
-    /// at `before`. If that fails, the scene has no instances.
+    /// at `before`, or an object of its own if there are none. If that fails, the scene has no instances.
     fn place(
         &mut self,
         node: Place<'_>,
         mesh: usize,
-        own: Vec<Triangle>,
+        own: Option<Vec<Triangle>>,
         world: Mat4,
         before: usize,
     ) {
         let Some(copies) = &mut self.copies else {
             return;
         };
-        let (object, triangles, to_world) = if copies.uses[mesh] > 1 {
+        let own = own.filter(|_| copies.uses[mesh] > 1);
+        let (object, triangles, to_world) = if let Some(own) = own {
             (
                 &mut copies.objects[mesh],
                 own,
@@ -408,7 +444,7 @@ pub(super) const AT_REST: &str =
 const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// A node's own transform. What is no number is NaN, and drops the triangles below.
-fn transform(node: Item<'_>) -> Mat4 {
+pub(super) fn transform(node: Item<'_>) -> Mat4 {
     let given = |value: Option<f32>| value.unwrap_or(f32::NAN);
     if let Some(matrix) = node.numbers::<16>("matrix") {
         return Mat4::from_cols_array(&matrix.map(given));

@@ -48,10 +48,11 @@ impl<'a> Item<'a> {
         members.map(|(name, value)| (name.as_str(), Item(value)))
     }
 
-    /// The elements of an array, or the members of an object.
+    /// The elements of an array, or the members of an object, without `extras`.
     pub(crate) fn parts(self) -> impl Iterator<Item = Item<'a>> {
         let list = self.0.as_array().into_iter().flatten().map(Item);
-        list.chain(self.members().map(|(_, part)| part))
+        let members = self.members().filter(|(name, _)| *name != "extras");
+        list.chain(members.map(|(_, part)| part))
     }
 
     /// A whole number from 0, also one written with a fraction of 0.
@@ -65,7 +66,7 @@ impl<'a> Item<'a> {
         self.get(key).as_index()
     }
 
-    fn as_number(self) -> Option<f32> {
+    pub(crate) fn as_number(self) -> Option<f32> {
         let number = self.0.as_f64().map(|x| x as f32);
         number.filter(|x| x.is_finite())
     }

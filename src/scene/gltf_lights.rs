@@ -12,6 +12,12 @@ pub(super) fn of_node(node: Item<'_>) -> Option<usize> {
     node.extension(EXTENSION).index("light")
 }
 
+/// True if a light says how far it reaches, which is not read: light has no end.
+pub(super) fn has_range(document: Item<'_>, index: usize) -> bool {
+    let light = document.extension(EXTENSION).at("lights", index);
+    light.is_some_and(|light| light.number("range").is_some())
+}
+
 /// Converts a light; `None` if there is none of this number, or of an unknown type. It shines along
 /// −z; scaling leaves its intensity alone, in candela (point, spot) or lux (directional), so
 /// radiance is in nits. The light list validates it. Its range is not physical and is ignored.

@@ -272,15 +272,18 @@ fn warnings(document: Item<'_>, materials: &[Material]) -> Vec<String> {
         let volume = original.extension(VOLUME);
         volume.number("attenuationDistance").is_some()
     });
+    let unknown =
+        of(&|_, original| !["OPAQUE", "MASK", "BLEND"].contains(&alpha_mode(original).as_str()));
     let occluded = of(&|_, original| texture(original, "occlusionTexture").is_some());
     let extended = EXTENSIONS.iter().filter_map(|name| {
         let names = of(&|_, original| original.extension(name).is_given());
         approximation_warning(&format!("extended by {name}"), "if it were not", names)
     });
     [
-        approximation_warning("transmissive", "diffuse", transmissive),
+        approximation_warning("transmissive", "if it were not", transmissive),
         approximation_warning("frosted glass", "clear glass", frosted),
         approximation_warning("rough metal", "diffuse", metal),
+        approximation_warning("of an unknown alpha mode", "opaque", unknown),
         approximation_warning("tinted by depth", "if it were not", tinted),
         approximation_warning(
             "darkened by an occlusion texture",

@@ -4,6 +4,7 @@ use super::gltf_document::Item;
 use super::gltf_instancing::OF_NODES;
 use super::gltf_meshopt::COMPRESSIONS;
 use super::tally::unread_warning;
+use glam::Mat4;
 use std::collections::BTreeMap;
 
 /// Extensions that are read, or that change nothing once the data is.
@@ -37,6 +38,9 @@ const LISTS: [(&str, &str); 13] = [
     ("textures", "texture"),
 ];
 
+/// `magFilter` of a sampler that does not interpolate.
+const NEAREST: usize = 9728;
+
 /// How often something was met, and the first place of it.
 struct Met {
     count: usize,
@@ -60,6 +64,25 @@ impl Notes {
         add(&mut self.unread, what.into(), place);
     }
 
+    /// Records what is odd about a node's own transform.
+    pub(crate) fn see_transform(&mut self, node: Item<'_>, own: Mat4, place: impl Fn() -> String) {
+        let parts = ["translation", "rotation", "scale"];
+        if node.get("matrix").is_given() && parts.iter().any(|key| node.get(key).is_given()) {
+            let what =
+                "nodes have a matrix besides a translation, rotation or scale: the matrix counts";
+            self.tell(what, &place);
+        }
+        let is_odd = |key: &&str| node.lacks_list(key);
+        if parts.iter().chain(&["matrix"]).any(is_odd) {
+            let what = "nodes have a transform that is no list of numbers, which is left out";
+            self.tell(what, &place);
+        }
+        if !own.is_finite() {
+            let what = "nodes have a transform with numbers missing: what they show is dropped";
+            self.tell(what, place);
+        }
+    }
+
     /// Records everything in the document that no reader sees: extensions, except those `named`
     /// elsewhere, and animations.
     pub(crate) fn see_document(&mut self, document: Item<'_>, named: &[&str]) {
@@ -68,6 +91,12 @@ impl Notes {
             known.any(|read| *read == name) || named.contains(&name)
         };
         self.see_lists(document);
+        for (index, sampler) in document.list("samplers").enumerate() {
+            if sampler.index("magFilter") == Some(NEAREST) {
+                let what = "samplers ask for the nearest texel: four are interpolated";
+                self.tell(what, || sampler.place("sampler", index));
+            }
+        }
         for (key, kind) in LISTS {
             for (index, item) in document.list(key).enumerate() {
                 each_extension(item, &mut |name| {
@@ -79,6 +108,11 @@ impl Notes {
             }
         }
         // Those that no element has are the document's own, or only declared.
+        let own = document.get("extensions").members().map(|(name, _)| name);
+        let own: Vec<&str> = own.filter(|name| !is_read(name)).collect();
+        for name in own {
+            self.unread(format!("the extension `{name}`"), String::new);
+        }
         for key in ["extensionsUsed", "extensionsRequired"] {
             for name in document.list(key).filter_map(Item::as_text) {
                 let what = format!("the extension `{name}`");
@@ -132,7 +166,8 @@ fn written((what, met): (String, Met)) -> String {
     }
 }
 
-/// Calls `found` with every extension of a part and of the parts within it.
+/// Calls `found` with every extension of a part and of the parts within it, but for what
+/// applications keep in `extras`.
 fn each_extension(part: Item<'_>, found: &mut impl FnMut(&str)) {
     for (name, _) in part.get("extensions").members() {
         found(name);

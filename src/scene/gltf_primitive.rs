@@ -1,7 +1,9 @@
 //! Primitives of glTF meshes: their triangles, with what their corners have.
 
-use super::gltf::{AT_REST, Geometry, Place};
+use super::gltf::{Geometry, Place};
+use super::gltf_data::Values;
 use super::gltf_document::Item;
+use super::gltf_pose::{Moved, Pose};
 use super::normals::of_normals;
 use glam::{DMat3, Mat4, Vec2, Vec3};
 use raystone_core::geometry::Triangle;
@@ -16,7 +18,7 @@ impl<'a> Geometry<'a> {
         &mut self,
         primitive: Item<'a>,
         place: Place<'_>,
-        world: Mat4,
+        (pose, world): (&Pose, Mat4),
         mut own: Option<&mut Vec<Triangle>>,
     ) -> Result<(), String> {
         let mode = primitive.index("mode").unwrap_or(TRIANGLES);
@@ -31,26 +33,43 @@ impl<'a> Geometry<'a> {
             self.notes.tell(what, place);
             return Ok(());
         };
-        if primitive.list("targets").len() > 0 {
-            self.notes.tell(AT_REST, place);
-        }
         let local = self.data.accessor(positions);
         let local = local.and_then(|values| values.vectors::<3>());
-        let local = local.map_err(|problem| format!("its positions {problem}"))?;
-        let positions: Vec<Vec3> = (local.iter())
-            .map(|p| world.transform_point3(Vec3::from(*p)))
+        let mut local = local.map_err(|problem| format!("its positions {problem}"))?;
+        if local.as_flattened().iter().any(|x| !x.is_finite()) {
+            let what = "vertices are not finite: triangles with such a corner are dropped";
+            self.notes.tell(what, place);
+        }
+        self.morph(primitive, ("POSITION", &mut local), pose, place);
+        let moved = self.moved(attributes, (pose, world), local.len(), place);
+        let positions: Vec<Vec3> = (local.iter().enumerate())
+            .map(|(k, p)| moved.of(k).transform_point3(Vec3::from(*p)))
             .collect();
         let indices = self.read_indices(primitive, positions.len())?;
         let colors = self.read_colors(attributes, positions.len(), place);
         let material = self.material(primitive, !colors.is_empty(), place);
         let set = self.sets.get(material).copied().flatten();
-        self.see_attributes(attributes, set, place);
+        self.see_attributes(attributes, set, matches!(moved, Moved::Each(_)), place);
         let uvs = self.read_uvs(attributes, set, place);
-        let normals = self.read_normals(attributes, world, place);
+        let normals = self.read_normals(primitive, pose, &moved, place);
+        for (name, count) in [
+            ("colour", colors.len()),
+            ("normal", normals.len()),
+            ("texture coordinate", uvs.len()),
+        ] {
+            if (1..positions.len()).contains(&count) {
+                let what = format!("vertices beyond the last {name} are drawn without");
+                self.notes.tell(what, place);
+            }
+        }
         let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
         let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
         let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);
         for run in indices.iter() {
+            if mode == TRIANGLES && run.len() % 3 != 0 {
+                let what = "primitives end within a triangle, which is left out";
+                self.notes.tell(what, place);
+            }
             for_each_face(mode, run, |corners| {
                 let vertices = corners.map(|i| positions[i as usize]);
                 let normals = (!normals.is_empty()).then(|| corners.map(normal));
@@ -109,10 +128,18 @@ impl<'a> Geometry<'a> {
 
     /// Records attributes that are not read. Skins and morph targets are handled elsewhere, and
     /// unused texture coordinates lose nothing.
-    fn see_attributes(&mut self, attributes: Item<'a>, set: Option<u32>, place: Place<'_>) {
+    fn see_attributes(
+        &mut self,
+        attributes: Item<'a>,
+        set: Option<u32>,
+        is_skinned: bool,
+        place: Place<'_>,
+    ) {
         let used = set.map(|set| format!("TEXCOORD_{set}"));
+        let of_skin = |name: &str| name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
         for (name, _) in attributes.members() {
             let is_read = ["POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0"].contains(&name);
+            let is_read = is_read || is_skinned && of_skin(name);
             if !is_read && used.as_deref() != Some(name) {
                 self.notes.unread(format!("`{name}`"), place);
             }
@@ -125,7 +152,7 @@ impl<'a> Geometry<'a> {
         attributes: Item<'a>,
         name: &str,
         place: Place<'_>,
-        read: impl FnOnce(super::gltf_data::Values) -> Result<Vec<T>, String>,
+        read: impl FnOnce(Values) -> Result<Vec<T>, String>,
     ) -> Vec<T> {
         let Some(accessor) = attributes.get(name).given() else {
             return Vec::new();
@@ -184,12 +211,35 @@ impl<'a> Geometry<'a> {
     }
 
     /// World-space normals; empty if none can be read.
-    fn read_normals(&mut self, attributes: Item<'a>, world: Mat4, place: Place<'_>) -> Vec<Vec3> {
+    fn read_normals(
+        &mut self,
+        primitive: Item<'a>,
+        pose: &Pose,
+        moved: &Moved,
+        place: Place<'_>,
+    ) -> Vec<Vec3> {
+        let attributes = primitive.get("attributes");
+        let read = |values: Values| values.vectors::<3>();
+        let mut normals = self.read(attributes, "NORMAL", place, read);
+        self.morph(primitive, ("NORMAL", &mut normals), pose, place);
         // In f64, so that a small scale does not make it singular.
-        let to_world = of_normals(DMat3::from_mat4(world.as_dmat4()));
-        let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
-        let normals = self.read(attributes, "NORMAL", place, |values| values.vectors::<3>());
-        normals.into_iter().map(|n| moved(n).as_vec3()).collect()
+        let to_world = |world: Mat4| of_normals(DMat3::from_mat4(world.as_dmat4()));
+        let turned = |by: DMat3, n: [f32; 3]| {
+            let normal = by * Vec3::from(n).as_dvec3();
+            normal.normalize_or_zero().as_vec3()
+        };
+        match moved {
+            Moved::As(world) => {
+                let by = to_world(*world);
+                normals.into_iter().map(|n| turned(by, n)).collect()
+            }
+            Moved::Each(worlds) => {
+                let pairs = normals.into_iter().zip(worlds);
+                pairs
+                    .map(|(n, world)| turned(to_world(*world), n))
+                    .collect()
+            }
+        }
     }
 }
 

@@ -28,6 +28,7 @@ mod gltf_meshopt;
 #[cfg(test)]
 mod gltf_meshopt_tests;
 mod gltf_notes;
+mod gltf_pose;
 mod gltf_primitive;
 mod gltf_roots;
 mod gltf_texture;
@@ -329,6 +330,10 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
         .read_to_end(&mut start);
     read.map_err(SceneError::unreadable(path))?;
     let text = raystone_core::text::plain_text_or_latin1(start.clone());
+    if text.starts_with("version https://git-lfs") {
+        let problem = "it is a pointer of Git LFS to the model; `git lfs pull` fetches that";
+        return Err(SceneError::malformed(path, "", problem));
+    }
     let json = || text.trim_ascii_start().starts_with('{');
     let xml = || text.trim_ascii_start().starts_with('<');
     let (begins_well, expected) = match extension(path).as_str() {

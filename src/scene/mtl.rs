@@ -8,7 +8,9 @@ use super::obj_statements::without_comment;
 use super::tally::{Tally, Unread};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{AlphaChannel, AlphaMask, DIELECTRIC, LoadOptions, MIRROR, Material, TextureUse};
+use super::{
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, TextureUse,
+};
 use glam::Vec3;
 use raystone_core::files::files;
 use std::cell::RefCell;
@@ -33,17 +35,25 @@ pub(super) struct Contents {
     unused: BTreeMap<&'static str, Vec<String>>,
     /// Index in `textures` by path.
     texture_ids: HashMap<PathBuf, u32>,
+    /// Folder of the model.
+    model_folder: PathBuf,
     /// Texture files found elsewhere than the current library says.
     moved: Tally,
+    /// Wholly transparent materials of the current library.
+    unseen: Tally,
 }
 
 impl Library {
     /// Looks for libraries next to the OBJ file `obj`.
     pub(crate) fn new(obj: &Path, options: &LoadOptions) -> Self {
+        let folder = obj.parent().unwrap_or(Path::new("")).to_owned();
         Self {
-            folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
             options: *options,
-            contents: RefCell::default(),
+            contents: RefCell::new(Contents {
+                model_folder: folder.clone(),
+                ..Contents::default()
+            }),
+            folder,
             loaded: RefCell::default(),
         }
     }
@@ -65,7 +75,7 @@ impl Library {
 
     fn load_one(&self, name: &str) -> HashMap<String, u32> {
         let named = self.folder.join(plain(name));
-        let place = place(&self.folder, &plain(name), &self.options);
+        let place = place(&[&self.folder], &plain(name), &self.options);
         let mut contents = self.contents.borrow_mut();
         let path = place.as_ref().unwrap_or(&named).clone();
         if !self.loaded.borrow_mut().insert(path.clone()) {
@@ -138,7 +148,15 @@ impl Contents {
                     "textures are not where they should be",
                 ],
                 "line",
-                "the file of this name, in any case, beside the library is read",
+                "the file of this name, in any case, beside the library or the model is read",
+            ),
+            std::mem::take(&mut self.unseen).note(
+                [
+                    "material is wholly transparent, by `d` or `Tr`",
+                    "materials are wholly transparent, by `d` or `Tr`",
+                ],
+                "line",
+                "nothing is drawn there",
             ),
         ];
         let named = notes.iter().flatten();
@@ -156,6 +174,7 @@ impl Contents {
     ) {
         let Definition {
             name,
+            line,
             diffuse,
             emission,
             source,
@@ -165,6 +184,16 @@ impl Contents {
         let folder = file.parent().unwrap_or(Path::new(""));
         // The standard shows textures unscaled by default.
         let unstated = map_kd.as_ref().map_or(DEFAULT_ALBEDO, |_| 1.0);
+        // No light is better than light everywhere.
+        let unstated_light = map_ke.as_ref().map_or(0.0, |_| 1.0) * f32::from(options.textures);
+        for (map, color, what) in [
+            (&map_kd, diffuse, "`map_Kd` where `Kd` is 0"),
+            (&map_ke, emission, "`map_Ke` where `Ke` is 0"),
+        ] {
+            if let (Some(map), Some([0.0, 0.0, 0.0])) = (map, color) {
+                unread.see(what, map.line);
+            }
+        }
         let description = Description {
             format: Format::Mtl,
             base_color: Vec3::from(diffuse.unwrap_or([unstated; 3])),
@@ -186,12 +215,13 @@ impl Contents {
             None if found.kind != &DIELECTRIC => Some(AlphaMask::even(factor)),
             None => None,
         };
+        self.unseen.see_if(mask.is_some() && factor <= 0.0, line);
         let mut texture = |map: Option<Map>, is_used: bool| {
             let map = map.filter(|_| is_used && options.textures)?;
             Some(self.texture(folder, &map, options, unread).place)
         };
         let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
-        let emission = emitted(emission.unwrap_or_default());
+        let emission = emitted(emission.unwrap_or([unstated_light; 3]));
         let is_lamp = emission != Vec3::ZERO;
         let textured = Material {
             base_color_texture: texture(map_kd, is_rough),
@@ -201,7 +231,11 @@ impl Contents {
             mask,
             ..found
         };
-        for what in definition.unused {
+        let shines = source.specular.is_some_and(|ks| ks != [0.0; 3]);
+        // The models 0 and 1 have no highlights.
+        let is_shown = textured.kind != &DIFFUSE || matches!(source.illum, Some(0 | 1));
+        let specular = (shines && !is_shown).then_some("a specular colour (`Ks`)");
+        for what in definition.unused.into_iter().chain(specular) {
             let names = self.unused.entry(what).or_default();
             names.push(textured.name.clone());
         }
@@ -234,7 +268,9 @@ impl Contents {
         };
         let next = self.textures.len() as u32;
         let named = folder.join(&file);
-        let (path, encoded) = match place(folder, &file, options) {
+        // Some exporters write paths from the model's folder.
+        let folders = [folder, &self.model_folder];
+        let (path, encoded) = match place(&folders, &file, options) {
             Ok(path) => (path.clone(), Encoded::File(path)),
             Err(error) => (named.clone(), Encoded::Missing(error.to_string())),
         };
@@ -262,26 +298,21 @@ fn plain(name: &str) -> String {
     name.trim().trim_matches('"').replace('\\', "/")
 }
 
-/// The path of a file that a model in `folder` names.
+/// The path of a file that is named relative to the first of `folders`, or to another; or else the
+/// path of a file of its name in one of them.
 ///
 /// # Errors
 /// The path is absolute and may not be read: it belongs to the machine that wrote the file. Relative
 /// ones may leave the folder: many models keep textures in `../textures`.
-fn place(folder: &Path, file: &str, options: &LoadOptions) -> std::io::Result<PathBuf> {
-    let is_drive = file.as_bytes().get(1) == Some(&b':');
+fn place(folders: &[&Path], file: &str, options: &LoadOptions) -> std::io::Result<PathBuf> {
+    let in_any = |file: &str| folders.iter().find_map(|folder| found(folder, file));
     let is_absolute = Path::new(file).has_root();
     let is_allowed = !is_absolute || options.allow_outside;
-    let there = is_allowed.then(|| found(folder, file)).flatten();
-    let beside = || {
-        let name = file
-            .rsplit('/')
-            .next()
-            .filter(|_| is_absolute || is_drive)?;
-        found(folder, name)
-    };
+    let there = is_allowed.then(|| in_any(file)).flatten();
+    let beside = || in_any(file.rsplit('/').next()?);
     match there.or_else(beside) {
         Some(path) => Ok(path),
-        None if is_allowed => Ok(folder.join(file)),
+        None if is_allowed => Ok(folders[0].join(file)),
         None => Err(std::io::Error::other(
             "an absolute path, which is read with --allow-outside only",
         )),

@@ -133,15 +133,16 @@ fn set<T>(place: &mut Option<T>, value: Option<T>) -> bool {
     is_some
 }
 
-/// The numbers at the beginning of a statement, behind `-halo`, which `d` may have.
+/// The finite numbers at the beginning of a statement, behind `-halo`, which `d` may have.
 fn numbers(text: &str) -> Vec<f32> {
     let words = text.split_whitespace().skip_while(|word| *word == "-halo");
-    words.map_while(number).take(3).collect()
+    let finite = |word| number(word).filter(|x: &f32| x.is_finite());
+    words.map_while(finite).take(3).collect()
 }
 
-/// An illumination model, a small integer.
+/// An illumination model.
 fn model(value: f32) -> Option<u8> {
-    ((0.0..=255.0).contains(&value) && value.fract() == 0.0).then_some(value as u8)
+    ((0.0..=10.0).contains(&value) && value.fract() == 0.0).then_some(value as u8)
 }
 
 #[cfg(test)]

@@ -42,6 +42,7 @@ pub(super) fn load(
         builder.report.warnings.extend(warnings);
         let mut model = Model::new(read, builder, materials.len() as u32);
         model.push_faces().map_err(broken)?;
+        model.builder.note_far();
         model.tell();
         materials.append(&mut model.without);
         let mut builder = model.builder;

@@ -97,6 +97,10 @@ impl Statements {
             // Names may contain `#`; their readers use `rest`.
             let mut words = without_comment(statement).split_whitespace();
             let Some(keyword) = words.next() else {
+                if statement.starts_with("#MRGB") {
+                    let what = "vertex colours of ZBrush (`#MRGB`)";
+                    reader.unread.see(what, line);
+                }
                 continue;
             };
             let rest = statement[keyword.len()..].trim();
@@ -168,10 +172,7 @@ impl Statements {
         let ([x, y, z, w, g, b, alpha, _], count) = numbers(words.clone());
         if count < 3 {
             let odd = words.clone().nth(count);
-            return Err(odd.map_or_else(
-                || format!("`v` with {count} numbers"),
-                |word| format!("`{word}` is not a number"),
-            ));
+            return Err(odd.map_or_else(|| format!("`v` with {count} numbers"), no_number));
         }
         let mut position = Vec3::new(x, y, z);
         match count {
@@ -320,7 +321,8 @@ fn numbers<const N: usize>(words: SplitWhitespace<'_>) -> ([f32; N], usize) {
     (found, count)
 }
 
-/// Parses numbers of C, C++ and Fortran: NaN as `-1.#IND` or `nan(ind)`, exponents as `1.0D+00`.
+/// Parses numbers of C, C++ and Fortran: NaN as `-1.#IND` or `nan(ind)`, exponents as `1.0D+00`,
+/// floats as `1.0f`.
 pub(super) fn number<T: FromStr + From<f32>>(word: &str) -> Option<T> {
     word.parse().ok().or_else(|| {
         let word = word.to_ascii_lowercase();
@@ -328,9 +330,21 @@ pub(super) fn number<T: FromStr + From<f32>>(word: &str) -> Option<T> {
         if begins_as_none || word.contains(".#") {
             Some(f32::NAN.into())
         } else {
+            // `1.0f`, as source text of C has it.
+            let word = word.strip_suffix('f').unwrap_or(&word);
             word.replace('d', "e").parse().ok()
         }
     })
+}
+
+/// Says what is wrong with a word in place of a number.
+pub(super) fn no_number(word: &str) -> String {
+    let with_point = number::<f64>(&word.replace(',', "."));
+    let hint = match with_point {
+        Some(_) if word.contains(',') => "; decimals are written with a point",
+        _ => "",
+    };
+    format!("`{word}` is not a number{hint}")
 }
 
 /// Parses a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, given the number of each so far.
@@ -363,6 +377,9 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
 }
 
 fn beyond(vertex: i64, count: usize, place: &str) -> String {
+    if vertex == 0 {
+        return "the face refers to vertex 0, but the first is 1".to_owned();
+    }
     format!("the face refers to vertex {vertex}, but there are {count}{place}")
 }
 

@@ -27,6 +27,7 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     let mut body = Body::new(source, header.encoding, header.lines);
     let mut model = Model::default();
     model.read(&header, &mut body, bytes).map_err(broken)?;
+    model.builder.note_far();
     model.tell(&header);
     let is_colored = !model.colors.is_empty();
     let builder = std::mem::take(&mut model.builder);
@@ -86,6 +87,10 @@ impl Model {
         let vertices = first("vertex");
         let read = [vertices, first("face"), first(STRIPS)];
         let last = read.into_iter().flatten().max();
+        if last.is_some() && elements.iter().all(|e| e.name != "vertex") {
+            let problem = "there is no element `vertex`".to_owned();
+            return Err(("header".to_owned(), problem));
+        }
         for (k, element) in elements.iter().enumerate() {
             let is_read = read.contains(&Some(k));
             if is_read {
@@ -96,7 +101,9 @@ impl Model {
             } else if is_read {
                 self.read_faces(element, body, vertices > Some(k))?;
             } else if element.count > 0 {
-                self.unread.push(format!("the element `{}`", element.name));
+                let Element { name, line, .. } = element;
+                self.unread
+                    .push(format!("the element `{name}` (line {line})"));
                 if Some(k) < last {
                     each(element, body, |_, body| {
                         element.properties.iter().try_for_each(|p| body.skip(p))
@@ -268,7 +275,10 @@ impl Model {
     fn name_unread(&mut self, element: &Element, is_read: impl Fn(usize) -> bool) {
         let others = element.properties.iter().enumerate();
         let others = others.filter(|(k, _)| !is_read(*k));
-        let named = others.map(|(_, p)| format!("`{}` of `{}`", p.name, element.name));
+        let named = others.map(|(_, p)| {
+            let Property { name, line, .. } = p;
+            format!("`{name}` of `{}` (line {line})", element.name)
+        });
         self.unread.extend(named);
     }
 
@@ -376,7 +386,9 @@ fn white(kind: Kind) -> Option<f32> {
 
 /// Indices of the first properties of these names that are no lists; `None` unless all are there.
 fn find(element: &Element, names: [&str; 3], is_fit: impl Fn(Kind) -> bool) -> Option<[usize; 3]> {
-    let is = |p: &Property, name| p.name == name && p.length.is_none() && is_fit(p.kind);
+    let is = |p: &Property, name| {
+        p.name.eq_ignore_ascii_case(name) && p.length.is_none() && is_fit(p.kind)
+    };
     let at = |name| element.properties.iter().position(|p| is(p, name));
     match names.map(at) {
         [Some(a), Some(b), Some(c)] => Some([a, b, c]),

@@ -1,6 +1,6 @@
 //! Values of PLY files, read one after the other from text or bytes.
 
-use super::obj_statements::number;
+use super::obj_statements::{no_number, number};
 use super::ply_header::{Encoding, Kind, Property};
 use std::io::{BufRead, ErrorKind};
 
@@ -133,7 +133,7 @@ impl<S: BufRead> Body<S> {
             Kind::Float => number::<f32>(word).map(f64::from),
             _ => number(word),
         };
-        found.ok_or_else(|| format!("`{}` is not a number", self.word.escape_ascii()))
+        found.ok_or_else(|| no_number(&self.word.escape_ascii().to_string()))
     }
 
     /// Reads a word. Line ends are blanks: writers break lines within elements, too.

@@ -64,12 +64,16 @@ pub(super) struct Property {
     pub kind: Kind,
     /// Type of the length, if it is a list.
     pub length: Option<Kind>,
+    /// Line in the file, from 1.
+    pub line: usize,
 }
 
 /// A kind of element.
 pub(super) struct Element {
     pub name: String,
     pub count: u64,
+    /// Line in the file, from 1.
+    pub line: usize,
     pub properties: Vec<Property>,
 }
 
@@ -165,6 +169,7 @@ impl Header {
                 self.elements.push(Element {
                     name: name.to_owned(),
                     count: count.parse().map_err(|_| problem())?,
+                    line,
                     properties: Vec::new(),
                 });
             }
@@ -180,6 +185,7 @@ impl Header {
                     name: name.join(" "),
                     kind: Kind::named(kind),
                     length: length.map(Kind::named),
+                    line,
                 });
             }
             ["element", ..] => {

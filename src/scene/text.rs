@@ -2,7 +2,7 @@
 
 use raystone_core::text::plain_text_or_latin1;
 
-/// The plain text of a file. A line that ends in `\`, unless in a comment, continues on the next; empty lines replace the joined ones, to preserve line numbers.
+/// The plain text of a file. A line that ends in `\`, also with blanks behind it, but not in a comment, continues on the next; empty lines replace the joined ones, to preserve line numbers.
 pub(super) fn normalised(bytes: Vec<u8>) -> String {
     let mut bytes = plain_text_or_latin1(bytes).into_bytes();
     // Exporters pad files with zeros at the end.
@@ -16,20 +16,21 @@ pub(super) fn normalised(bytes: Vec<u8>) -> String {
     let (mut from, mut to, mut line, mut joined) = (0, 0, 0, 0);
     let mut is_comment = false;
     while from < bytes.len() {
-        match bytes[from] {
-            b'\\' if bytes.get(from + 1) == Some(&b'\n') && !is_comment => {
+        let continued = continuation(&bytes[from..]).filter(|_| !is_comment);
+        match (bytes[from], continued) {
+            (_, Some(length)) => {
                 bytes[to] = b' ';
                 to += 1;
                 joined += 1;
-                from += 2;
+                from += length;
             }
-            b'\n' => {
+            (b'\n', None) => {
                 let end = to + 1 + joined;
                 bytes[to..end].fill(b'\n');
                 (to, line, joined, is_comment) = (end, end, 0, false);
                 from += 1;
             }
-            byte => {
+            (byte, None) => {
                 // Names may contain `#`, but do not begin with it.
                 let before = bytes[line..to].last();
                 is_comment |= byte == b'#' && before.is_none_or(u8::is_ascii_whitespace);
@@ -42,6 +43,19 @@ pub(super) fn normalised(bytes: Vec<u8>) -> String {
     bytes.truncate(to);
     // Only whole characters were copied, and only blanks and line ends added.
     String::from_utf8(bytes).unwrap_or_default()
+}
+
+/// Length of a `\` that ends a line, with blanks behind it and the line end. Before the end of the
+/// text there is none to continue on.
+fn continuation(bytes: &[u8]) -> Option<usize> {
+    let rest = bytes.strip_prefix(b"\\")?;
+    let is_blank = |byte: &&u8| matches!(byte, b' ' | b'\t');
+    let blanks = rest.iter().take_while(is_blank).count();
+    match rest.get(blanks) {
+        Some(b'\n') => Some(blanks + 2),
+        None => Some(blanks + 1),
+        Some(_) => None,
+    }
 }
 
 #[cfg(test)]
@@ -59,7 +73,10 @@ mod tests {
             (b" # c:\\models\\\nv 1\n", " # c:\\models\\\nv 1\n"),
             (b"v 1 2 3 # c:\\a\\\nv 1\n", "v 1 2 3 # c:\\a\\\nv 1\n"),
             (b"usemtl a#1 \\\n\nf 1\n", "usemtl a#1  \n\nf 1\n"),
-            (b"f 1 2 \\", "f 1 2 \\"),
+            (b"f 1 2 \\", "f 1 2  "),
+            (b"f 1 2 \\ \t\n3\nf 4\n", "f 1 2  3\n\nf 4\n"),
+            (b"f 1 2 \\  ", "f 1 2  "),
+            (b"map_Kd a\\ b.png\n", "map_Kd a\\ b.png\n"),
             (b"f 1 2 \\\n", "f 1 2  "),
             (b"\\\n\\\n\\\n", "   "),
             (b"usemtl M\xfcll\n", "usemtl M\u{fc}ll\n"),

@@ -2,7 +2,8 @@
 
 use super::reduce::{Texels, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
-use image::ImageReader;
+use image::error::UnsupportedErrorKind;
+use image::{ImageError, ImageReader};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -60,7 +61,13 @@ pub(super) fn decode_all(
     let mut new_index = Vec::new();
     for (source, result) in sources.iter().zip(decoded) {
         new_index.push(match result {
-            Ok((texture, reduced_from)) => {
+            Ok((texture, reduced_from, is_cut)) => {
+                if is_cut {
+                    report.warnings.push(format!(
+                        "texture {}: the file ends before the image does; the rest of it is made up",
+                        source.name
+                    ));
+                }
                 if let Some((width, height)) = reduced_from {
                     report.warnings.push(format!(
                         "texture {}: reduced from {width}x{height} to {}x{}",
@@ -135,11 +142,21 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
     limit
 }
 
+fn said(error: ImageError) -> String {
+    let formats = match &error {
+        ImageError::Unsupported(what) if matches!(what.kind(), UnsupportedErrorKind::Format(_)) => {
+            " (PNG, JPEG and WebP are read)"
+        }
+        _ => "",
+    };
+    format!("{error}{formats}")
+}
+
 /// The size of an image, refused before allocation if its bytes cannot hold so many texels.
 fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|e| e.to_string())?;
-    let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
+    let (width, height) = reader.into_dimensions().map_err(said)?;
     let needed = 4 * u64::from(width) * u64::from(height);
     let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);
     if needed > most {
@@ -163,14 +180,22 @@ fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String
     Ok((bytes, size))
 }
 
-/// The texture, and its original size if it was reduced.
+/// True for a JPEG without its end, from which decoders make a whole image all the same. Both marks
+/// cannot occur within the data of an image.
+fn ends_early(bytes: &[u8]) -> bool {
+    let last = |mark: [u8; 2]| bytes.array_windows().rposition(|pair| *pair == mark);
+    let [start, end] = [[0xff, 0xda], [0xff, 0xd9]].map(last);
+    bytes.starts_with(&[0xff, 0xd8]) && end < start
+}
+
+/// The texture, its original size if it was reduced, and whether the file ends within the image.
 fn decode(
     source: &ImageSource<'_>,
     bytes: &[u8],
     max_size: u32,
     kind: Texels,
-) -> Result<(Texture, Option<Size>), String> {
-    let image = image::load_from_memory(bytes).map_err(|e| e.to_string())?;
+) -> Result<(Texture, Option<Size>, bool), String> {
+    let image = image::load_from_memory(bytes).map_err(said)?;
     let image = image.into_rgba8();
     let size = image.dimensions();
     let texels = image.as_raw().as_chunks::<4>().0;
@@ -191,12 +216,28 @@ fn decode(
             texels.to_vec()
         },
     };
-    Ok((texture, larger.then_some(size)))
+    Ok((texture, larger.then_some(size), ends_early(bytes)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_jpeg_that_is_cut_short_is_told_from_a_whole_one() {
+        let mut whole = Cursor::new(Vec::new());
+        let image =
+            image::RgbImage::from_fn(32, 32, |x, y| image::Rgb([x as u8 * 7, y as u8 * 5, 9]));
+        image
+            .write_to(&mut whole, image::ImageFormat::Jpeg)
+            .expect("an image");
+        let whole = whole.into_inner();
+        assert!(!ends_early(&whole));
+        assert!(!ends_early(&[&whole[..], b"\0\0 more"].concat()));
+        assert!(ends_early(&whole[..whole.len() - 9]));
+        assert!(ends_early(&whole[..whole.len() - 1]));
+        assert!(!ends_early(b"\x89PNG"));
+    }
 
     #[test]
     fn textures_are_halved_until_they_fit_and_no_further() {

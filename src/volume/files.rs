@@ -17,7 +17,8 @@ pub struct Grid {
     pub corners: Option<[DVec3; 2]>,
 }
 
-/// Reads a grid by the ending of the file's name: `.npy` with an array `[z, y, x]` of floats, or Mitsuba's `.vol` with
+/// Reads a grid by the ending of the file's name: `.npy` with an array `[z, y, x]` or `[z, y, x, 1]` of
+/// numbers, or Mitsuba's `.vol` with
 /// one channel.
 ///
 /// # Errors
@@ -39,7 +40,7 @@ pub fn read_grid(path: &Path) -> Result<Grid, MediaError> {
 
 fn from_npy(bytes: &[u8]) -> Result<Grid, String> {
     let (shape, values) = read_npy_array(bytes)?;
-    let &[z, y, x] = shape.as_slice() else {
+    let (&[z, y, x] | &[z, y, x, 1]) = shape.as_slice() else {
         return Err(format!("its shape is {shape:?}, not [z, y, x]"));
     };
     let axis = |n: u64| u32::try_from(n).map_err(|_| format!("{n} voxels along an axis"));
@@ -134,6 +135,8 @@ mod tests {
             (read_npy.resolution, &*read_npy.values),
             ([3, 2, 1], &values[..])
         );
+        let with_channel = read("a.npy", &npy("1, 2, 3, 1", &values)).unwrap();
+        assert_eq!(with_channel, read_npy);
         let read_vol = read("a.VOL", &vol(1, 1, bytemuck::cast_slice(&values))).unwrap();
         assert_eq!(
             (read_vol.resolution, &*read_vol.values),

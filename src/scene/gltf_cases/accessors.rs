@@ -242,12 +242,43 @@ fn faces_are_listed_in_any_way() {
     )
     .load()
     .whole(2);
-    listed("a face too few", 5121, vec![0, 1, 2, 0, 2], 5, 4)
+    listed("a face cut short", 5121, vec![0, 1, 2, 0, 2], 5, 4)
         .load()
-        .whole(1);
+        .but(
+            1,
+            &["end within a triangle", "mesh 0 `square`, primitive 0"],
+        );
     listed("a vertex too many", 5121, vec![0, 1, 4], 3, 4)
         .load()
         .fails(&["vertex 4", "there are 4"]);
+}
+
+#[test]
+fn vertices_that_lack_something_are_named() {
+    for (name, components, word) in [("NORMAL", 3, "normal"), ("COLOR_0", 3, "colour")] {
+        case("two of four")
+            .accessor(floats(vec![1.0; 2 * components]), 5126, "VEC3", 2)
+            .set(
+                &format!("/meshes/0/primitives/0/attributes/{name}"),
+                json!(2),
+            )
+            .load()
+            .but(
+                2,
+                &[
+                    &format!("vertices beyond the last {word}"),
+                    "mesh 0 `square`, primitive 0",
+                ],
+            );
+    }
+    let mut broken = case("a vertex that is not finite");
+    broken.bytes[36..40].copy_from_slice(&f32::NAN.to_le_bytes());
+    let loaded = broken.load();
+    assert_eq!(loaded.scene().report.dropped_non_finite, 1);
+    loaded.but(
+        1,
+        &["vertices are not finite", "mesh 0 `square`, primitive 0"],
+    );
 }
 
 #[test]
@@ -259,11 +290,11 @@ fn what_is_no_face_is_left_out() {
         .set("/nodes/0/skin", json!(-1))
         .set("/nodes/0/camera", json!(-1))
         .load()
-        .whole(1);
+        .but(1, &["end within a triangle"]);
     case("no indices")
         .set("/meshes/0/primitives/0/indices", Value::Null)
         .load()
-        .whole(1);
+        .but(1, &["end within a triangle"]);
     case("a strip without indices")
         .set("/meshes/0/primitives/0/indices", Value::Null)
         .set("/meshes/0/primitives/0/mode", json!(6))
@@ -322,7 +353,7 @@ fn other_attributes_are_read_in_every_type_or_named() {
     with("colours of some", "COLOR_0")
         .accessor(reds[..24].to_vec(), 5126, "VEC3", 2)
         .load()
-        .whole(2);
+        .but(2, &["vertices beyond the last colour"]);
     with("colours outside", "COLOR_0")
         .accessor(reds[..24].to_vec(), 5126, "VEC3", 4)
         .load()

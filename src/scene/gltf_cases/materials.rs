@@ -242,7 +242,14 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
         .material(json!({"name": "pane", "extensions":
             {"KHR_materials_transmission": {"transmissionFactor": 0.4}}}))
         .load()
-        .but(2, &["1 material is transmissive", "pane"]);
+        .but(
+            2,
+            &[
+                "1 material is transmissive",
+                "drawn as if it were not",
+                "pane",
+            ],
+        );
     case("blended")
         .material(json!({"name": "veil", "alphaMode": "BLEND"}))
         .load()
@@ -269,7 +276,7 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
             ],
         );
     case("a strange mode")
-        .material(json!({"alphaMode": "GLOW"}))
+        .material(json!({"name": "lava", "alphaMode": "GLOW"}))
         .load()
-        .whole(2);
+        .but(2, &["unknown alpha mode", "drawn as opaque: lava"]);
 }

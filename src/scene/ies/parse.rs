@@ -230,16 +230,11 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
             return Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3")));
         }
     };
-    for what in [
-        "the unit of length",
-        "the width",
-        "the length",
-        "the height",
-    ] {
-        numbers.number(what)?;
-    }
+    let unit = numbers.number("the unit of length")?;
+    let opening = opening(unit, numbers)?;
     let ballast = numbers.number("the ballast factor")?;
     let third = numbers.number("the number behind the ballast factor")?;
+    let third_line = numbers.line();
     let ballast_lamp = if year < NO_LAMP_FACTOR { third } else { 1.0 };
     let factor = multiplier * ballast * ballast_lamp;
     if factor <= 0.0 {
@@ -266,10 +261,10 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
             candela.push(intensity);
         }
     }
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = opening.into_iter().collect();
     if (NO_LAMP_FACTOR..GENERATION_TYPE).contains(&year) && third != 1.0 {
         warnings.push(format!(
-            "{file}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
+            "{file}, line {third_line}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
         ));
     }
     if let Some((line, word)) = numbers.words.get(numbers.next) {
@@ -287,9 +282,29 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
         input_watts,
         warnings,
     };
-    out.unfold()
+    out.unfold(last_angle)
         .map_err(|problem| numbers.error(last_angle, problem))?;
     Ok(out)
+}
+
+/// Reads the luminous opening, and says that it is not drawn if it has an extent.
+fn opening(unit: f64, numbers: &mut Numbers) -> Result<Option<String>, IesError> {
+    let [width, length, height] = ["the width", "the length", "the height"];
+    let sides = [
+        numbers.number(width)?,
+        numbers.number(length)?,
+        numbers.number(height)?,
+    ];
+    let unit = if unit == 1.0 { "feet" } else { "metres" };
+    // Negative numbers tell round openings.
+    let [width, length, height] = sides.map(f64::abs);
+    Ok(sides.iter().any(|side| *side != 0.0).then(|| {
+        format!(
+            "{}, line {}: the luminous opening of {width} × {length} × {height} {unit} is not drawn; all light comes from one point",
+            numbers.file,
+            numbers.line()
+        )
+    }))
 }
 
 pub(super) fn is(a: f32, b: f32) -> bool {

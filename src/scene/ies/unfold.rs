@@ -4,8 +4,8 @@ use super::parse::{SAME, is};
 use super::{IesProfile, Photometry};
 
 impl IesProfile {
-    /// Completes the horizontal angles by symmetry.
-    pub(super) fn unfold(&mut self) -> Result<(), String> {
+    /// Completes the horizontal angles, which end in `line`, by symmetry.
+    pub(super) fn unfold(&mut self, line: usize) -> Result<(), String> {
         let [first, last] = [
             self.horizontal[0],
             self.horizontal[self.horizontal.len() - 1],
@@ -50,7 +50,7 @@ impl IesProfile {
                     return Err(unknown());
                 }
                 self.warnings.push(format!(
-                    "{}: the horizontal angle 360 is missing, and taken to be that of 0",
+                    "{}, line {line}: the horizontal angle 360 is missing, and taken to be that of 0",
                     self.name
                 ));
                 self.horizontal.push(360.0);

@@ -63,6 +63,11 @@ const IES: &[(&str, Outcome, &str)] = &[
         "",
     ),
     (
+        "IESNA91\nTILT=NONE\n1 1000 1 3 1 1 1 -1.5 2 0\n1 1 40\n0 45 90\n0\n100 50 0\n",
+        Ok([100.0, 50.0, 50.0]),
+        "line 3: the luminous opening of 1.5 × 2 × 0 feet",
+    ),
+    (
         "IESNA91\n1 1000 1 3 1 1 2 0 0 0\n",
         Err("there is no line `TILT=`"),
         "",

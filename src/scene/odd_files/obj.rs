@@ -156,10 +156,39 @@ const OBJ: &[(&str, Outcome)] = &[
         "# c:\\models\\\nf 1 2 3 # c:\\a\\\nf 1 3 4\n",
         Reads("..", &[]),
     ),
+    ("f 1 2 \\ \t\n3 4\n", Reads("..", &[])),
+    ("v 1.5f 0.F 1e0f\nf 1 2 5\n", Reads(".", &[])),
+    (
+        "#MRGB ffff0000ff00ff00\nf 1 2 3\n",
+        Reads(".", &["vertex colours of ZBrush (`#MRGB`) (line 5)"]),
+    ),
+    (
+        "v 500000.125 4649776.25 0\nv 500001.125 4649776.25 0\nv 500000.125 4649777.25 0\nf 5 6 7\n",
+        Reads(".", &["rounded to steps of 0.5, and the model is 1"]),
+    ),
+    (
+        "v 5000 0 0\nv 5001 0 0\nv 5000 1 0\nf 5 6 7\n",
+        Reads(".", &["subtract an offset"]),
+    ),
+    (
+        "v 500 0 0\nv 501 0 0\nv 500 1 0\nf 5 6 7\n",
+        Reads(".", &[]),
+    ),
+    (
+        "f 0 1 2\n",
+        Fails(&["line 5", "vertex 0, but the first is 1"]),
+    ),
+    (
+        "v nan 0 0\nf 1 2 5\n",
+        Fails(&["all 1 have a NaN", "1 vertex is not finite (line 5)"]),
+    ),
     ("f 1 2 9\n", Fails(&["line 5", "vertex 9, but there are 4"])),
     (
         "v 0,5 0 0\nf 1 2 5\n",
-        Fails(&["line 5", "`0,5` is not a number"]),
+        Fails(&[
+            "line 5",
+            "`0,5` is not a number; decimals are written with a point",
+        ]),
     ),
 ];
 
@@ -178,6 +207,11 @@ fn obj_files_as_found_are_read() {
         for bytes in variants {
             let files: [(&str, &[u8]); 2] = [("a.obj", &bytes), ("m.mtl", RED_AND_BLUE.as_bytes())];
             check(text, load_files(&files), expected);
+        }
+        let is_advice = |part: &&str| part.contains("with a point");
+        if matches!(expected, Fails(parts) if parts.iter().any(is_advice)) {
+            let advised = load_files(&[("a.obj", model.replace(',', ".").as_bytes())]);
+            assert!(advised.is_ok(), "{text}: {advised:?}");
         }
     }
 }
@@ -256,7 +290,45 @@ const MTL: &[(&str, Outcome)] = &[
         "newmtl a\nKd 1 0 0\nmap_Pr t.png\nPc 1\nmap_Pr t.png",
         Reads("r", &["`Pc` (line 4), `map_Pr` (2 times, first: line 3)"]),
     ),
-    ("newmtl a\nKd nan -1 0", Reads(".", &[])),
+    (
+        "newmtl a\nKd nan -1 0\nd nan\nNs 1e999",
+        Reads(
+            ".",
+            &["the value of `Kd` (line 2), the value of `Ns` (line 4), the value of `d` (line 3)"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 9\nillum 3",
+        Reads(
+            "r",
+            &["1 material is shaped by a specular colour (`Ks`), which is not rendered yet"],
+        ),
+    ),
+    (
+        "newmtl a\nKd 0.5 0 0\nKs 0.2 0.2 0.2\nNs 9\nillum 1",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 0 0 0\nmap_Kd t.png",
+        Reads(".", &["`map_Kd` where `Kd` is 0 (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nillum 11",
+        Reads("r", &["the value of `illum` (line 3)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nTr 1",
+        Reads(
+            "r",
+            &["1 material is wholly transparent, by `d` or `Tr` (line 1)"],
+        ),
+    ),
+    ("newmtl a\nKd 1 0 0\nd 0\nillum 4", Reads(".", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd ..\\maps\\t.png",
+        Reads("r", &["1 texture is not where it should be (line 3)"]),
+    ),
+    ("newmtl a\nKd 1 0 0\nKd 0.5f 0.f 0.0F", Reads("r", &[])),
     (
         "newmtl a # wall\nKd 1 0 0\nnewmtl a #2\nKd 0 1 0",
         Reads("r", &[]),

@@ -42,12 +42,15 @@ const PLY: &[(&str, Outcome)] = &[
         "V4property float scalar_C2M_distances[<0.5]_(2)\nproperty uchar a b\nF1E 0 0 0 1 2\n1 0 0 1 2\n1 1 0 1 2\n0 1 0 x -\n4 0 1 2 3\n",
         Reads(
             "..",
-            &["`scalar_C2M_distances[<0.5]_(2)` of `vertex`, `a b` of `vertex`"],
+            &["`scalar_C2M_distances[<0.5]_(2)` of `vertex` (line 7), `a b` of `vertex` (line 8)"],
         ),
     ),
     (
         "V4property float x\nproperty list uchar float w\nF1E 0 0 0 9 0\n1 0 0 9 2 5 5\n1 1 0 9 0\n0 1 0 9 1 7\n4 0 1 2 3\n",
-        Reads("..", &["`x` of `vertex`, `w` of `vertex`"]),
+        Reads(
+            "..",
+            &["`x` of `vertex` (line 7), `w` of `vertex` (line 8)"],
+        ),
     ),
     (
         "V4property string name\nF1E 0 0 0 a\n1 0 0 b\n1 1 0 c\n0 1 0 d\n4 0 1 2 3\n",
@@ -76,7 +79,7 @@ const PLY: &[(&str, Outcome)] = &[
     ),
     (
         "element camera 1\nproperty float view\nproperty list uchar int ids\nV4F1E 0.5 2 1 2\nC4 0 1 2 3\n",
-        Reads("..", &["the element `camera`"]),
+        Reads("..", &["the element `camera` (line 3)"]),
     ),
     (
         "V4F1element edge 3\nproperty int a\nE C4 0 1 2 3\n1\n",
@@ -136,6 +139,21 @@ const PLY: &[(&str, Outcome)] = &[
     (
         "V4element face 1\nproperty int n\nE C3\n",
         Fails(&["element `face`", "vertex_indices"]),
+    ),
+    (
+        "element vertices 1\nproperty float x\nF1E 0\n3 0 0 0\n",
+        Fails(&["header", "no element `vertex`"]),
+    ),
+    (
+        "V4F1E 0,5 0 0\n",
+        Fails(&[
+            "vertex 0 of 4, line 10",
+            "`0,5` is not a number; decimals are written with a point",
+        ]),
+    ),
+    (
+        "element vertex 4\nproperty float X\nproperty float Y\nproperty float Z\nF1E C4 0 1 2 3\n",
+        Reads("..", &[]),
     ),
     (
         "property float x\nV4F1E C",
@@ -233,7 +251,10 @@ fn binary_ply_files_have_any_types_and_orders_and_line_ends() {
         check(
             order,
             whole,
-            &Reads("rr", &["`t` of `face`, `name` of `vertex`"]),
+            &Reads(
+                "rr",
+                &["`t` of `face` (line 5), `name` of `vertex` (line 9)"],
+            ),
         );
         let short = load_files(&[("a.ply", &bytes[..bytes.len() - 1])]);
         check(

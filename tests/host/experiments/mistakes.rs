@@ -14,7 +14,7 @@ use std::path::Path;
 
 const CASES: &str = include_str!("mistakes.txt");
 
-const ERRORS: [&str; 16] = [
+const ERRORS: [&str; 17] = [
     "Duplicate",
     "Empty",
     "Missing",
@@ -26,6 +26,7 @@ const ERRORS: [&str; 16] = [
     "Override",
     "Read",
     "Refused",
+    "Several",
     "Syntax",
     "TooMany",
     "Unknown",
