@@ -2,7 +2,7 @@
 
 mod checks;
 mod exports;
-mod fixture;
+pub(crate) mod fixture;
 mod gallery;
 mod names;
 mod pages;
