@@ -22,7 +22,7 @@ const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
 const CELLS: usize = 4;
 
 /// Figures of one seed's points at each number of points.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SeedFigures {
     star: Vec<f64>,
     /// Square roots; shorter than `star` if N goes beyond [`MOST_QUADRATIC`].

@@ -2,7 +2,7 @@
 
 mod checks;
 mod exports;
-pub(crate) mod fixture;
+mod fixture;
 mod gallery;
 mod names;
 mod pages;

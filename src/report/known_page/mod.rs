@@ -1,7 +1,7 @@
 //! A page of known records, made anew before any is written: columns that are exchanged, a figure in another unit, a curve
 //! along another value or a winner of the wrong side look like other measurements.
 //!
-//! `records.jsonl` is the first scene of the tests' synthetic run. `page.txt` has what a page and the terminal show of it:
+//! `records.jsonl` is a synthetic run of one scene. `page.txt` has what a page and the terminal show of it:
 //! tables, checks, and of each plot its words and the mean places and colours of its shapes. Its figures were worked out by
 //! another program (`the_figures_of_the_page` below says which); the rest was read. A changed page is written by
 //! `RAYSTONE_WRITE_PAGES=1 cargo test -p raystone-report known_page`; read the difference before you commit it.
@@ -172,16 +172,12 @@ impl Mean {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::fixture::small_run;
 
     #[test]
     fn the_page_is_the_known_one() {
         if std::env::var_os("RAYSTONE_WRITE_PAGES").is_some() {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("known_page");
-            let lines = small_run();
-            let text = raystone_record::text_of(&lines).expect("records");
-            std::fs::write(folder.join("records.jsonl"), text).expect("written");
-            std::fs::write(folder.join("page.txt"), page(&lines)).expect("written");
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("known_page/page.txt");
+            std::fs::write(file, page(&records().unwrap())).expect("written");
             return;
         }
         assert_eq!(check(), Ok(()));

@@ -345,7 +345,7 @@ pub(super) fn full_run() -> Vec<Line> {
 }
 
 /// Returns the first scene of [`full_run`] with one integrator: as much in kind, a quarter in plots.
-pub(crate) fn small_run() -> Vec<Line> {
+pub(super) fn small_run() -> Vec<Line> {
     let kept = |line: &Line| {
         ["", "cornell-box"].contains(&line.key.label(axis::SCENE))
             && ["", "path"].contains(&line.key.label(axis::INTEGRATOR))
