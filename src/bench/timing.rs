@@ -66,7 +66,9 @@ impl Watch {
     /// True if two turns with other answers than the first pass unseen.
     pub(crate) fn is_blind() -> bool {
         let watch = Self::default();
-        [b"a", b"b", b"a"].map(|answers| watch.note(blake3::hash(answers)));
+        for answers in [b"a", b"b", b"a"] {
+            watch.note(blake3::hash(answers));
+        }
         watch.fault().is_none()
     }
 }
