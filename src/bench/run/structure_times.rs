@@ -9,7 +9,7 @@ use super::world::World;
 use crate::clock_check;
 use crate::heat_map::heat_map;
 use crate::timed_rays::TimedRays;
-use crate::timing::{Measured, Samples, Watch, empty_ms, interleave};
+use crate::timing::{Measured, Samples, Watch, empty_rounds, interleave};
 use glam::Vec3;
 use raystone_accel::tracer::count_work;
 use raystone_accel::{Ask, NO_HIT, Query, Ray, RayBatch, Tracer};
@@ -226,9 +226,9 @@ fn class_timing(
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }
-    let empty = session
+    let empties = session
         .clock
-        .time("gpu", || empty_ms(|| item.rays.batch.trace_nothing()))
+        .time("gpu", || empty_rounds(|| item.rays.batch.trace_nothing()))
         .map_err(text)?;
     let triangles = &world.buffers.triangles;
     let work = session
@@ -237,10 +237,10 @@ fn class_timing(
             count_work(gpu, triangles, &one.traced, set.query(), &set.rays)
         })
         .map_err(text)?;
-    let ms = without_overhead(&samples.ms, empty);
+    let ms = without_overhead(&samples.ms, median(&empties).unwrap_or(0.0));
     let rays = set.rays.len() as f64;
     let rate = millions_per_second(&ms, rays);
-    let fault = overhead_fault(&samples.ms, empty, &ms)
+    let fault = overhead_fault(&samples.ms, &empties, &ms)
         .or_else(|| rate.and_then(|rate| rate_fault(&rate, rays, &ms)));
     if let Some(fault) = fault {
         return Err(fault.into());
