@@ -1,13 +1,15 @@
-//! Costs of trees over two triangles, and the box of a placed object, computed anew: rays show whether a tree is right, and
+//! Costs and shapes of trees over a few triangles, a phase of a build, and the box of a placed object, computed anew: rays show whether a tree is right, and
 //! not whether its figures are, nor whether its boxes have the room that their proof asks for.
 
 use crate::bounds::Bounds;
 use crate::instancing::BoxMap;
-use crate::{AccelRegistry, BuildLog, TriangleSoup, triangle::TriangleRecord};
+use crate::{AccelRegistry, BuildLog, StructureStats, TriangleSoup, triangle::TriangleRecord};
 use glam::Vec3;
+use raystone_core::clock::Instant;
 use raystone_core::geometry::Triangle;
 use raystone_core::params::Params;
 use raystone_scene::{Assembly, Instance, Transform};
+use std::time::Duration;
 
 /// Structures, and their cost by the surface area heuristic with both constants 1: the root, 1, and two leaves of a triangle
 /// each, (1 + 1) / 4, for halves of the boxes' surfaces are 1, 1 and 4.
@@ -28,6 +30,9 @@ const OF_BOX: f64 = 1.5e-6;
 /// One is not what it should be: of which, and both values.
 pub fn check() -> Result<(), String> {
     costs()?;
+    shapes()?;
+    row()?;
+    phases()?;
     box_agrees(&BoxMap::new(&placed()?))
 }
 
@@ -66,15 +71,9 @@ fn placed() -> Result<Instance, String> {
 }
 
 fn costs() -> Result<(), String> {
-    let registry = AccelRegistry::default();
-    let records: Vec<TriangleRecord> = (0..2)
-        .map(|id| TriangleRecord::new(&half_a_square(id), id, 0))
-        .collect();
-    let soup = TriangleSoup::from(records);
+    let triangles = [0, 1].map(half_a_square);
     COSTS.into_iter().try_for_each(|(name, expected)| {
-        let kind = registry.named("structure", name)?;
-        let built = kind.build(&soup, &Params::default(), &mut BuildLog::default());
-        let found = built.map_err(|e| e.to_string())?.stats().sah_cost;
+        let found = stats(name, &triangles)?.sah_cost;
         let agrees = found.is_some_and(|found| (found - expected).abs() < 1e-6);
         agrees.then_some(()).ok_or_else(|| {
             format!(
@@ -83,6 +82,79 @@ fn costs() -> Result<(), String> {
             )
         })
     })
+}
+
+/// Two triangles of areas 8 and √10/2, of which the box of the second holds a unit square of the first: a root and two leaves,
+/// and an end-point overlap of 1 / (8 + √10/2).
+fn shapes() -> Result<(), String> {
+    let corners = [
+        [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]],
+    ];
+    let triangles = corners.map(|corners| Triangle {
+        vertices: corners.map(Vec3::from),
+    });
+    let found = stats("bvh", &triangles)?;
+    let counts = [found.nodes, found.leaves, found.references];
+    let epo = 1.0 / (8.0 + 10f64.sqrt() / 2.0);
+    let is_right = counts == [3, 2, 2]
+        && found.depth == Some(1)
+        && found.epo.is_some_and(|found| (found - epo).abs() < 1e-9);
+    is_right.then_some(()).ok_or_else(|| {
+        format!(
+            "a known bvh has {found:?}, and should have 3 nodes, 2 leaves and references, a depth of 1 and an overlap of {epo}: \
+             this program computes wrong figures; build it anew, and report what stays wrong"
+        )
+    })
+}
+
+/// The least cost of a tree over a row of sixteen, by dynamic programming over all splits: 178 / 46.
+const LEAST_OF_ROW: f64 = 178.0 / 46.0;
+/// A builder that looks at few splits may miss so much of it.
+const MISSED: f64 = 1.1;
+
+/// A builder that takes bad splits makes trees that answer right, and a structure that looks slow.
+fn row() -> Result<(), String> {
+    let triangles: Vec<Triangle> = (0..16).map(half_a_square).collect();
+    let found = stats("bvh", &triangles)?.sah_cost.unwrap_or(f64::NAN);
+    let right = LEAST_OF_ROW * (1.0 - 1e-6)..=LEAST_OF_ROW * MISSED;
+    right.contains(&found).then_some(()).ok_or_else(|| {
+        format!(
+            "the SAH cost of a bvh over a known row is {found}, and should be {LEAST_OF_ROW} and at most a tenth more: this \
+             program builds other trees than it says; build it anew, and report what stays wrong"
+        )
+    })
+}
+
+/// A phase that waits takes at least as long, and no longer than the clock around it says.
+fn phases() -> Result<(), String> {
+    const WAIT: Duration = Duration::from_micros(300);
+    let around = Instant::now();
+    let mut log = BuildLog::default();
+    log.phase("known", || {
+        let started = Instant::now();
+        while started.elapsed() < WAIT {}
+    });
+    let (told, most) = (log.total_ms(), around.elapsed().as_secs_f64() * 1e3);
+    let least = WAIT.as_secs_f64() * 1e3;
+    (least..=most).contains(&told).then_some(()).ok_or_else(|| {
+        format!(
+            "a phase of {least} ms and more in {most} ms is measured as {told} ms: this program computes wrong figures; build \
+             it anew, and report what stays wrong"
+        )
+    })
+}
+
+fn stats(structure: &str, triangles: &[Triangle]) -> Result<StructureStats, String> {
+    let registry = AccelRegistry::default();
+    let records = (0..).zip(triangles);
+    let records: Vec<TriangleRecord> = records
+        .map(|(id, t)| TriangleRecord::new(t, id, 0))
+        .collect();
+    let kind = registry.named("structure", structure)?;
+    let mut log = BuildLog::default().noting_quality();
+    let built = kind.build(&TriangleSoup::from(records), &Params::default(), &mut log);
+    Ok(built.map_err(|e| e.to_string())?.stats())
 }
 
 /// Of a row of squares with a gap of two between them.

@@ -8,6 +8,8 @@ use std::f64::consts::TAU;
 
 /// The ends of the colour map viridis, as Matplotlib 3.9 prints them: violet for nothing, yellow for the most.
 const ENDS: [[u8; 3]; 2] = [[68, 1, 84], [253, 231, 37]];
+/// And at a quarter, a half and three quarters.
+const BETWEEN: [[u8; 3]; 3] = [[59, 82, 139], [33, 145, 140], [94, 201, 98]];
 /// Width and height.
 const SIZE: [u32; 2] = [8, 4];
 /// Relative error of sums over pixels of f32.
@@ -19,10 +21,20 @@ const ROUNDING: f64 = 1e-6;
 /// One is not what it should be: what of which, and both values.
 pub fn check() -> Result<(), String> {
     let [cheap, dear] = ENDS;
-    let map = heat_map(&[0.0, 3.0, 3.0, 0.0, 0.0, 9.0], 3.0, [3, 2]);
-    let pixels = vec![cheap, dear, dear, cheap, cheap, dear];
+    let [quarter, half, most] = BETWEEN;
+    let map = heat_map(&[0.0, 4.0, 2.0, 1.0, 3.0, 9.0], 4.0, [3, 2]);
+    let pixels = vec![cheap, dear, half, quarter, most, dear];
     if (map.width, map.height, &map.pixels) != (3, 2, &pixels) {
         return Err(wrong("heat map", format!("{map:?}"), format!("{pixels:?}")));
+    }
+    // Of 1, 2 and 6 the mean is 3, and the variance (4 + 1 + 9) / 2.
+    let spread = Image::variance_of(&[1.0, 2.0, 6.0].map(flat)).map_err(|e| e.to_string())?;
+    if spread != flat(7.0) {
+        return Err(wrong(
+            "variance",
+            format!("{:?}", spread.pixels),
+            "7".to_owned(),
+        ));
     }
     let found = spectrum_of(&wave(1.0), &wave(0.0)).map_err(|e| e.to_string())?;
     for (what, found, expected) in [
@@ -46,6 +58,14 @@ fn wrong(what: &str, found: String, expected: String) -> String {
         "the {what} of a known picture is {found}, and should be {expected}: this program shows wrong figures; build it \
          anew, and report what stays wrong"
     )
+}
+
+fn flat(value: f32) -> Image {
+    Image {
+        width: 2,
+        height: 1,
+        pixels: vec![[value; 3]; 2],
+    }
 }
 
 fn cosine(column: u32) -> f64 {

@@ -22,7 +22,7 @@ const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
 const CELLS: usize = 4;
 
 /// Figures of one seed's points at each number of points.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct SeedFigures {
     star: Vec<f64>,
     /// Square roots; shorter than `star` if N goes beyond [`MOST_QUADRATIC`].
@@ -89,15 +89,76 @@ pub fn check() -> Result<(), String> {
             0.13123593500391467,
         ),
     ];
-    known.into_iter().try_for_each(|(name, found, expected)| {
-        let found = found.copied().unwrap_or(f64::NAN);
-        ((found - expected).abs() <= 1e-12).then_some(()).ok_or_else(|| {
-            format!(
-                "the {name} of known points is {found}, and should be {expected}: this program computes wrong figures; \
-                 build it anew, and report what stays wrong"
-            )
-        })
+    let known = known.map(|(name, found, expected)| (name, found.copied(), expected));
+    let known = known.into_iter().chain(of_seeds()?).chain(of_pixels());
+    let wrong = known.into_iter().find(|(_, found, expected)| {
+        // No figure is none that is right.
+        !found.is_some_and(|found| (found - expected).abs() <= 1e-12)
+    });
+    wrong.map_or(Ok(()), |(name, found, expected)| {
+        Err(format!(
+            "the {name} of known points is {found:?}, and should be {expected}: this program computes wrong figures; \
+             build it anew, and report what stays wrong"
+        ))
     })
+}
+
+/// A figure's name, what was computed, and what it should be.
+type Known = (&'static str, Option<f64>, f64);
+
+/// Means and slopes over two seeds, the points and their mirror image, by SciPy and NumPy.
+fn of_seeds() -> Result<Vec<Known>, String> {
+    let counts = [2, 4, 8];
+    let mirrored = POINTS.map(|[x, y]| [0.875 - x, y]);
+    let mut seeds = [SeedFigures::default(), SeedFigures::default()];
+    for (seed, points) in seeds.iter_mut().zip([POINTS, mirrored]) {
+        let added = seed.add(&points, &counts);
+        added.map_err(|e| format!("known points: {e}"))?;
+    }
+    let (star, figures) = over_seeds(&counts, &seeds);
+    let mean =
+        |figures: &[FigureAtCount], n| Some(figures.iter().find(|at| at.n == n)?.value.value);
+    let slope = |slope: Option<Interval>| slope.map(|slope| slope.value);
+    let exponential = figures.integrands.first();
+    let rmse = exponential.and_then(|of| mean(&of.rmse, 4));
+    Ok(vec![
+        ("mean of D*", mean(&star, 4), 0.390_625),
+        (
+            "slope of D*",
+            slope(figures.star_slope),
+            -0.719_060_556_195_942_4,
+        ),
+        (
+            "mean of L2-star",
+            mean(&figures.l2_star, 2),
+            0.288_193_396_322_893_2,
+        ),
+        (
+            "slope of L2-star",
+            slope(figures.l2_star_slope),
+            -0.836_333_984_616_544_8,
+        ),
+        (
+            "mean of centred discrepancies",
+            mean(&figures.centered, 8),
+            0.015_499_538_845_485_938,
+        ),
+        ("error of an integral", rmse, 0.548_195_132_904_098_9),
+        (
+            "slope of an integral's error",
+            exponential.and_then(|of| slope(of.slope)),
+            -0.611_699_117_055_745_2,
+        ),
+    ])
+}
+
+/// Two by two pixels of two directions each, and cells of eleven by eleven.
+fn of_pixels() -> Vec<Known> {
+    let angle = neighbour_angle(&POINTS, 2, 2);
+    vec![
+        ("angle of neighbours", angle, 0.861_271_325_873_668),
+        ("coverage", Some(coverage(&POINTS, 8)), 8.0 / 121.0),
+    ]
 }
 
 /// Squared error of a function's mean over the first `n` points, for ascending `counts`.

@@ -6,7 +6,7 @@ use raystone_core::random::Pcg32;
 use raystone_gpu::{Elapsed, Gpu, GpuError, Stopwatch};
 use raystone_record::figure::Figure;
 use raystone_record::{Reading, Samples as Rounds};
-use raystone_stats::statistics::{median, median_interval};
+use raystone_stats::statistics::median_interval;
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 
@@ -61,6 +61,15 @@ impl Watch {
             "dispatches do not repeat: timed turn {turn} of {} answered otherwise than the first",
             self.turns.get()
         ))
+    }
+
+    /// True if two turns with other answers than the first pass unseen.
+    pub(crate) fn is_blind() -> bool {
+        let watch = Self::default();
+        for answers in [b"a", b"b", b"a"] {
+            watch.note(blake3::hash(answers));
+        }
+        watch.fault().is_none()
     }
 }
 
@@ -185,15 +194,13 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
     }
 }
 
-/// Median of an empty measurement.
+/// Times of nine dispatches of nothing, ms: what a measurement costs by itself is their median.
 ///
 /// # Errors
-/// It failed.
-pub(crate) fn empty_ms(
+/// The device is lost or hangs, or a clock ran backwards.
+pub(crate) fn empty_rounds(
     mut measure: impl FnMut() -> Result<Elapsed, GpuError>,
-) -> Result<f64, GpuError> {
-    let samples = (0..9)
-        .map(|_| measure().and_then(Elapsed::measured).map(|e| e.ms()))
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok(median(&samples).unwrap_or(0.0))
+) -> Result<Vec<f64>, GpuError> {
+    let rounds = (0..9).map(|_| measure().and_then(Elapsed::measured).map(|e| e.ms()));
+    rounds.collect()
 }

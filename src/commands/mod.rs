@@ -166,6 +166,7 @@ fn known_figures() -> Result<()> {
         raystone::accel::known_figures::check,
         raystone::scene::known_figures::check,
         raystone::measure::known_pictures::check,
+        raystone::run::known_plan::check,
         raystone::report::plot::known::check,
         raystone::report::check_rulings,
     ];

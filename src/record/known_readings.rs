@@ -2,16 +2,18 @@
 //! another unit, looks like a measurement.
 
 use crate::{
-    ClassTiming, CountersPerRay, GateVerdict, Interval, RayClass, Reading, ReferenceCheck, Samples,
-    StructureRecord, TimeRecord,
+    BiasRecord, ClassTiming, CountersPerRay, FigureAtCount, FilteredError, GateVerdict,
+    IntegrandFigures, Interval, PixelsAtCount, RayClass, Reading, ReferenceCheck, ReferenceRecord,
+    Samples, SpectrumRecord, StreamFigures, StreamRecord, StructureRecord, TimeRecord,
 };
 use raystone_core::structure::{Counters, Phase, StructureStats};
+use raystone_stats::bias::BiasVerdict;
 use std::collections::BTreeMap;
 
 /// Relative error that is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Makes the readings of a structure and of a full cell, every number of which is another.
+/// Makes the readings of a structure, a full cell, a bias, a spectrum, a stream and a reference, every number of which is another.
 ///
 /// # Errors
 /// A reading is not what it should be: which, and both values.
@@ -24,7 +26,21 @@ pub fn check() -> Result<(), String> {
     if count != [STRUCTURE.len(), CELL.len()] {
         return Err(format!("known records have {count:?} readings"));
     }
-    structures.chain(cells).try_for_each(agree)
+    structures.chain(cells).try_for_each(agree)?;
+    let (bias, spectrum, stream, reference) = further();
+    let others = [
+        (bias.readings(), &BIAS[..]),
+        (spectrum.readings(), &SPECTRUM),
+        (stream.readings(), &STREAM),
+        (reference.readings(), &REFERENCE),
+    ];
+    others.into_iter().try_for_each(|(readings, known)| {
+        if readings.len() != known.len() {
+            return Err(format!("known records have {} readings", readings.len()));
+        }
+        let known = known.iter().map(|(id, value)| (*id, *value, 0.0));
+        readings.into_iter().zip(known).try_for_each(agree)
+    })
 }
 
 fn agree((found, (id, value, round)): (Reading, (&str, f64, f64))) -> Result<(), String> {
@@ -69,6 +85,119 @@ const CELL: [(&str, f64, f64); 2] = [
     ("ms-per-spp/v1", 2.5, 2.0),
     ("cell-mrays-per-s/v1", 0.07, 0.0875),
 ];
+
+const BIAS: [(&str, f64); 9] = [
+    ("bias-tiles/v1", 48.0),
+    ("bias-rejected/v1", 2.0),
+    ("bias-least-p/v1", 0.001),
+    ("bias-z/v1", 2.5),
+    ("bias-p/v1", 0.040_992_218_585_752_89),
+    ("bias-freedom/v1", 7.0),
+    ("bias-weighted-p/v1", 0.25),
+    ("bias-weighted-freedom/v1", 6.5),
+    ("bias-detectable/v1", 1.5),
+];
+/// Before the filter ½, after it ⅛.
+const SPECTRUM: [(&str, f64); 5] = [
+    ("low-frequency-power/v1", 0.75),
+    ("loudest-wave/v1", 3.0),
+    ("neighbour-correlation/v1", 0.125),
+    ("luminance-rmse/v1", 0.5),
+    ("filtered-share/v1", 0.25),
+];
+/// A quarter of π is 45 degrees.
+const STREAM: [(&str, f64); 9] = [
+    ("star-discrepancy/v1", 0.5),
+    ("l2-star/v1", 0.25),
+    ("centered/v1", 0.0625),
+    ("star-exponent/v1", -0.75),
+    ("l2-star-exponent/v1", -1.25),
+    ("integral-rmse/v1", 0.03125),
+    ("integral-exponent/v1", -1.5),
+    ("neighbour-angle/v1", 45.0),
+    ("coverage/v1", 0.875),
+];
+const REFERENCE: [(&str, f64); 1] = [("reference-mse/v1", 0.002)];
+
+/// Records of a bias, a spectrum, a stream and a reference, every number of which is another.
+pub(crate) fn further() -> (BiasRecord, SpectrumRecord, StreamRecord, ReferenceRecord) {
+    let exact = |x| Some(Interval::exact(x));
+    let bias = BiasRecord {
+        tiles: 48,
+        rejected: 2,
+        alpha: 0.005,
+        alpha_of_run: Some(0.01),
+        min_p: 0.001,
+        p_of_all: Some(0.04),
+        p_histogram: vec![40, 8],
+        z: Some(2.5),
+        p: Some(0.040_992_218_585_752_89),
+        degrees_of_freedom: Some(7.0),
+        weighted_p: Some(0.25),
+        weighted_degrees_of_freedom: Some(6.5),
+        detectable: Some(0.015),
+        by_design: false,
+        verdict: BiasVerdict::NoBiasFound,
+    };
+    let filtered = |(sigma, rmse)| FilteredError {
+        sigma,
+        rmse: Interval::exact(rmse),
+    };
+    let spectrum = SpectrumRecord {
+        spp: 4,
+        replicates: 3,
+        power: Vec::new(),
+        low_frequency: exact(0.75),
+        loudest: exact(3.0),
+        autocorrelation: exact(0.125),
+        filtered: [(0.0, 0.5), (1.0, 0.125)].map(filtered).to_vec(),
+    };
+    let at = |value| {
+        let value = Interval::exact(value);
+        vec![FigureAtCount { n: 64, value }]
+    };
+    let stream = StreamRecord {
+        dimensions: [2, 3],
+        purpose: "direction".to_owned(),
+        named: true,
+        worst_of: None,
+        randomised: true,
+        seeds: 1,
+        pixels: vec![0],
+        star: at(0.5),
+        figures: StreamFigures {
+            star_slope: exact(-0.75),
+            l2_star: at(0.25),
+            l2_star_slope: exact(-1.25),
+            centered: at(0.0625),
+            integrands: vec![IntegrandFigures {
+                function: "exponential".to_owned(),
+                integral: 3.0,
+                rmse: at(0.03125),
+                slope: exact(-1.5),
+            }],
+            pixels: vec![PixelsAtCount {
+                n: 64,
+                neighbour_angle: std::f64::consts::FRAC_PI_4,
+                coverage: 0.875,
+            }],
+        },
+        points: None,
+    };
+    let reference = ReferenceRecord {
+        spp: 4096,
+        exact: None,
+        cached: false,
+        file: None,
+        sampler: "pixel-hash".to_owned(),
+        seconds: 5.0,
+        mse: Some(0.002),
+        relmse: Some(0.003),
+        image: String::new(),
+        mean: 0.5,
+    };
+    (bias, spectrum, stream, reference)
+}
 
 fn structure() -> StructureRecord {
     // Means of 1 and 3, 2 and 7, 0 and 3, and the greatest of 5 and 4.

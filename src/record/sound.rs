@@ -4,12 +4,15 @@
 
 use super::*;
 use raystone_core::structure::StructureStats;
+use raystone_stats::hypothesis::student_t_two_sided;
 use raystone_stats::rates::rate_fault;
 use raystone_stats::statistics::median;
 use std::collections::BTreeSet;
 
 /// Relative difference of two figures that is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Most that the stages of an image may take of its longest round: each is a median of its own.
+const OF_STAGES: f64 = 1.5;
 
 /// A body of a record that can detect its own damage.
 pub trait Sound {
@@ -74,6 +77,7 @@ pub fn contradiction(body: &Body) -> Option<String> {
         Body::Time(record) => of_image(record, &mut faults),
         Body::Error(record) => of_errors(&record.errors, &mut faults),
         Body::Bias(record) => of_bias(record, &mut faults),
+        Body::Spectrum(record) => of_spectrum(record, &mut faults),
         Body::Stream(record) => of_stream(record, &mut faults),
         _ => {}
     }
@@ -122,6 +126,29 @@ fn of_bias(record: &BiasRecord, faults: &mut Vec<String>) {
     }
     for (what, p) in [("p", record.p), ("p_of_all", record.p_of_all)] {
         share(what, p.unwrap_or_default(), faults);
+    }
+    let test = record.z.zip(record.degrees_of_freedom);
+    let p = test.map(|(z, freedom)| student_t_two_sided(z, freedom));
+    equal("p of the image", record.p, p, faults);
+    // Of three tests, each at a third of the level, the least decides.
+    let least = [record.p, record.weighted_p].into_iter().flatten();
+    let least = least.fold(f64::INFINITY, f64::min);
+    if let Some(all) = record.p_of_all.filter(|all| *all < 1.0)
+        && all > 3.0 * least * (1.0 + ROUNDING)
+    {
+        faults.push(format!("p of all tests is {all}, and that of one {least}"));
+    }
+}
+
+/// The loudest wave is none below the mean of some.
+fn of_spectrum(record: &SpectrumRecord, faults: &mut Vec<String>) {
+    if let Some((loudest, low)) = record.loudest.zip(record.low_frequency)
+        && loudest.value < low.value * (1.0 - ROUNDING)
+    {
+        faults.push(format!(
+            "the loudest wave has a power of {}, and low frequencies {}",
+            loudest.value, low.value
+        ));
     }
 }
 
@@ -181,6 +208,18 @@ fn of_rays(record: &StructureRecord, faults: &mut Vec<String>) {
             ));
         }
         faults.extend(rate_fault(&timing.mrays_s, timing.rays as f64, &timing.ms));
+        counted_twice(&timing.ms, &timing.wall_ms, faults);
+    }
+}
+
+/// Two rounds that are equal to the bit by each of two clocks are one. Where one clock is all there is, it may be coarse.
+fn counted_twice(ms: &[f64], wall_ms: &[f64], faults: &mut Vec<String>) {
+    let mut known = BTreeSet::new();
+    let rounds = ms.iter().zip(wall_ms).filter(|(ms, wall)| ms != wall);
+    let mut rounds = rounds.map(|(ms, wall)| (ms.to_bits(), wall.to_bits()));
+    if let Some((ms, _)) = rounds.find(|round| !known.insert(*round)) {
+        let ms = f64::from_bits(ms);
+        faults.push(format!("a round of {ms} ms is counted twice"));
     }
 }
 
@@ -213,6 +252,14 @@ fn of_image(record: &TimeRecord, faults: &mut Vec<String>) {
     equal("ms_per_spp", per_spp, ms.map(|ms| ms / spp), faults);
     if let Some(rate) = record.mrays_s {
         faults.extend(rate_fault(&rate, record.traced_rays() as f64, &record.ms));
+    }
+    counted_twice(&record.ms, &record.wall_ms, faults);
+    let stages: f64 = record.stages.values().sum();
+    let longest = record.ms.iter().copied().fold(0.0, f64::max);
+    if !record.ms.is_empty() && stages > OF_STAGES * longest {
+        faults.push(format!(
+            "the stages of an image take {stages} ms, and the image at most {longest}"
+        ));
     }
     let rays = |class: &str| record.rays.get(class).copied();
     let Some(primary) = rays("primary") else {
@@ -292,7 +339,11 @@ mod tests {
         assert_eq!(said(Body::Structure(structure.clone())), "");
         assert_eq!(said(Body::Time(cell.clone())), "");
         type Of<T> = (&'static str, fn(&mut T));
-        let structures: [Of<StructureRecord>; 5] = [
+        let structures: [Of<StructureRecord>; 6] = [
+            ("counted twice", |r| {
+                let of = &mut r.timings[0];
+                (of.ms, of.wall_ms) = (vec![2.0, 3.0, 3.0, 4.0], vec![2.5, 3.5, 3.5, 4.5]);
+            }),
             ("sum of build", |r| r.build_ms = 0.005),
             ("rate", |r| r.timings[0].mrays_s = Interval::exact(4.0)),
             ("timed twice", |r| r.timings.push(r.timings[0].clone())),
@@ -304,7 +355,10 @@ mod tests {
             change(&mut record);
             assert!(said(Body::Structure(record)).contains(part), "{part}");
         }
-        let cells: [Of<TimeRecord>; 5] = [
+        let cells: [Of<TimeRecord>; 6] = [
+            ("stages", |r| {
+                r.stages = [("a".to_owned(), 11.0), ("b".to_owned(), 8.0)].into();
+            }),
             ("ms_per_spp", |r| r.ms_per_spp = Some(Interval::exact(10.0))),
             ("rate", |r| r.mrays_s = Some(Interval::exact(0.17))),
             ("samples", |r| r.resolution = [20, 10]),
@@ -319,6 +373,24 @@ mod tests {
             let fault = said(Body::Time(record));
             assert!(fault.contains(part), "{part}: {fault}");
         }
+        let (bias, spectrum, ..) = crate::known_readings::further();
+        assert_eq!(said(Body::Bias(bias.clone())), "");
+        assert_eq!(said(Body::Spectrum(spectrum.clone())), "");
+        let biases: [Of<BiasRecord>; 3] = [
+            ("p of the image", |r| r.p = r.weighted_p),
+            ("p of the image", |r| {
+                r.degrees_of_freedom = r.weighted_degrees_of_freedom;
+            }),
+            ("p of all", |r| r.p_of_all = Some(0.9)),
+        ];
+        for (part, change) in biases {
+            let mut record = bias.clone();
+            change(&mut record);
+            assert!(said(Body::Bias(record)).contains(part), "{part}");
+        }
+        let mut turned = spectrum;
+        (turned.loudest, turned.low_frequency) = (turned.low_frequency, turned.loudest);
+        assert!(said(Body::Spectrum(turned)).contains("loudest"));
         let errors = |metrics: &[(&str, f64)], spp: [u32; 2]| {
             let at = |spp| ErrorAtSpp {
                 partial_net: false,

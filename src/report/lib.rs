@@ -16,6 +16,7 @@ pub mod format;
 pub mod gallery;
 pub mod history;
 pub mod html;
+mod known_page;
 pub mod markdown;
 pub(crate) mod names;
 pub(crate) mod pictures;
@@ -96,6 +97,10 @@ pub struct ReportPaths {
 /// # Errors
 /// Unreadable records, see [`read_records`], a table that is wrong, or a folder that cannot be written.
 pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
+    known_page::check().map_err(|fault| ReportError::Altered {
+        path: dir.join("index.html"),
+        fault,
+    })?;
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
     let values = values::values(&data);

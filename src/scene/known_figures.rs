@@ -1,6 +1,7 @@
 //! Normals of known triangles under known maps, computed anew: rays show where a surface is, and not how it is lit.
 
 use crate::Transform;
+use crate::colors::shown;
 use crate::normals::{decode_normal, encode_normal, moved, of_normals};
 use glam::{DMat3, DVec3, Vec3};
 
@@ -18,12 +19,14 @@ const EDGES: [[[f64; 3]; 2]; 2] = [
 /// Largest difference of unit vectors, and of those of sixteen bits.
 const ROUNDING: f64 = 1e-12;
 const OF_WORDS: f64 = 3e-4;
+const OF_SINGLE: f64 = 1e-6;
 
 /// Moves the normals, and compares them with those of the moved triangles.
 ///
 /// # Errors
-/// One is not perpendicular to its triangle, or points to the other side.
+/// A normal is not perpendicular to its triangle, or points to the other side; or a colour is another.
 pub fn check() -> Result<(), String> {
+    colors()?;
     for columns in MAPS {
         let map = DMat3::from_cols_array_2d(&columns);
         let columns = columns.map(|column| DVec3::from_array(column).as_vec3());
@@ -42,6 +45,19 @@ pub fn check() -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Grey of the curve and of its straight part, and no more than white, by IEC 61966-2-1.
+fn colors() -> Result<(), String> {
+    let found = shown(Vec3::new(0.5, 0.03, 1.5)).as_dvec3();
+    let expected = DVec3::new(0.214_041_140_482_232_55, 0.03 / 12.92, 1.0);
+    let agrees = found.distance(expected) <= OF_SINGLE;
+    agrees.then_some(()).ok_or_else(|| {
+        format!(
+            "the radiance of a known colour is {found}, and should be {expected}: this program lights surfaces wrongly; build it \
+             anew, and report what stays wrong"
+        )
+    })
 }
 
 fn agree(found: DVec3, expected: DVec3, tolerance: f64) -> Result<(), String> {

@@ -4,6 +4,7 @@
 //! The constants are those of NumPy 2 and SciPy 1.17 (`scipy.stats`, and for jackknives, slopes, trimmed
 //! means and images the formulas in NumPy), printed with all digits; the calls stand beside them.
 
+use super::{known_metrics, known_tests};
 use crate::bias::{BiasOptions, check_bias};
 use crate::comparison::Pairs;
 use crate::hypothesis::{
@@ -21,13 +22,16 @@ use crate::statistics::{
 use raystone_image::{Image, tone_map};
 
 /// A figure's name, what was computed, and what it should be.
-type Known = (&'static str, Option<f64>, f64);
+pub(super) type Known = (&'static str, Option<f64>, f64);
 
 /// Relative error that is rounding.
 const ROUNDING: f64 = 1e-12;
 /// Relative error of special functions, and of the integral behind the power of a test.
 const OF_FUNCTIONS: f64 = 1e-10;
 const OF_POWER: f64 = 1e-3;
+/// That of pixels in single precision, and of programs that compute with it.
+const OF_PIXELS: f64 = 1e-6;
+const OF_SINGLE: f64 = 3e-4;
 
 const X: [f64; 8] = [2.5, 0.7, 4.1, 3.3, 9.2, 1.9, 5.8, 2.2];
 const Y: [f64; 7] = [1.1, 0.4, 2.0, 1.6, 2.9, 0.8, 2.6];
@@ -48,6 +52,14 @@ pub fn check() -> Result<(), String> {
         (OF_POWER, vec![power()]),
         (ROUNDING, images()?),
         (OF_FUNCTIONS, bias()?),
+        (OF_FUNCTIONS, known_tests::ratio()),
+        (ROUNDING, known_tests::front()),
+        (OF_FUNCTIONS, known_tests::laws()),
+        (OF_PIXELS, known_tests::biases()?),
+        (ROUNDING, known_metrics::metrics()?),
+        (OF_PIXELS, known_metrics::pictures()?),
+        (OF_SINGLE, known_metrics::flip()),
+        (OF_FUNCTIONS, known_metrics::tails()?),
     ];
     groups
         .into_iter()
@@ -486,6 +498,11 @@ mod tests {
             student(),
             intervals(),
             images().unwrap(),
+            known_tests::ratio(),
+            known_tests::laws(),
+            known_tests::biases().unwrap(),
+            known_metrics::metrics().unwrap(),
+            known_metrics::tails().unwrap(),
         ];
         assert!(groups.iter().flatten().count() > 40);
         for (name, found, expected) in groups.into_iter().flatten() {

@@ -10,6 +10,8 @@ pub mod heavy_tails;
 pub mod hypothesis;
 pub mod interval;
 pub mod known_figures;
+mod known_metrics;
+mod known_tests;
 mod log_figure;
 pub mod metrics;
 pub mod rates;

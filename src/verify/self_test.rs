@@ -6,7 +6,7 @@ use crate::image_gate::{Answer, differing_sum, differs, judge};
 use crate::path_oracle::{PathOracle, View};
 use crate::rays::RaySet;
 use glam::{DVec3, Vec3};
-use raystone_accel::oracle::{Verdict, judge_closest_hits};
+use raystone_accel::oracle::{Fault, Verdict, judge_closest_hits};
 use raystone_accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
 use raystone_core::geometry::Triangle;
 use raystone_gpu::KERNEL_ERRORS;
@@ -68,7 +68,7 @@ pub fn unseen_hit(
     unseen.or_else(|| in_reference(scene, soup, reference, &hits))
 }
 
-/// At a hit, and at the last ray; `wrong` counts the wrong rays.
+/// At the first ray, at a hit, and at the last ray; `wrong` counts the wrong rays.
 fn in_class(
     set: &RaySet,
     first: usize,
@@ -81,7 +81,7 @@ fn in_class(
         return Some("that right answers are right".to_owned());
     }
     for (name, of_bits, plant) in PLANTS {
-        for at in [first, set.rays.len() - 1] {
+        for at in [0, first, set.rays.len() - 1] {
             let mut answers = right.clone();
             plant(&mut answers, at);
             if (exact || !of_bits) && wrong(&answers) != 1 {
@@ -130,6 +130,21 @@ fn in_reference(
     wrong.check_brute_force(u64::MAX, 1, |_| truth.map(|(_, hit)| hit).collect());
     if wrong.brute_force.wrong != 1 || wrong.is_sound() {
         return Some("a wrong answer of the reference tracer".to_owned());
+    }
+    let mut refuted_once = right.thinned(1);
+    refuted_once.brute_force = ReferenceCheck::default();
+    refuted_once.oracle = ReferenceCheck::default();
+    let verdict = Verdict::Wrong(Fault::FalseBlock);
+    refuted_once.note_oracle(&right.subset(1), vec![verdict]);
+    if refuted_once.oracle.wrong != 1 || refuted_once.is_sound() {
+        return Some("a distance that the oracle says is wrong".to_owned());
+    }
+    // As many as there are classes are some of each, the last one included.
+    let timed = || right.sets.iter().filter(|set| set.is_timed());
+    let few = right.subset(timed().count());
+    let of_last = |set: &RaySet| few.last().is_some_and(|(ray, _)| set.rays.contains(ray));
+    if !timed().next_back().is_some_and(of_last) {
+        return Some("the last class of rays, which is left out of what is compared".to_owned());
     }
     let of_scene = refuted(&scene.triangles, soup, hits);
     let is_seen = of_scene.is_some() && refuted(&[PLAIN], soup, &plain()) == Some(1);

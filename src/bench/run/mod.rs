@@ -18,6 +18,7 @@ mod inputs;
 mod inventory;
 mod kernels;
 mod known_images;
+pub mod known_plan;
 mod ledger;
 mod measurement;
 mod merge;

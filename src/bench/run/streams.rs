@@ -255,6 +255,14 @@ fn worst_pair(
         .iter()
         .zip(&stars)
         .max_by(|a, b| a.1.total_cmp(b.1));
+    // By its words: there is none worse.
+    if let Some((pair, worst)) = worst
+        && stars.iter().any(|star| star > worst)
+    {
+        return Err(format!(
+            "dimensions {pair:?} are said to be the worst, and are not"
+        ));
+    }
     Ok(worst.map(|(pair, _)| (*pair, candidates.len())))
 }
 
@@ -310,7 +318,9 @@ fn stream_record(
         }
         per_seed.push(figures);
     }
-    if !cell.randomised {
+    if cell.randomised {
+        check_seeds(&per_seed)?;
+    } else {
         check_shared(session, gpu, &sets, dimensions)?;
     }
     let (star, mut figures) = over_seeds(&counts, &per_seed);
@@ -346,6 +356,16 @@ fn stream_record(
         points,
     };
     Ok((kernel_hash(gpu, &sets[0].0)?, record))
+}
+
+/// Seeds whose points have the same figures to the bit are one, and intervals over them are too short.
+fn check_seeds(seeds: &[SeedFigures]) -> Result<(), String> {
+    for (number, seed) in seeds.iter().enumerate() {
+        if let Some(other) = seeds[..number].iter().position(|other| other == seed) {
+            return Err(format!("seeds {other} and {number} draw the same points"));
+        }
+    }
+    Ok(())
 }
 
 /// That pixels draw the same where no seed changes anything: one of them stands for all.
@@ -551,4 +571,22 @@ fn dump_points(
         }
     }
     Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_that_draw_the_same_points_are_told() {
+        let of = |points: &[[f64; 2]]| {
+            let mut seed = SeedFigures::default();
+            seed.add(points, &[2]).expect("figures");
+            seed
+        };
+        let (one, other) = ([[0.25, 0.5], [0.75, 0.0]], [[0.25, 0.5], [0.75, 0.125]]);
+        assert_eq!(check_seeds(&[of(&one), of(&other)]), Ok(()));
+        let fault = check_seeds(&[of(&one), of(&other), of(&one)]).expect_err("a fault");
+        assert!(fault.contains("seeds 0 and 2"), "{fault}");
+    }
 }

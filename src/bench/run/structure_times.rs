@@ -9,10 +9,12 @@ use super::world::World;
 use crate::clock_check;
 use crate::heat_map::heat_map;
 use crate::timed_rays::TimedRays;
-use crate::timing::{Measured, Samples, empty_ms, interleave};
+use crate::timing::{Measured, Samples, Watch, empty_rounds, interleave};
+use glam::Vec3;
 use raystone_accel::tracer::count_work;
-use raystone_accel::{Ask, Query, Ray, RayBatch, Tracer};
+use raystone_accel::{Ask, NO_HIT, Query, Ray, RayBatch, Tracer};
 use raystone_config::Axis;
+use raystone_core::geometry::Camera;
 use raystone_gpu::{Gpu, GpuError, slow_slice};
 use raystone_record::{ClassTiming, CountersPerRay};
 use raystone_stats::rates::{millions_per_second, overhead_fault, rate_fault, without_overhead};
@@ -154,6 +156,12 @@ fn prove_clock(
     };
     session.checked.clock_is_proven = true;
     let (set, one) = (item.set, &gated[item.structure]);
+    if Watch::is_blind() || !sees_a_wrong_answer(world, one, item) {
+        return Err(RunError::Wrong(
+            "the comparison of timed answers is blind: one that is wrong is not seen; no time would mean anything"
+                .to_owned(),
+        ));
+    }
     let most = (CLOCK_RAYS / set.rays.len()).max(1);
     let repeats = ((CLOCK_MS / ms).ceil() as usize).clamp(1, most);
     let batch = |times: usize| {
@@ -176,6 +184,19 @@ fn prove_clock(
         // A device that is lost, or has no room for so many rays, fails where it is used.
         Ok(None) | Err(_) => Ok(()),
     }
+}
+
+/// Compares the last timed turn with answers of which one is wrong. A device that is lost, or other arithmetic, says nothing.
+fn sees_a_wrong_answer(world: &World, one: &Gated, item: &Timed) -> bool {
+    if !world.probe.is_exact() || !world.soup.intersection.triangle.is_exact() {
+        return true;
+    }
+    let mut wrong = item.set.clone();
+    if let Some(last) = wrong.truth.last_mut() {
+        last.triangle = if last.triangle == NO_HIT { 0 } else { NO_HIT };
+    }
+    let found = (item.rays).fault(&wrong, &world.soup, one.traced.space, true);
+    found.is_err() || found.is_ok_and(|fault| fault.is_some())
 }
 
 /// The figures of a class, if its answers are right; none where the time is below what can be measured.
@@ -205,9 +226,9 @@ fn class_timing(
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }
-    let empty = session
+    let empties = session
         .clock
-        .time("gpu", || empty_ms(|| item.rays.batch.trace_nothing()))
+        .time("gpu", || empty_rounds(|| item.rays.batch.trace_nothing()))
         .map_err(text)?;
     let triangles = &world.buffers.triangles;
     let work = session
@@ -216,10 +237,10 @@ fn class_timing(
             count_work(gpu, triangles, &one.traced, set.query(), &set.rays)
         })
         .map_err(text)?;
-    let ms = without_overhead(&samples.ms, empty);
+    let ms = without_overhead(&samples.ms, median(&empties).unwrap_or(0.0));
     let rays = set.rays.len() as f64;
     let rate = millions_per_second(&ms, rays);
-    let fault = overhead_fault(&samples.ms, empty, &ms)
+    let fault = overhead_fault(&samples.ms, &empties, &ms)
         .or_else(|| rate.and_then(|rate| rate_fault(&rate, rays, &ms)));
     if let Some(fault) = fault {
         return Err(fault.into());
@@ -240,6 +261,33 @@ fn class_timing(
         dispatches: 1,
         discarded: 0,
     }))
+}
+
+/// Compares the cost of pixels with that of the rays that point there. Returns the first that is another's.
+fn misplaced(
+    costs: &[f32],
+    (rays, counted): (&[Ray], &[f32]),
+    camera: Camera,
+    size: [u32; 2],
+) -> Option<String> {
+    let [forward, right, up] = camera.basis(size);
+    let last = costs.len().checked_sub(1)?;
+    let dearest = (0..=last).max_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let wrong = [0, dearest, last].into_iter().find(|pixel| {
+        let [column, row] = [*pixel as u32 % size[0], *pixel as u32 / size[0]];
+        let [width, height] = size.map(|edge| edge as f32);
+        let across = right * (2.0 * (column as f32 + 0.5) / width - 1.0);
+        let down = up * (2.0 * (row as f32 + 0.5) / height - 1.0);
+        let towards = (forward + across - down).normalize();
+        let beside = |ray: &Ray| Vec3::from(ray.direction).distance_squared(towards);
+        let nearest =
+            (0..rays.len()).min_by(|a, b| beside(&rays[*a]).total_cmp(&beside(&rays[*b])));
+        nearest.is_some_and(|ray| counted[ray].to_bits() != costs[*pixel].to_bits())
+    })?;
+    let at = [wrong as u32 % size[0], wrong as u32 / size[0]];
+    Some(format!(
+        "a heat map has the cost of another ray at pixel {at:?}: no picture of it would mean anything"
+    ))
 }
 
 /// Cost of every pixel's primary ray as a picture, one scale for all structures of a scene. The
@@ -270,6 +318,14 @@ pub(super) fn draw_heat_maps(
         for (pixel, counters) in pixels.iter().zip(&work) {
             structure.costs[*pixel as usize] = (counters.nodes + counters.triangle_tests) as f32;
         }
+        let counted: Vec<f32> = work
+            .iter()
+            .map(|w| (w.nodes + w.triangle_tests) as f32)
+            .collect();
+        let size = [width, height];
+        if let Some(fault) = misplaced(&structure.costs, (&rays, &counted), world.camera, size) {
+            return Err(RunError::Wrong(fault));
+        }
     }
     let percentile = |costs: &[f32]| {
         let mut sorted = costs.to_vec();
@@ -287,4 +343,27 @@ pub(super) fn draw_heat_maps(
         structure.record.body.heat_map_max = Some(f64::from(scale));
     }
     Ok(gated)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_heat_map_that_is_turned_or_shifted_is_told() {
+        let size = [16, 8];
+        let camera = Camera::upright(Vec3::ZERO, Vec3::Z, 40.0);
+        let (rays, pixels) = (primary_rays(camera, 16, 8), primary_pixels(16, 8));
+        let counted: Vec<f32> = (0..rays.len()).map(|ray| (ray * 7 % 128) as f32).collect();
+        let map = |place: &dyn Fn(usize) -> usize| {
+            let mut costs = vec![0.0; counted.len()];
+            let pairs = pixels.iter().zip(&counted);
+            pairs.for_each(|(pixel, cost)| costs[place(*pixel as usize)] = *cost);
+            misplaced(&costs, (&rays, &counted), camera, size)
+        };
+        assert_eq!(map(&|pixel| pixel), None);
+        assert!(map(&|pixel| 127 - pixel).is_some());
+        assert!(map(&|pixel| (pixel + 1) % 128).is_some());
+        assert!(map(&|pixel| 16 * (7 - pixel / 16) + pixel % 16).is_some());
+    }
 }
