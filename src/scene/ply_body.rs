@@ -127,7 +127,12 @@ impl<S: BufRead> Body<S> {
 
     fn number(&mut self, kind: Kind) -> Result<f64, String> {
         self.next_word()?;
-        let word = std::str::from_utf8(&self.word).unwrap_or_default();
+        // Writers of text put a byte order mark where their text begins: behind the header.
+        let word = self
+            .word
+            .strip_prefix(b"\xef\xbb\xbf")
+            .unwrap_or(&self.word);
+        let word = std::str::from_utf8(word).unwrap_or_default();
         // Rounded once: a float's text through f64 may be another float.
         let found = match kind {
             Kind::Float => number::<f32>(word).map(f64::from),

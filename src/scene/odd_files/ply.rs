@@ -215,6 +215,16 @@ fn ply_files_as_found_are_read() {
 }
 
 #[test]
+fn a_byte_order_mark_may_stand_behind_the_header() {
+    let text = ply("V4F1E C4 0 1 2 3\n").replace("end_header\n", "end_header\n\u{feff}");
+    check(
+        "a mark",
+        load_files(&[("a.ply", text.as_bytes())]),
+        &Reads("..", &[]),
+    );
+}
+
+#[test]
 fn binary_ply_files_have_any_types_and_orders_and_line_ends() {
     let header = "ply\nformat ORDER 1.0\nelement face 1\nproperty list uint16 int8 vertex_index\n\
         property list uchar double t\nelement vertex 4\nproperty float64 x\nproperty uint8 y\n\
