@@ -204,3 +204,18 @@ pub(crate) fn empty_rounds(
     let rounds = (0..9).map(|_| measure().and_then(Elapsed::measured).map(|e| e.ms()));
     rounds.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_that_answer_otherwise_are_told_with_their_number() {
+        assert!(!Watch::is_blind());
+        let watch = Watch::default();
+        [b"a", b"a", b"b"]
+            .iter()
+            .for_each(|answers| watch.note(blake3::hash(*answers)));
+        assert!(watch.fault().is_some_and(|fault| fault.contains("turn 3")));
+    }
+}

@@ -150,3 +150,29 @@ pub async fn fault_of_kernels(
     }
     Ok(None)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_counter_of_the_last_ray_counts() {
+        let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
+        let of = |rays: usize| TwinWork {
+            class: RayClass::Primary,
+            query: Query::Closest,
+            rays: vec![ray; rays],
+            counted: vec![Counters::default(); rays],
+        };
+        assert_eq!(of(2).unseen(), None);
+        assert_eq!(of(0).unseen(), None);
+        let twin = of(2);
+        assert_eq!(twin.fault(&twin.counted), None);
+        let more = Counters {
+            stack_high_water: 1,
+            ..Counters::default()
+        };
+        let fault = twin.fault(&[Counters::default(), more]);
+        assert!(fault.is_some_and(|fault| fault.contains("1 on the stack")));
+    }
+}

@@ -337,6 +337,14 @@ fn finish_reference(
     session.compared("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
     let part_spp = line.body.spp / REFERENCE_PARTS;
+    // What a part foretells of fewer samples depends on its own.
+    let together = part_spp * reference.parts().len() as u32;
+    if together != line.body.spp {
+        return Err(RunError::Wrong(format!(
+            "the parts of a reference have {part_spp} samples per pixel each, {together} together, and it has {}",
+            line.body.spp
+        )));
+    }
     let done = format!("reference {}: done", labels.join(", "));
     session.recorder.note_kernels(&done);
     let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
