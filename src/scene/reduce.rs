@@ -120,7 +120,8 @@ fn decoded(c: f32) -> f32 {
     }
 }
 
-fn encode(c: f32) -> f32 {
+/// Encodes a linear component as sRGB (IEC 61966-2-1).
+pub(super) fn encode(c: f32) -> f32 {
     if c <= 0.003_130_8 {
         c * 12.92
     } else {

@@ -1,19 +1,19 @@
 //! Decodes all textures of a scene in parallel.
 
-use super::reduce::{Texels, reduced};
+use super::reduce::{Texels, encode, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::error::UnsupportedErrorKind;
-use image::{ImageError, ImageReader};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Pixel, RgbaImage};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Source of the encoded image.
 pub(super) enum Encoded<'a> {
-    /// A PNG, JPEG or WebP file.
+    /// A file in one of the formats that [`reader`] knows.
     File(PathBuf),
-    /// A PNG, JPEG or WebP in memory.
+    /// The bytes of one in memory.
     Memory(Cow<'a, [u8]>),
     /// Not found, with the reason.
     Missing(String),
@@ -145,18 +145,30 @@ fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
 fn said(error: ImageError) -> String {
     let formats = match &error {
         ImageError::Unsupported(what) if matches!(what.kind(), UnsupportedErrorKind::Format(_)) => {
-            " (PNG, JPEG and WebP are read)"
+            " (PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, PNM, DDS and HDR are read)"
         }
         _ => "",
     };
     format!("{error}{formats}")
 }
 
-/// The size of an image, refused before allocation if its bytes cannot hold so many texels.
-fn checked_size(bytes: &[u8]) -> Result<Size, String> {
+/// Returns what decodes an image. Its format is that of its first bytes, whatever its ending says; TGA has none that
+/// are its own, so that there the ending counts.
+fn reader<'a>(name: &str, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let reader = reader.map_err(|e| e.to_string())?;
-    let (width, height) = reader.into_dimensions().map_err(said)?;
+    let mut reader = reader.map_err(|e| e.to_string())?;
+    let is_tga = Path::new(name)
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("tga"));
+    if reader.format().is_none() && is_tga {
+        reader.set_format(ImageFormat::Tga);
+    }
+    Ok(reader)
+}
+
+/// The size of an image, refused before allocation if its bytes cannot hold so many texels.
+fn checked_size(name: &str, bytes: &[u8]) -> Result<Size, String> {
+    let (width, height) = reader(name, bytes)?.into_dimensions().map_err(said)?;
     let needed = 4 * u64::from(width) * u64::from(height);
     let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);
     if needed > most {
@@ -176,7 +188,7 @@ fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String
         Encoded::Memory(bytes) => Cow::Borrowed(bytes.as_ref()),
         Encoded::Missing(why) => return Err(why.clone()),
     };
-    let size = checked_size(&bytes)?;
+    let size = checked_size(&source.name, &bytes)?;
     Ok((bytes, size))
 }
 
@@ -188,6 +200,23 @@ fn ends_early(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xff, 0xd8]) && end < start
 }
 
+/// Eight bits per channel. Floats are linear light, whole numbers are as they are to be used; colours become sRGB, in
+/// which textures of colours are kept, and what is brighter than 1 becomes 1.
+fn eight_bits(image: DynamicImage, kind: Texels) -> RgbaImage {
+    let is_float = matches!(
+        image,
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
+    );
+    if kind != Texels::Colours || !is_float {
+        return image.into_rgba8();
+    }
+    let mut light = image.into_rgba32f();
+    for pixel in light.pixels_mut() {
+        pixel.apply_without_alpha(|part| encode(part.clamp(0.0, 1.0)));
+    }
+    DynamicImage::from(light).into_rgba8()
+}
+
 /// The texture, its original size if it was reduced, and whether the file ends within the image.
 fn decode(
     source: &ImageSource<'_>,
@@ -195,8 +224,8 @@ fn decode(
     max_size: u32,
     kind: Texels,
 ) -> Result<(Texture, Option<Size>, bool), String> {
-    let image = image::load_from_memory(bytes).map_err(said)?;
-    let image = image.into_rgba8();
+    let image = reader(&source.name, bytes)?.decode().map_err(said)?;
+    let image = eight_bits(image, kind);
     let size = image.dimensions();
     let texels = image.as_raw().as_chunks::<4>().0;
     let larger = size.0.max(size.1) > max_size;

@@ -30,7 +30,7 @@ fn rate<'a>(structure: &Measured<'a, StructureRecord>, class: RayClass) -> Optio
     (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
-/// Returns the structures with speeds: the one that is built fastest, and the others.
+/// Returns the ranked structures with speeds: the one that is built fastest, and the others.
 fn by_build<'a>(
     scene: &'a SceneGroup,
 ) -> Option<(
@@ -39,7 +39,7 @@ fn by_build<'a>(
 )> {
     let passed = scene.structures.iter();
     let mut passed: Vec<_> = passed
-        .filter(|s| s.fault().is_none() && !s.timings.is_empty())
+        .filter(|s| s.fault().is_none() && !s.is_inexact() && !s.timings.is_empty())
         .collect();
     let least = (passed.iter().enumerate())
         .min_by(|a, b| a.1.build_ms.total_cmp(&b.1.build_ms))?

@@ -52,6 +52,24 @@ fn names(data: &RunData) -> (Vec<String>, Vec<String>, Vec<String>) {
 }
 
 #[test]
+fn a_test_that_is_not_exact_breaks_even_with_nobody_however_fast_it_is_built() {
+    let mut lines = both(axis::TRIANGLE, ["bare", "watertight"]);
+    for line in &mut lines {
+        if let (Body::Structure(s), "bare") = (&mut line.body, line.key.label(axis::TRIANGLE)) {
+            s.build_ms *= 1e-3;
+            s.gate.iter_mut().for_each(|gate| gate.inexact = true);
+        }
+    }
+    let data = RunData::new(&lines);
+    let values = sections::trade_off::break_even(&data.scenes[0]);
+    let exact = |value: &Value| value.key.label(axis::TRIANGLE) == "watertight";
+    assert!(!values.is_empty() && values.iter().all(exact));
+    let (_, summary) = report("inexact", &lines);
+    let mut ranked = summary.lines().filter(|line| line.contains("fastest"));
+    assert!(!ranked.any(|line| line.contains("bare")), "{summary}");
+}
+
+#[test]
 fn two_triangle_or_box_tests_make_two_competitors_and_two_views_each() {
     for axis in [axis::TRIANGLE, axis::BOX_TEST] {
         let lines = both(axis, ["ours", "theirs"]);

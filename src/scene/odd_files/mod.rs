@@ -3,6 +3,7 @@
 mod ies;
 mod obj;
 mod ply;
+mod textures;
 
 use super::{LoadOptions, Params, SceneData, Variant, decode_color, load_alone};
 use std::path::Path;
