@@ -13,8 +13,8 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Loads a PLY model: polygons and triangle strips become triangles. There are no materials:
-/// surfaces are grey or have vertex colours, which are sRGB whatever their type, as in MeshLab,
-/// Blender and three.js. Vertex normals are shading normals.
+/// surfaces are grey or have the colours of vertices, or else of faces, which are sRGB whatever their type, as in
+/// MeshLab, Blender and three.js. Vertex normals are shading normals.
 ///
 /// # Errors
 /// [`SceneError`] naming the unreadable element.
@@ -29,7 +29,7 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     model.read(&header, &mut body, bytes).map_err(broken)?;
     model.builder.note_far();
     model.tell(&header);
-    let is_colored = !model.colors.is_empty();
+    let is_colored = model.has_colors;
     let builder = std::mem::take(&mut model.builder);
     // Their memory serves what follows.
     drop(model);
@@ -54,6 +54,10 @@ struct Model {
     normals: Vec<Vec3>,
     /// Faces before the vertices: index, number of corners, corners.
     early: Vec<u32>,
+    /// Their colours, linear. Empty if faces have none that are shown.
+    early_colors: Vec<Vec3>,
+    /// True if vertices or faces have colours.
+    has_colors: bool,
     odd: Odd,
     /// What is not read, for a warning.
     unread: Vec<String>,
@@ -67,6 +71,7 @@ struct Odd {
     positions: Tally,
     normals: Tally,
     colors: Tally,
+    face_colors: Tally,
     /// Faces with fewer than three corners.
     flat: Tally,
     /// Self-intersecting polygons.
@@ -85,6 +90,7 @@ impl Model {
         let elements = &header.elements;
         let first = |name: &str| elements.iter().position(|e| e.name == name && e.count > 0);
         let vertices = first("vertex");
+        let plain = vertices.is_none_or(|k| Colors::of(&elements[k]).is_none());
         let read = [vertices, first("face"), first(STRIPS)];
         let last = read.into_iter().flatten().max();
         if last.is_some() && elements.iter().all(|e| e.name != "vertex") {
@@ -99,7 +105,8 @@ impl Model {
             if Some(k) == vertices {
                 self.read_vertices(element, body)?;
             } else if is_read {
-                self.read_faces(element, body, vertices > Some(k))?;
+                let colors = Colors::of(element).filter(|_| plain && element.name == "face");
+                self.read_faces(element, body, vertices > Some(k), colors)?;
             } else if element.count > 0 {
                 let Element { name, line, .. } = element;
                 self.unread
@@ -131,17 +138,15 @@ impl Model {
         let needed = || (place(), "the properties x, y and z are needed".to_owned());
         let position = find(element, ["x", "y", "z"], |_| true).ok_or_else(needed)?;
         let normal = find(element, ["nx", "ny", "nz"], |_| true);
-        let color = COLORS
-            .iter()
-            .find_map(|names| find(element, *names, |kind| white(kind).is_some()));
+        let colors = Colors::of(element);
+        let color = colors.as_ref().map(|colors| colors.properties);
+        self.has_colors |= color.is_some();
         let mut slots = vec![None; element.properties.len()];
         let sets = [Some(position), normal, color];
         for (k, property) in sets.iter().flatten().flatten().enumerate() {
             slots[*property] = Some(k);
         }
         self.name_unread(element, |k| slots[k].is_some());
-        let white = |k: usize| white(element.properties[k].kind).unwrap_or(1.0);
-        let white = color.map(|parts| Vec3::from(parts.map(white)));
         let count = element.count as usize;
         self.positions.reserve_exact(count);
         self.normals.reserve_exact(normal.map_or(0, |_| count));
@@ -160,7 +165,7 @@ impl Model {
                 index,
                 next(),
                 normal.map(|_| next()),
-                white.map(|w| next() / w),
+                colors.as_ref().map(|colors| next() / colors.white),
             );
             Ok(())
         })
@@ -190,14 +195,19 @@ impl Model {
         element: &Element,
         body: &mut Body<S>,
         is_early: bool,
+        colors: Option<Colors>,
     ) -> Result<(), Problem> {
         let list = corner_list(element).ok_or_else(|| {
             let place = format!("element `{}`", element.name);
             (place, "the property vertex_indices is needed".to_owned())
         })?;
-        self.name_unread(element, |k| k == list);
+        let part =
+            |k: usize| (colors.as_ref()).and_then(|c| c.properties.iter().position(|p| *p == k));
+        self.name_unread(element, |k| k == list || part(k).is_some());
+        self.has_colors |= colors.is_some();
         self.builder.reserve(element.count as usize);
         let mut corners = Vec::new();
+        let mut values = Vec3::ZERO;
         each(element, body, |index, body| {
             corners.clear();
             for (k, property) in element.properties.iter().enumerate() {
@@ -206,16 +216,25 @@ impl Model {
                         corners.push(corner(x)?);
                         Ok(())
                     })?,
-                    _ => body.skip(property)?,
+                    _ => match part(k) {
+                        Some(part) => values[part] = body.value(property.kind)? as f32,
+                        None => body.skip(property)?,
+                    },
                 }
             }
+            let color = colors.as_ref().map(|colors| values / colors.white);
+            self.odd
+                .face_colors
+                .see_if(color.is_some_and(|color| !is_color(color)), index);
+            let color = color.map(shown);
             let mut face = |corners: &[u32]| match is_early {
                 true => {
                     self.early.extend([index as u32, corners.len() as u32]);
                     self.early.extend(corners);
+                    self.early_colors.extend(color);
                     Ok(())
                 }
-                false => self.push_face(index, corners),
+                false => self.push_face(index, corners, color),
             };
             match element.name == STRIPS {
                 true => strip(&corners).try_for_each(|triangle| face(&triangle)),
@@ -226,17 +245,25 @@ impl Model {
 
     fn push_early_faces(&mut self) -> Result<(), Problem> {
         let early = std::mem::take(&mut self.early);
+        let mut colors = std::mem::take(&mut self.early_colors).into_iter();
         let mut rest = &early[..];
         while let [index, count, after @ ..] = rest {
             let (corners, after) = after.split_at(*count as usize);
             let broken = |problem| (format!("face {index}"), problem);
-            self.push_face(*index as usize, corners).map_err(broken)?;
+            self.push_face(*index as usize, corners, colors.next())
+                .map_err(broken)?;
             rest = after;
         }
         Ok(())
     }
 
-    fn push_face(&mut self, index: usize, corners: &[u32]) -> Result<(), String> {
+    /// Adds a polygon. Vertices have colours, or `color` is that of all its corners.
+    fn push_face(
+        &mut self,
+        index: usize,
+        corners: &[u32],
+        color: Option<Vec3>,
+    ) -> Result<(), String> {
         let Self {
             builder,
             positions,
@@ -263,7 +290,10 @@ impl Model {
         let crosses = triangulate(places, |triangle| {
             let of = triangle.map(|k| corners[k] as usize);
             let normals = (!normals.is_empty()).then(|| of.map(|v| normals[v]));
-            let colors = (!colors.is_empty()).then(|| of.map(|v| colors[v]));
+            let colors = match color {
+                Some(color) => Some([color; 3]),
+                None => (!colors.is_empty()).then(|| of.map(|v| colors[v])),
+            };
             let vertices = triangle.map(|k| places[k]);
             builder.push_colored(vertices, [Vec2::ZERO; 3], normals, colors, 0);
         });
@@ -315,6 +345,14 @@ impl Model {
                     "vertices have a colour beyond 0 to 1",
                 ],
                 "vertex",
+                "each component is taken as 0 or 1",
+            ),
+            odd.face_colors.note(
+                [
+                    "face has a colour beyond 0 to 1",
+                    "faces have a colour beyond 0 to 1",
+                ],
+                "face",
                 "each component is taken as 0 or 1",
             ),
             unread_warning(self.unread.drain(..)),
@@ -373,6 +411,26 @@ const COLORS: [[&str; 3]; 3] = [
     ["r", "g", "b"],
     ["diffuse_red", "diffuse_green", "diffuse_blue"],
 ];
+
+/// Where an element has its colour.
+struct Colors {
+    /// Indices of red, green and blue among its properties.
+    properties: [usize; 3],
+    /// What white has there.
+    white: Vec3,
+}
+
+impl Colors {
+    fn of(element: &Element) -> Option<Self> {
+        let known = |names: &[&str; 3]| find(element, *names, |kind| white(kind).is_some());
+        let properties = COLORS.iter().find_map(known)?;
+        let white = properties.map(|k| white(element.properties[k].kind).unwrap_or(1.0));
+        Some(Self {
+            properties,
+            white: white.into(),
+        })
+    }
+}
 
 /// The largest colour component of a type; `None` if its range is unknown.
 fn white(kind: Kind) -> Option<f32> {

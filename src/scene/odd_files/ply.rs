@@ -74,6 +74,21 @@ const PLY: &[(&str, Outcome)] = &[
     ),
     ("F1V4E 4 0 1 2 3\nC", Reads("..", &[])),
     (
+        "V4F2property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nE C4 0 1 2 3 255 0 0 9\n3 0 1 2 0 9 255 0\n",
+        Reads("rrb", &["`alpha` of `face`"]),
+    ),
+    (
+        "F2property float r\nproperty float g\nproperty float b\nV4E 3 0 1 2 0 1 0\n4 0 1 2 3 0 0 2\nC",
+        Reads("gbb", &["1 face has a colour beyond 0 to 1 (face 1)"]),
+    ),
+    (
+        "V4property uchar red\nproperty uchar green\nproperty uchar blue\nF1property uchar red\nproperty uchar green\nproperty uchar blue\nE 0 0 0 255 0 0\n1 0 0 255 0 0\n1 1 0 255 0 0\n0 1 0 255 0 0\n4 0 1 2 3 0 0 255\n",
+        Reads(
+            "rr",
+            &["`red` of `face` (line 12), `green` of `face` (line 13), `blue` of `face` (line 14)"],
+        ),
+    ),
+    (
         "F1V4E 3 0 1 4\nC",
         Fails(&["face 0", "vertex 4, but there are 4"]),
     ),
