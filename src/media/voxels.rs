@@ -5,14 +5,12 @@ use raystone_gpu::{
     Bindings, Composition, Gpu, GpuError, Player, Recording, Storage, UniformValues, groups_for,
 };
 use raystone_scene::SceneData;
-use std::collections::HashMap;
+use raystone_volume::solid::{MOST_SIDE, OpenMesh, check_closed};
 use std::f64::consts::TAU;
 
 /// Cells of a voxel along each axis, and units of a cell: as in the kernels.
 const CELLS: u32 = 4;
 const UNITS: f64 = 16.0;
-/// Most voxels along an axis: products of places stay whole.
-pub const MOST_SIDE: u32 = 256;
 
 /// Reasons why a mesh is no volume.
 #[derive(Debug, thiserror::Error)]
@@ -39,17 +37,8 @@ pub enum VoxelError {
         at: DVec3,
     },
     /// A mesh that encloses nothing.
-    #[error(
-        "the mesh is open: {edges} edges belong to an odd number of triangles, the first from {from} to {to}; close it"
-    )]
-    Open {
-        /// Edges.
-        edges: usize,
-        /// Where the first begins.
-        from: DVec3,
-        /// Where it ends.
-        to: DVec3,
-    },
+    #[error(transparent)]
+    Open(#[from] OpenMesh),
     /// Columns that leave a mesh without entering it.
     #[error(
         "{columns} columns of cells cross the mesh an odd number of times, the last at ({x}, {y}): it is open"
@@ -193,9 +182,9 @@ impl Mesh {
         let high = corners().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
         let scale = extent / (high - low).max_element().max(f64::MIN_POSITIVE);
         let mut mesh = Self::default();
-        for triangle in &scene.triangles {
-            let corners = triangle.vertices;
-            if (0..3).any(|k| corners[k] == corners[(k + 1) % 3]) {
+        for k in 0..scene.triangles.len() {
+            let corners = scene.outward(k);
+            if (0..3).any(|at| corners[at] == corners[(at + 1) % 3]) {
                 continue;
             }
             let first = mesh.positions.len() as u32;
@@ -225,31 +214,8 @@ impl Mesh {
             let at = self.positions[vertex];
             return Err(VoxelError::Outside { vertex, at });
         }
-        // Edges in the order of triangles, each with how often it is there.
-        let mut places = HashMap::new();
-        let mut edges: Vec<([DVec3; 2], u32)> = Vec::new();
-        for triangle in &self.triangles {
-            let corners = self.corners(*triangle);
-            for k in 0..3 {
-                let ends = [corners[k], corners[(k + 1) % 3]];
-                let mut key = ends.map(|end| end.to_array().map(|c| (c + 0.0).to_bits()));
-                key.sort_unstable();
-                let place = *places.entry(key).or_insert_with(|| {
-                    edges.push((ends, 0));
-                    edges.len() - 1
-                });
-                edges[place].1 += 1;
-            }
-        }
-        let mut open = edges.iter().filter(|(_, count)| count % 2 == 1);
-        let Some(([from, to], _)) = open.next() else {
-            return Ok(());
-        };
-        Err(VoxelError::Open {
-            edges: 1 + open.count(),
-            from: *from,
-            to: *to,
-        })
+        let triangles = self.triangles.iter();
+        Ok(check_closed(triangles.map(|t| self.corners(*t)))?)
     }
 }
 

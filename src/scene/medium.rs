@@ -1,11 +1,12 @@
 //! The medium of a scene: fog, smoke or a cloud in a box or a ball.
 
-use super::{SceneData, SceneError};
+use super::{SceneData, SceneError, extension, named};
 use glam::{DVec3, Vec3};
 use raystone_core::parameters;
 use raystone_volume::files::Grid;
 use raystone_volume::volume::voxels;
-use raystone_volume::{Bounds, MediaError, Phase, Volume, grid, phase};
+use raystone_volume::{Bounds, MediaError, Phase, Volume, grid, phase, solid};
+use std::path::Path;
 
 /// A volume in a scene, and what finds the way through it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,8 +40,8 @@ parameters! {
 
     /// The medium of any scene.
     pub(crate) struct MediumParameters {
-        /// medium in the scene: `constant`, `cloud`, or a grid of densities from a file (NumPy's .npy or
-        /// Mitsuba's .vol); that of the scene itself if empty
+        /// medium in the scene: `constant`, `cloud`, a grid of densities from a file (NumPy's .npy or Mitsuba's
+        /// .vol), or what a closed mesh encloses (a model's file); that of the scene itself if empty
         medium: String = String::new();
         /// grid of what absorbs, where it is another than that of what scatters: as `medium`
         absorber: String = String::new();
@@ -60,7 +61,7 @@ parameters! {
         phase: PhaseFunction = PhaseFunction::Isotropic;
         /// its anisotropy, k of Schlick or g of Henyey and Greenstein: above 0 is forward
         anisotropy: f64 = 0.0, in -0.99..=0.99;
-        /// voxels along an axis of `cloud`
+        /// voxels along an axis of `cloud`, and along the longest of a mesh
         medium_voxels: u32 = 32, in 1..=256;
         /// structure over the volume, whose bounds free flights go by
         medium_structure: String = "level-map".to_owned();
@@ -77,17 +78,28 @@ impl MediumParameters {
             name: scene.name.clone(),
             source,
         };
-        scene.medium = Some(self.built(&scene).map_err(problem)?);
+        let grid = |name: &str| match extension(Path::new(name)).as_str() {
+            "obj" | "ply" | "gltf" | "glb" | "xml" => {
+                of_mesh(&named(name)?, self.medium_voxels).map_err(problem)
+            }
+            _ => grid(name, self.medium_voxels).map_err(problem),
+        };
+        let scatters = grid(&self.medium)?;
+        let absorbs = match self.absorber.as_str() {
+            "" => scatters.clone(),
+            other => grid(other)?,
+        };
+        let medium = self.built(&scene, [&scatters, &absorbs]);
+        scene.medium = Some(medium.map_err(problem)?);
         scene.hash = scene.content_hash();
         Ok(scene)
     }
 
-    fn built(&self, scene: &SceneData) -> Result<SceneMedium, MediaError> {
-        let scatters = grid(&self.medium, self.medium_voxels)?;
-        let absorbs = match self.absorber.as_str() {
-            "" => scatters.clone(),
-            other => grid(other, self.medium_voxels)?,
-        };
+    fn built(
+        &self,
+        scene: &SceneData,
+        [scatters, absorbs]: [&Grid; 2],
+    ) -> Result<SceneMedium, MediaError> {
         let [low, high] = self.corners(scene, scatters.corners);
         let scaled = |grid: &Grid, factor: f64| -> Vec<f32> {
             grid.values.iter().map(|x| factor as f32 * x).collect()
@@ -100,8 +112,8 @@ impl MediumParameters {
                 Shape::Box => Bounds::Box,
                 Shape::Ball => Bounds::Sphere,
             },
-            scattering: scaled(&scatters, self.scattering),
-            absorption: scaled(&absorbs, self.absorption),
+            scattering: scaled(scatters, self.scattering),
+            absorption: scaled(absorbs, self.absorption),
             refraction: vec![1.0; voxels(scatters.resolution)],
             phase: Phase {
                 kind: match self.phase {
@@ -117,7 +129,7 @@ impl MediumParameters {
         SceneMedium::tinted(volume, tints, &self.medium_structure)
     }
 
-    /// The medium's box: as given, or as the file of its grid has it, or that of the scene.
+    /// The medium's box: as given, or as the file of its grid or mesh has it, or that of the scene.
     fn corners(&self, scene: &SceneData, filed: Option<[DVec3; 2]>) -> [DVec3; 2] {
         let [a, b, c, d, e, f] = self.medium_box;
         if self.medium_box != [0.0; 6] {
@@ -126,6 +138,29 @@ impl MediumParameters {
         let bounds = scene.bounds();
         filed.unwrap_or_else(|| [bounds.min, bounds.max].map(|corner| corner.as_dvec3()))
     }
+}
+
+/// The part of each voxel that a closed mesh encloses, in the box of the mesh, with so many voxels along its longest
+/// side. Triangles of which two corners are one have no inside.
+fn of_mesh(scene: &SceneData, side: u32) -> Result<Grid, MediaError> {
+    let corners =
+        (0..scene.triangles.len()).map(|k| scene.outward(k).map(|corner| corner.as_dvec3()));
+    let triangles: Vec<solid::Triangle> = corners
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    let all = triangles.iter().flatten();
+    let [low, high] = all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
+        [low.min(*p), high.max(*p)]
+    });
+    let size = high - low;
+    let voxels = (size / size.max_element() * f64::from(side)).round();
+    let resolution = voxels.max(DVec3::ONE).to_array().map(|n| n as u32);
+    let values = solid::solid(&triangles, resolution, [low, high])?;
+    Ok(Grid {
+        resolution,
+        values,
+        corners: Some([low, high]),
+    })
 }
 
 impl SceneMedium {
@@ -263,6 +298,84 @@ mod tests {
             &[("medium", name("constant")), ("anisotropy", Number(0.5))],
         );
         assert_ne!(other.hash, fog.hash);
+    }
+
+    /// A scene in which a mesh of this text encloses a medium.
+    fn filled(text: &str, voxels: i64) -> Result<crate::SceneData, crate::SceneError> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("mesh.obj");
+        std::fs::write(&file, text).unwrap();
+        let file = file.to_string_lossy();
+        let changes = [
+            ("medium", name(&file)),
+            ("medium_voxels", Integer(voxels)),
+            ("scattering", Number(0.5)),
+        ];
+        try_load_with("cornell-box", &changes)
+    }
+
+    /// A box from (1, 2, 3) to (3, 6, 4) without one of its faces.
+    const BOX: [&str; 2] = [
+        "v 1 2 3\nv 3 2 3\nv 3 6 3\nv 1 6 3\nv 1 2 4\nv 3 2 4\nv 3 6 4\nv 1 6 4\n\
+         f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\n",
+        "f 4 1 5 8\n",
+    ];
+
+    #[test]
+    fn a_closed_mesh_encloses_a_medium_where_it_is() {
+        let scene = filled(&BOX.concat(), 12).unwrap();
+        let volume = scene.medium.unwrap().volume;
+        assert_eq!(volume.resolution, [6, 12, 3]);
+        assert_eq!(
+            [volume.low, volume.high],
+            [DVec3::new(1.0, 2.0, 3.0), DVec3::new(3.0, 6.0, 4.0)]
+        );
+        assert!(volume.scattering.iter().all(|sigma| *sigma == 0.5));
+        // A pyramid over the square from (-1, -1, 0) to (1, 1, 0), as high as 2: a third of its box, and of a layer at
+        // height z the part (1 - z / 2)².
+        let pyramid = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 2\n\
+                       f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n";
+        let volume = filled(pyramid, 32).unwrap().medium.unwrap().volume;
+        assert_eq!(volume.resolution, [32; 3]);
+        for layer in 0..32_usize {
+            let values = &volume.scattering[layer * 1024..][..1024];
+            let part = values.iter().sum::<f32>() / 512.0;
+            let left = 1.0 - (layer as f32 + 0.5) / 32.0;
+            assert!((part - left * left).abs() < 0.01, "{layer}: {part}");
+        }
+        // The layer at half the height is full from -0.5 to 0.5, here along x in the middle of y.
+        let row = &volume.scattering[16 * 1024 + 16 * 32..][..32];
+        assert_eq!(row[..7], [0.0; 7]);
+        assert!(row[9..23].iter().all(|sigma| *sigma == 0.5), "{row:?}");
+        assert_eq!(row[25..], [0.0; 7]);
+    }
+
+    #[test]
+    fn meshes_that_enclose_nothing_or_themselves_twice_are_refused() {
+        let open = filled(BOX[0], 8).unwrap_err().to_string();
+        assert!(open.contains("the mesh is open: 4 edges"), "{open}");
+        let moved: String = BOX
+            .concat()
+            .lines()
+            .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+                ["v", x, y, z] => {
+                    let beside = x.parse::<f64>().unwrap() + 1.0;
+                    format!("v {beside} {y} {z}\n")
+                }
+                ["f", ..] => {
+                    let corners = line[2..].split(' ').map(|k| k.parse::<i32>().unwrap() - 9);
+                    let corners: Vec<String> = corners.map(|k| k.to_string()).collect();
+                    format!("f {}\n", corners.join(" "))
+                }
+                _ => panic!("{line}"),
+            })
+            .collect();
+        let twice = filled(&format!("{}{moved}", BOX.concat()), 24).unwrap_err();
+        assert!(twice.to_string().contains("parts of it overlap"), "{twice}");
+        let flat = filled("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n", 8).unwrap_err();
+        assert!(flat.to_string().contains("above zero"), "{flat}");
+        let missing = try_load_with("cornell-box", &[("medium", name("no.ply"))]).unwrap_err();
+        assert!(missing.to_string().contains("no.ply"), "{missing}");
     }
 
     #[test]

@@ -82,6 +82,19 @@ pub enum MediaError {
         .0[0], .0[1], .0[2]
     )]
     Tint([f32; 3]),
+    /// A mesh that encloses nothing.
+    #[error(transparent)]
+    Open(#[from] crate::solid::OpenMesh),
+    /// A mesh of which parts are inside others.
+    #[error(
+        "the mesh encloses {found:.1} cells where its triangles enclose {enclosed:.1}: parts of it overlap, or are inside out; join them, or turn them"
+    )]
+    Overlaps {
+        /// Cells whose middles are inside.
+        found: f64,
+        /// By the divergence theorem.
+        enclosed: f64,
+    },
     /// Parameters that a structure does not have.
     #[error("the structure over a volume: {0}")]
     Structure(String),

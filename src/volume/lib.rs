@@ -10,6 +10,7 @@ pub mod files;
 pub mod medium;
 pub mod phase;
 pub mod procedures;
+pub mod solid;
 mod straight;
 pub mod structure;
 pub mod volume;

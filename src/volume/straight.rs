@@ -90,9 +90,13 @@ pub fn grid(name: &str, side: u32) -> Result<Grid, MediaError> {
         _ => Err(MediaError::Unknown {
             what: "medium",
             name: name.to_owned(),
-            known: ["constant", "cloud", "a file ending in .npy or .vol"]
-                .map(str::to_owned)
-                .to_vec(),
+            known: [
+                "constant",
+                "cloud",
+                "a file of a grid (.npy, .vol) or of a closed mesh",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
         }),
     }
 }

@@ -6,6 +6,7 @@ use crate::voxels::{Mesh, VoxelError, coverage, covered};
 use glam::{DVec3, UVec3};
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Gpu, KernelLibrary};
+use raystone_volume::solid::{OpenMesh, Triangle, solid};
 use std::f64::consts::{PI, TAU};
 
 const SIDE: u32 = 20;
@@ -126,6 +127,21 @@ fn voxels_of_a_sphere_a_torus_and_a_box_have_their_volumes() {
 }
 
 #[test]
+fn the_host_covers_what_the_device_covers() {
+    let Some(gpu) = adapter() else { return };
+    for (name, mesh) in meshes() {
+        let triangles: Vec<Triangle> = mesh.triangles.iter().map(|t| mesh.corners(*t)).collect();
+        let host = solid(&triangles, [SIDE; 3], [DVec3::ZERO, DVec3::ONE]).unwrap();
+        let device = coverage(&gpu, &mesh, SIDE).unwrap();
+        let cells = (host.iter().zip(&device)).map(|(a, b)| (a - b).abs() * 64.0);
+        let others: f32 = cells.sum();
+        // The device rounds places along z to f32.
+        assert!(others <= 2.0, "{name}: {others} cells");
+        assert!(host.iter().any(|part| *part > 0.0 && *part < 1.0), "{name}");
+    }
+}
+
+#[test]
 fn a_mesh_that_is_open_or_beside_the_cube_is_refused() {
     let Some(gpu) = adapter() else { return };
     let middle = DVec3::splat(0.5);
@@ -134,7 +150,7 @@ fn a_mesh_that_is_open_or_beside_the_cube_is_refused() {
     open.triangles.swap_remove(40);
     let reason = coverage(&gpu, &open, 16).unwrap_err();
     assert!(
-        matches!(reason, VoxelError::Open { edges: 3, .. }),
+        matches!(reason, VoxelError::Open(OpenMesh { edges: 3, .. })),
         "{reason}"
     );
     assert!(
