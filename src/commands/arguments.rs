@@ -4,8 +4,8 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
-use raystone::run::{Registries, RunOptions, kernel_library};
-use raystone::scene::{SceneData, check_model};
+use raystone::run::{LEAST_FOR_TILES, Registries, RunOptions, kernel_library};
+use raystone::scene::{SceneData, check_files, check_model};
 use raystone::text::{nearest, plain_text};
 use std::fs::File;
 use std::io::{IsTerminal as _, Read as _};
@@ -187,6 +187,20 @@ pub fn plan(experiment: &Experiment, only: &[String], registries: &Registries) -
     };
     for scene in plan.scenes.iter().filter(|scene| is_model(&scene.name)) {
         check_model(Path::new(&scene.name))?;
+    }
+    for scene in &plan.scenes {
+        check_files(scene)?;
+    }
+    let by_tile = experiment.stop.is_some_and(|rule| rule.tile.is_some());
+    if by_tile
+        && plan.samplers.iter().any(|cell| cell.randomised)
+        && (plan.replicates as usize) < LEAST_FOR_TILES
+    {
+        bail!(
+            "`run.stop.tile` ends tiles by what replicates say of each other, which takes {LEAST_FOR_TILES} or more, and there are {}: \
+             raise `run.replicates`",
+            plan.replicates
+        );
     }
     Ok(plan)
 }

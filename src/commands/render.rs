@@ -42,7 +42,7 @@ pub struct Render {
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse_size)]
     size: [u32; 2],
     /// Seed [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u32>,
     /// Order of the pixels: each sample in one-pass, in 16 blocks, or one pixel of each tile of 16 x 16 at a time, which
     /// shows a coarse picture after the first of 256 passes (quad-tree); at most 256 spp, and no other picture than the first and

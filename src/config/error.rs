@@ -108,7 +108,7 @@ pub enum ConfigError {
         expected: String,
     },
     /// An axis or list of parameter values is empty.
-    #[error("{at}: `{key}` is empty; list at least one value, or leave the key out")]
+    #[error("{at}: `{key}` is empty; list at least one value")]
     Empty {
         /// The place.
         at: Place,

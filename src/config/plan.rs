@@ -161,7 +161,7 @@ impl Plan {
         if self.structures.is_empty() && self.benches.is_empty() {
             let filters = if only.is_empty() { "" } else { " and --only" };
             return Err(nothing_left(format!(
-                "the excludes{filters} leave no scene with a structure"
+                "the excludes and conditions (`when`){filters} leave no scene with a structure"
             )));
         }
         Ok(self)

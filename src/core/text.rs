@@ -25,18 +25,28 @@ pub fn plain_text(bytes: Vec<u8>) -> Result<String, NotUtf8> {
     })
 }
 
-/// [`plain_text`] for formats older than UTF-8: invalid UTF-8 is read as Latin-1, byte by byte, so
-/// different names stay different.
+/// [`plain_text`] for formats older than UTF-8: invalid UTF-8 is read as Windows-1252, byte by byte, so different names stay
+/// different. It is Latin-1 with letters in the place of control characters, which names do not have (WHATWG Encoding).
 pub fn plain_text_or_latin1(bytes: Vec<u8>) -> String {
     String::from_utf8(plain_bytes(bytes)).unwrap_or_else(|error| {
         let mut text = String::with_capacity(error.as_bytes().len());
         for chunk in error.as_bytes().utf8_chunks() {
             text.push_str(chunk.valid());
-            text.extend(chunk.invalid().iter().map(|byte| char::from(*byte)));
+            text.extend(chunk.invalid().iter().map(|byte| match byte {
+                0x80..=0x9f => WINDOWS[usize::from(byte - 0x80)],
+                _ => char::from(*byte),
+            }));
         }
         text
     })
 }
+
+/// Windows-1252 from 0x80 to 0x9f; the five bytes that it leaves open are control characters, as in Latin-1.
+const WINDOWS: [char; 32] = [
+    '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž',
+    '\u{8f}', //
+    '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
+];
 
 /// [`plain_text`] for bytes that may not be UTF-8.
 fn plain_bytes(mut bytes: Vec<u8>) -> Vec<u8> {
@@ -164,6 +174,9 @@ mod tests {
         let latin1 = b"a\rb \xfc\xe9\r\n".to_vec();
         assert_eq!(plain_text(latin1.clone()), Err(NotUtf8 { line: 2 }));
         assert_eq!(plain_text_or_latin1(latin1), "a\nb \u{fc}\u{e9}\n");
+        let windows = b"wood \x96 \x93dark\x94 \x80\x81\x8c\x9f\xa0".to_vec();
+        let expected = "wood \u{2013} \u{201c}dark\u{201d} \u{20ac}\u{81}\u{152}\u{178}\u{a0}";
+        assert_eq!(plain_text_or_latin1(windows), expected);
     }
 
     #[test]

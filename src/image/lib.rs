@@ -9,12 +9,13 @@ mod formats;
 mod picture;
 mod primaries;
 mod read;
+mod upright;
 
 pub use color::*;
 pub use exr_file::Attribute;
 pub use formats::*;
 pub use picture::*;
-pub use primaries::other_primaries;
+pub use primaries::{is_cube_map, other_primaries};
 pub use read::{read_linear, read_npy_array};
 
 use std::io;

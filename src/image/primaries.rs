@@ -16,12 +16,7 @@ const HEADER: u64 = 1 << 16;
 /// The primaries of an OpenEXR or Radiance file (x and y of red, green, blue and white) where they
 /// are not those of Rec. 709. [`read_linear`](super::read_linear) does not convert them.
 pub fn other_primaries(path: &Path) -> Option<[f32; 8]> {
-    let (file, _) = raystone_core::files::files().open(path).ok()?;
-    let mut start = Vec::new();
-    BufReader::new(file)
-        .take(HEADER)
-        .read_to_end(&mut start)
-        .ok()?;
+    let start = start_of(path)?;
     let ending = path.extension()?.to_ascii_lowercase();
     let found = match ending.to_str()? {
         "hdr" => of_radiance(&start),
@@ -31,6 +26,34 @@ pub fn other_primaries(path: &Path) -> Option<[f32; 8]> {
     }?;
     let mut pairs = found.iter().zip(REC_709);
     (!pairs.all(|(x, known)| (x - known).abs() <= SAME)).then_some(found)
+}
+
+/// True for an OpenEXR file whose `envmap` says that it has the six sides of a cube, as `exrenvmap` writes by default.
+#[cfg(feature = "exr")]
+pub fn is_cube_map(path: &Path) -> bool {
+    let is_exr = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+    let meta = start_of(path)
+        .filter(|_| is_exr)
+        .and_then(|start| exr::meta::MetaData::read_from_buffered(&start[..], false).ok());
+    let map = meta.and_then(|meta| meta.headers.first()?.own_attributes.environment_map);
+    map == Some(exr::meta::attribute::EnvironmentMap::Cube)
+}
+
+/// OpenEXR files are not read.
+#[cfg(not(feature = "exr"))]
+pub fn is_cube_map(_: &Path) -> bool {
+    false
+}
+
+/// The bytes in which a header is.
+fn start_of(path: &Path) -> Option<Vec<u8>> {
+    let (file, _) = raystone_core::files::files().open(path).ok()?;
+    let mut start = Vec::new();
+    let mut reader = BufReader::new(file).take(HEADER);
+    reader.read_to_end(&mut start).ok()?;
+    Some(start)
 }
 
 fn of_radiance(start: &[u8]) -> Option<[f32; 8]> {
@@ -90,6 +113,26 @@ mod tests {
         }
         assert_eq!(of("a.pfm", file(&words).as_bytes()), None);
         assert_eq!(of("a.exr", b"short"), None);
+    }
+
+    #[cfg(feature = "exr")]
+    #[test]
+    fn cube_maps_of_exr_are_told_from_others() {
+        use exr::meta::attribute::EnvironmentMap::{Cube, LatitudeLongitude};
+        use exr::prelude::*;
+        let folder = tempfile::tempdir().unwrap();
+        for (kind, expected) in [
+            (None, false),
+            (Some(LatitudeLongitude), false),
+            (Some(Cube), true),
+        ] {
+            let pixel = |_| (1.0_f32, 1.0_f32, 1.0_f32);
+            let mut image = Image::from_channels((2, 12), SpecificChannels::rgb(pixel));
+            image.layer_data.attributes.environment_map = kind;
+            let path = folder.path().join("a.exr");
+            image.write().to_file(&path).unwrap();
+            assert_eq!(is_cube_map(&path), expected, "{kind:?}");
+        }
     }
 
     #[cfg(feature = "exr")]

@@ -66,6 +66,9 @@ pub(super) fn checked_size(width: u64, height: u64) -> Result<[u32; 2], String> 
 }
 
 pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
+    if let Some((file, turn)) = super::upright::upright(bytes) {
+        return turn.undone(&read_hdr(&file)?);
+    }
     // Some programs write the encoding's name first; the rest is the same.
     let strict = !bytes.starts_with(b"#?RGBE");
     let decoder = HdrDecoder::with_strictness(Cursor::new(bytes), strict);
@@ -192,6 +195,9 @@ pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
     let (header, data) = npy_parts(bytes).ok_or("it does not begin with a header of NumPy")?;
     let kind = kind_of(bytes);
     let shape = entry(header, "shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next());
+    if entry(header, "descr").is_some_and(|rest| rest.starts_with('[')) {
+        return Err("its values are records of fields: save one field alone".to_owned());
+    }
     let (Some(kind), Some(shape)) = (kind, shape) else {
         return Err("its header has no `descr` or no `shape`".to_owned());
     };
@@ -434,6 +440,9 @@ mod tests {
         assert_eq!(values("<i2", &[0xff, 0xff, 1, 1]), Ok(vec![-1.0, 257.0]));
         assert!(values("<c8", &[0; 16]).unwrap_err().contains("`<c8`"));
         assert!(refused("a.npy", b"\x93NUMPY\x01").contains("NumPy"));
+        let fields = header("<f4", "2").replace("'<f4'", "[('r', '<f4'), ('g', '<f4')]");
+        let message = read_npy_array(&npy(1, &fields, &[0; 16])).unwrap_err();
+        assert!(message.contains("records of fields"), "{message}");
     }
 
     #[test]

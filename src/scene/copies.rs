@@ -22,7 +22,7 @@ const FINEST: u32 = 1 << 16;
 /// unchanged if it is small enough already.
 ///
 /// # Errors
-/// [`SceneError::NoTriangles`] if no grid gives so few triangles.
+/// [`SceneError::TooFew`] if no grid gives so few triangles.
 pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneData, SceneError> {
     if scene.triangles.len() <= most {
         return Ok(scene);
@@ -38,6 +38,10 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
         } else {
             too_fine = cells;
         }
+    }
+    if kept.is_empty() {
+        let (name, count) = (scene.name, scene.triangles.len());
+        return Err(SceneError::TooFew { name, most, count });
     }
     for material in &mut scene.materials {
         material.texture_uses_mut().for_each(|used| *used = None);
@@ -312,7 +316,10 @@ mod tests {
         let many = with("copies", 4096);
         assert!(many.contains("most_triangles = 24414"), "{many}");
         let none = with("most_triangles", 1);
-        assert!(none.contains("no triangles"), "{none}");
+        assert!(
+            none.contains("leaves none of 59688 triangles; raise it"),
+            "{none}"
+        );
         assert!(named("city").is_ok());
     }
 

@@ -43,6 +43,12 @@ impl EnvironmentMap {
         super::error::open(path)?;
         let map = raystone_image::read_linear(path).map_err(|error| match error {
             raystone_image::ImageError::Decode { reason, .. } => malformed(reason),
+            raystone_image::ImageError::UnknownFormat { .. } => SceneError::Unsupported {
+                path: path.to_owned(),
+                place: String::new(),
+                problem: "this kind of image".to_owned(),
+                advice: "give one of linear light: .exr, .hdr, .pfm or .npy",
+            },
             error => malformed(error.to_string()),
         })?;
         if let Some([rx, ry, gx, gy, bx, by, wx, wy]) = raystone_image::other_primaries(path) {
@@ -52,7 +58,18 @@ impl EnvironmentMap {
                 path.display()
             ));
         }
+        if raystone_image::is_cube_map(path) {
+            let problem = "it has the six sides of a cube; make it a map by latitude and longitude: exrenvmap -l IN.exr OUT.exr";
+            return Err(malformed(problem.to_owned()));
+        }
         let (width, height) = (map.width, map.height);
+        if width == height && width > 1 {
+            warnings.push(format!(
+                "{}: it is {width} × {height} texels, like pictures of mirror balls; it is taken as a map by latitude and longitude, \
+                 which is twice as wide as high",
+                path.display()
+            ));
+        }
         let texels = map.pixels.into_iter().map(Vec3::from).collect();
         Self::new(
             &path.display().to_string(),

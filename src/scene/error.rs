@@ -25,7 +25,7 @@ pub enum SceneError {
         path: PathBuf,
     },
     /// The operating system could not read the file.
-    #[error("{}: cannot read the model ({source}); check the path and its permissions", path.display())]
+    #[error("{}: cannot read the file ({source}); check the path and its permissions", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -75,6 +75,16 @@ pub enum SceneError {
         name: String,
         /// The reason.
         reason: String,
+    },
+    /// No grid of merged vertices gives so few triangles.
+    #[error("{name}: `most_triangles = {most}` leaves none of {count} triangles; raise it")]
+    TooFew {
+        /// The scene, as typed.
+        name: String,
+        /// Triangles that it may have.
+        most: usize,
+        /// Triangles that it has.
+        count: usize,
     },
     /// Coordinates so large that f32 arithmetic on them overflows.
     #[error(

@@ -221,9 +221,11 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
     for parameter in MediumParameters::schema() {
         (medium.0).extend(variant.params.0.remove_entry(parameter.name));
     }
+    let idle = MediumParameters::idle(&medium);
     let medium = MediumParameters::from_params(&medium)?;
     let common = common.completed(&common_parameters())?;
     let mut scene = load_alone(&variant, options)?;
+    scene.report.warnings.extend(idle);
     let number = |name| match common.0.get(name) {
         Some(ParamValue::Integer(number @ 1..)) => Some(*number as usize),
         _ => None,
@@ -316,6 +318,23 @@ fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Sce
             hint: builtin::hint(name),
         }),
     }
+}
+
+/// Checks that the files which the parameters of a scene name can be opened: its environment and its medium.
+///
+/// # Errors
+/// The first that cannot.
+pub fn check_files(variant: &Variant) -> Result<(), SceneError> {
+    let named = [ENVIRONMENT, "medium", "absorber"].map(|name| variant.params.0.get(name));
+    for value in named.into_iter().flatten() {
+        match value {
+            ParamValue::Name(file) if Path::new(file).extension().is_some() => {
+                error::open(Path::new(file))?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Checks a model file without loading it: known format, not empty, and a plausible beginning.

@@ -3,6 +3,7 @@
 use super::{SceneData, SceneError, extension, named};
 use glam::{DVec3, Vec3};
 use raystone_core::parameters;
+use raystone_core::params::{ParamValue, Parameters as _, Params};
 use raystone_volume::files::Grid;
 use raystone_volume::volume::voxels;
 use raystone_volume::{Bounds, MediaError, Phase, Volume, grid, phase, solid};
@@ -69,6 +70,26 @@ parameters! {
 }
 
 impl MediumParameters {
+    /// A warning of parameters that say nothing, because no `medium` is given.
+    pub(super) fn idle(params: &Params) -> Option<String> {
+        let is_given =
+            |value: &ParamValue| !matches!(value, ParamValue::Name(name) if name.is_empty());
+        if params.0.get("medium").is_some_and(is_given) {
+            return None;
+        }
+        let changed = Self::schema().into_iter().filter(|parameter| {
+            let value = params.0.get(parameter.name);
+            value.is_some_and(|value| *value != parameter.default)
+        });
+        let names: Vec<String> = changed.map(|p| format!("`{}`", p.name)).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{} of a medium say nothing without `medium`, its kind: give `medium = \"constant\"`, for instance",
+                names.join(", ")
+            )
+        })
+    }
+
     /// The scene with this medium, or as it is.
     pub(super) fn applied(&self, mut scene: SceneData) -> Result<SceneData, SceneError> {
         if self.medium.is_empty() {
@@ -376,6 +397,24 @@ mod tests {
         assert!(flat.to_string().contains("above zero"), "{flat}");
         let missing = try_load_with("cornell-box", &[("medium", name("no.ply"))]).unwrap_err();
         assert!(missing.to_string().contains("no.ply"), "{missing}");
+    }
+
+    #[test]
+    fn parameters_of_a_medium_that_is_not_there_are_named() {
+        let scene = load_with("cornell-box", &[("scattering", Number(2.0))]);
+        assert!(scene.medium.is_none());
+        let said = scene.report.warnings.join("\n");
+        assert!(
+            said.contains("`scattering` of a medium say nothing"),
+            "{said}"
+        );
+        for silent in [
+            vec![],
+            vec![("medium", name("constant")), ("scattering", Number(2.0))],
+        ] {
+            let said = load_with("cornell-box", &silent).report.warnings.join("\n");
+            assert!(!said.contains("say nothing"), "{said}");
+        }
     }
 
     #[test]

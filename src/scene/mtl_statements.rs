@@ -69,6 +69,11 @@ impl Definition {
         };
         let source = &mut self.source;
         let key = keyword.to_ascii_lowercase();
+        if color.is_some_and(|parts| parts.iter().any(|part| *part < 0.0))
+            && COLORS.contains(&&*key)
+        {
+            unread.see(&format!("what is below 0 in `{keyword}`"), line);
+        }
         let is_read = match key.as_str() {
             "ka" => true,
             "kd" => set(&mut self.diffuse, color),
@@ -111,6 +116,9 @@ impl Definition {
         // roughness is the square root of alpha.
         let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
         let source = &mut self.source;
+        if source.roughness.is_some() && source.metallic.is_none() {
+            unread.see("`Pr` without `Pm`", self.line);
+        }
         source.roughness = source.roughness.or(source.shininess.map(phong));
         if let Some((transparency, line)) = self.transparency {
             let opacity = *source.opacity.get_or_insert(1.0 - transparency);
@@ -122,6 +130,9 @@ impl Definition {
         self
     }
 }
+
+/// Keywords of colours.
+const COLORS: [&str; 4] = ["kd", "ke", "ks", "tf"];
 
 /// Keywords of [`Definition::maps`].
 const MAPS: [&str; 4] = ["map_kd", "map_ke", "map_d", "norm"];

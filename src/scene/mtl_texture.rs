@@ -41,11 +41,9 @@ pub(super) fn statement(text: &str) -> Statement {
             if option == "-imfchan" {
                 channel = channel_of(word);
             }
-            if taken >= least && number.is_none() {
+            // The last word is the file, whatever it looks like: `nano.png` is no number that a program wrote oddly.
+            if taken >= least && (number.is_none() || after.is_empty()) {
                 break;
-            }
-            if taken == 0 && option == "-clamp" && word == "on" {
-                place.wrap = [Wrap::Clamp; 2];
             }
             numbers.extend(number.filter(|x: &f32| x.is_finite()));
             rest = after;
@@ -58,10 +56,12 @@ pub(super) fn statement(text: &str) -> Statement {
             "-s" => scale = pair(scale),
             "-o" => offset = pair(offset),
             "-bm" => place.scale = numbers.first().copied().unwrap_or(1.0),
-            "-clamp" | "-imfchan" => {}
+            "-clamp" if value.eq_ignore_ascii_case("on") => place.wrap = [Wrap::Clamp; 2],
+            "-clamp" if value.eq_ignore_ascii_case("off") => {}
+            "-imfchan" if channel.is_some() => {}
             "-mm" if numbers == [0.0, 1.0] => {}
-            "-blendu" | "-blendv" if value == "on" => {}
-            "-cc" if value == "off" => {}
+            "-blendu" | "-blendv" if value.eq_ignore_ascii_case("on") => {}
+            "-cc" if value.eq_ignore_ascii_case("off") => {}
             _ => skipped.push(option.to_owned()),
         }
     }
@@ -121,6 +121,18 @@ mod tests {
         let odd = statement("-blendu on -blendv off -mm 0.1 1 -boost 2 a.png");
         assert_eq!(odd.file, "a.png");
         assert_eq!(odd.skipped, ["-blendv", "-mm", "-boost"]);
+        let odd = statement("-imfchan z -clamp ON -clamp maybe a.png");
+        assert_eq!((odd.place.wrap, odd.channel), ([Wrap::Clamp; 2], None));
+        assert_eq!(odd.skipped, ["-imfchan", "-clamp"]);
+        for (text, file) in [
+            ("-s 2 2 nano_tex.png", "nano_tex.png"),
+            ("-o 0.5 nandina.png", "nandina.png"),
+            ("-t 0 tile.#1.png", "tile.#1.png"),
+            ("-s 2 2 2 infinity.png", "infinity.png"),
+            ("-bm 1 1.png", "1.png"),
+        ] {
+            assert_eq!(statement(text).file, file);
+        }
         assert_eq!(statement("c:\\my files\\a.png").file, "c:/my files/a.png");
         assert_eq!(
             statement("-s 2 a.png").place.linear,

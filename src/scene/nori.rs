@@ -90,16 +90,56 @@ impl Reader<'_> {
         Ok(())
     }
 
+    /// Names the children of a node that are neither of these elements nor values of these names.
+    fn warn_of_others(&mut self, node: Node<'_, '_>, elements: &[&str], values: &[&str]) {
+        for child in node.children().filter(Node::is_element) {
+            let (element, name) = (child.tag_name().name(), child.attribute("name"));
+            let is_value =
+                child.has_attribute("value") && name.is_some_and(|n| values.contains(&n));
+            if !is_value && !elements.contains(&element) {
+                let named = name.map_or(String::new(), |name| format!(" `{name}`"));
+                let owner = node.tag_name().name();
+                self.warn(
+                    child,
+                    &format!("`<{element}>`{named} of `<{owner}>` is not read"),
+                );
+            }
+        }
+    }
+
     /// Sets the camera; returns the reflection to apply to the scene if it is mirrored.
     fn camera(&mut self, node: Node<'_, '_>) -> Result<Option<DMat4>, SceneError> {
+        if let Some(kind) = node.attribute("type").filter(|kind| *kind != "perspective") {
+            self.warn(
+                node,
+                &format!("the camera `{kind}` is not known; drawn as perspective"),
+            );
+        }
+        // What makes an image of light, and how deep it is, is asked of the run.
+        let others = ["transform", "rfilter", "sampler"];
+        let values = ["width", "height", "fov", "nearClip", "farClip"];
+        self.warn_of_others(node, &others, &values);
         let to_world = self.to_world(node)?;
         let [width, height] = ["width", "height"].map(|name| self.number(node, name));
         let (width, height) = (width?.unwrap_or(SIZE[0]), height?.unwrap_or(SIZE[1]));
         let fov = self.number(node, "fov")?.unwrap_or(FOV);
+        if !(fov > 0.0 && fov < 180.0) || !(width >= 1.0 && height >= 1.0) {
+            let problem = format!(
+                "a camera of {width} × {height} pixels with a field of view of {fov}° sees nothing: it takes 0° to 180°"
+            );
+            return Err(self.broken(node, &problem));
+        }
         let half_width = (0.5 * fov.to_radians()).tan();
         let vertical = 2.0 * (half_width * height / width).atan();
         let [left, up, forward, eye] = to_world.to_cols_array_2d().map(DVec4::from_array);
         let [left, up, forward, eye] = [left, up, forward, eye].map(|v| v.truncate());
+        if [left, up, forward]
+            .iter()
+            .any(|axis| !(axis.length() > 0.0))
+        {
+            let problem = "the camera's `toWorld` has no directions: the target is at the origin, or `up` is along the view";
+            return Err(self.broken(node, problem));
+        }
         self.look.camera = Some(Camera {
             eye: eye.as_vec3(),
             target: (eye + forward.normalize_or_zero()).as_vec3(),
@@ -132,6 +172,7 @@ impl Reader<'_> {
             _ => obj::load(&path, file, &plain)?,
         };
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
+        self.warn_of_others(node, &["bsdf", "emitter", "transform"], &["filename"]);
         let material = self.material(node, file)?;
         let sky = mesh.daylight.as_ref().map(|sky| sky.note());
         let told = mesh.report.warnings.iter();
@@ -174,6 +215,7 @@ impl Reader<'_> {
                 self.warn(emitter, "an emitter of a mesh that is not `area`, left out");
                 continue;
             }
+            self.warn_of_others(emitter, &[], &["radiance"]);
             let radiance = self.color(emitter, "radiance")?.unwrap_or(Vec3::ZERO);
             material = material.emitting_from_front(emitted(radiance));
         }
@@ -182,6 +224,15 @@ impl Reader<'_> {
 
     fn bsdf(&mut self, node: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {
         let kind = node.attribute("type").unwrap_or_default();
+        let values: &[&str] = match kind {
+            "diffuse" => &["albedo"],
+            "dielectric" => &["intIOR", "extIOR"],
+            "microfacet" => &["kd", "alpha", "intIOR", "extIOR"],
+            _ => &[],
+        };
+        if matches!(kind, "diffuse" | "mirror" | "dielectric" | "microfacet") {
+            self.warn_of_others(node, &[], values);
+        }
         let inside = self
             .number(node, "intIOR")?
             .map_or(INSIDE_IOR, |v| v as f32);

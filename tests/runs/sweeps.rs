@@ -113,6 +113,17 @@ fn a_finished_run_is_resumed_without_an_adapter_and_stays_to_the_byte() {
     let after = fs::read(folder.path().join("records.jsonl")).expect("records");
     assert!(before == after, "the records changed");
     assert!(!folder.path().join("partial").exists());
+    // A plan without some of the cells would drop what was measured there.
+    let narrow = experiment(&["axes.accel = ['bvh']"]);
+    let refused = run_with(&narrow, resumed(folder.path())).expect_err("cells are left out");
+    let refused = refused.to_string();
+    assert!(
+        refused.contains("uniform-grid") && refused.contains("--out"),
+        "{refused}"
+    );
+    let after = fs::read(folder.path().join("records.jsonl")).expect("records");
+    assert!(before == after, "the records changed");
+    assert!(!folder.path().join("partial").exists());
 }
 
 #[test]

@@ -14,6 +14,8 @@ use raystone_stats::adaptive::{LEAST_GROUP, Tiles, samples_needed, tile_error};
 
 /// Groups of replicates, each of which decides for the other.
 const GROUPS: usize = 2;
+/// Replicates that tiles need to end on their own.
+pub const LEAST_FOR_TILES: usize = GROUPS * LEAST_GROUP;
 
 /// Renders all replicates of one sampler, each tile with as many samples as it needs. Errors are
 /// recorded at the mean number of samples per pixel.
@@ -30,10 +32,9 @@ pub(super) fn by_tile(
         edge,
     };
     let seeds = replicates(session, cell);
-    if seeds.len() < GROUPS * LEAST_GROUP {
+    if seeds.len() < LEAST_FOR_TILES {
         return Err(Fault::Cell(format!(
-            "tiles are ended by what {} replicates or more say of each other, and there are {}: raise `run.replicates`",
-            GROUPS * LEAST_GROUP,
+            "tiles are ended by what {LEAST_FOR_TILES} replicates or more say of each other, and there are {}: raise `run.replicates`",
             seeds.len()
         )));
     }

@@ -49,6 +49,7 @@ mod units;
 mod words;
 mod world;
 
+pub use adaptive::LEAST_FOR_TILES;
 pub use cost::{Cost, Work};
 pub use error::RunError;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder, records_in};
@@ -114,6 +115,9 @@ pub fn run(
     let mut session = Session::new(experiment, plan, registries, options)?;
     session.keep_shard();
     let earlier = session.recorder.take_earlier();
+    earlier
+        .check_whole(&session.ledger.units, &options.out)
+        .inspect_err(|_| session.recorder.abandon())?;
     let file = session.reference_file.as_ref();
     let mut current = Current::new(experiment, file, registries, &kernels);
     if !earlier.is_empty() {

@@ -30,9 +30,13 @@ impl ReferenceFile {
         let [width, height] = experiment.run.resolution;
         if [image.width, image.height] != [width, height] {
             let [w, h] = [image.width, image.height];
+            let or_else = match w.min(h) >= LEAST_SIDE {
+                true => format!(", or set run.resolution=[{w}, {h}]"),
+                false => String::new(),
+            };
             return Err(RunError::Input(format!(
                 "reference {name} has {w}×{h} pixels, and run.resolution is {width}×{height}: render one \
-                 of the size, or set run.resolution=[{w}, {h}]"
+                 of the size{or_else}"
             )));
         }
         let hash = image_hash(&image);
@@ -45,6 +49,9 @@ impl ReferenceFile {
         }))
     }
 }
+
+/// Least width and height of images of a run.
+const LEAST_SIDE: u32 = 16;
 
 /// BLAKE3 of the f32 pixels.
 pub(super) fn image_hash(image: &Image) -> String {

@@ -122,6 +122,31 @@ impl Earlier {
         &self.lines
     }
 
+    /// Refuses units that leave out cells which were measured: a run that goes on keeps those of its own plan alone.
+    ///
+    /// # Errors
+    /// How many they are, the first of them, and what keeps them.
+    pub(super) fn check_whole(&self, units: &[Unit], out: &Path) -> Result<(), RunError> {
+        let planned: HashSet<&str> = units.iter().map(|unit| unit.name.as_str()).collect();
+        let lost = self
+            .cells()
+            .into_iter()
+            .filter(|(name, cell)| cell.outcome == Outcome::Done && !planned.contains(name));
+        let lost: Vec<&str> = lost.map(|(name, _)| name).collect();
+        let Some(first) = lost.first() else {
+            return Ok(());
+        };
+        Err(RunError::Input(format!(
+            "{} holds cells that this plan leaves out: {first}{}. Going on would drop what was measured there: plan them, too, or write \
+             to another folder (--out)",
+            out.display(),
+            match lost.len() - 1 {
+                0 => String::new(),
+                others => format!(", and {others} more"),
+            },
+        )))
+    }
+
     /// What still holds of these units.
     pub(super) fn kept(&self, units: &[Unit], current: &Current) -> Kept {
         let cells = self.cells();

@@ -1,6 +1,7 @@
 //! Files as programs write them, with what is read of each and what is said about the rest.
 
 mod ies;
+mod nori;
 mod obj;
 mod ply;
 mod textures;

@@ -330,6 +330,15 @@ const MTL: &[(&str, Outcome)] = &[
     ),
     ("newmtl a\nKd 1 0 0\nKd 0.5f 0.f 0.0F", Reads("r", &[])),
     (
+        "newmtl a\nKd 1 -0.5 0",
+        Reads("r", &["what is below 0 in `Kd` (line 2)"]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nPr 0.5",
+        Reads("r", &["`Pr` without `Pm` (line 1)"]),
+    ),
+    ("newmtl a\nKd 1 0 0\nPr 0.5\nPm 0", Reads("r", &[])),
+    (
         "newmtl a # wall\nKd 1 0 0\nnewmtl a #2\nKd 0 1 0",
         Reads("r", &[]),
     ),

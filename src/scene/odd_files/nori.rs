@@ -1,0 +1,69 @@
+//! Nori's XML.
+
+use super::{Fails, Outcome, Reads, check, load_files};
+
+const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// What stands in `<mesh>` after the file's name, what stands in `<camera>` with its type, and what becomes of it.
+const NORI: &[(&str, &str, Outcome)] = &[
+    (
+        "<bsdf type=\"diffuse\"><color name=\"albedo\" value=\"1 0 0\"/></bsdf>",
+        "<camera type=\"perspective\"><float name=\"fov\" value=\"30\"/><float name=\"nearClip\" value=\"1\"/></camera>",
+        Reads("r", &[]),
+    ),
+    (
+        "<bsdf type=\"diffuse\"><color name=\"albeddo\" value=\"1 0 0\"/></bsdf>",
+        "",
+        Reads(
+            ".",
+            &["line 4: `<color>` `albeddo` of `<bsdf>` is not read"],
+        ),
+    ),
+    (
+        "<bsdf type=\"diffuse\"><texture type=\"checkerboard_color\" name=\"albedo\"/></bsdf>",
+        "",
+        Reads(".", &["`<texture>` `albedo` of `<bsdf>` is not read"]),
+    ),
+    (
+        "<medium type=\"homogeneous\"/>",
+        "",
+        Reads(".", &["`<medium>` of `<mesh>` is not read"]),
+    ),
+    (
+        "",
+        "<camera type=\"thinlens\"><float name=\"apertureRadius\" value=\"1\"/></camera>",
+        Reads(
+            ".",
+            &[
+                "the camera `thinlens` is not known; drawn as perspective",
+                "`<float>` `apertureRadius` of `<camera>` is not read",
+            ],
+        ),
+    ),
+    (
+        "",
+        "<camera type=\"perspective\"><float name=\"fov\" value=\"0\"/></camera>",
+        Fails(&["line 2", "field of view of 0°"]),
+    ),
+    (
+        "",
+        "<camera type=\"perspective\"><transform name=\"toWorld\"><lookat origin=\"0 0 1\" target=\"0 0 1\" up=\"0 1 0\"/></transform></camera>",
+        Fails(&["line 2", "has no directions"]),
+    ),
+    (
+        "",
+        "<camera type=\"perspective\"><transform name=\"toWorld\"><lookat origin=\"0 0 1\" target=\"0 0 0\" up=\"0 0 1\"/></transform></camera>",
+        Fails(&["line 2", "has no directions"]),
+    ),
+];
+
+#[test]
+fn nori_files_as_found_are_read() {
+    for (mesh, camera, expected) in NORI {
+        let text = format!(
+            "<scene>\n{camera}\n<mesh type=\"obj\"><string name=\"filename\" value=\"m.obj\"/>\n{mesh}</mesh></scene>"
+        );
+        let files: [(&str, &[u8]); 2] = [("a.xml", text.as_bytes()), ("m.obj", MESH)];
+        check(&text, load_files(&files), expected);
+    }
+}
