@@ -523,6 +523,7 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         "photons = 48\ngeneral_steps = true\ncontent = [\"fog\", \"cloud\"]",
         "photons = 48\ngeneral_ways = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
+        "content = \"shadow\"\nmode = \"adaptive\"\nwarp = [\"alias\", \"hierarchical\"]",
         "photons = 48\ncontent = [\"ball\", \"cube\", \"lens\", \"torus\"]",
         "photons = 32\nmode = \"adaptive\"\ncontent = \"ball\"\nfilter = \"both\"",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\nfilter = [\"blur\", \"constant\", \"count\", \"surround\", \"weight\", \"both\"]",

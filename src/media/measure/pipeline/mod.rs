@@ -162,6 +162,11 @@ impl Load {
         })
     }
 
+    /// True if points are sent to cells by a table, which undoes how even they are.
+    fn is_shuffled(&self) -> bool {
+        self.mode == Mode::Adaptive && self.warp == Warp::Alias
+    }
+
     fn smoothing(&self) -> Smoothing {
         Smoothing {
             filter: self.filter,

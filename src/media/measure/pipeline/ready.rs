@@ -89,7 +89,8 @@ impl Ready {
                 Filter::None => load.content.blur(load.side),
                 _ => load.content.blur_of_smooth(load.side),
             },
-            even: load.points != Points::Random,
+            // An alias table sends neighbours to places of their own.
+            even: load.points != Points::Random && !load.is_shuffled(),
             unit: pipeline.unit(),
             smoothing: load.smoothing(),
             adaptive,
