@@ -22,7 +22,8 @@
 //!
 //! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance (other
 //! surfaces are counted separately, up to the number of paths that meet surfaces with another
-//! within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
+//! within rounding; flips of one sample count as one where all pixels draw its numbers, since one
+//! that is on a boundary is so in every pixel, such as the 0 with which sequences begin), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
 //! left within a texel, so the last two have separate bounds for textures.
 
@@ -35,6 +36,7 @@ use raystone_gpu::GpuError;
 use raystone_image::Image;
 use raystone_record::PathsRecord;
 use raystone_render::{BLOCK_SAMPLES, Renderer};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -222,9 +224,29 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
             let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
             Some(describe(&answers[i], &truth[i]) + &played)
         }
-        None => out_of_bounds(&record, oracle.texturing()),
+        None => {
+            let sampler = view.sampler;
+            let flips = || {
+                let flips =
+                    |class: &Class| matches!(class, Class::Flip(Parting::Edge | Parting::Decision));
+                let classes = differing.iter().zip(&classes);
+                classes.filter(move |(_, class)| flips(class))
+            };
+            let repeated = match sampler.is_random() {
+                true => 0,
+                false => most_of_one(flips().map(|(&i, _)| answers[i].id.sample)).saturating_sub(1),
+            };
+            out_of_bounds(&record, repeated, oracle.texturing())
+        }
     };
     record
+}
+
+/// How often the value is there that is there most often.
+fn most_of_one(values: impl Iterator<Item = u32>) -> usize {
+    let mut counts = BTreeMap::new();
+    values.for_each(|value| *counts.entry(value).or_default() += 1);
+    counts.into_values().max().unwrap_or(0)
 }
 
 /// The radiance below which differences of these paths are ignored.
@@ -359,8 +381,9 @@ fn most(paths: usize, share: f64) -> usize {
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// Checks the totals of a record against their bounds; `texturing` comes from the oracle.
-pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
+/// Checks the totals of a record against their bounds; `repeated` flips are those of numbers that other pixels drew, too,
+/// `texturing` comes from the oracle.
+pub fn out_of_bounds(record: &PathsRecord, repeated: usize, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
         paths,
@@ -381,7 +404,7 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let strange = strange.then(|| {
         format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
     });
-    over("take another branch", flips - surfaces, FLIPS)
+    over("take another branch", flips - surfaces - repeated, FLIPS)
         .or(strange)
         .or_else(|| over("are ill-conditioned", ill_conditioned, share))
         .or_else(|| {
