@@ -123,7 +123,8 @@ impl Reader<'_> {
         let [width, height] = ["width", "height"].map(|name| self.number(node, name));
         let (width, height) = (width?.unwrap_or(SIZE[0]), height?.unwrap_or(SIZE[1]));
         let fov = self.number(node, "fov")?.unwrap_or(FOV);
-        if !(fov > 0.0 && fov < 180.0) || !(width >= 1.0 && height >= 1.0) {
+        let has_view = fov > 0.0 && fov < 180.0 && width >= 1.0 && height >= 1.0;
+        if !has_view {
             let problem = format!(
                 "a camera of {width} × {height} pixels with a field of view of {fov}° sees nothing: it takes 0° to 180°"
             );
@@ -135,7 +136,7 @@ impl Reader<'_> {
         let [left, up, forward, eye] = [left, up, forward, eye].map(|v| v.truncate());
         if [left, up, forward]
             .iter()
-            .any(|axis| !(axis.length() > 0.0))
+            .any(|axis| axis.try_normalize().is_none())
         {
             let problem = "the camera's `toWorld` has no directions: the target is at the origin, or `up` is along the view";
             return Err(self.broken(node, problem));

@@ -62,7 +62,7 @@ fn a_test_that_is_not_exact_breaks_even_with_nobody_however_fast_it_is_built() {
     }
     let data = RunData::new(&lines);
     let values = sections::trade_off::break_even(&data.scenes[0]);
-    let exact = |value: &Value| value.key.label(axis::TRIANGLE) == "watertight";
+    let exact = |value: &crate::values::Value| value.key.label(axis::TRIANGLE) == "watertight";
     assert!(!values.is_empty() && values.iter().all(exact));
     let (_, summary) = report("inexact", &lines);
     let mut ranked = summary.lines().filter(|line| line.contains("fastest"));
