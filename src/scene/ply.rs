@@ -54,8 +54,8 @@ struct Model {
     normals: Vec<Vec3>,
     /// Faces before the vertices: index, number of corners, corners.
     early: Vec<u32>,
-    /// Their colours, linear. Empty if faces have none that are shown.
-    early_colors: Vec<Vec3>,
+    /// Their colours, linear, where they have some that are shown.
+    early_colors: Vec<Option<Vec3>>,
     /// True if vertices or faces have colours.
     has_colors: bool,
     odd: Odd,
@@ -231,7 +231,7 @@ impl Model {
                 true => {
                     self.early.extend([index as u32, corners.len() as u32]);
                     self.early.extend(corners);
-                    self.early_colors.extend(color);
+                    self.early_colors.push(color);
                     Ok(())
                 }
                 false => self.push_face(index, corners, color),
@@ -250,7 +250,7 @@ impl Model {
         while let [index, count, after @ ..] = rest {
             let (corners, after) = after.split_at(*count as usize);
             let broken = |problem| (format!("face {index}"), problem);
-            self.push_face(*index as usize, corners, colors.next())
+            self.push_face(*index as usize, corners, colors.next().flatten())
                 .map_err(broken)?;
             rest = after;
         }

@@ -82,6 +82,10 @@ const PLY: &[(&str, Outcome)] = &[
         Reads("gbb", &["1 face has a colour beyond 0 to 1 (face 1)"]),
     ),
     (
+        "element tristrips 1\nproperty list int int vertex_indices\nF1property uchar red\nproperty uchar green\nproperty uchar blue\nV4E 5 0 1 3 2 -1\n3 0 1 2 255 0 0\nC",
+        Reads("..r", &[]),
+    ),
+    (
         "V4property uchar red\nproperty uchar green\nproperty uchar blue\nF1property uchar red\nproperty uchar green\nproperty uchar blue\nE 0 0 0 255 0 0\n1 0 0 255 0 0\n1 1 0 255 0 0\n0 1 0 255 0 0\n4 0 1 2 3 0 0 255\n",
         Reads(
             "rr",
