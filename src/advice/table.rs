@@ -113,7 +113,11 @@ impl AdviceTable {
     /// # Errors
     /// It is not TOML of this form, has no choices, or was fitted on other features.
     pub fn parse(text: &str) -> Result<Self, AdviceError> {
-        let table: Self = toml::from_str(text).map_err(|e| AdviceError::Syntax(e.to_string()))?;
+        let table: Self = toml::from_str(text).map_err(|e| {
+            let before = e.span().and_then(|span| text.get(..span.start));
+            let line = before.map_or(0, |before| before.matches('\n').count()) + 1;
+            AdviceError::Syntax(format!("line {line}: {}", e.message()))
+        })?;
         if table.choices.is_empty() {
             return Err(AdviceError::Empty("the table has no choices".to_owned()));
         }

@@ -100,7 +100,7 @@ parameters! {
         /// An image (.exr, .hdr, .pfm, .npy) of the run's resolution to compare with in place of a rendered one, relative
         /// to the current directory; its own noise is not known.
         file: Option<PathBuf> = None;
-        /// Samples per pixel of the reference image, both halves together.
+        /// Samples per pixel of the reference image, its eight parts together: rounded down to a multiple of 8, at least 8.
         spp: u32 = 16384, in 2..=1 << 24;
         /// Sequence of the reference, with its default parameters.
         sequence: Variant = Variant::plain("pixel-hash"), where entry_of("sequence");

@@ -284,7 +284,10 @@ fn in_c_order(sizes: &[u64], values: &[f32]) -> Vec<f32> {
 
 pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
     // Integers of an image would be codes of a display, not radiance.
-    let is_float = |kind: &str| kind[1.min(kind.len())..].starts_with('f');
+    let is_float = |kind: &str| {
+        kind.trim_start_matches(['<', '>', '=', '|'])
+            .starts_with('f')
+    };
     if let Some(kind) = kind_of(bytes).filter(|kind| !is_float(kind)) {
         return Err(format!(
             "its values are `{kind}`, not floats of 16, 32 or 64 bits"
@@ -410,6 +413,7 @@ mod tests {
         assert_eq!(half.pixels, [[1.0; 3]]);
         for (kind, shape, says) in [
             ("<i4", "1, 1", "<i4"),
+            ("é", "1, 1", "`é`"),
             ("<f4", "4", "shape"),
             ("<f4", "1, 1, 2", "shape"),
             ("<f4", "1, 2, 3", "4 bytes"),

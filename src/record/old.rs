@@ -32,8 +32,11 @@ const KERNELS_MARK: &str = " @";
 /// Returns the same line in the present schema.
 ///
 /// # Errors
-/// A body that lacks a field.
+/// A line that is no object, or a body that lacks a field.
 pub(crate) fn renewed(line: Value) -> serde_json::Result<Value> {
+    if !line.is_object() {
+        return Err(serde::de::Error::custom("a line is an object"));
+    }
     let mut line = match line.get("schema").and_then(Value::as_str) == Some(OLD_SCHEMAS[0]) {
         true => with_key(line),
         false => line,

@@ -236,6 +236,14 @@ mod tests {
             read(&text),
             Err(RecordError::Parse { line: 2, .. })
         ));
+        // Readers of structures take lists for them.
+        for schema in ["raystone/1", "raystone/2", "raystone/3"] {
+            let list = read(&format!("{GOOD}\n[\"{schema}\"]\n"));
+            assert!(
+                matches!(list, Err(RecordError::Parse { line: 2, .. })),
+                "{schema}: {list:?}"
+            );
+        }
     }
 
     #[test]

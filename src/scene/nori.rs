@@ -123,15 +123,15 @@ impl Reader<'_> {
         let [width, height] = ["width", "height"].map(|name| self.number(node, name));
         let (width, height) = (width?.unwrap_or(SIZE[0]), height?.unwrap_or(SIZE[1]));
         let fov = self.number(node, "fov")?.unwrap_or(FOV);
+        let half_width = (0.5 * fov.to_radians()).tan();
+        let vertical = 2.0 * (half_width * height / width).atan();
         let has_view = fov > 0.0 && fov < 180.0 && width >= 1.0 && height >= 1.0;
-        if !has_view {
+        if !has_view || vertical as f32 <= 0.0 {
             let problem = format!(
                 "a camera of {width} × {height} pixels with a field of view of {fov}° sees nothing: it takes 0° to 180°"
             );
             return Err(self.broken(node, &problem));
         }
-        let half_width = (0.5 * fov.to_radians()).tan();
-        let vertical = 2.0 * (half_width * height / width).atan();
         let [left, up, forward, eye] = to_world.to_cols_array_2d().map(DVec4::from_array);
         let [left, up, forward, eye] = [left, up, forward, eye].map(|v| v.truncate());
         if [left, up, forward]
@@ -157,6 +157,7 @@ impl Reader<'_> {
 
     fn mesh(&mut self, node: Node<'_, '_>, mirror: Option<DMat4>) -> Result<(), SceneError> {
         let file = property(node, "filename")
+            .filter(|file| !file.trim().is_empty())
             .ok_or_else(|| self.broken(node, "a mesh without `<string name=\"filename\" …>`"))?;
         let relative = Path::new(file);
         if relative.is_absolute() && !self.options.allow_outside {
@@ -249,7 +250,15 @@ impl Reader<'_> {
                 kind: &MIRROR,
                 ..Material::diffuse(name, Vec3::ONE)
             },
-            "dielectric" => Material::dielectric(name, Vec3::ONE, inside / outside),
+            "dielectric" => {
+                if inside <= 0.0 || outside <= 0.0 {
+                    let problem = format!(
+                        "indices of refraction are above 0, and these are {inside} and {outside}"
+                    );
+                    return Err(self.broken(node, &problem));
+                }
+                Material::dielectric(name, Vec3::ONE, inside / outside)
+            }
             "microfacet" => {
                 let base = self.color(node, "kd")?.unwrap_or(Vec3::splat(ALBEDO));
                 let alpha = self.number(node, "alpha")?.map_or(ALPHA, |v| v as f32);
@@ -337,12 +346,19 @@ impl Reader<'_> {
         three.map(DVec3::from).ok_or_else(problem)
     }
 
-    fn color(&self, node: Node<'_, '_>, name: &str) -> Result<Option<Vec3>, SceneError> {
+    fn color(&mut self, node: Node<'_, '_>, name: &str) -> Result<Option<Vec3>, SceneError> {
         let Some(text) = property(node, name) else {
             return Ok(None);
         };
         let color = self.vector(node, Some(text), name)?;
-        Ok(Some(color.as_vec3()))
+        let drawn = color.as_vec3();
+        if !drawn.is_finite() || drawn.min_element() < 0.0 {
+            self.warn(
+                node,
+                &format!("`{name}` of {color} is beyond what is rendered, and taken as 0 there"),
+            );
+        }
+        Ok(Some(drawn))
     }
 
     fn number(&self, node: Node<'_, '_>, name: &str) -> Result<Option<f64>, SceneError> {

@@ -1,10 +1,13 @@
 //! Triangulation of polygons.
 
 use glam::{DVec2, DVec3, Vec3};
+use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 /// Reversed triangles smaller than this fraction of the largest count as flat (rounding).
 const FLAT: f64 = 1e-6;
+/// Slits to holes go through a place a few times; so often no polygon with an inside does.
+const MOST_VISITS: usize = 64;
 /// Rounding of a sum of angles, radians.
 const ANGLE: f64 = 1e-6;
 
@@ -30,7 +33,8 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
     let first = corners[0].as_dvec3();
     let flat = |c: DVec3| DVec2::new((c - first).dot(across), (c - first).dot(up));
     let flat: Vec<DVec2> = corners.iter().map(|c| flat(c.as_dvec3())).collect();
-    let crosses = crosses(&flat);
+    // What goes through a place again and again has no inside, and takes cubic time to cut into ears.
+    let crosses = most_at_a_place(corners) > MOST_VISITS || crosses(&flat);
     let ears = if crosses { Vec::new() } else { ears(&flat) };
     if ears.is_empty() {
         fan.for_each(&mut triangle)
@@ -38,6 +42,20 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
         ears.into_iter().for_each(&mut triangle)
     }
     crosses
+}
+
+/// How often the place is a corner that is one most often.
+fn most_at_a_place(corners: &[Vec3]) -> usize {
+    if corners.len() <= MOST_VISITS {
+        return 1;
+    }
+    let mut visits: HashMap<[u32; 3], usize> = HashMap::new();
+    for corner in corners {
+        // The zero that is added makes one of both zeros.
+        let place = corner.to_array().map(|c| (c + 0.0).to_bits());
+        *visits.entry(place).or_default() += 1;
+    }
+    visits.into_values().max().unwrap_or(0)
 }
 
 /// Unit normal of the side from which the corners turn counter-clockwise (M. Newell). If both sides
@@ -128,6 +146,13 @@ mod tests {
         let mut found = Vec::new();
         let crosses = triangulate(&corners, |t| found.push(t));
         (found, crosses)
+    }
+
+    #[test]
+    fn a_polygon_that_goes_round_and_round_is_a_fan_at_once() {
+        let round: Vec<[f32; 2]> = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].repeat(20_000);
+        let (triangles, crosses) = cut(&round);
+        assert!(crosses && triangles.len() == 59_998);
     }
 
     fn slanted(x: f32, y: f32) -> Vec3 {

@@ -5,7 +5,7 @@ mod plot;
 mod sampler;
 
 use super::output::{OutputArguments, print, print_json};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use measure::MeasureArguments;
 use raystone::discrepancy::PointSet;
@@ -74,6 +74,12 @@ impl Points {
             }
             return Ok(ExitCode::SUCCESS);
         }
+        if u64::from(count) * dims.len() as u64 > MOST_NUMBERS {
+            bail!(
+                "{count} points of {} coordinates are more than is held in memory, {MOST_NUMBERS} numbers: lower --count or --dims",
+                dims.len()
+            );
+        }
         let numbers: Vec<Vec<f64>> = parts.collect::<Result<_>>()?;
         let numbers = numbers.concat();
         if self.measures.is_asked() {
@@ -84,6 +90,9 @@ impl Points {
         Ok(ExitCode::SUCCESS)
     }
 }
+
+/// Most numbers that are measured, or shown as JSON: 1 GiB.
+const MOST_NUMBERS: u64 = 1 << 27;
 
 /// Returns a word as a fraction of 2³²: exact in double precision.
 fn fraction(word: u32) -> f64 {

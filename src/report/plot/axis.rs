@@ -25,7 +25,12 @@ pub struct Axis {
 impl Axis {
     /// Returns a linear axis from 0 to a little over `max`, with ticks at 1, 2 or 5 × 10ⁿ.
     pub fn linear(max: f64, title: &str) -> Self {
-        let max = if max > 0.0 { max } else { 1.0 };
+        // A step of numbers below the normal ones would be 0.
+        let max = if max > 0.0 && max.is_normal() {
+            max
+        } else {
+            1.0
+        };
         let rough = max / 6.0;
         let power = 10f64.powf(rough.log10().floor());
         let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
@@ -352,6 +357,10 @@ mod tests {
 
     #[test]
     fn shares_run_from_zero_to_one() {
+        // Neither nothing nor the least number has a scale of its own.
+        for max in [0.0, 5e-324, f64::NAN] {
+            assert_eq!(Axis::linear(max, "").max, 1.0);
+        }
         let axis = Axis::linear(7.0, "rate");
         assert_eq!([axis.share(0.0), axis.share(7.0)], [0.0, 1.0]);
         assert_eq!(labels(Some(axis)), ["0", "2", "4", "6"]);

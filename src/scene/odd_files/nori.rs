@@ -25,6 +25,19 @@ const NORI: &[(&str, &str, Outcome)] = &[
         Reads(".", &["`<texture>` `albedo` of `<bsdf>` is not read"]),
     ),
     (
+        "<bsdf type=\"dielectric\"><float name=\"intIOR\" value=\"-1.5\"/></bsdf>",
+        "",
+        Fails(&["line 4", "indices of refraction are above 0"]),
+    ),
+    (
+        "<emitter type=\"area\"><color name=\"radiance\" value=\"-5,-5,-5\"/></emitter>",
+        "",
+        Reads(
+            ".",
+            &["`radiance` of [-5, -5, -5] is beyond what is rendered"],
+        ),
+    ),
+    (
         "<medium type=\"homogeneous\"/>",
         "",
         Reads(".", &["`<medium>` of `<mesh>` is not read"]),
