@@ -23,7 +23,8 @@
 //! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance (other
 //! surfaces are counted separately, up to the number of paths that meet surfaces with another
 //! within rounding; flips of one sample count as one where all pixels draw its numbers, since one
-//! that is on a boundary is so in every pixel, such as the 0 with which sequences begin), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
+//! that is on a boundary is so in every pixel, such as the 0 with which sequences begin), more
+//! ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
 //! left within a texel, so the last two have separate bounds for textures.
 
@@ -36,7 +37,7 @@ use raystone_gpu::GpuError;
 use raystone_image::Image;
 use raystone_record::PathsRecord;
 use raystone_render::{BLOCK_SAMPLES, Renderer};
-use std::collections::BTreeMap;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -225,28 +226,21 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
             Some(describe(&answers[i], &truth[i]) + &played)
         }
         None => {
-            let sampler = view.sampler;
-            let flips = || {
-                let flips =
-                    |class: &Class| matches!(class, Class::Flip(Parting::Edge | Parting::Decision));
-                let classes = differing.iter().zip(&classes);
-                classes.filter(move |(_, class)| flips(class))
-            };
-            let repeated = match sampler.is_random() {
+            let flips =
+                |class: &Class| matches!(class, Class::Flip(Parting::Edge | Parting::Decision));
+            let flips = differing
+                .iter()
+                .zip(&classes)
+                .filter(|(_, class)| flips(class));
+            let samples: Vec<u32> = flips.map(|(&i, _)| answers[i].id.sample).collect();
+            let repeated = match view.sampler.is_random() {
                 true => 0,
-                false => most_of_one(flips().map(|(&i, _)| answers[i].id.sample)).saturating_sub(1),
+                false => samples.len() - samples.iter().collect::<HashSet<_>>().len(),
             };
             out_of_bounds(&record, repeated, oracle.texturing())
         }
     };
     record
-}
-
-/// How often the value is there that is there most often.
-fn most_of_one(values: impl Iterator<Item = u32>) -> usize {
-    let mut counts = BTreeMap::new();
-    values.for_each(|value| *counts.entry(value).or_default() += 1);
-    counts.into_values().max().unwrap_or(0)
 }
 
 /// The radiance below which differences of these paths are ignored.
