@@ -22,9 +22,7 @@
 //!
 //! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance (other
 //! surfaces are counted separately, up to the number of paths that meet surfaces with another
-//! within rounding; flips of one sample count as one where all pixels draw its numbers, since one
-//! that is on a boundary is so in every pixel, such as the 0 with which sequences begin), more
-//! ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
+//! within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
 //! left within a texel, so the last two have separate bounds for textures.
 
@@ -37,7 +35,6 @@ use raystone_gpu::GpuError;
 use raystone_image::Image;
 use raystone_record::PathsRecord;
 use raystone_render::{BLOCK_SAMPLES, Renderer};
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -225,20 +222,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
             let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
             Some(describe(&answers[i], &truth[i]) + &played)
         }
-        None => {
-            let flips =
-                |class: &Class| matches!(class, Class::Flip(Parting::Edge | Parting::Decision));
-            let flips = differing
-                .iter()
-                .zip(&classes)
-                .filter(|(_, class)| flips(class));
-            let samples: Vec<u32> = flips.map(|(&i, _)| answers[i].id.sample).collect();
-            let repeated = match view.sampler.is_random() {
-                true => 0,
-                false => samples.len() - samples.iter().collect::<HashSet<_>>().len(),
-            };
-            out_of_bounds(&record, repeated, oracle.texturing())
-        }
+        None => out_of_bounds(&record, oracle.texturing()),
     };
     record
 }
@@ -375,9 +359,8 @@ fn most(paths: usize, share: f64) -> usize {
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// Checks the totals of a record against their bounds; `repeated` flips are those of numbers that other pixels drew, too,
-/// `texturing` comes from the oracle.
-pub fn out_of_bounds(record: &PathsRecord, repeated: usize, texturing: usize) -> Option<String> {
+/// Checks the totals of a record against their bounds; `texturing` comes from the oracle.
+pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
         paths,
@@ -398,7 +381,7 @@ pub fn out_of_bounds(record: &PathsRecord, repeated: usize, texturing: usize) ->
     let strange = strange.then(|| {
         format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
     });
-    over("take another branch", flips - surfaces - repeated, FLIPS)
+    over("take another branch", flips - surfaces, FLIPS)
         .or(strange)
         .or_else(|| over("are ill-conditioned", ill_conditioned, share))
         .or_else(|| {

@@ -86,11 +86,8 @@ pub(super) fn read(file: Option<&Path>, dims: &[u32]) -> Result<PointSet> {
     }
     let dims: Vec<usize> = dims.iter().map(|dim| *dim as usize).collect();
     points.project(&dims).map_err(|_| {
-        let (asked, available) = (dims.iter().max().unwrap_or(&0), points.dim());
-        anyhow!(
-            "--dims {asked}: the points of {name} have {available} coordinates only, 0 to {}",
-            available.saturating_sub(1)
-        )
+        let (asked, available) = (dims.iter().max().unwrap_or(&0) + 1, points.dim());
+        anyhow!("--dim {asked}: the points of {name} have {available} coordinates only")
     })
 }
 
