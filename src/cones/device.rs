@@ -1,7 +1,7 @@
 //! Cones on the device.
 
 use crate::disk::{Overlap, V2};
-use crate::scene::Patch;
+use crate::scene::{Patch, tile_levels};
 use crate::trace::{Found, Given};
 use raystone_gpu::{
     Bindings, Composition, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues,
@@ -34,6 +34,7 @@ impl Tracer {
             .iter()
             .map(|patch| {
                 let [a, b, c] = patch.corners.map(|p| word(p, 0.0));
+                let a = [a[0], a[1], a[2], patch.tile];
                 let [x, y, z] = patch.colours.map(|p| word(p, 0.0));
                 [a, b, c, word(patch.centre, patch.radius), x, y, z]
             })
@@ -47,6 +48,7 @@ impl Tracer {
             .uniform("given", uniform(given, patches.len() as u32))
             .buffer("triangles", &gpu.storage("triangles", &words)?)
             .buffer("directions", &gpu.storage("directions", directions)?)
+            .buffer("texels", &gpu.storage("texels", &tile_levels())?)
             .buffer("layers", Storage::scratch("layers", layers))
             .buffer("found", &found)
             .buffer("status", &status);

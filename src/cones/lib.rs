@@ -9,6 +9,7 @@ pub mod check;
 pub mod cone;
 pub mod device;
 pub mod disk;
+mod level;
 mod measure;
 pub mod oracle;
 pub mod quadrature;

@@ -39,10 +39,8 @@ parameters! {
         Mean = "mean",
     }
 
-    /// pictures by cones from the eye, one a pixel (Roger 2008, chapter 5): their bias against distributed rays, and the samples with which samplers are as good
-    struct Primary {
-        /// scene
-        place: Place = Place::Checker;
+    /// what both have
+    struct Kept {
         /// layers that are kept, the nearest
         layers: u32 = 50, in 1..=256;
         /// how layers hide each other
@@ -59,6 +57,14 @@ parameters! {
         sampled: bool = true;
     }
 
+    /// pictures by cones from the eye, one a pixel (Roger 2008, chapter 5): their bias against distributed rays, and the samples with which samplers are as good
+    struct Primary {
+        /// scene
+        place: Place = Place::Checker;
+        /// what is kept of a cone, and measured
+        kept: Kept;
+    }
+
     /// pictures by cones off a mirror with a lobe, one a pixel (Roger 2008, chapter 5): their bias against distributed rays, and the samples with which samplers are as good
     struct Reflected {
         /// scene
@@ -69,20 +75,8 @@ parameters! {
         gloss: f64 = 0.0, in 0.0..=0.4;
         /// what a reflected cone is as wide as
         footprint: Footprint = Footprint::Incidence;
-        /// layers that are kept, the nearest
-        layers: u32 = 50, in 1..=256;
-        /// how layers hide each other
-        blend: Blend = Blend::Saturate;
-        /// the least part of a cone that is a layer
-        cut: f64 = 0.0, in 0.0..=0.5;
-        /// cones along each side of the picture
-        side: u32 = 32, in 4..=64;
-        /// pixels along each side of the picture that the cones are those of, evenly chosen
-        resolution: u32 = 256, in 4..=4096;
-        /// samples a pixel of the reference
-        samples: u32 = 2048, in 16..=65536;
-        /// whether errors of the sampler are measured; the cone's time is, if not
-        sampled: bool = true;
+        /// what is kept of a cone, and measured
+        kept: Kept;
     }
 }
 
@@ -97,53 +91,38 @@ impl Load {
     fn of(cell: &Cell) -> Option<Self> {
         let variant = &cell[Axis::Integrator];
         match variant.name.strip_prefix(CONES)? {
-            "primary" => Some(Primary::from_checked(&variant.params).into()),
-            "reflected" => Some(Reflected::from_checked(&variant.params).into()),
+            "primary" => {
+                let own = Primary::from_checked(&variant.params);
+                Some(Self::new(own.place, None, &own.kept))
+            }
+            "reflected" => {
+                let own = Reflected::from_checked(&variant.params);
+                let mut load = Self::new(own.place, Some(own.mirror), &own.kept);
+                load.view.gloss = own.gloss;
+                load.keep.is_mean = own.footprint == Footprint::Mean;
+                Some(load)
+            }
             _ => None,
         }
     }
-}
 
-impl From<Primary> for Load {
-    fn from(own: Primary) -> Self {
+    fn new(place: Place, mirror: Option<Mirror>, kept: &Kept) -> Self {
         Self {
             view: View {
-                place: own.place,
-                mirror: None,
+                place,
+                mirror,
                 gloss: 0.0,
-                side: own.side,
-                resolution: own.resolution,
-                samples: own.samples,
+                side: kept.side,
+                resolution: kept.resolution,
+                samples: kept.samples,
             },
             keep: Keep {
-                layers: own.layers,
-                blend: own.blend,
-                cut: own.cut,
+                layers: kept.layers,
+                blend: kept.blend,
+                cut: kept.cut,
                 is_mean: false,
             },
-            is_sampled: own.sampled,
-        }
-    }
-}
-
-impl From<Reflected> for Load {
-    fn from(own: Reflected) -> Self {
-        Self {
-            view: View {
-                place: own.place,
-                mirror: Some(own.mirror),
-                gloss: own.gloss,
-                side: own.side,
-                resolution: own.resolution,
-                samples: own.samples,
-            },
-            keep: Keep {
-                layers: own.layers,
-                blend: own.blend,
-                cut: own.cut,
-                is_mean: own.footprint == Footprint::Mean,
-            },
-            is_sampled: own.sampled,
+            is_sampled: kept.sampled,
         }
     }
 }
@@ -332,6 +311,8 @@ fn contradiction(load: &Load) -> Option<String> {
         "`resolution` is that of the whole picture: give at least `side`"
     } else if load.keep.is_mean && load.view.mirror != Some(Mirror::Sphere) {
         "off a plane a cone is as wide in both directions: leave `footprint` out"
+    } else if load.keep.blend == Blend::Level && load.keep.cut > 0.0 {
+        "with `blend = \"level\"` a cone has its axis only, and nothing is cut: leave `cut` out"
     } else {
         return None;
     };

@@ -8,7 +8,7 @@ use crate::cone::Camera;
 use crate::quadrature;
 use crate::rays::Lens;
 use crate::scene::Patch;
-use crate::trace::{Given, LEAST_SHARE};
+use crate::trace::{Blend, Given, LEAST_SHARE};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -139,6 +139,41 @@ fn barycentric(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
     [1.0 - second - third, second, third]
 }
 
+/// The mean of tiles half a unit wide over a texel, the square from (`x`, `y`) on: texels of up to half a unit lie
+/// within a tile, one of a whole unit has two of each colour.
+fn texel_mean(x: f64, y: f64, wide: f64) -> f64 {
+    if wide > 0.5 {
+        return 0.49;
+    }
+    let of = |at: f64| (2.0 * (at + 0.5 * wide)).floor() as i64;
+    if (of(x) + of(y)).rem_euclid(2) == 0 {
+        0.9
+    } else {
+        0.08
+    }
+}
+
+/// The tiles about a place of the floor as a texture has them whose texels are 1/32 to 1 unit wide: means over texels,
+/// weighted by how near their middles are, and between the two widths next to `width` on a line of logarithms.
+fn about(x: f64, y: f64, width: f64) -> f64 {
+    let level = (32.0 * width).log2().clamp(0.0, 5.0);
+    let of = |level: f64| {
+        let wide = level.exp2() / 32.0;
+        let corner = |at: f64| {
+            (
+                (at / wide - 0.5).floor() * wide,
+                (at / wide - 0.5).rem_euclid(1.0),
+            )
+        };
+        let ((left, u), (below, v)) = (corner(x), corner(y));
+        let row =
+            |y: f64| texel_mean(left, y, wide) * (1.0 - u) + texel_mean(left + wide, y, wide) * u;
+        row(below) * (1.0 - v) + row(below + wide) * v
+    };
+    let part = level.fract();
+    of(level.floor()) * (1.0 - part) + of(level.ceil()) * part
+}
+
 /// What is traced.
 pub struct Oracle<'a> {
     /// What is kept of a cone.
@@ -256,6 +291,55 @@ impl Oracle<'_> {
         self.directions.iter().filter(is_near).count() as u32
     }
 
+    /// What a ray from the beam's near plane meets: its distance from the apex along the axis, and the colour.
+    fn met(&self, beam: &Beam, direction: DVec3) -> Option<(f64, DVec3)> {
+        let hits = self.patches.iter().filter_map(|patch| {
+            let corners = patch.corners.map(|p| p.f64());
+            let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let t = n.dot(corners[0] - beam.apex) / n.dot(direction);
+            let p = beam.apex + direction * t;
+            let is_left = |k: usize| {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                (b - a).cross(p - a).dot(n) >= 0.0
+            };
+            let is_met = t.is_finite() && t >= beam.near && (0..3).all(is_left);
+            is_met.then_some((t, p, n.normalize(), patch))
+        });
+        let (t, p, n, patch) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let parts = barycentric(patch.corners.map(|p| p.f64()), p);
+        let colours = patch.colours.map(|p| p.f64());
+        let colour: DVec3 = (0..3).map(|k| colours[k] * parts[k]).sum();
+        if patch.tile == 0.0 {
+            return Some((t, colour));
+        }
+        let width = 2.0 * t * beam.angle.tan() / n.dot(beam.axis).abs();
+        Some((t, colour / patch.tile * about(p.x, p.y, width)))
+    }
+
+    /// The pixel of a cone of which only the axis counts. What rounding may change is what axes beside it see.
+    fn axis_pixel(&self, beam: &Beam, [x, y]: [DVec3; 2]) -> Expected {
+        let seen = |at: DVec2| {
+            let direction = beam.axis + (x * at.x + y * at.y) * beam.angle.tan();
+            self.met(beam, direction).map(|hit| hit.1)
+        };
+        let background = self.given.background.f64();
+        let own = seen(DVec2::ZERO);
+        let colour = own.unwrap_or(background);
+        let reach = reach_of(beam);
+        let beside = (0..8).map(|k| DVec2::from_angle(PI / 4.0 * f64::from(k)) * reach);
+        let off = beside.map(|at| {
+            let other = seen(at);
+            let apart = (other.unwrap_or(background) - colour).abs().max_element();
+            apart.max(f64::from(u8::from(own.is_some() != other.is_some())))
+        });
+        Expected {
+            colour,
+            covered: f64::from(u8::from(own.is_some())),
+            slack: OFF_COLOUR + 2.0 * off.fold(0.0, f64::max),
+            met: u32::from(own.is_some()),
+        }
+    }
+
     /// The pixel of a cone.
     pub fn pixel(&self, pixel: u32) -> Expected {
         let beam = beam(&self.given.camera, &self.lens, pixel);
@@ -267,6 +351,9 @@ impl Oracle<'_> {
         };
         let x = helper.cross(beam.axis).normalize();
         let frame = [x, beam.axis.cross(x)];
+        if self.given.blend == Blend::Level.word() {
+            return self.axis_pixel(&beam, frame);
+        }
         let parts = self
             .patches
             .iter()

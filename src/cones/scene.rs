@@ -29,6 +29,8 @@ pub struct Patch<T> {
     pub centre: V3<T>,
     /// Its radius, rounded up.
     pub radius: T,
+    /// Colour of the tile that it is half of, by which its colours are multiplied; 0 if it is none.
+    pub tile: T,
 }
 
 impl<T: Real> Patch<T> {
@@ -40,6 +42,7 @@ impl<T: Real> Patch<T> {
             colours: self.colours.map(double),
             centre: double(self.centre),
             radius: self.radius.f64(),
+            tile: self.tile.f64(),
         }
     }
 }
@@ -88,6 +91,36 @@ struct Builder {
     patches: Vec<Patch<f32>>,
 }
 
+/// Colours of the floor's tiles, which alternate; they are half a unit wide.
+const TILES: [f64; 2] = [0.9, 0.08];
+
+fn tile(row_and_column: u32) -> f64 {
+    TILES[row_and_column as usize % 2]
+}
+
+/// Texels along each side of the texture of the tiles: of two by two, a unit wide, repeated over the floor.
+pub const TEXELS: u32 = 32;
+/// Its levels, each with half the texels of the one before along each side.
+pub const LEVELS: u32 = 6;
+
+/// Texels of the tiles' texture, row by row and level by level: of each level the means of four of the one before.
+pub fn tile_levels() -> Vec<f32> {
+    let half = TEXELS / 2;
+    let texel = |k: u32| tile(k % TEXELS / half + k / TEXELS / half) as f32;
+    let mut all: Vec<f32> = (0..TEXELS * TEXELS).map(texel).collect();
+    let mut first = 0;
+    for level in 1..LEVELS {
+        let (wide, side) = ((TEXELS >> (level - 1)) as usize, (TEXELS >> level) as usize);
+        for k in 0..side * side {
+            let at = first + 2 * (k / side) * wide + 2 * (k % side);
+            let four = [at, at + 1, at + wide, at + wide + 1];
+            all.push(four.map(|k| all[k]).iter().sum::<f32>() * 0.25);
+        }
+        first += wide * wide;
+    }
+    all
+}
+
 /// A surface with this colour and normal at a point, lit by the lamp.
 fn lit(p: DVec3, n: DVec3, colour: DVec3) -> DVec3 {
     let to_lamp = (LAMP - p).normalize();
@@ -105,6 +138,7 @@ impl Builder {
             colours,
             centre: V3::of(centre),
             radius: radius as f32 * (1.0 + 2e-7),
+            tile: 0.0,
         });
     }
 
@@ -136,9 +170,12 @@ impl Builder {
             DVec3::Z * (CEILING - FLOOR),
         );
         let low = DVec3::new(-HALF, -HALF, FLOOR);
-        let tile =
-            |i: u32, j: u32| DVec3::splat(if (i + j).is_multiple_of(2) { 0.9 } else { 0.08 });
-        self.grid(low, [x, y], [20, 20], tile);
+        let first = self.patches.len();
+        self.grid(low, [x, y], [20, 20], |i, j| DVec3::splat(tile(i + j)));
+        // Two triangles a tile, column by column.
+        for (k, patch) in (0..).zip(&mut self.patches[first..]) {
+            patch.tile = tile(k / 2 / 20 + k / 2 % 20) as f32;
+        }
         let stripe = |colour: DVec3| {
             move |i: u32, _: u32| colour * if i.is_multiple_of(2) { 1.0 } else { 0.6 }
         };

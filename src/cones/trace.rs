@@ -1,4 +1,5 @@
-//! One cone a pixel through all triangles: the nearest layers, sorted, and blended (Roger 2008, sections 5.3 and 5.4).
+//! One cone a pixel through all triangles: the nearest layers, sorted, and blended (Roger 2008, sections 5.3 and 5.4);
+//! or its axis alone, which reads textures at the level that is as wide as the cone ([`level`](crate::level)).
 //! Kernel: `kernels/cones/trace.wesl`.
 
 use crate::cone::{Camera, Cone, cone_of, meets, seen_from};
@@ -11,6 +12,7 @@ use raystone_specular::reflector::{cross3, dot3};
 const SATURATE: u32 = 0;
 const MASK_AREA: u32 = 1;
 const MASK_COUNT: u32 = 2;
+const LEVEL: u32 = 3;
 
 /// Directions of a mask.
 pub const DIRECTIONS: u32 = 64;
@@ -28,6 +30,8 @@ parameters! {
         MaskArea = "mask-area",
         /// by a mask of 64 directions, which are counted in the place of areas
         MaskCount = "mask-count",
+        /// by the axis alone, which meets one; textures are read at the level that is as wide as the cone
+        Level = "level",
     }
 }
 
@@ -38,6 +42,7 @@ impl Blend {
             Self::Saturate => SATURATE,
             Self::MaskArea => MASK_AREA,
             Self::MaskCount => MASK_COUNT,
+            Self::Level => LEVEL,
         }
     }
 }
@@ -99,6 +104,8 @@ pub struct Tracing<'a, T> {
     pub patches: &'a [Patch<T>],
     /// [`DIRECTIONS`] places in the unit disk.
     pub directions: &'a [[T; 2]],
+    /// Texels of [`tile_levels`](crate::scene::tile_levels).
+    pub texels: &'a [T],
 }
 
 impl<T: Angle> Tracing<'_, T> {
@@ -179,6 +186,9 @@ impl<T: Angle> Tracing<'_, T> {
     /// The part of the cone that a triangle covers; its share is 0 where it is none.
     pub fn layer_of(&self, cone: &Cone<T>, patch: &Patch<T>, index: u32) -> Layer<T> {
         let [a, b, third] = patch.corners.map(|p| seen_from(cone, p));
+        if self.given.blend == LEVEL {
+            return self.axis_layer(cone, patch, [a, b, third], index);
+        }
         let covered = self.covered_by([a, b, third], cone.near);
         let part = overlap(covered.sum);
         let zero = c::<T>(0.0);
@@ -204,13 +214,8 @@ impl<T: Angle> Tracing<'_, T> {
         let low = a.z.min(b.z).min(third.z).max(cone.near);
         let high = a.z.max(b.z).max(third.z);
         out.depth = clamp(dot3(n, a) / facing, low, high);
-        let w = middle * out.depth - a;
-        let one = c::<T>(1.0);
-        let at_b = clamp(dot3(n, cross3(w, v)) / size, zero, one);
-        let at_c = clamp(dot3(n, cross3(u, w)) / size, zero, one - at_b);
-        let at_a = one - (at_b + at_c);
-        let colours = patch.colours;
-        out.colour = colours[0] * at_a + colours[1] * at_b + colours[2] * at_c;
+        let parts = corner_parts([u, v], middle * out.depth - a);
+        out.colour = weighted(patch.colours, parts);
         if self.given.blend != SATURATE {
             out.bits = match covered.sum.area < zero {
                 true => covered.right,
@@ -301,13 +306,28 @@ impl<T: Angle> Tracing<'_, T> {
     }
 }
 
+/// The parts of a triangle's corners in a point of it, which is `w` from the first; `u` and `v` lead to the others.
+pub(crate) fn corner_parts<T: Real>([u, v]: [V3<T>; 2], w: V3<T>) -> [T; 3] {
+    let n = cross3(u, v);
+    let size = dot3(n, n);
+    let (zero, one) = (c::<T>(0.0), c::<T>(1.0));
+    let second = clamp(dot3(n, cross3(w, v)) / size, zero, one);
+    let third = clamp(dot3(n, cross3(u, w)) / size, zero, one - second);
+    [one - (second + third), second, third]
+}
+
+/// The sum of three vectors by their parts.
+pub(crate) fn weighted<T: Real>(corners: [V3<T>; 3], parts: [T; 3]) -> V3<T> {
+    corners[0] * parts[0] + corners[1] * parts[1] + corners[2] * parts[2]
+}
+
 /// Where the edge from `a` to `b` crosses the plane z = `near`.
 fn crossing<T: Real>(a: V3<T>, b: V3<T>, near: T) -> V3<T> {
     let t = (near - a.z) / (b.z - a.z);
     V3::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t, near)
 }
 
-fn clamp<T: Real>(x: T, low: T, high: T) -> T {
+pub(crate) fn clamp<T: Real>(x: T, low: T, high: T) -> T {
     x.max(low).min(high)
 }
 

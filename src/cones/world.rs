@@ -8,9 +8,9 @@ use crate::oracle::Oracle;
 use crate::rays::{Lens, Rays};
 use crate::sample::Truth;
 use crate::scene::{BACKGROUND, Patch, Place, patches};
-#[cfg(test)]
-use crate::trace::Tracing;
 use crate::trace::{Blend, DIRECTIONS, Found, Given};
+#[cfg(test)]
+use crate::{scene::tile_levels, trace::Tracing};
 use glam::DVec3;
 use rayon::prelude::*;
 use raystone_bench::run::Absent;
@@ -159,7 +159,12 @@ impl World {
         Given {
             camera: self.view.camera(keep.is_mean),
             background: V3::of(BACKGROUND),
-            most: keep.layers,
+            // An axis meets one.
+            most: if keep.blend == Blend::Level {
+                1
+            } else {
+                keep.layers
+            },
             cut: keep.cut as f32,
             blend: keep.blend.word(),
         }
@@ -178,6 +183,7 @@ impl World {
             given: &given,
             patches: &self.patches,
             directions: &directions(),
+            texels: &tile_levels(),
         };
         let each = (0..self.pixels()).into_par_iter();
         each.map(|pixel| tracing.trace_cone(pixel)).collect()

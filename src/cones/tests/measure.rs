@@ -74,6 +74,7 @@ fn parameters_that_contradict_each_other_are_left_out_with_a_reason() {
             "mirror = \"plane\"\nfootprint = \"mean\"",
             "leave `footprint` out",
         ),
+        ("blend = \"level\"\ncut = 0.1", "leave `cut` out"),
     ];
     for (keys, reason) in cases {
         let folder = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@ use crate::disk::disk_triangle;
 use crate::oracle::Expected;
 use crate::rays::{Lens, Rays};
 use crate::sample::{Crossing, Truth, budget, crossing};
-use crate::scene::{Place, patches};
+use crate::scene::{LEVELS, Place, TEXELS, patches, tile_levels};
 use crate::trace::{Blend, Found};
 use crate::world::{Keep, View, World, directions, double};
 use glam::DVec3;
@@ -65,7 +65,14 @@ fn cases() -> Vec<(World, Keep)> {
         blend: Blend::MaskCount,
         ..KEEP
     };
+    let level = Keep {
+        blend: Blend::Level,
+        ..KEEP
+    };
     vec![
+        (world(Place::Balls, None, 0.0), level),
+        (world(Place::Checker, Some(Mirror::Sphere), 0.02), level),
+        (world(Place::Checker, Some(Mirror::Plane), 0.1), level),
         (world(Place::Checker, None, 0.0), KEEP),
         (world(Place::Thin, None, 0.0), few),
         (world(Place::Checker, Some(Mirror::Sphere), 0.0), KEEP),
@@ -98,7 +105,7 @@ fn the_kernel_agrees_with_oracle_and_quadrature() {
 /// Kernel, text, its replacement.
 type Fault = (&'static str, &'static str, &'static str);
 
-const FAULTS: [Fault; 26] = [
+const FAULTS: [Fault; 35] = [
     ("disk", "0.5 * angle_of", "0.49 * angle_of"),
     ("disk", "to_b.y - from_a.y", "to_b.y + from_a.y"),
     (
@@ -173,6 +180,23 @@ const FAULTS: [Fault; 26] = [
         "out.depth = low;",
     ),
     ("trace", "max(given.cut, LEAST_SHARE)", "LEAST_SHARE"),
+    ("trace", "c.x * a.y - c.y * a.x", "c.x * a.y + c.y * a.x"),
+    ("trace", "if (out.depth < cone.near) {", "if (false) {"),
+    (
+        "trace",
+        "weighted(triangle.a, triangle.b, triangle.c, parts)",
+        "weighted(triangle.a, triangle.c, triangle.b, parts)",
+    ),
+    ("level", "log2(2.0 * ", "log2("),
+    ("level", "length / abs(n.z)", "along / abs(n.z)"),
+    ("level", "(f32(side) - 0.5)", "f32(side)"),
+    ("level", "/ 3u * 4u", "/ 3u * 2u"),
+    (
+        "level",
+        "let upper = c + (d - c) * part.x;",
+        "let upper = c + (d - c) * part.y;",
+    ),
+    ("level", "bounded - f32(low)", "0.0"),
 ];
 
 /// What sees a fault: the oracle of pictures, quadrature of single overlaps.
@@ -323,6 +347,37 @@ fn a_cone_of_tiles_alone_has_next_to_no_bias() {
     // One layer is not the picture.
     let one = Keep { layers: 1, ..KEEP };
     assert!(world.truth.error(&colours(world.by_twin(&one))).sqrt() > 0.02);
+}
+
+#[test]
+fn levels_are_means_of_tiles_and_spare_most_of_the_noise_of_one_ray() {
+    let texels = tile_levels();
+    let mut first = 0;
+    for level in 0..LEVELS {
+        let side = (TEXELS >> level) as usize;
+        let all = &texels[first..first + side * side];
+        let mean = all.iter().map(|x| f64::from(*x)).sum::<f64>() / all.len() as f64;
+        assert!((mean - 0.49).abs() < 1e-6, "level {level}: {mean}");
+        first += side * side;
+    }
+    assert_eq!(first, texels.len());
+    assert_eq!(
+        [texels[0], texels[16], texels[16 * 32 + 16]],
+        [0.9, 0.08, 0.9]
+    );
+    // Off a plane with a wide lobe a ray sees one tile or another, and a level their mean.
+    let world = world(Place::Checker, Some(Mirror::Plane), 0.1);
+    let error = |blend: Blend, gloss: f64| {
+        let view = View {
+            gloss,
+            ..world.view
+        };
+        let found = World::new(view, 1).by_twin(&Keep { blend, ..KEEP });
+        let colours: Vec<DVec3> = found.iter().map(|pixel| pixel.colour.f64()).collect();
+        world.truth.error(&colours).sqrt()
+    };
+    let (ray, level) = (error(Blend::Level, 0.0), error(Blend::Level, 0.1));
+    assert!(level < 0.5 * ray, "{level} {ray}");
 }
 
 #[test]
