@@ -11,7 +11,7 @@ use raystone_record::{Body, Key, Line, PathsRecord, Ran};
 use raystone_render::{
     BLOCK_SAMPLES, ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stage, Traced,
 };
-use raystone_sampling::Sampler;
+use raystone_sampling::{Coordinate, Sampler};
 use raystone_verify::image_gate::{Choice, Frame, Pixels, answers, judge, sums};
 use raystone_verify::path_oracle::{Estimator, PathOracle, View};
 use raystone_verify::ray_counts;
@@ -406,9 +406,33 @@ fn drawn(
         samplers.sampler(sequence, decorrelation, &demand)
     };
     let made = sampler(spp.max(frame.summed)).or_else(|_| sampler(spp));
+    let made = made.map_err(|e| e.to_string())?;
     let seed = session.experiment.seeds().replicates.first().copied();
-    let pixels = frame.pixels(spp, seed.unwrap_or_default());
-    Ok((made.map_err(|e| e.to_string())?, pixels))
+    let mut pixels = frame.pixels(spp, seed.unwrap_or_default());
+    if subject.stage.scene.medium.is_some() && begins_in_the_corner(&made, pixels.seed) {
+        let another = u32::from(made.demand.samples != Some(1));
+        pixels.samples[0] = pixels.samples[0].max(another);
+        pixels.samples.dedup();
+    }
+    Ok((made, pixels))
+}
+
+/// True if the first sample of every pixel is 0 in all dimensions, as that of many sequences is without a decorrelation.
+/// In a medium its free flights have the length 0, and all paths scatter on the border, where rounding alone says
+/// which side they are on: there the next sample is looked at.
+fn begins_in_the_corner(sampler: &Sampler, seed: u32) -> bool {
+    let is_zero = |pixel, dimension| {
+        let at = Coordinate {
+            pixel,
+            sample: 0,
+            dimension,
+            seed,
+        };
+        sampler.sample_u32(at) == 0
+    };
+    [0, 77]
+        .into_iter()
+        .all(|pixel| (0..4).all(|dimension| is_zero(pixel, dimension)))
 }
 
 impl Subject<'_> {

@@ -257,6 +257,19 @@ fn each_kind_of_difference_has_a_bound() {
         ),
         (
             PathsRecord {
+                flips: 67,
+                unsettled: 50,
+                ..paths.clone()
+            },
+            PathsRecord {
+                flips: 68,
+                unsettled: 50,
+                ..paths.clone()
+            },
+            "at most 67 are explained",
+        ),
+        (
+            PathsRecord {
                 ill_conditioned: 134,
                 ..paths.clone()
             },
