@@ -13,7 +13,7 @@ use raystone_record::{
     all_of, axis,
 };
 use serde_json::{Value as Json, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// A folder that was offered, with what was found in it.
@@ -89,7 +89,7 @@ impl Gallery {
         let (software, hardware): (Vec<_>, Vec<_>) = self.devices.iter().partition(|d| d.software);
         let mut document = Document {
             title: "Raystone: rays per second by device".into(),
-            subtitle: format::plural(self.devices.len(), "device"),
+            subtitle: self.counted(),
             ..Document::default()
         };
         let mut devices = Section::new("devices", "Devices");
@@ -120,7 +120,21 @@ impl Gallery {
         document
     }
 
-    /// Returns the devices, a row each.
+    /// How many devices there are, and runs where some device has several.
+    fn counted(&self) -> String {
+        let named = self
+            .devices
+            .iter()
+            .map(|device| (&device.name, &device.about));
+        let devices = named.collect::<BTreeSet<_>>().len();
+        let text = format::plural(devices, "device");
+        match self.devices.len() {
+            runs if runs == devices => text,
+            runs => format!("{text}, {}", format::plural(runs, "run")),
+        }
+    }
+
+    /// Returns the devices, a row for each run.
     pub fn table(&self) -> Table {
         let heads = ["adapter", ":of", ":version", ":clock", ":gate"];
         let row = |device: &Device| {

@@ -16,7 +16,8 @@ const PLACE: &str = "NONCE-OF-THIS-PAGE";
 /// [`ReportError::Template`].
 pub fn page(document: &Document) -> Result<String, ReportError> {
     let mut environment = Environment::new();
-    environment.add_filter("breakable", breakable);
+    environment.add_filter("breakable", |text: &str| marked(text, breakable));
+    environment.add_filter("words", |text: &str| marked(text, xml));
     // The name's extension turns escaping on.
     environment.add_template("page.html", include_str!("template.html"))?;
     let page = environment.get_template("page.html")?.render(context! {
@@ -31,16 +32,28 @@ pub fn page(document: &Document) -> Result<String, ReportError> {
     Ok([policy, body, script].join(&nonce))
 }
 
+/// A text with what stands between two backticks as code; each part is escaped by `escaped`.
+fn marked(text: &str, escaped: fn(&str) -> String) -> Value {
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len() % 2 == 0 {
+        return Value::from_safe_string(escaped(text));
+    }
+    let part = |(number, part): (usize, &&str)| match number % 2 {
+        0 => escaped(part),
+        _ => format!("<code>{}</code>", escaped(part)),
+    };
+    Value::from_safe_string(parts.iter().enumerate().map(part).collect())
+}
+
 /// A text of a cell, in which lines may break behind the commas of a label, which no blank follows, and no digit as in numbers.
-fn breakable(text: &str) -> Value {
+fn breakable(text: &str) -> String {
     let mut parts = text.split(',');
     let first = xml(parts.next().unwrap_or_default());
-    let whole = parts.fold(first, |whole, part| {
+    parts.fold(first, |whole, part| {
         let is_label = part.starts_with(char::is_alphabetic);
         let comma = if is_label { ",<wbr>" } else { "," };
         whole + comma + &xml(part)
-    });
-    Value::from_safe_string(whole)
+    })
 }
 
 #[cfg(test)]
@@ -49,10 +62,19 @@ mod tests {
 
     #[test]
     fn labels_break_behind_commas_and_stay_escaped() {
-        assert_eq!(breakable("a(b=1,c=2)").to_string(), "a(b=1,<wbr>c=2)");
+        assert_eq!(breakable("a(b=1,c=2)"), "a(b=1,<wbr>c=2)");
+        assert_eq!(breakable("<b>&, 65,536"), "&lt;b&gt;&amp;, 65,536");
+    }
+
+    #[test]
+    fn names_between_backticks_are_code() {
+        let words = |text| marked(text, xml).to_string();
         assert_eq!(
-            breakable("<b>&, 65,536").to_string(),
-            "&lt;b&gt;&amp;, 65,536"
+            words("`a<b` and `c`"),
+            "<code>a&lt;b</code> and <code>c</code>"
         );
+        assert_eq!(words("a ` alone"), "a ` alone");
+        let label = marked("see `a(b=1,c=2)`", breakable).to_string();
+        assert_eq!(label, "see <code>a(b=1,<wbr>c=2)</code>");
     }
 }

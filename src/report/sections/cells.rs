@@ -138,7 +138,11 @@ impl<'a> Cells<'a> {
 
 impl Cell<'_> {
     fn fold(&self, data: &RunData) -> Block {
-        let labels = self.key.labels().map(|(_, label)| label);
+        // Several axes may be `auto`.
+        let labels = self.key.labels().map(|(axis, label)| match label {
+            "auto" => format!("{axis} auto"),
+            label => label.to_owned(),
+        });
         let mut blocks = Vec::new();
         let of_kernel = self.ran.into_iter().flat_map(|ran| {
             let hash = ran.kernel_hash.chars().take(SHORT_HASH).collect();

@@ -62,6 +62,7 @@ fn a_gallery_has_only_what_passed_and_says_what_it_leaves_out() {
         .collect();
     assert_eq!(names, ["Alpha", "Zeta <GPU>", "SwiftShader"]);
     let document = gallery.document();
+    assert_eq!(document.subtitle, "3 devices");
     let page = crate::html::page(&document).unwrap();
     assert!(!page.contains("1234") && !page.contains("4321") && !page.contains("1,234"));
     assert!(page.contains("Zeta &lt;GPU&gt;") && page.contains("65,536 ns"));
@@ -81,6 +82,13 @@ fn a_gallery_has_only_what_passed_and_says_what_it_leaves_out() {
             "{part}"
         );
     }
+}
+
+#[test]
+fn two_runs_of_a_device_are_one_device() {
+    let run = || Ok(of_device("Alpha", false, 99.0));
+    let gallery = Gallery::new(&offers(vec![run(), run()]));
+    assert_eq!(gallery.document().subtitle, "1 device, 2 runs");
 }
 
 #[test]
