@@ -230,13 +230,13 @@ fn of_leaves(stats: &StructureStats, faults: &mut Vec<String>) {
     if histogram.is_empty() {
         return;
     }
-    let all: u64 = histogram.iter().sum();
+    // A record may hold any numbers.
+    let all = histogram.iter().copied().fold(0, u64::saturating_add);
     let known = [all, all - histogram[0]].contains(&stats.leaves);
-    let references = histogram
-        .iter()
-        .zip(0..)
-        .map(|(leaves, size)| leaves * size);
-    if !known || references.sum::<u64>() > stats.references {
+    let references = (histogram.iter().zip(0..))
+        .map(|(leaves, size)| leaves.saturating_mul(size))
+        .fold(0, u64::saturating_add);
+    if !known || references > stats.references {
         faults.push(format!(
             "{} leaves with {} references have a histogram of {all} leaves",
             stats.leaves, stats.references

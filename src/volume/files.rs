@@ -81,8 +81,9 @@ fn from_vol(bytes: &[u8]) -> Result<Grid, String> {
         3 => data.iter().map(|b| f32::from(*b) / 255.0).collect(),
         _ => return Err(format!("its values are of type {kind}, not 1, 2 or 3")),
     };
-    let expected: u64 = resolution.iter().map(|n| u64::from(*n)).product();
-    if values.len() as u64 != expected {
+    // Three numbers of 31 bits.
+    let expected: u128 = resolution.iter().map(|n| u128::from(*n)).product();
+    if values.len() as u128 != expected {
         return Err(format!(
             "{} values where {resolution:?} voxels have {expected}",
             values.len()
@@ -107,8 +108,12 @@ mod tests {
     }
 
     fn vol(kind: i32, channels: i32, data: &[u8]) -> Vec<u8> {
+        vol_of([3, 2, 1], kind, channels, data)
+    }
+
+    fn vol_of([x, y, z]: [i32; 3], kind: i32, channels: i32, data: &[u8]) -> Vec<u8> {
         let mut out = b"VOL\x03".to_vec();
-        for word in [kind, 3, 2, 1, channels] {
+        for word in [kind, x, y, z, channels] {
             out.extend(word.to_le_bytes());
         }
         for real in [0.0_f32, 0.0, 0.0, 3.0, 2.0, 1.0] {
@@ -164,6 +169,9 @@ mod tests {
             (vol(1, 3, data), "3 channels"),
             (vol(4, 1, data), "type 4"),
             (vol(1, 1, &data[..20]), "5 values"),
+            // 2^64 voxels.
+            (vol_of([1 << 22, 1 << 22, 1 << 20], 1, 1, &[]), "0 values"),
+            (vol_of([-1, 1, 1], 1, 1, data), "-1 voxels"),
             (b"VOL\x03".to_vec(), "within its header"),
             ([b"GRD\x03", &[0; 44][..]].concat(), "`VOL`"),
         ] {
