@@ -1,6 +1,6 @@
 //! Errors of experiment files, with key, place and remedy.
 
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -255,10 +255,13 @@ fn lines(faults: &[ConfigError]) -> String {
 const LIST_LIMIT: usize = 16;
 
 fn suggestion(name: &str, known: &[String]) -> String {
-    match nearest(name, known.iter().map(String::as_str)) {
-        None => "; nothing is known here".to_owned(),
-        Some(near) if known.len() > LIST_LIMIT => format!("; did you mean `{near}`?"),
-        Some(near) => format!("; did you mean `{near}`? Known: {}", quoted(known)),
+    let near = did_you_mean(name, known.iter().map(String::as_str));
+    match known.len() {
+        0 => "; nothing is known here".to_owned(),
+        ..=LIST_LIMIT if near.is_empty() => format!("; known: {}", quoted(known)),
+        ..=LIST_LIMIT => format!("{near} Known: {}", quoted(known)),
+        _ if near.is_empty() => "; `raystone list` shows all that is known".to_owned(),
+        _ => near,
     }
 }
 

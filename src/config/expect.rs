@@ -8,7 +8,7 @@
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -260,10 +260,8 @@ impl Expect {
             .find(|on| substitutes.iter().all(|s| s.original != **on))
         {
             let known = substitutes.iter().map(|s| s.original.as_str());
-            let near = nearest(on, known).unwrap_or("none");
-            return Some(format!(
-                "no [[substitute]] is called \"{on}\"; did you mean \"{near}\"?"
-            ));
+            let near = did_you_mean(on, known);
+            return Some(format!("no [[substitute]] is called `{on}`{near}"));
         }
         if needs_thesis && (self.at.is_empty() || self.at.iter().any(|at| at.thesis.is_none())) {
             return Some(
@@ -385,7 +383,7 @@ mod tests {
         assert!(complaint(&format!("{HEAD}{order}")).contains("`order`"));
         let on = format!("{HEAD}{ITEM}least = 1.0\nat = [{{ on = \"Spnza\" }}]\n");
         let sponza = "[[substitute]]\noriginal = \"Sponza\"\n";
-        assert!(complaint(&format!("{on}{sponza}")).contains("did you mean \"Sponza\""));
+        assert!(complaint(&format!("{on}{sponza}")).contains("did you mean `Sponza`"));
         let within = complaint(&format!(
             "{HEAD}{ITEM}within = 1.1\nat = [{{ row = \"x\" }}]\n"
         ));

@@ -2,7 +2,7 @@
 
 use super::ConfigError;
 use raystone_core::params::Variant;
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use std::fmt;
 
 /// Selects variants of one axis by name or label, with `*` for any text; a leading `!` negates.
@@ -133,9 +133,9 @@ impl Selector {
 fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     let found = axes.iter().find(|axis| **axis == name).copied();
     found.ok_or_else(|| {
-        let near = nearest(name, axes.iter().copied()).unwrap_or_default();
+        let near = did_you_mean(name, axes.iter().copied());
         let all = axes.join(", ");
-        format!("unknown axis `{name}`; did you mean `{near}`? Known: {all}")
+        format!("unknown axis `{name}`{near} (known: {all})")
     })
 }
 

@@ -6,13 +6,11 @@ use super::error::{ConfigError, Place};
 use super::faults::Faults;
 use super::tree::{Item, Table, Value};
 use super::values::value;
+use raystone_core::files::MODEL_ENDINGS;
 use raystone_core::params::{
     Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant, repeated,
 };
 use std::path::Path;
-
-/// File extensions that make a scene name a path.
-const MODEL_EXTENSIONS: [&str; 5] = ["obj", "gltf", "glb", "ply", "xml"];
 
 /// The entry called `name`; for a model path or kernel folder, a generated one.
 pub(super) fn resolve(
@@ -62,7 +60,7 @@ fn shared_parameters(entries: &[Entry]) -> ParameterSchema {
 fn is_path(text: &str) -> bool {
     let extension = Path::new(text).extension().and_then(|e| e.to_str());
     text.contains(['/', '\\'])
-        || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
+        || extension.is_some_and(|e| MODEL_ENDINGS.contains(&e.to_lowercase().as_str()))
 }
 
 const EMBEDDED: &str = "embedded";

@@ -5,6 +5,9 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+/// Endings of the files that hold a model: a scene of such a name is a path.
+pub const MODEL_ENDINGS: [&str; 5] = ["obj", "gltf", "glb", "ply", "xml"];
+
 /// A source of files.
 pub trait Files: Send + Sync {
     /// Opens a regular file (no folder, device or pipe) and returns its length in bytes.

@@ -129,7 +129,16 @@ pub fn slug(parts: &[&str]) -> String {
 /// Compared characters of a name; time and memory grow with the product of both.
 const COMPARED: usize = 64;
 
-/// The known name nearest to `name`; `None` if none are known.
+/// Names that are less alike are none that was meant.
+const LEAST_ALIKE: f64 = 0.4;
+
+/// A question for a message about an unknown name, such as "; did you mean `bvh`?"; empty if no known name is near.
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let near = nearest(name, known);
+    near.map_or(String::new(), |near| format!("; did you mean `{near}`?"))
+}
+
+/// The known name nearest to `name`; `None` if none is like it.
 ///
 /// Uses the normalised Damerau–Levenshtein similarity; a name that contains the other is also near,
 /// so `grid` finds `uniform-grid`.
@@ -142,9 +151,13 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         strsim::normalized_damerau_levenshtein(&name, &candidate)
             + if contained { 0.5 } else { 0.0 }
     };
-    known
+    let known = known
         .into_iter()
-        .max_by(|a, b| score(a).total_cmp(&score(b)))
+        .map(|candidate| (score(candidate), candidate));
+    let nearest = known.max_by(|a, b| a.0.total_cmp(&b.0));
+    nearest
+        .filter(|(score, _)| *score >= LEAST_ALIKE)
+        .map(|(_, candidate)| candidate)
 }
 
 #[cfg(test)]
@@ -186,6 +199,9 @@ mod tests {
         assert_eq!(nearest("grid", known), Some("uniform-grid"));
         assert_eq!(nearest("Roped_BVH", known), Some("roped-bvh"));
         assert_eq!(nearest("bvh", []), None);
+        assert_eq!(nearest("x.stl", ["caustics", "fog"]), None);
+        assert_eq!(did_you_mean("bhv", known), "; did you mean `bvh`?");
+        assert_eq!(did_you_mean("quite another", ["bvh"]), "");
     }
 
     #[test]

@@ -152,9 +152,12 @@ impl KernelLibrary {
         };
         let known = EMBEDDED.iter().map(|(name, _)| *name);
         let known = known.chain(wanted.iter().map(String::as_str));
-        let near = nearest(lost, known).unwrap_or_default();
+        let near = nearest(lost, known);
+        let near = near.map_or(String::new(), |near| {
+            format!("; did you mean `{near}.wesl`?")
+        });
         Err(GpuError::Kernel(format!(
-            "{}: this file replaces no kernel, and none imports it; did you mean `{near}.wesl`? \
+            "{}: this file replaces no kernel, and none imports it{near} \
              (paths are relative to the folder given, upper and lower case count)",
             self.files[*lost].0.display()
         )))

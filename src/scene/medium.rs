@@ -2,6 +2,7 @@
 
 use super::{SceneData, SceneError, extension, named};
 use glam::{DVec3, Vec3};
+use raystone_core::files::MODEL_ENDINGS;
 use raystone_core::parameters;
 use raystone_core::params::{ParamValue, Parameters as _, Params};
 use raystone_volume::files::Grid;
@@ -100,7 +101,7 @@ impl MediumParameters {
             source,
         };
         let grid = |name: &str| match extension(Path::new(name)).as_str() {
-            "obj" | "ply" | "gltf" | "glb" | "xml" => {
+            ending if MODEL_ENDINGS.contains(&ending) => {
                 of_mesh(&named(name)?, self.medium_voxels).map_err(problem)
             }
             _ => grid(name, self.medium_voxels).map_err(problem),

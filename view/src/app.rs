@@ -11,6 +11,7 @@ use egui::util::History;
 use egui::{Color32, Key, Modifiers, RichText, ScrollArea, ThemePreference, Ui};
 use raystone_bench::run::Registries;
 use raystone_config::{Map, Pace};
+use raystone_core::files::MODEL_ENDINGS;
 use raystone_core::params::Choice as _;
 use raystone_viewer::Screen;
 use std::path::{Path, PathBuf};
@@ -404,7 +405,7 @@ impl App {
         let chosen = rfd::FileDialog::new()
             .add_filter(
                 "models and experiments",
-                &["obj", "gltf", "glb", "ply", "xml", "toml"],
+                &[&MODEL_ENDINGS[..], &["toml"]].concat(),
             )
             .pick_file();
         if let Some(path) = chosen {

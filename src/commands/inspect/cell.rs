@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use raystone::config::{Axis, Cell};
 use raystone::measure::record::{CellRecord, Outcome};
 use raystone::run::{Inventory, RunOptions, State};
-use raystone::text::{nearest, shell_word};
+use raystone::text::{did_you_mean, shell_word};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -41,11 +41,8 @@ fn find<'i>(inventory: &'i Inventory, dir: &Path, name: &str) -> Result<&'i Stat
         [one] => Ok(one),
         [] => {
             let names = states.iter().map(|state| state.unit.name.as_str());
-            let near = nearest(name, names).unwrap_or_default();
-            bail!(
-                "{} has no cell `{name}`; did you mean `{near}`?",
-                dir.display()
-            )
+            let near = did_you_mean(name, names);
+            bail!("{} has no cell `{name}`{near}", dir.display())
         }
         several => {
             let names = several.iter().map(|state| state.unit.name.as_str());

@@ -1,7 +1,7 @@
 //! Registries of static kinds that an axis can name.
 
 use super::{Entry, ParameterSchema};
-use crate::text::nearest;
+use crate::text::did_you_mean;
 
 /// Paths and texts of additional kernel modules that are not part of the program.
 pub type Sources = &'static [(&'static str, &'static str)];
@@ -63,8 +63,8 @@ impl<T: Named + ?Sized> Kinds<T> {
     /// No such kind exists; the message suggests the nearest name.
     pub fn named(&self, what: &str, name: &str) -> Result<&'static T, String> {
         self.get(name).ok_or_else(|| {
-            let near = nearest(name, self.iter().map(Named::name)).unwrap_or_default();
-            format!("no {what} is called `{name}`; did you mean `{near}`?")
+            let near = did_you_mean(name, self.iter().map(Named::name));
+            format!("no {what} is called `{name}`{near}")
         })
     }
 

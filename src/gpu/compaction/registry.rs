@@ -5,7 +5,7 @@ use super::{
     Roger, Subgroup, Workgroup,
 };
 use raystone_core::params::{Parameters, Registered, Registry, Variant};
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use std::sync::Arc;
 
 /// All compactions by name; more can be added.
@@ -36,12 +36,8 @@ impl CompactionRegistry {
     /// A description of an unknown name or parameter.
     pub fn configured(&self, variant: &Variant) -> Result<Arc<dyn Compaction>, String> {
         let Some(kind) = self.0.find(&variant.name) else {
-            let near = nearest(&variant.name, self.0.iter().map(Registered::name));
-            return Err(format!(
-                "no compaction is called `{}`; did you mean `{}`?",
-                variant.name,
-                near.unwrap_or_default()
-            ));
+            let near = did_you_mean(&variant.name, self.0.iter().map(Registered::name));
+            return Err(format!("no compaction is called `{}`{near}", variant.name));
         };
         let made = kind.make(&variant.params);
         made.map_err(|error| format!("{}: {error}", variant.name))

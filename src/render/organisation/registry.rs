@@ -2,7 +2,7 @@
 
 use super::{MultiKernel, Organisation, Regeneration, SingleKernel, Wavefront};
 use raystone_core::params::{Parameters, Registered, Registry, Variant};
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use std::sync::Arc;
 
 /// All organisations by name; more can be added.
@@ -27,11 +27,10 @@ impl OrganisationRegistry {
     /// A description of an unknown name or parameter.
     pub fn configured(&self, variant: &Variant) -> Result<Arc<dyn Organisation>, String> {
         let Some(kind) = self.0.find(&variant.name) else {
-            let near = nearest(&variant.name, self.0.iter().map(Registered::name));
+            let near = did_you_mean(&variant.name, self.0.iter().map(Registered::name));
             return Err(format!(
-                "no organisation is called `{}`; did you mean `{}`?",
-                variant.name,
-                near.unwrap_or_default()
+                "no organisation is called `{}`{near}",
+                variant.name
             ));
         };
         let made = kind.make(&variant.params);

@@ -15,7 +15,7 @@ pub mod table;
 
 use raystone_config::ConfigError;
 use raystone_config::expect::Thesis;
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use serde::Deserialize;
 
 /// An experiment of a thesis, embedded in the program.
@@ -135,9 +135,9 @@ pub fn chosen(names: &[String]) -> Result<Vec<Source>, String> {
             return Err(format!("{name} cannot be run yet: {}", table.why));
         }
         let known: Vec<&str> = SOURCES.iter().map(|source| source.name).collect();
-        let near = nearest(name, known.iter().copied()).unwrap_or_default();
+        let near = did_you_mean(name, known.iter().copied());
         return Err(format!(
-            "unknown table `{name}`; did you mean `{near}`? Known: {}",
+            "unknown table `{name}`{near} (known: {})",
             known.join(", ")
         ));
     }

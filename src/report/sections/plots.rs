@@ -7,7 +7,7 @@ use crate::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::repro::select::select;
 use crate::values::{Estimate, Value};
 use raystone_config::plot::{Abscissa, PlotRequest};
-use raystone_core::text::nearest;
+use raystone_core::text::did_you_mean;
 use raystone_record::{Interval, Key, axis};
 
 /// Returns the section; `None` where nothing is asked for.
@@ -42,10 +42,10 @@ fn misspelt(request: &PlotRequest) -> Option<String> {
     let named = request.curves.iter().chain(request.of.keys());
     let mut named = named.map(String::as_str).chain(of_x);
     let unknown = named.find(|axis| !axis::ALL.contains(axis))?;
-    let near = nearest(unknown, axis::ALL).unwrap_or_default();
+    let near = did_you_mean(unknown, axis::ALL);
     let caption = &request.caption;
     Some(format!(
-        "No plot “{caption}”: there is no axis `{unknown}`; did you mean `{near}`?"
+        "No plot “{caption}”: there is no axis `{unknown}`{near}"
     ))
 }
 
