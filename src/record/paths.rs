@@ -24,6 +24,9 @@ pub struct PathsRecord {
     /// Paths near a decision by the oracle alone, whatever their result; counted where flips are many.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub unsettled: usize,
+    /// Paths that one rounding moves by the oracle alone, whatever their result; counted where many are ill-conditioned.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub unsteady: usize,
     /// Paths that differ, not to be explained by rounding.
     pub wrong: usize,
     /// Median relative difference of the paths that found light.
@@ -61,6 +64,7 @@ impl PathsRecord {
             edges: self.edges + other.edges,
             layered: self.layered + other.layered,
             unsettled: self.unsettled + other.unsettled,
+            unsteady: self.unsteady + other.unsteady,
             wrong: self.wrong + other.wrong,
             median: self.median.max(other.median),
             worst: self.worst.max(other.worst),

@@ -32,6 +32,14 @@ pub enum SceneError {
         /// The reason.
         source: std::io::Error,
     },
+    /// Instances that cannot be shifted so.
+    #[error("{name}: `shifts` of the scene: {problem}")]
+    Shifts {
+        /// The scene, as typed.
+        name: String,
+        /// The reason.
+        problem: String,
+    },
     /// A medium that cannot be.
     #[error("{name}: the medium of the scene: {source}")]
     Medium {

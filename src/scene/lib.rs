@@ -54,6 +54,7 @@ mod ply_body;
 mod ply_header;
 mod polygon;
 mod reduce;
+mod shifts;
 mod tally;
 mod text;
 mod texture;
@@ -79,6 +80,7 @@ pub use material::{
 pub use medium::SceneMedium;
 pub use normals::{GEOMETRIC, decode_normal, encode_normal};
 pub use raystone_core::load::LoadReport;
+pub use shifts::{Shifts, parse_shifts, shifts_text};
 pub use texture_use::{TextureUse, Wrap};
 
 use glam::{Vec2, Vec3};
@@ -214,7 +216,7 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     let mut variant = variant.clone();
     let mut common = Params::default();
-    for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS] {
+    for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS, SHIFTS] {
         common.0.extend(variant.params.0.remove_entry(name));
     }
     let mut medium = Params::default();
@@ -240,16 +242,26 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         scene = hung_lamps::hang(scene, lamps as u32);
     }
     scene = medium.applied(scene)?;
-    match common.0.get(ENVIRONMENT) {
-        Some(ParamValue::Name(file)) if !file.is_empty() => {
-            scene.under(Path::new(file), options.table_bytes)
-        }
-        _ => Ok(scene),
+    let text = |name| match common.0.get(name) {
+        Some(ParamValue::Name(text)) if !text.is_empty() => Some(text.as_str()),
+        _ => None,
+    };
+    if let Some(file) = text(ENVIRONMENT) {
+        scene = scene.under(Path::new(file), options.table_bytes)?;
     }
+    if let Some(ways) = text(SHIFTS) {
+        let name = scene.name.clone();
+        let shifted = parse_shifts(ways).and_then(|ways| scene.shifted(&ways));
+        scene = shifted.map_err(|problem| SceneError::Shifts { name, problem })?;
+    }
+    Ok(scene)
 }
 
 /// Common parameter: environment map.
 const ENVIRONMENT: &str = "environment";
+
+/// Common parameter: ways of instances.
+pub const SHIFTS: &str = "shifts";
 
 /// Common parameter: number of added lamps.
 const HUNG_LAMPS: &str = "hung_lamps";
@@ -292,6 +304,12 @@ pub(crate) fn common_parameters() -> ParameterSchema {
             description: "small square lamps that are hung into the scene, at places of their own, and shine down",
             default: ParamValue::Integer(0),
             range: ParamRange::Integer { min: 0, max: 4096 },
+        },
+        Parameter {
+            name: SHIFTS,
+            description: "instances that stand elsewhere, each with its number and its way in scene units: `7 0.5 0 0, 9 0 1 -2`",
+            default: ParamValue::Name(String::new()),
+            range: ParamRange::Text,
         },
     ];
     common.extend(MediumParameters::schema());

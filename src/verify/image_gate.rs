@@ -20,11 +20,13 @@
 //! Means of a few samples summed in one dispatch are compared with those of single samples
 //! ([`sums`]).
 //!
-//! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance and than
-//! the oracle alone finds near a decision ([`unsettled`]; other surfaces are counted separately, up
-//! to the number of paths that meet surfaces with another within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
+//! One wrong path fails the check. So do more flips than `FLIPS` of the paths beyond chance (other
+//! surfaces are counted separately, up to the number of paths that meet surfaces with another
+//! within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
-//! left within a texel, so the last two have separate bounds for textures.
+//! left within a texel, so the last two have separate bounds for textures. Where all pixels draw the
+//! same numbers they are near a decision together: what the oracle alone says of its paths
+//! ([`unsettled`], [`unsteady`]) is then allowed beyond the bounds.
 
 pub use crate::pixels::{Choice, Frame, Pixels};
 
@@ -213,6 +215,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
         edges: of(Class::Flip(Parting::Edge)),
         layered: truth.iter().filter(|path| path.layers > 0).count(),
         unsettled: 0,
+        unsteady: 0,
         wrong: of(Class::Wrong),
         median: median(&truth, &differences, floor),
         worst: agreeing.copied().fold(0.0, f64::max),
@@ -220,6 +223,10 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     };
     if record.flips - record.surfaces > most(record.paths, FLIPS) {
         record.unsettled = unsettled(oracle, view, answers, &truth);
+    }
+    let share = ILL_CONDITIONED[oracle.texturing()];
+    if record.ill_conditioned > most(record.paths, share) {
+        record.unsteady = unsteady(oracle, view, answers, &truth);
     }
     record.fault = match first_wrong {
         Some((&i, _)) => {
@@ -319,14 +326,38 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
 /// roundings, whatever the kernel answered. Usually that is a few in ten thousand; but where all pixels draw the same
 /// number and it is a border (1/2, of two equal lights), it is all of them at once.
 fn unsettled(oracle: &PathOracle, view: &View, answers: &[Answer], truth: &[Path]) -> usize {
+    count_in_trials(oracle, view, answers, truth, SCALES[0], |played, path| {
+        played.parting(path) > Some(Parting::Surfaces)
+    })
+}
+
+/// The number of paths that one rounding of every quantity moves beyond what counts as agreement, in some trial and
+/// without another branch, whatever the kernel answered: all at once, too, where all pixels draw the same numbers.
+fn unsteady(oracle: &PathOracle, view: &View, answers: &[Answer], truth: &[Path]) -> usize {
+    let floor = floor_of(truth);
+    count_in_trials(oracle, view, answers, truth, 1.0, |played, path| {
+        let is_moved = difference(played.radiance, path.radiance, floor) > TOLERANCE;
+        is_moved && played.parting(path).is_none()
+    })
+}
+
+/// The number of paths of which some trial with so many roundings is what is looked for.
+fn count_in_trials(
+    oracle: &PathOracle,
+    view: &View,
+    answers: &[Answer],
+    truth: &[Path],
+    scale: f64,
+    is_looked_for: impl Fn(&Path, &Path) -> bool + Sync,
+) -> usize {
     let paths = answers.par_iter().zip(truth);
-    let is_unsettled = |(answer, path): &(&Answer, &Path)| {
+    let found = paths.filter(|(answer, path)| {
         (0..TRIALS).any(|trial| {
-            let played = oracle.trace(view, answer.id, Rounding::played(SCALES[0], trial));
-            played.parting(path) > Some(Parting::Surfaces)
+            let played = oracle.trace(view, answer.id, Rounding::played(scale, trial));
+            is_looked_for(&played, path)
         })
-    };
-    paths.filter(is_unsettled).count()
+    });
+    found.count()
 }
 
 /// Classifies a path by the fewest simulated roundings, for reports.
@@ -386,6 +417,7 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
         surfaces,
         layered,
         unsettled,
+        unsteady,
         ill_conditioned,
         ..
     } = *record;
@@ -402,7 +434,7 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     });
     over("take another branch", flips - surfaces, unsettled, FLIPS)
         .or(strange)
-        .or_else(|| over("are ill-conditioned", ill_conditioned, 0, share))
+        .or_else(|| over("are ill-conditioned", ill_conditioned, unsteady, share))
         .or_else(|| {
             off.then(|| format!("half of the paths differ by {:.1e} or more", record.median))
         })

@@ -4,11 +4,15 @@ use super::screen::Screen;
 use raystone_config::{Animation, Axis, Catalogue, Window};
 use raystone_core::geometry::Camera;
 use raystone_core::params::{ParamValue, ParameterType, Variant};
+use raystone_scene::{SHIFTS, parse_shifts, shifts_text};
 use std::fmt::Write as _;
 
 impl Screen {
     /// The experiment file of what is on screen, for [`Screen::parse`] and `raystone run`.
     pub fn to_toml(&self, catalogue: &Catalogue) -> String {
+        if !self.dragged.is_empty() {
+            return self.with_shifts().to_toml(catalogue);
+        }
         let mut written = String::from("# What was on screen.\n");
         let text = &mut written;
         section(
@@ -42,6 +46,30 @@ impl Screen {
         }
         section(text, "window", &shown(&self.window));
         written
+    }
+
+    /// The same screen with what was dragged as parameters of its scene.
+    fn with_shifts(&self) -> Self {
+        let mut screen = self.clone();
+        let dragged = std::mem::take(&mut screen.dragged);
+        for cell in &mut screen.cells {
+            let mut scene = cell[Axis::Scene].clone();
+            let before = scene.params.0.get(SHIFTS);
+            let before = before.and_then(|ways| match ways {
+                ParamValue::Name(ways) => parse_shifts(ways).ok(),
+                _ => None,
+            });
+            let mut ways = before.unwrap_or_default();
+            for (instance, way) in &dragged {
+                *ways.entry(*instance).or_default() += *way;
+            }
+            let text = ParamValue::Name(shifts_text(&ways));
+            scene.params.0.insert(SHIFTS.to_owned(), text);
+            // It is that of no entry any more.
+            scene.label = format!("{}({SHIFTS})", scene.name);
+            *cell = cell.clone().with(Axis::Scene, &scene);
+        }
+        screen
     }
 
     /// The axes with one or two values each, their parameters, and where more than one axis has two, which of the four
@@ -180,6 +208,7 @@ mod tests {
     use glam::Vec3;
     use raystone_bench::run::Registries;
     use raystone_config::{Follow, Map, Motion, Pace};
+    use raystone_scene::LoadOptions;
 
     fn screen(overrides: &[&str]) -> Screen {
         let text = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"sobol\"]\n";
@@ -227,6 +256,30 @@ mod tests {
         // The comparison can fail.
         moved.window.swipe = 0.4;
         assert_ne!(read_back(&one), moved);
+    }
+
+    #[test]
+    fn what_was_dragged_reads_back_as_shifts_of_the_scene() {
+        let mut screen = screen(&["axes.scene=[\"instances\"]"]);
+        let still = screen.clone();
+        screen.dragged.insert(7, Vec3::new(0.5, -1.0, 1.0 / 3.0));
+        let loaded = |screen: &Screen| {
+            let scene =
+                raystone_scene::load(&screen.cells[0][Axis::Scene], &LoadOptions::default());
+            scene.unwrap().shifted(&screen.dragged).unwrap().triangles
+        };
+        let read = read_back(&screen);
+        assert!(read.dragged.is_empty());
+        assert_eq!(loaded(&read), loaded(&screen));
+        assert_ne!(loaded(&read), loaded(&still));
+        // Dragged on, and back.
+        let mut again = read;
+        again.dragged.insert(7, Vec3::new(-0.5, 1.0, -1.0 / 3.0));
+        again.dragged.insert(2, Vec3::X);
+        let read = read_back(&again);
+        let mut alone = still;
+        alone.dragged.insert(2, Vec3::X);
+        assert_eq!(loaded(&read), loaded(&alone));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::world::{Structure, World};
 use raystone_accel::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use raystone_bench::animation::{Actor, Taken, Way, moved, shifted};
+use raystone_bench::animation::{Actor, Taken, Way, moved};
 use raystone_bench::run::{Registries, RunError};
 use raystone_config::{Animation, Axis, Cell, Follow, Motion};
 use raystone_core::clock::Instant;
@@ -29,7 +29,7 @@ impl Pose {
     fn of(&self, still: &Arc<SceneData>) -> Result<Arc<SceneData>, String> {
         let mut scene = Arc::clone(still);
         if !self.dragged.is_empty() {
-            scene = Arc::new(shifted(&scene, &self.dragged)?);
+            scene = Arc::new(SceneData::clone(&scene).shifted(&self.dragged)?);
         }
         match &self.animation {
             // The first frame of a motion without instances is refused, too.

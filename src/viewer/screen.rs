@@ -45,7 +45,7 @@ pub struct Screen {
     pub reference: Reference,
     /// How the scene moves from frame to frame.
     pub animation: Option<Animation>,
-    /// Ways of instances that were dragged, scene units; no experiment has them.
+    /// Ways of instances that were dragged, scene units; an experiment has them as `shifts` of the scene.
     pub dragged: BTreeMap<u32, Vec3>,
     /// How images are shown.
     pub window: Window,

@@ -5,7 +5,7 @@ mod actor;
 mod motion;
 
 pub use actor::{Actor, Taken, Way};
-pub use motion::{moved, shifted};
+pub use motion::moved;
 
 use crate::timing::{Measured, interleave};
 use raystone_accel::tracer::count_work;

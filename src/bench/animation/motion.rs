@@ -3,8 +3,7 @@
 use glam::{DVec3, Vec3};
 use raystone_config::{Animation, Motion};
 use raystone_core::random::Pcg32;
-use raystone_scene::{SceneData, Transform};
-use std::collections::BTreeMap;
+use raystone_scene::SceneData;
 use std::f64::consts::TAU;
 
 const SEED: u64 = 1;
@@ -34,7 +33,8 @@ pub fn moved(scene: &SceneData, animation: &Animation, frame: u32) -> Result<Sce
         Motion::Instances => {
             let assembly = moved.assembly.as_ref();
             let count = assembly.map_or(0, |assembly| assembly.instances().len());
-            shift(&mut moved, directions(count).map(|d| amplitude * time * d))?;
+            let ways = directions(count).map(|d| (amplitude * time * d).as_vec3());
+            moved.shift((0..).zip(ways))?;
         }
     }
     moved.hash = format!("{}, frame {frame} of {animation:?}", scene.hash);
@@ -61,40 +61,6 @@ impl Wave {
         let by = DVec3::new(at.y, at.z, at.x).to_array();
         (at + DVec3::from_array(by.map(|x| self.displacement(x)))).as_vec3()
     }
-}
-
-/// The scene with some instances shifted, each by a way of its own, scene units.
-///
-/// # Errors
-/// There is no such instance, or it cannot be placed.
-pub fn shifted(scene: &SceneData, ways: &BTreeMap<u32, Vec3>) -> Result<SceneData, String> {
-    let mut moved = scene.clone();
-    let count = ways.keys().last().map_or(0, |last| last + 1);
-    let way = |instance| ways.get(&instance).copied().unwrap_or_default();
-    shift(
-        &mut moved,
-        (0..count).map(|instance| way(instance).as_dvec3()),
-    )?;
-    moved.hash = format!("{}, shifted by {ways:?}", scene.hash);
-    Ok(moved)
-}
-
-/// Shifts the first instances by these ways.
-fn shift(scene: &mut SceneData, ways: impl Iterator<Item = DVec3>) -> Result<(), String> {
-    let assembly = scene.assembly.as_mut();
-    let assembly = assembly.ok_or("the scene has no instances that could move")?;
-    for (instance, way) in ways.enumerate() {
-        let now = assembly.instances().get(instance);
-        let mut to_world = now.map_or(Transform::IDENTITY, |now| now.to_world);
-        for (row, by) in to_world.rows.iter_mut().zip(way.to_array()) {
-            row[3] += by as f32;
-        }
-        let placed = assembly.move_to(instance, to_world);
-        placed.map_err(|e| e.to_string())?;
-    }
-    let instances = assembly.instances().iter();
-    scene.triangles = instances.flat_map(|i| assembly.copy(i)).collect();
-    Ok(())
 }
 
 /// Directions of so many instances.

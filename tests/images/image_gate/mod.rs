@@ -270,6 +270,19 @@ fn each_kind_of_difference_has_a_bound() {
         ),
         (
             PathsRecord {
+                ill_conditioned: 184,
+                unsteady: 50,
+                ..paths.clone()
+            },
+            PathsRecord {
+                ill_conditioned: 185,
+                unsteady: 50,
+                ..paths.clone()
+            },
+            "at most 184 are explained",
+        ),
+        (
+            PathsRecord {
                 ill_conditioned: 134,
                 ..paths.clone()
             },
