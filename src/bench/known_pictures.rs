@@ -2,8 +2,8 @@
 //! sides exchanged, looks like another result.
 
 use crate::heat_map::heat_map;
-use crate::spectrum::spectrum_of;
-use raystone_image::Image;
+use crate::spectrum::{SIGMAS, error_spectrum, spectrum_of};
+use raystone_image::{Image, automatic_exposure};
 use std::f64::consts::TAU;
 
 /// The ends of the colour map viridis, as Matplotlib 3.9 prints them: violet for nothing, yellow for the most.
@@ -49,6 +49,47 @@ pub fn check() -> Result<(), String> {
         if !agrees {
             return Err(wrong(what, format!("{found:?}"), expected.to_string()));
         }
+    }
+    filtered()?;
+    exposed()
+}
+
+/// An impulse after a Gaussian: along each axis the squares of its weights sum to 0.282 (σ = 1) and 0.141 (σ = 2), as
+/// `scipy.ndimage.gaussian_filter` has them.
+fn filtered() -> Result<(), String> {
+    const SIDE: usize = 41;
+    let mut error = [0.0; SIDE * SIDE];
+    error[SIDE * SIDE / 2] = 1.0;
+    let found = error_spectrum(&error, [SIDE; 2]).filtered;
+    for (sigma, of_axis) in [
+        (0.0, 1.0),
+        (1.0, 0.282_125_655_064_598_14),
+        (2.0, 0.141_052_356_387_740_7),
+        (4.0, 0.070_528_689_080_396),
+    ] {
+        let place = SIGMAS.iter().position(|s| *s == sigma);
+        let found = place.and_then(|k| found.get(k)).copied();
+        let expected = of_axis / SIDE as f64;
+        let agrees = found.is_some_and(|x| (x - expected).abs() <= ROUNDING * expected);
+        if !agrees {
+            let what = format!("filtered impulse (σ = {sigma})");
+            return Err(wrong(&what, format!("{found:?}"), expected.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// A picture of 2, 8, black and no number: the exposure makes 4, the middle of the logarithms of what is lit, 0.36.
+fn exposed() -> Result<(), String> {
+    let pixels = vec![[2.0; 3], [8.0; 3], [0.0; 3], [f32::NAN; 3]];
+    let image = Image {
+        width: 4,
+        height: 1,
+        pixels,
+    };
+    let exposure = automatic_exposure(&image);
+    if (exposure - 0.09).abs() > 1e-6 {
+        return Err(wrong("exposure", exposure.to_string(), "0.09".to_owned()));
     }
     Ok(())
 }

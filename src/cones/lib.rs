@@ -9,6 +9,7 @@ pub mod check;
 pub mod cone;
 pub mod device;
 pub mod disk;
+pub mod known_figures;
 mod level;
 mod measure;
 pub mod oracle;

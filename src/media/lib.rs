@@ -7,6 +7,7 @@
 
 pub mod adaptive;
 mod bend;
+pub mod known_figures;
 pub mod march;
 mod measure;
 pub mod optics;

@@ -1,6 +1,7 @@
 //! Readings of known records, made anew before any figure is shown: a figure that is taken from its neighbour's field, or in
 //! another unit, looks like a measurement.
 
+use crate::coherence::Tally;
 use crate::{
     BiasRecord, ClassTiming, CountersPerRay, FigureAtCount, FilteredError, GateVerdict,
     IntegrandFigures, Interval, PixelsAtCount, RayClass, Reading, ReferenceCheck, ReferenceRecord,
@@ -27,6 +28,7 @@ pub fn check() -> Result<(), String> {
         return Err(format!("known records have {count:?} readings"));
     }
     structures.chain(cells).try_for_each(agree)?;
+    cycles()?;
     let (bias, spectrum, stream, reference) = further();
     let others = [
         (bias.readings(), &BIAS[..]),
@@ -40,6 +42,27 @@ pub fn check() -> Result<(), String> {
         }
         let known = known.iter().map(|(id, value)| (*id, *value, 0.0));
         readings.into_iter().zip(known).try_for_each(agree)
+    })
+}
+
+/// Cycles of known accesses: 25 an issue, 1 a line, 5 from the L2, 9 more from memory; and lanes that take part.
+fn cycles() -> Result<(), String> {
+    let tally = Tally {
+        issues: 4,
+        active: 32,
+        lanes: 128,
+        lines: 100,
+        l1_hits: 70,
+        l2_hits: 20,
+        ..Tally::default()
+    };
+    let found = (tally.cost(), tally.efficiency(), tally.misses());
+    let expected = (4 * 25 + 100 + 30 * 5 + 10 * 9, Some(0.25), 10);
+    (found == expected).then_some(()).ok_or_else(|| {
+        format!(
+            "cycles, efficiency and misses of known accesses are {found:?}, and should be {expected:?}: this program shows \
+             wrong figures; build it anew, and report what stays wrong"
+        )
     })
 }
 

@@ -78,8 +78,14 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     }
     let angle = 0.5 * (wide.1 + between + narrow.1);
     let across = wide.0.cross(narrow.0);
-    if angle >= PI || across.length_squared() < 1e-24 {
+    if angle >= PI {
         return (wide.0, PI);
+    }
+    if across.length_squared() < 1e-24 {
+        // Equal up to rounding, of which the angle has more than the vectors; or opposite.
+        let is_opposite = between > FRAC_PI_2;
+        let reach = if is_opposite { PI } else { between + narrow.1 };
+        return (wide.0, reach);
     }
     let turn = glam::DQuat::from_axis_angle(across.normalize(), angle - wide.1);
     ((turn * wide.0).normalize(), angle)
@@ -281,6 +287,19 @@ mod tests {
             assert!((nodes[ROOT].bounds.power / total - 1.0).abs() < 1e-12);
         }
         assert!(light_tree(&[]).0.is_empty());
+    }
+
+    #[test]
+    fn lamps_that_face_one_way_have_a_narrow_cone() {
+        let mut random = Pcg32::new(3);
+        let narrow = (0..1000).filter(|_| {
+            let axis = random.direction();
+            let (_, angle) = cone_union((axis, 0.0), (axis, 0.0));
+            angle < 1e-6
+        });
+        assert_eq!(narrow.count(), 1000);
+        let (_, opposite) = cone_union((DVec3::X, 0.0), (-DVec3::X, 0.0));
+        assert_eq!(opposite, PI);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 
 pub mod device;
 mod judge;
+pub mod known_figures;
 mod measure;
 pub mod newton;
 pub mod oracle;

@@ -60,6 +60,7 @@ pub fn check() -> Result<(), String> {
         (OF_PIXELS, known_metrics::pictures()?),
         (OF_SINGLE, known_metrics::flip()),
         (OF_FUNCTIONS, known_metrics::tails()?),
+        (ROUNDING, known_metrics::tiles()),
     ];
     groups
         .into_iter()

@@ -4,9 +4,11 @@
 //! Values are those of NumPy 2, from the formulas of `METRICS`; of ꟻLIP those of the authors' program.
 
 use super::known_figures::Known;
+use crate::adaptive::{Tiles, samples_needed};
 use crate::flip::Seen;
 use crate::heavy_tails::{PixelErrors, Tail, is_heavy};
 use crate::interval::Interval;
+use crate::log_figure::LogFigure;
 use crate::metrics::{Reference, error_map, measure};
 use raystone_image::Image;
 
@@ -189,4 +191,51 @@ pub(super) fn tails() -> Result<Vec<Known>, String> {
         ),
         ("verdicts on tails", Some(verdicts), 6.0),
     ])
+}
+
+/// Tiles of 8² pixels of an image of 20 × 12, and the samples that one needs.
+pub(super) fn tiles() -> Vec<Known> {
+    let tiles = Tiles {
+        size: [20, 12],
+        edge: 8,
+    };
+    let last = tiles.pixels(5);
+    let own = (0..tiles.len()).map(|tile| {
+        let all = tiles.pixels(tile).into_iter();
+        all.filter(|pixel| tiles.of_pixel(*pixel) == tile).count()
+    });
+    // A jackknife of ln 0.04 with an error of √(3/4 · 0.025): with 3 degrees of freedom the upper end of 95 % is 0.0552.
+    let around = [-0.1, -0.05, 0.05, 0.1].map(|off| 0.04_f64.ln() + off);
+    let error = LogFigure::new(0.04_f64.ln(), &[around.to_vec()], Vec::new());
+    let needed = |target: f64, confidence: f64| {
+        let counts = [4, 8, 16, 32];
+        Some(f64::from(samples_needed(
+            error.as_ref(),
+            &counts,
+            target,
+            confidence,
+        )))
+    };
+    vec![
+        (
+            "tile of a pixel",
+            Some(tiles.of_pixel(9 * 20 + 17) as f64),
+            5.0,
+        ),
+        ("pixels of the last tile", Some(last.len() as f64), 16.0),
+        (
+            "first pixel of the last tile",
+            last.first().map(|p| *p as f64),
+            176.0,
+        ),
+        (
+            "pixels in their own tiles",
+            Some(own.sum::<usize>() as f64),
+            240.0,
+        ),
+        ("samples that a tile needs", needed(0.0145, 0.95), 16.0),
+        ("samples with less certainty", needed(0.022, 0.5), 8.0),
+        ("samples with more certainty", needed(0.022, 0.95), 16.0),
+        ("samples beyond all", needed(0.001, 0.95), 32.0),
+    ]
 }

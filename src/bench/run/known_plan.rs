@@ -1,6 +1,7 @@
 //! The plan of a known experiment, made anew before any is carried out: what a plan forgets is missing from every figure, and
 //! nothing fails.
 
+use super::adaptive;
 use super::registries::Registries;
 use raystone_config::{Axis, Cell, Experiment, Plan};
 
@@ -53,8 +54,9 @@ left out: 6, 6, 4, 8";
 /// Makes the plan.
 ///
 /// # Errors
-/// It is not what it should be: the first line that is another.
+/// It is not what it should be: the first line that is another. Or tiles are ended otherwise.
 pub fn check() -> Result<(), String> {
+    adaptive::check()?;
     let found = planned(TEXT)?;
     let mut pairs = found.lines().zip(EXPECTED.lines());
     match pairs.find(|(found, expected)| found != expected) {

@@ -129,8 +129,12 @@ fn least_cone(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     }
     let half = (wide.1 + between + narrow.1) / 2.0;
     let across = wide.0.cross(narrow.0);
-    if half >= PI || across.length() < 1e-12 {
+    let is_along = across.length() < 1e-12;
+    if half >= PI || is_along && wide.0.dot(narrow.0) < 0.0 {
         return (wide.0, PI);
+    }
+    if is_along {
+        return (wide.0, between + narrow.1);
     }
     let turn = DQuat::from_axis_angle(across.normalize(), half - wide.1);
     ((turn * wide.0).normalize(), half)

@@ -1,0 +1,167 @@
+//! Known scenes and texts, read anew before anything is rendered: kernels and oracles start from the same scene, and say
+//! nothing of what a file or a parameter means.
+
+use crate::ies::IesProfile;
+use crate::material::reflectance_of_ior;
+use crate::mtl_statements::{Definition, read};
+use crate::tally::Unread;
+use crate::{LoadOptions, SceneData, load};
+use glam::{DVec3, Vec3};
+use raystone_core::params::{ParamValue, Params, Variant};
+
+/// A value by name, and what it should be.
+type Known = (&'static str, f64, f64);
+
+/// Relative error of sums in f32.
+const ROUNDING: f64 = 1e-5;
+
+/// Of 50 cd times a multiplier of 2.5 and a ballast of 0.8, straight down twice as much as to the sides, all around.
+const LUMINAIRE: &str =
+    "IESNA:LM-63-2002\nTILT=NONE\n1 1000 2.5 3 1 1 2 0 0 0\n0.8 1 40\n0 90 180\n0\n100 50 50\n";
+const LIBRARY: &str = "newmtl a\nTr .25\nNs 30\nnewmtl b\nd .25\nNi 1.5\nKd .1 .2 .3\n";
+
+/// Reads them.
+///
+/// # Errors
+/// A value is not what it should be: which, and both values.
+pub(crate) fn check() -> Result<(), String> {
+    let all = luminaire()?
+        .into_iter()
+        .chain(library())
+        .chain(parameters()?);
+    for (what, found, expected) in all {
+        let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
+        if !agrees {
+            return Err(format!(
+                "the {what} of a known scene is {found}, and should be {expected}: this program reads scenes wrongly; build \
+                 it anew, and report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Its intensities, and its flux: 2π ∫ I sin θ dθ, of 100 below the sides 4π · 100, and what is straight down beyond them
+/// 2π · 100 (1 − 2 / π), since ∫ (1 − 2θ/π) sin θ dθ from 0 to π / 2 is 1 − 2 / π.
+fn luminaire() -> Result<[Known; 4], String> {
+    let profile = IesProfile::parse("a known luminaire", LUMINAIRE).map_err(|e| e.to_string())?;
+    let at = |x: f64, y: f64, z: f64| profile.intensity(DVec3::new(x, y, z).normalize());
+    let greatest = [at(0.0, -1.0, 0.0), at(0.0, 0.0, -1.0)];
+    let tau = std::f64::consts::TAU;
+    Ok([
+        ("greatest intensity", greatest[0].max(greatest[1]), 200.0),
+        ("intensity of a side", at(1.0, 0.0, 0.0), 100.0),
+        (
+            "factor of a luminaire",
+            f64::from(profile.candela[2]),
+            100.0,
+        ),
+        (
+            "flux of a luminaire",
+            profile.lumens(),
+            tau * (200.0 + 100.0 * (1.0 - 2.0 / std::f64::consts::PI)),
+        ),
+    ])
+}
+
+/// Materials of a library: `Tr` is what `d` lacks, and a lobe's exponent n has a Beckmann roughness of √(2 / (n + 2)),
+/// of which glTF's is the root.
+fn library() -> Vec<Known> {
+    let mut materials: Vec<Definition> = Vec::new();
+    read(LIBRARY, &mut Unread::default(), |material, _| {
+        materials.push(material)
+    });
+    let of = |name: &str, value: fn(&Definition) -> Option<f32>| {
+        let found = materials.iter().find(|material| material.name == name);
+        found.and_then(value).map_or(f64::NAN, f64::from)
+    };
+    vec![
+        ("opacity of `Tr`", of("a", |m| m.source.opacity), 0.75),
+        ("opacity of `d`", of("b", |m| m.source.opacity), 0.25),
+        ("roughness of `Ns`", of("a", |m| m.source.roughness), 0.5),
+        ("index of `Ni`", of("b", |m| m.source.ior), 1.5),
+        ("blue of `Kd`", of("b", |m| m.diffuse.map(|c| c[2])), 0.3),
+        (
+            "reflectance of glass",
+            f64::from(reflectance_of_ior(1.5)),
+            0.04,
+        ),
+    ]
+}
+
+fn with(parameters: &[(&str, ParamValue)]) -> Result<SceneData, String> {
+    let parameters = parameters
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), value.clone()));
+    let variant = Variant {
+        name: "single-triangle".to_owned(),
+        params: Params(parameters.collect()),
+        ..Variant::default()
+    };
+    load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())
+}
+
+/// Power of the lamps of a scene, but for a factor: emission times area.
+fn power(scene: &SceneData) -> f64 {
+    let of = |k: usize| {
+        let emission = scene.materials[scene.material_ids[k] as usize].emission;
+        let [a, b, c] = scene.triangles[k].vertices.map(Vec3::as_dvec3);
+        0.5 * (b - a).cross(c - a).length() * f64::from(emission.x)
+    };
+    (0..scene.triangles.len()).map(of).sum()
+}
+
+/// What parameters of every scene do.
+fn parameters() -> Result<[Known; 6], String> {
+    let lamps = |count: i64| with(&[("hung_lamps", ParamValue::Integer(count))]);
+    let [one, eight] = [power(&lamps(1)?), power(&lamps(8)?)];
+    let number = ParamValue::Number;
+    let fog = with(&[
+        ("medium", ParamValue::Name("constant".to_owned())),
+        ("scattering", number(0.75)),
+        ("absorption", number(0.25)),
+    ])?;
+    let volume = fog.medium.as_ref().map(|medium| &medium.volume);
+    let first = |of: Option<&Vec<f32>>| {
+        of.and_then(|all| all.first())
+            .map_or(f64::NAN, |x| f64::from(*x))
+    };
+    let copies = with(&[("copies", ParamValue::Integer(3))])?;
+    let single = with(&[])?;
+    let its = copies
+        .material_ids
+        .iter()
+        .filter(|id| **id == single.material_ids[0]);
+    Ok([
+        ("power of eight hung lamps", eight / one, 1.0),
+        (
+            "number of triangles with eight lamps",
+            lamps(8)?.triangles.len() as f64,
+            17.0,
+        ),
+        (
+            "scattering of a medium",
+            first(volume.map(|v| &v.scattering)),
+            0.75,
+        ),
+        (
+            "absorption of a medium",
+            first(volume.map(|v| &v.absorption)),
+            0.25,
+        ),
+        ("copies of a material", its.count() as f64, 3.0),
+        (
+            "number of triangles of copies",
+            copies.triangles.len() as f64,
+            5.0,
+        ),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn they_are_as_by_hand() {
+        assert_eq!(super::check(), Ok(()));
+    }
+}
