@@ -88,7 +88,7 @@ impl SceneData {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LoadOptions, load, load_by_name};
+    use crate::{LoadOptions, load};
     use raystone_core::params::{ParamValue, Params, Variant};
 
     #[test]
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_parameter_moves_the_triangles_of_an_instance_and_no_others() {
-        let scene = load_by_name("instances").unwrap();
+        let scene = with("instances", "").unwrap();
         let moved = with("instances", "3 0.5 -1 0.25").unwrap();
         assert_ne!(scene.hash, moved.hash);
         let assembly = scene.assembly.as_ref().unwrap();
