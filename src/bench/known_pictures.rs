@@ -65,7 +65,6 @@ fn filtered() -> Result<(), String> {
         (0.0, 1.0),
         (1.0, 0.282_125_655_064_598_14),
         (2.0, 0.141_052_356_387_740_7),
-        (4.0, 0.070_528_689_080_396),
     ] {
         let place = SIGMAS.iter().position(|s| *s == sigma);
         let found = place.and_then(|k| found.get(k)).copied();

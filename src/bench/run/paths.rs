@@ -408,31 +408,41 @@ fn drawn(
     let made = sampler(spp.max(frame.summed)).or_else(|_| sampler(spp));
     let made = made.map_err(|e| e.to_string())?;
     let seed = session.experiment.seeds().replicates.first().copied();
-    let mut pixels = frame.pixels(spp, seed.unwrap_or_default());
-    if subject.stage.scene.medium.is_some() && begins_in_the_corner(&made, pixels.seed) {
-        let another = u32::from(made.demand.samples != Some(1));
-        pixels.samples[0] = pixels.samples[0].max(another);
-        pixels.samples.dedup();
-    }
+    let seed = seed.unwrap_or_default();
+    let limit = made.demand.samples.unwrap_or(frame.summed).max(spp);
+    let pixels = match subject.stage.scene.medium.is_some() && shares_numbers(&made, seed) {
+        true => Pixels {
+            samples: inner_samples(frame.samples, limit),
+            ..frame.pixels(spp, seed)
+        },
+        false => frame.pixels(spp, seed),
+    };
     Ok((made, pixels))
 }
 
-/// True if the first sample of every pixel is 0 in all dimensions, as that of many sequences is without a decorrelation.
-/// In a medium its free flights have the length 0, and all paths scatter on the border, where rounding alone says
-/// which side they are on: there the next sample is looked at.
-fn begins_in_the_corner(sampler: &Sampler, seed: u32) -> bool {
-    let is_zero = |pixel, dimension| {
-        let at = Coordinate {
+/// True if all pixels draw the same numbers, as they do of many sequences without a decorrelation.
+///
+/// The first samples of these are 0, 1/2, 1/4 and 3/4 in most dimensions. In a medium that is many borders at once, which
+/// f64 alone can tell apart: flights of length 0 end where the medium begins, 1/2 divides two equal lights, and 1/4 and
+/// 3/4 are the probabilities with which a path goes on. There, other samples are looked at.
+fn shares_numbers(sampler: &Sampler, seed: u32) -> bool {
+    let number = |pixel, dimension| {
+        sampler.sample_u32(Coordinate {
             pixel,
-            sample: 0,
+            sample: 1,
             dimension,
             seed,
-        };
-        sampler.sample_u32(at) == 0
+        })
     };
-    [0, 77]
-        .into_iter()
-        .all(|pixel| (0..4).all(|dimension| is_zero(pixel, dimension)))
+    (0..4).all(|dimension| number(0, dimension) == number(77, dimension))
+}
+
+/// So many samples below a limit, evenly between its ends: of 258 four, 51, 103, 154 and 206.
+fn inner_samples(count: u32, limit: u32) -> Vec<u32> {
+    let part = |k: u32| u64::from(limit) * u64::from(k) / u64::from(count + 1);
+    let mut samples: Vec<u32> = (1..=count).map(|k| part(k) as u32).collect();
+    samples.dedup();
+    samples
 }
 
 impl Subject<'_> {
