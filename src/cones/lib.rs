@@ -10,7 +10,7 @@ pub mod cone;
 pub mod device;
 pub mod disk;
 pub mod known_figures;
-mod level;
+pub mod level;
 mod measure;
 pub mod oracle;
 pub mod quadrature;

@@ -1,5 +1,6 @@
 //! Scenes of a few hundred triangles in a closed room, with colours at vertices.
 
+use crate::level::{LEVELS, TEXELS};
 use glam::DVec3;
 use raystone_core::parameters;
 use raystone_core::random::Pcg32;
@@ -97,11 +98,6 @@ const TILES: [f64; 2] = [0.9, 0.08];
 fn tile(row_and_column: u32) -> f64 {
     TILES[row_and_column as usize % 2]
 }
-
-/// Texels along each side of the texture of the tiles: of two by two, a unit wide, repeated over the floor.
-pub const TEXELS: u32 = 32;
-/// Its levels, each with half the texels of the one before along each side.
-pub const LEVELS: u32 = 6;
 
 /// Texels of the tiles' texture, row by row and level by level: of each level the means of four of the one before.
 pub fn tile_levels() -> Vec<f32> {

@@ -4,6 +4,7 @@
 
 use crate::cone::{Camera, Cone, cone_of, meets, seen_from};
 use crate::disk::{Angle, Sum, c, edge, overlap};
+use crate::level::{level_of, tiles};
 use crate::scene::Patch;
 use raystone_core::parameters;
 use raystone_specular::real::{Real, V3};
@@ -232,6 +233,46 @@ impl<T: Angle> Tracing<'_, T> {
         out
     }
 
+    /// The layer of a triangle that the cone's axis meets; its share is 1, or 0 where it does not.
+    pub(crate) fn axis_layer(
+        &self,
+        cone: &Cone<T>,
+        patch: &Patch<T>,
+        [a, b, third]: [V3<T>; 3],
+        index: u32,
+    ) -> Layer<T> {
+        let zero = c::<T>(0.0);
+        let mut out = Layer {
+            colour: V3::new(zero, zero, zero),
+            share: zero,
+            depth: zero,
+            place: 2 * index,
+            bits: [0; 2],
+        };
+        // The axis is the line x = y = 0 of the cone's frame.
+        let sides = [(a, b), (b, third), (third, a)].map(|(p, q)| p.x * q.y - p.y * q.x);
+        let is_left = sides.iter().all(|side| *side >= zero);
+        let is_right = sides.iter().all(|side| *side <= zero);
+        let n = cross3(b - a, third - a);
+        if !(is_left || is_right) || n.z == zero {
+            return out;
+        }
+        out.depth = dot3(n, a) / n.z;
+        if out.depth < cone.near {
+            return out;
+        }
+        out.share = c(1.0);
+        let w = V3::new(zero, zero, out.depth) - a;
+        let parts = corner_parts([b - a, third - a], w);
+        out.colour = weighted(patch.colours, parts);
+        if patch.tile > zero {
+            let place = weighted(patch.corners, parts);
+            let tiles = tiles(self.texels, place, level_of(n, cone.tangent, out.depth));
+            out.colour = out.colour * (tiles / patch.tile);
+        }
+        out
+    }
+
     /// Puts a layer among those of a pixel, of which the nearest are kept.
     fn insert(&self, layers: &mut Vec<Layer<T>>, layer: Layer<T>) {
         let at = layers.partition_point(|other| !is_before(&layer, other));
@@ -307,7 +348,7 @@ impl<T: Angle> Tracing<'_, T> {
 }
 
 /// The parts of a triangle's corners in a point of it, which is `w` from the first; `u` and `v` lead to the others.
-pub(crate) fn corner_parts<T: Real>([u, v]: [V3<T>; 2], w: V3<T>) -> [T; 3] {
+fn corner_parts<T: Real>([u, v]: [V3<T>; 2], w: V3<T>) -> [T; 3] {
     let n = cross3(u, v);
     let size = dot3(n, n);
     let (zero, one) = (c::<T>(0.0), c::<T>(1.0));
@@ -317,7 +358,7 @@ pub(crate) fn corner_parts<T: Real>([u, v]: [V3<T>; 2], w: V3<T>) -> [T; 3] {
 }
 
 /// The sum of three vectors by their parts.
-pub(crate) fn weighted<T: Real>(corners: [V3<T>; 3], parts: [T; 3]) -> V3<T> {
+fn weighted<T: Real>(corners: [V3<T>; 3], parts: [T; 3]) -> V3<T> {
     corners[0] * parts[0] + corners[1] * parts[1] + corners[2] * parts[2]
 }
 

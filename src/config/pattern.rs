@@ -2,7 +2,7 @@
 
 use super::ConfigError;
 use raystone_core::params::Variant;
-use raystone_core::text::did_you_mean;
+use raystone_core::text::did_you_mean_or_known;
 use std::fmt;
 
 /// Selects variants of one axis by name or label, with `*` for any text; a leading `!` negates.
@@ -132,11 +132,7 @@ impl Selector {
 
 fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     let found = axes.iter().find(|axis| **axis == name).copied();
-    found.ok_or_else(|| {
-        let near = did_you_mean(name, axes.iter().copied());
-        let all = axes.join(", ");
-        format!("unknown axis `{name}`{near} (known: {all})")
-    })
+    found.ok_or_else(|| format!("unknown axis `{name}`{}", did_you_mean_or_known(name, axes)))
 }
 
 /// Splits at separators outside parentheses, as labels such as `grid(a=1,b=2)` contain them.

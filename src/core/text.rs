@@ -131,6 +131,8 @@ const COMPARED: usize = 64;
 
 /// Names that are less alike are none that was meant.
 const LEAST_ALIKE: f64 = 0.4;
+/// What likeness to a part of a name counts.
+const OF_PARTS: f64 = 0.8;
 
 /// A question for a message about an unknown name, such as "; did you mean `bvh`?"; empty if no known name is near.
 pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
@@ -138,18 +140,28 @@ pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
     near.map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
+/// The same with all known names behind it.
+pub fn did_you_mean_or_known(name: &str, known: &[&str]) -> String {
+    let all = known.join(", ");
+    match did_you_mean(name, known.iter().copied()) {
+        near if near.is_empty() => format!("; known: {all}"),
+        near => format!("{near} Known: {all}"),
+    }
+}
+
 /// The known name nearest to `name`; `None` if none is like it.
 ///
-/// Uses the normalised Damerau–Levenshtein similarity; a name that contains the other is also near,
-/// so `grid` finds `uniform-grid`.
+/// Uses the normalised Damerau–Levenshtein similarity to the name, or to a part between hyphens; a
+/// name that contains the other is also near. So `grid` and `gird` find `uniform-grid`.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let beginning = |text: &str| text.chars().take(COMPARED).collect::<String>();
     let name = beginning(name).to_lowercase();
     let score = |candidate: &str| {
         let candidate = beginning(candidate);
         let contained = name.len() >= 3 && (candidate.contains(&name) || name.contains(&candidate));
-        strsim::normalized_damerau_levenshtein(&name, &candidate)
-            + if contained { 0.5 } else { 0.0 }
+        let alike = |part: &str| strsim::normalized_damerau_levenshtein(&name, part);
+        let of_parts = candidate.split('-').map(alike).fold(0.0, f64::max);
+        alike(&candidate).max(OF_PARTS * of_parts) + if contained { 0.5 } else { 0.0 }
     };
     let known = known
         .into_iter()
@@ -200,6 +212,12 @@ mod tests {
         assert_eq!(nearest("Roped_BVH", known), Some("roped-bvh"));
         assert_eq!(nearest("bvh", []), None);
         assert_eq!(nearest("x.stl", ["caustics", "fog"]), None);
+        assert_eq!(nearest("gird", known), Some("uniform-grid"));
+        assert_eq!(
+            did_you_mean_or_known("bhv", &["bvh", "grid"]),
+            "; did you mean `bvh`? Known: bvh, grid"
+        );
+        assert_eq!(did_you_mean_or_known("x", &["bvh"]), "; known: bvh");
         assert_eq!(did_you_mean("bhv", known), "; did you mean `bvh`?");
         assert_eq!(did_you_mean("quite another", ["bvh"]), "");
     }

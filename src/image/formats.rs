@@ -305,7 +305,7 @@ mod tests {
             for change in changes {
                 let mut other = image.clone();
                 change(&mut other);
-                let fault = differing_pixel(&read_linear(&path).unwrap(), &other);
+                let fault = differing_pixel(&read_linear(&path).unwrap(), &other, true);
                 assert!(fault.unwrap().starts_with("pixel ("), "{}", format.ending);
             }
             let swapped = FileFormat {

@@ -21,12 +21,6 @@ pub struct PathsRecord {
     /// Paths that hit a surface with another one within rounding, whatever their result.
     #[serde(default)]
     pub layered: usize,
-    /// Paths near a decision by the oracle alone, whatever their result; counted where flips are many.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub unsettled: usize,
-    /// Paths that one rounding moves by the oracle alone, whatever their result; counted where many are ill-conditioned.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub unsteady: usize,
     /// Paths that differ, not to be explained by rounding.
     pub wrong: usize,
     /// Median relative difference of the paths that found light.
@@ -39,10 +33,6 @@ pub struct PathsRecord {
     /// The feature without a formula in the oracle, because of which nothing was checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
-}
-
-fn is_zero(n: &usize) -> bool {
-    *n == 0
 }
 
 impl PathsRecord {
@@ -63,8 +53,6 @@ impl PathsRecord {
             surfaces: self.surfaces + other.surfaces,
             edges: self.edges + other.edges,
             layered: self.layered + other.layered,
-            unsettled: self.unsettled + other.unsettled,
-            unsteady: self.unsteady + other.unsteady,
             wrong: self.wrong + other.wrong,
             median: self.median.max(other.median),
             worst: self.worst.max(other.worst),

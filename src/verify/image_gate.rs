@@ -24,9 +24,7 @@
 //! surfaces are counted separately, up to the number of paths that meet surfaces with another
 //! within rounding), more ill-conditioned paths than `ILL_CONDITIONED`, and a median difference
 //! above `MEDIAN`, which no single path shows. Often-repeated texture coordinates have few digits
-//! left within a texel, so the last two have separate bounds for textures. Where all pixels draw the
-//! same numbers they are near a decision together: what the oracle alone says of its paths
-//! ([`unsettled`], [`unsteady`]) is then allowed beyond the bounds.
+//! left within a texel, so the last two have separate bounds for textures.
 
 pub use crate::pixels::{Choice, Frame, Pixels};
 
@@ -214,20 +212,11 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
         surfaces: of(Class::Flip(Parting::Surfaces)),
         edges: of(Class::Flip(Parting::Edge)),
         layered: truth.iter().filter(|path| path.layers > 0).count(),
-        unsettled: 0,
-        unsteady: 0,
         wrong: of(Class::Wrong),
         median: median(&truth, &differences, floor),
         worst: agreeing.copied().fold(0.0, f64::max),
         ..PathsRecord::default()
     };
-    if record.flips - record.surfaces > most(record.paths, FLIPS) {
-        record.unsettled = unsettled(oracle, view, answers, &truth);
-    }
-    let share = ILL_CONDITIONED[oracle.texturing()];
-    if record.ill_conditioned > most(record.paths, share) {
-        record.unsteady = unsteady(oracle, view, answers, &truth);
-    }
     record.fault = match first_wrong {
         Some((&i, _)) => {
             let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
@@ -322,44 +311,6 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     Class::Wrong
 }
 
-/// The number of paths that take another branch, and not only because of layers, in some trial of the fewest
-/// roundings, whatever the kernel answered. Usually that is a few in ten thousand; but where all pixels draw the same
-/// number and it is a border (1/2, of two equal lights), it is all of them at once.
-fn unsettled(oracle: &PathOracle, view: &View, answers: &[Answer], truth: &[Path]) -> usize {
-    count_in_trials(oracle, view, answers, truth, SCALES[0], |played, path| {
-        played.parting(path) > Some(Parting::Surfaces)
-    })
-}
-
-/// The number of paths that one rounding of every quantity moves beyond what counts as agreement, in some trial and
-/// without another branch, whatever the kernel answered: all at once, too, where all pixels draw the same numbers.
-fn unsteady(oracle: &PathOracle, view: &View, answers: &[Answer], truth: &[Path]) -> usize {
-    let floor = floor_of(truth);
-    count_in_trials(oracle, view, answers, truth, 1.0, |played, path| {
-        let is_moved = difference(played.radiance, path.radiance, floor) > TOLERANCE;
-        is_moved && played.parting(path).is_none()
-    })
-}
-
-/// The number of paths of which some trial with so many roundings is what is looked for.
-fn count_in_trials(
-    oracle: &PathOracle,
-    view: &View,
-    answers: &[Answer],
-    truth: &[Path],
-    scale: f64,
-    is_looked_for: impl Fn(&Path, &Path) -> bool + Sync,
-) -> usize {
-    let paths = answers.par_iter().zip(truth);
-    let found = paths.filter(|(answer, path)| {
-        (0..TRIALS).any(|trial| {
-            let played = oracle.trace(view, answer.id, Rounding::played(scale, trial));
-            is_looked_for(&played, path)
-        })
-    });
-    found.count()
-}
-
 /// Classifies a path by the fewest simulated roundings, for reports.
 fn spread_of(
     oracle: &PathOracle,
@@ -416,13 +367,11 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
         flips,
         surfaces,
         layered,
-        unsettled,
-        unsteady,
         ill_conditioned,
         ..
     } = *record;
-    let over = |what: &str, found: usize, known: usize, share: f64| {
-        let most = known + most(paths, share);
+    let over = |what: &str, found: usize, share: f64| {
+        let most = most(paths, share);
         (found > most).then(|| {
             format!("{found} of {paths} paths {what}, at most {most} are explained by rounding")
         })
@@ -432,9 +381,9 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let strange = strange.then(|| {
         format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
     });
-    over("take another branch", flips - surfaces, unsettled, FLIPS)
+    over("take another branch", flips - surfaces, FLIPS)
         .or(strange)
-        .or_else(|| over("are ill-conditioned", ill_conditioned, unsteady, share))
+        .or_else(|| over("are ill-conditioned", ill_conditioned, share))
         .or_else(|| {
             off.then(|| format!("half of the paths differ by {:.1e} or more", record.median))
         })

@@ -6,10 +6,11 @@ use crate::check;
 use crate::cone::{Camera, Mirror, cone_of};
 use crate::device::{Tracer, overlaps};
 use crate::disk::disk_triangle;
+use crate::level::{LEVELS, TEXELS};
 use crate::oracle::Expected;
 use crate::rays::{Lens, Rays};
 use crate::sample::{Crossing, Truth, budget, crossing};
-use crate::scene::{LEVELS, Place, TEXELS, patches, tile_levels};
+use crate::scene::{Place, patches, tile_levels};
 use crate::trace::{Blend, Found};
 use crate::world::{Keep, View, World, directions, double};
 use glam::DVec3;
@@ -171,8 +172,8 @@ const FAULTS: [Fault; 35] = [
     ),
     (
         "trace",
-        "colours[1].xyz * second + colours[2].xyz * third",
-        "colours[2].xyz * second + colours[1].xyz * third",
+        "b * parts.y + c * parts.z",
+        "c * parts.y + b * parts.z",
     ),
     (
         "trace",

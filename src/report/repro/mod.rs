@@ -15,7 +15,7 @@ pub mod table;
 
 use raystone_config::ConfigError;
 use raystone_config::expect::Thesis;
-use raystone_core::text::did_you_mean;
+use raystone_core::text::did_you_mean_or_known;
 use serde::Deserialize;
 
 /// An experiment of a thesis, embedded in the program.
@@ -135,11 +135,8 @@ pub fn chosen(names: &[String]) -> Result<Vec<Source>, String> {
             return Err(format!("{name} cannot be run yet: {}", table.why));
         }
         let known: Vec<&str> = SOURCES.iter().map(|source| source.name).collect();
-        let near = did_you_mean(name, known.iter().copied());
-        return Err(format!(
-            "unknown table `{name}`{near} (known: {})",
-            known.join(", ")
-        ));
+        let near = did_you_mean_or_known(name, &known);
+        return Err(format!("unknown table `{name}`{near}"));
     }
     let is_named = |source: &&Source| names.is_empty() || names.iter().any(|n| n == source.name);
     Ok(SOURCES.iter().filter(is_named).copied().collect())
