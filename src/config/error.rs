@@ -256,12 +256,13 @@ const LIST_LIMIT: usize = 16;
 
 fn suggestion(name: &str, known: &[String]) -> String {
     let near = did_you_mean(name, known.iter().map(String::as_str));
-    match known.len() {
-        0 => "; nothing is known here".to_owned(),
-        ..=LIST_LIMIT if near.is_empty() => format!("; known: {}", quoted(known)),
-        ..=LIST_LIMIT => format!("{near} Known: {}", quoted(known)),
-        _ if near.is_empty() => "; `raystone list` shows all that is known".to_owned(),
-        _ => near,
+    let is_short = known.len() <= LIST_LIMIT;
+    match (is_short, near.is_empty()) {
+        _ if known.is_empty() => "; nothing is known here".to_owned(),
+        (true, true) => format!("; known: {}", quoted(known)),
+        (true, false) => format!("{near} Known: {}", quoted(known)),
+        (false, true) => "; `raystone list` shows all that is known".to_owned(),
+        (false, false) => near,
     }
 }
 

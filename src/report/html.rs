@@ -35,7 +35,7 @@ pub fn page(document: &Document) -> Result<String, ReportError> {
 /// A text with what stands between two backticks as code; each part is escaped by `escaped`.
 fn marked(text: &str, escaped: fn(&str) -> String) -> Value {
     let parts: Vec<&str> = text.split('`').collect();
-    if parts.len() % 2 == 0 {
+    if parts.len().is_multiple_of(2) {
         return Value::from_safe_string(escaped(text));
     }
     let part = |(number, part): (usize, &&str)| match number % 2 {

@@ -429,7 +429,7 @@ fn shares_numbers(sampler: &Sampler, seed: u32) -> bool {
     let number = |pixel, dimension| {
         sampler.sample_u32(Coordinate {
             pixel,
-            sample: 1,
+            sample: 0,
             dimension,
             seed,
         })
