@@ -30,7 +30,7 @@ pub const NOISE: f64 = 1.5e-3;
 /// Relative difference allowed beyond four standard errors: f32, and the width of a pixel.
 pub const SYSTEMATIC: f64 = 5e-4;
 /// Samples per pixel: minimum, and maximum, beyond which the noise counts as a fault.
-const SAMPLES: [u32; 2] = [256, 1 << 14];
+const SAMPLES: [u32; 2] = [256, 1 << 15];
 /// Fraction of the brightest channel that a channel without light may show.
 const DARK: f64 = 1e-5;
 const SEED: u32 = 4_242;
