@@ -291,8 +291,8 @@ impl Oracle<'_> {
         self.directions.iter().filter(is_near).count() as u32
     }
 
-    /// What a ray from the beam's near plane meets: its distance from the apex along the axis, and the colour.
-    fn met(&self, beam: &Beam, direction: DVec3) -> Option<(f64, DVec3)> {
+    /// The colour of what a ray from the beam's near plane meets.
+    fn met(&self, beam: &Beam, direction: DVec3) -> Option<DVec3> {
         let hits = self.patches.iter().filter_map(|patch| {
             let corners = patch.corners.map(|p| p.f64());
             let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -310,17 +310,17 @@ impl Oracle<'_> {
         let colours = patch.colours.map(|p| p.f64());
         let colour: DVec3 = (0..3).map(|k| colours[k] * parts[k]).sum();
         if patch.tile == 0.0 {
-            return Some((t, colour));
+            return Some(colour);
         }
         let width = 2.0 * t * beam.angle.tan() / n.dot(beam.axis).abs();
-        Some((t, colour / patch.tile * about(p.x, p.y, width)))
+        Some(colour / patch.tile * about(p.x, p.y, width))
     }
 
     /// The pixel of a cone of which only the axis counts. What rounding may change is what axes beside it see.
     fn axis_pixel(&self, beam: &Beam, [x, y]: [DVec3; 2]) -> Expected {
         let seen = |at: DVec2| {
             let direction = beam.axis + (x * at.x + y * at.y) * beam.angle.tan();
-            self.met(beam, direction).map(|hit| hit.1)
+            self.met(beam, direction)
         };
         let background = self.given.background.f64();
         let own = seen(DVec2::ZERO);
