@@ -72,9 +72,58 @@ pub fn read_from(files: &'static dyn Files) -> Result<(), &'static str> {
         .map_err(|_| "files were read already; hand them in before anything else")
 }
 
+/// A file of the program itself: where it stands, and its bytes.
+pub type EmbeddedFile = (&'static str, &'static [u8]);
+
+static EMBEDDED: OnceLock<&'static [EmbeddedFile]> = OnceLock::new();
+
+/// Adds files of the program itself to those of the host; only the first call counts. They stand where no host has a
+/// folder.
+pub fn embed(files: &'static [EmbeddedFile]) {
+    EMBEDDED.get_or_init(|| files);
+}
+
+/// The embedded files before those of the host.
+struct WithEmbedded;
+
+impl WithEmbedded {
+    fn embedded(path: &Path) -> Option<&'static [u8]> {
+        let mut all = EMBEDDED.get()?.iter();
+        all.find_map(|(place, bytes)| (Path::new(place) == path).then_some(*bytes))
+    }
+
+    fn host() -> &'static dyn Files {
+        *HOST.get_or_init(|| &Disk)
+    }
+}
+
+impl Files for WithEmbedded {
+    fn open(&self, path: &Path) -> io::Result<(Box<dyn Read + Send>, u64)> {
+        match Self::embedded(path) {
+            Some(bytes) => Ok((Box::new(bytes), bytes.len() as u64)),
+            None => Self::host().open(path),
+        }
+    }
+
+    fn list(&self, folder: &Path) -> io::Result<Vec<PathBuf>> {
+        Self::host().list(folder)
+    }
+
+    fn is_folder(&self, path: &Path) -> bool {
+        Self::host().is_folder(path)
+    }
+
+    fn real(&self, path: &Path) -> io::Result<PathBuf> {
+        match Self::embedded(path) {
+            Some(_) => Ok(path.to_owned()),
+            None => Self::host().real(path),
+        }
+    }
+}
+
 /// The current source of files.
 pub fn files() -> &'static dyn Files {
-    *HOST.get_or_init(|| &Disk)
+    &WithEmbedded
 }
 
 /// Reads a regular file.

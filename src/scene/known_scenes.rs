@@ -2,6 +2,7 @@
 //! nothing of what a file or a parameter means.
 
 use crate::ies::IesProfile;
+use crate::known_files;
 use crate::material::reflectance_of_ior;
 use crate::mtl_statements::{Definition, read};
 use crate::tally::Unread;
@@ -10,7 +11,7 @@ use glam::{DVec3, Vec3};
 use raystone_core::params::{ParamValue, Params, Variant};
 
 /// A value by name, and what it should be.
-type Known = (&'static str, f64, f64);
+pub(crate) type Known = (&'static str, f64, f64);
 
 /// Relative error of sums in f32.
 const ROUNDING: f64 = 1e-5;
@@ -28,9 +29,10 @@ pub(crate) fn check() -> Result<(), String> {
     let all = luminaire()?
         .into_iter()
         .chain(library())
-        .chain(parameters()?);
+        .chain(parameters()?)
+        .chain(known_files::values()?);
     for (what, found, expected) in all {
-        let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
+        let agrees = (found - expected).abs() <= ROUNDING * expected.abs().max(1.0);
         if !agrees {
             return Err(format!(
                 "the {what} of a known scene is {found}, and should be {expected}: this program reads scenes wrongly; build \
@@ -89,7 +91,7 @@ fn library() -> Vec<Known> {
     ]
 }
 
-fn with(parameters: &[(&str, ParamValue)]) -> Result<SceneData, String> {
+pub(crate) fn with(parameters: &[(&str, ParamValue)]) -> Result<SceneData, String> {
     let parameters = parameters
         .iter()
         .map(|(name, value)| ((*name).to_owned(), value.clone()));

@@ -36,6 +36,7 @@ mod hung_lamps;
 mod ies;
 mod instances;
 pub mod known_figures;
+mod known_files;
 mod known_scenes;
 mod light;
 mod mask;
