@@ -45,6 +45,11 @@ impl Loop<'_> {
     }
 }
 
+/// Nanoseconds per pair of dimensions of a dispatch that draws so many of each sample.
+pub(crate) fn ns_per_draw(ms: f64, pairs: u32, samples: u32) -> f64 {
+    ms * 1e6 / (u64::from(PIXELS) * u64::from(pairs) * u64::from(samples)) as f64
+}
+
 /// Measures a sampler's cost on this adapter: nanoseconds of adapter time per two-dimensional
 /// sample minus the empty loop (near zero it may be negative), and those of the empty loop, as
 /// medians of the rounds. Also returns the BLAKE3 hash of the drawing kernel. Uses the sampler's
@@ -85,13 +90,12 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], Strin
     let most = most.min(allowed).clamp(1, MOST_SAMPLES);
     let per_sample = work.run(&drawing, most.min(8))? / f64::from(most.min(8));
     let samples = ((DISPATCH_MS / per_sample.max(1e-6)) as u32).clamp(1, most);
-    let count = u64::from(PIXELS) * u64::from(pairs) * u64::from(samples);
     let mut drawn = Vec::with_capacity(ROUNDS);
     let mut looped = Vec::with_capacity(ROUNDS);
     for _ in 0..ROUNDS {
         let without = work.run(&empty, samples)?;
         let with = work.run(&drawing, samples)?;
-        let ns = |ms: f64| ms * 1e6 / count as f64;
+        let ns = |ms: f64| ns_per_draw(ms, pairs, samples);
         drawn.push(ns(with - without));
         looped.push(ns(without));
     }

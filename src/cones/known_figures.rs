@@ -1,6 +1,7 @@
 //! Known errors, budgets and scenes, computed anew before any figure of cones is shown.
 
 use crate::cone::{Camera, Mirror};
+use crate::measure::covering;
 use crate::rays::{Lens, Rays};
 use crate::sample::{Crossing, MOST, Truth, budget, crossing};
 use crate::scene::{Place, patches};
@@ -39,6 +40,17 @@ pub fn check() -> Result<(), String> {
         &format!("{bounded:?}"),
         f64::from(MOST),
     )?;
+    // Cones of 1 to 200 layers, of which every other is covered, and the rest by a quarter.
+    let cones = (1..=200).map(|k| (201 - k, if k % 2 == 0 { 1.0 } else { 0.25 }));
+    let found = covering(cones.collect());
+    for (what, found, expected) in [
+        ("mean number of layers", found.mean, 100.5),
+        ("number of layers of 99 %", found.of_99, 198.0),
+        ("open part", found.open, 0.375),
+    ] {
+        let agrees = (found - expected).abs() < 1e-9;
+        agree(agrees, what, &found.to_string(), expected)?;
+    }
     halves()
 }
 

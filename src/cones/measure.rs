@@ -429,6 +429,31 @@ impl Errors {
     }
 }
 
+/// How layers cover cones.
+pub(crate) struct Covering {
+    /// Layers, mean.
+    pub(crate) mean: f64,
+    /// The greatest number of 99 % of the cones.
+    pub(crate) of_99: f64,
+    /// Part that none covers, mean.
+    pub(crate) open: f64,
+}
+
+/// Of each cone the number of layers, and the part that they cover.
+pub(crate) fn covering(mut cones: Vec<(u32, f32)>) -> Covering {
+    cones.sort_unstable_by_key(|cone| cone.0);
+    let count = cones.len() as f64;
+    let place = (0.99 * count).ceil() as usize;
+    let mean = |of: fn(&(u32, f32)) -> f64| cones.iter().map(of).sum::<f64>() / count;
+    Covering {
+        mean: mean(|cone| cone.0.into()),
+        of_99: cones
+            .get(place.saturating_sub(1))
+            .map_or(0.0, |cone| cone.0.into()),
+        open: mean(|cone| 1.0 - f64::from(cone.1)),
+    }
+}
+
 impl Measured for Ready {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         match &self.tracer {
@@ -467,14 +492,11 @@ impl Prepared for Ready {
             values[ADAPTIVE] = errors.adaptive;
         } else {
             let found = &self.picture.found;
-            let count = found.len() as f64;
-            let mut layers: Vec<u32> = found.iter().map(|pixel| pixel.counts[0]).collect();
-            layers.sort_unstable();
-            let place = (0.99 * count).ceil() as usize;
-            let open = found.iter().map(|pixel| 1.0 - f64::from(pixel.covered));
-            values[LAYERS] = Some(layers.iter().map(|n| f64::from(*n)).sum::<f64>() / count);
-            values[LAYERS_99] = layers.get(place.saturating_sub(1)).map(|n| f64::from(*n));
-            values[OPEN] = Some(open.sum::<f64>() / count);
+            let of_cones = found.iter().map(|pixel| (pixel.counts[0], pixel.covered));
+            let of_cones = covering(of_cones.collect());
+            values[LAYERS] = Some(of_cones.mean);
+            values[LAYERS_99] = Some(of_cones.of_99);
+            values[OPEN] = Some(of_cones.open);
             values[APART] = Some(self.picture.apart.colour);
             values[AREA] = self.area;
         }

@@ -2,6 +2,7 @@
 //! counted of their answers has not.
 
 use crate::march::{angle_of, ball_deviation};
+use crate::measure;
 use crate::photons::{cell_deviation, collisions, density_deviation, segments_of_32};
 use glam::Vec3;
 
@@ -10,6 +11,8 @@ const SPREAD: [[f64; 2]; 4] = [[0.2, 0.2], [0.7, 0.2], [0.2, 0.7], [0.7, 0.7]];
 const TOGETHER: [[f64; 2]; 4] = [[0.2, 0.2], [0.3, 0.2], [0.2, 0.3], [0.3, 0.3]];
 /// Relative error of a few operations.
 const ROUNDING: f64 = 1e-12;
+/// And where paths are those of f32.
+const OF_SINGLE: f64 = 1e-5;
 
 /// Computes them.
 ///
@@ -24,7 +27,7 @@ pub fn check() -> Result<(), String> {
     let inside = 0.8 / 1.5;
     let tangents = [0.8 / 0.6, inside / (1.0_f64 - inside * inside).sqrt()];
     let turned = -2.0 * (tangents[0].atan() - tangents[1].atan()).to_degrees();
-    for (what, found, expected) in [
+    let photons = [
         (
             "deviation of cells with one photon each",
             cell_deviation(&SPREAD, 2, 0.0, 1.0),
@@ -71,8 +74,13 @@ pub fn check() -> Result<(), String> {
             ball_deviation(1.5, 10.0, 8.0),
             turned,
         ),
-    ] {
-        let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
+    ];
+    let exact = photons.into_iter().map(|known| (ROUNDING, known));
+    let single = measure::known()?
+        .into_iter()
+        .map(|known| (OF_SINGLE, known));
+    for (rounding, (what, found, expected)) in exact.chain(single) {
+        let agrees = (found - expected).abs() <= rounding * expected.abs();
         if !agrees {
             return Err(format!(
                 "the {what}, known photons or rays, is {found}, and should be {expected}: this program shows wrong \

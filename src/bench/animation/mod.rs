@@ -271,16 +271,19 @@ impl Measured for Timed<'_> {
     }
 }
 
+/// Cost over the last rounds.
+pub(crate) fn last_rounds(notes: &[Elapsed], rounds: usize) -> Cost {
+    let kept = &notes[notes.len().saturating_sub(rounds)..];
+    Cost {
+        processor_ms: kept.iter().filter_map(|n| n.cpu_ms).collect(),
+        wall_ms: kept.iter().map(|n| n.wall_ms).collect(),
+        passes_ms: kept.iter().filter_map(|n| n.gpu_ms).collect(),
+    }
+}
+
 impl Timed<'_> {
-    /// Cost over the last rounds.
     fn cost(&self, rounds: usize) -> Cost {
-        let notes = self.notes.borrow();
-        let kept = &notes[notes.len().saturating_sub(rounds)..];
-        Cost {
-            processor_ms: kept.iter().filter_map(|n| n.cpu_ms).collect(),
-            wall_ms: kept.iter().map(|n| n.wall_ms).collect(),
-            passes_ms: kept.iter().filter_map(|n| n.gpu_ms).collect(),
-        }
+        last_rounds(&self.notes.borrow(), rounds)
     }
 
     /// Error in the answers of the last round.

@@ -10,6 +10,7 @@
 //! mask words. `docs/coherence.md` states the rules and their meaning.
 
 pub mod cache;
+pub(crate) mod known;
 pub mod memory;
 pub mod model;
 pub mod organisation;

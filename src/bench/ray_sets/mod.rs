@@ -1,7 +1,7 @@
 //! Sets of rays of one kind in a room of any size, traced through any structure: times with and without building it, and
 //! for trees over the rays what each level of a descent does.
 
-mod readings;
+pub(crate) mod readings;
 mod room;
 
 use room::Lobes;
@@ -413,7 +413,7 @@ impl Ready {
         };
         Ok(Self {
             rays: TimedRays::new(tracer.batch(&set.rays)?),
-            live: set.rays.iter().filter(|ray| ray.is_ray()).count(),
+            live: readings::live(&set.rays),
             build_ms,
             bytes: built.stats().bytes,
             space: built.space(),

@@ -3,6 +3,7 @@
 use super::Descent;
 use crate::timing::Samples;
 use raystone_accel::{Anatomy, Division, LevelAnatomy, StreamCounts};
+use raystone_core::geometry::Ray;
 use raystone_record::figure::{Better, CYCLES_PER_RAY, Figure, Shown, Spread};
 use raystone_record::{Key, Reading, axis};
 
@@ -91,8 +92,13 @@ pub(super) static FIGURES: [Figure; 18] = [
     once("lobe-error/v1", "RMSE of 16 samples of a lobe", ""),
 ];
 
+/// Rays that can hit something: the others end at once.
+pub(crate) fn live(rays: &[Ray]) -> usize {
+    rays.iter().filter(|ray| ray.is_ray()).count()
+}
+
 /// Times per ray, without building and with it.
-pub(super) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<Reading>, String> {
+pub(crate) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<Reading>, String> {
     let after_building = |ms: &[f64]| ms.iter().map(|ms| ms + build_ms).collect();
     let frame = Samples {
         ms: after_building(&samples.ms),

@@ -80,10 +80,6 @@ impl Prepared for Ready {
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
         let elements = f64::from(self.load.elements);
-        let rates = [
-            (&COMPACTION_MELEMENTS_PER_S, elements),
-            (&COMPACTION_GB_PER_S, self.bench.least_bytes() as f64 * 1e-3),
-        ];
         let counted: [(&Figure, f64); 4] = [
             (&COMPACTION_PASSES, f64::from(self.bench.runs)),
             (&COMPACTION_KEPT, f64::from(self.bench.kept_elements)),
@@ -94,15 +90,22 @@ impl Prepared for Ready {
             "{} elements of {} bytes",
             self.load.elements, self.load.bytes
         ));
-        let rates = rates.into_iter().filter_map(|(figure, items)| {
-            Some(Reading::new(
-                figure,
-                millions_per_second(&samples.ms, items)?,
-            ))
-        });
+        let rates = rates(&samples.ms, elements, self.bench.least_bytes() as f64);
         let counted = counted.map(|(figure, value)| Reading::exact(figure, value));
         Ok([time].into_iter().chain(rates).chain(counted).collect())
     }
+}
+
+/// Millions of elements a second, and of thousands of bytes.
+pub(super) fn rates(ms: &[f64], elements: f64, bytes: f64) -> impl Iterator<Item = Reading> {
+    let figures = [
+        (&COMPACTION_MELEMENTS_PER_S, elements),
+        (&COMPACTION_GB_PER_S, bytes * 1e-3),
+    ];
+    let rates = figures.map(|(figure, items)| {
+        millions_per_second(ms, items).map(|rate| Reading::new(figure, rate))
+    });
+    rates.into_iter().flatten()
 }
 
 /// Streams of equal kind are prefixes of one: share of survivors, buckets, bytes per element.

@@ -1,8 +1,8 @@
 //! The plan of a known experiment, made anew before any is carried out: what a plan forgets is missing from every figure, and
 //! nothing fails.
 
-use super::adaptive;
 use super::registries::Registries;
+use super::{adaptive, known_turns};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 
 /// Two excludes leave a decorrelation to each sequence, one a structure to a scene, one a sequence to a structure.
@@ -54,9 +54,11 @@ left out: 6, 6, 4, 8";
 /// Makes the plan.
 ///
 /// # Errors
-/// It is not what it should be: the first line that is another. Or tiles are ended otherwise.
+/// It is not what it should be: the first line that is another. Or tiles are ended otherwise, or turns reported
+/// wrongly.
 pub fn check() -> Result<(), String> {
     adaptive::check()?;
+    known_turns::check()?;
     let found = planned(TEXT)?;
     let mut pairs = found.lines().zip(EXPECTED.lines());
     match pairs.find(|(found, expected)| found != expected) {

@@ -61,16 +61,20 @@ pub(super) fn of_cell(
     }
     turns.sort_by_key(|(order, _)| Order::ALL.iter().position(|known| known == order));
     let spp = f64::from(timing.spp);
-    let of_order = |(order, turns): &(Order, Vec<InOrder>)| {
-        let median = |ms: &dyn Fn(&InOrder) -> f64| {
-            median_interval(&turns.iter().map(ms).collect::<Vec<_>>())
-        };
-        OrderTime {
-            order: order.name().to_owned(),
-            passes: turns.first().map_or(0, |turn| turn.passes),
-            ms_per_spp: median(&|turn| turn.total.wall_ms / spp),
-            first_picture_ms: median(&|turn| turn.first_picture.wall_ms),
-        }
-    };
-    Ok(turns.iter().map(of_order).collect())
+    let times = turns
+        .iter()
+        .map(|(order, turns)| of_turns(*order, turns, spp));
+    Ok(times.collect())
+}
+
+/// The times of an order, of images with `spp` samples.
+pub(super) fn of_turns(order: Order, turns: &[InOrder], spp: f64) -> OrderTime {
+    let median =
+        |ms: &dyn Fn(&InOrder) -> f64| median_interval(&turns.iter().map(ms).collect::<Vec<_>>());
+    OrderTime {
+        order: order.name().to_owned(),
+        passes: turns.first().map_or(0, |turn| turn.passes),
+        ms_per_spp: median(&|turn| turn.total.wall_ms / spp),
+        first_picture_ms: median(&|turn| turn.first_picture.wall_ms),
+    }
 }

@@ -38,9 +38,7 @@ pub(super) fn of_cell(
     let turns = Turns::taken(session, world, structure, gpu, visibility).map_err(text)?;
     let traced = centred(session, world, structure, cell)?;
     let rasterised = renderer.image().map_err(text)?;
-    let mut record = compared(&rasterised, &traced, &turns.other_triangle);
-    record.raster_ms = median_interval(&turns.raster_ms);
-    record.traced_ms = median_interval(&turns.traced_ms);
+    let record = turns.timed(compared(&rasterised, &traced, &turns.other_triangle));
     if world.probe.is_exact() && record.unexplained * UNEXPLAINED > record.pixels {
         return Err(format!(
             "{} of {} pixels have another value than by rays through their centres, although they see the same triangle",
@@ -51,13 +49,23 @@ pub(super) fn of_cell(
 }
 
 /// Results and times of rasteriser and rays.
-struct Turns {
-    other_triangle: Vec<bool>,
-    raster_ms: Vec<f64>,
-    traced_ms: Vec<f64>,
+#[derive(Default)]
+pub(super) struct Turns {
+    pub(super) other_triangle: Vec<bool>,
+    pub(super) raster_ms: Vec<f64>,
+    pub(super) traced_ms: Vec<f64>,
 }
 
 impl Turns {
+    /// A comparison with its times.
+    pub(super) fn timed(&self, record: PrimaryRecord) -> PrimaryRecord {
+        PrimaryRecord {
+            raster_ms: median_interval(&self.raster_ms),
+            traced_ms: median_interval(&self.traced_ms),
+            ..record
+        }
+    }
+
     /// Runs both in turns by the wall clock; the first round warms up.
     fn taken(
         session: &mut Session,

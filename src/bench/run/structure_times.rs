@@ -17,6 +17,7 @@ use raystone_config::Axis;
 use raystone_core::geometry::Camera;
 use raystone_gpu::{Gpu, GpuError, slow_slice};
 use raystone_record::{ClassTiming, CountersPerRay};
+use raystone_stats::interval::Interval;
 use raystone_stats::rates::{millions_per_second, overhead_fault, rate_fault, without_overhead};
 use raystone_stats::statistics::median;
 use raystone_verify::rays::{RaySet, primary_pixels, primary_rays};
@@ -246,21 +247,36 @@ fn class_timing(
         return Err(fault.into());
     }
     Ok(rate.map(|mrays_s| ClassTiming {
+        unlike_shadow: unlike_shadow(set, &world.reference.of(one.traced.space).sets),
+        counters: work.as_deref().map(CountersPerRay::mean_of),
+        ..of_rounds(set, (ms, samples), mrays_s, gpu.is_software())
+    }))
+}
+
+/// The figures of a class from its rounds, those by the device's clock without what a dispatch of nothing takes.
+pub(super) fn of_rounds(
+    set: &RaySet,
+    (ms, samples): (Vec<f64>, Samples),
+    mrays_s: Interval,
+    is_software: bool,
+) -> ClassTiming {
+    ClassTiming {
         class: set.class,
         rays: set.rays.len(),
         hit_fraction: set.hit_fraction(),
-        unlike_shadow: unlike_shadow(set, &world.reference.of(one.traced.space).sets),
+        unlike_shadow: None,
         ms,
         wall_ms: samples.wall_ms,
-        cpu_ms: match gpu.is_software() {
-            true => samples.cpu_ms,
-            false => Vec::new(),
+        cpu_ms: if is_software {
+            samples.cpu_ms
+        } else {
+            Vec::new()
         },
         mrays_s,
-        counters: work.as_deref().map(CountersPerRay::mean_of),
+        counters: None,
         dispatches: 1,
         discarded: 0,
-    }))
+    }
 }
 
 /// Compares the cost of pixels with that of the rays that point there. Returns the first that is another's.

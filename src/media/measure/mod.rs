@@ -20,6 +20,13 @@ pub fn register(registries: &mut Registries) -> Result<(), String> {
     registries.measurements.add(&pipeline::Photons)
 }
 
+/// Figures of known ends and walks, by name, and what they should be.
+pub(crate) fn known() -> Result<Vec<(&'static str, f64, f64)>, String> {
+    let mut all = paths::known().to_vec();
+    all.extend(structures::known()?);
+    Ok(all)
+}
+
 /// Adds a name to the axis of integrators.
 fn declare<P: Parameters>(catalogue: &mut Catalogue, name: &str, about: &str) {
     catalogue[Axis::Integrator].push(Entry {

@@ -222,11 +222,11 @@ impl Ready {
                 }
             }
         }
-        let mean = |sum: f64| sum / f64::from(RAYS);
+        let (drift, steps) = drift_and_steps(&ended);
         Ok(Self {
             error: error_of(load, &ended, &heights),
-            drift: ended.iter().map(|e| e.drift).fold(0.0, f32::max).into(),
-            steps: mean(ended.iter().map(|e| f64::from(e.steps)).sum()),
+            drift,
+            steps,
             capped: ended.iter().filter(|e| optical.holds(e.path.x)).count(),
             marcher,
         })
@@ -280,6 +280,65 @@ fn begins(load: &Load, optical: &Optical) -> (Vec<f64>, Vec<Path>) {
             .collect(),
     };
     (heights, begins)
+}
+
+/// The greatest drift, and the mean number of steps.
+fn drift_and_steps(ended: &[Ended]) -> (f64, f64) {
+    let drift = ended.iter().map(|e| e.drift).fold(0.0, f32::max);
+    let steps: f64 = ended.iter().map(|e| f64::from(e.steps)).sum();
+    (drift.into(), steps / ended.len() as f64)
+}
+
+/// Known ends through the middle of a ball, which Snell's law leaves straight, 3° and 4° off; and through the focus of a
+/// lens, one of them three voxels beside it: of each the error by name, and what it should be.
+pub(crate) fn known() -> [(&'static str, f64, f64); 4] {
+    let end = |x: Vec3, before: Vec3, degrees: f32, steps| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Ended {
+            path: Path {
+                x,
+                v: Vec3::new(cos, sin, 0.0),
+            },
+            before,
+            steps,
+            drift: 0.125 * steps as f32,
+        }
+    };
+    let bent =
+        [3.0, -4.0].map(|degrees| end(Vec3::ZERO, Vec3::ZERO, degrees, 2 + degrees.abs() as u32));
+    let load = |target| Load {
+        target,
+        ..Load::default()
+    };
+    let side = Load::default().side as f32;
+    let (middle, far) = (Vec3::splat(0.5 * side), side * (0.5 + LENS as f32));
+    let along = |y: f32| {
+        let at = |x: f32| Vec3::new(x, middle.y + y, middle.z);
+        end(at(far + 1.0), at(far - 20.0), 0.0, 1)
+    };
+    let (drift, steps) = drift_and_steps(&bent);
+    let of = |load: &Load, ended: &[Ended]| error_of(load, ended, &[0.0; 2]).value.value;
+    [
+        (
+            "error of angles",
+            of(&load(Target::Ball), &bent),
+            12.5_f64.sqrt(),
+        ),
+        (
+            "distance from a focus",
+            of(&load(Target::Lens), &[along(0.0), along(3.0)]),
+            focus_error(),
+        ),
+        ("drift of paths", drift, 0.75),
+        ("number of steps", steps, 5.5),
+    ]
+}
+
+/// Mean of 0 and of the chord from the focus to where a parallel 3 voxels off meets the sphere.
+fn focus_error() -> f64 {
+    let radius = LENS * f64::from(Load::default().side);
+    let back = radius - (radius * radius - 9.0).sqrt();
+    0.5 * 3.0_f64.hypot(back)
 }
 
 /// Mean distance from the focus, or the root of the mean square of angles' errors.

@@ -211,14 +211,11 @@ impl Ready {
         if let Some(wrong) = fault(&medium, &rays, &walked, exact) {
             return Err(Absent::Failed(wrong));
         }
-        let mean = |of: fn(&Walked) -> u32| {
-            walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / f64::from(load.rays)
-        };
         Ok(Self {
             walker: Walker::new(gpu, &medium, &rays, false)?,
             rays: f64::from(load.rays),
-            steps: mean(|w| w.steps),
-            fetches: mean(|w| w.fetches),
+            steps: mean_of(&walked, |w| w.steps),
+            fetches: mean_of(&walked, |w| w.fetches),
             build_ms: medium.build_ms,
             bytes: medium.bytes() as f64,
         })
@@ -258,14 +255,51 @@ impl Prepared for Ready {
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
-        let [steps, fetches, per_step, per_ray, build, bytes] = &FIGURES;
-        Ok(vec![
+        let [steps, fetches, _, _, build, bytes] = &FIGURES;
+        let counted = [
             Reading::exact(steps, self.steps),
             Reading::exact(fetches, self.fetches),
-            samples.ns_per_item(per_step, self.rays * self.steps)?,
-            samples.ns_per_item(per_ray, self.rays)?,
+        ];
+        let [per_step, per_ray] = times(&samples, self.rays, self.steps)?;
+        let built = [
             Reading::exact(build, self.build_ms),
             Reading::exact(bytes, self.bytes),
-        ])
+        ];
+        Ok([&counted[..], &[per_step, per_ray], &built].concat())
     }
+}
+
+/// Times per step and per ray, of rays with so many steps each.
+fn times(samples: &Samples, rays: f64, steps: f64) -> Result<[Reading; 2], String> {
+    let [_, _, per_step, per_ray, ..] = &FIGURES;
+    Ok([
+        samples.ns_per_item(per_step, rays * steps)?,
+        samples.ns_per_item(per_ray, rays)?,
+    ])
+}
+
+/// Two rays of 3 and 5 steps, which a millisecond is spent on: of each figure the name, and what it should be.
+pub(super) fn known() -> Result<[(&'static str, f64, f64); 3], String> {
+    let walked = [3, 5].map(|steps| Walked {
+        depth: 0.0,
+        steps,
+        fetches: 7,
+        digest: 0,
+    });
+    let steps = mean_of(&walked, |w| w.steps);
+    let samples = Samples {
+        ms: vec![1.0; 3],
+        ..Samples::default()
+    };
+    let [per_step, per_ray] = times(&samples, 2.0, steps)?.map(|reading| reading.value.value);
+    Ok([
+        ("number of steps of a ray", steps, 4.0),
+        ("time of a step", per_step, 125_000.0),
+        ("time of a ray", per_ray, 500_000.0),
+    ])
+}
+
+/// Mean of what each ray has.
+fn mean_of(walked: &[Walked], of: fn(&Walked) -> u32) -> f64 {
+    walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / walked.len() as f64
 }

@@ -1,0 +1,252 @@
+//! Known turns and rays as measurements report them, before any is timed: what a record says of its times, no second figure
+//! of it need contradict.
+
+use super::compactions::rates;
+use super::orders::of_turns;
+use super::primary::Turns;
+use super::structure_times::of_rounds;
+use crate::animation::last_rounds;
+use crate::coherence::known;
+use crate::ray_sets::readings;
+use crate::sampler_cost::ns_per_draw;
+use crate::timing::{Measured, Samples, interleave};
+use raystone_accel::{Hit, NO_HIT};
+use raystone_config::Timing;
+use raystone_core::geometry::Ray;
+use raystone_core::params::Choice as _;
+use raystone_gpu::{Elapsed, GpuError};
+use raystone_record::{PrimaryRecord, RayClass, Reading};
+use raystone_render::{InOrder, Order};
+use raystone_stats::interval::Interval;
+use raystone_verify::rays::RaySet;
+use std::cell::RefCell;
+
+/// A value by name, and what it should be.
+type Known = (&'static str, f64, f64);
+
+/// Relative error of a few operations.
+const ROUNDING: f64 = 1e-9;
+const ROUNDS: usize = 12;
+
+/// Takes them.
+///
+/// # Errors
+/// One is reported as something else: which, and both values.
+pub(super) fn check() -> Result<(), String> {
+    known::check()?;
+    rounds()?;
+    let all = classes()
+        .into_iter()
+        .chain(turns())
+        .chain(per_item()?)
+        .chain(frames());
+    for (what, found, expected) in all {
+        let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
+        if !agrees {
+            return Err(format!(
+                "the {what} of known turns is {found}, and should be {expected}: this program reports wrong times; build it \
+                 anew, and report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Turns of which each takes a nanosecond more than the one before, whosever it was.
+struct Counting<'a> {
+    place: usize,
+    turns: &'a RefCell<Vec<usize>>,
+}
+
+/// By a clock of the device, by that of the wall and by those of the processors, of a turn by its number.
+fn taken(turn: usize) -> Elapsed {
+    let ms = 1e-9 * turn as f64;
+    Elapsed {
+        gpu_ms: Some(ms),
+        wall_ms: 2.0 * ms,
+        cpu_ms: Some(3.0 * ms),
+        backwards: false,
+    }
+}
+
+impl Measured for Counting<'_> {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        let mut turns = self.turns.borrow_mut();
+        turns.push(self.place);
+        Ok(taken(turns.len()))
+    }
+}
+
+/// Three measurements in rounds: each has one turn in each, none of which warms up, and they do not always take the same
+/// places.
+fn rounds() -> Result<(), String> {
+    let wrong = |what: &str| {
+        Err(format!(
+            "{what} of known turns: this program times wrongly; build it anew, and report what stays wrong"
+        ))
+    };
+    let log = RefCell::default();
+    let all = [0, 1, 2].map(|place| Counting { place, turns: &log });
+    let timing = Timing {
+        rounds: ROUNDS as u32,
+        min_warmup_ms: 0,
+        max_warmup_ms: 0,
+        ..Timing::default()
+    };
+    let found = interleave(&all, &timing, 1, || ()).map_err(|(_, e)| e.to_string())?;
+    let log = log.borrow();
+    let begin = log.len().saturating_sub(3 * ROUNDS);
+    let ordered: Vec<&[usize]> = log[begin..].chunks(3).collect();
+    let is_round = |round: &&[usize]| (0..3).all(|place| round.contains(&place));
+    if begin < 3 || !ordered.iter().all(|round| is_round(round)) {
+        return wrong("a measurement has no turn, or two, in a round");
+    }
+    if ordered.iter().all(|round| *round == ordered[0]) {
+        return wrong("the order is the same in all rounds");
+    }
+    for (place, found) in found.into_iter().enumerate() {
+        let samples = found.map_err(|e| e.to_string())?;
+        let own = (begin..log.len()).filter(|turn| log[*turn] == place);
+        let own: Vec<Elapsed> = own.map(|turn| taken(turn + 1)).collect();
+        let of = |ms: fn(&Elapsed) -> f64| own.iter().map(ms).collect::<Vec<f64>>();
+        let is_equal = samples.ms == of(|e| e.gpu_ms.unwrap_or_default())
+            && samples.wall_ms == of(|e| e.wall_ms)
+            && samples.cpu_ms == of(|e| e.cpu_ms.unwrap_or_default());
+        if !is_equal {
+            return wrong("the samples are not the times");
+        }
+    }
+    Ok(())
+}
+
+fn at(found: Option<Interval>) -> f64 {
+    found.map_or(f64::NAN, |interval| interval.value)
+}
+
+fn last(of: &[f64]) -> f64 {
+    of.last().copied().unwrap_or(f64::NAN)
+}
+
+/// Four rays, three of which hit; one of five is none.
+fn classes() -> [Known; 5] {
+    let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
+    let hit = |triangle| Hit {
+        triangle,
+        ..Hit::miss(&ray)
+    };
+    let set = RaySet {
+        class: RayClass::Primary,
+        rays: vec![ray; 4],
+        truth: vec![hit(0), hit(NO_HIT), hit(2), hit(3)],
+        shadow: Vec::new(),
+    };
+    let samples = || Samples {
+        ms: vec![7.0],
+        wall_ms: vec![2.0],
+        cpu_ms: vec![3.0],
+    };
+    let of = |is_software| {
+        let rate = Interval::exact(1.0);
+        of_rounds(&set, (vec![1.0], samples()), rate, is_software)
+    };
+    let [own, of_gpu] = [true, false].map(of);
+    let mut with_none = set.rays.clone();
+    with_none.push(Ray {
+        direction: [f32::NAN; 3],
+        ..ray
+    });
+    [
+        ("share of hits", own.hit_fraction, 0.75),
+        ("time by the wall", last(&own.wall_ms), 2.0),
+        ("time of processors", last(&own.cpu_ms), 3.0),
+        (
+            "time of processors beside a GPU",
+            of_gpu.cpu_ms.len() as f64,
+            0.0,
+        ),
+        ("number of rays", readings::live(&with_none) as f64, 4.0),
+    ]
+}
+
+/// Rasterised and traced; in an order of pixels, with eight samples.
+fn turns() -> [Known; 5] {
+    let turns = Turns {
+        raster_ms: vec![1.0; 3],
+        traced_ms: vec![2.0; 3],
+        ..Turns::default()
+    };
+    let primary = turns.timed(PrimaryRecord::default());
+    let ms = |wall_ms| Elapsed {
+        wall_ms,
+        ..Elapsed::default()
+    };
+    let turn = InOrder {
+        passes: 16,
+        total: ms(24.0),
+        first_picture: ms(2.0),
+    };
+    let order = of_turns(Order::ALL[0], &[turn; 3], 8.0);
+    [
+        ("time of rasterising", at(primary.raster_ms), 1.0),
+        ("time of tracing", at(primary.traced_ms), 2.0),
+        ("time of a sample", at(order.ms_per_spp), 3.0),
+        ("time to a first picture", at(order.first_picture_ms), 2.0),
+        ("number of passes", order.passes as f64, 16.0),
+    ]
+}
+
+/// A millisecond for a thousand elements of eight bytes, for a thousand rays after as long a build, and for four pairs of 8
+/// samples of 2^14 pixels twice that many ns.
+fn per_item() -> Result<Vec<Known>, String> {
+    let ms = [1.0; 3];
+    let rates: Vec<Reading> = rates(&ms, 1000.0, 8000.0).collect();
+    let samples = Samples {
+        ms: ms.to_vec(),
+        ..Samples::default()
+    };
+    let times = readings::times(&samples, 1000.0, 1.0)?;
+    let value = |all: &[Reading], k: usize| all.get(k).map_or(f64::NAN, |one| one.value.value);
+    Ok(vec![
+        ("millions of elements a second", value(&rates, 0), 1.0),
+        ("gigabytes a second", value(&rates, 1), 0.008),
+        ("time of a ray", value(&times, 0), 1000.0),
+        ("time of a ray with building", value(&times, 1), 2000.0),
+        ("time of building", value(&times, 2), 1.0),
+        (
+            "cost of a pair of dimensions",
+            ns_per_draw(1.048_576, 4, 8),
+            2.0,
+        ),
+    ])
+}
+
+/// The last three of four notes, the first of which warmed up.
+fn frames() -> [Known; 3] {
+    let notes: Vec<Elapsed> = [9.0, 1.0, 2.0, 3.0]
+        .map(|ms| Elapsed {
+            gpu_ms: Some(ms),
+            wall_ms: 10.0 * ms,
+            cpu_ms: Some(100.0 * ms),
+            backwards: false,
+        })
+        .to_vec();
+    let cost = last_rounds(&notes, 3);
+    let sum = |of: &[f64]| of.iter().sum();
+    [
+        ("time of a frame's passes", sum(&cost.passes_ms), 6.0),
+        ("time of a frame by the wall", sum(&cost.wall_ms), 60.0),
+        (
+            "time of a frame on processors",
+            sum(&cost.processor_ms),
+            600.0,
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn they_are_as_by_hand() {
+        assert_eq!(super::check(), Ok(()));
+    }
+}
