@@ -166,6 +166,7 @@ fn next(warps: &mut VecDeque<Queue>) -> Option<(Queue, (u32, Issue))> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coherence::Fetch;
     use crate::coherence::known::{self, lane, machine, pass};
     use Kind::{Node, Triangle};
     use raystone_core::random::Pcg32;
