@@ -79,9 +79,11 @@ pub struct Cone<T> {
     pub tangent: T,
     /// What is nearer along the axis is not in it.
     pub near: T,
+    /// What the narrower of the pixel's cone and the mirror's lobe has of its width.
+    pub narrow: T,
 }
 
-fn framed<T: Real>(apex: V3<T>, axis: V3<T>, tangent: T, near: T) -> Cone<T> {
+fn framed<T: Real>(apex: V3<T>, axis: V3<T>, tangent: T, near: T, narrow: T) -> Cone<T> {
     let (zero, one) = (c(0.0), c(1.0));
     let mut helper = V3::new(zero, zero, one);
     if axis.z.abs() > c(UPRIGHT) {
@@ -95,6 +97,7 @@ fn framed<T: Real>(apex: V3<T>, axis: V3<T>, tangent: T, near: T) -> Cone<T> {
         up: cross3(axis, right),
         tangent,
         near,
+        narrow,
     }
 }
 
@@ -127,7 +130,8 @@ fn reflected<T: Real>(
     // The tangent of the sum of both angles.
     let sum = (own + camera.gloss) / (c::<T>(1.0) - own * camera.gloss);
     let behind = tangent * t / sum;
-    framed(at - axis * behind, axis, sum, behind)
+    let narrow = own.min(camera.gloss) / (own + camera.gloss);
+    framed(at - axis * behind, axis, sum, behind, narrow)
 }
 
 /// Offsets of a pixel from the middle of the picture, in pixels.
@@ -161,7 +165,7 @@ pub fn cone_of<T: Angle>(camera: &Camera<T>, pixel: u32) -> Cone<T> {
         let normal = V3::new(c(1.0), c(0.0), c(0.0));
         return reflected(camera, eye + direction * t, normal, direction, t, tangent);
     }
-    framed(eye, direction, tangent, c(LEAST_NEAR))
+    framed(eye, direction, tangent, c(LEAST_NEAR), c(0.0))
 }
 
 /// Whether a sphere may meet the cone: the thesis's test (its equation 3.1) times the cosine, right for all angles.

@@ -1,6 +1,7 @@
 //! Cones on the device.
 
 use crate::disk::{Overlap, V2};
+use crate::lobe::lobe_table;
 use crate::scene::{Patch, tile_levels};
 use crate::trace::{Found, Given};
 use raystone_gpu::{
@@ -49,6 +50,7 @@ impl Tracer {
             .buffer("triangles", &gpu.storage("triangles", &words)?)
             .buffer("directions", &gpu.storage("directions", directions)?)
             .buffer("texels", &gpu.storage("texels", &tile_levels())?)
+            .buffer("lobes", &gpu.storage("lobes", lobe_table())?)
             .buffer("layers", Storage::scratch("layers", layers))
             .buffer("found", &found)
             .buffer("status", &status);

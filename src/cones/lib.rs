@@ -11,6 +11,7 @@ pub mod device;
 pub mod disk;
 pub mod known_figures;
 pub mod level;
+pub mod lobe;
 mod measure;
 pub mod oracle;
 pub mod quadrature;

@@ -311,6 +311,8 @@ fn contradiction(load: &Load) -> Option<String> {
         "`resolution` is that of the whole picture: give at least `side`"
     } else if load.keep.is_mean && load.view.mirror != Some(Mirror::Sphere) {
         "off a plane a cone is as wide in both directions: leave `footprint` out"
+    } else if load.keep.blend == Blend::Lobe && load.view.mirror.is_none() {
+        "from the eye a cone has no lobe: leave `blend = \"lobe\"` out"
     } else if load.keep.blend == Blend::Level && load.keep.cut > 0.0 {
         "with `blend = \"level\"` a cone has its axis only, and nothing is cut: leave `cut` out"
     } else {

@@ -11,6 +11,7 @@ use crate::scene::Patch;
 use crate::trace::{Blend, Given, LEAST_SHARE};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// The widest cone that a curved mirror makes, and the least cosine there: bounds of the method.
 const WIDEST: f64 = 0.5;
@@ -23,6 +24,9 @@ const OFF_PLACE: f64 = 2e-6;
 const OFF_DEPTH: f64 = 2e-6;
 /// What rounding of colours and sums may change.
 const OFF_COLOUR: f64 = 2e-4;
+/// What a mean of a lobe may be off, and how steep means are that are known at sixteenths.
+const OFF_LOBE: f64 = 2e-3;
+const STEEPEST: f64 = 16.0;
 /// What a direction of a mask may change that falls to another layer: its own weight, and that of its layer's others.
 const OPEN_BIT: f64 = 2.0 / 64.0;
 
@@ -39,6 +43,8 @@ fn reach_of(beam: &Beam) -> f64 {
     OFF_PLACE + axis / beam.angle + cancelled / beam.cosine.powi(2)
 }
 
+static LOBES: LazyLock<quadrature::LobeMeans> = LazyLock::new(quadrature::LobeMeans::new);
+
 /// A cone with what stands behind its numbers.
 pub(crate) struct Beam {
     pub(crate) apex: DVec3,
@@ -48,6 +54,8 @@ pub(crate) struct Beam {
     /// At the mirror, and whether that is curved.
     cosine: f64,
     is_curved: bool,
+    /// What the narrower of the pixel's cone and the lobe has of its width.
+    narrow: f64,
 }
 
 /// The cone of a pixel.
@@ -62,6 +70,7 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
             near: LEAST_NEAR,
             cosine: 1.0,
             is_curved: false,
+            narrow: 0.0,
         };
     };
     let t = eye.distance(at);
@@ -74,8 +83,8 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
         true => (tangential * sagittal).sqrt(),
         false => tangential,
     };
-    let own = (tangent * wider).min(WIDEST).atan();
-    let angle = own + camera.gloss.atan();
+    let own = (tangent * wider).min(WIDEST);
+    let angle = own.atan() + camera.gloss.atan();
     // As wide at the mirror as the pixel's cone is there.
     let behind = tangent * t / angle.tan();
     Beam {
@@ -85,6 +94,7 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
         near: behind,
         cosine,
         is_curved: camera.mirror == 1,
+        narrow: own.min(camera.gloss) / (own + camera.gloss),
     }
 }
 
@@ -98,6 +108,8 @@ struct Part {
     is_thin: bool,
     /// Directions so near an edge that f32 may see them on either side.
     open: u32,
+    /// How much of the lobe passes where it is, over the mean of the cone, and what that may be off.
+    lobe: [f64; 2],
 }
 
 /// A pixel, with what f32 may be off.
@@ -187,6 +199,12 @@ pub struct Oracle<'a> {
 }
 
 impl Oracle<'_> {
+    fn has_mask(&self) -> bool {
+        [Blend::MaskArea, Blend::MaskCount]
+            .map(Blend::word)
+            .contains(&self.given.blend)
+    }
+
     fn part(&self, beam: &Beam, [x, y]: [DVec3; 2], patch: &Patch<f64>) -> Option<Part> {
         let tangent = beam.angle.tan();
         let corners = patch.corners.map(|p| p.f64());
@@ -230,6 +248,7 @@ impl Oracle<'_> {
         let parts = barycentric(corners, p);
         let colours = patch.colours.map(|p| p.f64());
         let bits = self.bits(beam, [x, y], &corners, n);
+        let lobe = self.lobe(beam, area / PI, middle.length(), reach);
         let nearest = || {
             let far = |d: &[f64; 2]| DVec2::from(*d).distance_squared(middle);
             let all = 0..self.directions.len();
@@ -241,6 +260,7 @@ impl Oracle<'_> {
             off: off.iter().copied().fold(0.0, f64::max) + OFF_DEPTH * at,
             colour: (0..3).map(|k| colours[k] * parts[k]).sum(),
             is_thin: bits == 0,
+            lobe,
             open: self.open_bits(&polygon, reach_of(beam)),
             bits: if bits == 0 {
                 nearest().map_or(1, |k| 1 << k)
@@ -250,9 +270,18 @@ impl Oracle<'_> {
         })
     }
 
+    /// The weight of a part by the lobe. It changes by its own size over an eighth of the cone at most.
+    fn lobe(&self, beam: &Beam, share: f64, distance: f64, reach: f64) -> [f64; 2] {
+        if self.given.blend != Blend::Lobe.word() {
+            return [1.0, 0.0];
+        }
+        let weight = LOBES.of(share, distance, beam.narrow);
+        [weight, OFF_LOBE + STEEPEST * reach]
+    }
+
     /// Directions whose rays meet the triangle beyond the plane at `near`.
     fn bits(&self, beam: &Beam, [x, y]: [DVec3; 2], corners: &[DVec3; 3], n: DVec3) -> u64 {
-        if self.given.blend == 0 {
+        if !self.has_mask() {
             return 0;
         }
         let mut bits = 0;
@@ -276,7 +305,7 @@ impl Oracle<'_> {
 
     /// Directions within reach of an edge.
     fn open_bits(&self, polygon: &[DVec2], reach: f64) -> u32 {
-        if self.given.blend == 0 {
+        if !self.has_mask() {
             return 0;
         }
         let is_near = |d: &&[f64; 2]| {
@@ -376,6 +405,9 @@ impl Oracle<'_> {
         let met = kept.len() as u32;
         kept.truncate(self.given.most as usize);
         let (colour, covered) = self.blended(&kept);
+        if self.given.blend == Blend::Lobe.word() {
+            slack = lobe_slack(&kept, slack);
+        }
         Expected {
             colour,
             covered,
@@ -387,27 +419,51 @@ impl Oracle<'_> {
     fn blended(&self, parts: &[Part]) -> (DVec3, f64) {
         let mut colour = DVec3::ZERO;
         let mut free = 1.0;
+        let mut passed = 0.0;
         let mut open = u64::MAX;
         for part in parts {
             let of = |bits: u64| f64::from(bits.count_ones());
             let weight: f64 = match self.given.blend {
-                0 => part.share,
+                0 | 4 => part.share,
                 1 => part.share * of(part.bits & open) / of(part.bits),
                 _ if part.is_thin => 0.0,
                 _ => of(part.bits & open) / 64.0,
             };
             let weight = weight.min(free);
-            colour += part.colour * weight;
+            colour += part.colour * weight * part.lobe[0];
+            passed += weight * part.lobe[0];
             free -= weight;
             if !part.is_thin {
                 open &= !part.bits;
             }
         }
-        if self.given.blend != 0 && open == 0 && free < 1.0 {
+        if self.has_mask() && open == 0 && free < 1.0 {
             return (colour / (1.0 - free), 1.0);
+        }
+        // What passes is shared among layers as if it were all that they cover.
+        if passed > 0.0 {
+            colour *= (1.0 - free) / passed;
         }
         (colour + self.given.background.f64() * free, 1.0 - free)
     }
+}
+
+/// What may be off where layers weigh by a lobe: that of shares as much more as a weight exceeds their mean, and that of
+/// the weights themselves.
+fn lobe_slack(parts: &[Part], slack: f64) -> f64 {
+    let (mut free, mut covered, mut passed, mut off, mut most) = (1.0_f64, 0.0, 0.0, 0.0, 0.0_f64);
+    for part in parts {
+        let weight = part.share.min(free);
+        free -= weight;
+        covered += weight;
+        passed += weight * part.lobe[0];
+        off += weight * part.lobe[1];
+        most = most.max(part.lobe[0]);
+    }
+    if passed <= 0.0 {
+        return slack + covered;
+    }
+    slack * (most * covered / passed).max(1.0) + 2.0 * off * covered / passed
 }
 
 /// What another order of layers that are as far away as f32 can tell may change.

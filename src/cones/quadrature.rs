@@ -104,3 +104,97 @@ pub fn overlap(polygon: &[DVec2]) -> (f64, DVec2) {
     }
     (sums[0], DVec2::new(sums[1], sums[2]) / sums[0])
 }
+
+/// Area in which two disks overlap whose middles are this far apart, by their chords.
+fn common(narrow: f64, wide: f64, apart: f64) -> f64 {
+    const CHORDS: u32 = 256;
+    let step = PI / f64::from(CHORDS);
+    let each = (0..CHORDS).map(|k| {
+        let (sine, cosine) = (-0.5 * PI + (f64::from(k) + 0.5) * step).sin_cos();
+        let (own, other) = (
+            narrow * cosine,
+            (wide.powi(2) - (narrow * sine).powi(2)).sqrt(),
+        );
+        let length = own.min(apart + other) - (-own).max(apart - other);
+        length.max(0.0) * narrow * cosine * step
+    });
+    each.sum()
+}
+
+/// What a lobe sends through disks of a cone: the means of 17 radii by 17 distances by 9 parts of the width, each over
+/// points of the disk, that lie between them on lines.
+pub(crate) struct LobeMeans(Vec<f64>);
+
+impl LobeMeans {
+    const LINES: u32 = 4096;
+
+    pub(crate) fn new() -> Self {
+        let mut means = Vec::new();
+        for part in 0..9 {
+            let narrow = f64::from(part) / 16.0;
+            let wide = 1.0 - narrow;
+            let along: Vec<f64> = (0..=Self::LINES)
+                .map(|k| common(narrow, wide, f64::from(k) / f64::from(Self::LINES)))
+                .map(|area| area / (PI * (narrow * wide).powi(2)))
+                .collect();
+            let density = |at: f64| {
+                let place = at * f64::from(Self::LINES);
+                let low = (place as usize).min(along.len() - 2);
+                along[low] + (along[low + 1] - along[low]) * (place - low as f64)
+            };
+            for place in 0..17 {
+                for size in 0..17 {
+                    let (place, size) = (f64::from(place) / 16.0, f64::from(size) / 16.0);
+                    means.push(if part == 0 {
+                        1.0
+                    } else if size == 0.0 {
+                        density(place)
+                    } else {
+                        let sum: f64 = points(place, size).map(density).sum();
+                        let area = PI * size * size / f64::from(RINGS * ANGLES);
+                        sum * area / common(size, 1.0, place)
+                    });
+                }
+            }
+        }
+        Self(means)
+    }
+
+    /// The mean of a disk of this share of the cone at a distance from its axis.
+    pub(crate) fn of(&self, share: f64, distance: f64, narrow: f64) -> f64 {
+        let places = [
+            share.clamp(0.0, 1.0).sqrt() * 16.0,
+            distance.clamp(0.0, 1.0) * 16.0,
+            narrow.clamp(0.0, 0.5) * 16.0,
+        ];
+        let most = [16, 16, 8];
+        (0..8_usize)
+            .map(|corner| {
+                let mut weight = 1.0;
+                let mut node = [0; 3];
+                for axis in 0..3 {
+                    let low = (places[axis] as usize).min(most[axis] - 1);
+                    let beyond = places[axis] - low as f64;
+                    let is_upper = corner >> axis & 1 == 1;
+                    weight *= if is_upper { beyond } else { 1.0 - beyond };
+                    node[axis] = low + usize::from(is_upper);
+                }
+                weight * self.0[(node[2] * 17 + node[1]) * 17 + node[0]]
+            })
+            .sum()
+    }
+}
+
+/// Rings of equal areas of a disk, and points of each.
+const RINGS: u32 = 48;
+const ANGLES: u32 = 96;
+
+/// How far from the axis the points of a disk are that lie in the cone.
+fn points(place: f64, size: f64) -> impl Iterator<Item = f64> {
+    let each = (0..RINGS * ANGLES).map(move |k| {
+        let radius = size * ((f64::from(k / ANGLES) + 0.5) / f64::from(RINGS)).sqrt();
+        let angle = 2.0 * PI * (f64::from(k % ANGLES) + 0.5) / f64::from(ANGLES);
+        (place + radius * angle.cos()).hypot(radius * angle.sin())
+    });
+    each.filter(|distance| *distance <= 1.0)
+}

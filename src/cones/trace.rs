@@ -5,6 +5,7 @@
 use crate::cone::{Camera, Cone, cone_of, meets, seen_from};
 use crate::disk::{Angle, Sum, c, edge, overlap};
 use crate::level::{level_of, tiles};
+use crate::lobe::lobe_weight;
 use crate::scene::Patch;
 use raystone_core::parameters;
 use raystone_specular::real::{Real, V3};
@@ -14,6 +15,7 @@ const SATURATE: u32 = 0;
 const MASK_AREA: u32 = 1;
 const MASK_COUNT: u32 = 2;
 const LEVEL: u32 = 3;
+const LOBE: u32 = 4;
 
 /// Directions of a mask.
 pub const DIRECTIONS: u32 = 64;
@@ -33,6 +35,8 @@ parameters! {
         MaskCount = "mask-count",
         /// by the axis alone, which meets one; textures are read at the level that is as wide as the cone
         Level = "level",
+        /// not, as `saturate`; a layer weighs by its area and by how much of the lobe passes there, from a table: the thesis's F
+        Lobe = "lobe",
     }
 }
 
@@ -44,6 +48,7 @@ impl Blend {
             Self::MaskArea => MASK_AREA,
             Self::MaskCount => MASK_COUNT,
             Self::Level => LEVEL,
+            Self::Lobe => LOBE,
         }
     }
 }
@@ -76,6 +81,8 @@ pub struct Layer<T> {
     pub place: u32,
     /// Directions of the mask that meet it.
     pub bits: [u32; 2],
+    /// Weight by the lobe, which kernels have in the place of the mask.
+    pub weight: T,
 }
 
 /// A picture's pixel.
@@ -107,13 +114,19 @@ pub struct Tracing<'a, T> {
     pub directions: &'a [[T; 2]],
     /// Texels of [`tile_levels`](crate::scene::tile_levels).
     pub texels: &'a [T],
+    /// Densities of [`lobe_table`](crate::lobe::lobe_table).
+    pub lobes: &'a [T],
 }
 
 impl<T: Angle> Tracing<'_, T> {
+    fn has_mask(&self) -> bool {
+        matches!(self.given.blend, MASK_AREA | MASK_COUNT)
+    }
+
     /// Directions to the left and right of the line through an edge.
     fn add_edge(&self, covered: &mut Covered<T>, a: V3<T>, b: V3<T>) {
         covered.sum = edge(covered.sum, a, b);
-        if self.given.blend == SATURATE {
+        if !self.has_mask() {
             return;
         }
         let n = cross3(a, b);
@@ -199,6 +212,7 @@ impl<T: Angle> Tracing<'_, T> {
             depth: zero,
             place: 2 * index,
             bits: [0; 2],
+            weight: c(1.0),
         };
         let u = b - a;
         let v = third - a;
@@ -217,7 +231,12 @@ impl<T: Angle> Tracing<'_, T> {
         out.depth = clamp(dot3(n, a) / facing, low, high);
         let parts = corner_parts([u, v], middle * out.depth - a);
         out.colour = weighted(patch.colours, parts);
-        if self.given.blend != SATURATE {
+        if self.given.blend == LOBE {
+            let at = part.centroid;
+            let beside = (at.x * at.x + at.y * at.y).sqrt();
+            out.weight = lobe_weight(self.lobes, out.share, beside, cone.narrow);
+        }
+        if self.has_mask() {
             out.bits = match covered.sum.area < zero {
                 true => covered.right,
                 false => covered.left,
@@ -248,6 +267,7 @@ impl<T: Angle> Tracing<'_, T> {
             depth: zero,
             place: 2 * index,
             bits: [0; 2],
+            weight: c(1.0),
         };
         // The axis is the line x = y = 0 of the cone's frame.
         let sides = [(a, b), (b, third), (third, a)].map(|(p, q)| p.x * q.y - p.y * q.x);
@@ -286,6 +306,8 @@ impl<T: Angle> Tracing<'_, T> {
         let given = self.given;
         let mut colour = V3::new(zero, zero, zero);
         let mut covered = zero;
+        // The sum of the layers' weights by the lobe.
+        let mut sum = zero;
         let mut mask = [0_u32; 2];
         for layer in layers {
             let is_thin = layer.place & 1 == 1;
@@ -302,14 +324,22 @@ impl<T: Angle> Tracing<'_, T> {
                 }
             }
             weight = weight.min(one - covered);
-            colour = colour + layer.colour * weight;
             covered = covered + weight;
+            if given.blend == LOBE {
+                weight = weight * layer.weight;
+                sum = sum + weight;
+            }
+            colour = colour + layer.colour * weight;
             if !is_thin {
                 mask = [mask[0] | layer.bits[0], mask[1] | layer.bits[1]];
             }
         }
+        // Weights of a cone without a gap sum to 1.
+        if given.blend == LOBE && sum > zero {
+            colour = colour * (covered / sum);
+        }
         // All directions have met something, and so has all of the cone.
-        if given.blend != SATURATE && mask == [u32::MAX; 2] && covered > zero {
+        if self.has_mask() && mask == [u32::MAX; 2] && covered > zero {
             colour = colour / covered;
             covered = one;
         }

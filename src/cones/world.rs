@@ -10,7 +10,7 @@ use crate::sample::Truth;
 use crate::scene::{BACKGROUND, Patch, Place, patches};
 use crate::trace::{Blend, DIRECTIONS, Found, Given};
 #[cfg(test)]
-use crate::{scene::tile_levels, trace::Tracing};
+use crate::{lobe::lobe_table, scene::tile_levels, trace::Tracing};
 use glam::DVec3;
 use rayon::prelude::*;
 use raystone_bench::run::Absent;
@@ -184,6 +184,7 @@ impl World {
             patches: &self.patches,
             directions: &directions(),
             texels: &tile_levels(),
+            lobes: lobe_table(),
         };
         let each = (0..self.pixels()).into_par_iter();
         each.map(|pixel| tracing.trace_cone(pixel)).collect()

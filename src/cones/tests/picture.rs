@@ -70,7 +70,13 @@ fn cases() -> Vec<(World, Keep)> {
         blend: Blend::Level,
         ..KEEP
     };
+    let lobe = Keep {
+        blend: Blend::Lobe,
+        ..KEEP
+    };
     vec![
+        (world(Place::Checker, Some(Mirror::Sphere), 0.01), lobe),
+        (world(Place::Thin, Some(Mirror::Plane), 0.003), lobe),
         (world(Place::Balls, None, 0.0), level),
         (world(Place::Checker, Some(Mirror::Sphere), 0.02), level),
         (world(Place::Checker, Some(Mirror::Plane), 0.1), level),
@@ -106,7 +112,7 @@ fn the_kernel_agrees_with_oracle_and_quadrature() {
 /// Kernel, text, its replacement.
 type Fault = (&'static str, &'static str, &'static str);
 
-const FAULTS: [Fault; 35] = [
+const FAULTS: [Fault; 43] = [
     ("disk", "0.5 * angle_of", "0.49 * angle_of"),
     ("disk", "to_b.y - from_a.y", "to_b.y + from_a.y"),
     (
@@ -139,7 +145,11 @@ const FAULTS: [Fault; 35] = [
         "wider = 1.0 + 2.0 * t * cosine;",
     ),
     ("cone", "normal * (2.0 * cosine)", "normal * cosine"),
-    ("cone", "(own + camera.gloss)", "max(own, camera.gloss)"),
+    (
+        "cone",
+        "sum = (own + camera.gloss)",
+        "sum = max(own, camera.gloss)",
+    ),
     (
         "cone",
         "let behind = tangent * t / sum;",
@@ -198,6 +208,22 @@ const FAULTS: [Fault; 35] = [
         "let upper = c + (d - c) * part.y;",
     ),
     ("level", "bounded - f32(low)", "0.0"),
+    ("lobe", "sqrt(min(share, 1.0))", "min(share, 1.0)"),
+    ("lobe", "min(2.0 * part, 1.0)", "min(part, 1.0)"),
+    ("lobe", "min(distance, 1.0)", "0.0"),
+    ("lobe", "(size - f32(low))", "1.0"),
+    (
+        "lobe",
+        "(part * PLACES + place) * SIZES + size",
+        "(part * PLACES + size) * SIZES + place",
+    ),
+    ("cone", "min(own, camera.gloss) /", "own /"),
+    ("trace", "colour = colour * (covered / sum);", ""),
+    (
+        "trace",
+        "weight = weight * bitcast<f32>(layer.bits.x);",
+        "weight = weight;",
+    ),
 ];
 
 /// What sees a fault: the oracle of pictures, quadrature of single overlaps.
