@@ -98,7 +98,7 @@ fn rounds() -> Result<(), String> {
     let begin = log.len().saturating_sub(3 * ROUNDS);
     let ordered: Vec<&[usize]> = log[begin..].chunks(3).collect();
     let is_round = |round: &&[usize]| (0..3).all(|place| round.contains(&place));
-    if begin < 3 || !ordered.iter().all(|round| is_round(round)) {
+    if begin < 3 || !ordered.iter().all(is_round) {
         return wrong("a measurement has no turn, or two, in a round");
     }
     if ordered.iter().all(|round| *round == ordered[0]) {
