@@ -172,6 +172,7 @@ fn known_figures() -> Result<()> {
         raystone::run::known_plan::check,
         raystone::report::plot::known::check,
         raystone::report::check_rulings,
+        raystone::report::check_texts,
     ];
     checks
         .into_iter()

@@ -35,6 +35,7 @@ mod tests;
 pub(crate) mod trust;
 pub mod values;
 
+pub use known_page::check_texts;
 pub use ruling::check as check_rulings;
 pub use terminal::{failed_checks, terminal_tables};
 

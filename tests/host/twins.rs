@@ -463,6 +463,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("cones/disk", "segment", "the thesis's formula, for tests"),
     ("cones/cone", "offsets", "three lines of the kernel"),
     ("cones/trace", "clamp", "a function of WGSL"),
+    ("cones/lobe", "before", "two lines of the kernel"),
+    ("cones/lobe", "lobe_table", "makes the table"),
+    ("cones/lobe", "lens", "makes the table"),
+    ("cones/lobe", "density", "makes the table"),
+    ("cones/lobe", "mean_density", "makes the table"),
     ("accel/bvh/pairs", "validate", "looks at what was built"),
     (
         "accel/triangle/watertight",

@@ -17,6 +17,10 @@ use raystone_record::Line;
 use std::fmt::Write as _;
 use std::path::Path;
 
+mod texts;
+
+pub use texts::check as check_texts;
+
 const RECORDS: &str = include_str!("records.jsonl");
 const PAGE: &str = include_str!("page.txt");
 
@@ -25,7 +29,7 @@ const PAGE: &str = include_str!("page.txt");
 /// # Errors
 /// A line of it is another: both.
 pub(crate) fn check() -> Result<(), String> {
-    differing(&page(&records()?), PAGE)
+    differing("a page", &page(&records()?), PAGE)
 }
 
 fn records() -> Result<Vec<Line>, String> {
@@ -34,16 +38,16 @@ fn records() -> Result<Vec<Line>, String> {
     lines.map_err(|error| format!("known records: {error}"))
 }
 
-fn differing(found: &str, expected: &str) -> Result<(), String> {
+fn differing(what: &str, found: &str, expected: &str) -> Result<(), String> {
     let mut pairs = found.lines().zip(expected.lines());
     let pair = pairs.find(|(found, expected)| found != expected);
     match pair {
         Some((found, expected)) => Err(format!(
-            "a page of known records has the line `{found}` in place of `{expected}`"
+            "{what} of known records has the line `{found}` in place of `{expected}`"
         )),
-        None if found.lines().count() != expected.lines().count() => {
-            Err("a page of known records has more or fewer lines than it should".to_owned())
-        }
+        None if found.lines().count() != expected.lines().count() => Err(format!(
+            "{what} of known records has more or fewer lines than it should"
+        )),
         None => Ok(()),
     }
 }
@@ -189,16 +193,16 @@ mod tests {
         for (from, to) in [("5.02", "5.03"), ("36", "35"), ("around", "about")] {
             let wrong = text.replacen(from, to, 1);
             assert!(wrong != text, "{from}");
-            assert!(differing(&wrong, &text).is_err(), "{from}");
+            assert!(differing("a page", &wrong, &text).is_err(), "{from}");
         }
         let (less, _) = text.trim_end().rsplit_once('\n').unwrap();
-        assert!(differing(less, &text).is_err());
+        assert!(differing("a page", less, &text).is_err());
     }
 
     #[test]
     fn columns_that_are_exchanged_are_told() {
         let mut lines = records().unwrap();
         lines.swap(2, 3);
-        assert!(differing(&page(&lines), PAGE).is_err());
+        assert!(differing("a page", &page(&lines), PAGE).is_err());
     }
 }
