@@ -3,6 +3,7 @@
 
 use crate::bounds::Bounds;
 use crate::instancing::BoxMap;
+use crate::known_parameters;
 use crate::{AccelRegistry, BuildLog, StructureStats, TriangleSoup, triangle::TriangleRecord};
 use glam::Vec3;
 use raystone_core::clock::Instant;
@@ -33,6 +34,7 @@ pub fn check() -> Result<(), String> {
     shapes()?;
     row()?;
     phases()?;
+    known_parameters::check()?;
     box_agrees(&BoxMap::new(&placed()?))
 }
 

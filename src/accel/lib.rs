@@ -26,6 +26,7 @@ mod intersection;
 mod irregular_grid;
 mod kd_tree;
 pub mod known_figures;
+mod known_parameters;
 mod leaf;
 pub mod mask;
 mod octree;

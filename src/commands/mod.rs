@@ -165,6 +165,7 @@ fn known_figures() -> Result<()> {
         raystone::measure::stream::check,
         raystone::accel::known_figures::check,
         raystone::scene::known_figures::check,
+        raystone::integrator::offset::check_known,
         raystone::measure::known_pictures::check,
         raystone::media::known_figures::check,
         raystone::specular::known_figures::check,

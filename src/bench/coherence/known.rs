@@ -2,7 +2,7 @@
 
 use super::{CacheShape, Fetch, Kind, Machine, Pass, Trace, Warp, run};
 use Kind::{Node, Triangle};
-use raystone_config::Rule;
+use raystone_config::{Coherence, Rule};
 use raystone_record::{Tallies, Tally};
 
 /// A lane that fetches 4 bytes at each of these addresses, step by step.
@@ -104,6 +104,22 @@ pub(super) fn by_hand() -> Tallies {
 /// # Errors
 /// They are counted otherwise.
 pub(crate) fn check() -> Result<(), String> {
+    // 2 KiB are 16 lines of 128 bytes, 12 KiB 96.
+    let settings = Coherence {
+        l1_kib: 2,
+        l1_ways: 4,
+        l2_kib: 12,
+        l2_ways: 8,
+        ..Coherence::default()
+    };
+    let machine = Machine::new(&settings);
+    let cache = |lines, ways| CacheShape { lines, ways };
+    if (machine.l1, machine.l2, machine.line_bytes) != (cache(16, 4), cache(96, 8), 128) {
+        return Err(format!(
+            "a known machine of coherence is {machine:?}: this program models another one; build it anew, and report what stays \
+             wrong"
+        ));
+    }
     let (found, expected) = (found(), by_hand());
     (found == expected).then_some(()).ok_or_else(|| {
         format!(

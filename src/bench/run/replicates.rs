@@ -22,6 +22,8 @@ const ERROR_MAP_FULL_SCALE: f32 = 1.0;
 /// images of two seeds cannot be equal by chance.
 const NOISE: f32 = 1e-3;
 const NOISY_VALUES: usize = 64;
+/// Relative difference of a mean that is taken in steps.
+const STEPS: f32 = 1e-5;
 
 /// One render of a replicate, and the numbers of samples at which its image is kept.
 pub(super) struct Pass<'a> {
@@ -59,7 +61,11 @@ pub(super) fn all_samples(
         for pass in passes {
             let render = || pass.renderer.render(&pass.spps, seed);
             let rendered = session.clock.time("gpu", render);
-            snapshots.extend(rendered.map_err(|e| e.to_string())?);
+            let rendered = rendered.map_err(|e| e.to_string())?;
+            if let (true, Some(second)) = (images.is_empty(), rendered.get(1)) {
+                check_at_once(session, pass, second, seed)?;
+            }
+            snapshots.extend(rendered);
         }
         let mut record = blank_record(session, cell, (replicate, seed));
         for snapshot in &snapshots {
@@ -112,6 +118,9 @@ pub(super) fn until_met(
             let further = || further_samples(pass, before, spp, record.seed);
             let snapshot = session.clock.time("gpu", further);
             let snapshot = snapshot.map_err(|e| e.to_string())?;
+            if index == 0 && pass.spps.get(1) == Some(&spp) {
+                check_at_once(session, pass, &snapshot, record.seed)?;
+            }
             add_error(
                 session,
                 cell,
@@ -163,6 +172,37 @@ fn further_samples(
         }
     }
     Ok(Snapshot { spp, image })
+}
+
+/// Fails a cell of which an image that was made in two steps is not that of its samples at once: samples that are repeated
+/// or left out make noise of another size, and bias nothing.
+pub(super) fn check_at_once(
+    session: &mut Session,
+    pass: &Pass,
+    snapshot: &Snapshot,
+    seed: u32,
+) -> Result<(), String> {
+    let spp = snapshot.spp;
+    let at_once = session
+        .clock
+        .time("gpu", || pass.renderer.render(&[spp], seed));
+    let at_once = at_once.map_err(|e| e.to_string())?;
+    let Some(image) = at_once.first().map(|other| &other.image) else {
+        return Err("nothing was rendered".to_owned());
+    };
+    let pairs = image.pixels.iter().zip(&snapshot.image.pixels);
+    let differs = |(a, b): (&[f32; 3], &[f32; 3])| {
+        // What is not finite is said elsewhere.
+        (0..3).any(|k| (a[k] - b[k]).abs() > STEPS * a[k].abs().max(b[k].abs()))
+    };
+    match pairs.into_iter().position(differs) {
+        None => Ok(()),
+        Some(pixel) => Err(format!(
+            "pixel {pixel} after {spp} samples in two steps is {:?}, and after as many at once {:?}: samples are repeated \
+             or left out",
+            snapshot.image.pixels[pixel], image.pixels[pixel]
+        )),
+    }
 }
 
 /// Fails a cell of which two replicates are one image, or whose reference has two equal parts: other seeds must

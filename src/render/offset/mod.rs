@@ -10,10 +10,11 @@ pub(crate) use fixed::FIXED;
 pub(crate) use integer::INTEGER;
 pub use none::NONE;
 
+use glam::Vec3;
 use raystone_accel::TriangleSoup;
 use raystone_core::params::{Kinds, Named, Sources};
 use raystone_gpu::Composition;
-use raystone_scene::{Instance, row_sum_norm};
+use raystone_scene::{Instance, Transform, row_sum_norm};
 use std::fmt;
 
 /// An offset of ray origins from the surface.
@@ -103,7 +104,10 @@ pub struct TransformError {
 impl TransformError {
     /// The error for the instances of a scene.
     pub fn of(soup: &TriangleSoup) -> Self {
-        let instances = soup.placed.iter().flat_map(|p| &p.instances);
+        Self::of_instances(soup.placed.iter().flat_map(|p| &p.instances))
+    }
+
+    fn of_instances<'a>(instances: impl Iterator<Item = &'a Instance>) -> Self {
         let moved = instances.filter(|instance| !instance.is_identity());
         moved.fold(Self::default(), |worst, instance: &Instance| {
             let (linear, offset) = instance.to_object.parts();
@@ -116,6 +120,41 @@ impl TransformError {
             }
         })
     }
+}
+
+/// The errors of two known instances, computed anew before any ray is offset.
+///
+/// # Errors
+/// They are others: both.
+pub fn check_known() -> Result<(), String> {
+    // To the object 1/2, 1 and 4 along the axes and 1, 2, 3 on; back 2, 1 and 1/4. The other one is turned and moved less.
+    let instance = |columns: [[f32; 3]; 3], shift: [f32; 3]| {
+        let to_object = Transform::new(columns.map(Vec3::from), Vec3::from(shift));
+        Instance {
+            object: 0,
+            first: 0,
+            to_world: to_object,
+            to_object,
+        }
+    };
+    let instances = [
+        instance(
+            [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 4.0]],
+            [1.0, 2.0, 3.0],
+        ),
+        instance(
+            [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            [1.0; 3],
+        ),
+    ];
+    let found = TransformError::of_instances(instances.iter());
+    if (found.scale, found.shift) == (8.0, 6.0) {
+        return Ok(());
+    }
+    Err(format!(
+        "the error of two known instances is {found:?}, and should be 8 and 6: this program offsets rays wrongly; build it anew, and \
+         report what stays wrong"
+    ))
 }
 
 /// Bound on the distance, per axis, between a triangle and a point v₀ − u·e₁ + v·e₂ computed on it,

@@ -71,9 +71,17 @@ fn altered(value: &mut Value, factors: &[(&str, f64)], own: f64) {
                 (scaled.round() as u64).into()
             };
         }
-        Value::Array(all) => all
-            .iter_mut()
-            .for_each(|value| altered(value, factors, own)),
+        // No two neighbours alike, so that intervals have a width.
+        Value::Array(all) if own != 1.0 => {
+            for (k, value) in all.iter_mut().enumerate() {
+                altered(value, factors, own * (1.0 + 0.002 * (k % 3) as f64));
+            }
+        }
+        Value::Array(all) => {
+            for value in all {
+                altered(value, factors, 1.0);
+            }
+        }
         Value::Object(all) => {
             for (key, value) in all {
                 let factor = factors.iter().find(|(name, _)| name == key);
