@@ -14,6 +14,9 @@ const MOST_CLAIMED: f64 = 1.05;
 /// Least of it that it must claim, after [`SPARE_MS`] for wiping answers and waking up.
 const LEAST_CLAIMED: f64 = 0.65;
 const SPARE_MS: f64 = 2.0;
+/// Least of the time around a measurement that the processors of a software adapter must have worked in some round; on an
+/// idle machine it is about their number, and a thread that waits works a few hundredths of it.
+const LEAST_WORKED: f64 = 0.1;
 /// Milliseconds below which a time says nothing about a clock.
 const LEAST_MS: f64 = 5.0;
 /// Rounds between two verdicts, and how long a wrong verdict asks for more of them: other work on the machine lengthens
@@ -36,6 +39,7 @@ struct Shortest {
 pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<String>, GpuError> {
     let started = Stopwatch::start();
     let mut shortest = [Shortest::NONE; 2];
+    let mut worked: Option<f64> = None;
     loop {
         for _ in 0..ROUNDS {
             for (shortest, batch) in shortest.iter_mut().zip([single, double]) {
@@ -44,14 +48,26 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
                 if let Some(fault) = other_clock(&elapsed) {
                     return Ok(Some(fault));
                 }
-                shortest.note(elapsed, around.elapsed());
+                let around = around.elapsed();
+                if let (true, Some(cpu_ms)) = (batch.gpu().is_software(), elapsed.cpu_ms) {
+                    worked = Some(worked.unwrap_or(0.0).max(cpu_ms / around.wall_ms));
+                }
+                shortest.note(elapsed, around);
             }
         }
-        let found = judge(shortest);
+        let found = judge(shortest).or_else(|| idle(shortest[1], worked));
         if found.is_none() || started.elapsed().wall_ms > PATIENCE.as_secs_f64() * 1e3 {
             return Ok(found);
         }
     }
+}
+
+/// What is wrong with the time of processors, whose greatest share of the time around it is given where they do the work.
+fn idle(double: Shortest, worked: Option<f64>) -> Option<String> {
+    let worked = worked.filter(|share| *share < LEAST_WORKED && double.around_ms >= LEAST_MS)?;
+    Some(format!(
+        "the processors are said to work for {worked:.3} of the time in which a software adapter traces"
+    ))
 }
 
 /// That of the device counts where there is one, and else that on the wall; never that of the processors.
@@ -107,6 +123,22 @@ fn judge([single, double]: [Shortest; 2]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn processors_that_hardly_work_are_told() {
+        let double = Shortest {
+            ms: 20.0,
+            around_ms: 21.0,
+        };
+        assert!(idle(double, Some(0.04)).is_some());
+        assert_eq!(idle(double, Some(0.4)), None);
+        assert_eq!(idle(double, None), None);
+        let short = Shortest {
+            around_ms: 1.0,
+            ..double
+        };
+        assert_eq!(idle(short, Some(0.04)), None);
+    }
 
     #[test]
     fn times_that_do_not_follow_the_work_or_the_clock_are_told() {
