@@ -499,7 +499,9 @@ impl Prepared for Ready {
             values[LAYERS] = Some(of_cones.mean);
             values[LAYERS_99] = Some(of_cones.of_99);
             values[OPEN] = Some(of_cones.open);
-            values[APART] = Some(self.picture.apart.colour);
+            // Where something is open in every pixel, none was compared closely.
+            let apart = self.picture.apart.colour;
+            values[APART] = (apart > 0.0).then_some(apart);
             values[AREA] = self.area;
         }
         let mut readings = Reading::known(FIGURES.iter().zip(values));
