@@ -11,7 +11,7 @@ use raystone_gpu::{Elapsed, GpuError, Stopwatch};
 const TWICE: [f64; 2] = [1.5, 2.8];
 /// Most that a measurement may claim of the time around it: timestamps have another period.
 const MOST_CLAIMED: f64 = 1.05;
-/// Least of it that it must claim, after [`SPARE_MS`] for wiping answers and waking up.
+/// Least of it that it must claim in some round, after [`SPARE_MS`] for wiping answers and waking up.
 const LEAST_CLAIMED: f64 = 0.65;
 const SPARE_MS: f64 = 2.0;
 /// Least of the time around a measurement that the processors of a software adapter must have worked in some round; on an
@@ -24,11 +24,14 @@ const LEAST_MS: f64 = 5.0;
 const ROUNDS: usize = 5;
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The shortest times of a measurement: as told, and around it.
+/// The shortest times of a measurement: as told, around it, and of the processors of a software adapter around it.
 #[derive(Debug, Clone, Copy)]
 struct Shortest {
     ms: f64,
     around_ms: f64,
+    cpu_ms: Option<f64>,
+    /// Least and most of the time around it that a round claims, the most with [`SPARE_MS`].
+    claimed: [f64; 2],
 }
 
 /// Compares a batch with one of twice the rays. Returns what is wrong; `None` if nothing is, or if
@@ -52,7 +55,8 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
                 if let (true, Some(cpu_ms)) = (batch.gpu().is_software(), elapsed.cpu_ms) {
                     worked = Some(worked.unwrap_or(0.0).max(cpu_ms / around.wall_ms));
                 }
-                shortest.note(elapsed, around);
+                let around_cpu_ms = around.cpu_ms.filter(|_| batch.gpu().is_software());
+                shortest.note(elapsed.ms(), around.wall_ms, around_cpu_ms);
             }
         }
         let found = judge(shortest).or_else(|| idle(shortest[1], worked));
@@ -86,78 +90,114 @@ impl Shortest {
     const NONE: Self = Self {
         ms: f64::INFINITY,
         around_ms: f64::INFINITY,
+        cpu_ms: None,
+        claimed: [f64::INFINITY, 0.0],
     };
 
-    fn note(&mut self, elapsed: Elapsed, around: Elapsed) {
-        self.ms = self.ms.min(elapsed.ms());
-        self.around_ms = self.around_ms.min(around.wall_ms);
+    fn note(&mut self, ms: f64, around_ms: f64, cpu_ms: Option<f64>) {
+        self.ms = self.ms.min(ms);
+        self.around_ms = self.around_ms.min(around_ms);
+        let shorter = |cpu_ms: f64| self.cpu_ms.map_or(cpu_ms, |before| before.min(cpu_ms));
+        self.cpu_ms = cpu_ms.map(shorter);
+        let [least, most] = self.claimed;
+        self.claimed = [
+            least.min(ms / around_ms),
+            most.max((ms + SPARE_MS) / around_ms),
+        ];
     }
 }
 
 /// Judges the shortest times of the rays, and of twice as many.
 fn judge([single, double]: [Shortest; 2]) -> Option<String> {
-    let [least, most] = TWICE;
     if single.around_ms < LEAST_MS {
         return None;
     }
     let ratio = double.ms / single.ms;
-    // Other work can keep twice the rays from ever having the processors to itself: then more time passes on every clock.
-    let is_kept_waiting = ratio > most && double.around_ms / single.around_ms > most;
     // NaN is no ratio.
-    if !((least..=most).contains(&ratio) || is_kept_waiting) {
+    if !(is_twice(ratio) || is_kept_waiting(ratio, single, double)) {
         return Some(format!(
             "twice the rays take {ratio:.2} times as long, {:.3} ms and {:.3} ms",
             double.ms, single.ms
         ));
     }
-    let claimed = double.ms / double.around_ms;
-    if claimed > MOST_CLAIMED || double.ms + SPARE_MS < LEAST_CLAIMED * double.around_ms {
-        return Some(format!(
-            "{:.3} ms are measured while {:.3} ms pass on the clock around it",
-            double.ms, double.around_ms
-        ));
-    }
-    None
+    let is_wrong = |of: &Shortest| of.claimed[0] > MOST_CLAIMED || of.claimed[1] < LEAST_CLAIMED;
+    let wrong = [double, single].into_iter().find(is_wrong)?;
+    Some(format!(
+        "{:.3} ms are measured while {:.3} ms pass on the clock around it",
+        wrong.ms, wrong.around_ms
+    ))
+}
+
+fn is_twice(ratio: f64) -> bool {
+    let [least, most] = TWICE;
+    (least..=most).contains(&ratio)
+}
+
+/// Other work can keep one batch or the other from ever having the processors to itself. Then those of a software adapter
+/// still work twice as long for twice the rays, or more time passes on the clock around it, too.
+fn is_kept_waiting(ratio: f64, single: Shortest, double: Shortest) -> bool {
+    let around = double.around_ms / single.around_ms;
+    let worked = double.cpu_ms.zip(single.cpu_ms);
+    let works_twice = worked.is_some_and(|(double, single)| is_twice(double / single));
+    ratio.is_finite() && (works_twice || ratio > TWICE[1] && around > TWICE[1])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Two rounds with a time, the one around it, and that of the processors.
+    fn of(ms: f64, around_ms: f64, cpu_ms: f64) -> Shortest {
+        let mut all = Shortest::NONE;
+        all.note(1.5 * ms, 1.5 * around_ms, Some(1.1 * cpu_ms));
+        all.note(ms, around_ms, Some(cpu_ms));
+        all
+    }
+
     #[test]
     fn processors_that_hardly_work_are_told() {
-        let double = Shortest {
-            ms: 20.0,
-            around_ms: 21.0,
-        };
+        let double = of(20.0, 21.0, 20.0);
         assert!(idle(double, Some(0.04)).is_some());
         assert_eq!(idle(double, Some(0.4)), None);
         assert_eq!(idle(double, None), None);
-        let short = Shortest {
-            around_ms: 1.0,
-            ..double
-        };
-        assert_eq!(idle(short, Some(0.04)), None);
+        assert_eq!(idle(of(0.5, 1.0, 1.0), Some(0.04)), None);
     }
 
     #[test]
     fn times_that_do_not_follow_the_work_or_the_clock_are_told() {
-        let of = |ms: f64, around_ms: f64| Shortest { ms, around_ms };
         let said = |single, double| judge([single, double]).unwrap_or_default();
-        assert_eq!(said(of(10.0, 11.0), of(20.0, 21.5)), "");
-        assert_eq!(said(of(10.0, 14.0), of(27.0, 33.0)), "");
-        // A busy machine.
-        assert_eq!(said(of(6.0, 6.5), of(21.0, 22.0)), "");
+        assert_eq!(said(of(10.0, 11.0, 18.0), of(20.0, 21.5, 37.0)), "");
+        assert_eq!(said(of(10.0, 14.0, 18.0), of(27.0, 33.0, 37.0)), "");
+        // Busy machines.
+        assert_eq!(said(of(6.0, 6.5, 11.0), of(21.0, 22.0, 60.0)), "");
+        assert_eq!(said(of(15.0, 16.0, 11.0), of(21.0, 22.0, 22.0)), "");
+        assert_eq!(said(of(6.0, 6.5, 11.0), of(21.0, 22.0, 22.0)), "");
         // Too short to say.
-        assert_eq!(said(of(0.2, 1.0), of(0.2, 1.0)), "");
+        assert_eq!(said(of(0.2, 1.0, 0.2), of(0.2, 1.0, 0.2)), "");
         for (single, double, part) in [
-            (of(10.0, 10.5), of(11.0, 20.5), "1.10 times"),
-            (of(10.0, 10.5), of(40.0, 25.0), "4.00 times"),
-            (of(0.0, 10.5), of(0.0, 20.5), "twice the rays"),
-            (of(20.0, 10.5), of(40.0, 20.5), "40.000 ms are measured"),
-            (of(5.0, 10.5), of(10.0, 20.5), "10.000 ms are measured"),
+            (of(10.0, 10.5, 18.0), of(11.0, 20.5, 36.0), "11.000 ms are"),
+            (of(10.0, 10.5, 18.0), of(11.0, 11.5, 20.0), "1.10 times"),
+            (of(10.0, 10.5, 18.0), of(40.0, 25.0, 36.0), "40.000 ms are"),
+            (of(0.0, 10.5, 18.0), of(0.0, 20.5, 36.0), "twice the rays"),
+            (
+                of(20.0, 10.5, 18.0),
+                of(40.0, 20.5, 36.0),
+                "40.000 ms are measured",
+            ),
+            (
+                of(5.0, 10.5, 18.0),
+                of(10.0, 20.5, 36.0),
+                "10.000 ms are measured",
+            ),
         ] {
             assert!(said(single, double).contains(part), "{part}");
         }
+    }
+
+    #[test]
+    fn one_round_that_waited_says_nothing_of_what_a_measurement_claims() {
+        let mut double = of(20.0, 21.0, 37.0);
+        double.note(19.0, 60.0, Some(36.0));
+        assert_eq!(judge([of(10.0, 11.0, 18.0), double]), None);
     }
 }
