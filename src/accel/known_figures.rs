@@ -35,6 +35,7 @@ pub fn check() -> Result<(), String> {
     row()?;
     phases()?;
     known_parameters::check()?;
+    crate::wide::check_octants()?;
     box_agrees(&BoxMap::new(&placed()?))
 }
 

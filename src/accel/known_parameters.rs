@@ -83,6 +83,9 @@ const ROWS: [Row; 34] = [
     ("kd-tree", &[], ("empty_bonus", Number(0.9))),
 ];
 
+/// Structures with two costs.
+const SCALED: [&str; 2] = ["bvh", "kd-tree"];
+
 /// Triangles of many sizes.
 const TRIANGLES: usize = 160;
 
@@ -92,7 +95,27 @@ const TRIANGLES: usize = 160;
 /// A parameter changes nothing, or nothing is built: of which structure.
 pub(crate) fn check() -> Result<(), String> {
     let soup = soup();
-    ROWS.iter().try_for_each(|row| changes(row, &soup))
+    ROWS.iter().try_for_each(|row| changes(row, &soup))?;
+    SCALED
+        .iter()
+        .try_for_each(|structure| scales(structure, &soup))
+}
+
+/// Costs are compared with each other alone: eight times both, which is exact in floats, is the same tree.
+fn scales(structure: &str, soup: &TriangleSoup) -> Result<(), String> {
+    let costs = |scale: f64| {
+        [
+            ("traversal_cost", Number(2.0 * scale)),
+            ("intersection_cost", Number(3.0 * scale)),
+        ]
+    };
+    if built(structure, &costs(1.0), soup)? == built(structure, &costs(8.0), soup)? {
+        return Ok(());
+    }
+    Err(format!(
+        "a known {structure} is another one where both of its costs are eight times as high: this program weighs them \
+         otherwise than it says; build it anew, and report what stays wrong"
+    ))
 }
 
 fn changes((structure, given, changed): &Row, soup: &TriangleSoup) -> Result<(), String> {
@@ -170,5 +193,12 @@ mod tests {
         let soup = soup();
         let wrong = ROWS.iter().filter_map(|row| changes(row, &soup).err());
         assert_eq!(wrong.collect::<Vec<_>>(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn only_the_ratio_of_costs_counts() {
+        for structure in SCALED {
+            assert_eq!(scales(structure, &soup()), Ok(()));
+        }
     }
 }

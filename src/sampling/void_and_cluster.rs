@@ -63,6 +63,10 @@ impl Pattern {
     }
 }
 
+/// Moves of clusters into voids, at most: each makes the pattern more even, and some hundred suffice. Weights that are not those of a
+/// torus may never settle.
+const MOVES: usize = PIXELS;
+
 /// A random pattern, with clusters moved into voids until nothing changes.
 fn first_pattern() -> Pattern {
     let mut pattern = Pattern::new();
@@ -71,15 +75,16 @@ fn first_pattern() -> Pattern {
         let free = pixels.by_ref().find(|&pixel| !pattern.set[pixel]);
         free.into_iter().for_each(|pixel| pattern.flip(pixel));
     }
-    loop {
+    for _ in 0..MOVES {
         let cluster = pattern.cluster();
         pattern.flip(cluster);
         let void = pattern.void();
         pattern.flip(void);
         if cluster == void {
-            return pattern;
+            break;
         }
     }
+    pattern
 }
 
 fn generate() -> Vec<u32> {

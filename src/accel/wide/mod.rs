@@ -20,6 +20,7 @@ use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use bytemuck::Pod;
 use collapse::{Shape, WideTree};
+pub(crate) use octants::check as check_octants;
 use std::marker::PhantomData;
 use std::ops::Range;
 

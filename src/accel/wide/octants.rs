@@ -19,6 +19,38 @@ fn agreement(offset: [f32; 3], slot: usize) -> f32 {
     along(0) + along(1) + along(2)
 }
 
+/// Eight children in the corners of a cube take the slots whose bits say on which side they lie.
+///
+/// # Errors
+/// Another child of a slot.
+pub(crate) fn check() -> Result<(), String> {
+    let corner = |slot: u32| {
+        let min = [0, 1, 2].map(|axis| 3.0 * (slot >> axis & 1) as f32);
+        WideChild {
+            bounds: Bounds {
+                min,
+                max: min.map(|x| x + 1.0),
+            },
+            ..WideChild::NOTHING
+        }
+    };
+    let whole = Bounds {
+        min: [0.0; 3],
+        max: [4.0; 3],
+    };
+    // Not in their order.
+    let children: Vec<WideChild> = (0..8).map(|k| corner(k * 3 % 8)).collect();
+    let found = arrange(&whole, &children);
+    let wrong = (0..8).find(|&slot| found[slot as usize].bounds.min != corner(slot).bounds.min);
+    wrong.map_or(Ok(()), |slot| {
+        Err(format!(
+            "the child in slot {slot} of a known cube lies at {:?}: this program visits far children first; build it anew, \
+             and report what stays wrong",
+            found[slot as usize].bounds.min
+        ))
+    })
+}
+
 /// The children in slots, assigned greedily by best agreement. Empty slots get an empty leaf.
 pub(super) fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
     let middle = bounds.doubled_centre();

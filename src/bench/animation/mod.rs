@@ -5,6 +5,7 @@ mod actor;
 mod motion;
 
 pub use actor::{Actor, Taken, Way};
+pub(crate) use motion::check as check_known;
 pub use motion::moved;
 
 use crate::timing::{Measured, interleave};

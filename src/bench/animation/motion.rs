@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use raystone_config::{Animation, Motion};
 use raystone_core::random::Pcg32;
-use raystone_scene::SceneData;
+use raystone_scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::f64::consts::TAU;
 
 const SEED: u64 = 1;
@@ -61,6 +61,54 @@ impl Wave {
         let by = DVec3::new(at.y, at.z, at.x).to_array();
         (at + DVec3::from_array(by.map(|x| self.displacement(x)))).as_vec3()
     }
+}
+
+/// The corners of a box of which the radius is half the way from the lowest to the highest corner. A quarter of the way through a
+/// wave as long as that and a tenth as high, x moves by R (sin 2π(y/R + ¼) − sin 2π y/R) / 10.
+///
+/// # Errors
+/// Another place of a corner.
+pub(crate) fn check() -> Result<(), String> {
+    let mut entries = builtin_scenes().into_iter();
+    let entry = entries.find(|entry| entry.name == "cornell-box");
+    let variant = entry.ok_or("there is no box")?.default_variant();
+    let scene = load(&variant, &LoadOptions::default()).map_err(|error| error.to_string())?;
+    let corners = |scene: &SceneData| -> Vec<DVec3> {
+        let all = scene.triangles.iter().flat_map(|of| of.vertices);
+        all.map(|corner| corner.as_dvec3()).collect()
+    };
+    let still = corners(&scene);
+    let low = still.iter().copied().reduce(DVec3::min).unwrap_or_default();
+    let high = still.iter().copied().reduce(DVec3::max).unwrap_or_default();
+    let radius = 0.5 * (high - low).length();
+    let animation = Animation {
+        motion: Motion::Deform,
+        frames: 5,
+        amplitude: 0.1,
+        wavelength: 1.0,
+    };
+    let [quarter, whole] = [1, 4].map(|frame| moved(&scene, &animation, frame));
+    let [quarter, whole] = [corners(&quarter?), corners(&whole?)];
+    let expected = |x: f64, y: f64| {
+        let angle = TAU * y / radius;
+        x + 0.1 * radius * ((angle + TAU / 4.0).sin() - angle.sin())
+    };
+    for (k, at) in still.iter().enumerate() {
+        let by_hand = DVec3::new(
+            expected(at.x, at.y),
+            expected(at.y, at.z),
+            expected(at.z, at.x),
+        );
+        for (found, expected) in [(quarter[k], by_hand), (whole[k], *at)] {
+            if (found - expected).abs().max_element() > 1e-5 * radius {
+                return Err(format!(
+                    "a known corner at {at} moves to {found} and should move to {expected}: this program moves scenes otherwise; \
+                     build it anew, and report what stays wrong"
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Directions of so many instances.

@@ -24,6 +24,7 @@ pub use memory::{Fetch, Memory};
 pub(crate) use model::run_groups;
 pub use model::{Machine, Pass, Running, Warp, run, together};
 pub use organisation::Organisation;
+pub(crate) use paths::check_origins;
 pub use paths::{RayClass, Rays, View, groups_of};
 pub use sets::of_rays;
 pub use trace::{Kind, Step, Trace, trace_of};

@@ -6,6 +6,7 @@
 
 use super::trace::{Trace, trace_of};
 use super::{Memory, Pass, Warp};
+use glam::DVec3;
 use rayon::prelude::*;
 use raystone_accel::{CpuTwin, Query, Ray};
 use raystone_render::{CountedRays, RAY_COUNT_CLASSES};
@@ -248,6 +249,33 @@ fn for_structure(ray: &PathRay, diagonal: f64) -> Ray {
         _ => ray.length,
     };
     Ray::new(origin.as_vec3(), ray.direction.as_vec3()).between(0.0, length as f32)
+}
+
+/// A ray that is reflected by a floor and one that goes through it start on the side to which they go, 10⁻⁵ of the diagonal off.
+///
+/// # Errors
+/// They start elsewhere.
+pub(crate) fn check_origins() -> Result<(), String> {
+    let height_of = |down: f64| {
+        let ray = PathRay {
+            class: CountedRays::Bounce,
+            depth: 0,
+            light: 0,
+            origin: DVec3::new(1.0, 2.0, 0.0),
+            normal: DVec3::Z,
+            direction: DVec3::new(0.6, 0.0, -0.8 * down),
+            length: 3.0,
+        };
+        for_structure(&ray, 1000.0).origin[2]
+    };
+    let heights = [-1.0, 1.0].map(height_of);
+    let is_right = (heights[0] - 0.01).abs() < 1e-6 && (heights[1] + 0.01).abs() < 1e-6;
+    is_right.then_some(()).ok_or_else(|| {
+        format!(
+            "known rays off a floor and through it start at heights {heights:?} and should at 0.01 and -0.01: this program \
+             models other rays than it traces; build it anew, and report what stays wrong"
+        )
+    })
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::words::borders;
 use raystone_core::params::Variant;
 use raystone_discrepancy::{Budget, PointSet, net_quality};
 use raystone_sampling::{Coordinate, Sampler, to_unit};
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// Lines `s a m_1 … m_s` of the dimensions 1 to 255: degree and inner coefficients of the polynomial, and
@@ -17,6 +18,8 @@ const JOE_KUO: &str = include_str!("joe_kuo.txt");
 const NET: u32 = 256;
 /// Decorrelations that leave nets in base 2 as they are.
 const KEEP_NETS: [&str; 4] = ["none", "digital-shift", "linear-scramble", "owen-hash"];
+/// Samples whose strata are looked at, at most.
+const STRATA: u32 = 1024;
 /// Seconds that counting a net may take.
 const NET_SECONDS: f64 = 60.0;
 
@@ -188,7 +191,36 @@ pub fn fault(sampler: &Sampler) -> Option<String> {
             }
         }
     }
-    fault_of_nets(sampler)
+    fault_of_nets(sampler).or_else(|| fault_of_strata(sampler))
+}
+
+/// Points of `jittered` that share a stratum, or strata that are more than twice as long as wide, or more than a row too many.
+fn fault_of_strata(sampler: &Sampler) -> Option<String> {
+    let count = sampler.demand.samples?.min(STRATA);
+    let is_whole = sampler.demand.samples == Some(count);
+    if sampler.sequence_variant.name != "jittered" || !is_whole || sampler.demand.dimensions < 2 {
+        return None;
+    }
+    let [columns, rows] = [0, 3].map(|place| sampler.table.sequence_word(place));
+    let is_even = columns <= 2 * rows && rows <= columns;
+    if !is_even || columns * rows < count || columns * rows >= count + columns {
+        return Some(format!("{columns} × {rows} strata for {count} samples"));
+    }
+    let stratum = |sample| {
+        let word = |dimension, count: u32| {
+            let at = Coordinate {
+                pixel: 5,
+                sample,
+                dimension,
+                seed: 1,
+            };
+            let word = sampler.sequence.sequence(&sampler.table, at);
+            (u64::from(word) * u64::from(count)) >> 32
+        };
+        [word(0, columns), word(1, rows)]
+    };
+    let taken: BTreeSet<[u64; 2]> = (0..count).map(stratum).collect();
+    (taken.len() < count as usize).then(|| format!("{count} samples lie in {} strata", taken.len()))
 }
 
 /// The t of a pair of dimensions: 2^m points are a (t, m, 2)-net in base 2.

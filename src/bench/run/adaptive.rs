@@ -4,6 +4,7 @@ use super::error::Fault;
 use super::reference::ReferenceImage;
 use super::replicates::{
     Pass, Replicates, add_error, blank_record, check_finite, draw, replicate_s, replicates,
+    same_at_once,
 };
 use super::session::Session;
 use raystone_config::{Cell, StopRule};
@@ -54,6 +55,13 @@ pub(super) fn by_tile(
             match images.get_mut(index) {
                 Some(before) => add(before, &image, tiles, needed, (done, spp)),
                 None => images.push(image),
+            }
+            if (step, index) == (1, 0) {
+                let at_once = || self::further(pass, tiles, needed, (0, spp), record.seed);
+                let at_once = session.clock.time("gpu", at_once);
+                let at_once = at_once.map_err(|e| e.to_string())?;
+                let took = |pixel| needed[tiles.of_pixel(pixel)] >= spp;
+                same_at_once([&images[0], &at_once], spp, took)?;
             }
         }
         if step == 0 {

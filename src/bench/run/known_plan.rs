@@ -2,7 +2,8 @@
 //! nothing fails.
 
 use super::registries::Registries;
-use super::{adaptive, known_turns};
+use super::{adaptive, known_settings, known_turns};
+use crate::{animation, coherence};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 
 /// Two excludes leave a decorrelation to each sequence, one a structure to a scene, one a sequence to a structure.
@@ -55,11 +56,14 @@ left out: 6, 6, 4, 8";
 /// Makes the plan.
 ///
 /// # Errors
-/// It is not what it should be: the first line that is another. Or tiles are ended otherwise, or turns reported
-/// wrongly.
+/// It is not what it should be: the first line that is another. Or tiles are ended otherwise, turns reported wrongly, figures
+/// kept that do not hold, scenes moved or rays set off otherwise.
 pub fn check() -> Result<(), String> {
     adaptive::check()?;
     known_turns::check()?;
+    known_settings::check()?;
+    animation::check_known()?;
+    coherence::check_origins()?;
     let found = planned(TEXT)?;
     let mut pairs = found.lines().zip(EXPECTED.lines());
     match pairs.find(|(found, expected)| found != expected) {

@@ -214,7 +214,10 @@ fn parts(
     for number in wanted {
         let place = kept_part(session, world, &format!("{hash}, part {number}"));
         let kept = place.as_ref().and_then(Kept::read);
-        let kept = kept.and_then(|bytes| image_of(&bytes, size));
+        // Stands in the file, too: a name that forgets one of them would hand out another image.
+        let (seed, camera) = (seeds[number], world.camera);
+        let made_of = format!("{spp} spp, seed {seed}, {size:?}, {camera:?}\n");
+        let kept = kept.and_then(|bytes| image_of(bytes.strip_prefix(made_of.as_bytes())?, size));
         let cached = kept.is_some();
         let image = match kept {
             Some(image) => image,
@@ -226,10 +229,10 @@ fn parts(
                 last.ok_or("nothing was rendered".to_owned())?.image
             }
         };
-        if let Some(Err(error)) = place
-            .filter(|_| !cached)
-            .map(|place| place.write(bytemuck::cast_slice(&image.pixels).to_vec()))
-        {
+        if let Some(Err(error)) = place.filter(|_| !cached).map(|place| {
+            let pixels: &[u8] = bytemuck::cast_slice(&image.pixels);
+            place.write([made_of.as_bytes(), pixels].concat())
+        }) {
             session.warn("reference", format!("is not kept for later runs: {error}"))?;
         }
         parts.push(Part { image, cached });

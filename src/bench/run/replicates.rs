@@ -190,17 +190,30 @@ pub(super) fn check_at_once(
     let Some(image) = at_once.first().map(|other| &other.image) else {
         return Err("nothing was rendered".to_owned());
     };
-    let pairs = image.pixels.iter().zip(&snapshot.image.pixels);
-    let differs = |(a, b): (&[f32; 3], &[f32; 3])| {
+    same_at_once([&snapshot.image, image], spp, |_| true)
+}
+
+/// Compares the pixels that were rendered in steps and at once, where they were.
+///
+/// # Errors
+/// The first that differs.
+pub(super) fn same_at_once(
+    [in_steps, at_once]: [&Image; 2],
+    spp: u32,
+    is_compared: impl Fn(usize) -> bool,
+) -> Result<(), String> {
+    let differs = |pixel: &usize| {
+        let [a, b] = [in_steps, at_once].map(|image| image.pixels[*pixel]);
         // What is not finite is said elsewhere.
         (0..3).any(|k| (a[k] - b[k]).abs() > STEPS * a[k].abs().max(b[k].abs()))
     };
-    match pairs.into_iter().position(differs) {
+    let mut pixels = (0..at_once.pixels.len()).filter(|pixel| is_compared(*pixel));
+    match pixels.find(differs) {
         None => Ok(()),
         Some(pixel) => Err(format!(
             "pixel {pixel} after {spp} samples in two steps is {:?}, and after as many at once {:?}: samples are repeated \
              or left out",
-            snapshot.image.pixels[pixel], image.pixels[pixel]
+            in_steps.pixels[pixel], at_once.pixels[pixel]
         )),
     }
 }
