@@ -81,6 +81,31 @@ impl Octants {
                 ensure!(right, "node {child}: a rope leads astray");
             }
         }
+        (0..8).try_for_each(|octant| self.validate_walk(octant))
+    }
+
+    /// A ray that enters every box visits every node once.
+    fn validate_walk(&self, octant: u32) -> Result<(), AccelError> {
+        let mut visited = vec![false; self.0.len()];
+        let (mut current, mut count) = (ROOT, 0);
+        while current != NONE {
+            let is_new = !std::mem::replace(&mut visited[current as usize], true);
+            ensure!(
+                is_new,
+                "node {current}: ropes of octant {octant} return to it"
+            );
+            count += 1;
+            let OctantNode { node, ropes } = self.0[current as usize];
+            current = match node.content < LEAF {
+                true => (node.content & CHILD_MASK) + near_side(node.content, octant),
+                false => ropes[octant as usize],
+            };
+        }
+        let reachable = self.0.iter().filter(|of| of.node.content < LEAF).count() * 2 + 1;
+        ensure!(
+            count == reachable,
+            "ropes of octant {octant} reach {count} of {reachable} nodes"
+        );
         Ok(())
     }
 }

@@ -71,9 +71,10 @@ fn reach(partition: &Partition, cell: &GridCell, axis: usize, up: bool) -> Optio
                 bound.max(neighbour.min[axis])
             };
             next = next.min(u32::from(neighbour.max[a]));
-            voxel[b] = u32::from(neighbour.max[b]);
+            // Beyond this voxel, also where the map names a cell that does not hold it: checks of the grid say so, if it is built.
+            voxel[b] = u32::from(neighbour.max[b]).max(voxel[b] + 1);
         }
-        voxel[a] = next;
+        voxel[a] = next.max(voxel[a] + 1);
     }
     Some(bound)
 }

@@ -47,7 +47,8 @@ pub fn place(environment: &Environment) -> String {
 
 /// Current inputs of a run's cells.
 pub(super) struct Current<'a> {
-    settings: BTreeMap<&'static str, String>,
+    /// Name of a measurement → the settings that it depends on.
+    pub settings: BTreeMap<&'static str, String>,
     kernels: &'a Kernels,
     /// Label of a scene → hash of its content, or why it has none.
     pub scenes: HashMap<String, Result<String, String>>,

@@ -131,10 +131,8 @@ fn settings(
     change: &str,
 ) -> Result<BTreeMap<&'static str, String>, String> {
     let experiment = parsed(registries, change)?;
-    let measurements = registries.measurements.iter();
-    Ok(measurements
-        .map(|measurement| (measurement.name(), measurement.settings(&experiment, "")))
-        .collect())
+    let kernels = Kernels::load(&[], registries).map_err(|error| error.to_string())?;
+    Ok(Current::new(&experiment, None, registries, &kernels).settings)
 }
 
 fn parsed(registries: &Registries, change: &str) -> Result<Experiment, String> {
