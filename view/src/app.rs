@@ -103,7 +103,8 @@ impl App {
         egui::Panel::bottom("bottom").show(ui, |ui| self.draw_bottom(ui));
         let [has_choices, has_figures] = [0, 1].map(|panel| self.is_open(ui, panel));
         if has_choices {
-            let panel = egui::Panel::left("left").default_size(290.0);
+            let most = 0.4 * ui.available_width();
+            let panel = egui::Panel::left("left").default_size(290.0).max_size(most);
             panel.show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| self.draw_choices(ui));
             });
@@ -147,14 +148,17 @@ impl App {
     fn draw_top(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Raystone").strong());
-            if ui.button("Open…").on_hover_text("Ctrl + O").clicked() {
+            let open = ui.button("Open…").on_hover_text("Ctrl + O");
+            if open.clicked() {
                 self.open_dialog();
             }
+            let hint = RichText::new("path of a model or an experiment").color(ui.visuals().text_color());
             let typed = ui.add(
                 egui::TextEdit::singleline(&mut self.path)
-                    .hint_text("path of a model or an experiment")
+                    .hint_text(hint)
                     .desired_width(220.0),
             );
+            let typed = typed.labelled_by(open.id);
             if typed.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) && !self.path.is_empty() {
                 self.open(&PathBuf::from(self.path.clone()));
             }
@@ -204,8 +208,9 @@ impl App {
             }
             if !notes.is_empty() {
                 ui.separator();
-                ui.label(format!("notes on the scene: {}", notes.len()))
-                    .on_hover_text(notes.join("\n"));
+                ui.menu_button(format!("notes on the scene: {}", notes.len()), |ui| {
+                    ui.label(notes.join("\n"));
+                });
             }
         });
         let mut is_read = false;
@@ -342,6 +347,16 @@ impl App {
         if let Some(path) = dropped.first() {
             self.open(path);
         }
+        if let ([first, _, ..], None) = (&dropped[..], &self.message) {
+            self.message = Some(Message {
+                text: format!(
+                    "{} files were dropped, and {} is opened: drop the model alone, what belongs to it is found beside it",
+                    dropped.len(),
+                    first.display()
+                ),
+                is_error: false,
+            });
+        }
     }
 
     fn take_keys(&mut self, ui: &Ui) {
@@ -408,8 +423,16 @@ impl App {
                 &[&MODEL_ENDINGS[..], &["toml"]].concat(),
             )
             .pick_file();
-        if let Some(path) = chosen {
-            self.open(&path);
+        match chosen {
+            Some(path) => self.open(&path),
+            // A desktop without dialogs answers like one that was cancelled.
+            None => {
+                self.message = Some(Message {
+                    text: "no file was chosen; where no dialog opens, type the path beside, or drop the file on the window"
+                        .to_owned(),
+                    is_error: false,
+                });
+            }
         }
     }
 

@@ -56,7 +56,7 @@ fn draw_axis(
         let list = ComboBox::from_id_salt((axis.name(), side))
             .width(150.0)
             .truncate()
-            .selected_text(&now.label)
+            .selected_text(shortened(&now.label))
             .show_ui(ui, |ui| {
                 let renders = |entry: &&Entry| {
                     !entry.name.starts_with(COMPACTIONS) && !entry.name.starts_with(STRESS)
@@ -69,7 +69,9 @@ fn draw_axis(
                 }
             });
         let label = ui.label(axis.name());
-        list.response.labelled_by(label.id);
+        list.response
+            .labelled_by(label.id)
+            .on_hover_text(&now.label);
     });
     // A model has those that every scene has.
     let entry = catalogue.entry(axis, &now.name);
@@ -94,6 +96,17 @@ fn draw_axis(
             });
     });
     chosen
+}
+
+/// Characters of a choice that are shown at most: parameters hold whole paths and lists.
+const SHOWN: usize = 30;
+
+/// The beginning of a text that is too long for the panel.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(SHOWN) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{}…", &text[..end]),
+    }
 }
 
 /// A field for a text, and what was entered where that is another one: half a name is none yet.
@@ -164,7 +177,10 @@ fn draw_parameter(
                 widget.response
             }
             // Lists and steps are changed in an experiment.
-            _ => ui.label(value.to_string()),
+            _ => {
+                let text = value.to_string();
+                ui.label(shortened(&text)).on_hover_text(text)
+            }
         };
         let label = ui.label(parameter.name);
         widget.labelled_by(label.id);

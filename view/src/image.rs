@@ -8,6 +8,7 @@ use egui::{
 use raystone_core::geometry::Camera;
 use raystone_image::Picture;
 use raystone_viewer::{Frame, Motion, SIDE_NAMES, Screen, moved};
+use std::collections::HashSet;
 use std::f32::consts::PI;
 
 /// Distance from the line at which a drag moves it, points.
@@ -234,14 +235,23 @@ impl ImageView {
 /// The moves of the keys that are held.
 fn by_keys(ui: &Ui) -> Vec<Motion> {
     let (seconds, is_plain) = ui.input(|i| (i.stable_dt.min(0.1), i.modifiers.is_none()));
+    // A key of a shortcut moves nothing until it is released, also if Ctrl is released first.
+    let id = ui.scope_id().with("keys of shortcuts");
+    let before: HashSet<Key> = ui.data(|kept| kept.get_temp(id)).unwrap_or_default();
+    let of_shortcuts: HashSet<Key> = ui.input(|i| {
+        let down = i.keys_down.iter().copied();
+        down.filter(|key| !is_plain || before.contains(key))
+            .collect()
+    });
+    ui.data_mut(|kept| kept.insert_temp(id, of_shortcuts.clone()));
     if !is_plain {
         return Vec::new();
     }
     // Arrows move the focus between buttons, where one has it.
     let is_free = ui.memory(|memory| memory.focused().is_none());
     let held = |more: Key, less: Key| {
-        let [more, less] =
-            [more, less].map(|key| f32::from(u8::from(ui.input(|i| i.key_down(key)))));
+        let is_held = |key| ui.input(|i| i.key_down(key)) && !of_shortcuts.contains(&key);
+        let [more, less] = [more, less].map(|key| f32::from(u8::from(is_held(key))));
         more - less
     };
     let fly = [

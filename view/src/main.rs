@@ -76,6 +76,12 @@ impl Arguments {
             }
             None => (START.to_owned(), "raystone view".to_owned()),
         };
+        if let Some((axis, names)) = self.lists().into_iter().find(|(_, names)| names.len() > 2) {
+            let count = names.len();
+            return Err(format!(
+                "--{axis} names {count}: there are two images, A and B, at most"
+            ));
+        }
         let is_split = self.lists().iter().any(|(_, names)| names.len() > 1);
         let overrides = |side: usize| self.of_side(side).chain(self.set.iter().cloned()).collect();
         let sides: Vec<Vec<String>> = (0..=usize::from(is_split)).map(overrides).collect();

@@ -371,3 +371,34 @@ fn names_of_files_that_are_there_are_numbered() {
     }
     assert_eq!(app::unused(&file), folder.path().join("view-3.png"));
 }
+
+#[test]
+fn a_key_of_a_shortcut_moves_nothing_until_it_is_released() {
+    let mut harness = window(&[], 1);
+    harness.hover_at(egui::pos2(640.0, 500.0));
+    harness.key_down_modifiers(egui::Modifiers::COMMAND, egui::Key::E);
+    harness.run_steps(2);
+    assert!(has(&harness, "copied"));
+    harness.event(egui::Event::ModifiersChanged(egui::Modifiers::NONE));
+    harness.run_steps(4);
+    assert_eq!(harness.state().screen.camera, None);
+    harness.key_up(egui::Key::E);
+    harness.run_steps(1);
+    harness.key_down(egui::Key::E);
+    harness.run_steps(4);
+    assert_ne!(harness.state().screen.camera, None, "E alone flies");
+}
+
+#[test]
+fn a_scene_with_a_long_parameter_leaves_the_image_its_place() {
+    let ways: Vec<String> = (0..24).map(|k| format!("{k} 0.25 0 0")).collect();
+    let file = tempfile::NamedTempFile::with_suffix(".toml").unwrap();
+    let text = format!(
+        "[axes]\nscene = [\"instances\"]\naccel = [\"cwbvh\"]\nsequence = [\"sobol\"]\n[scene.instances]\nshifts = [\"{}\"]\n",
+        ways.join(", ")
+    );
+    std::fs::write(file.path(), text).unwrap();
+    let harness = window(&["--experiment", &file.path().display().to_string()], 1);
+    let list = harness.get_all_by_role(Role::ComboBox).next().unwrap();
+    assert!(list.rect().width() < 260.0, "{:?}", list.rect());
+}

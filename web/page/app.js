@@ -83,7 +83,8 @@ function interrupted(reason) {
   records.push(JSON.stringify({ schema: run.schema, body: { kind: "interrupted", reason, wall_s } }));
 }
 
-async function end(reason) {
+// `told`: what the visitor reads, where records say something else.
+async function end(reason, told = reason) {
   worker?.terminate();
   if (worker && reason) interrupted(reason);
   worker = null;
@@ -92,7 +93,8 @@ async function end(reason) {
   at("stop").hidden = true;
   at("scenes").disabled = false;
   at("progress").hidden = true;
-  trouble(reason);
+  trouble(told);
+  if (records.length > 0) draw();
   dispatchEvent(new Event("measuring"));
   if (asked.post) {
     const body = JSON.stringify({ trouble: reason, records: records.join("\n") + "\n" });
@@ -119,7 +121,7 @@ function draw() {
   const scenes = rows(parsed);
   at("scenes-measured").replaceChildren(...scenes.flatMap((scene) => {
     const title = element("h3", `${scene.name}, ${scene.triangles.toLocaleString("en")} triangles`);
-    if (scene.structures.length === 0) return [title, element("p", "being measured")];
+    if (scene.structures.length === 0) return [title, element("p", worker ? "being measured" : "not measured")];
     const list = element("ul");
     list.className = "verdicts";
     list.append(...verdicts(scene).map((text) => element("li", text)));
@@ -198,7 +200,7 @@ async function copy() {
 }
 
 at("start").onclick = start;
-at("stop").onclick = () => end("Stopped. What was measured until then is below.");
+at("stop").onclick = () => end("stopped by the visitor", records.length > 0 ? "Stopped. What was measured until then is below." : "Stopped before anything was measured.");
 at("download").onclick = download;
 at("copy").onclick = copy;
 document.addEventListener("visibilitychange", () => {

@@ -10,6 +10,7 @@ let size = [1, 1];
 let sides = 1;
 let samples = 1;
 let trail = [];
+let swipe = 0.5;
 let hasPath = false;
 // The image changed since the pixel was inspected.
 let isStale = false;
@@ -167,7 +168,7 @@ function drawPoints({ purpose, points, star }) {
 
 // What is drawn over the image: a frame around the pixel, and the path.
 export function marks(known) {
-  ({ size, sides, samples, trail } = known);
+  ({ size, sides, samples, trail, swipe } = known);
   at("pixel-side").parentElement.hidden = sides < 2;
   mark();
 }
@@ -183,6 +184,17 @@ function mark() {
     return made;
   };
   const shapes = [];
+  if (sides > 1) {
+    const x = swipe * size[0];
+    for (const name of ["outer", "inner"]) shapes.push(shape("line", { class: `${name} swipe`, x1: x, y1: 0, x2: x, y2: size[1] }));
+    // As large on every screen, whatever the image's size.
+    const letter = (14 * size[0]) / Math.max(at("canvas").clientWidth, 1);
+    for (const [name, place, anchor] of [["A", x - letter / 2, "end"], ["B", x + letter / 2, "start"]]) {
+      const text = shape("text", { x: place, y: 1.3 * letter, "font-size": letter, "text-anchor": anchor });
+      text.textContent = name;
+      shapes.push(text);
+    }
+  }
   if (pixel) {
     // As large as can be seen, whatever the image's size.
     const around = Math.max(0.5, (5 * size[0]) / Math.max(at("canvas").clientWidth, 1));

@@ -19,6 +19,8 @@ let worker = null;
 let figures = null;
 // What the last change took.
 let said = "";
+// Why a link's settings are not shown, until the visitor changes something.
+let leftOut = "";
 // Of a test, once it asks for them.
 let images = null;
 
@@ -72,10 +74,17 @@ function take(news) {
     at("view-status").textContent = "";
     trouble(news.trouble);
     post({ trouble: news.trouble });
+    if (!figures && asked.set.length > 0) {
+      // Nothing is on screen, and what the link asks for cannot be.
+      leftOut = `${news.trouble} The link's settings are left out.`;
+      asked.set = [];
+      show();
+    }
   } else if ("status" in news) {
     at("view-status").textContent = news.status || said;
   } else if ("done" in news) {
-    trouble("");
+    trouble(leftOut);
+    leftOut = "";
     said = news.done?.join("; ") ?? said;
     at("view-status").textContent = said;
     // Controls say what a link asked for, and from then on have the last word.
@@ -198,7 +207,7 @@ function draw({ figures: known, width, height, picture }) {
   at("faults").textContent = faults.filter(Boolean).join(" ");
   at("faults").hidden = !faults.some(Boolean);
   showFrame(known);
-  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value) });
+  marks({ size: [width, height], trail: known.trail, sides: sides.length, samples: Number(at("spp").value), swipe: Number(at("swipe").value) });
   const rows = [
     ...timesOf(known.times),
     ["samples a pixel", (side) => (side.spp ? `${side.spp} of ${side.of}` : "coarse")],

@@ -3,6 +3,17 @@
 use raystone_gpu::{Gpu, GpuError, KernelLibrary};
 use raystone_record::Line;
 
+/// Why there is no device, to someone who has a browser and no shell.
+pub(crate) fn no_device(error: &GpuError) -> String {
+    match error {
+        GpuError::NoAdapter => {
+            "the browser offers no adapter any more: reload the page, or start the browser anew"
+                .to_owned()
+        }
+        other => other.to_string(),
+    }
+}
+
 /// The page, or a test.
 pub trait Host {
     /// Opens a device; a lost one is followed by another.

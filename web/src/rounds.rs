@@ -48,9 +48,18 @@ fn dispatches_for(ms: f64) -> u32 {
 }
 
 impl Clocked {
-    /// Takes the times of a batch; false if the clock ran backwards, which is counted.
+    /// Dispatches of a batch that is long enough, where one of as many as now takes `ms`.
+    fn longer(&self, ms: f64) -> u32 {
+        let each = without_overhead(&[ms], self.empty_ms)[0] / f64::from(self.dispatches.max(1));
+        // At most four times as many: a batch that seems to take nothing says little.
+        let most = self.dispatches.saturating_mul(4);
+        dispatches_for(each).clamp(self.dispatches, most.min(MOST_DISPATCHES))
+    }
+
+    /// Takes the times of a batch; false if the clock ran backwards, or the batch took no longer than an empty one, which is
+    /// counted.
     fn take(&mut self, told: Elapsed) -> bool {
-        if told.measured().is_err() {
+        if told.measured().is_err() || told.ms() <= self.empty_ms {
             self.discarded += 1;
             return false;
         }
@@ -71,7 +80,7 @@ impl<'a> Timed<'a> {
     ) -> Result<Self, GpuError> {
         // The first trace is in slices that grow, the second in those that fit.
         batch.trace_async().await?;
-        let ms = batch.trace_async().await?.wall_ms;
+        let ms = batch.trace_async().await?.ms();
         let mut empty = Vec::new();
         for _ in 0..EMPTY {
             empty.extend(
@@ -88,12 +97,14 @@ impl<'a> Timed<'a> {
             ..Clocked::default()
         };
         clocked.empty_ms = median(&empty).unwrap_or(0.0);
-        // Wall times hold the way through the browser, which a batch takes once: it may need more dispatches.
-        if clocked.dispatches > 1 {
+        // What one takes alone holds the way through the browser, which a batch takes once: it may need more.
+        for _ in 0..TRIES {
             let whole = batch.trace_times_async(clocked.dispatches).await?;
-            let each = without_overhead(&[whole.ms()], clocked.empty_ms)[0]
-                / f64::from(clocked.dispatches);
-            clocked.dispatches = dispatches_for(each).max(clocked.dispatches);
+            let needed = clocked.longer(whole.ms());
+            if needed == clocked.dispatches {
+                break;
+            }
+            clocked.dispatches = needed;
         }
         Ok(Self {
             structure,
@@ -220,7 +231,9 @@ mod tests {
         };
         assert!(!clocked.take(backwards));
         assert!(clocked.take(told(0, 10_000_000, 1)));
-        assert_eq!(clocked.discarded, 1);
+        // No longer than an empty one.
+        assert!(!clocked.take(told(0, 1_900_000, 1)));
+        assert_eq!(clocked.discarded, 2);
         assert_eq!(clocked.ms, [2.0]);
         assert_eq!(clocked.wall_ms, [2.75]);
         // Without timestamps the wall clock counts.
@@ -237,6 +250,21 @@ mod tests {
             [0.0, 0.01, 0.3, 3.0, 9.9, 10.0, 500.0].map(dispatches_for),
             [256, 256, 34, 4, 2, 1, 1]
         );
+    }
+
+    #[test]
+    fn a_batch_that_is_too_short_gets_more_dispatches_and_never_fewer() {
+        let clocked = |dispatches, empty_ms| Clocked {
+            dispatches,
+            empty_ms,
+            ..Clocked::default()
+        };
+        assert_eq!(clocked(1, 0.0).longer(5.0), 2);
+        assert_eq!(clocked(2, 1.0).longer(5.0), 5);
+        assert_eq!(clocked(3, 0.0).longer(30.0), 3);
+        // One that takes no longer than an empty one.
+        assert_eq!(clocked(2, 5.0).longer(4.0), 8);
+        assert_eq!(clocked(200, 5.0).longer(4.0), MOST_DISPATCHES);
     }
 
     #[test]

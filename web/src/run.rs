@@ -1,7 +1,7 @@
 //! A measurement from its first record to its last.
 
 use crate::PROGRAM;
-use crate::host::Host;
+use crate::host::{Host, no_device};
 use crate::plan::{FILE, plan};
 use crate::world::{Outcome, World};
 use raystone_bench::run::Registries;
@@ -62,7 +62,9 @@ pub async fn run(host: &impl Host, overrides: &[String], only: &[String]) -> Res
     let (experiment, plan) = plan(&registries, overrides, only)?;
     let start = Instant::now();
     let text = |e: GpuError| e.to_string();
-    let mut device = Device::open(host, &registries).await.map_err(text)?;
+    let mut device = Device::open(host, &registries)
+        .await
+        .map_err(|error| no_device(&error))?;
     let run = Run {
         host,
         registries: &registries,
@@ -84,7 +86,9 @@ pub async fn run(host: &impl Host, overrides: &[String], only: &[String]) -> Res
                     &format!("the device was lost ({lost}); opening another"),
                     run.share(),
                 );
-                device = Device::open(host, &registries).await.map_err(text)?;
+                device = Device::open(host, &registries)
+                    .await
+                    .map_err(|error| no_device(&error))?;
             }
         }
     }

@@ -1,6 +1,7 @@
 //! A scene on screen: takes what the page asks for, steps the viewer between two looks at it, and hands pictures and figures out.
 
 use crate::PROGRAM;
+use crate::host::no_device;
 use crate::memory::MEMORY;
 use crate::opened::Opened;
 use crate::told::{self, AXES};
@@ -144,7 +145,7 @@ pub async fn view(shell: &impl Shell) -> Result<(), String> {
     for _ in 0..MOST_DEVICES {
         let registries = Registries::default();
         let gpu = shell.open(registries.library()).await;
-        let gpu = gpu.map_err(|e| e.to_string())?;
+        let gpu = gpu.map_err(|error| no_device(&error))?;
         shell.tell(&json!({ "opened": told::opened(&gpu, &registries) }));
         let mut viewer = Viewer::new(&gpu, registries, PROGRAM, false);
         let lost = serve(shell, &mut viewer, &mut session, screen.take()).await;
