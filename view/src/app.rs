@@ -152,10 +152,11 @@ impl App {
             if open.clicked() {
                 self.open_dialog();
             }
-            let hint = RichText::new("path of a model or an experiment").color(ui.visuals().text_color());
+            // Hints are weak texts, too weak to be read.
+            ui.visuals_mut().weak_text_color = Some(ui.visuals().text_color());
             let typed = ui.add(
                 egui::TextEdit::singleline(&mut self.path)
-                    .hint_text(hint)
+                    .hint_text("path of a model or an experiment")
                     .desired_width(220.0),
             );
             let typed = typed.labelled_by(open.id);

@@ -137,8 +137,11 @@ fn main() -> ExitCode {
 fn take(arguments: &Arguments, screen: Screen, file: &Path) -> Result<(), String> {
     let adapter = arguments.adapter.clone().unwrap_or_default();
     let worker = Worker::start(adapter, arguments.allow_outside, || ());
-    let mut harness =
-        screenshot::settled(App::new(worker, screen), arguments.frames, arguments.size)?;
+    let mut app = App::new(worker, screen);
+    screenshot::wait(&app.worker, &app.screen, arguments.frames)?;
+    // Two devices at once take more memory.
+    app.worker.end();
+    let mut harness = screenshot::drawn(app, arguments.size);
     screenshot::write(&mut harness, file)?;
     let found = harness.state().worker.found();
     if let Some(ms) = found.first_picture_ms {

@@ -3,6 +3,8 @@
 use crate::app::App;
 use crate::worker::Worker;
 use eframe::egui;
+use eframe::egui_wgpu::WgpuSetup;
+use eframe::wgpu;
 use egui_kittest::Harness;
 use raystone_viewer::{Screen, SideFrame};
 use std::path::Path;
@@ -14,19 +16,21 @@ const PATIENCE: Duration = Duration::from_secs(300);
 const REST: Duration = Duration::from_millis(20);
 
 /// Waits for the images of a window, and draws it. Nothing is drawn meanwhile: all of the machine is for the images.
-pub fn settled<'a>(
-    app: App,
-    frames: u32,
-    [width, height]: [u32; 2],
-) -> Result<Harness<'a, App>, String> {
+#[cfg(test)]
+pub fn settled<'a>(app: App, frames: u32, size: [u32; 2]) -> Result<Harness<'a, App>, String> {
     wait(&app.worker, &app.screen, frames)?;
+    Ok(drawn(app, size))
+}
+
+/// Draws a window.
+pub fn drawn<'a>(app: App, [width, height]: [u32; 2]) -> Harness<'a, App> {
     let builder = Harness::builder()
         .with_size(egui::vec2(width as f32, height as f32))
         .with_render_cursor(false)
         // A widget without a name is a fault of the window, and no reason to refuse a picture of it.
         .with_accessibility_check(cfg!(test))
         .allow_missing_glyphs()
-        .wgpu();
+        .wgpu_setup(setup(app.worker.found().backend));
     let draw = |ui: &mut egui::Ui, app: &mut App| {
         // All of the picture: what is handed over has a margin.
         let whole = ui.ctx().content_rect();
@@ -36,7 +40,16 @@ pub fn settled<'a>(
     };
     let mut harness = builder.build_ui_state(draw, app);
     harness.run_steps(3);
-    Ok(harness)
+    harness
+}
+
+/// A device to draw with, of the interface that images are made with: a driver for another would only take memory.
+fn setup(backend: Option<wgpu::Backend>) -> WgpuSetup {
+    let mut setup = egui_kittest::wgpu::default_wgpu_setup();
+    if let (WgpuSetup::CreateNew(new), Some(backend)) = (&mut setup, backend) {
+        new.instance_descriptor.backends = backend.into();
+    }
+    setup
 }
 
 /// Waits until each image of a screen has so many samples, fails, or is finished; an error on screen ends it.

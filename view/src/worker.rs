@@ -1,5 +1,6 @@
 //! The thread that renders: it owns the device, takes requests, and leaves what it found for the window.
 
+use eframe::wgpu;
 use raystone_bench::run::{Registries, RunError};
 use raystone_config::{Catalogue, Window};
 use raystone_core::geometry::Camera;
@@ -64,6 +65,8 @@ pub struct Found {
     pub refused: bool,
     /// The adapter.
     pub adapter: String,
+    /// The interface through which it is used.
+    pub backend: Option<wgpu::Backend>,
     pub inspection: Option<Inspection>,
     /// The instance that is being dragged.
     pub grasp: Option<Grasp>,
@@ -141,6 +144,16 @@ impl Worker {
         }
     }
 
+    /// Ends the thread, and gives its device and its scene back. What it found stays.
+    pub fn end(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.asks = None;
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to say any more.
+            let _ = thread.join();
+        }
+    }
+
     /// What it found.
     pub fn found(&self) -> MutexGuard<'_, Found> {
         self.found.lock().unwrap_or_else(PoisonError::into_inner)
@@ -149,12 +162,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.asks = None;
-        if let Some(thread) = self.thread.take() {
-            // It has nothing to say any more.
-            let _ = thread.join();
-        }
+        self.end();
     }
 }
 
@@ -202,6 +210,7 @@ impl Inside {
             };
             self.change(|found| {
                 found.adapter = gpu.info.name.clone();
+                found.backend = Some(gpu.info.backend);
                 found.status = None;
             });
             let viewer = Viewer::new(&gpu, registries, Program::default(), allow_outside);
