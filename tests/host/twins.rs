@@ -541,6 +541,7 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("accel/bvh/roped", "rope", "build"),
     ("accel/bvh/roped", "rope_of", "build and validation"),
     ("accel/bvh/octant_roped", "ropes_of", "build and validation"),
+    ("accel/wide/octants", "check", "a known cube"),
     (
         "accel/bvh/octant_roped",
         "near_side",

@@ -153,7 +153,7 @@ impl App {
                 self.open_dialog();
             }
             // Hints are weak texts, too weak to be read.
-            ui.visuals_mut().weak_text_color = Some(ui.visuals().text_color());
+            ui.visuals_mut().weak_text_color = Some(ui.visuals().strong_text_color());
             let typed = ui.add(
                 egui::TextEdit::singleline(&mut self.path)
                     .hint_text("path of a model or an experiment")
