@@ -62,7 +62,10 @@ fn reach(partition: &Partition, cell: &GridCell, axis: usize, up: bool) -> Optio
         voxel[b] = u32::from(cell.min[b]);
         while voxel[b] < u32::from(cell.max[b]) {
             let neighbour = &partition.cells[map.cell_at(voxel) as usize];
-            if !is_subset(neighbour.list(&partition.pool), own) {
+            // A cell that does not hold the voxel ends no search; checks of the grid name it.
+            let holds = (0..3)
+                .all(|k| (neighbour.min[k].into()..neighbour.max[k].into()).contains(&voxel[k]));
+            if !holds || !is_subset(neighbour.list(&partition.pool), own) {
                 return None;
             }
             bound = if up {
@@ -71,10 +74,9 @@ fn reach(partition: &Partition, cell: &GridCell, axis: usize, up: bool) -> Optio
                 bound.max(neighbour.min[axis])
             };
             next = next.min(u32::from(neighbour.max[a]));
-            // Beyond this voxel, also where the map names a cell that does not hold it: checks of the grid say so, if it is built.
-            voxel[b] = u32::from(neighbour.max[b]).max(voxel[b] + 1);
+            voxel[b] = u32::from(neighbour.max[b]);
         }
-        voxel[a] = next.max(voxel[a] + 1);
+        voxel[a] = next;
     }
     Some(bound)
 }
