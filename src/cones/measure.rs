@@ -4,7 +4,7 @@
 use crate::check;
 use crate::cone::Mirror;
 use crate::device::{Tracer, overlaps};
-use crate::sample::{Crossing, DIMENSIONS, MOST, POWERS, budget, crossing, sampled};
+use crate::sample::{Crossing, DIMENSIONS, MOST, POWERS, budget, crossing, sampled, shimmer};
 use crate::scene::Place;
 use crate::trace::Blend;
 use crate::world::{Keep, Picture as Traced, View, World};
@@ -53,6 +53,8 @@ parameters! {
         resolution: u32 = 256, in 4..=4096;
         /// samples a pixel of the reference
         samples: u32 = 2048, in 16..=65536;
+        /// pictures while the eye turns by a pixel, of which the reference is one each; 1: it does not move
+        frames: u32 = 1, in 1..=16;
         /// whether errors of the sampler are measured; the cone's time is, if not
         sampled: bool = true;
     }
@@ -84,6 +86,7 @@ parameters! {
 struct Load {
     view: View,
     keep: Keep,
+    frames: u32,
     is_sampled: bool,
 }
 
@@ -115,6 +118,7 @@ impl Load {
                 side: kept.side,
                 resolution: kept.resolution,
                 samples: kept.samples,
+                turned: 0.0,
             },
             keep: Keep {
                 layers: kept.layers,
@@ -122,6 +126,7 @@ impl Load {
                 cut: kept.cut,
                 is_mean: false,
             },
+            frames: kept.frames,
             is_sampled: kept.sampled,
         }
     }
@@ -141,8 +146,12 @@ const OPEN: usize = POWERS + 5;
 const APART: usize = POWERS + 6;
 const AREA: usize = POWERS + 7;
 const TIME: usize = POWERS + 8;
+const EDGES: usize = POWERS + 9;
+const EDGE_BIAS: usize = POWERS + 10;
+const EDGE_CROSSING: usize = POWERS + 11;
+const SHIMMER: usize = POWERS + 12;
 
-static FIGURES: [Figure; POWERS + 9] = [
+static FIGURES: [Figure; POWERS + 13] = [
     figure("cones-error-1/v1", "RMSE of 1 sample", "", Shown::Digits(3)),
     figure("cones-error-2/v1", "of 2", "", Shown::Digits(3)),
     figure("cones-error-4/v1", "of 4", "", Shown::Digits(3)),
@@ -207,6 +216,32 @@ static FIGURES: [Figure; POWERS + 9] = [
         Better::Lower,
         Shown::Digits(3),
         Spread::Median,
+    ),
+    Figure::new(
+        "cones-edges/v1",
+        "pixels at silhouettes",
+        "",
+        Better::Neither,
+        Shown::Percent,
+        Spread::Exact,
+    ),
+    figure(
+        "cones-edge-bias/v1",
+        "RMSE of the cone there",
+        "",
+        Shown::Digits(3),
+    ),
+    figure(
+        "cones-edge-crossing/v1",
+        "samples with which the sampler is as good there",
+        "spp",
+        Shown::Digits(3),
+    ),
+    figure(
+        "cones-shimmer/v1",
+        "deviation of the error over frames",
+        "",
+        Shown::Digits(3),
     ),
 ];
 
@@ -277,6 +312,7 @@ impl Measurement for Cones {
         } else {
             load.view.samples
         };
+        let rays = rays + (load.frames - 1) * load.view.samples;
         let host = Work::other(1e-6 * f64::from(pixels) * f64::from(rays));
         if load.is_sampled {
             return host;
@@ -291,16 +327,21 @@ impl Measurement for Cones {
             let absent = || Absent::Failed("there are no such cones".to_owned());
             let load = Load::of(cell).ok_or_else(absent)?;
             contradiction(&load).map_or(Ok(()), |reason| Err(Absent::Refused(reason)))?;
-            let known = worlds.iter().find(|world| world.view == load.view);
-            let world = match known {
-                Some(world) => Arc::clone(world),
-                None => {
-                    let world = World::new(load.view, u64::from(at.experiment.run.seed));
-                    worlds.push(Arc::new(world));
-                    worlds.last().cloned().ok_or_else(absent)?
+            let frames = (0..load.frames).map(|frame| {
+                let turned = f64::from(frame) / f64::from(load.frames);
+                let view = View {
+                    turned,
+                    ..load.view
+                };
+                if let Some(world) = worlds.iter().find(|world| world.view == view) {
+                    return Arc::clone(world);
                 }
-            };
-            Ok(Box::new(Ready::new(at, cell, &load, &world)?) as Box<dyn Prepared>)
+                let world = Arc::new(World::new(view, u64::from(at.experiment.run.seed)));
+                worlds.push(Arc::clone(&world));
+                world
+            });
+            let frames: Vec<Arc<World>> = frames.collect();
+            Ok(Box::new(Ready::new(at, cell, &load, &frames)?) as Box<dyn Prepared>)
         }))
     }
 }
@@ -351,8 +392,11 @@ fn samplers(at: &At, cell: &Cell, side: u32) -> Result<Vec<Sampler>, Absent> {
 struct Ready {
     picture: Arc<Traced>,
     world: Arc<World>,
-    /// Mean square of the cone's error.
+    /// Mean square of the cone's error, and that at silhouettes.
     floor: f64,
+    edge_floor: f64,
+    /// Variance over frames of the error of the cone, or of the sampler.
+    shimmer: Option<f64>,
     /// Mean squares of a sampler's errors, and of its adaptive and even pictures.
     errors: Option<Errors>,
     area: Option<f64>,
@@ -361,27 +405,42 @@ struct Ready {
 
 struct Errors {
     powers: Vec<f64>,
+    /// At silhouettes.
+    edges: Vec<f64>,
     /// Over that with as many samples everywhere.
     adaptive: Option<f64>,
 }
 
 impl Ready {
-    fn new(at: &At, cell: &Cell, load: &Load, world: &Arc<World>) -> Result<Self, Absent> {
+    fn new(at: &At, cell: &Cell, load: &Load, frames: &[Arc<World>]) -> Result<Self, Absent> {
         let gpu = at.gpu(cell)?;
+        let world = &frames[0];
         let picture = world.picture(gpu, &load.keep)?;
-        let floor = world.truth.error(&picture.colours());
+        let colours = picture.colours();
         let mut ready = Self {
             picture,
             world: Arc::clone(world),
-            floor,
+            floor: world.truth.error(&colours),
+            edge_floor: world
+                .truth
+                .error_where(&colours, |pixel| world.edges[pixel]),
+            shimmer: None,
             errors: None,
             area: None,
             tracer: None,
         };
         if load.is_sampled {
             let samplers = samplers(at, cell, load.view.side)?;
-            ready.errors = Some(Errors::new(world, &samplers, at.experiment.run.seed));
+            let seed = at.experiment.run.seed;
+            ready.errors = Some(Errors::new(world, &samplers, seed));
+            ready.shimmer = shimmer_of(frames, |world| {
+                let all = sampled(&world.lens(), &samplers, world.pixels(), seed, None);
+                Ok(all.powers[SPENT.trailing_zeros() as usize].clone())
+            })?;
         } else {
+            ready.shimmer = shimmer_of(frames, |world| {
+                Ok(world.picture(gpu, &load.keep)?.colours())
+            })?;
             ready.area = Some(area_off(gpu, at.experiment.run.seed)?);
             ready.tracer = Some(world.tracer(gpu, &load.keep)?);
         }
@@ -392,6 +451,30 @@ impl Ready {
     fn is_resolved(&self) -> bool {
         self.floor > 0.1 * self.world.truth.noise()
     }
+
+    /// The same of silhouettes, if there are any.
+    fn is_resolved_at_edges(&self) -> bool {
+        self.edge_floor
+            > 0.1
+                * self
+                    .world
+                    .truth
+                    .noise_where(|pixel| self.world.edges[pixel])
+    }
+}
+
+/// The variance of errors over frames, if there are several.
+fn shimmer_of(
+    frames: &[Arc<World>],
+    picture: impl Fn(&World) -> Result<Vec<DVec3>, Absent>,
+) -> Result<Option<f64>, Absent> {
+    if frames.len() < 2 {
+        return Ok(None);
+    }
+    let pictures = frames.iter();
+    let pictures = pictures.map(|world| Ok((&world.truth, picture(world)?)));
+    let pictures: Vec<_> = pictures.collect::<Result<_, Absent>>()?;
+    Ok(Some(shimmer(&pictures)))
 }
 
 /// What the device is off quadrature in overlaps of random triangles.
@@ -410,12 +493,15 @@ impl Errors {
         let is_random = samplers.iter().all(Sampler::is_random);
         let replicates = if is_random { REPLICATES } else { 1 };
         let mut powers = vec![0.0; POWERS];
+        let mut edges = vec![0.0; POWERS];
         let mut adaptive = None;
         for replicate in 0..replicates {
             let seed = seed.wrapping_add(replicate);
             let all = sampled(&lens, samplers, world.pixels(), seed, budget.as_deref());
-            for (sum, picture) in powers.iter_mut().zip(&all.powers) {
-                *sum += world.truth.error(picture) / f64::from(replicates);
+            for (k, picture) in all.powers.iter().enumerate() {
+                let at_edges = world.truth.error_where(picture, |pixel| world.edges[pixel]);
+                powers[k] += world.truth.error(picture) / f64::from(replicates);
+                edges[k] += at_edges / f64::from(replicates);
             }
             if let Some(picture) = &all.adaptive {
                 let error = world.truth.error(picture) / f64::from(replicates);
@@ -427,6 +513,7 @@ impl Errors {
         Self {
             adaptive: ratio.map(|square| (square / even).sqrt()),
             powers,
+            edges,
         }
     }
 }
@@ -479,10 +566,14 @@ impl Prepared for Ready {
     }
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
-        let mut values = [None; POWERS + 9];
+        let mut values = [None; FIGURES.len()];
         if self.is_resolved() {
             values[BIAS] = root(self.floor);
         }
+        if self.is_resolved_at_edges() {
+            values[EDGE_BIAS] = root(self.edge_floor);
+        }
+        values[SHIMMER] = self.shimmer.and_then(root);
         if let Some(errors) = &self.errors {
             for (value, square) in values.iter_mut().zip(&errors.powers) {
                 *value = root(*square);
@@ -491,11 +582,17 @@ impl Prepared for Ready {
                 Some(Crossing::At(samples)) => Some(samples),
                 _ => None,
             };
+            values[EDGE_CROSSING] = match self.edge_crossing(errors) {
+                Some(Crossing::At(samples)) => Some(samples),
+                _ => None,
+            };
             values[ADAPTIVE] = errors.adaptive;
         } else {
             let found = &self.picture.found;
             let of_cones = found.iter().map(|pixel| (pixel.counts[0], pixel.covered));
             let of_cones = covering(of_cones.collect());
+            let edges = self.world.edges.iter().filter(|edge| **edge).count();
+            values[EDGES] = Some(edges as f64 / found.len() as f64);
             values[LAYERS] = Some(of_cones.mean);
             values[LAYERS_99] = Some(of_cones.of_99);
             values[OPEN] = Some(of_cones.open);
@@ -545,6 +642,11 @@ impl Ready {
     fn crossing(&self, errors: &Errors) -> Option<Crossing> {
         self.is_resolved()
             .then(|| crossing(&errors.powers, self.floor))
+    }
+
+    fn edge_crossing(&self, errors: &Errors) -> Option<Crossing> {
+        self.is_resolved_at_edges()
+            .then(|| crossing(&errors.edges, self.edge_floor))
     }
 }
 

@@ -114,12 +114,6 @@ impl Rays {
         let hits = self.faces.iter().map(|face| face.hit(origin, direction));
         hits.fold(None, nearer)
     }
-
-    /// What a ray sees.
-    pub fn seen(&self, origin: DVec3, direction: DVec3) -> DVec3 {
-        self.closest(origin, direction)
-            .map_or(BACKGROUND, |hit| hit.1)
-    }
 }
 
 fn nearer(a: Option<(f64, DVec3)>, b: Option<(f64, DVec3)>) -> Option<(f64, DVec3)> {
@@ -207,15 +201,20 @@ impl<'a> Lens<'a> {
 
     /// What the ray of four numbers in [0, 1) sees: two choose it in the pixel, two in the lobe.
     pub fn sample(&self, pixel: u32, u: [f64; 4]) -> DVec3 {
+        self.hit(pixel, u).map_or(BACKGROUND, |hit| hit.1)
+    }
+
+    /// The distance that it ends at, from the mirror if it meets one, and the colour there.
+    pub fn hit(&self, pixel: u32, u: [f64; 4]) -> Option<(f64, DVec3)> {
         let (axis, tangent) = self.pixel(pixel);
         let direction = within(axis, tangent, [u[0], u[1]]).normalize();
         let eye = self.camera.eye.f64();
         match self.mirrored(eye, direction) {
             Some((at, mirrored)) => {
                 let lobe = within(mirrored, self.camera.gloss, [u[2], u[3]]);
-                self.rays.seen(at, lobe)
+                self.rays.closest(at, lobe)
             }
-            None => self.rays.seen(eye, direction),
+            None => self.rays.closest(eye, direction),
         }
     }
 

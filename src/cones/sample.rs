@@ -14,6 +14,51 @@ pub const POWERS: usize = 9;
 /// Most of them.
 pub const MOST: u32 = 1 << (POWERS - 1);
 
+/// The point of a lattice that is shifted.
+fn on_lattice(k: u32, shift: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|d| (shift[d] + f64::from(k) * GOLDEN.powi(-1 - d as i32)).fract())
+}
+
+/// Rays that tell whether a pixel is at a silhouette, and how much farther than the next of them one is there.
+const PROBES: u32 = 64;
+const GAP: f64 = 1.1;
+
+/// Which pixels are at a silhouette: of their rays, in order of distance, two neighbours end at distances that differ by
+/// more than a tenth.
+pub fn silhouettes(lens: &Lens, pixels: u32) -> Vec<bool> {
+    let is_edge = |pixel: u32| {
+        let ends = (0..PROBES).map(|k| {
+            let hit = lens.hit(pixel, on_lattice(k, [0.5; 4]));
+            hit.map_or(f64::INFINITY, |hit| hit.0)
+        });
+        let mut ends: Vec<f64> = ends.collect();
+        ends.sort_by(f64::total_cmp);
+        ends.windows(2).any(|pair| pair[1] > GAP * pair[0])
+    };
+    (0..pixels).into_par_iter().map(is_edge).collect()
+}
+
+/// The variance over frames of a pixel's error, mean of channels and pixels; its expectation is that against true pictures.
+/// Each frame has its reference and its picture.
+pub fn shimmer(frames: &[(&Truth, Vec<DVec3>)]) -> f64 {
+    let [(_, first), ..] = frames else {
+        return 0.0;
+    };
+    let count = frames.len() as f64;
+    let of_pixel = |pixel: usize| {
+        let errors = |half: usize| {
+            let each = frames.iter();
+            let each = each.map(|(truth, picture)| picture[pixel] - truth.halves[half][pixel]);
+            let each: Vec<DVec3> = each.collect();
+            let mean = each.iter().sum::<DVec3>() / count;
+            each.into_iter().map(move |error| error - mean)
+        };
+        let products = errors(0).zip(errors(1)).map(|(a, b)| a.dot(b) / 3.0);
+        products.sum::<f64>() / (count - 1.0)
+    };
+    (0..first.len()).map(of_pixel).sum::<f64>() / first.len() as f64
+}
+
 /// A picture twice, from samples that have nothing in common, so that squares of errors have no noise of their own.
 #[derive(Debug, Clone)]
 pub struct Truth {
@@ -26,16 +71,12 @@ const GOLDEN: f64 = 1.167_303_978_261_418_7;
 impl Truth {
     /// Half of `samples` each, a lattice with its own shift for each pixel.
     pub fn new(lens: &Lens, pixels: u32, samples: u32, seed: u64) -> Self {
-        let step = [1, 2, 3, 4].map(|k| GOLDEN.powi(-k));
         let half = |which: u64| {
             let each = (0..pixels).into_par_iter().map(|pixel| {
                 let mut random = Pcg32::with_stream(seed, 2 * u64::from(pixel) + which);
                 let shift = [(); 4].map(|()| random.uniform());
                 let count = samples / 2;
-                let sum = (0..count).map(|k| {
-                    let at = |d: usize| (shift[d] + f64::from(k) * step[d]).fract();
-                    lens.sample(pixel, [at(0), at(1), at(2), at(3)])
-                });
+                let sum = (0..count).map(|k| lens.sample(pixel, on_lattice(k, shift)));
                 sum.sum::<DVec3>() / f64::from(count)
             });
             each.collect()
@@ -59,21 +100,34 @@ impl Truth {
 
     /// The mean square of a picture's error.
     pub fn error(&self, picture: &[DVec3]) -> f64 {
-        let each = picture
-            .iter()
-            .enumerate()
-            .map(|(k, value)| self.square(k, *value));
-        each.sum::<f64>() / picture.len() as f64
+        self.error_where(picture, |_| true)
+    }
+
+    /// That of some pixels; NaN if there are none.
+    pub fn error_where(&self, picture: &[DVec3], counts: impl Fn(usize) -> bool) -> f64 {
+        let counted = (0..picture.len()).filter(|pixel| counts(*pixel));
+        let (sum, count) = counted.fold((0.0, 0.0), |(sum, count), pixel| {
+            (sum + self.square(pixel, picture[pixel]), count + 1.0)
+        });
+        sum / count
     }
 
     /// The mean square of the error of one half, from the difference of both.
     pub fn noise(&self) -> f64 {
+        self.noise_where(|_| true)
+    }
+
+    /// That of some pixels; NaN if there are none.
+    pub fn noise_where(&self, counts: impl Fn(usize) -> bool) -> f64 {
         let [a, b] = &self.halves;
-        let each = a
-            .iter()
-            .zip(b)
-            .map(|(a, b)| (*a - *b).length_squared() / 6.0);
-        each.sum::<f64>() / a.len() as f64
+        let counted = (0..a.len()).filter(|pixel| counts(*pixel));
+        let (sum, count) = counted.fold((0.0, 0.0), |(sum, count), pixel| {
+            (
+                sum + (a[pixel] - b[pixel]).length_squared() / 6.0,
+                count + 1.0,
+            )
+        });
+        sum / count
     }
 }
 

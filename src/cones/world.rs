@@ -6,7 +6,7 @@ use crate::cone::{Camera, Mirror, cone_of};
 use crate::device::Tracer;
 use crate::oracle::Oracle;
 use crate::rays::{Lens, Rays};
-use crate::sample::Truth;
+use crate::sample::{Truth, silhouettes};
 use crate::scene::{BACKGROUND, Patch, Place, patches};
 use crate::trace::{Blend, DIRECTIONS, Found, Given};
 #[cfg(test)]
@@ -37,6 +37,8 @@ pub(crate) struct View {
     pub(crate) resolution: u32,
     /// Samples of the reference.
     pub(crate) samples: u32,
+    /// How far the eye is turned to the right, in pixels of the whole picture.
+    pub(crate) turned: f64,
 }
 
 /// What is kept of a cone.
@@ -51,19 +53,22 @@ pub(crate) struct Keep {
 impl View {
     /// The camera, its numbers rounded to f32, so that both kinds have the same.
     fn camera(&self, is_mean: bool) -> Camera<f32> {
-        let forward = -EYE.normalize();
-        let right = forward.cross(DVec3::Z).normalize();
         let degrees = match self.mirror {
             Some(Mirror::Sphere) => NARROW,
             _ => WIDE,
         };
         let half = 0.5 * f64::from(self.resolution);
+        let distance = half / (0.5 * degrees.to_radians()).tan();
+        let ahead = -EYE.normalize();
+        let aside = ahead.cross(DVec3::Z).normalize();
+        let (sine, cosine) = (self.turned / distance).atan().sin_cos();
+        let [forward, right] = [ahead * cosine + aside * sine, aside * cosine - ahead * sine];
         Camera {
             eye: V3::of(EYE),
             right: V3::of(right),
             up: V3::of(right.cross(forward)),
             forward: V3::of(forward),
-            distance: (half / (0.5 * degrees.to_radians()).tan()) as f32,
+            distance: distance as f32,
             stride: (f64::from(self.resolution) / f64::from(self.side)) as f32,
             side: self.side,
             mirror: self.mirror.map_or(0, Mirror::word),
@@ -120,6 +125,8 @@ pub(crate) struct World {
     pub(crate) patches: Vec<Patch<f32>>,
     rays: Rays,
     pub(crate) truth: Truth,
+    /// Of each pixel, whether it is at a silhouette.
+    pub(crate) edges: Vec<bool>,
     pictures: Mutex<Vec<(Keep, Arc<Picture>)>>,
 }
 
@@ -129,11 +136,13 @@ impl World {
         let rays = Rays::new(&patches);
         let lens = Lens::new(double(&view.camera(false)), &rays);
         let truth = Truth::new(&lens, view.side * view.side, view.samples, seed);
+        let edges = silhouettes(&lens, view.side * view.side);
         Self {
             view,
             patches,
             rays,
             truth,
+            edges,
             pictures: Mutex::default(),
         }
     }

@@ -37,6 +37,8 @@ fn an_experiment_needs_no_scene_and_leaves_figures_and_pictures() {
 [[integrator."cones:reflected"]]
 side = 8
 samples = 256
+place = "thin"
+frames = 2
 sampled = [true, false]
 "#;
     let (lines, failed, skipped) = ran(&experiment(axes, tables), folder.path());
@@ -51,6 +53,9 @@ sampled = [true, false]
     };
     assert_eq!(has("cones-ns/v1"), 1);
     assert_eq!(has("cones-bias/v1"), 3);
+    assert_eq!(has("cones-edge-bias/v1"), 3);
+    assert_eq!(has("cones-shimmer/v1"), 3);
+    assert_eq!(has("cones-edges/v1"), 1);
     assert_eq!(has("cones-error-1/v1"), 2);
     assert_eq!(
         has("cones-adaptive/v1"),

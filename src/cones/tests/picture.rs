@@ -9,7 +9,7 @@ use crate::disk::disk_triangle;
 use crate::level::{LEVELS, TEXELS};
 use crate::oracle::Expected;
 use crate::rays::{Lens, Rays};
-use crate::sample::{Crossing, Truth, budget, crossing};
+use crate::sample::{Crossing, Truth, budget, crossing, shimmer};
 use crate::scene::{Place, patches, tile_levels};
 use crate::trace::{Blend, Found};
 use crate::world::{Keep, View, World, directions, double};
@@ -43,6 +43,7 @@ fn view(place: Place, mirror: Option<Mirror>, gloss: f64) -> View {
         side: 12,
         resolution: 256,
         samples: 64,
+        turned: 0.0,
     }
 }
 
@@ -431,6 +432,84 @@ fn the_reference_has_no_noise_in_its_squares() {
     // A picture 0.1 too bright is 0.1 off, by few samples too.
     let bright: Vec<DVec3> = many.mean().iter().map(|p| *p + 0.1).collect();
     assert!((few.error(&bright).sqrt() - 0.1).abs() < 0.01);
+}
+
+#[test]
+fn silhouettes_are_where_something_ends_before_something_else() {
+    let count = |world: &World| world.edges.iter().filter(|edge| **edge).count();
+    let of = |place: Place, mirror: Option<Mirror>| count(&world(place, mirror, 0.0));
+    // Pixels that are as wide as their distance.
+    let wide = |place: Place| {
+        let view = View {
+            resolution: 12,
+            ..view(place, None, 0.0)
+        };
+        World::new(view, 1)
+    };
+    // Walls and floor meet, and nothing stands before them.
+    assert_eq!(of(Place::Checker, None), 0);
+    assert_eq!(of(Place::Checker, Some(Mirror::Plane)), 0);
+    let [balls, thin] = [Place::Balls, Place::Thin].map(|place| count(&wide(place)));
+    assert!(
+        (10..130).contains(&balls) && (10..130).contains(&thin),
+        "{balls} {thin}"
+    );
+    // Along 24 circles of a pixel neighbours end at much the same distance, unless a silhouette is between them.
+    let world = wide(Place::Balls);
+    let lens = world.lens();
+    let mut cut = 0;
+    for pixel in 0..world.pixels() {
+        let gap = |circle: u32| {
+            let end = |k: u32| {
+                let u = [(f64::from(circle) + 0.5) / 24.0, f64::from(k) / 256.0];
+                let hit = lens.hit(pixel, [u[0], u[1], 0.0, 0.0]);
+                hit.map_or(f64::MAX, |hit| hit.0)
+            };
+            let pairs = (0..256).map(|k| end(k) / end(k + 1));
+            pairs.fold(0.0, f64::max)
+        };
+        let widest = (0..24).map(gap).fold(0.0, f64::max);
+        assert!(
+            !world.edges[pixel as usize] || widest > 1.05,
+            "{pixel}: {widest}"
+        );
+        cut += usize::from(widest > 1.1);
+    }
+    // One that cuts off next to nothing may be missed by 64 rays.
+    assert!(10 * balls >= 7 * cut, "{balls} of {cut}");
+}
+
+#[test]
+fn a_steady_error_does_not_shimmer_and_a_changing_one_by_how_much_it_changes() {
+    let world = world(Place::Thin, None, 0.0);
+    let truth = &world.truth;
+    let off = |by: f64| {
+        (
+            truth,
+            truth.mean().iter().map(|p| *p + by).collect::<Vec<_>>(),
+        )
+    };
+    assert!(shimmer(&[off(0.1), off(0.1), off(0.1)]).abs() < 1e-12);
+    // About their mean 0.1, -0.1, 0.1, -0.1: the squares' sum over one less than four.
+    let found = shimmer(&[off(0.3), off(0.1), off(0.3), off(0.1)]);
+    assert!((found - 0.04 / 3.0).abs() < 1e-12, "{found}");
+}
+
+#[test]
+fn an_eye_that_turns_by_a_pixel_sees_the_next_one() {
+    let still = View {
+        resolution: 12,
+        ..view(Place::Balls, None, 0.0)
+    };
+    let [still, turned] = [0.0, 1.0].map(|turned| World::new(View { turned, ..still }, 1));
+    let (row, middle) = (6 * 12, 6);
+    let axis = |world: &World, column: u32| world.lens().pixel(row + column).0;
+    let (next, now) = (axis(&still, middle), axis(&turned, middle - 1));
+    // In the middle row about the horizon, half a pixel to either side: angles of neighbours differ a little.
+    assert!(
+        next.angle_between(now) < 0.01 * next.angle_between(axis(&still, middle - 1)),
+        "{next} {now}"
+    );
 }
 
 #[test]
