@@ -69,6 +69,17 @@ fn every_parameter_answers_like_brute_force() {
             ("bundle", number(3)),
             ("apex", name("linear")),
         ]),
+        with(&[
+            ("dual", number(3)),
+            ("chunks", number(3)),
+            ("cluster", number(2)),
+            ("start", number(1)),
+        ]),
+        with(&[
+            ("dual", number(12)),
+            ("fused", ParamValue::Flag(false)),
+            ("branching", number(8)),
+        ]),
     ]);
     for case in in_turn("scenes of ray-hierarchy", cases) {
         let rays = mixed_rays(&mut rng, &case.soup, 150);
@@ -118,6 +129,14 @@ fn streams_hold_the_pairs_of_the_scalar_twin_level_by_level() {
             ("bound", name("box")),
             ("fused", ParamValue::Flag(false)),
         ]),
+        // Both sides together; and with a level of the tree over rays that is tested against the lowest primitives.
+        with(&[("dual", number(2)), ("start", number(1))]),
+        with(&[
+            ("dual", number(12)),
+            ("branching", number(8)),
+            ("cluster", number(3)),
+            ("fused", ParamValue::Flag(false)),
+        ]),
         // Two batches of primitives have the same pairs as one.
         with(&[("start", number(1024)), ("capacity", number(131_072))]),
     ] {
@@ -141,16 +160,30 @@ fn pairs_without_room_are_counted_and_answered_all_the_same() {
     let mut rng = Pcg::new(9);
     let soup = scenes::lattice_soup(&mut rng, 120, 6);
     let rays = scenes::lattice_rays(&mut rng, 6000, 6);
-    let params = with(&[("capacity", number(16_384)), ("branching", number(16))]);
-    let walked: u32 = streams(gpu, &soup, &params, &rays)
-        .iter()
-        .map(|[_, walked]| walked)
-        .sum();
-    assert!(
-        walked > 1000,
-        "only {walked} pairs had no room: the test is blunt"
-    );
-    assert_right("short streams", gpu, &soup, (KIND, &params), &rays);
+    for (least, params) in [
+        (
+            1000,
+            with(&[("capacity", number(16_384)), ("branching", number(16))]),
+        ),
+        (
+            300,
+            with(&[
+                ("capacity", number(16_384)),
+                ("branching", number(8)),
+                ("dual", number(2)),
+            ]),
+        ),
+    ] {
+        let walked: u32 = streams(gpu, &soup, &params, &rays)
+            .iter()
+            .map(|[_, walked]| walked)
+            .sum();
+        assert!(
+            walked > least,
+            "{params:?}: only {walked} pairs had no room: the test is blunt"
+        );
+        assert_right("short streams", gpu, &soup, (KIND, &params), &rays);
+    }
 }
 
 #[test]
@@ -180,11 +213,21 @@ fn sets_of_no_ray_one_and_a_million_equal_ones_are_answered() {
             .tests()
             < 500
     );
-    let contradiction = with(&[("chunks", number(2)), ("reach", ParamValue::Flag(false))]);
-    let error = KIND
-        .build(&soup, &contradiction, &mut Default::default())
-        .err();
-    assert!(error.is_some_and(|e| e.to_string().contains("reach = true")));
+    for (contradiction, remedy) in [
+        (
+            with(&[("chunks", number(2)), ("reach", ParamValue::Flag(false))]),
+            "reach = true",
+        ),
+        (
+            with(&[("dual", number(1)), ("branching", number(16))]),
+            "branching to 8",
+        ),
+    ] {
+        let error = KIND
+            .build(&soup, &contradiction, &mut Default::default())
+            .err();
+        assert!(error.is_some_and(|e| e.to_string().contains(remedy)));
+    }
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use super::enclosing::enclosing;
 use super::layout::Layout;
-use super::node::{FAR, Node, no_rays, node_of_ray};
-use super::primitives::Primitives;
-use super::{Options, Order, Union};
+use super::node::{Bounding, FAR, Node, no_rays, node_of_ray};
+use super::primitives::{Primitive, Primitives};
+use super::{Bound, Options, Order, Union};
 use crate::{AccelError, Ray, TriangleSoup};
 use rayon::prelude::*;
 use raystone_core::params::{Parameters as _, Params};
@@ -52,25 +52,19 @@ impl Anatomy {
         let live = rays.iter().filter(|ray| ray.is_ray()).count() as u64;
         let mut found: Vec<LevelAnatomy> = levels.iter().map(|nodes| shape(nodes)).collect();
         found.truncate(layout.begin + 1);
-        let (bounding, bound) = (options.bounding(), options.bound);
-        let branching = options.branching as usize;
-        let counts = primitives.all().par_iter().map(|primitive| {
+        let descent = Descent {
+            layout: &layout,
+            levels: &levels,
+            primitives: primitives.levels(),
+            bound: options.bound,
+            bounding: options.bounding(),
+            branching: options.branching as usize,
+        };
+        let [_, coming] = layout.primitives[layout.primitives.len() - 1];
+        let counts = (0..coming as usize).into_par_iter().map(|primitive| {
             let mut counts = vec![[0_u64; 2]; layout.begin + 1];
-            let mut met: Vec<usize> = (0..levels[layout.begin].len()).collect();
-            for level in (0..=layout.begin).rev() {
-                let nodes = &levels[level];
-                if level < layout.begin {
-                    let children = |node: &usize| node * branching..(node + 1) * branching;
-                    met = met.iter().flat_map(children).collect();
-                    met.retain(|child| *child < nodes.len());
-                }
-                counts[level][0] = met
-                    .iter()
-                    .filter(|node| nodes[**node].radius >= 0.0)
-                    .count() as u64;
-                met.retain(|node| primitive.meets(&nodes[*node], bound, &bounding));
-                counts[level][1] = met.len() as u64;
-            }
+            let nodes = (0..levels[layout.begin].len()).collect();
+            descent.below(layout.begin, primitive, nodes, &mut counts);
             counts
         });
         for counts in counts.collect::<Vec<_>>() {
@@ -97,6 +91,51 @@ impl Anatomy {
             .map(|level| level.pairs)
             .max()
             .unwrap_or(0)
+    }
+}
+
+/// The scalar twin of `begin.wesl` and `expand.wesl`.
+struct Descent<'a> {
+    layout: &'a Layout,
+    /// Nodes over rays.
+    levels: &'a [Vec<Node>],
+    /// Primitives of all levels.
+    primitives: &'a [Primitive],
+    bound: Bound,
+    bounding: Bounding,
+    branching: usize,
+}
+
+impl Descent<'_> {
+    /// Tests nodes of a level against a primitive, the how manieth of its own level, and then the children of those that
+    /// meet; adds tests and pairs of each level.
+    fn below(
+        &self,
+        level: usize,
+        primitive: usize,
+        mut nodes: Vec<usize>,
+        counts: &mut [[u64; 2]],
+    ) {
+        let of_level = &self.levels[level];
+        let [first, _] = self.layout.primitives[self.layout.height(level)];
+        let tested = &self.primitives[first as usize + primitive];
+        nodes.retain(|node| of_level[*node].radius >= 0.0);
+        counts[level][0] += nodes.len() as u64;
+        nodes.retain(|node| tested.meets(&of_level[*node], self.bound, &self.bounding));
+        counts[level][1] += nodes.len() as u64;
+        if level == 0 || nodes.is_empty() {
+            return;
+        }
+        let children = |at: usize| at * self.branching..(at + 1) * self.branching;
+        let mut met: Vec<usize> = nodes.into_iter().flat_map(children).collect();
+        met.retain(|child| *child < self.levels[level - 1].len());
+        if !self.layout.is_dual(level) {
+            return self.below(level - 1, primitive, met, counts);
+        }
+        let [_, many] = self.layout.primitives[self.layout.height(level - 1)];
+        for child in children(primitive).filter(|child| *child < many as usize) {
+            self.below(level - 1, child, met.clone(), counts);
+        }
     }
 }
 

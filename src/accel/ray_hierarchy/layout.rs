@@ -15,10 +15,23 @@ pub(super) struct Layout {
     pub begin: usize,
     /// Pairs that a stream has room for.
     pub capacity: u32,
-    /// Pairs of a stream that have room for all their children.
-    pub expands: u32,
-    /// Primitives of a batch.
+    /// First primitive and number of primitives of each level that is descended, from those that have triangles up.
+    pub primitives: Vec<[u32; 2]>,
+    /// Primitives of a batch, of the level that comes in.
     pub batch: u32,
+    branching: u32,
+}
+
+/// First and number of the level above one.
+fn above([first, count]: [u32; 2], branching: u32) -> [u32; 2] {
+    [first + count, count.div_ceil(branching)]
+}
+
+/// First primitive and number of primitives of each level of the tree over them; one level where there is no such tree.
+pub(super) fn tree_over(primitives: usize, options: &Options) -> Vec<[u32; 2]> {
+    let lowest = Some([0, primitives as u32]);
+    let levels = std::iter::successors(lowest, |level| Some(above(*level, options.branching)));
+    levels.take(1 + options.dual as usize).collect()
 }
 
 impl Layout {
@@ -31,24 +44,52 @@ impl Layout {
             rays
         };
         let mut levels = vec![[0, rays.div_ceil(options.bundle)]];
-        while let &[.., [first, count]] = levels.as_slice()
-            && count > 1
+        while let &[.., last] = levels.as_slice()
+            && last[1] > 1
         {
-            levels.push([first + count, count.div_ceil(branching)]);
+            levels.push(above(last, branching));
         }
         let begin = levels.iter().position(|[_, count]| *count <= options.start);
         let begin = begin.unwrap_or(levels.len() - 1);
-        let most = u64::from(levels[0][1]) * primitives as u64 * u64::from(branching);
-        let least = u64::from(options.start.max(branching));
+        let mut over = tree_over(primitives, options);
+        over.truncate(begin + 1);
+        let coming = over[over.len() - 1][1];
+        let children = branching.pow(if over.len() > 1 { 2 } else { 1 });
+        let most = u64::from(levels[0][1]) * primitives as u64 * u64::from(children);
+        let least = u64::from(options.start.max(children));
         let capacity = most.clamp(least, u64::from(options.capacity).max(least)) as u32;
-        let batch = (capacity / levels[begin][1]).min((primitives as u32).div_ceil(options.chunks));
+        let batch = (capacity / levels[begin][1]).min(coming.div_ceil(options.chunks));
         Self {
             rays,
             levels,
             begin,
             capacity,
-            expands: capacity / branching,
+            primitives: over,
             batch: batch.max(1),
+            branching,
+        }
+    }
+
+    /// The level of the primitives of a level's stream.
+    pub(super) fn height(&self, level: usize) -> usize {
+        level.min(self.primitives.len() - 1)
+    }
+
+    /// Whether the pairs of a level are divided on both sides.
+    pub(super) fn is_dual(&self, level: usize) -> bool {
+        level > 0 && level < self.primitives.len()
+    }
+
+    /// Children of a pair of a level.
+    pub(super) fn children(&self, level: usize) -> u32 {
+        self.branching.pow(1 + u32::from(self.is_dual(level)))
+    }
+
+    /// Pairs of a level's stream that have room for all their children; all of the lowest are tested where they lie.
+    pub(super) fn expands(&self, level: usize) -> u32 {
+        match level {
+            0 => u32::MAX,
+            _ => self.capacity / self.children(level),
         }
     }
 

@@ -82,6 +82,8 @@ parameters! {
         apex: Apex = Apex::Exact;
         /// how a node is put around its children: at once, or two at a time (Roger 2008)
         union: Union = Union::AtOnce;
+        /// levels of a tree over the primitives, of the same branching, that is descended together with that over rays
+        dual: u32 = 0, in 0..=12;
         /// the order of rays in the tree: as given, by origin and direction, or by a hash of them
         order: Order = Order::Natural;
         /// whether a node ends where the farthest of its rays ends
@@ -166,6 +168,13 @@ impl Structure for RayHierarchy {
                 "ray-hierarchy: chunks > 1 shorten rays to their hits, which reach = false ignores; set reach = true or chunks = 1".to_owned(),
             ));
         }
+        if options.dual > 0 && options.branching > 8 {
+            return Err(AccelError::Contradiction(format!(
+                "ray-hierarchy: dual = {} has branching² = {} children of a pair, of which 64 are possible; set branching to 8 or less, or dual = 0",
+                options.dual,
+                options.branching.pow(2),
+            )));
+        }
         let primitives = log.phase("bounds", || Primitives::new(soup, options));
         Ok(Box::new(Built {
             options: options.clone(),
@@ -190,7 +199,8 @@ impl BuiltAccel for Built {
         let (low, scale) = keys::extent(&self.bounds);
         let bounding = UniformValues::new()
             .f32("inflation", self.options.bounding().inflation)
-            .u32("primitives", self.primitives.count as u32);
+            .u32("primitives", self.primitives.count as u32)
+            .u32("rows", self.primitives.total as u32);
         let extent = UniformValues::new().vec("low", &low).f32("scale", scale);
         GpuBuffers {
             kernel: "",
@@ -220,7 +230,7 @@ impl BuiltAccel for Built {
     fn stats(&self) -> StructureStats {
         let lists = self.primitives.all().iter();
         StructureStats {
-            nodes: self.primitives.count as u64,
+            nodes: self.primitives.total as u64,
             bytes: self.buffers().bytes(),
             ..StructureStats::of_leaves(lists.map(|p| (p.end - p.first) as usize))
         }

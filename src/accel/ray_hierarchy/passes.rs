@@ -45,7 +45,6 @@ impl TracePasses for Passes {
         let layout = Layout::new(steps.count, self.primitives, &self.options);
         Descent {
             options: &self.options,
-            primitives: self.primitives as u32,
             layout,
             steps,
         }
@@ -56,7 +55,6 @@ impl TracePasses for Passes {
 /// The recorder of one trace.
 struct Descent<'a, 'b> {
     options: &'a Options,
-    primitives: u32,
     layout: Layout,
     steps: &'a mut TraceSteps<'b>,
 }
@@ -70,12 +68,13 @@ impl Descent<'_, '_> {
             self.order_primitives()?;
         }
         let batch = self.layout.batch;
-        for first in (0..self.primitives).step_by(batch as usize) {
+        let [_, coming] = self.layout.primitives[self.layout.primitives.len() - 1];
+        for first in (0..coming).step_by(batch as usize) {
             if first > 0 && self.options.chunks > 1 {
                 // Rays end at what they have hit.
                 self.build()?;
             }
-            self.descend(first, batch.min(self.primitives - first))?;
+            self.descend(first, batch.min(coming - first))?;
         }
         let answers = kernel("answers");
         let groups = self.steps.groups(self.layout.rays);
@@ -85,19 +84,21 @@ impl Descent<'_, '_> {
     /// The uniform `tree` for a level.
     fn at_level(&self, level: usize) -> Bindings {
         let first = self.layout.levels.get(level).map_or(0, |[first, _]| *first);
-        // All pairs of the lowest level are tested where they lie.
-        let expands = if level == 0 {
-            u32::MAX
-        } else {
-            self.layout.expands
-        };
+        let height = self.layout.height(level);
+        let [primitive, many] = self.layout.primitives[height];
+        let [primitive_below, many_below] = self.layout.primitives[height.saturating_sub(1)];
         let mut bindings = Bindings::new();
         let tree = UniformValues::new()
             .u32("rays", self.layout.rays)
             .u32("bundles", self.layout.levels[0][1])
             .u32("level", level as u32)
             .u32("first", first)
-            .u32("expands", expands);
+            .u32("expands", self.layout.expands(level))
+            .u32("height", height as u32)
+            .u32("primitive", primitive)
+            .u32("many", many)
+            .u32("primitive_below", primitive_below)
+            .u32("many_below", many_below);
         bindings.uniform("tree", tree);
         bindings
     }
@@ -163,9 +164,10 @@ impl Descent<'_, '_> {
 
     fn order_primitives(&mut self) -> Result<(), GpuError> {
         let root = self.at_level(self.layout.levels.len() - 1);
-        let groups = self.steps.groups(self.primitives);
+        let [_, coming] = self.layout.primitives[self.layout.primitives.len() - 1];
+        let groups = self.steps.groups(coming);
         self.run("depths", kernel("depths"), groups, &root)?;
-        self.sort("depth_keys", "depth_order", self.primitives)
+        self.sort("depth_keys", "depth_order", coming)
     }
 
     /// Descends with some primitives, level by level.
@@ -185,8 +187,12 @@ impl Descent<'_, '_> {
             let groups = self.plan(level, compacted)?;
             let mut bindings = self.at_level(level);
             bindings.buffer("pairs", &pairs).buffer("next_pairs", &next);
-            let expand = kernel("expand").constant("CHILDREN", self.options.branching);
-            self.run("expand", expand, groups, &bindings)?;
+            let is_dual = self.layout.is_dual(level);
+            let name = if is_dual { "expand both" } else { "expand" };
+            let expand = kernel("expand")
+                .feature("dual", is_dual)
+                .constant("CHILDREN", self.layout.children(level));
+            self.run(name, expand, groups, &bindings)?;
             if self.options.fused {
                 std::mem::swap(&mut pairs, &mut next);
             } else {
@@ -201,10 +207,16 @@ impl Descent<'_, '_> {
 
     /// Determines the workgroups of a level on the device.
     fn plan(&mut self, level: usize, compacted: bool) -> Result<Groups, GpuError> {
-        let name = if compacted { "plan compacted" } else { "plan" };
+        // A kernel is known by its name.
+        let name = match (compacted, self.layout.is_dual(level)) {
+            (false, false) => "plan",
+            (false, true) => "plan both",
+            (true, false) => "plan compacted",
+            (true, true) => "plan compacted both",
+        };
         let plan = kernel("plan")
             .feature("compacted", compacted)
-            .constant("CHILDREN", self.options.branching);
+            .constant("CHILDREN", self.layout.children(level));
         self.run(name, plan, [1, 1, 1], &self.at_level(level))?;
         Ok(Groups::Indirect(self.steps.storage("pair_groups")?, 0))
     }

@@ -1,5 +1,6 @@
 //! What the tree over rays is tested against: triangles, or clusters of neighbours.
 
+use super::layout::tree_over;
 use super::node::{Bounding, Node, meets_ball, meets_box};
 use super::{Bound, Options};
 use crate::bounds::Bounds;
@@ -42,6 +43,14 @@ impl Primitive {
         }
     }
 
+    /// The primitive around neighbours.
+    fn around(children: &[Self]) -> Self {
+        let bounds = children.iter().map(Self::bounds);
+        let bounds = bounds.fold(Bounds::EMPTY, |all, b| all.union(&b));
+        let [first, end] = [children[0].first, children[children.len() - 1].end];
+        Self::new(&bounds, first as usize, end as usize)
+    }
+
     pub(crate) fn bounds(&self) -> Bounds {
         Bounds {
             min: self.low,
@@ -73,7 +82,10 @@ impl Primitive {
 
 /// All primitives, and the words that the kernels read.
 pub(crate) struct Primitives {
+    /// Those that have triangles.
     pub count: usize,
+    /// These, and the levels of the tree over them.
+    pub total: usize,
     /// Three rows a primitive, then the indices of triangles, four a row.
     pub rows: Vec<[u32; 4]>,
 }
@@ -81,33 +93,47 @@ pub(crate) struct Primitives {
 impl Primitives {
     pub(crate) fn new(soup: &TriangleSoup, options: &Options) -> Self {
         let cluster = options.cluster as usize;
-        let order = ordered(soup, cluster);
+        let order = ordered(soup, cluster > 1 || options.dual > 0);
         let of_cluster = |(at, ids): (usize, &[u32])| {
             let boxes = ids.iter().map(|id| soup.records[*id as usize].bounds());
             let bounds = boxes.fold(Bounds::EMPTY, |all, b| all.union(&b));
             Primitive::new(&bounds, at * cluster, at * cluster + ids.len())
         };
-        let made: Vec<Primitive> = order
+        let mut made: Vec<Primitive> = order
             .par_chunks(cluster)
             .enumerate()
             .map(of_cluster)
             .collect();
+        let count = made.len();
+        // Each level but the last has parents.
+        for [first, many] in &tree_over(count, options)[..options.dual as usize] {
+            let children = made[*first as usize..(*first + *many) as usize].to_vec();
+            let parents = children.chunks(options.branching as usize);
+            made.extend(parents.map(Primitive::around));
+        }
         let mut rows: Vec<[u32; 4]> = bytemuck::cast_slice(&made).to_vec();
         let padded = |ids: &[u32]| std::array::from_fn(|k| ids.get(k).copied().unwrap_or(0));
         rows.extend(order.chunks(4).map(padded));
         Self {
-            count: made.len(),
+            count,
+            total: made.len(),
             rows,
         }
     }
 
+    /// Those that have triangles.
     pub(crate) fn all(&self) -> &[Primitive] {
-        bytemuck::cast_slice(&self.rows[..3 * self.count])
+        &self.levels()[..self.count]
+    }
+
+    /// Those of all levels.
+    pub(crate) fn levels(&self) -> &[Primitive] {
+        bytemuck::cast_slice(&self.rows[..3 * self.total])
     }
 
     /// The indices of triangles; behind the last primitive's they are padding.
     pub(crate) fn order(&self) -> &[u32] {
-        self.rows[3 * self.count..].as_flattened()
+        self.rows[3 * self.total..].as_flattened()
     }
 
     /// The triangles of a primitive.
@@ -117,7 +143,7 @@ impl Primitives {
 
     pub(crate) fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let mut listed = vec![false; soup.records.len()];
-        for (at, primitive) in self.all().iter().enumerate() {
+        for (at, primitive) in self.levels().iter().enumerate() {
             let range = primitive.first as usize..primitive.end as usize;
             let ids = self.order().get(range).unwrap_or_default();
             ensure!(!ids.is_empty(), "primitive {at} lists no triangles");
@@ -129,7 +155,7 @@ impl Primitives {
                 let reach = primitive.farthest(&bounds);
                 let inside = reach <= f64::from(primitive.radius);
                 ensure!(inside, "primitive {at}: its ball lacks triangle {id}");
-                let first = !std::mem::replace(&mut listed[id as usize], true);
+                let first = at >= self.count || !std::mem::replace(&mut listed[id as usize], true);
                 ensure!(first, "triangle {id} is listed twice");
             }
         }
@@ -140,9 +166,9 @@ impl Primitives {
 }
 
 /// Triangles along a Morton curve, if neighbours are to be side by side.
-fn ordered(soup: &TriangleSoup, cluster: usize) -> Vec<u32> {
+fn ordered(soup: &TriangleSoup, by_place: bool) -> Vec<u32> {
     let mut order: Vec<u32> = (0..soup.records.len() as u32).collect();
-    if cluster == 1 {
+    if !by_place {
         return order;
     }
     let centres = soup.records.par_iter().map(|r| r.bounds().doubled_centre());

@@ -250,6 +250,7 @@ fn every_pass_is_a_valid_kernel() {
             order: Order::Morton,
             fused: false,
             reach: false,
+            dual: 2,
             ..plain
         },
     ];
@@ -272,10 +273,18 @@ fn every_pass_is_a_valid_kernel() {
             let kernel = built
                 .buffers()
                 .activate(Intersection::default().activate(kernel));
-            for feature in ["any", "counted", "alpha_masks", "texels", "compacted"] {
+            for feature in [
+                "any",
+                "counted",
+                "alpha_masks",
+                "texels",
+                "compacted",
+                "dual",
+            ] {
                 let on = match feature {
                     "counted" => counted,
                     "compacted" => is("plan"),
+                    "dual" => is("expand"),
                     _ => true,
                 };
                 let kernel = kernel.clone().feature(feature, on);

@@ -15,6 +15,11 @@ const APART: Subject = structure("ray-hierarchy", &[("fused", "false")]);
 const BUNDLES: Subject = structure("ray-hierarchy", &[("bundle", "4"), ("cluster", "6")]);
 const SORTED: Subject = structure("ray-hierarchy", &[("order", "morton")]);
 const PARTS: Subject = structure("ray-hierarchy", &[("chunks", "3")]);
+const BOTH: Subject = structure("ray-hierarchy", &[("dual", "2")]);
+const BOTH_WALKED: Subject = structure(
+    "ray-hierarchy",
+    &[("dual", "2"), ("branching", "8"), ("capacity", "16384")],
+);
 
 /// Balls of half their radius.
 fn shrink_balls(buffers: &mut GpuBuffers) -> usize {
@@ -265,6 +270,39 @@ pub const MUTANTS: &[Mutant] = &[
             "0.5 * nearest(place, ray).t",
         ),
         PARTS,
+        Check::Lattice,
+    ),
+    row(
+        "ray-last-primitive-below",
+        "the last primitive of a level is no child",
+        text(
+            "accel/ray_hierarchy/passes/expand",
+            "child.y - tree.primitive_below >= tree.many_below",
+            "child.y - tree.primitive_below + 1u >= tree.many_below",
+        ),
+        BOTH,
+        Check::Lattice,
+    ),
+    row(
+        "ray-children-of-one-side",
+        "a pair that is divided on both sides has the first child of its primitive only",
+        text(
+            "accel/ray_hierarchy/tree",
+            "<< BRANCHING_BITS) + (k >> BRANCHING_BITS);",
+            "<< BRANCHING_BITS);",
+        ),
+        BOTH,
+        Check::Lattice,
+    ),
+    row(
+        "ray-walk-of-one-primitive",
+        "a pair of inner nodes that has no room is answered by its first primitive",
+        text(
+            "accel/ray_hierarchy/tree",
+            "first + (1u << bits)",
+            "first + 1u",
+        ),
+        BOTH_WALKED,
         Check::Lattice,
     ),
 ];
