@@ -35,6 +35,8 @@ parameters! {
         squares: u32 = 24, in 4..=256, where multiple_of(2);
         /// pixels along each edge of the image, which come along a Morton curve
         side: u32 = 128, in 16..=2048, where power_of_two();
+        /// how far the balls have moved since the first frame, scene units; trees of that frame are refitted, too
+        moved: f64 = 0.0, in 0.0..=0.5;
     }
 
     /// The rays of the camera.
@@ -206,8 +208,10 @@ impl Bounce {
 
 /// A room on the host, with what judges answers in it.
 struct World {
-    squares: u32,
+    room: Room,
+    /// The triangles, and those of the first frame if they have moved.
     soup: TriangleSoup,
+    first: Option<TriangleSoup>,
     judge: BuiltBvh,
     exact: bool,
     truth: Mutex<Option<Truth>>,
@@ -222,18 +226,28 @@ struct Truth {
 }
 
 impl World {
-    fn new(gpu: &Gpu, squares: u32) -> Result<Self, Absent> {
-        let soup = room::room(squares);
+    fn new(gpu: &Gpu, room: &Room) -> Result<Self, Absent> {
+        let still = room::room(room.squares);
+        let (soup, first) = match room.moved > 0.0 {
+            true => (room::moved(&still, room.moved as f32), Some(still)),
+            false => (still, None),
+        };
         let parameters = BvhParameters::default();
         let judge = BuiltBvh::build(&soup, &parameters, &mut BuildLog::default());
         let judge = judge.map_err(|error| Absent::Failed(error.to_string()))?;
         Ok(Self {
-            squares,
+            room: room.clone(),
             soup,
+            first,
             judge,
             exact: probe_arithmetic(gpu)?.is_exact(),
             truth: Mutex::default(),
         })
+    }
+
+    /// Whether it has the triangles of a room.
+    fn is_of(&self, room: &Room) -> bool {
+        (self.room.squares, self.room.moved) == (room.squares, room.moved)
     }
 
     /// The brightness that these lobes see; samplers and structures share the last one.
@@ -305,7 +319,11 @@ impl Measurement for RaySets {
                 Kind::of(cell).is_some_and(|kind| kind.is_sampled() == is_sampled)
             })
         });
-        cells.collect()
+        by_rays(cells.collect())
+    }
+
+    fn group(&self, cell: &Cell) -> String {
+        cell[Axis::Integrator].to_string()
     }
 
     fn unit_name(&self, cell: &Cell) -> String {
@@ -325,19 +343,54 @@ impl Measurement for RaySets {
 
     fn prepare<'a>(&'a self, at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let mut last: Option<Arc<World>> = None;
+        let mut last_set: Option<(String, Arc<RaySet>)> = None;
         Box::new(cells.iter().map(move |cell| {
             let absent = || Absent::Failed("there are no such rays".to_owned());
             let kind = Kind::of(cell).ok_or_else(absent)?;
-            let squares = kind.room().squares;
-            let world = match last.take().filter(|world| world.squares == squares) {
+            let world = match last.take().filter(|world| world.is_of(kind.room())) {
                 Some(world) => world,
-                None => Arc::new(World::new(at.gpu(cell)?, squares)?),
+                None => Arc::new(World::new(at.gpu(cell)?, kind.room())?),
             };
             last = Some(Arc::clone(&world));
-            let ready = Ready::new(at, cell, &kind, world)?;
+            let draw = Draw::new(at, cell, &kind)?;
+            let name = sampler_of(cell);
+            let set = match last_set.take().filter(|(of, _)| *of == name) {
+                Some((_, set)) => set,
+                None => Arc::new(kind.set(draw.as_ref(), &world)?),
+            };
+            last_set = Some((name, Arc::clone(&set)));
+            let error = match (&kind, &draw) {
+                (Kind::Bounce(bounce), Some(draw)) => bounce.error(draw, &world),
+                _ => None,
+            };
+            let ready = Ready::new(at, cell, (world, set), error)?;
             Ok(Box::new(ready) as Box<dyn Prepared>)
         }))
     }
+}
+
+/// The sampler of a cell.
+fn sampler_of(cell: &Cell) -> String {
+    let axes = [Axis::Sequence, Axis::Decorrelation].into_iter();
+    let labels = axes.filter_map(|axis| cell.get(axis).map(Variant::to_string));
+    labels.collect::<Vec<_>>().join(" ")
+}
+
+/// Cells set by set, in the order in which sets and samplers come first, so that structures share rays.
+fn by_rays(mut cells: Vec<Cell>) -> Vec<Cell> {
+    fn first(known: &mut Vec<String>, name: String) -> usize {
+        let place = known.iter().position(|other| *other == name);
+        place.unwrap_or_else(|| {
+            known.push(name);
+            known.len() - 1
+        })
+    }
+    let (mut sets, mut samplers) = (Vec::new(), Vec::new());
+    cells.sort_by_cached_key(|cell| {
+        let set = first(&mut sets, cell[Axis::Integrator].to_string());
+        [set, first(&mut samplers, sampler_of(cell))]
+    });
+    cells
 }
 
 /// Builds, of which the fastest counts: the first touches pages for the first time.
@@ -354,10 +407,74 @@ enum Descent {
     Division { host: Division, without_room: u64 },
 }
 
+/// A tree of the first frame, its boxes fitted to the triangles as they have moved.
+struct Refitted {
+    rays: TimedRays,
+    space: Space,
+    /// What fitting and laying out took, the fastest of some.
+    ms: f64,
+}
+
+impl Refitted {
+    /// `None` for a structure that is no layout of one binary tree, and where nothing has moved.
+    fn new(at: &At, cell: &Cell, world: &World, set: &RaySet) -> Result<Option<Self>, Absent> {
+        let gpu = at.gpu(cell)?;
+        let text = |error: AccelError| Absent::Failed(error.to_string());
+        let accel = &cell[Axis::Accel];
+        let structure = at.registries.accel.named("structure", &accel.name);
+        let structure = structure.map_err(Absent::Failed)?;
+        let (Some(over), Some(first)) = (structure.over_tree(), &world.first) else {
+            return Ok(None);
+        };
+        let (soup, params) = (&world.soup, &accel.params);
+        let log = || BuildLog::with_gpu(gpu);
+        let of_first = over.tree(first, params, &mut log()).map_err(text)?;
+        let mut fastest: Option<(f64, Box<dyn BuiltAccel>)> = None;
+        for _ in 0..BUILDS {
+            let mut tree = of_first.clone();
+            let start = Instant::now();
+            tree.refit(soup).map_err(text)?;
+            let built = over
+                .lay_out(&tree, soup, params, &mut log())
+                .map_err(text)?;
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            if fastest.as_ref().is_none_or(|(least, _)| ms < *least) {
+                fastest = Some((ms, built));
+            }
+        }
+        let Some((ms, built)) = fastest else {
+            return Ok(None);
+        };
+        built.validate(soup).map_err(text)?;
+        let tracer = tracer_of(at, gpu, (&*built, soup), set)?;
+        Ok(Some(Self {
+            rays: TimedRays::new(tracer.batch(&set.rays)?),
+            space: built.space(),
+            ms,
+        }))
+    }
+}
+
+fn tracer_of(
+    at: &At,
+    gpu: &Gpu,
+    (built, soup): (&dyn BuiltAccel, &TriangleSoup),
+    set: &RaySet,
+) -> Result<Tracer, Absent> {
+    let triangles = TriangleBuffers::upload(gpu, soup)?;
+    let traced = Traced::upload(gpu, built)?;
+    let ask = Ask {
+        runtime_checks: at.experiment.run.runtime_checks,
+        ..set.query().into()
+    };
+    Ok(Tracer::new(gpu, &triangles, &traced, ask)?)
+}
+
 /// A structure on the device, with rays for it.
 struct Ready {
     rays: TimedRays,
-    set: RaySet,
+    refitted: Option<Refitted>,
+    set: Arc<RaySet>,
     world: Arc<World>,
     space: Space,
     live: usize,
@@ -369,7 +486,12 @@ struct Ready {
 }
 
 impl Ready {
-    fn new(at: &At, cell: &Cell, kind: &Kind, world: Arc<World>) -> Result<Self, Absent> {
+    fn new(
+        at: &At,
+        cell: &Cell,
+        (world, set): (Arc<World>, Arc<RaySet>),
+        error: Option<f64>,
+    ) -> Result<Self, Absent> {
         let gpu = at.gpu(cell)?;
         let text = |error: AccelError| Absent::Failed(error.to_string());
         let accel = &cell[Axis::Accel];
@@ -386,15 +508,7 @@ impl Ready {
             build_ms = build_ms.min(build().map_err(text)?.0);
         }
         built.validate(soup).map_err(text)?;
-        let draw = Draw::new(at, cell, kind)?;
-        let set = kind.set(draw.as_ref(), &world)?;
-        let triangles = TriangleBuffers::upload(gpu, soup)?;
-        let traced = Traced::upload(gpu, &*built)?;
-        let ask = Ask {
-            runtime_checks: at.experiment.run.runtime_checks,
-            ..set.query().into()
-        };
-        let tracer = Tracer::new(gpu, &triangles, &traced, ask)?;
+        let tracer = tracer_of(at, gpu, (&*built, soup), &set)?;
         let exact = world.exact;
         let descent = match accel.name.as_str() {
             RayHierarchy::NAME => Some(Descent::of_tree(
@@ -413,14 +527,12 @@ impl Ready {
         };
         Ok(Self {
             rays: TimedRays::new(tracer.batch(&set.rays)?),
+            refitted: Refitted::new(at, cell, &world, &set)?,
             live: readings::live(&set.rays),
             build_ms,
             bytes: built.stats().bytes,
             space: built.space(),
-            error: match (kind, &draw) {
-                (Kind::Bounce(bounce), Some(draw)) => bounce.error(draw, &world),
-                _ => None,
-            },
+            error,
             cycles: match &at.experiment.coherence {
                 Some(settings) => cycles(&*built, soup, &set, settings).map_err(Absent::Failed)?,
                 None => None,
@@ -511,7 +623,10 @@ fn agree(
 
 impl Prepared for Ready {
     fn timed(&self) -> Vec<&dyn Measured> {
-        vec![&self.rays]
+        let refitted = self.refitted.iter().map(|tree| &tree.rays as &dyn Measured);
+        std::iter::once(&self.rays as &dyn Measured)
+            .chain(refitted)
+            .collect()
     }
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
@@ -521,8 +636,16 @@ impl Prepared for Ready {
         if let Some(wrong) = wrong.map_err(|e| e.to_string())? {
             return Err(wrong);
         }
-        let samples = samples.into_iter().next().unwrap_or_default();
-        let mut found = readings::times(&samples, self.live as f64, self.build_ms)?;
+        let mut samples = samples.into_iter();
+        let own = samples.next().unwrap_or_default();
+        let mut found = readings::times(&own, self.live as f64, self.build_ms)?;
+        if let Some((tree, samples)) = self.refitted.as_ref().zip(samples.next()) {
+            let wrong = tree.rays.fault(&self.set, soup, tree.space, exact);
+            if let Some(wrong) = wrong.map_err(|e| e.to_string())? {
+                return Err(format!("refitted: {wrong}"));
+            }
+            found.extend(readings::refitted(&samples, self.live as f64, tree.ms)?);
+        }
         let triangles = self.world.soup.records.len();
         found.extend(readings::counts(self.live, triangles, self.bytes));
         found.extend(readings::of_sampler(self.error, self.cycles));

@@ -42,8 +42,10 @@ const WALKED: usize = 8;
 const LEVEL: usize = 9;
 const TRIANGLES: usize = 16;
 const ERROR: usize = 17;
+const REFIT: usize = 18;
+const REFIT_FRAME: usize = 19;
 
-pub(super) static FIGURES: [Figure; 18] = [
+pub(super) static FIGURES: [Figure; 20] = [
     time("rays-ns/v1", "time"),
     time("rays-frame-ns/v1", "time with building"),
     Figure::new(
@@ -90,6 +92,15 @@ pub(super) static FIGURES: [Figure; 18] = [
         Spread::Exact,
     ),
     once("lobe-error/v1", "RMSE of 16 samples of a lobe", ""),
+    Figure::new(
+        "rays-refit-ms/v1",
+        "refitting",
+        "ms",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
+    time("rays-refit-frame-ns/v1", "time with refitting"),
 ];
 
 /// Rays that can hit something: the others end at once.
@@ -99,17 +110,29 @@ pub(crate) fn live(rays: &[Ray]) -> usize {
 
 /// Times per ray, without building and with it.
 pub(crate) fn times(samples: &Samples, rays: f64, build_ms: f64) -> Result<Vec<Reading>, String> {
-    let after_building = |ms: &[f64]| ms.iter().map(|ms| ms + build_ms).collect();
-    let frame = Samples {
-        ms: after_building(&samples.ms),
-        wall_ms: after_building(&samples.wall_ms),
-        cpu_ms: Vec::new(),
-    };
     Ok(vec![
         samples.ns_per_item(&FIGURES[TIME], rays)?,
-        frame.ns_per_item(&FIGURES[FRAME], rays)?,
+        after(samples, build_ms).ns_per_item(&FIGURES[FRAME], rays)?,
         Reading::exact(&FIGURES[BUILD], build_ms),
     ])
+}
+
+/// Times per ray through a refitted structure, with refitting it.
+pub(super) fn refitted(samples: &Samples, rays: f64, ms: f64) -> Result<[Reading; 2], String> {
+    Ok([
+        after(samples, ms).ns_per_item(&FIGURES[REFIT_FRAME], rays)?,
+        Reading::exact(&FIGURES[REFIT], ms),
+    ])
+}
+
+/// Samples of what comes after something that took `ms` milliseconds.
+fn after(samples: &Samples, ms: f64) -> Samples {
+    let later = |all: &[f64]| all.iter().map(|sample| sample + ms).collect();
+    Samples {
+        ms: later(&samples.ms),
+        wall_ms: later(&samples.wall_ms),
+        cpu_ms: Vec::new(),
+    }
 }
 
 pub(super) fn counts(rays: usize, triangles: usize, bytes: u64) -> [Reading; 3] {

@@ -68,6 +68,23 @@ pub fn room(squares: u32) -> TriangleSoup {
     records.collect::<Vec<_>>().into()
 }
 
+/// The room whose balls a smooth field moves by up to `by` scene units, each vertex by another distance; walls stay.
+pub(super) fn moved(room: &TriangleSoup, by: f32) -> TriangleSoup {
+    let along = |place: [f32; 3]| {
+        let [x, y, z] = place;
+        // 0 at each wall.
+        let inside: f32 = place.iter().map(|c| 1.0 - (c / HALF).powi(2)).product();
+        let turns = [1.3 * y + 0.4, 1.1 * z + 1.7, 0.9 * x + 2.9].map(f32::sin);
+        Vec3::from(place) + by * inside * Vec3::from(turns) / 3.0_f32.sqrt()
+    };
+    let record = |(id, record): (usize, &TriangleRecord)| {
+        let vertices = record.vertices().map(along);
+        TriangleRecord::new(&Triangle { vertices }, id as u32, 0)
+    };
+    let records = room.records.iter().enumerate().map(record);
+    records.collect::<Vec<_>>().into()
+}
+
 /// A point at which a path leaves a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Vertex {

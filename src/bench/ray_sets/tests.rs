@@ -23,6 +23,10 @@ bounce = [1, 2]
 squares = 4
 side = 32
 spread = 30
+[[integrator."rays:bounce"]]
+squares = 4
+side = 32
+moved = 0.4
 [integrator."rays:shadow"]
 squares = 4
 side = 32
@@ -52,8 +56,8 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     let cells: Vec<Recorded<MeasuredRecord>> = all_of::<MeasuredRecord>(&lines).collect();
-    // Seven sets of rays through three structures: a sampler is varied where there is a choice.
-    assert_eq!(cells.len(), 21);
+    // Eight sets of rays through three structures: a sampler is varied where there is a choice.
+    assert_eq!(cells.len(), 24);
     for cell in &cells {
         let whole = |figure: &str| {
             let reading = cell
@@ -66,6 +70,11 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
         assert_eq!(whole("rays-triangles/v1"), 384.0);
         let is_sampled = !cell.key.label(axis::SEQUENCE).is_empty();
         assert_eq!(cell.reading("lobe-error/v1").is_some(), is_sampled);
+        let is_moved = cell.key.label(axis::INTEGRATOR).contains("moved");
+        let is_refitted = is_moved && cell.key.label(axis::ACCEL) == "bvh";
+        for figure in ["rays-refit-ms/v1", "rays-refit-frame-ns/v1"] {
+            assert_eq!(cell.reading(figure).is_some(), is_refitted, "{figure}");
+        }
         let is_tree = cell.key.label(axis::ACCEL).starts_with("ray");
         assert_eq!(cell.reading("descent-tests/v1").is_some(), is_tree);
         if is_tree {
@@ -119,6 +128,21 @@ fn the_error_of_a_lobe_falls_with_samples_at_the_rate_of_independent_ones_and_fa
     assert!((few / many / 4.0 - 1.0).abs() < 0.1, "{few} {many}");
     let net = error("sobol", "owen-hash", 64);
     assert!(net < 0.5 * many, "{net} {many}");
+}
+
+#[test]
+fn balls_move_by_so_much_and_walls_do_not() {
+    let still = room(8);
+    let moved = room::moved(&still, 0.4);
+    let mut farthest: f32 = 0.0;
+    for (a, b) in still.records.iter().zip(&moved.records) {
+        for (a, b) in a.vertices().into_iter().zip(b.vertices()) {
+            let (a, b) = (glam::Vec3::from(a), glam::Vec3::from(b));
+            assert!(a.abs().max_element() < 5.0 || a == b, "{a} {b}");
+            farthest = farthest.max(a.distance(b));
+        }
+    }
+    assert!((0.1..=0.4).contains(&farthest), "{farthest}");
 }
 
 #[test]

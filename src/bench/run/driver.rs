@@ -1,5 +1,5 @@
 //! Runs cell-by-cell measurements: skips finished cells, prepares and checks the others one by one,
-//! times them in the same rounds, and records them.
+//! times those of a group in the same rounds, and records them.
 
 use super::error::RunError;
 use super::measurement::{Absent, At, Measurement, Prepared};
@@ -29,12 +29,24 @@ pub(super) fn run(
     };
     let mut cells = measurement.cells(session.experiment, session.plan);
     cells.retain(|cell| is_here(cell) && !session.ledger.is_done(&measurement.unit_name(cell)));
-    if cells.is_empty() {
-        return Ok(());
+    for group in cells.chunk_by(|a, b| measurement.group(a) == measurement.group(b)) {
+        run_group(session, measurement, at, group)?;
+        if at.device.gpu.lost().is_some() {
+            break;
+        }
     }
+    Ok(())
+}
+
+fn run_group(
+    session: &mut Session,
+    measurement: &'static dyn Measurement,
+    at: &At,
+    cells: &[Cell],
+) -> Result<(), RunError> {
     let mut ready = Vec::new();
-    let mut preparation = measurement.prepare(at, &cells);
-    for cell in &cells {
+    let mut preparation = measurement.prepare(at, cells);
+    for cell in cells {
         session.go_on()?;
         let name = measurement.unit_name(cell);
         session.say(format!("{name}: preparing"));

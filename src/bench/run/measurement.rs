@@ -74,7 +74,13 @@ pub trait Measurement: Send + Sync {
         Through::Own
     }
 
-    /// Prepares and checks cells in order; the driver times them together and writes readings.
+    /// What the cells that are timed in the same rounds have in common, and follow each other by. Others are prepared
+    /// when these are done, so that a device holds at one time what one group needs.
+    fn group(&self, _cell: &Cell) -> String {
+        String::new()
+    }
+
+    /// Prepares and checks cells of one group in order; the driver times them together and writes readings.
     fn prepare<'a>(&'a self, _at: &'a At<'a>, cells: &'a [Cell]) -> Preparation<'a> {
         let unfit = || Absent::Failed(format!("{} are not measured cell by cell", self.plural()));
         Box::new(cells.iter().map(move |_| Err(unfit())))
