@@ -3,7 +3,7 @@
 use super::mtl::Library;
 use super::tally::{Tally, Unread};
 use glam::{Vec2, Vec3};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::str::{FromStr, SplitWhitespace};
 
@@ -59,6 +59,8 @@ pub(super) struct Statements {
     pub warnings: Vec<String>,
     /// Corners whose texture coordinates do not exist, and corners whose normal does not.
     pub lost: [Tally; 2],
+    /// Lines and problems of vertices that are not three numbers, by index; those that no face used yet.
+    pub broken: BTreeMap<u32, (usize, String)>,
 }
 
 #[derive(Default)]
@@ -68,6 +70,8 @@ struct Reader {
     short: Tally,
     /// Vertices, texture coordinates and normals that are not finite.
     infinite: [Tally; 3],
+    /// Libraries that define a material of an earlier one.
+    again: Tally,
     /// True while a smoothing group is on.
     is_smooth: bool,
     unread: Unread,
@@ -90,6 +94,7 @@ impl Statements {
             objects: vec!["unnamed_object".to_owned()],
             warnings: Vec::new(),
             lost: [Tally::default(); 2],
+            broken: BTreeMap::new(),
         };
         let mut reader = Reader::default();
         for (line, content) in (1..).zip(text.lines()) {
@@ -122,7 +127,7 @@ impl Statements {
         words: SplitWhitespace<'_>,
     ) -> Result<(), String> {
         match keyword {
-            "v" => self.vertex(reader, line, words)?,
+            "v" => self.vertex(reader, line, words),
             "vt" => {
                 let ([u, v], count) = numbers(words);
                 let u = if count == 0 { f32::NAN } else { u };
@@ -151,7 +156,7 @@ impl Statements {
                 let known = reader.material(rest);
                 self.materials.push(known.ok_or_else(|| rest.to_owned()));
             }
-            "mtllib" => reader.numbers.extend(library.load(rest)),
+            "mtllib" => reader.define(library.load(rest), line),
             "s" => {
                 let group = words.clone().next().unwrap_or("off");
                 reader.is_smooth = !matches!(group, "off" | "0");
@@ -161,18 +166,18 @@ impl Statements {
         Ok(())
     }
 
-    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha.
-    fn vertex(
-        &mut self,
-        reader: &mut Reader,
-        line: usize,
-        words: SplitWhitespace<'_>,
-    ) -> Result<(), String> {
+    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha. One that is broken is an error
+    /// once a face uses it.
+    fn vertex(&mut self, reader: &mut Reader, line: usize, words: SplitWhitespace<'_>) {
         let all = words.clone().count();
         let ([x, y, z, w, g, b, alpha, _], count) = numbers(words.clone());
         if count < 3 {
             let odd = words.clone().nth(count);
-            return Err(odd.map_or_else(|| format!("`v` with {count} numbers"), no_number));
+            let problem = odd.map_or_else(|| format!("`v` with {count} numbers"), no_number);
+            self.broken
+                .insert(self.positions.len() as u32, (line, problem));
+            self.positions.push(Vec3::NAN);
+            return;
         }
         let mut position = Vec3::new(x, y, z);
         match count {
@@ -191,7 +196,6 @@ impl Statements {
         }
         reader.infinite[0].see_if(!position.is_finite(), line);
         self.positions.push(position);
-        Ok(())
     }
 
     fn face(
@@ -228,15 +232,24 @@ impl Statements {
     /// not is as one that is not given.
     ///
     /// # Errors
-    /// The missing vertex.
-    pub(crate) fn check(&mut self, corners: Range<usize>, line: usize) -> Result<(), String> {
+    /// The missing vertex, or one that is broken, with the line.
+    pub(crate) fn check(
+        &mut self,
+        corners: Range<usize>,
+        line: usize,
+    ) -> Result<(), (usize, String)> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         for Corner(indices) in &mut self.corners[corners] {
             for (k, index) in indices.iter_mut().enumerate() {
                 let (number, count) = (u64::from(*index) + 1, counts[k]);
+                if k == 0
+                    && let Some(broken) = self.broken.remove(index)
+                {
+                    return Err(broken);
+                }
                 match *index == NONE || number <= count as u64 {
                     true => {}
-                    false if k == 0 => return Err(beyond(number as i64, count, "")),
+                    false if k == 0 => return Err((line, beyond(number as i64, count, ""))),
                     false => {
                         *index = NONE;
                         self.lost[k - 1].see(line);
@@ -285,6 +298,14 @@ impl Statements {
                 "line",
                 "the triangle's is used",
             ),
+            reader.again.note(
+                [
+                    "library defines a material of an earlier one again",
+                    "libraries define a material of an earlier one again",
+                ],
+                "line",
+                "the last definition counts from there on",
+            ),
             reader.unread.note(),
             cut_off(text),
         ];
@@ -293,6 +314,12 @@ impl Statements {
 }
 
 impl Reader {
+    fn define(&mut self, materials: HashMap<String, u32>, line: usize) {
+        let is_again = materials.keys().any(|name| self.numbers.contains_key(name));
+        self.again.see_if(is_again, line);
+        self.numbers.extend(materials);
+    }
+
     /// The material of this name; a comment may follow.
     fn material(&self, name: &str) -> Option<u32> {
         let known = |name: &str| self.numbers.get(name).copied();

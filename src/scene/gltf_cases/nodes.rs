@@ -466,3 +466,11 @@ fn extensions_that_are_not_read_refuse_nothing_and_are_named() {
         .load()
         .whole(2);
 }
+
+#[test]
+fn meshes_that_no_node_shows_are_named() {
+    case("meshes without nodes")
+        .set("/nodes/0", json!({}))
+        .load()
+        .fails(&["no triangles", "no node shows one (mesh 0 `square`)"]);
+}
