@@ -1,6 +1,7 @@
 //! Material libraries (MTL) of OBJ files.
 
 use super::builder::DEFAULT_ALBEDO;
+use super::disguise::Disguise;
 use super::gltf_files::decoded;
 use super::material::{Description, Format, emitted};
 use super::mtl_statements::{self, Definition, Map};
@@ -16,6 +17,7 @@ use glam::Vec3;
 use raystone_core::files::files;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Collects the materials of all `mtllib` statements while the OBJ file is read.
@@ -86,6 +88,12 @@ impl Library {
             return HashMap::new();
         }
         let bytes = place.and_then(|path| raystone_core::files::read(&path));
+        let bytes = bytes.and_then(|bytes| match Disguise::of(&bytes) {
+            Some(Disguise { problem, advice }) => {
+                Err(std::io::Error::other(format!("{problem} ({advice})")))
+            }
+            None => Ok(bytes),
+        });
         let bytes = match bytes {
             Ok(bytes) => bytes,
             Err(error) => {
@@ -345,22 +353,29 @@ fn place(folders: &[&Path], file: &str, options: &LoadOptions) -> std::io::Resul
     }
 }
 
-/// The file of this name, or else the only one whose name differs in case alone: models come from
-/// systems that ignore it.
+/// The file of this name, or else the only one whose name differs in case alone, as those of its folders may: models come
+/// from systems that ignore it.
 pub(super) fn found(folder: &Path, file: &str) -> Option<PathBuf> {
     let path = folder.join(file);
     let is_file = |path: &PathBuf| files().open(path).is_ok();
     if is_file(&path) {
         return Some(path);
     }
-    let name = path.file_name()?;
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut parts = Path::new(file).components();
+    let in_any_case = parts.try_fold(folder.to_owned(), |at, part| entry(&at, part.as_os_str()));
+    in_any_case.filter(is_file)
+}
+
+/// What stands in a folder under this name, or else the only thing whose name differs in case alone.
+fn entry(folder: &Path, name: &OsStr) -> Option<PathBuf> {
+    let path = folder.join(name);
+    if files().is_folder(&path) || files().open(&path).is_ok() {
+        return Some(path);
+    }
+    let parent = Some(folder).filter(|folder| !folder.as_os_str().is_empty());
     let listed = files().list(parent.unwrap_or(Path::new("."))).ok()?;
-    let is_same = |other: &&PathBuf| {
-        let other = other.file_name();
-        other.is_some_and(|other| other.eq_ignore_ascii_case(name))
-    };
-    let mut same = listed.iter().filter(is_same);
+    let names = listed.iter().filter_map(|other| other.file_name());
+    let mut same = names.filter(|other| other.eq_ignore_ascii_case(name));
     let only = same.next().filter(|_| same.next().is_none())?;
-    Some(path.with_file_name(only.file_name()?)).filter(is_file)
+    Some(folder.join(only))
 }

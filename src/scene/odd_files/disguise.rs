@@ -48,6 +48,10 @@ fn textures_libraries_and_skies_may_be_none_either() {
         let told = load_files(&files).expect("a scene").report.warnings;
         assert!(told.iter().any(|line| line.contains(says)), "{told:?}");
     }
+    let told = load_files(&[("a.obj", model), ("m.mtl", GZIP)]);
+    let told = told.expect("a scene").report.warnings;
+    let says = "m.mtl: it is compressed by gzip (unpack it first: `gzip -dc IN > OUT`); its materials are drawn grey";
+    assert!(told.iter().any(|line| line.contains(says)), "{told:?}");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.hdr");
     std::fs::write(&path, POINTER).expect("a file");

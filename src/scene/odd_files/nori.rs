@@ -95,11 +95,7 @@ fn meshes_are_found_as_other_systems_write_them() {
         let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
         for text in [text.as_bytes(), &latin1] {
             let result = load_files(&[("a.xml", text), ("parts/m.obj", MESH)]);
-            if file.starts_with("Parts") {
-                check(file, result, &Fails(&["line 2", "is not there"]));
-            } else {
-                check(file, result, &Reads(".", notes));
-            }
+            check(file, result, &Reads(".", notes));
         }
     }
     let glb =

@@ -292,6 +292,10 @@ const MTL: &[(&str, Outcome)] = &[
         Reads("r", &[]),
     ),
     (
+        "newmtl a\nKd 1 0 0\nmap_Kd SUB\\T 1.PNG",
+        Reads("r", &["1 texture is not where it should be (line 3)"]),
+    ),
+    (
         "newmtl a\nKd 1 0 0\nmap_Kd D:\\maps\\t.png\nmap_d /maps/t.png",
         Reads(
             "r",
