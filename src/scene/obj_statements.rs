@@ -10,6 +10,9 @@ use std::str::{FromStr, SplitWhitespace};
 /// Marks a missing index of a corner.
 const NONE: u32 = u32::MAX;
 
+/// Limit on the broken vertices that wait for a face: a file with more is no model.
+const MOST_BROKEN: usize = 4096;
+
 /// Marks an index of a texture coordinate or normal that cannot exist.
 const LOST: u32 = NONE - 1;
 
@@ -127,7 +130,7 @@ impl Statements {
         words: SplitWhitespace<'_>,
     ) -> Result<(), String> {
         match keyword {
-            "v" => self.vertex(reader, line, words),
+            "v" => self.vertex(reader, line, words)?,
             "vt" => {
                 let ([u, v], count) = numbers(words);
                 let u = if count == 0 { f32::NAN } else { u };
@@ -168,16 +171,24 @@ impl Statements {
 
     /// Reads three coordinates, with optional weight (a divisor) or colour and alpha. One that is broken is an error
     /// once a face uses it.
-    fn vertex(&mut self, reader: &mut Reader, line: usize, words: SplitWhitespace<'_>) {
+    fn vertex(
+        &mut self,
+        reader: &mut Reader,
+        line: usize,
+        words: SplitWhitespace<'_>,
+    ) -> Result<(), String> {
         let all = words.clone().count();
         let ([x, y, z, w, g, b, alpha, _], count) = numbers(words.clone());
         if count < 3 {
             let odd = words.clone().nth(count);
             let problem = odd.map_or_else(|| format!("`v` with {count} numbers"), no_number);
-            self.broken
-                .insert(self.positions.len() as u32, (line, problem));
+            if self.broken.len() == MOST_BROKEN {
+                return Err(problem);
+            }
+            let index = self.positions.len() as u32;
+            self.broken.insert(index, (line, problem));
             self.positions.push(Vec3::NAN);
-            return;
+            return Ok(());
         }
         let mut position = Vec3::new(x, y, z);
         match count {
@@ -196,6 +207,7 @@ impl Statements {
         }
         reader.infinite[0].see_if(!position.is_finite(), line);
         self.positions.push(position);
+        Ok(())
     }
 
     fn face(
