@@ -49,7 +49,7 @@ fn a_scene_begins_somewhere() {
     case("an empty scene")
         .set("/scenes/0/nodes", json!([]))
         .load()
-        .fails(&["no triangles"]);
+        .fails(&["no triangles", "the scene to show has no nodes (scene 0)"]);
     two("a root that is not there")
         .set("/scenes/0/nodes", json!([0, 9]))
         .load()
