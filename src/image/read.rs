@@ -69,11 +69,28 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     if let Some((file, turn)) = super::upright::upright(bytes) {
         return turn.undone(&read_hdr(&file)?);
     }
-    // Some programs write the encoding's name first; the rest is the same.
-    let strict = !bytes.starts_with(b"#?RGBE");
-    let decoder = HdrDecoder::with_strictness(Cursor::new(bytes), strict);
-    let decoder = decoder.map_err(|e| e.to_string())?;
+    // Programs write their own name first, or that of the encoding; the rest is the same.
+    if !bytes.starts_with(b"#?") {
+        return Err("it does not begin with `#?`, as Radiance files do".to_owned());
+    }
+    let is_crlf = |line: &[u8]| line.ends_with(b"\r");
+    if bytes
+        .split(|byte| *byte == b'\n')
+        .next()
+        .is_some_and(is_crlf)
+    {
+        let problem = "the lines of its header end in CR LF, as after a transfer as text, which spoils pixels; fetch it as binary data";
+        return Err(problem.to_owned());
+    }
+    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes));
+    let decoder = decoder.map_err(|error| match error {
+        ::image::ImageError::Unsupported(what) if what.to_string().contains("xyze") => {
+            format!("{what}; convert it: `ra_xyze -r IN OUT`")
+        }
+        error => error.to_string(),
+    })?;
     let header = decoder.metadata();
+    check_factors(&header.custom_attributes)?;
     let [width, height] = checked_size(header.width.into(), header.height.into())?;
     let mut values = vec![0.0_f32; 3 * width as usize * height as usize];
     let target = bytemuck::cast_slice_mut(&mut values);
@@ -88,13 +105,38 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
     let scale = [r, g, b].map(|correction| exposure * correction);
     if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
         return Err(format!(
-            "the factors of EXPOSURE and COLORCORR are {scale:?}"
+            "the factors of EXPOSURE and COLORCORR are {scale:?}, which are not above 0: without these lines of its header the pixels are read as they are"
         ));
     }
     let pixels = values
         .chunks_exact(3)
         .map(|p| [0, 1, 2].map(|c| p[c] / scale[c]));
     Image::new(width, height, pixels.collect()).map_err(|e| e.to_string())
+}
+
+/// Refuses lines of a Radiance header that would change its pixels, and are no numbers.
+fn check_factors(lines: &[(String, String)]) -> Result<(), String> {
+    for (key, value) in lines {
+        let count = match key.as_str() {
+            "EXPOSURE" => 1,
+            "COLORCORR" => 3,
+            _ => continue,
+        };
+        let is_number = |word: &str| word.parse::<f32>().is_ok();
+        let words: Vec<&str> = value.split_whitespace().collect();
+        if words.len() != count || !words.into_iter().all(is_number) {
+            let value = value.trim();
+            let numbers = if count == 1 {
+                "no number"
+            } else {
+                "not three numbers"
+            };
+            return Err(format!(
+                "the value of `{key}={value}` in its header is {numbers}"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The next word of a header, and the bytes after the single white space.
@@ -129,6 +171,12 @@ pub(super) fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
     let (channels, width, height, scale, data) = header;
     let [width, height] = checked_size(width, height)?;
     let expected = width as usize * height as usize * channels * 4;
+    // A header whose lines end in CR LF.
+    let has_crlf = bytes[..bytes.len() - data.len()].ends_with(b"\r") && data.len() == expected + 1;
+    let data = data
+        .strip_prefix(b"\n")
+        .filter(|_| has_crlf)
+        .unwrap_or(data);
     if data.len() != expected {
         return Err(format!(
             "{} bytes of values where {width} × {height} pixels of {channels} have {expected}",
@@ -160,10 +208,11 @@ fn pixels(values: &[f32], channels: usize) -> Vec<[f32; 3]> {
     values.chunks_exact(channels).map(pixel).collect()
 }
 
-/// The text after `'key':` in the literal of an NPY header.
+/// The text after `'key':` in the literal of an NPY header, which may have either quotation mark.
 fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
-    let (_, rest) = header.split_once(&format!("'{key}':"))?;
-    Some(rest.trim_start())
+    let mut marks = ['\'', '"'].into_iter();
+    let (_, rest) = marks.find_map(|mark| header.split_once(&format!("{mark}{key}{mark}")))?;
+    Some(rest.trim_start().strip_prefix(':')?.trim_start())
 }
 
 /// The header and the values of an NPY file.
@@ -183,7 +232,7 @@ fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
 /// The type of an NPY file's values, such as `<f4`.
 fn kind_of(bytes: &[u8]) -> Option<&str> {
     let (header, _) = npy_parts(bytes)?;
-    entry(header, "descr").and_then(|rest| rest.split('\'').nth(1))
+    entry(header, "descr").and_then(|rest| rest.split(['\'', '"']).nth(1))
 }
 
 /// Reads an array of NumPy, of floats, integers or flags: its shape, and its values in C order.
@@ -357,8 +406,19 @@ mod tests {
         let header = "#?RADIANCE\nEXPOSURE=2\nEXPOSURE=2\nCOLORCORR=1 2 0.5\n";
         let scaled = read("a.hdr", &file(header)).unwrap();
         assert_eq!(scaled.pixels, [[0.25, 0.0625, 0.125]]);
-        let dark = refused("a.hdr", &file("#?RADIANCE\nEXPOSURE=0\n"));
-        assert!(dark.contains("EXPOSURE"), "{dark}");
+        let odd = "#?AUTOPANO\nrpict -vp 1 2 3\nPIXASPECT=wide\n";
+        assert_eq!(read("a.hdr", &file(odd)).unwrap(), plain);
+        for (header, says) in [
+            ("#?RADIANCE\nEXPOSURE=0\n", "EXPOSURE"),
+            ("#?RGBE\nEXPOSURE=bright\n", "`EXPOSURE=bright`"),
+            ("#?RADIANCE\nCOLORCORR=1 1\n", "not three numbers"),
+            ("#?RADIANCE\r\n", "CR LF"),
+            ("RADIANCE\n", "`#?`"),
+            ("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n", "ra_xyze -r IN OUT"),
+        ] {
+            let message = refused("a.hdr", &file(header));
+            assert!(message.contains(says), "{message}");
+        }
     }
 
     #[test]
@@ -371,6 +431,8 @@ mod tests {
         );
         let read_big = read("a.pfm", &big).unwrap();
         assert_eq!(read_big.pixels, [[3.0; 3], [4.0; 3], [1.0; 3], [2.0; 3]]);
+        let crlf = [&b"PF\r\n1 1\r\n-1.0\r\n"[..], &[0, 0, 128, 63].repeat(3)].concat();
+        assert_eq!(read("a.pfm", &crlf).unwrap().pixels, [[1.0; 3]]);
         for (bytes, says) in [
             (&b"P6\n2 2\n1.0\n"[..], "header"),
             (&b"PF\n2 2\n0\n"[..], "header"),
@@ -427,6 +489,11 @@ mod tests {
         assert_eq!(turned.pixels, [[1.0; 3], [3.0; 3], [2.0; 3], [9.0; 3]]);
         let long = read("a.npy", &npy(1, &header("<f4", "1L, 1L"), &[0; 4])).unwrap();
         assert_eq!((long.width, long.height), (1, 1));
+        let quoted = header("<f4", "1, 1")
+            .replace('\'', "\"")
+            .replace("\":", "\" :");
+        let quoted = read("a.npy", &npy(3, &quoted, &[0, 0, 128, 63])).unwrap();
+        assert_eq!(quoted.pixels, [[1.0; 3]]);
         let values = |kind: &str, data: &[u8]| {
             let bytes = npy(1, &header(kind, "2"), data);
             read_npy_array(&bytes).map(|(_, values)| values)

@@ -41,6 +41,7 @@ impl EnvironmentMap {
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
         let malformed = |problem: String| SceneError::malformed(path, "", problem);
         super::error::open(path)?;
+        super::disguise::check(path)?;
         let map = raystone_image::read_linear(path).map_err(|error| match error {
             raystone_image::ImageError::Decode { reason, .. } => malformed(reason),
             raystone_image::ImageError::UnknownFormat { .. } => SceneError::Unsupported {

@@ -127,6 +127,7 @@ fn build(
         palette.materials.push(plain);
     }
     builder.report.warnings.extend(notes.warnings());
+    builder.report.warnings.append(&mut files.others.take());
     builder.report.warnings.append(&mut palette.warnings);
     let textures = decode_all(
         &palette.images,
@@ -200,6 +201,12 @@ impl<'a> Geometry<'a> {
     fn read_scene(&mut self) -> Result<(), SceneError> {
         let nodes: Vec<Item<'a>> = self.document.list("nodes").collect();
         let roots = roots(self.document, &nodes, &mut self.notes);
+        if let Some(mesh) = self.document.at("meshes", 0)
+            && !nodes.iter().any(|node| node.get("mesh").is_given())
+        {
+            let what = "there are meshes, but no node shows one";
+            self.notes.tell(what, || mesh.place("mesh", 0));
+        }
         let into = |node: &usize| Step::Into(*node, Mat4::IDENTITY, true);
         let mut stack: Vec<Step> = roots.iter().rev().map(into).collect();
         // An explicit stack, so that no depth overflows.

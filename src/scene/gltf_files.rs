@@ -1,8 +1,11 @@
 //! Files that a glTF model names by URI.
 
 use super::LoadOptions;
+use super::disguise::Disguise;
+use super::mtl::found;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use base64::{Engine, alphabet};
+use std::cell::RefCell;
 use std::path::{Component, Path, PathBuf};
 
 /// Finds and reads a model's files, by default only inside its folder.
@@ -10,6 +13,8 @@ pub(super) struct Files {
     pub model: PathBuf,
     folder: PathBuf,
     allow_outside: bool,
+    /// Notes on files that are read in the place of others.
+    pub others: RefCell<Vec<String>>,
 }
 
 impl Files {
@@ -22,6 +27,7 @@ impl Files {
             model: model.to_owned(),
             folder: folder.to_owned(),
             allow_outside: options.allow_outside,
+            others: RefCell::default(),
         }
     }
 
@@ -34,11 +40,19 @@ impl Files {
             return read_data(uri).map_err(|p| format!("the data URI cannot be decoded: {p}"));
         }
         let file = self.find(uri)?;
-        raystone_core::files::read(&file).map_err(|error| format!("{}: {error}", file.display()))
+        let bytes = raystone_core::files::read(&file);
+        let bytes = bytes.map_err(|error| format!("{}: {error}", file.display()))?;
+        match Disguise::of_text(&bytes) {
+            Some(Disguise { problem, advice }) => {
+                Err(format!("{}: {problem}; {advice}", file.display()))
+            }
+            None => Ok(bytes),
+        }
     }
 
     /// Resolves a relative URI: as the standard has it, with `%20` and the like decoded, or as
-    /// exporters write it, with backslashes, a blank or percent sign as it is, or a query behind.
+    /// exporters write it, with backslashes, a blank or percent sign as it is, or a query behind; or else the only file
+    /// whose name differs in case alone, with a note.
     ///
     /// # Errors
     /// The file lies outside the model's folder, by name or by link, and that is not allowed.
@@ -55,8 +69,17 @@ impl Files {
         let written = [&plain, uri, &slashes(&plain), &slashes(uri), &decoded(bare)];
         let files = written.map(|name| self.folder.join(name));
         let exists = |file: &&PathBuf| raystone_core::files::files().real(file).is_ok();
+        let as_written = files.iter().find(exists).cloned();
+        let in_any_case = || {
+            let other = written.iter().find_map(|name| found(&self.folder, name))?;
+            let note = format!("`{uri}` is not there: {} is read", other.display());
+            self.others.borrow_mut().push(note);
+            Some(other)
+        };
         // None exists: the name that is most likely meant, for the message.
-        let file = files.iter().find(exists).unwrap_or(&files[2]).clone();
+        let file = as_written
+            .or_else(in_any_case)
+            .unwrap_or_else(|| files[2].clone());
         if self.allow_outside {
             return Ok(file);
         }
@@ -107,7 +130,7 @@ const UNPADDED: GeneralPurposeConfig = GeneralPurposeConfig::new()
     .with_decode_padding_mode(DecodePaddingMode::RequireNone)
     .with_decode_allow_trailing_bits(true);
 
-fn decoded(uri: &str) -> String {
+pub(super) fn decoded(uri: &str) -> String {
     String::from_utf8_lossy(&decoded_bytes(uri)).into_owned()
 }
 

@@ -9,7 +9,7 @@ use super::material::{Description, Format, emitted};
 use super::texture::ImageSource;
 use super::{
     AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, MaterialSource,
-    PRINCIPLED, approximation_warning,
+    NAMES_IN_WARNING, PRINCIPLED, approximation_warning,
 };
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -66,6 +66,7 @@ pub(super) fn read<'a>(
     materials.push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
     sets.push(None);
     told.extend(warnings(document, &materials));
+    told.extend(unseen(&materials));
     let elsewhere = elsewhere.iter().map(String::as_str).collect();
     told.extend(approximation_warning(
         "textured by several sets of coordinates",
@@ -140,6 +141,28 @@ fn mask<'a>(
         factor: factor.w,
         cutoff,
     })
+}
+
+/// Names the materials of which no point is ever shown, whatever their textures say.
+fn unseen(materials: &[Material]) -> Option<String> {
+    let never = |mask: AlphaMask| match mask.cutoff {
+        Some(cutoff) => mask.factor < cutoff,
+        None => mask.factor <= 0.0,
+    };
+    let unseen = materials.iter().filter(|m| m.mask.is_some_and(never));
+    let names: Vec<&str> = unseen.map(|m| m.name.as_str()).collect();
+    let are = match names.len() {
+        0 => return None,
+        1 => "material is",
+        _ => "materials are",
+    };
+    let (count, names) = (
+        names.len(),
+        names[..names.len().min(NAMES_IN_WARNING)].join(", "),
+    );
+    Some(format!(
+        "{count} {are} wholly transparent, by the alpha of its colour, and nothing is drawn there: {names}"
+    ))
 }
 
 const METALLIC: &str = "pbrMetallicRoughness";

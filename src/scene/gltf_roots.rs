@@ -25,6 +25,13 @@ pub(super) fn roots(document: Item<'_>, nodes: &[Item<'_>], notes: &mut Notes) -
         Some(scene) => scene.list("nodes").filter_map(Item::as_index).collect(),
         None => (0..nodes.len()).collect(),
     };
+    if let Some(scene) = scenes.get(shown)
+        && listed.is_empty()
+        && !nodes.is_empty()
+    {
+        let what = "the scene to show has no nodes";
+        notes.tell(what, || scene.place("scene", shown));
+    }
     let children = |node: Item<'_>| -> Vec<usize> {
         let children = node.list("children").filter_map(Item::as_index);
         children.filter(|child| *child < nodes.len()).collect()

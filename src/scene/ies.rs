@@ -32,8 +32,8 @@ pub struct IesProfile {
     pub photometry: Photometry,
     /// Ascending, degrees.
     pub vertical: Vec<f32>,
-    /// Ascending, degrees, all around (0 to 360 for type C, −90 to 90 for A and B); a single one if
-    /// the luminaire is symmetric about its axis.
+    /// Ascending, degrees, all around (0 to 360 for type C, −90 to 90 for A and B, or as far as a beam was measured); a
+    /// single one if the luminaire is symmetric about its axis.
     pub horizontal: Vec<f32>,
     /// Candela, all vertical angles of the first horizontal angle, then of the next. The file's
     /// factors are applied (candela and ballast, and ballast-lamp until 1991).
@@ -57,7 +57,8 @@ impl IesProfile {
             file: name.clone(),
             source,
         })?;
-        // Names of makers and luminaires come in many encodings; only ASCII matters.
-        Self::parse(&name, &plain_text_or_latin1(bytes))
+        // Names of makers and luminaires come in many encodings; only ASCII matters. Zeros at the end are padding.
+        let text = plain_text_or_latin1(bytes);
+        Self::parse(&name, text.trim_end_matches('\0'))
     }
 }

@@ -11,6 +11,7 @@ mod colors;
 mod content;
 mod copies;
 mod daylight;
+mod disguise;
 mod environment;
 mod error;
 mod framing;
@@ -325,6 +326,7 @@ fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Sce
     }
     let name = variant.name.as_str();
     let path = Path::new(name);
+    disguise::check(path)?;
     match extension(path).as_str() {
         "obj" => obj::load(path, name, options),
         "gltf" | "glb" => gltf::load(path, name, options),
@@ -369,11 +371,9 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
         .read_to_end(&mut start);
     read.map_err(SceneError::unreadable(path))?;
     let text = raystone_core::text::plain_text_or_latin1(start.clone());
-    if text.starts_with("version https://git-lfs") {
-        let problem = "it is a pointer of Git LFS to the model; `git lfs pull` fetches that";
-        return Err(SceneError::malformed(path, "", problem));
-    }
-    let json = || text.trim_ascii_start().starts_with('{');
+    disguise::check(path)?;
+    let padding = |c: char| matches!(c, '\0' | '\u{feff}') || c.is_ascii_whitespace();
+    let json = || text.trim_start_matches(padding).starts_with('{');
     let xml = || text.trim_ascii_start().starts_with('<');
     let (begins_well, expected) = match extension(path).as_str() {
         // Exporters pad files with zeros at the end.

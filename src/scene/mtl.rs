@@ -1,6 +1,8 @@
 //! Material libraries (MTL) of OBJ files.
 
 use super::builder::DEFAULT_ALBEDO;
+use super::disguise::Disguise;
+use super::gltf_files::decoded;
 use super::material::{Description, Format, emitted};
 use super::mtl_statements::{self, Definition, Map};
 use super::mtl_texture::{Statement, statement};
@@ -15,6 +17,7 @@ use glam::Vec3;
 use raystone_core::files::files;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Collects the materials of all `mtllib` statements while the OBJ file is read.
@@ -63,9 +66,11 @@ impl Library {
     /// warnings.
     pub(crate) fn load(&self, names: &str) -> HashMap<String, u32> {
         let cut = without_comment(names).trim();
-        let is_there = |name: &&str| found(&self.folder, &plain(name)).is_some();
-        match [names, cut].iter().find(|name| is_there(name)) {
-            Some(name) => self.load_one(name),
+        match [names, cut]
+            .iter()
+            .find_map(|name| spelt(&[&self.folder], name))
+        {
+            Some(name) => self.load_one(&name),
             None => cut
                 .split_whitespace()
                 .flat_map(|name| self.load_one(name))
@@ -74,14 +79,21 @@ impl Library {
     }
 
     fn load_one(&self, name: &str) -> HashMap<String, u32> {
-        let named = self.folder.join(plain(name));
-        let place = place(&[&self.folder], &plain(name), &self.options);
+        let name = spelt(&[&self.folder], name).unwrap_or_else(|| plain(name));
+        let named = self.folder.join(&name);
+        let place = place(&[&self.folder], &name, &self.options);
         let mut contents = self.contents.borrow_mut();
         let path = place.as_ref().unwrap_or(&named).clone();
         if !self.loaded.borrow_mut().insert(path.clone()) {
             return HashMap::new();
         }
         let bytes = place.and_then(|path| raystone_core::files::read(&path));
+        let bytes = bytes.and_then(|bytes| match Disguise::of(&bytes) {
+            Some(Disguise { problem, advice }) => {
+                Err(std::io::Error::other(format!("{problem} ({advice})")))
+            }
+            None => Ok(bytes),
+        });
         let bytes = match bytes {
             Ok(bytes) => bytes,
             Err(error) => {
@@ -250,26 +262,23 @@ impl Contents {
         options: &LoadOptions,
         unread: &mut Unread,
     ) -> Statement {
+        // Some exporters write paths from the model's folder.
+        let folders = [folder, &self.model_folder];
         let Statement {
             file,
             place: used,
             channel,
             skipped,
-        } = statement(&map.text);
+        } = in_order(&map.text, &folders);
         for option in skipped {
             unread.see(&format!("`{option}` of a texture"), map.line);
         }
         // A comment may follow, but names contain `#`, too.
-        let [whole, cut] = [&file, without_comment(&file)].map(plain);
-        let is_cut = whole != cut && found(folder, &whole).is_none();
-        let file = match is_cut && found(folder, &cut).is_some() {
-            true => cut,
-            false => whole,
-        };
+        let spellings = [&file, without_comment(&file)];
+        let file = spellings.iter().find_map(|name| spelt(&folders, name));
+        let file = file.unwrap_or_else(|| plain(spellings[0]));
         let next = self.textures.len() as u32;
         let named = folder.join(&file);
-        // Some exporters write paths from the model's folder.
-        let folders = [folder, &self.model_folder];
         let (path, encoded) = match place(&folders, &file, options) {
             Ok(path) => (path.clone(), Encoded::File(path)),
             Err(error) => (named.clone(), Encoded::Missing(error.to_string())),
@@ -298,6 +307,31 @@ fn plain(name: &str) -> String {
     name.trim().trim_matches('"').replace('\\', "/")
 }
 
+/// The spelling of a name that a file in one of `folders` has: as it is, with blanks behind backslashes as in a shell, or
+/// with `%20` and the like as in a URI.
+fn spelt(folders: &[&Path], name: &str) -> Option<String> {
+    let as_is = plain(name);
+    let mut spellings = vec![plain(&name.replace("\\ ", " ")), decoded(&as_is)];
+    spellings.retain(|other| *other != as_is);
+    let is_there = |name: &String| folders.iter().any(|folder| found(folder, name).is_some());
+    [as_is].into_iter().chain(spellings).find(is_there)
+}
+
+/// Reads a statement; options may also stand behind the file, where that makes the name one of a file.
+fn in_order(text: &str, folders: &[&Path]) -> Statement {
+    let read = statement(text);
+    if spelt(folders, &read.file).is_some() {
+        return read;
+    }
+    match read.file.split_once(" -") {
+        Some((name, options)) if spelt(folders, name).is_some() => {
+            let before = &text[..text.len() - read.file.len()];
+            statement(&format!("{before}-{options} {name}"))
+        }
+        _ => read,
+    }
+}
+
 /// The path of a file that is named relative to the first of `folders`, or to another; or else the
 /// path of a file of its name in one of them.
 ///
@@ -319,22 +353,29 @@ fn place(folders: &[&Path], file: &str, options: &LoadOptions) -> std::io::Resul
     }
 }
 
-/// The file of this name, or else the only one whose name differs in case alone: models come from
-/// systems that ignore it.
-fn found(folder: &Path, file: &str) -> Option<PathBuf> {
+/// The file of this name, or else the only one whose name differs in case alone, as those of its folders may: models come
+/// from systems that ignore it.
+pub(super) fn found(folder: &Path, file: &str) -> Option<PathBuf> {
     let path = folder.join(file);
     let is_file = |path: &PathBuf| files().open(path).is_ok();
     if is_file(&path) {
         return Some(path);
     }
-    let name = path.file_name()?;
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut parts = Path::new(file).components();
+    let in_any_case = parts.try_fold(folder.to_owned(), |at, part| entry(&at, part.as_os_str()));
+    in_any_case.filter(is_file)
+}
+
+/// What stands in a folder under this name, or else the only thing whose name differs in case alone.
+fn entry(folder: &Path, name: &OsStr) -> Option<PathBuf> {
+    let path = folder.join(name);
+    if files().is_folder(&path) || files().open(&path).is_ok() {
+        return Some(path);
+    }
+    let parent = Some(folder).filter(|folder| !folder.as_os_str().is_empty());
     let listed = files().list(parent.unwrap_or(Path::new("."))).ok()?;
-    let is_same = |other: &&PathBuf| {
-        let other = other.file_name();
-        other.is_some_and(|other| other.eq_ignore_ascii_case(name))
-    };
-    let mut same = listed.iter().filter(is_same);
+    let names = listed.iter().filter_map(|other| other.file_name());
+    let mut same = names.filter(|other| other.eq_ignore_ascii_case(name));
     let only = same.next().filter(|_| same.next().is_none())?;
-    Some(path.with_file_name(only.file_name()?)).filter(is_file)
+    Some(folder.join(only))
 }

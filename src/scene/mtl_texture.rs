@@ -6,7 +6,7 @@ use glam::{Mat2, Vec2};
 
 /// A parsed statement such as `-s 2 2 -clamp on wall.png`.
 pub(super) struct Statement {
-    /// Path with `/` between folders.
+    /// Path as it is written.
     pub file: String,
     /// Its use, with a placeholder texture index, for coordinates with v pointing down.
     pub place: TextureUse,
@@ -25,7 +25,12 @@ pub(super) fn statement(text: &str) -> Statement {
     let mut skipped = Vec::new();
     let mut rest = text.trim();
     while rest.starts_with('-') {
-        let (option, after) = first_word(rest);
+        let (written, after) = first_word(rest);
+        let option = &*written.to_ascii_lowercase();
+        // The file, whose name may begin so, too.
+        if after.is_empty() && !OPTIONS.contains(&option) {
+            break;
+        }
         rest = after;
         let (value, _) = first_word(rest);
         // -o, -s, -t take one to three numbers, -mm two, the others one word.
@@ -62,19 +67,25 @@ pub(super) fn statement(text: &str) -> Statement {
             "-mm" if numbers == [0.0, 1.0] => {}
             "-blendu" | "-blendv" if value.eq_ignore_ascii_case("on") => {}
             "-cc" if value.eq_ignore_ascii_case("off") => {}
-            _ => skipped.push(option.to_owned()),
+            _ => skipped.push(written.to_owned()),
         }
     }
     // v' = s v + o pointing up is v' = s v + 1 - s - o pointing down.
     place.linear = Mat2::from_diagonal(scale);
     place.offset = Vec2::new(offset.x, 1.0 - scale.y - offset.y);
     Statement {
-        file: rest.replace('\\', "/"),
+        file: rest.to_owned(),
         place,
         channel,
         skipped,
     }
 }
+
+/// The options of the standard.
+const OPTIONS: [&str; 12] = [
+    "-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfchan", "-mm", "-o", "-s", "-t",
+    "-texres",
+];
 
 fn channel_of(letter: &str) -> Option<AlphaChannel> {
     Some(match letter {
@@ -101,7 +112,9 @@ mod tests {
         for (text, file) in [
             ("a b.png", "a b.png"),
             ("-s 1 1 1 -o 0 0 a.png", "a.png"),
-            ("-clamp off -mm 0 1 dir\\a.png", "dir/a.png"),
+            ("-clamp off -mm 0 1 dir\\a.png", "dir\\a.png"),
+            ("-S 1 1 1 -CLAMP off a.png", "a.png"),
+            ("-s 1 1 1 -tex.png", "-tex.png"),
             ("-s", ""),
         ] {
             let found = statement(text);
@@ -133,7 +146,6 @@ mod tests {
         ] {
             assert_eq!(statement(text).file, file);
         }
-        assert_eq!(statement("c:\\my files\\a.png").file, "c:/my files/a.png");
         assert_eq!(
             statement("-s 2 a.png").place.linear,
             Mat2::from_diagonal(Vec2::new(2.0, 1.0))

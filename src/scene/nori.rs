@@ -7,6 +7,7 @@
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
 use super::material::{emitted, reflectance};
+use super::mtl::found;
 use super::normals::of_normals;
 use super::{
     CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError,
@@ -14,8 +15,8 @@ use super::{
 };
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use raystone_core::geometry::Camera;
-use raystone_core::text::plain_text;
-use roxmltree::{Document, Node};
+use raystone_core::text::plain_text_or_latin1;
+use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 
 /// Nori's defaults: albedo of `diffuse`, roughness of `microfacet`, indices of BK7 glass and air.
@@ -39,16 +40,27 @@ pub(super) fn load(
 ) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
-        let text = plain_text(bytes).map_err(|e| {
-            SceneError::malformed(path, format!("line {}", e.line), "it is not UTF-8 text")
-        })?;
-        let document = Document::parse(&text).map_err(|e| {
+        let text = plain_text_or_latin1(bytes);
+        let with_types = ParsingOptions {
+            allow_dtd: true,
+            ..ParsingOptions::default()
+        };
+        let document = Document::parse_with_options(&text, with_types).map_err(|e| {
             SceneError::malformed(path, format!("line {}", e.pos().row), e.to_string())
         })?;
         let root = document.root_element();
         if !root.has_tag_name("scene") {
             let problem = "the root is no `<scene>`; of XML scenes only those of Nori are read";
             return Err(SceneError::malformed(path, "", problem));
+        }
+        let has = |tag: &str| root.children().any(|node| node.has_tag_name(tag));
+        if has("shape") && !has("mesh") {
+            return Err(SceneError::Unsupported {
+                path: path.to_owned(),
+                place: String::new(),
+                problem: "it is a scene of Mitsuba".to_owned(),
+                advice: "of XML scenes only those of Nori are; give its meshes as .obj, .gltf or .ply",
+            });
         }
         let mut reader = Reader {
             path,
@@ -159,20 +171,7 @@ impl Reader<'_> {
         let file = property(node, "filename")
             .filter(|file| !file.trim().is_empty())
             .ok_or_else(|| self.broken(node, "a mesh without `<string name=\"filename\" …>`"))?;
-        let relative = Path::new(file);
-        if relative.is_absolute() && !self.options.allow_outside {
-            let problem = format!("`{file}` is an absolute path, which only --allow-outside reads");
-            return Err(self.broken(node, &problem));
-        }
-        let path = self.path.with_file_name("").join(relative);
-        let plain = LoadOptions {
-            textures: false,
-            ..*self.options
-        };
-        let mesh = match super::extension(&path).as_str() {
-            "ply" => ply::load(&path, file)?,
-            _ => obj::load(&path, file, &plain)?,
-        };
+        let mesh = self.file(node, file)?;
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
         self.warn_of_others(node, &["bsdf", "emitter", "transform"], &["filename"]);
         let material = self.material(node, file)?;
@@ -204,6 +203,35 @@ impl Reader<'_> {
             self.builder.push_corners(turn([a, b, c]), uvs, normals, id);
         }
         Ok(())
+    }
+
+    /// Loads the file of a mesh, whose name may be written as on a system with backslashes that ignores case.
+    fn file(&mut self, node: Node<'_, '_>, file: &str) -> Result<SceneData, SceneError> {
+        let relative = file.trim().replace('\\', "/");
+        if Path::new(&relative).is_absolute() && !self.options.allow_outside {
+            let problem = format!("`{file}` is an absolute path, which only --allow-outside reads");
+            return Err(self.broken(node, &problem));
+        }
+        let folder = self.path.with_file_name("");
+        let named = folder.join(&relative);
+        let path = found(&folder, &relative);
+        let path = path.ok_or_else(|| self.broken(node, &format!("`{file}` is not there")))?;
+        if path != named {
+            let what = format!("`{file}` is not there; {} is read", path.display());
+            self.warn(node, &what);
+        }
+        let plain = LoadOptions {
+            textures: false,
+            ..*self.options
+        };
+        match super::extension(&path).as_str() {
+            "ply" => ply::load(&path, file),
+            "gltf" | "glb" | "stl" | "serialized" => {
+                let problem = format!("`{file}` is no mesh of Nori: it takes .obj, and .ply here");
+                Err(self.broken(node, &problem))
+            }
+            _ => obj::load(&path, file, &plain),
+        }
     }
 
     fn material(&mut self, mesh: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {

@@ -99,9 +99,7 @@ impl Model {
         for face in &faces {
             let end = first + face.corners as usize;
             let line = face.line as usize;
-            self.read
-                .check(first..end, line)
-                .map_err(|problem| (line, problem))?;
+            self.read.check(first..end, line)?;
             self.push_face(face, first..end);
             first = end;
         }
@@ -165,7 +163,19 @@ impl Model {
     /// Warns about everything drawn differently from the file.
     fn tell(&mut self) {
         let [uvs, normals] = self.read.lost;
+        let mut unused = Tally::default();
+        for (line, _) in self.read.broken.values() {
+            unused.see(*line);
+        }
         let notes = [
+            unused.note(
+                [
+                    "vertex is not three numbers",
+                    "vertices are not three numbers",
+                ],
+                "line",
+                "used by no face",
+            ),
             uvs.note(
                 [
                     "corner names a texture coordinate that does not exist",

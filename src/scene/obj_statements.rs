@@ -3,12 +3,15 @@
 use super::mtl::Library;
 use super::tally::{Tally, Unread};
 use glam::{Vec2, Vec3};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::str::{FromStr, SplitWhitespace};
 
 /// Marks a missing index of a corner.
 const NONE: u32 = u32::MAX;
+
+/// Limit on the broken vertices that wait for a face: a file with more is no model.
+const MOST_BROKEN: usize = 4096;
 
 /// Marks an index of a texture coordinate or normal that cannot exist.
 const LOST: u32 = NONE - 1;
@@ -59,6 +62,8 @@ pub(super) struct Statements {
     pub warnings: Vec<String>,
     /// Corners whose texture coordinates do not exist, and corners whose normal does not.
     pub lost: [Tally; 2],
+    /// Lines and problems of vertices that are not three numbers, by index; those that no face used yet.
+    pub broken: BTreeMap<u32, (usize, String)>,
 }
 
 #[derive(Default)]
@@ -68,6 +73,8 @@ struct Reader {
     short: Tally,
     /// Vertices, texture coordinates and normals that are not finite.
     infinite: [Tally; 3],
+    /// Libraries that define a material of an earlier one.
+    again: Tally,
     /// True while a smoothing group is on.
     is_smooth: bool,
     unread: Unread,
@@ -90,6 +97,7 @@ impl Statements {
             objects: vec!["unnamed_object".to_owned()],
             warnings: Vec::new(),
             lost: [Tally::default(); 2],
+            broken: BTreeMap::new(),
         };
         let mut reader = Reader::default();
         for (line, content) in (1..).zip(text.lines()) {
@@ -151,7 +159,7 @@ impl Statements {
                 let known = reader.material(rest);
                 self.materials.push(known.ok_or_else(|| rest.to_owned()));
             }
-            "mtllib" => reader.numbers.extend(library.load(rest)),
+            "mtllib" => reader.define(library.load(rest), line),
             "s" => {
                 let group = words.clone().next().unwrap_or("off");
                 reader.is_smooth = !matches!(group, "off" | "0");
@@ -161,7 +169,8 @@ impl Statements {
         Ok(())
     }
 
-    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha.
+    /// Reads three coordinates, with optional weight (a divisor) or colour and alpha. One that is broken is an error
+    /// once a face uses it.
     fn vertex(
         &mut self,
         reader: &mut Reader,
@@ -172,7 +181,14 @@ impl Statements {
         let ([x, y, z, w, g, b, alpha, _], count) = numbers(words.clone());
         if count < 3 {
             let odd = words.clone().nth(count);
-            return Err(odd.map_or_else(|| format!("`v` with {count} numbers"), no_number));
+            let problem = odd.map_or_else(|| format!("`v` with {count} numbers"), no_number);
+            if self.broken.len() == MOST_BROKEN {
+                return Err(problem);
+            }
+            let index = self.positions.len() as u32;
+            self.broken.insert(index, (line, problem));
+            self.positions.push(Vec3::NAN);
+            return Ok(());
         }
         let mut position = Vec3::new(x, y, z);
         match count {
@@ -228,15 +244,24 @@ impl Statements {
     /// not is as one that is not given.
     ///
     /// # Errors
-    /// The missing vertex.
-    pub(crate) fn check(&mut self, corners: Range<usize>, line: usize) -> Result<(), String> {
+    /// The missing vertex, or one that is broken, with the line.
+    pub(crate) fn check(
+        &mut self,
+        corners: Range<usize>,
+        line: usize,
+    ) -> Result<(), (usize, String)> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         for Corner(indices) in &mut self.corners[corners] {
             for (k, index) in indices.iter_mut().enumerate() {
                 let (number, count) = (u64::from(*index) + 1, counts[k]);
+                if k == 0
+                    && let Some(broken) = self.broken.remove(index)
+                {
+                    return Err(broken);
+                }
                 match *index == NONE || number <= count as u64 {
                     true => {}
-                    false if k == 0 => return Err(beyond(number as i64, count, "")),
+                    false if k == 0 => return Err((line, beyond(number as i64, count, ""))),
                     false => {
                         *index = NONE;
                         self.lost[k - 1].see(line);
@@ -285,6 +310,14 @@ impl Statements {
                 "line",
                 "the triangle's is used",
             ),
+            reader.again.note(
+                [
+                    "library defines a material of an earlier one again",
+                    "libraries define a material of an earlier one again",
+                ],
+                "line",
+                "the last definition counts from there on",
+            ),
             reader.unread.note(),
             cut_off(text),
         ];
@@ -293,6 +326,12 @@ impl Statements {
 }
 
 impl Reader {
+    fn define(&mut self, materials: HashMap<String, u32>, line: usize) {
+        let is_again = materials.keys().any(|name| self.numbers.contains_key(name));
+        self.again.see_if(is_again, line);
+        self.numbers.extend(materials);
+    }
+
     /// The material of this name; a comment may follow.
     fn material(&self, name: &str) -> Option<u32> {
         let known = |name: &str| self.numbers.get(name).copied();

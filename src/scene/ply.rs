@@ -99,6 +99,9 @@ impl Model {
         }
         for (k, element) in elements.iter().enumerate() {
             let is_read = read.contains(&Some(k));
+            if Some(k) <= last && element.count > 0 {
+                check_types(element, header.encoding)?;
+            }
             if is_read {
                 check_size(element, header.encoding, bytes)?;
             }
@@ -388,6 +391,15 @@ fn each<S: BufRead>(
         })?;
     }
     Ok(())
+}
+
+/// Refuses elements with values of a type that is none of PLY's, behind which nothing can be found.
+fn check_types(element: &Element, encoding: Encoding) -> Result<(), Problem> {
+    let Some(Property { name, line, .. }) = element.unknown(encoding) else {
+        return Ok(());
+    };
+    let problem = format!("the type of `{name}` is none of PLY");
+    Err((format!("header, line {line}"), problem))
 }
 
 /// Refuses elements that cannot fit into a file of `bytes` bytes, before memory is reserved.

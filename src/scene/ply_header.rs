@@ -88,6 +88,15 @@ impl Element {
         let each: u64 = self.properties.iter().map(least).sum();
         each.saturating_mul(self.count)
     }
+
+    /// The first property whose values cannot be told apart.
+    pub(crate) fn unknown(&self, encoding: Encoding) -> Option<&Property> {
+        let is_unknown = |p: &&Property| [Some(p.kind), p.length].contains(&Some(Kind::Unknown));
+        let mut properties = self.properties.iter();
+        properties
+            .find(is_unknown)
+            .filter(|_| encoding != Encoding::Text)
+    }
 }
 
 /// A header.
@@ -145,15 +154,7 @@ impl Header {
         }
         let none = || (1, "the header has no line `format`".to_owned());
         header.encoding = encoding.ok_or_else(none)?;
-        let unknown = |p: &&Property| p.kind == Kind::Unknown || p.length == Some(Kind::Unknown);
-        let mut properties = header.elements.iter().flat_map(|e| &e.properties);
-        match properties.find(unknown) {
-            Some(property) if header.encoding != Encoding::Text => Err((
-                header.lines,
-                format!("the type of `{}` is none of PLY", property.name),
-            )),
-            _ => Ok(header),
-        }
+        Ok(header)
     }
 
     fn statement(&mut self, text: &str) -> Result<(), String> {

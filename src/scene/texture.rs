@@ -1,5 +1,6 @@
 //! Decodes all textures of a scene in parallel.
 
+use super::disguise::Disguise;
 use super::reduce::{Texels, encode, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::error::UnsupportedErrorKind;
@@ -168,6 +169,12 @@ fn reader<'a>(name: &str, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]
 
 /// The size of an image, refused before allocation if its bytes cannot hold so many texels.
 fn checked_size(name: &str, bytes: &[u8]) -> Result<Size, String> {
+    if bytes.is_empty() {
+        return Err("the file is empty".to_owned());
+    }
+    if let Some(Disguise { problem, advice }) = Disguise::of(bytes) {
+        return Err(format!("{problem} ({advice})"));
+    }
     let (width, height) = reader(name, bytes)?.into_dimensions().map_err(said)?;
     let needed = 4 * u64::from(width) * u64::from(height);
     let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);

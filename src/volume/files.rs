@@ -71,6 +71,15 @@ fn from_vol(bytes: &[u8]) -> Result<Grid, String> {
         u32::try_from(n).map_err(|_| format!("{n} voxels along an axis"))
     };
     let resolution = [axis(8)?, axis(12)?, axis(16)?];
+    let each = match kind {
+        1 => 4,
+        2 => 2,
+        _ => 1,
+    };
+    if data.len() % each != 0 {
+        let length = data.len();
+        return Err(format!("{length} bytes of values of {each} bytes each"));
+    }
     let values: Vec<f32> = match kind {
         1 => (data.as_chunks().0.iter())
             .map(|b| f32::from_le_bytes(*b))
@@ -169,6 +178,7 @@ mod tests {
             (vol(1, 3, data), "3 channels"),
             (vol(4, 1, data), "type 4"),
             (vol(1, 1, &data[..20]), "5 values"),
+            (vol(1, 1, &data[..23]), "23 bytes"),
             // 2^64 voxels.
             (vol_of([1 << 22, 1 << 22, 1 << 20], 1, 1, &[]), "0 values"),
             (vol_of([-1, 1, 1], 1, 1, data), "-1 voxels"),

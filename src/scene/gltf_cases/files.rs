@@ -79,6 +79,20 @@ fn files_are_found_as_exporters_name_them() {
     ] {
         case("a file").beside(name, uri).load().whole(2);
     }
+    case("a file in another case")
+        .beside("Data.BIN", "data.bin")
+        .load()
+        .but(2, &["`data.bin` is not there: ", "Data.BIN is read"]);
+    let pointer = b"version https://git-lfs.github.com/spec/v1\n".to_vec();
+    case("a pointer to a file")
+        .file("quad.bin", pointer)
+        .set("/buffers/0/uri", json!("quad.bin"))
+        .load()
+        .fails(&[
+            "mesh 0",
+            "quad.bin: it is a pointer of Git LFS",
+            "git lfs pull",
+        ]);
     let of = |uri: &str| case("no file").set("/buffers/0/uri", json!(uri)).load();
     of("data\\quad.bin").fails(&["buffer 0", "data/quad.bin"]);
     of("..\\quad.bin").fails(&["buffer 0", "outside the model's folder"]);

@@ -254,6 +254,22 @@ fn surfaces_that_are_drawn_otherwise_are_named() {
         .material(json!({"name": "veil", "alphaMode": "BLEND"}))
         .load()
         .whole(2);
+    for (name, material) in [
+        (
+            "blended away",
+            json!({"name": "air", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0]}}),
+        ),
+        (
+            "cut away",
+            json!({"name": "air", "alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.4]}}),
+        ),
+    ] {
+        let told = [
+            "1 material is wholly transparent",
+            "nothing is drawn there: air",
+        ];
+        case(name).material(material).load().but(2, &told);
+    }
     case("specular and gloss")
         .material(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness":
             {"diffuseFactor": [0.1, 0.2, 0.3, 1], "specularFactor": [0, 0, 0]}}}))

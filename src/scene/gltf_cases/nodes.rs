@@ -49,7 +49,7 @@ fn a_scene_begins_somewhere() {
     case("an empty scene")
         .set("/scenes/0/nodes", json!([]))
         .load()
-        .fails(&["no triangles"]);
+        .fails(&["no triangles", "the scene to show has no nodes (scene 0)"]);
     two("a root that is not there")
         .set("/scenes/0/nodes", json!([0, 9]))
         .load()
@@ -465,4 +465,12 @@ fn extensions_that_are_not_read_refuse_nothing_and_are_named() {
         .set("/meshes/0/name", json!(null))
         .load()
         .whole(2);
+}
+
+#[test]
+fn meshes_that_no_node_shows_are_named() {
+    case("meshes without nodes")
+        .set("/nodes/0", json!({}))
+        .load()
+        .fails(&["no triangles", "no node shows one (mesh 0 `square`)"]);
 }

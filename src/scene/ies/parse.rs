@@ -267,6 +267,12 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
             "{file}, line {third_line}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
         ));
     }
+    if candela.iter().all(|candela| *candela == 0.0) {
+        let line = numbers.line();
+        warnings.push(format!(
+            "{file}, line {line}: all candela values are 0: the luminaire gives no light"
+        ));
+    }
     if let Some((line, word)) = numbers.words.get(numbers.next) {
         warnings.push(format!(
             "{file}, line {line}: `{word}` and what follows stands behind the last candela value and is not read"
@@ -315,9 +321,10 @@ fn check_vertical(photometry: Photometry, angles: &[f32]) -> Result<(), String> 
     let (first, last) = (angles[0], angles[angles.len() - 1]);
     let (starts, ends): (&[f32], &[f32]) = match photometry {
         Photometry::C => (&[0.0, 90.0], &[90.0, 180.0]),
-        _ => (&[-90.0, 0.0], &[90.0]),
+        _ => (&[-90.0, 0.0, -last], &[90.0]),
     };
     // In practice, files of luminaires that shine only slightly upwards are truncated.
+    // Beams of floodlights are, too.
     let fits = starts.iter().any(|s| is(*s, first)) && last <= ends[ends.len() - 1] + SAME;
     if fits && last > first {
         Ok(())

@@ -13,8 +13,10 @@ impl IesProfile {
         let unknown =
             || format!("horizontal angles from {first} to {last} are none of the standard");
         if self.photometry != Photometry::C {
-            return match is(last, 90.0) {
-                true if is(first, -90.0) => Ok(()),
+            // Narrow beams are measured as far as they go.
+            let is_known = last > 0.0 && last <= 90.0 + SAME;
+            return match is_known {
+                true if is(first, -last) => Ok(()),
                 true if is(first, 0.0) => {
                     self.mirror(0.0);
                     Ok(())

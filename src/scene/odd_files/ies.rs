@@ -68,6 +68,21 @@ const IES: &[(&str, Outcome, &str)] = &[
         "line 3: the luminous opening of 1.5 × 2 × 0 feet",
     ),
     (
+        "IESNA91\nTILT=NONE\n1 -1 1 3 2 2 2 0 0 0\n1 1 0\n-50 0 50\n0 50\n10 90 10 0 50 0\n\0\0",
+        Ok([90.0, 54.0, 18.0]),
+        "",
+    ),
+    (
+        "IESNA91\nTILT=NONE\n1 -1 1 3 3 3 2 0 0 0\n1 1 0\n-20 0 20\n-20 0 20\n0 50 0 0 90 0 0 50 0\n",
+        Ok([90.0, 0.0, 0.0]),
+        "",
+    ),
+    (
+        "IESNA91\nTILT=NONE\n1 1000 1 3 1 1 2 0 0 0\n1 1 40\n0 45 90\n0\n0 0 0\n",
+        Ok([0.0, 0.0, 0.0]),
+        "line 7: all candela values are 0",
+    ),
+    (
         "IESNA91\n1 1000 1 3 1 1 2 0 0 0\n",
         Err("there is no line `TILT=`"),
         "",

@@ -1,5 +1,6 @@
 //! Files as programs write them, with what is read of each and what is said about the rest.
 
+mod disguise;
 mod ies;
 mod nori;
 mod obj;

@@ -80,3 +80,37 @@ fn nori_files_as_found_are_read() {
         check(&text, load_files(&files), expected);
     }
 }
+
+#[test]
+fn meshes_are_found_as_other_systems_write_them() {
+    for (file, notes) in [
+        ("parts\\m.obj", &[][..]),
+        (" parts/m.obj", &[]),
+        ("Parts\\M.OBJ", &["line 2: `Parts\\M.OBJ` is not there; "]),
+        ("parts/M.obj", &["line 2: `parts/M.obj` is not there; "]),
+    ] {
+        let text = format!(
+            "<!DOCTYPE scene>\n<scene><mesh type=\"obj\"><string name=\"filename\" value=\"{file}\"/></mesh></scene>\n<!-- M\u{fc}ller -->"
+        );
+        let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        for text in [text.as_bytes(), &latin1] {
+            let result = load_files(&[("a.xml", text), ("parts/m.obj", MESH)]);
+            check(file, result, &Reads(".", notes));
+        }
+    }
+    let glb =
+        "<scene>\n<mesh type=\"obj\"><string name=\"filename\" value=\"m.glb\"/></mesh></scene>";
+    let files: [(&str, &[u8]); 2] = [("a.xml", glb.as_bytes()), ("m.glb", MESH)];
+    let fails = Fails(&["line 2", "`m.glb` is no mesh of Nori"]);
+    check("glb", load_files(&files), &fails);
+}
+
+#[test]
+fn scenes_of_mitsuba_are_told_from_those_of_nori() {
+    let text = b"<scene version=\"3.0.0\">\n<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape></scene>";
+    let fails = Fails(&[
+        "a scene of Mitsuba, which is not read",
+        "give its meshes as",
+    ]);
+    check("mitsuba", load_files(&[("a.xml", text)]), &fails);
+}

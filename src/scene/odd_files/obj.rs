@@ -182,6 +182,17 @@ const OBJ: &[(&str, Outcome)] = &[
         "v nan 0 0\nf 1 2 5\n",
         Fails(&["all 1 have a NaN", "1 vertex is not finite (line 5)"]),
     ),
+    (
+        "v 1 2\nv 1 x 2\nf 1 2 3\n",
+        Reads(
+            ".",
+            &["2 vertices are not three numbers (first: line 5): used by no face"],
+        ),
+    ),
+    (
+        "v 1 2\nv 1 x 2\nf 1 2 6\n",
+        Fails(&["line 6", "`x` is not a number"]),
+    ),
     ("f 1 2 9\n", Fails(&["line 5", "vertex 9, but there are 4"])),
     (
         "v 0,5 0 0\nf 1 2 5\n",
@@ -267,9 +278,22 @@ const MTL: &[(&str, Outcome)] = &[
         "newmtl a\nKd 1 0 0\nmap_Kd -bm 1 -s 1 1 1 -mm 0 1 sub\\t 1.png",
         Reads("r", &[]),
     ),
+    ("newmtl a\nKd 1 0 0\nmap_Kd sub\\t\\ 1.png", Reads("r", &[])),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd -S 2 2 2 -Clamp ON sub/t%201.png",
+        Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd -clamp on t.png -s 2 2 -blendu off",
+        Reads("r", &["`-blendu` of a texture (line 3)"]),
+    ),
     (
         "newmtl a\nKd 1 0 0\nmap_Kd \"sub/t 1.png\" # bricks",
         Reads("r", &[]),
+    ),
+    (
+        "newmtl a\nKd 1 0 0\nmap_Kd SUB\\T 1.PNG",
+        Reads("r", &["1 texture is not where it should be (line 3)"]),
     ),
     (
         "newmtl a\nKd 1 0 0\nmap_Kd D:\\maps\\t.png\nmap_d /maps/t.png",
@@ -381,4 +405,36 @@ fn several_libraries_stand_in_a_line_and_a_name_with_a_blank_goes_first() {
         b"newmtl red\nKd 0 1 0\nnewmtl blue\nKd 0 1 0\n",
     ));
     check("one", load_files(&files), &Reads("gg", &[]));
+}
+
+#[test]
+fn a_blank_in_the_name_of_a_library_may_be_written_in_three_ways() {
+    for name in [
+        "my m.mtl",
+        "my\\ m.mtl",
+        "my%20m.mtl",
+        "./my m.mtl",
+        ".\\my m.mtl",
+    ] {
+        let model = format!("mtllib {name}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl red\nf 1 2 3\n");
+        let files: [(&str, &[u8]); 2] = [
+            ("a.obj", model.as_bytes()),
+            ("my m.mtl", RED_AND_BLUE.as_bytes()),
+        ];
+        check(name, load_files(&files), &Reads("r", &[]));
+    }
+}
+
+#[test]
+fn a_material_of_two_libraries_is_that_of_the_last() {
+    let model = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\nf 1 2 3\nmtllib b.mtl\nusemtl red\nf 1 3 4\n";
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", model),
+        ("m.mtl", RED_AND_BLUE.as_bytes()),
+        ("b.mtl", b"newmtl red\nKd 0 1 0\n"),
+    ];
+    let note = &[
+        "1 library defines a material of an earlier one again (line 8): the last definition counts from there on",
+    ];
+    check("two", load_files(&files), &Reads("rg", note));
 }

@@ -299,6 +299,33 @@ fn binary_ply_files_have_any_types_and_orders_and_line_ends() {
             &Reads("rr", &["the rest behind the last element"]),
         );
     }
+    let square = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let axes = "property float x\nproperty float y\nproperty float z\n";
+    let of = |before: &str, behind: &str| {
+        let list = "property list uchar uchar vertex_indices\n";
+        let header = format!(
+            "ply\nformat binary_little_endian 1.0\n{before}element vertex 3\n{axes}element face 1\n{list}{behind}end_header\n"
+        );
+        let bytes = [
+            header.as_bytes(),
+            square.as_flattened(),
+            &[3, 0, 1, 2],
+            b"text",
+        ]
+        .concat();
+        load_files(&[("a.ply", &bytes)])
+    };
+    let named = "element name COUNT\nproperty string s\n";
+    let behind = Reads(".", &["the element `name` (line 9)"]);
+    check("behind", of("", &named.replace("COUNT", "1")), &behind);
+    let unused = of(&named.replace("COUNT", "0"), "");
+    check(
+        "none",
+        unused,
+        &Reads(".", &["the rest behind the last element"]),
+    );
+    let before = Fails(&["header, line 4", "the type of `s` is none of PLY"]);
+    check("before", of(&named.replace("COUNT", "1"), ""), &before);
     let odd =
         b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty string s\nend_header\n";
     let fails = Fails(&["the type of `s` is none of PLY"]);
