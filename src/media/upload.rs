@@ -13,7 +13,8 @@ pub(crate) fn bindings(of: &Medium, gpu: &Gpu) -> Result<Bindings, GpuError> {
         .u32("levels", of.levels)
         .vec("spans", &of.spans.to_array())
         .u32("empty", of.empty)
-        .u32("entries", of.index.len() as u32);
+        .u32("entries", of.index.len() as u32)
+        .u32("top", of.top);
     let index: &[u32] = if of.index.is_empty() { &[0] } else { &of.index };
     let mut bindings = Bindings::new();
     bindings

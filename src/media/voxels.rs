@@ -228,11 +228,25 @@ pub fn coverage(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Vec<f32>, VoxelErro
         return Err(VoxelError::Side(side));
     }
     mesh.check()?;
-    covered(gpu, mesh, side)
+    covered(gpu, mesh, side, Counted::Border)
+}
+
+/// Voxels whose cells are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Counted {
+    /// Those that a triangle comes near: all cells of any other are like its first.
+    Border,
+    /// All of them, though a mesh does not ask for it.
+    All,
 }
 
 /// The same of a mesh whose edges nobody looked at: an open one shows by columns that are crossed an odd number of times, if it does.
-pub(crate) fn covered(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Vec<f32>, VoxelError> {
+pub(crate) fn covered(
+    gpu: &Gpu,
+    mesh: &Mesh,
+    side: u32,
+    counted: Counted,
+) -> Result<Vec<f32>, VoxelError> {
     let fine = side * CELLS;
     let (corners, rows) = rows_of(mesh, fine);
     if rows.is_empty() {
@@ -260,6 +274,9 @@ pub(crate) fn covered(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Vec<f32>, Vox
         .buffer("odd", &odd)
         .buffer("tally", &tally)
         .buffer("covered", &found);
+    if counted == Counted::Border {
+        bindings.buffer("border", &gpu.storage("border", &border_of(mesh, side))?);
+    }
     let mut recording = Recording::new();
     let passes = [
         ("flip", rows.len() as u32),
@@ -267,7 +284,8 @@ pub(crate) fn covered(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Vec<f32>, Vox
         ("cover", side.pow(3)),
     ];
     for (name, count) in passes {
-        let kernel = Composition::new(&format!("media/voxels/{name}"));
+        let kernel = Composition::new(&format!("media/voxels/{name}"))
+            .feature("border", counted == Counted::Border);
         recording.run(
             name,
             &gpu.pipeline(&kernel, true)?,
@@ -317,4 +335,44 @@ fn rows_of(mesh: &Mesh, fine: u32) -> (Vec<[[i32; 4]; 3]>, Vec<[u32; 2]>) {
         rows.extend((low as u32..=(high as u32).min(fine - 1)).map(|row| [index, row]));
     }
     (corners, rows)
+}
+
+/// How much more of a triangle's surroundings counts as near than the rounding of its corners moves it, in voxels.
+const MARGIN: f64 = 1.0 / 32.0;
+
+/// A bit for each of `side`³ voxels, x fastest: whether a triangle comes near it. In each column of voxels along z those between the
+/// planes beside the triangle's, within its box.
+pub(crate) fn border_of(mesh: &Mesh, side: u32) -> Vec<u32> {
+    let mut bits = vec![0_u32; side.pow(3).div_ceil(32) as usize];
+    let reach = 0.5 + MARGIN;
+    let voxel = |x: f64| (x.floor().max(0.0) as u32).min(side - 1);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = mesh.corners(*triangle).map(|p| p * f64::from(side));
+        let [low, high] = [a.min(b).min(c) - MARGIN, a.max(b).max(c) + MARGIN];
+        let normal = (b - a).cross(c - a);
+        let wide = reach * (normal.x.abs() + normal.y.abs());
+        for y in voxel(low.y)..=voxel(high.y) {
+            for x in voxel(low.x)..=voxel(high.x) {
+                let beside = DVec2::new(f64::from(x) + 0.5 - a.x, f64::from(y) + 0.5 - a.y);
+                let off = normal.x * beside.x + normal.y * beside.y;
+                // Heights at which the plane meets the column.
+                let span = if normal.z != 0.0 {
+                    let [middle, half] = [a.z - off / normal.z, wide / normal.z.abs() + MARGIN];
+                    [(middle - half).max(low.z), (middle + half).min(high.z)]
+                } else if off.abs() <= wide {
+                    [low.z, high.z]
+                } else {
+                    continue;
+                };
+                if span[0] > span[1] {
+                    continue;
+                }
+                for z in voxel(span[0])..=voxel(span[1]) {
+                    let place = x + side * (y + side * z);
+                    bits[(place / 32) as usize] |= 1 << (place % 32);
+                }
+            }
+        }
+    }
+    bits
 }

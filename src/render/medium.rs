@@ -67,6 +67,7 @@ impl MediumTables {
             .vec("spans", &medium.spans.to_array())
             .u32("empty", medium.empty)
             .u32("entries", medium.index.len() as u32)
+            .u32("top", medium.top)
             .u32("first_field", field)
             .u32("first_pair", pair)
             .u32("first_index", index);

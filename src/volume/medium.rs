@@ -84,6 +84,8 @@ pub struct Medium {
     pub resolution: UVec3,
     /// The longest axis has at most 2^levels voxels.
     pub levels: u32,
+    /// The highest level of cubes that the structure asks for.
+    pub top: u32,
     /// What n and σ may differ by in a homogeneous box.
     pub spans: Vec2,
     /// 1 if such a box also has n = 1 and σ = 0.
@@ -138,6 +140,7 @@ impl Medium {
         let mut medium = Self {
             resolution,
             levels: resolution.max_element().next_power_of_two().ilog2(),
+            top: 0,
             spans: Vec2::new(n, sigma),
             empty: u32::from(homogeneity.key == Key::Empty),
             field,
@@ -152,6 +155,7 @@ impl Medium {
         let parts = medium.structure.parts(&medium);
         medium.pairs = parts.pairs.iter().map(|pair| pair.packed()).collect();
         medium.index = parts.index;
+        medium.top = parts.top;
         medium.build_ms = start.elapsed().as_secs_f64() * 1e3;
         medium
     }

@@ -10,7 +10,7 @@ use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, 
 use raystone_bench::timing::{Measured, Samples};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
-use raystone_core::params::{Parameters as _, Variant};
+use raystone_core::params::{Entry, ParamValue, Parameters as _, Params, Variant};
 use raystone_gpu::{Elapsed, GpuError, probe_arithmetic};
 use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
@@ -37,6 +37,8 @@ parameters! {
         side: u32 = 64, in 8..=512;
         /// rays, half of them hard
         rays: u32 = 16384, in 64..=1 << 20;
+        /// true to keep levels in which no cube is homogeneous, of structures with a pyramid
+        general_levels: bool = false;
         homogeneity: Homogeneity;
     }
 }
@@ -104,6 +106,8 @@ static FIGURES: [Figure; 6] = [
     ),
 ];
 
+/// The parameter of structures that keep all levels of a pyramid.
+const WHOLE: &str = "whole";
 /// Voxels whose answers are compared with the field, about.
 const CHECKED_VOXELS: usize = 4096;
 /// Rays whose answers are compared with the scalar twin, to the bit.
@@ -180,6 +184,22 @@ impl Load {
     fn of(variant: &Variant) -> Self {
         Self::from_checked(&variant.params)
     }
+
+    /// Parameters of the structure itself.
+    fn of_structure(&self, entry: &Entry) -> Result<Params, Absent> {
+        let mut params = Params::default();
+        if self.general_levels {
+            if entry.schema.iter().all(|parameter| parameter.name != WHOLE) {
+                let name = &entry.name;
+                return Err(Absent::Refused(format!(
+                    "`{name}` has no pyramid whose levels could be left out or kept"
+                )));
+            }
+            let whole = (WHOLE.to_owned(), ParamValue::Flag(true));
+            params.0.extend([whole]);
+        }
+        Ok(params)
+    }
 }
 
 /// A structure on the device that passed its checks.
@@ -197,11 +217,11 @@ impl Ready {
         let gpu = at.gpu(cell)?;
         let registry = structure::registry();
         let kind = name_of(cell).and_then(|name| registry.find(name));
-        let made = kind.map(|kind| kind.make(&Default::default()));
-        let structure = match made {
-            Some(Ok(structure)) => structure,
-            _ => return Err(Absent::Failed("there is no such structure".to_owned())),
+        let Some(kind) = kind else {
+            return Err(Absent::Failed("there is no such structure".to_owned()));
         };
+        let made = kind.make(&load.of_structure(&kind.entry)?);
+        let structure = made.map_err(|error| Absent::Failed(error.to_string()))?;
         let medium = Medium::new(volume, structure, load.homogeneity);
         (medium.validate((medium.field.len() / CHECKED_VOXELS) | 1)).map_err(failed)?;
         let seed = u64::from(at.experiment.run.seed);

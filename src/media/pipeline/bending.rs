@@ -4,7 +4,8 @@ use super::PipelineError;
 use crate::march::{March, Scheme};
 use crate::optics::Optical;
 use crate::{Medium, Volume};
-use raystone_gpu::{Bindings, Composition, Gpu, GpuError};
+use glam::Vec3;
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, UniformValues};
 
 /// How far beyond the border of a region a step ends, in voxels.
 pub(crate) const NUDGE: f32 = 1e-3;
@@ -57,6 +58,36 @@ impl Bending {
         self.optical.bind(gpu, bindings, self.voxel)?;
         bindings.uniform("march", self.march.values());
         Ok(())
+    }
+}
+
+/// A surface of one index in a medium that bends light, as a mirror of a part of it: once along a ray of the view, where it enters what
+/// is denser, that part is light of a sky (Pfeuti 2009, §3.7). Photons do not see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mirror {
+    /// n of the surface.
+    pub index: f32,
+    /// The part of light that it reflects, 0 to 1.
+    pub part: f32,
+    /// Radiance of the zenith; that of other directions falls with the cosine from it, and there is none below.
+    pub zenith: Vec3,
+}
+
+impl Mirror {
+    /// A surface that is none.
+    pub(super) const NONE: Self = Self {
+        index: 1.0,
+        part: 0.0,
+        zenith: Vec3::ZERO,
+    };
+
+    /// Adds what kernels read of it.
+    pub(super) fn bind(&self, bindings: &mut Bindings) {
+        let values = UniformValues::new()
+            .f32("index", self.index)
+            .f32("part", self.part)
+            .vec("zenith", &self.zenith.to_array());
+        bindings.uniform("mirror", values);
     }
 }
 

@@ -67,6 +67,24 @@ impl Pipeline {
             .collect())
     }
 
+    /// Additions to sums of voxels and cells when photons last ran: those of photons, and those of pilots. A deposit adds to three sums,
+    /// and to three more where directions are asked for; a photon that is counted in a voxel to two, a pilot in a cell to five.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn additions(&self) -> Result<[u64; 2], PipelineError> {
+        let Some(grid) = &self.grid else {
+            return Ok([0; 2]);
+        };
+        let sums = if self.is_directed() { 6 } else { 3 };
+        let visits: u64 = self.counts()?.iter().map(|(n, _)| u64::from(*n)).sum();
+        let of_pilots = grid.pilots.as_ref().map_or(0, |pilots| {
+            let cells: u64 = pilots.cells.iter().map(|cell| u64::from(cell.count)).sum();
+            6 * pilots.deposits + 5 * cells
+        });
+        Ok([sums * grid.tallies.deposits + 2 * visits, of_pilots])
+    }
+
     fn words_of(&self, grid: &Storage) -> Result<Vec<Sums>, PipelineError> {
         let words: Vec<[f32; 8]> = self.downloaded(grid)?;
         let sums = words

@@ -58,6 +58,8 @@ pub(super) struct Through<'a> {
     pub(super) bending: Option<&'a Bending>,
     /// True to read σ where it is known to be the same, too.
     pub(super) general: bool,
+    /// True to cross voxels at once from which nothing is scattered and which no view reads, where ways are straight.
+    pub(super) crosses: bool,
     /// All points of the light, to have those whose photons miss the medium in the list, too.
     pub(super) missed: Option<&'a [([f64; 2], f64)]>,
 }
@@ -90,6 +92,7 @@ impl Marched {
             medium,
             bending,
             general,
+            crosses,
             missed,
         } = through;
         let brightest = photons.iter().map(|p| p.energy.max_element());
@@ -138,6 +141,7 @@ impl Marched {
         let mut kernel = kernel("photons", bending)
             .with("structure", medium.structure.module())
             .feature("coarse", cells > 0)
+            .feature("cross_empty", crosses && bending.is_none())
             .feature("general", general);
         let mut passes = Recording::new();
         passes.clear(&status);

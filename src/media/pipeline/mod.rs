@@ -9,6 +9,7 @@ mod marched;
 pub(crate) mod oracle;
 pub(crate) mod ways;
 
+pub use bending::Mirror;
 pub use light::{Photon, Source, photons};
 
 use crate::adaptive::{Adaptive, Filter, Pilots, Smoother, Smoothing, importance};
@@ -77,6 +78,7 @@ struct Grid {
 /// What pilots leave for photons.
 struct Piloted {
     photons: Vec<Photon>,
+    deposits: u64,
     cells: Vec<Pilots>,
     map: ImportanceMap,
     passes: Recording,
@@ -103,6 +105,11 @@ pub struct Generality {
     pub empty: bool,
     /// Photons that miss the medium are in the list as well, where ways are straight.
     pub missed: bool,
+    /// Photons leave energy in voxels that no view reads, too, where ways are straight and nothing is smoothed: those from which, and from
+    /// whose neighbours, nothing is scattered.
+    pub unread: bool,
+    /// The view looks for a mirror where there is none, where ways are curved.
+    pub mirror: bool,
     /// Directions of light are summed where the phase function is isotropic, and so does not ask for them.
     pub directions: bool,
 }
@@ -134,6 +141,7 @@ pub struct Pipeline {
     adaptive: Option<Adaptive>,
     smoothing: Smoothing,
     generality: Generality,
+    mirror: Option<Mirror>,
     view: Vec<ViewRay>,
     grid: Option<Grid>,
     view_passes: Recording,
@@ -182,8 +190,10 @@ impl Pipeline {
             smoothing: Smoothing::default(),
             generality: Generality {
                 directions: true,
+                unread: true,
                 ..Generality::default()
             },
+            mirror: None,
             view: Vec::new(),
             grid: None,
             view_passes: Recording::new(),
@@ -218,7 +228,7 @@ impl Pipeline {
     }
 
     /// What is done though the medium does not ask for it. Photons run again. Before, directions are summed whatever the phase function
-    /// is, so that another one needs the view alone.
+    /// is, so that another one needs the view alone, and all voxels have their sums.
     ///
     /// # Errors
     /// Ways are to be curved, and voxels are no cubes.
@@ -232,6 +242,12 @@ impl Pipeline {
     /// Whether photons leave directions, which a phase function that is not isotropic asks for.
     pub fn is_directed(&self) -> bool {
         self.generality.directions || self.volume.phase.kind != phase::ISOTROPIC
+    }
+
+    /// Whether voxels that no view reads may lack their sums.
+    pub fn leaves_unread(&self) -> bool {
+        let straight = self.bending.is_none() && self.smoothing.filter == Filter::None;
+        straight && !self.generality.unread
     }
 
     /// Another medium, in which photons run again; rays of the view are those of the old box, so it needs a new one.
@@ -257,6 +273,12 @@ impl Pipeline {
         } else {
             Dirty::View
         });
+    }
+
+    /// A mirror in a medium that bends light: the view runs again. In others there is none.
+    pub fn set_mirror(&mut self, mirror: Option<Mirror>) {
+        self.mirror = mirror;
+        self.touch(Dirty::View);
     }
 
     /// Rays of a view: origins and directions of length 1.
@@ -369,6 +391,7 @@ impl Pipeline {
             ..self.adding
         };
         let through = Through {
+            crosses: self.leaves_unread(),
             missed: (self.generality.missed && self.bending.is_none()).then_some(&points),
             ..self.through()
         };
@@ -394,6 +417,7 @@ impl Pipeline {
             medium: &self.medium,
             bending: self.bending.as_ref(),
             general: self.generality.extinction,
+            crosses: false,
             missed: None,
         }
     }
@@ -425,7 +449,7 @@ impl Pipeline {
         let gpu = self.player.gpu();
         let marched = Marched::record(gpu, self.through(), adding, &photons, counting)?;
         let played = self.play(&marched.passes, passes)?;
-        marched.scatter.checked(marched.scatter.tallies(&played)?)?;
+        let tallies = marched.scatter.checked(marched.scatter.tallies(&played)?)?;
         let radiance: Vec<[f32; 8]> = self.downloaded(&marched.scatter.radiance)?;
         let counts: Vec<[u32; 5]> = match &marched.counts {
             Some(counts) => self.downloaded(counts)?,
@@ -441,6 +465,7 @@ impl Pipeline {
         let map = importance(adaptive, &cells).map_err(PipelineError::Importance)?;
         Ok(Piloted {
             photons,
+            deposits: tallies.deposits,
             cells,
             map,
             passes: marched.passes,
@@ -500,12 +525,15 @@ impl Pipeline {
             .buffer("radiance", grid.gathered())
             .buffer("image", &image)
             .buffer("status", &status);
+        let is_mirrored = self.mirror.is_some() || self.generality.mirror;
         if let Some(bending) = &self.bending {
             bending.bind(&gpu, &mut bindings)?;
+            self.mirror.unwrap_or(Mirror::NONE).bind(&mut bindings);
         }
         let kernel = bending::kernel("gather", self.bending.as_ref())
             .with("structure", self.medium.structure.module())
             .feature("general", self.generality.extinction)
+            .feature("mirror", is_mirrored && self.bending.is_some())
             .feature("step_empty", self.generality.empty);
         let mut recording = Recording::new();
         recording

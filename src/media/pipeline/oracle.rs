@@ -74,6 +74,8 @@ struct Leg {
     span: [f64; 2],
     /// Its direction in the world.
     direction: DVec3,
+    /// v where it begins.
+    v: DVec3,
 }
 
 /// The legs of a way from a place in the grid along a unit direction, if it is curved.
@@ -83,6 +85,7 @@ fn curved(medium: &Medium, ways: &Ways, origin: DVec3, direction: DVec3) -> Vec<
         line: (chord.from, raised(chord.direction / side)),
         span: [0.0, (chord.to - chord.from).length() * side],
         direction: chord.direction,
+        v: chord.v,
     };
     ways.way(origin, direction).into_iter().map(leg).collect()
 }
@@ -97,6 +100,7 @@ fn legs_of(medium: &Medium, ways: Option<&Ways>, photon: &Photon) -> Vec<Leg> {
             line: (origin, of.direction.as_dvec3()),
             span: [photon.ray.from, photon.ray.to].map(f64::from),
             direction,
+            v: direction,
         }],
     }
 }
@@ -189,6 +193,8 @@ pub(crate) struct Left {
     pub(crate) slack: Vec<f64>,
     /// Deposits in each voxel.
     pub(crate) counts: Vec<u32>,
+    /// Deposits in voxels that were not looked at.
+    pub(crate) unread: u32,
     /// How often a photon came into each voxel.
     pub(crate) visits: Vec<u32>,
     /// The sum of these photons' weights.
@@ -243,6 +249,7 @@ pub(crate) fn left_by(fields: &Fields, ways: Option<&Ways>, photons: &[Photon]) 
         sums: vec![[0.0; 6]; count],
         slack: vec![0.0; count],
         counts: vec![0; count],
+        unread: 0,
         visits: vec![0; count],
         weights: vec![0.0; count],
         lost: 0.0,
@@ -333,7 +340,8 @@ fn density(phase: Phase, cosine: f64) -> f64 {
 }
 
 /// What rays of a view see of a grid of radiance: in each voxel on their way, the light at the middle of their piece that is
-/// scattered into them, times the transmittance up to the eye and the square of n where the ray enters over n there.
+/// scattered into them, times the transmittance up to the eye and the square of n where the ray enters over n there; and what a
+/// mirror reflects.
 pub(crate) fn seen_by(
     fields: &Fields,
     ways: Option<&Ways>,
@@ -358,11 +366,13 @@ pub(crate) fn seen_by(
                 line: fields.line(*origin, *direction),
                 span,
                 direction: *direction,
+                v: *direction,
             }],
         };
         let n_at = |position| ways.map_or(1.0, |ways| ways.n_at(position));
         let outside = legs.first().map_or(1.0, |leg| n_at(leg.line.0));
         let (mut light, mut through) = (DVec3::ZERO, 1.0);
+        let mut sky = None;
         for leg in legs {
             for piece in pieces(medium.resolution, leg.line, leg.span) {
                 let middle = leg.line.0 + leg.line.1 * (0.5 * (piece.span[0] + piece.span[1]));
@@ -378,8 +388,14 @@ pub(crate) fn seen_by(
                 }
                 through *= after;
             }
+            if let (Some(ways), None) = (ways, sky) {
+                let end = leg.line.0 + leg.line.1 * leg.span[1];
+                let found = ways.mirrored([leg.line.0, end], leg.v, outside);
+                sky = found.map(|(reflected, _)| reflected * through);
+                through *= found.map_or(1.0, |(_, onward)| onward);
+            }
         }
-        light
+        light + sky.unwrap_or_default()
     };
     Ok(rays.par_iter().map(seen).collect())
 }

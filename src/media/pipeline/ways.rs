@@ -1,6 +1,7 @@
 //! Curved ways in f64, by the ray equation (Pfeuti 2009, eq. 2.7): judges of `kernels/media/curved/`, written from the definitions in
 //! `docs/media.md` and the thesis.
 
+use super::Mirror;
 use super::bending::NUDGE;
 use crate::{Medium, Volume};
 use glam::{DVec3, UVec3};
@@ -9,6 +10,8 @@ use glam::{DVec3, UVec3};
 const STRAIGHT: f64 = 0.02;
 /// More steps than these catch light.
 const MOST_STEPS: usize = 1 << 20;
+/// Halvings of a chord until a mirror is found.
+const HALVINGS: u32 = 8;
 
 /// How a way is stepped.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +29,7 @@ pub(crate) struct Ways<'a> {
     n: Vec<f64>,
     gradient: Vec<DVec3>,
     steps: Steps,
+    mirror: Option<Mirror>,
 }
 
 /// A straight piece of a way, in voxels.
@@ -37,6 +41,8 @@ pub(crate) struct Chord {
     pub(crate) to: DVec3,
     /// Of length 1.
     pub(crate) direction: DVec3,
+    /// v where it begins.
+    pub(crate) v: DVec3,
 }
 
 impl<'a> Ways<'a> {
@@ -67,7 +73,44 @@ impl<'a> Ways<'a> {
             n,
             gradient,
             steps,
+            mirror: None,
         }
+    }
+
+    /// The same with a mirror.
+    pub(crate) fn with(self, mirror: Option<Mirror>) -> Self {
+        Self { mirror, ..self }
+    }
+
+    /// What a mirror reflects into a ray between two places on its way, where it comes with v from a place of index `outside`, and what
+    /// part of light goes on; `None` where it is not crossed.
+    pub(crate) fn mirrored(
+        &self,
+        ends: [DVec3; 2],
+        v: DVec3,
+        outside: f64,
+    ) -> Option<(DVec3, f64)> {
+        let mirror = self.mirror?;
+        let index = f64::from(mirror.index);
+        let [mut near, mut far] = ends;
+        if self.n_at(near) >= index || self.n_at(far) < index {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (near + far);
+            let end = if self.n_at(middle) < index {
+                &mut near
+            } else {
+                &mut far
+            };
+            *end = middle;
+        }
+        let normal = -self.gradient_at(far).normalize();
+        let along = v.reject_from_normalized(normal) / outside;
+        let onward = along + normal * (1.0 - along.length_squared()).max(0.0).sqrt();
+        let part = f64::from(mirror.part);
+        let light = mirror.zenith.as_dvec3() * (part * onward.y.max(0.0));
+        Some((light, 1.0 - part))
     }
 
     /// Weights of the eight voxels around a position.
@@ -123,6 +166,7 @@ impl<'a> Ways<'a> {
                 from: x,
                 to: x + direction * length,
                 direction,
+                v,
             });
             (x, v) = (next, kicked);
         }

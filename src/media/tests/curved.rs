@@ -7,7 +7,7 @@ use crate::march::ball_deviation;
 use crate::medium::{Homogeneity, Key, Medium};
 use crate::photons::Points;
 use crate::pipeline::ways::{Steps, Ways};
-use crate::pipeline::{Pipeline, PipelineError, Source, camera};
+use crate::pipeline::{Generality, Mirror, Pipeline, PipelineError, Source, camera};
 use crate::scatter::{Adding, Strategy};
 use crate::{Volume, procedures, structure};
 use glam::{DVec3, Vec3};
@@ -110,6 +110,52 @@ fn a_ball_of_glass_turns_ways_as_snells_law_does() {
         println!("{steps:?}: {:.3}° RMS", square.sqrt());
         // What the blurred border leaves.
         assert!(square.sqrt() < 1.0, "{steps:?}: {}°", square.sqrt());
+    }
+}
+
+#[test]
+fn a_ball_reflects_the_sky_as_a_mirror_of_its_form() {
+    let Some(gpu) = adapter() else { return };
+    let (centre, radius) = (DVec3::splat(0.5), 0.3);
+    let volume = ball(64, centre, radius, 1e-3);
+    let medium = medium_of(&volume);
+    let source = beam(DVec3::new(0.5, 2.0, 0.5), DVec3::NEG_Y, 0.2);
+    let list = points(Points::Grid, 16, 0);
+    let adding = Adding::new(Strategy::Fixed64, 0);
+    let mut pipeline = Pipeline::new(&gpu, (&volume, &medium), adding, source, list).unwrap();
+    let heights: Vec<f64> = (1..=12).map(|k| 0.1 * f64::from(k)).collect();
+    let ray = |height: &f64| (DVec3::new(0.5, 0.5 + radius * height, -1.0), DVec3::Z);
+    pipeline.set_view(&heights.iter().map(ray).collect::<Vec<_>>());
+    let bare = pipeline.render().unwrap().image;
+    // Looked for where there is none.
+    let generality = Generality {
+        mirror: true,
+        ..Generality::default()
+    };
+    pipeline.set_generality(generality).unwrap();
+    assert_eq!(pipeline.render().unwrap().image, bare);
+    for part in [1.0, 0.25] {
+        let zenith = Vec3::new(1.0, 2.0, 0.5);
+        pipeline.set_mirror(Some(Mirror {
+            index: 1.25,
+            part,
+            zenith,
+        }));
+        let image = pipeline.render().unwrap().image;
+        for ((height, seen), bare) in heights.iter().zip(image).zip(&bare) {
+            if *height > 1.15 {
+                assert_eq!(seen, *bare, "beside the border");
+            }
+            if *height > 0.95 {
+                continue;
+            }
+            // A normal of (0, h, −√(1 − h²)) turns the ray to a height of 2 h √(1 − h²).
+            let exact = 2.0 * height * (1.0 - height * height).sqrt();
+            let found = f64::from(seen.y / (2.0 * part));
+            println!("height {height:.1}, part {part}: {found:.4} for {exact:.4}");
+            assert!((found - exact).abs() < 0.05, "{found} for {exact}");
+            assert!((seen.y / seen.x - 2.0).abs() < 0.05 && seen.z < seen.x);
+        }
     }
 }
 

@@ -6,8 +6,10 @@ use crate::phase::Phase;
 use crate::photons::Points;
 use crate::pipeline::{Generality, Pipeline, camera};
 use crate::scatter::{Adding, Strategy};
-use crate::{Volume, procedures};
-use glam::{DVec3, Vec3};
+use crate::voxels::{Counted, Mesh, border_of, covered};
+use crate::{Homogeneity, Medium, Volume, procedures, structure};
+use glam::{DVec3, UVec3, Vec3};
+use raystone_core::params::{ParamValue, Params};
 use raystone_gpu::Gpu;
 
 const SIDE: u32 = 24;
@@ -69,6 +71,23 @@ fn voxels_in_which_nothing_scatters_are_crossed_at_once_and_unseen() {
     let skipped = rendered(&gpu, &fog, Generality::default());
     let stepped = rendered(&gpu, &fog, by_one);
     assert_eq!((skipped.0, skipped.1), (stepped.0, stepped.1));
+}
+
+#[test]
+fn energy_that_no_view_reads_is_left_out_unseen() {
+    let Some(gpu) = adapter() else { return };
+    let all = Generality {
+        unread: true,
+        ..Generality::default()
+    };
+    let volume = cloud(fog([1; 3]).phase);
+    let [few, all_of] = [Generality::default(), all].map(|of| rendered(&gpu, &volume, of));
+    println!("cloud: {} deposits in the place of {}", few.3, all_of.3);
+    assert!(off(&few.0, &all_of.0) < 1e-6);
+    assert!(few.3 < all_of.3);
+    let fog = fog([SIDE; 3]);
+    let [few, all] = [Generality::default(), all].map(|of| rendered(&gpu, &fog, of));
+    assert_eq!((few.0, few.3), (all.0, all.3));
 }
 
 #[test]
@@ -140,4 +159,62 @@ fn photons_that_miss_the_medium_add_nothing() {
     let volume = fog([SIDE; 3]);
     let [few, all] = [Generality::default(), all].map(|of| rendered(&gpu, &volume, of));
     assert_eq!((few.0, few.3), (all.0, all.3));
+}
+
+#[test]
+fn levels_in_which_no_cube_is_homogeneous_answer_nothing() {
+    let volume = cloud(fog([1; 3]).phase);
+    for name in ["level-map", "min-max"] {
+        let of = |whole: bool| {
+            let params = [("whole".to_owned(), ParamValue::Flag(whole))];
+            let kind = structure::registry().find(name).unwrap().clone();
+            let made = kind.make(&Params(params.into())).unwrap();
+            Medium::new(&volume, made, Homogeneity::default())
+        };
+        let [few, all] = [false, true].map(of);
+        let mut fetches = [0, 0];
+        for place in 0..SIDE.pow(3) {
+            let voxel = UVec3::new(place % SIDE, place / SIDE % SIDE, place / (SIDE * SIDE));
+            let [a, b] = &mut fetches;
+            assert_eq!(few.region_of(voxel, a), all.region_of(voxel, b), "{voxel}");
+        }
+        println!(
+            "{name}: levels to {} for {}, {} bytes for {}, fetches {} for {}",
+            few.top,
+            all.top,
+            few.bytes(),
+            all.bytes(),
+            fetches[0],
+            fetches[1]
+        );
+        assert!(few.top < all.top && few.bytes() < all.bytes());
+        assert!(fetches[0] <= fetches[1] && (name == "level-map" || fetches[0] < fetches[1]));
+    }
+}
+
+#[test]
+fn cells_are_counted_where_a_triangle_comes_near_and_nowhere_else() {
+    let Some(gpu) = adapter() else { return };
+    let middle = DVec3::splat(0.5);
+    let low = DVec3::new(0.21, 0.3, 0.17);
+    for (name, mesh) in [
+        ("sphere", Mesh::sphere(middle, 0.4, 24)),
+        (
+            "torus",
+            Mesh::torus(middle, DVec3::new(0.6, 0.0, 0.8), [0.3, 0.1], 48),
+        ),
+        ("box", Mesh::cuboid(low, low + DVec3::new(0.5, 0.25, 0.625))),
+    ] {
+        for side in [7, 32] {
+            let of = |counted| covered(&gpu, &mesh, side, counted).unwrap();
+            let [all, some] = [Counted::All, Counted::Border].map(of);
+            assert_eq!(all, some, "{name}");
+            let border = border_of(&mesh, side);
+            let near: u32 = border.iter().map(|word| word.count_ones()).sum();
+            let is_cut = |part: &&f32| **part > 0.0 && **part < 1.0;
+            let cut = all.iter().filter(is_cut).count();
+            println!("{name}, {side}³: {near} voxels near, {cut} of them cut");
+            assert!(near >= cut as u32 && f64::from(near) < 0.75 * f64::from(side.pow(3)));
+        }
+    }
 }

@@ -421,7 +421,7 @@ const CURVED_FAULTS: [(&str, &str, &str, &str); 18] = [
 ];
 
 /// The same where something is left out that the medium does not ask for; the last word is what is loaded.
-const SWITCH_FAULTS: [(&str, &str, &str, &str); 7] = [
+const SWITCH_FAULTS: [(&str, &str, &str, &str); 13] = [
     // Voxels that scatter are crossed, and more than a region.
     (
         "gather",
@@ -433,6 +433,19 @@ const SWITCH_FAULTS: [(&str, &str, &str, &str); 7] = [
         "gather",
         "leave(ray, walk, region.low, region.high)",
         "leave(ray, walk, max(region.low, vec3<u32>(2u)) - 2u, min(region.high + 2u, medium.resolution))",
+        CLOUD,
+    ),
+    // Voxels that views read are crossed by photons: those beside what scatters, and some that do.
+    (
+        "photons",
+        "select(region.high - 1u, region.high,",
+        "select(region.high, region.high,",
+        CLOUD,
+    ),
+    (
+        "photons",
+        "region.sigma.y > 0.0",
+        "region.sigma.y > 1.0",
         CLOUD,
     ),
     // Two sums, the third from another place, and directions that nothing has added.
@@ -467,7 +480,28 @@ const SWITCH_FAULTS: [(&str, &str, &str, &str); 7] = [
         "let share = outside / (n + 0.1);",
         WAYS,
     ),
+    // A mirror that turns light by less, that is seen where it is not entered, and behind which no light is lost.
+    (
+        "curved/mirror",
+        "- normal * dot(v, normal)",
+        "- normal * (0.8 * dot(v, normal))",
+        MIRROR,
+    ),
+    (
+        "curved/mirror",
+        "optics_at(first).n < mirror.index",
+        "optics_at(first).n >= mirror.index",
+        MIRROR,
+    ),
+    ("curved/gather", "through *= 1.0 - mirror.part;", "", MIRROR),
+    (
+        "curved/gather",
+        "path.v, outside) * through;",
+        "path.v, outside);",
+        MIRROR,
+    ),
 ];
+const MIRROR: &str = "content = \"ball\"\nreflectivity = 0.5";
 const CLOUD: &str = "content = \"cloud\"";
 const EVEN: &str = "scatters = \"isotropic\"";
 const WAYS: &str = "content = \"shadow\"\ngeneral_ways = true";
@@ -521,7 +555,10 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         "photons = 48\nscatters = \"isotropic\"\ngeneral_directions = true",
         "photons = 48\ngeneral_list = true\nmode = [\"reference\", \"adaptive\"]",
         "photons = 48\ngeneral_steps = true\ncontent = [\"fog\", \"cloud\"]",
+        "photons = 48\ngeneral_deposits = true\ncontent = [\"fog\", \"cloud\"]\nstrategy = [\"fixed-64\", \"tiles\"]",
         "photons = 48\ngeneral_ways = true\ncontent = [\"fog\", \"shadow\", \"cloud\"]",
+        "photons = 48\ncontent = [\"ball\", \"torus\"]\nreflectivity = 0.5",
+        "photons = 48\ncontent = \"ball\"\ngeneral_mirror = true",
         "photons = 48\nmode = [\"reference\", \"adaptive\"]\ncontent = [\"shadow\", \"cloud\"]",
         "content = \"shadow\"\nmode = \"adaptive\"\nwarp = [\"alias\", \"hierarchical\"]",
         "photons = 48\ncontent = [\"ball\", \"cube\", \"lens\", \"torus\"]",

@@ -33,7 +33,7 @@ fn a_wrong_answer_of_any_array_is_seen() {
         let pairs = medium.pairs.len();
         assert!(
             (0..pairs)
-                .step_by((pairs / 16).max(1))
+                .step_by((pairs / 256).max(1))
                 .chain([middle, 0])
                 .any(seen),
             "{}",

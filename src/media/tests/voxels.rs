@@ -2,7 +2,7 @@
 
 use super::segments::adapter;
 use super::tier::faults_in_turn;
-use crate::voxels::{Mesh, VoxelError, coverage, covered};
+use crate::voxels::{Counted, Mesh, VoxelError, coverage, covered};
 use glam::{DVec3, UVec3};
 use raystone_core::random::Pcg32;
 use raystone_gpu::{Gpu, KernelLibrary};
@@ -164,7 +164,8 @@ fn a_mesh_that_is_open_or_beside_the_cube_is_refused() {
     // Without that check columns tell: those of the triangle's area.
     let [a, b, c] = sphere.corners(sphere.triangles[40]).map(|p| p * 64.0);
     let area = ((b - a).cross(c - a).z / 2.0).abs();
-    let Err(VoxelError::OddColumns { columns, x, y }) = covered(&gpu, &open, 16) else {
+    let Err(VoxelError::OddColumns { columns, x, y }) = covered(&gpu, &open, 16, Counted::Border)
+    else {
         panic!("not seen");
     };
     assert!(
@@ -190,7 +191,7 @@ fn a_mesh_that_is_open_or_beside_the_cube_is_refused() {
 }
 
 /// Kernel, text, its replacement.
-const FAULTS: [(&str, &str, &str); 8] = [
+const FAULTS: [(&str, &str, &str); 9] = [
     // Points on edges in both triangles, or in none.
     (
         "flip",
@@ -217,6 +218,12 @@ const FAULTS: [(&str, &str, &str); 8] = [
         "cover",
         "(word >> (voxel.z & 31u)) & 15u",
         "(word >> (voxel.x & 31u)) & 15u",
+    ),
+    // The bit of another voxel.
+    (
+        "cover",
+        "border[i >> 5u] >> (i & 31u)",
+        "border[i >> 5u] >> (i & 15u)",
     ),
 ];
 

@@ -66,12 +66,8 @@ impl Export<'_> {
         };
         let (kind, coefficients) = if volume.scattering.len() == 1 {
             ("homogeneous", one_voxel(medium))
-        } else if medium.is_coloured() {
-            return Err(ExportError::Medium(
-                "its coefficients differ from voxel to voxel and by channel: take a constant one or leave out its tints",
-            ));
         } else {
-            ("heterogeneous", self.grids(volume)?)
+            ("heterogeneous", self.grids(medium)?)
         };
         let (low, size) = (vector(volume.low.as_vec3()), vector(size.as_vec3()));
         let to_world = |scale: &str, place: &str| {
@@ -103,21 +99,19 @@ impl Export<'_> {
         Ok(())
     }
 
-    /// Writes extinction and albedo as grids.
-    fn grids(&mut self, volume: &Volume) -> Result<String, ExportError> {
-        let pairs = || volume.scattering.iter().zip(&volume.absorption);
-        let extinction: Vec<f32> = pairs().map(|(s, a)| s + a).collect();
-        let shares = pairs().map(|(s, a)| if s + a > 0.0 { s / (s + a) } else { 0.0 });
-        let albedo: Vec<f32> = shares.collect();
-        let mut known = albedo
-            .iter()
-            .zip(&extinction)
-            .filter(|(_, sigma)| **sigma > 0.0);
-        let first = known.next().map_or(0.0, |(share, _)| *share);
-        let is_even = known.all(|(share, _)| (share - first).abs() < 1e-4);
+    /// Writes extinction and albedo as grids, with the channels of [`parts_of`].
+    fn grids(&mut self, medium: &SceneMedium) -> Result<String, ExportError> {
+        let resolution = medium.volume.resolution;
+        let (channels, parts) = parts_of(medium);
+        let extinction: Vec<f32> = parts.iter().map(|[s, a]| s + a).collect();
+        let share = |[s, a]: &[f32; 2]| if s + a > 0.0 { s / (s + a) } else { 0.0 };
+        let albedo: Vec<f32> = parts.iter().map(share).collect();
+        let even: Option<Vec<f32>> = (0..channels)
+            .map(|channel| the_same(channel, channels, &albedo, &extinction))
+            .collect();
         let path = self.folder.join("medium");
         std::fs::create_dir_all(&path).map_err(super::unwritable(&path))?;
-        self.write(FILES[0], &vol(volume.resolution, &extinction))?;
+        self.write(FILES[0], &vol(resolution, channels, &extinction))?;
         let grid = |name: &str, file: &str| {
             format!(
                 r#"        <volume name="{name}" type="gridvolume">
@@ -129,16 +123,47 @@ impl Export<'_> {
             )
         };
         let sigma = grid("sigma_t", FILES[0]);
-        if is_even {
-            return Ok(sigma + &format!("        <float name=\"albedo\" value=\"{first}\"/>\n"));
+        match even.as_deref() {
+            Some([all]) => {
+                return Ok(sigma + &format!("        <float name=\"albedo\" value=\"{all}\"/>\n"));
+            }
+            Some([r, g, b]) => {
+                return Ok(
+                    sigma + &format!("        <rgb name=\"albedo\" value=\"{r} {g} {b}\"/>\n")
+                );
+            }
+            _ => {}
         }
         self.warnings.push(
             "the medium's albedo differs from voxel to voxel: between them Mitsuba mixes albedos, not scattering"
                 .to_owned(),
         );
-        self.write(FILES[1], &vol(volume.resolution, &albedo))?;
+        self.write(FILES[1], &vol(resolution, channels, &albedo))?;
         Ok(sigma + &grid("albedo", FILES[1]))
     }
+}
+
+/// Scattering and absorption of each channel of each voxel, channels fastest: of one channel, or of red, green and blue where they
+/// differ.
+fn parts_of(medium: &SceneMedium) -> (usize, Vec<[f32; 2]>) {
+    let channels = if medium.is_coloured() { 3 } else { 1 };
+    let [scatters, absorbs] = medium.tints;
+    let volume = &medium.volume;
+    let pairs = volume.scattering.iter().zip(&volume.absorption);
+    let of_voxel = |(s, a): (&f32, &f32)| {
+        let (s, a) = (*s, *a);
+        (0..channels).map(move |c| [scatters[c] * s, absorbs[c] * a])
+    };
+    (channels, pairs.flat_map(of_voxel).collect())
+}
+
+/// The albedo of a channel where there is any extinction, if it is the same everywhere.
+fn the_same(channel: usize, channels: usize, albedo: &[f32], extinction: &[f32]) -> Option<f32> {
+    let all = albedo.iter().zip(extinction).skip(channel);
+    let mut known = (all.step_by(channels)).filter(|(_, sigma)| **sigma > 0.0);
+    let first = known.next().map_or(0.0, |(share, _)| *share);
+    let is_even = known.all(|(share, _)| (share - first).abs() < 1e-4);
+    is_even.then_some(first)
 }
 
 fn one_voxel(medium: &SceneMedium) -> String {
@@ -164,10 +189,10 @@ fn one_voxel(medium: &SceneMedium) -> String {
     )
 }
 
-/// A grid in Mitsuba's binary format, version 3, in the unit cube.
-fn vol(resolution: [u32; 3], values: &[f32]) -> Vec<u8> {
+/// A grid in Mitsuba's binary format, version 3, in the unit cube; of each voxel its channels one after the other.
+fn vol(resolution: [u32; 3], channels: usize, values: &[f32]) -> Vec<u8> {
     let mut bytes = b"VOL\x03".to_vec();
-    let words = [1].into_iter().chain(resolution).chain([1]);
+    let words = [1].into_iter().chain(resolution).chain([channels as u32]);
     bytes.extend(words.flat_map(u32::to_le_bytes));
     let corners = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0];
     bytes.extend(corners.iter().chain(values).flat_map(|x| x.to_le_bytes()));
@@ -184,9 +209,51 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.vol");
         let values: Vec<f32> = (0..24_u8).map(f32::from).collect();
-        std::fs::write(&path, vol([2, 3, 4], &values)).unwrap();
+        std::fs::write(&path, vol([2, 3, 4], 1, &values)).unwrap();
         let grid = read_grid(&path).unwrap();
         assert_eq!((grid.resolution, grid.values), ([2, 3, 4], values));
         assert_eq!(grid.corners, Some([DVec3::ZERO, DVec3::ONE]));
+    }
+
+    /// A medium of two voxels along x, tinted.
+    fn tinted(absorption: Vec<f32>) -> SceneMedium {
+        let volume = Volume {
+            resolution: [2, 1, 1],
+            scattering: vec![1.0, 2.0],
+            absorption,
+            refraction: vec![1.0; 2],
+            ..Volume::constant(1.0, 0.0, 1.0).unwrap()
+        };
+        let tints = [Vec3::new(1.0, 0.5, 0.0), Vec3::new(0.5, 1.0, 1.0)];
+        SceneMedium::tinted(volume, tints, "dda").unwrap()
+    }
+
+    #[test]
+    fn voxels_have_the_coefficients_of_each_channel() {
+        let (channels, parts) = parts_of(&tinted(vec![0.5, 3.0]));
+        let of_first = [[1.0, 0.25], [0.5, 0.5], [0.0, 0.5]];
+        let of_second = [[2.0, 1.5], [1.0, 3.0], [0.0, 3.0]];
+        assert_eq!((channels, parts), (3, [of_first, of_second].concat()));
+        // A file of them: three channels in the header, and the values as they are.
+        let bytes = vol([2, 1, 1], channels, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(bytes[20..24], [3, 0, 0, 0]);
+        assert_eq!(bytes[48..52], 1.0_f32.to_le_bytes());
+        assert_eq!(bytes[56..60], 3.0_f32.to_le_bytes());
+        assert_eq!(bytes.len(), 48 + 6 * 4);
+    }
+
+    #[test]
+    fn an_albedo_is_one_colour_where_scattering_and_absorption_are_in_proportion() {
+        let albedos = |medium: &SceneMedium| {
+            let (channels, parts) = parts_of(medium);
+            let extinction: Vec<f32> = parts.iter().map(|[s, a]| s + a).collect();
+            let albedo: Vec<f32> = parts.iter().map(|[s, a]| s / (s + a)).collect();
+            [0, 1, 2].map(|channel| the_same(channel, channels, &albedo, &extinction))
+        };
+        assert_eq!(
+            albedos(&tinted(vec![0.5, 1.0])),
+            [Some(0.8), Some(0.5), Some(0.0)]
+        );
+        assert_eq!(albedos(&tinted(vec![0.5, 3.0])), [None, None, Some(0.0)]);
     }
 }

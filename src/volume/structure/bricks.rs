@@ -48,7 +48,8 @@ impl VolumeStructure for Bricks {
             }
         }
         pairs.extend(pool);
-        Parts { pairs, index }
+        let top = medium.levels;
+        Parts { pairs, index, top }
     }
 
     fn region_of(&self, medium: &Medium, voxel: UVec3, fetches: &mut u32) -> Region {

@@ -39,6 +39,7 @@ impl VolumeStructure for Chebyshev {
         Parts {
             pairs,
             index: packed_bytes(&reach),
+            top: medium.levels,
         }
     }
 

@@ -81,7 +81,8 @@ impl VolumeStructure for CubeBvh {
         }
         let mut index = Vec::new();
         append(&mut cubes, &mut index);
-        Parts { pairs, index }
+        let top = medium.levels;
+        Parts { pairs, index, top }
     }
 
     fn region_of(&self, medium: &Medium, voxel: UVec3, fetches: &mut u32) -> Region {

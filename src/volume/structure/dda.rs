@@ -19,6 +19,7 @@ impl VolumeStructure for Dda {
         Parts {
             pairs: medium.dilated(),
             index: Vec::new(),
+            top: medium.levels,
         }
     }
 

@@ -1,13 +1,16 @@
 //! The level map of Pfeuti 2009, §3.3. Kernel: `kernels/volume/structure/level_map.wesl`.
 
-use super::{Parts, VolumeStructure, levels_of, packed_bytes};
+use super::{Parts, VolumeStructure, levels_of, occupied, packed_bytes};
 use crate::medium::{Medium, Region};
 use glam::UVec3;
 use raystone_core::parameters;
 
 parameters! {
     /// level of the largest homogeneous cube around each voxel, and a pyramid of bounds (Pfeuti 2009)
-    pub(super) struct LevelMap {}
+    pub(super) struct LevelMap {
+        /// true to keep levels of the pyramid in which no cube is homogeneous
+        whole: bool = false;
+    }
 }
 
 impl VolumeStructure for LevelMap {
@@ -16,11 +19,10 @@ impl VolumeStructure for LevelMap {
     }
 
     fn parts(&self, medium: &Medium) -> Parts {
-        let pairs = medium.pyramid(&medium.dilated());
-        Parts {
-            index: packed_bytes(&levels_of(medium, &pairs)),
-            pairs,
-        }
+        let pyramid = medium.pyramid(&medium.dilated());
+        let index = packed_bytes(&levels_of(medium, &pyramid));
+        let (pairs, top) = occupied(medium, pyramid, self.whole);
+        Parts { pairs, index, top }
     }
 
     fn region_of(&self, medium: &Medium, voxel: UVec3, fetches: &mut u32) -> Region {

@@ -1,13 +1,16 @@
 //! A pyramid of bounds, without a map. Kernel: `kernels/volume/structure/min_max.wesl`.
 
-use super::{Parts, VolumeStructure};
+use super::{Parts, VolumeStructure, occupied};
 use crate::medium::{Medium, Region};
 use glam::UVec3;
 use raystone_core::parameters;
 
 parameters! {
     /// a pyramid of bounds, descended from its top to the first homogeneous cube
-    pub(super) struct MinMax {}
+    pub(super) struct MinMax {
+        /// true to begin with levels in which no cube is homogeneous
+        whole: bool = false;
+    }
 }
 
 impl VolumeStructure for MinMax {
@@ -16,14 +19,14 @@ impl VolumeStructure for MinMax {
     }
 
     fn parts(&self, medium: &Medium) -> Parts {
-        Parts {
-            pairs: medium.pyramid(&medium.dilated()),
-            index: Vec::new(),
-        }
+        let pyramid = medium.pyramid(&medium.dilated());
+        let (pairs, top) = occupied(medium, pyramid, self.whole);
+        let index = Vec::new();
+        Parts { pairs, index, top }
     }
 
     fn region_of(&self, medium: &Medium, voxel: UVec3, fetches: &mut u32) -> Region {
-        let mut level = medium.levels;
+        let mut level = medium.top;
         let mut cube = |level| {
             let pair = medium.fetch_pair(medium.cube_index(voxel, level), fetches);
             medium.cube_of(voxel, level, pair)

@@ -11,7 +11,7 @@ mod sparse_tree;
 
 use crate::medium::{Medium, Pair, Region};
 use glam::UVec3;
-use raystone_core::params::{Registered, Registry};
+use raystone_core::params::{Parameters as _, Registered, Registry};
 use std::sync::Arc;
 
 /// A structure over a volume.
@@ -32,16 +32,20 @@ pub struct Parts {
     pub pairs: Vec<Pair>,
     /// What leads to them.
     pub index: Vec<u32>,
+    /// The highest level of cubes that are asked for.
+    pub top: u32,
 }
 
 /// All structures by name.
 pub fn registry() -> Registry<dyn VolumeStructure> {
     Registry::new(vec![
         Registered::new::<dda::Dda>("dda", |_| Ok(Arc::new(dda::Dda {}))),
-        Registered::new::<level_map::LevelMap>("level-map", |_| {
-            Ok(Arc::new(level_map::LevelMap {}))
+        Registered::new::<level_map::LevelMap>("level-map", |params| {
+            Ok(Arc::new(level_map::LevelMap::from_params(params)?))
         }),
-        Registered::new::<min_max::MinMax>("min-max", |_| Ok(Arc::new(min_max::MinMax {}))),
+        Registered::new::<min_max::MinMax>("min-max", |params| {
+            Ok(Arc::new(min_max::MinMax::from_params(params)?))
+        }),
         Registered::new::<bricks::Bricks>("bricks", |_| Ok(Arc::new(bricks::Bricks {}))),
         Registered::new::<sparse_tree::SparseTree>("sparse-tree", |_| {
             Ok(Arc::new(sparse_tree::SparseTree {}))
@@ -61,6 +65,20 @@ fn packed_bytes(bytes: &[u8]) -> Vec<u32> {
             .fold(0, |word, byte| word << 8 | u32::from(*byte))
     };
     bytes.chunks(4).map(word).collect()
+}
+
+/// A pyramid without the levels in which no cube is homogeneous, and the highest one left: no answer is from those above it. As it is,
+/// if it is to be `whole`.
+fn occupied(medium: &Medium, mut pyramid: Vec<Pair>, whole: bool) -> (Vec<Pair>, u32) {
+    // Cubes beyond the grid are none.
+    let is_even = |pair: &Pair| *pair != Pair::NONE && medium.is_homogeneous(pair.n, pair.sigma);
+    let start = |level: u32| medium.level_start(level) as usize;
+    let mut top = medium.levels;
+    while !whole && top > 0 && !pyramid[start(top)..].iter().any(is_even) {
+        pyramid.truncate(start(top));
+        top -= 1;
+    }
+    (pyramid, top)
 }
 
 /// The level of the largest homogeneous cube around each voxel, 0 where only the voxel itself could be one

@@ -40,7 +40,8 @@ impl VolumeStructure for SparseTree {
                 nodes.extend((0..8).map(|k| (child(k), level - 1)));
             }
         }
-        Parts { pairs, index }
+        let top = medium.levels;
+        Parts { pairs, index, top }
     }
 
     fn region_of(&self, medium: &Medium, voxel: UVec3, fetches: &mut u32) -> Region {

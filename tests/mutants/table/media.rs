@@ -188,4 +188,76 @@ pub const MUTANTS: &[Mutant] = &[
             "flight.albedo <= 0.0",
         ),
     ),
+    fault(
+        "medium-colours-null-without-weight",
+        "collisions that are none leave the colours as they were",
+        text(
+            "integrator/coloured_medium",
+            "passed *= lacking / none;",
+            "",
+        ),
+    ),
+    fault(
+        "medium-colours-even-shares",
+        "channels decide in even shares, whatever the throughput",
+        text(
+            "integrator/coloured_medium",
+            "throughput / (throughput.x + throughput.y + throughput.z)",
+            "vec3<f32>(0.33333334)",
+        ),
+    ),
+    fault(
+        "medium-colours-tints-exchanged",
+        "scattering has the tint of absorption, and the opposite",
+        text(
+            "integrator/coloured_medium",
+            "placed.scattering_tint * there.x + placed.absorption_tint",
+            "placed.absorption_tint * there.x + placed.scattering_tint",
+        ),
+    ),
+    fault(
+        "medium-colours-majorant-too-small",
+        "flights go by the least extinction of a region",
+        text(
+            "integrator/coloured_medium",
+            "let most = greatest(range.least + range.more);",
+            "let most = greatest(range.least);",
+        ),
+    ),
+    fault(
+        "medium-colours-scatter-white",
+        "what is scattered has no colour",
+        text(
+            "integrator/coloured_medium",
+            "passed * placed.scattering_tint * (there.x / mean)",
+            "passed * (there.x / mean)",
+        ),
+    ),
+    fault(
+        "medium-colours-pass-white",
+        "light that passes keeps its colour",
+        text(
+            "integrator/coloured_medium",
+            "    return Flight(end, passed, false);",
+            "    return Flight(end, vec3<f32>(1.0), false);",
+        ),
+    ),
+    fault(
+        "medium-colours-control-of-one",
+        "shadow rays lose the greatest of what channels lose at least",
+        text(
+            "integrator/coloured_medium",
+            "result *= exp(-range.least * unit",
+            "result *= exp(-greatest(range.least) * unit",
+        ),
+    ),
+    fault(
+        "medium-colours-control-twice",
+        "what channels lose at least is lost again at collisions",
+        text(
+            "integrator/coloured_medium",
+            "(extinction(there) - range.least)",
+            "extinction(there)",
+        ),
+    ),
 ];

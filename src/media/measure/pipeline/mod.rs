@@ -9,7 +9,7 @@ mod tests;
 use super::{cells_of, declare};
 use crate::adaptive::{Adaptive, Filter, Mode, Smoothing};
 use crate::photons::{Order, Points, Warp, ordered, point_set};
-use crate::pipeline::{Generality, PipelineError};
+use crate::pipeline::{Generality, Mirror, PipelineError};
 use crate::scatter::{ScatterError, Strategy};
 use crate::voxels::VoxelError;
 use crate::{Phase, phase};
@@ -30,6 +30,8 @@ const FOG: [f32; 2] = [1.2, 0.3];
 /// The lamp.
 const LAMP: DVec3 = DVec3::new(0.3, 2.0, 0.4);
 const INTENSITY: Vec3 = Vec3::new(2.0, 1.6, 1.0);
+/// Radiance of the zenith of a sky, for a lamp of intensity 1.
+const SKY: f32 = 0.03;
 /// How the fog scatters.
 const PHASE: Phase = Phase {
     kind: phase::HENYEY_GREENSTEIN,
@@ -123,8 +125,14 @@ parameters! {
         general_steps: bool = false;
         /// true to have photons that miss the medium in the list, too, where ways are straight
         general_list: bool = false;
+        /// true to have photons leave energy in voxels that no view reads, too, where ways are straight and nothing is smoothed
+        general_deposits: bool = false;
+        /// true to have the view look for a mirror even where nothing is reflected, where light is refracted
+        general_mirror: bool = false;
         /// true to sum directions of light even where the phase function is isotropic
         general_directions: bool = false;
+        /// the part of light that the glass reflects: that of a sky, where the index is halfway
+        reflectivity: f64 = 0.0, in 0.0..=1.0;
         /// how the medium scatters: forward, by Henyey and Greenstein's function with 0.4, or the same in all directions
         scatters: Scatters = Scatters::Forward;
     }
@@ -144,8 +152,19 @@ impl Load {
             curves: self.general_ways,
             empty: self.general_steps,
             missed: self.general_list,
+            unread: self.general_deposits,
+            mirror: self.general_mirror,
             directions: self.general_directions,
         }
+    }
+
+    /// The glass as a mirror, of a sky whose colour is that of a lamp of this intensity.
+    fn mirror(&self, intensity: Vec3) -> Option<Mirror> {
+        (self.reflectivity > 0.0).then(|| Mirror {
+            index: (1.0 + scene::GLASS) / 2.0,
+            part: self.reflectivity as f32,
+            zenith: SKY * intensity,
+        })
     }
 
     fn adaptive(&self, seed: u64) -> Option<Adaptive> {
@@ -197,7 +216,7 @@ const fn exact(id: &'static str, title: &'static str) -> Figure {
     )
 }
 
-static FIGURES: [Figure; 26] = [
+static FIGURES: [Figure; 29] = [
     Figure::new(
         "scatter-deposit-ns/v1",
         "photons to grid",
@@ -323,6 +342,26 @@ static FIGURES: [Figure; 26] = [
     ),
     exact("scatter-flip-shadow/v1", "of those that it darkens"),
     exact("scatter-flip-even/v1", "and of the others"),
+    exact(
+        "scatter-deposits/v1",
+        "voxels that a photon leaves energy in",
+    ),
+    Figure::new(
+        "photon-adds/v1",
+        "additions to sums, of photons and pilots",
+        "",
+        Better::Lower,
+        Shown::Count,
+        Spread::Exact,
+    ),
+    Figure::new(
+        "photon-pilot-adds/v1",
+        "those of pilots",
+        "",
+        Better::Lower,
+        Shown::Count,
+        Spread::Exact,
+    ),
 ];
 
 pub(super) struct Photons;

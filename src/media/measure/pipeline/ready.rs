@@ -2,7 +2,7 @@
 
 use super::checks::{Judge, Judged};
 use super::scene::{Scene, drawn, lamp};
-use super::{FIGURES, IMAGE, Load, REACH};
+use super::{FIGURES, IMAGE, INTENSITY, Load, REACH};
 use crate::adaptive::{Filter, Smoothing};
 use crate::photons::Points;
 use crate::pipeline::{Part, Pipeline, PipelineError, Rendered, Source, camera};
@@ -48,6 +48,8 @@ pub(super) struct Ready {
     /// Steps of a ray of the view.
     steps: f64,
     photons: usize,
+    /// Additions to sums, of photons and of pilots.
+    adds: [u64; 2],
     pilots: Option<Piloted>,
 }
 
@@ -74,6 +76,7 @@ impl Ready {
         pipeline.set_points(load.points(load.photons, seed)?);
         pipeline.set_smoothing(load.smoothing());
         pipeline.set_generality(load.generality())?;
+        pipeline.set_mirror(load.mirror(INTENSITY));
         ran("other points", &pipeline.render()?, true)?;
         pipeline.set_adaptive(adaptive);
         let rendered = pipeline.render()?;
@@ -95,6 +98,7 @@ impl Ready {
             smoothing: load.smoothing(),
             adaptive,
             curved: load.general_ways,
+            mirror: load.mirror(INTENSITY),
         };
         let judged = judge.check(&pipeline, &rendered).map_err(Absent::Failed)?;
         let photons = pipeline.photons().len();
@@ -107,6 +111,7 @@ impl Ready {
             }),
         };
         let bytes = pipeline.bytes() as f64;
+        let adds = pipeline.additions()?;
         let steps = pipeline.view_steps() as f64 / f64::from(IMAGE * IMAGE);
         let mut parts = vec![Part::Photons, Part::View, Part::All];
         if pilots.is_some() {
@@ -132,6 +137,7 @@ impl Ready {
             flips: scene.flip_of_parts(&rendered.image),
             steps,
             photons,
+            adds,
             pilots,
         })
     }
@@ -154,6 +160,7 @@ fn equal(gpu: &Gpu, load: &Load, scene: &Scene, seed: u64) -> Result<[f64; 2], A
     let points = load.points(load.photons, seed)?;
     let mut pipeline = Pipeline::new(gpu, medium, adding, lamp(), points)?;
     pipeline.set_view(&scene.rays);
+    pipeline.set_mirror(load.mirror(INTENSITY));
     pipeline.set_smoothing(Smoothing {
         filter: Filter::Blur,
         ..Smoothing::default()
@@ -272,7 +279,7 @@ impl Prepared for Ready {
             parts @ ..,
         ] = rest;
         let (parts, after) = parts.split_at(3);
-        let [view_steps, flip, flips @ ..] = after else {
+        let [view_steps, flip, flips @ .., per_photon, adds, pilot_adds] = after else {
             return Err("figures are missing".to_owned());
         };
         let deposits = self.tallies.deposits as f64;
@@ -287,6 +294,8 @@ impl Prepared for Ready {
             Reading::exact(conflicts, self.tallies.retries as f64),
             Reading::exact(view_steps, self.steps),
             Reading::exact(flip, self.flip),
+            Reading::exact(per_photon, deposits / self.photons as f64),
+            Reading::exact(adds, self.adds.iter().sum::<u64>() as f64),
         ];
         for (passes, samples) in self.passes.iter().zip(samples) {
             // Nanoseconds to milliseconds.
@@ -313,6 +322,7 @@ impl Prepared for Ready {
         if let Some(of) = &self.pilots {
             readings.extend([
                 Reading::exact(pilots, of.photons as f64),
+                Reading::exact(pilot_adds, self.adds[1] as f64),
                 Reading::exact(density, of.density),
                 Reading::exact(equal, of.equal[0]),
                 Reading::exact(equal_all, of.equal[1]),

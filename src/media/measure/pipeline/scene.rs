@@ -8,7 +8,7 @@ use crate::medium::{Homogeneity, Key, Medium};
 use crate::photons::{Points, point_set};
 use crate::pipeline::oracle::{Fields, seen_by};
 use crate::pipeline::ways::{Steps, Ways};
-use crate::pipeline::{Pipeline, PipelineError, Source, camera};
+use crate::pipeline::{Mirror, Pipeline, PipelineError, Source, camera};
 use crate::scatter::{Adding, Strategy};
 use crate::voxels::{Mesh, coverage};
 use crate::{MediaError, Volume, procedures, structure};
@@ -26,7 +26,7 @@ const BALL: DVec3 = DVec3::new(0.45, 0.6, 0.5);
 const RADIUS: f64 = 0.15;
 const DENSE: f32 = 40.0;
 /// Glass, its middle, radius of the ball or half the side of the cube, and the part of the fog's σ that it has.
-const GLASS: f32 = 1.5;
+pub(super) const GLASS: f32 = 1.5;
 const MIDDLE: DVec3 = DVec3::new(0.5, 0.62, 0.5);
 const SIZE: f64 = 0.18;
 const CLEAR: f32 = 0.25;
@@ -205,6 +205,7 @@ pub(super) struct Scene {
     mesh: String,
     side: u32,
     kernels: String,
+    mirror: Option<Mirror>,
     pub(super) volume: Volume,
     pub(super) medium: Medium,
     pub(super) rays: Vec<(DVec3, DVec3)>,
@@ -223,10 +224,17 @@ impl Scene {
             && self.side == load.side
             && self.volume.phase == load.phase()
             && self.kernels == kernels
+            && self.mirror == load.mirror(INTENSITY)
     }
 
     /// The volume with a level map over it, and its images.
     pub(super) fn new(gpu: &Gpu, load: &Load, kernels: &str) -> Result<Self, Absent> {
+        if load.reflectivity > 0.0 && !load.content.is_refractive() {
+            return Err(Absent::Refused(
+                "nothing is refracted here, so that no surface of an index reflects: take `reflectivity` of 0"
+                    .to_owned(),
+            ));
+        }
         let mut volume = load.content.volume(gpu, &load.mesh, load.side)?;
         volume.phase = load.phase();
         let made = structure::registry()
@@ -247,7 +255,13 @@ impl Scene {
         let medium = Medium::new(&volume, structure, homogeneity);
         let rays = view();
         let truth = if load.content.is_refractive() {
-            refracted_truth(&volume, &medium, &rays, TRUE_PHOTONS * load.side)?
+            refracted_truth(
+                &volume,
+                &medium,
+                &rays,
+                TRUE_PHOTONS * load.side,
+                load.mirror(Vec3::ONE),
+            )?
         } else {
             truth_of(&volume, &medium, LAMP, &rays)
         };
@@ -263,12 +277,17 @@ impl Scene {
         let mut pipeline = Pipeline::new(gpu, (&volume, &medium), adding, lamp(), points.clone())?;
         pipeline.set_smoothing(Smoothing::default());
         pipeline.set_view(&rays);
-        let many = pipeline.render()?.image;
+        let bare = pipeline.render()?.image;
         let parts = match load.content.is_refractive() {
-            true => Some(parts_of(gpu, (&volume, &medium), &rays, &many, points)?),
+            true => Some(parts_of(gpu, (&volume, &medium), &rays, &bare, points)?),
             false => None,
         };
+        // Parts are those of refraction alone.
+        let mirror = load.mirror(INTENSITY);
+        pipeline.set_mirror(mirror);
+        let many = pipeline.render()?.image;
         Ok(Self {
+            mirror,
             content: load.content,
             mesh: load.mesh.clone(),
             side: load.side,

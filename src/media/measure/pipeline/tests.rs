@@ -88,6 +88,7 @@ fn another_light_or_medium_than_the_one_judged_fails_the_cell() {
         smoothing: Default::default(),
         adaptive: None,
         curved: false,
+        mirror: None,
     };
     let judged = judge.check(&pipeline, &rendered).unwrap();
     assert!(judged.rmse < 0.05 && judged.dropped == 0.0, "{judged:?}");
