@@ -233,7 +233,7 @@ pub fn coverage(gpu: &Gpu, mesh: &Mesh, side: u32) -> Result<Vec<f32>, VoxelErro
 
 /// Voxels whose cells are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Counted {
+pub enum Counted {
     /// Those that a triangle comes near: all cells of any other are like its first.
     Border,
     /// All of them, though a mesh does not ask for it.
@@ -241,7 +241,10 @@ pub(crate) enum Counted {
 }
 
 /// The same of a mesh whose edges nobody looked at: an open one shows by columns that are crossed an odd number of times, if it does.
-pub(crate) fn covered(
+///
+/// # Errors
+/// Columns are crossed an odd number of times, or the device fails.
+pub fn covered(
     gpu: &Gpu,
     mesh: &Mesh,
     side: u32,

@@ -162,7 +162,7 @@ impl Marched {
         let pipeline = gpu.pipeline(&scatter.compose(kernel), true)?;
         let name = if cells > 0 { "pilots" } else { "photons" };
         passes.run(name, &pipeline, &bindings, groups_for(count));
-        scatter.record_after(&mut passes);
+        scatter.record_after(&mut passes, &status);
         passes.download("status", &status);
         Ok(Self {
             scatter,

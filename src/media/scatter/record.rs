@@ -136,11 +136,13 @@ impl Scatter {
         }
     }
 
-    /// Makes sums of what was added, and downloads what was counted.
-    pub(crate) fn record_after(&self, recording: &mut Recording) {
+    /// Makes sums of what was added, and downloads what was counted. Where a driver cuts loops, a kernel tells so by `status`.
+    pub(crate) fn record_after(&self, recording: &mut Recording, status: &Storage) {
         let mut bindings = Bindings::new();
         self.bind(&mut bindings);
-        bindings.buffer("radiance", &self.radiance);
+        bindings
+            .buffer("radiance", &self.radiance)
+            .buffer("status", status);
         let groups = groups_for(self.cells);
         match &self.after {
             After::Resolve(pipeline) => {
@@ -259,7 +261,7 @@ pub fn scatter_list(
     recording.clear(&status);
     scatter.record_before(&mut recording);
     recording.run("scatter", &pipeline, &bindings, groups_for(count));
-    scatter.record_after(&mut recording);
+    scatter.record_after(&mut recording, &status);
     recording
         .download("radiance", &scatter.radiance)
         .download("status", &status);
