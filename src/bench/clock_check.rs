@@ -42,6 +42,9 @@ struct Shortest {
 /// # Errors
 /// The device is lost or hangs, or a clock ran backwards.
 pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<String>, GpuError> {
+    if let Some(fault) = single.gpu().period_fault() {
+        return Ok(Some(fault));
+    }
     let started = Stopwatch::start();
     let mut shortest = [Shortest::NONE; 2];
     let mut worked: Option<f64> = None;

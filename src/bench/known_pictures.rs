@@ -1,7 +1,7 @@
 //! Known pictures, made anew before any is shown: a heat map with its colours reversed, or the spectrum of an image with its
 //! sides exchanged, looks like another result.
 
-use crate::heat_map::heat_map;
+use crate::heat_map::{heat_map, scale_of};
 use crate::spectrum::{SIGMAS, error_spectrum, spectrum_of};
 use raystone_image::{Image, automatic_exposure};
 use std::f64::consts::TAU;
@@ -26,6 +26,14 @@ pub fn check() -> Result<(), String> {
     let pixels = vec![cheap, dear, half, quarter, most, dear];
     if (map.width, map.height, &map.pixels) != (3, 2, &pixels) {
         return Err(wrong("heat map", format!("{map:?}"), format!("{pixels:?}")));
+    }
+    // Of 1 to 200 the one behind 99 hundredths of them is 199; of 1 to 100 it is 100, and of nothing the least.
+    let costs = |most: u16| -> Vec<f32> { (1..=most).rev().map(f32::from).collect() };
+    let all = [costs(100), costs(200), Vec::new()];
+    let top = scale_of(all.iter().map(Vec::as_slice));
+    if top != 199.0 {
+        let top = top.to_string();
+        return Err(wrong("top of a heat map", top, "199".to_owned()));
     }
     // Of 1, 2 and 6 the mean is 3, and the variance (4 + 1 + 9) / 2.
     let spread = Image::variance_of(&[1.0, 2.0, 6.0].map(flat)).map_err(|e| e.to_string())?;

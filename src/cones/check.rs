@@ -73,6 +73,26 @@ pub fn near(found: &[Found<f32>], expected: &[Expected]) -> Result<Apart, String
     Ok(apart)
 }
 
+/// Compares the counts of pixels with each other: of the layers met as many are kept as there is room for, each is of a triangle of
+/// its own, and what covers a cone was met.
+///
+/// # Errors
+/// The first that contradicts itself.
+pub fn counted(found: &[Found<f32>], most: u32, triangles: usize) -> Result<(), String> {
+    let is_right = |pixel: &Found<f32>| {
+        let [met, kept, cut] = pixel.counts;
+        let is_empty = kept == 0 && pixel.covered > 0.0;
+        kept == met.min(most) && met <= cut && cut as usize <= triangles && !is_empty
+    };
+    let wrong = found.iter().position(|pixel| !is_right(pixel));
+    wrong.map_or(Ok(()), |k| {
+        Err(format!(
+            "pixel {k}: the counts of {:?} contradict each other, of {triangles} triangles and room for {most} layers",
+            found[k]
+        ))
+    })
+}
+
 /// Triangles that meet the disk in all ways: of its size, tiny, slivers, and far larger.
 pub fn triangles(count: usize, seed: u64) -> Vec<[V3<f32>; 3]> {
     let mut random = Pcg32::new(seed);

@@ -1,11 +1,14 @@
 //! Known errors, budgets and scenes, computed anew before any figure of cones is shown.
 
 use crate::cone::{Camera, Mirror};
-use crate::measure::covering;
+use crate::measure::{covering, layers_of};
 use crate::rays::{Lens, Rays};
-use crate::sample::{Crossing, MOST, Truth, budget, crossing};
+use crate::sample::{Crossing, DIMENSIONS, MOST, Truth, budget, crossing, sampled};
 use crate::scene::{Place, patches};
+use crate::trace::Found;
 use glam::DVec3;
+use raystone_core::params::Variant;
+use raystone_sampling::{Coordinate, Demand, SamplerRegistry, to_unit};
 use raystone_specular::real::V3;
 
 /// Computes them.
@@ -51,15 +54,23 @@ pub fn check() -> Result<(), String> {
         let agrees = (found - expected).abs() < 1e-9;
         agree(agrees, what, &found.to_string(), expected)?;
     }
-    halves()
+    let pixel = Found {
+        colour: V3::new(0.0, 0.0, 0.0),
+        covered: 0.5,
+        counts: [7, 5, 9],
+    };
+    let found = layers_of(&pixel);
+    let agrees = found == (7, 0.5);
+    agree(agrees, "number of layers met", &format!("{found:?}"), 7.0)?;
+    let rays = Rays::new(&patches(Place::Checker));
+    let lens = lens(&rays);
+    means_of_samples(&lens)?;
+    halves(&lens)
 }
 
-/// Both halves of a reference see the same scene by other rays: their difference is noise, neither nothing nor all.
-fn halves() -> Result<(), String> {
-    let (rays, eye) = (
-        Rays::new(&patches(Place::Checker)),
-        DVec3::new(4.0, 0.0, 0.3),
-    );
+/// A mirror before the eye, of 2 × 2 pixels.
+fn lens(rays: &Rays) -> Lens<'_> {
+    let eye = DVec3::new(4.0, 0.0, 0.3);
     let forward = -eye.normalize();
     let right = forward.cross(DVec3::Z).normalize();
     let camera = Camera {
@@ -74,7 +85,51 @@ fn halves() -> Result<(), String> {
         gloss: 0.1,
         is_mean: false,
     };
-    let truth = Truth::new(&Lens::new(camera, &rays), 4, 32, 1);
+    Lens::new(camera, rays)
+}
+
+/// The mean of 2ᵏ rays, each drawn anew; and the same where a pixel's own budget is as many.
+fn means_of_samples(lens: &Lens) -> Result<(), String> {
+    let variant = |name: &str| Variant {
+        name: name.to_owned(),
+        ..Variant::default()
+    };
+    let demand = Demand {
+        samples: Some(MOST),
+        dimensions: DIMENSIONS,
+        width: Some(2),
+    };
+    let registry = SamplerRegistry::default();
+    let sampler = registry.sampler(&variant("pixel-hash"), &variant("none"), &demand);
+    let sampler = sampler.map_err(|e| e.to_string())?;
+    let budget = [1, 2, 8, MOST];
+    let found = sampled(lens, std::slice::from_ref(&sampler), 4, 3, Some(&budget));
+    for (pixel, count) in (0_u32..).zip(budget) {
+        let rays = (0..count).map(|sample| {
+            let number = |dimension| {
+                to_unit(sampler.sample_u32(Coordinate {
+                    pixel,
+                    sample,
+                    dimension,
+                    seed: 3,
+                }))
+            };
+            lens.sample(pixel, [0, 1, 2, 3].map(|d| number(d).into()))
+        });
+        let mean = rays.sum::<DVec3>() / f64::from(count);
+        let even = found.powers[count.ilog2() as usize][pixel as usize];
+        let own = found.adaptive.as_ref().map(|all| all[pixel as usize]);
+        let is_mean = |x: DVec3| x.distance(mean) < 1e-9;
+        let agrees = is_mean(even) && own.is_some_and(is_mean);
+        let of = format!("{even} and {own:?} where {mean} is right");
+        agree(agrees, "mean of samples", &of, f64::from(count))?;
+    }
+    Ok(())
+}
+
+/// Both halves of a reference see the same scene by other rays: their difference is noise, neither nothing nor all.
+fn halves(lens: &Lens) -> Result<(), String> {
+    let truth = Truth::new(lens, 4, 32, 1);
     let (noise, mean) = (truth.noise(), truth.mean());
     let is_noise = noise > 1e-9 && noise < 0.05;
     agree(is_noise, "noise of a reference", &noise.to_string(), 0.001)?;

@@ -6,7 +6,7 @@ use crate::cone::Mirror;
 use crate::device::{Tracer, overlaps};
 use crate::sample::{Crossing, DIMENSIONS, MOST, POWERS, budget, crossing, sampled, shimmer};
 use crate::scene::Place;
-use crate::trace::Blend;
+use crate::trace::{Blend, Found};
 use crate::world::{Keep, Picture as Traced, View, World};
 use glam::DVec3;
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Registries, Work};
@@ -528,6 +528,11 @@ pub(crate) struct Covering {
     pub(crate) open: f64,
 }
 
+/// The number of layers that a cone meets, and the part that those kept cover.
+pub(crate) fn layers_of(pixel: &Found<f32>) -> (u32, f32) {
+    (pixel.counts[0], pixel.covered)
+}
+
 /// Of each cone the number of layers, and the part that they cover.
 pub(crate) fn covering(mut cones: Vec<(u32, f32)>) -> Covering {
     cones.sort_unstable_by_key(|cone| cone.0);
@@ -589,8 +594,7 @@ impl Prepared for Ready {
             values[ADAPTIVE] = errors.adaptive;
         } else {
             let found = &self.picture.found;
-            let of_cones = found.iter().map(|pixel| (pixel.counts[0], pixel.covered));
-            let of_cones = covering(of_cones.collect());
+            let of_cones = covering(found.iter().map(layers_of).collect());
             let edges = self.world.edges.iter().filter(|edge| **edge).count();
             values[EDGES] = Some(edges as f64 / found.len() as f64);
             values[LAYERS] = Some(of_cones.mean);

@@ -232,6 +232,8 @@ impl World {
             return Ok(picture);
         }
         let (found, _) = self.tracer(gpu, keep)?.trace()?;
+        let most = self.given(keep).most;
+        check::counted(&found, most, self.patches.len()).map_err(Absent::Failed)?;
         let apart = check::near(&found, &self.by_oracle(keep)).map_err(Absent::Failed)?;
         let picture = Arc::new(Picture { found, apart });
         pictures.push((*keep, Arc::clone(&picture)));

@@ -445,6 +445,15 @@ impl Gpu {
         self.timestamp_period.is_some()
     }
 
+    /// What is wrong with the period of timestamps; `None` if it is that of the queue, or if there are none.
+    pub fn period_fault(&self) -> Option<String> {
+        let own = self.queue.get_timestamp_period();
+        let other = self.timestamp_period.filter(|period| *period != own)?;
+        Some(format!(
+            "timestamps are taken for {other} ns, and those of the queue are {own} ns"
+        ))
+    }
+
     /// True if the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu

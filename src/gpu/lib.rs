@@ -35,12 +35,12 @@ pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub(crate) use kernel_errors::LOOPS_CUT;
 pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};
-pub use player::Player;
+pub use player::{Player, check_span};
 pub use probe::{ArithmeticProbe, probe_arithmetic, probe_arithmetic_async, probe_clock_step};
 pub use raster::Raster;
 pub use recording::{Groups, Played, Recording, grid_of, groups_for};
 pub use slices::{MOST_SLICE_MS, Slices, slow_slice};
-pub use sort::{Pairs, RadixSort};
+pub use sort::{Pairs, RadixSort, check_sizes, fault_of_sort};
 pub use uniform::UniformValues;
 pub use wait::wait_for;
 

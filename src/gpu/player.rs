@@ -511,3 +511,18 @@ fn take(buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
     buffer.unmap();
     Ok(bytes)
 }
+
+/// Computes a known span: 2000 ticks of 2.5 ns.
+///
+/// # Errors
+/// It is not 0.005 ms.
+pub fn check_span() -> Result<(), String> {
+    let found = span_ms([7000, 9000], Some(2.5));
+    let agrees = found.is_some_and(|ms| (ms - 0.005).abs() < 1e-12);
+    agrees.then_some(()).ok_or_else(|| {
+        format!(
+            "2000 ticks of 2.5 ns are {found:?} ms, and should be 0.005: this program shows wrong times; build it anew, and \
+             report what stays wrong"
+        )
+    })
+}

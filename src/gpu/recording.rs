@@ -130,6 +130,25 @@ impl Recording {
         self
     }
 
+    /// Number of kernels that it runs.
+    pub fn run_count(&self) -> usize {
+        self.runs().count()
+    }
+
+    /// Bytes of all scratch buffers whose names are wanted, each once, as long as the longest use of it.
+    pub fn scratch_bytes(&self, is_wanted: impl Fn(&str) -> bool) -> u64 {
+        let mut longest: BTreeMap<&str, u64> = BTreeMap::new();
+        for storage in self.storages() {
+            if let Storage::Scratch { name, bytes } = storage
+                && is_wanted(name)
+            {
+                let known = longest.entry(name).or_default();
+                *known = (*known).max(*bytes);
+            }
+        }
+        longest.values().sum()
+    }
+
     pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
         self.steps.iter().filter_map(|step| match step {
             Step::Run(run) => Some(&**run),

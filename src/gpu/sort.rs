@@ -12,6 +12,10 @@ use super::recording::Recording;
 use super::{Composition, GpuError, UniformValues};
 use std::sync::Arc;
 
+mod known;
+
+pub use known::{check_sizes, fault_of_sort};
+
 const DIGIT_BITS: u32 = 8;
 /// Values of a digit, as in `kernels/common/sort/digits.wesl`.
 const BINS: u32 = 1 << DIGIT_BITS;

@@ -3,11 +3,14 @@
 //! time: a run ends before it writes them.
 
 use super::*;
+use between::{of_animation, of_hits, of_paths, of_processors};
 use raystone_core::structure::StructureStats;
 use raystone_stats::hypothesis::student_t_two_sided;
 use raystone_stats::rates::rate_fault;
 use raystone_stats::statistics::median;
 use std::collections::BTreeSet;
+
+mod between;
 
 /// Relative difference of two figures that is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -79,6 +82,7 @@ pub fn contradiction(body: &Body) -> Option<String> {
         Body::Bias(record) => of_bias(record, &mut faults),
         Body::Spectrum(record) => of_spectrum(record, &mut faults),
         Body::Stream(record) => of_stream(record, &mut faults),
+        Body::Animation(record) => of_animation(record, &mut faults),
         _ => {}
     }
     faults.into_iter().next()
@@ -209,7 +213,9 @@ fn of_rays(record: &StructureRecord, faults: &mut Vec<String>) {
         }
         faults.extend(rate_fault(&timing.mrays_s, timing.rays as f64, &timing.ms));
         counted_twice(&timing.ms, &timing.wall_ms, faults);
+        of_processors(&timing.cpu_ms, [&timing.ms, &timing.wall_ms], faults);
     }
+    of_hits(&record.timings, faults);
 }
 
 /// Two rounds that are equal to the bit by each of two clocks are one. Where one clock is all there is, it may be coarse.
@@ -254,6 +260,8 @@ fn of_image(record: &TimeRecord, faults: &mut Vec<String>) {
         faults.extend(rate_fault(&rate, record.traced_rays() as f64, &record.ms));
     }
     counted_twice(&record.ms, &record.wall_ms, faults);
+    of_processors(&record.cpu_ms, [&record.ms, &record.wall_ms], faults);
+    of_paths(record, faults);
     let stages: f64 = record.stages.values().sum();
     let longest = record.ms.iter().copied().fold(0.0, f64::max);
     if !record.ms.is_empty() && stages > OF_STAGES * longest {

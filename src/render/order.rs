@@ -7,6 +7,7 @@
 //! with one pass and with sixteen (Table 2.2).
 
 use raystone_core::parameters;
+use raystone_core::params::Choice as _;
 use raystone_image::Image;
 
 parameters! {
@@ -105,6 +106,36 @@ impl Order {
             splat(&sums, size).is_some()
         });
         complete.map_or(parts.len(), |place| place + 1)
+    }
+
+    /// What is wrong with sums that are said to be the first with a colour for every pixel: they are those of one sample and
+    /// whole passes, and without the last of these a pixel has none.
+    pub fn fault_of_first(self, sums: &[[f32; 4]], size: [u32; 2]) -> Option<String> {
+        let taken = sums.iter().filter(|[.., taken]| *taken == 1.0).count();
+        let others = sums.iter().filter(|[.., taken]| *taken > 1.0).count();
+        let (mut pixels, mut passes) = (0, 0);
+        let mut before = sums.to_vec();
+        for part in self.parts(size) {
+            if pixels >= taken {
+                break;
+            }
+            passes += 1;
+            pixels += part.count.iter().product::<u32>() as usize;
+            if pixels >= taken {
+                for [x, y] in part.pixels() {
+                    before[(y * size[0] + x) as usize] = [0.0; 4];
+                }
+            }
+        }
+        let is_first = pixels == taken && others == 0 && splat(sums, size).is_some();
+        let is_right = is_first && splat(&before, size).is_none();
+        (!is_right).then(|| {
+            format!(
+                "the first picture of the order {} has {taken} pixels after {passes} passes of a sample: it is not the first \
+                 without a gap",
+                self.name()
+            )
+        })
     }
 }
 
@@ -219,6 +250,31 @@ mod tests {
             assert_eq!(complete_after(order), passes);
             assert_eq!(order.passes_to_first_picture(size), passes);
         }
+        let sums = |order: Order, passes: usize, taken: f32| {
+            let mut sums = vec![[0.0; 4]; 40 * 37];
+            let pixels = order.parts(size).into_iter().take(passes);
+            let pixels: Vec<_> = pixels
+                .flat_map(|part| part.pixels().collect::<Vec<_>>())
+                .collect();
+            for [x, y] in pixels {
+                sums[(y * 40 + x) as usize][3] = taken;
+            }
+            sums
+        };
+        for (order, passes) in [
+            (Order::OnePass, 1),
+            (Order::Blocks, 16),
+            (Order::QuadTree, 1),
+        ] {
+            let fault = |passes, taken| order.fault_of_first(&sums(order, passes, taken), size);
+            assert_eq!(fault(passes, 1.0), None, "{order:?}");
+            assert!(fault(passes, 2.0).is_some() && fault(passes - 1, 1.0).is_some());
+        }
+        assert!(
+            Order::QuadTree
+                .fault_of_first(&sums(Order::QuadTree, 2, 1.0), size)
+                .is_some()
+        );
         // Two samples of a pixel are averaged.
         let sums = [[2.0, 4.0, 6.0, 2.0]];
         assert_eq!(

@@ -33,6 +33,7 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
     let ao_radius = job.integrator.facts.ao_radius.unwrap_or(0.0) * scene.diagonal;
     let values = lens(UniformValues::new(), job.camera, job.size);
     let values = scene.lights.uniform(values);
+    let values = scene.transform_error.uniform(values);
     values
         .vec("environment", &scene.environment)
         .u32("width", width)
@@ -45,8 +46,6 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
         .u32("mirror_nodes", scene.mirrors.mirror_nodes)
         .u32("first_connecting", scene.mirrors.first_connecting)
         .f32("ao_radius", ao_radius as f32)
-        .f32("transform_scale", scene.transform_error.scale)
-        .f32("transform_shift", scene.transform_error.shift)
         .vec("sky_up", &scene.daylight.up.to_array())
         .vec("sky_key", &scene.daylight.key.to_array())
         .f32(

@@ -10,6 +10,8 @@ use raystone_core::files;
 use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
 
+mod defaults;
+
 /// In a folder that no machine has.
 static FILES: &[(&str, &[u8])] = &[
     ("known:/a.gltf", include_bytes!("known_files/a.gltf")),
@@ -20,6 +22,12 @@ static FILES: &[(&str, &[u8])] = &[
     ("known:/a.xml", include_bytes!("known_files/a.xml")),
     ("known:/a.vol", include_bytes!("known_files/a.vol")),
     ("known:/a.npy", include_bytes!("known_files/a.npy")),
+    ("known:/b.gltf", include_bytes!("known_files/b.gltf")),
+    ("known:/b.obj", include_bytes!("known_files/b.obj")),
+    ("known:/b.ply", include_bytes!("known_files/b.ply")),
+    ("known:/b.xml", include_bytes!("known_files/b.xml")),
+    ("known:/b.vol", include_bytes!("known_files/b.vol")),
+    ("known:/b.npy", include_bytes!("known_files/b.npy")),
 ];
 
 /// What they say.
@@ -35,6 +43,7 @@ pub(crate) fn values() -> Result<Vec<Known>, String> {
     all.ply(&read("known:/a.ply")?)?;
     all.nori(&read("known:/a.xml")?)?;
     all.media()?;
+    defaults::values(&mut all)?;
     Ok(all.0)
 }
 

@@ -1,6 +1,7 @@
-//! The summary of known searches, computed anew before any is shown.
+//! The summary, readings and jumps of known searches, computed anew before any is shown.
 
 use crate::judge::{Judged, summary};
+use crate::measure;
 use crate::newton::{CAPPED, SINGULAR};
 
 /// A search that ended well, by its number from 1 to 100.
@@ -59,7 +60,7 @@ pub fn check() -> Result<(), String> {
             ));
         }
     }
-    Ok(())
+    measure::known::check()
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ use raystone_record::Reading;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
 use std::sync::Arc;
 
+pub(crate) mod known;
+
 /// The name on the axis of integrators, after [`SPECULAR`].
 const NAME: &str = "search";
 /// Vertices that are followed while the eye moves.

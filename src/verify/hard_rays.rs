@@ -6,10 +6,12 @@
 //! diagonals of the scene; from corners, triangle planes, box and cell planes, and far outside;
 //! with direction lengths from 1e-10 to 1e10. The other half are parts of these: they end or begin
 //! exactly at, just before or just behind the hit, are a point, or are empty. A few more see a triangle
-//! nearly edge-on, just above and just below the limit at which it is no longer hit.
+//! nearly edge-on, just above and just below the limit at which it is no longer hit; and the last go to the triangles that lists
+//! begin and end with.
 //!
 //! They depend only on the scene and a seed, and are never timed.
 
+use crate::end_rays::{END_RAYS, end_rays};
 use glam::Vec3;
 use raystone_accel::triangle::edge_on_share;
 use raystone_accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
@@ -20,7 +22,7 @@ const WHOLE_AND_PARTS: usize = 4100;
 /// Rays in the planes of triangles, near the limit of what is edge-on.
 const EDGE_ON: usize = 192;
 /// Number of hard rays; not a multiple of a workgroup.
-pub const HARD_RAYS: usize = WHOLE_AND_PARTS + EDGE_ON;
+pub const HARD_RAYS: usize = WHOLE_AND_PARTS + EDGE_ON + END_RAYS;
 
 /// Rays tried for each of these: one in sixty is near the limit, and of flat rectangles none.
 const TRIES: usize = 1000;
@@ -53,6 +55,7 @@ pub fn hard_rays(soup: &TriangleSoup, reference: &dyn CpuTwin, seed: u64) -> Vec
         .collect();
     rays.extend(parts);
     rays.extend((0..EDGE_ON).map(|turn| maker.edge_on(turn)));
+    rays.extend(end_rays(soup));
     rays
 }
 
@@ -340,7 +343,7 @@ mod tests {
             let mut shares_of = soup.records.iter().filter_map(share);
             shares_of.any(|share| shares.contains(&share))
         };
-        let rays: Vec<Ray> = rays[WHOLE_AND_PARTS..]
+        let rays: Vec<Ray> = rays[WHOLE_AND_PARTS..][..EDGE_ON]
             .iter()
             .map(|ray| soup.intersection.raised(ray))
             .collect();

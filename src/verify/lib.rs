@@ -3,6 +3,7 @@
 
 #[cfg(test)]
 mod connection_tests;
+mod end_rays;
 pub mod full_stacks;
 pub mod gate;
 pub mod hard_rays;

@@ -113,6 +113,36 @@ pub struct Bench {
     pub runs: u32,
     /// Total size of intermediate buffers.
     pub scratch_bytes: u64,
+    /// What the method says of both and does not record.
+    other_sizes: Option<String>,
+}
+
+/// See [`Bench::least_bytes`]: of so many flags, for survivors of so many bytes each.
+pub(crate) fn least_bytes(order: Order, flags: u64, [bytes, kept]: [u64; 2]) -> u64 {
+    let read = match order {
+        Order::WithHoles => 0,
+        _ => 4 * flags,
+    };
+    read + 2 * bytes * kept
+}
+
+/// Bytes by which scratch may be longer than a method says: buffers of few words are rounded up.
+const ROUNDED_UP: u64 = 64;
+
+/// What a method says of its dispatches and scratch, and does not record.
+fn other_sizes(recording: &Recording, runs: u32, scratch_bytes: u64) -> Option<String> {
+    let is_own = |name: &str| !name.starts_with("kept ");
+    let found = (
+        recording.run_count() as u32,
+        recording.scratch_bytes(is_own),
+    );
+    let agrees = found.0 == runs && (scratch_bytes..=scratch_bytes + ROUNDED_UP).contains(&found.1);
+    (!agrees).then(|| {
+        format!(
+            "it has (kernels, bytes) {found:?}, and says {:?}",
+            (runs, scratch_bytes)
+        )
+    })
 }
 
 impl Bench {
@@ -160,6 +190,7 @@ impl Bench {
             flags,
             bytes,
             prepare,
+            other_sizes: other_sizes(&compact, runs, scratch_bytes),
             compact,
             runs,
             scratch_bytes,
@@ -168,11 +199,11 @@ impl Bench {
 
     /// Minimum memory traffic of any method in bytes: flags once, survivors read and written once.
     pub fn least_bytes(&self) -> u64 {
-        let flags = match self.method.order() {
-            Order::WithHoles => 0,
-            _ => 4 * self.flags.len() as u64,
-        };
-        flags + 2 * u64::from(self.bytes) * u64::from(self.kept_elements)
+        least_bytes(
+            self.method.order(),
+            self.flags.len() as u64,
+            [self.bytes, self.kept_elements].map(u64::from),
+        )
     }
 
     /// Checks the method's output word by word; returns the first error, if any.
@@ -190,7 +221,8 @@ impl Bench {
         let fault = stream::fault(&self.flags, self.bytes, &*self.method, found);
         // The checksums that check every turn must agree.
         let sums: Vec<u32> = played.download("digest")?;
-        Ok(fault.or_else(|| self.differs(count, &sums)))
+        let fault = fault.or_else(|| self.differs(count, &sums));
+        Ok(fault.or_else(|| self.other_sizes.clone()))
     }
 
     fn differs(&self, count: u32, sums: &[u32]) -> Option<String> {

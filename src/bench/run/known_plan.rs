@@ -64,6 +64,8 @@ pub fn check() -> Result<(), String> {
     known_settings::check()?;
     animation::check_known()?;
     coherence::check_origins()?;
+    raystone_gpu::check_sizes()?;
+    raystone_gpu::check_span()?;
     let found = planned(TEXT)?;
     let mut pairs = found.lines().zip(EXPECTED.lines());
     match pairs.find(|(found, expected)| found != expected) {

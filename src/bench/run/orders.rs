@@ -47,8 +47,20 @@ pub(super) fn of_cell(
             turns.swap(left, random.below(left + 1));
         }
         for (order, spent) in &mut turns {
-            let render = || renderer.render(*order, of_image, |_| Ok::<_, GpuError>(()));
+            let mut first = Vec::new();
+            let look = |renderer: &PartRenderer| {
+                if round == 0 {
+                    first.push(
+                        order.fault_of_first(&renderer.sums()?, session.experiment.run.resolution),
+                    );
+                }
+                Ok::<_, GpuError>(())
+            };
+            let render = || renderer.render(*order, of_image, look);
             let turn = session.clock.time("gpu", render).map_err(text)?;
+            if round == 0 {
+                first_fault(&first, &turn)?;
+            }
             if round > 0 {
                 spent.push(turn);
             } else if image_hash(&renderer.image(timing.spp).map_err(text)?) != hash {
@@ -65,6 +77,20 @@ pub(super) fn of_cell(
         .iter()
         .map(|(order, turns)| of_turns(*order, turns, spp));
     Ok(times.collect())
+}
+
+/// There is one first picture, without a gap, and it is there before the last.
+fn first_fault(first: &[Option<String>], turn: &InOrder) -> Result<(), String> {
+    match first {
+        [Some(fault)] => Err(fault.clone()),
+        [None] if turn.first_picture.wall_ms <= turn.total.wall_ms => Ok(()),
+        _ => Err(format!(
+            "there are {} first pictures, the last after {} of {} ms",
+            first.len(),
+            turn.first_picture.wall_ms,
+            turn.total.wall_ms
+        )),
+    }
 }
 
 /// The times of an order, of images with `spp` samples.

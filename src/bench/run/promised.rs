@@ -3,8 +3,8 @@
 
 use raystone_config::{Experiment, REFERENCE_PARTS};
 use raystone_record::{
-    Body, ErrorRecord, Line, ReferenceRecord, SpectrumRecord, StreamRecord, StructureRecord,
-    TimeRecord,
+    AnimationRecord, Body, Cost, ErrorRecord, FrameRecord, Line, ReferenceRecord, SpectrumRecord,
+    StreamRecord, StructureRecord, TimeRecord,
 };
 use std::collections::BTreeMap;
 
@@ -57,6 +57,7 @@ impl Promised {
                 self.spectrum(record, written.unwrap_or_default())
             }
             Body::Stream(record) => self.stream(record),
+            Body::Animation(record) => self.animation(record),
             _ => None,
         };
         found.map(|fault| format!("{}: {fault}", line.key))
@@ -81,6 +82,19 @@ impl Promised {
         (rounds.flatten())
             .or_else(|| differs("samples", record.spp, experiment.timing.spp))
             .or_else(|| differs("size", record.resolution, experiment.run.resolution))
+    }
+
+    fn animation(&self, record: &AnimationRecord) -> Option<String> {
+        let asked = self.experiment.animation;
+        let of_classes = |frame: &FrameRecord| {
+            let costs = frame.classes.iter().flat_map(|of| of.cost.clone());
+            let own = [frame.refit.clone(), frame.rebuild.clone()];
+            own.into_iter().chain(costs).collect::<Vec<Cost>>()
+        };
+        let rounds = self.experiment.timing.rounds as usize;
+        let mut costs = record.frames.iter().flat_map(of_classes);
+        differs("animation", Some(record.settings), asked)
+            .or_else(|| costs.find_map(|cost| differs("rounds", cost.wall_ms.len(), rounds)))
     }
 
     fn reference(&self, record: &ReferenceRecord) -> Option<String> {

@@ -110,6 +110,8 @@ pub(super) struct Checked {
     pub on_all_trials: bool,
     /// True once the gate has seen faults in its own data.
     pub gate_is_proven: bool,
+    /// True once the device has sorted known keys.
+    pub sort_is_proven: bool,
     /// True once the check of images has.
     pub image_gate_is_proven: bool,
     /// True once times followed work and clocks.

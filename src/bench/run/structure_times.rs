@@ -7,7 +7,7 @@ use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
 use crate::clock_check;
-use crate::heat_map::heat_map;
+use crate::heat_map::{heat_map, scale_of};
 use crate::timed_rays::TimedRays;
 use crate::timing::{Measured, Samples, Watch, empty_rounds, interleave};
 use glam::Vec3;
@@ -224,6 +224,10 @@ fn class_timing(
                 .into(),
         );
     }
+    if samples.cpu_ms.len() > 2 && [&samples.ms, &samples.wall_ms].contains(&&samples.cpu_ms) {
+        let text = "its processors' time is that of another clock";
+        return Err(text.to_owned().into());
+    }
     if let Some(slow) = slow_slice(item.rays.batch.longest_slice_ms()) {
         session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
     }
@@ -343,15 +347,10 @@ pub(super) fn draw_heat_maps(
             return Err(RunError::Wrong(fault));
         }
     }
-    let percentile = |costs: &[f32]| {
-        let mut sorted = costs.to_vec();
-        sorted.sort_unstable_by(f32::total_cmp);
-        sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0)
-    };
     let others = gated
         .iter()
         .filter(|g| g.cell[Axis::Accel].name != "brute-force");
-    let scale = others.map(|g| percentile(&g.costs)).fold(1.0, f32::max);
+    let scale = scale_of(others.map(|g| &*g.costs));
     for structure in gated.iter_mut().filter(|s| !s.costs.is_empty()) {
         let picture = heat_map(&structure.costs, scale, [width, height]);
         let labels = structure.cell.labels(&[Axis::Scene, Axis::Accel]);

@@ -12,7 +12,7 @@ use crate::memory::peak_bytes;
 use raystone_accel::tracer::kernel_hash;
 use raystone_accel::{AccelError, BuildLog, BuiltAccel, Traced};
 use raystone_config::{Axis, Cell, Experiment, Plan};
-use raystone_gpu::{Gpu, GpuError, wait_for};
+use raystone_gpu::{Gpu, GpuError, fault_of_sort, wait_for};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
 use raystone_verify::gate::gate;
@@ -180,6 +180,7 @@ fn gate_with(
     candidate.traced = Some(traced.clone());
     let checks = session.experiment.run.runtime_checks;
     prove_gate(session, world)?;
+    prove_sort(session, gpu)?;
     let gated = session.clock.time("gate", || {
         let mut verdict = gate_twice(checks, world, gpu, &traced)?;
         if verdict.passed {
@@ -248,6 +249,21 @@ fn prove_gate(session: &mut Session, world: &World) -> Result<(), RunError> {
         None => Ok(()),
         Some(fault) => Err(RunError::Wrong(format!(
             "the gate is blind: of faults planted into its own data it does not see {fault}; nothing that it passes is proven"
+        ))),
+    }
+}
+
+/// Ends the run if the device sorts known keys otherwise than they should be, once per run. Of an adapter that cannot sort, those
+/// who need it tell.
+fn prove_sort(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
+    if std::mem::replace(&mut session.checked.sort_is_proven, true) {
+        return Ok(());
+    }
+    let found = session.clock.time("gate", || fault_of_sort(gpu));
+    match found.ok().flatten() {
+        None => Ok(()),
+        Some(fault) => Err(RunError::Wrong(format!(
+            "{fault}: what is built or rendered in that order is slower than it should be, or wrong"
         ))),
     }
 }

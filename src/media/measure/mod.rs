@@ -23,7 +23,9 @@ pub fn register(registries: &mut Registries) -> Result<(), String> {
 /// Figures of known ends and walks, by name, and what they should be.
 pub(crate) fn known() -> Result<Vec<(&'static str, f64, f64)>, String> {
     let mut all = paths::known().to_vec();
+    all.extend(paths::known_readings()?);
     all.extend(structures::known()?);
+    all.extend(pipeline::known()?);
     Ok(all)
 }
 

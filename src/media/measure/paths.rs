@@ -373,13 +373,44 @@ impl Prepared for Ready {
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
         let samples = samples.into_iter().next().unwrap_or_default();
-        let [_, _, drift, steps, capped, time] = &FIGURES;
-        Ok(vec![
-            self.error.clone(),
-            Reading::exact(drift, self.drift),
-            Reading::exact(steps, self.steps),
-            Reading::exact(capped, self.capped as f64),
-            samples.ns_per_item(time, f64::from(RAYS))?,
-        ])
+        let counted = [self.drift, self.steps, self.capped as f64];
+        readings_of(&self.error, counted, &samples)
     }
+}
+
+/// The readings of an error; of drift, steps and paths that used them up; and of times.
+fn readings_of(
+    error: &Reading,
+    [drift, steps, capped]: [f64; 3],
+    samples: &Samples,
+) -> Result<Vec<Reading>, String> {
+    let [_, _, of_drift, of_steps, of_capped, time] = &FIGURES;
+    Ok(vec![
+        error.clone(),
+        Reading::exact(of_drift, drift),
+        Reading::exact(of_steps, steps),
+        Reading::exact(of_capped, capped),
+        samples.ns_per_item(time, f64::from(RAYS))?,
+    ])
+}
+
+/// Readings by name, and what they should be: 2.048 ms are 2000 ns for each of 1024 rays.
+pub(super) fn known_readings() -> Result<[(&'static str, f64, f64); 5], String> {
+    let samples = Samples {
+        ms: vec![2.048; 3],
+        ..Samples::default()
+    };
+    let error = Reading::exact(&FIGURES[0], 0.5);
+    let found = readings_of(&error, [0.125, 40.0, 3.0], &samples)?;
+    let of = |id: &str| {
+        let reading = found.iter().find(|reading| reading.figure == id);
+        reading.map_or(f64::NAN, |reading| reading.value.value)
+    };
+    Ok([
+        ("reading of angles", of("media-angle/v1"), 0.5),
+        ("reading of drift", of("media-drift/v1"), 0.125),
+        ("reading of steps", of("media-path-steps/v1"), 40.0),
+        ("reading of capped paths", of("media-capped/v1"), 3.0),
+        ("time of a path", of("media-path-ns/v1"), 2000.0),
+    ])
 }

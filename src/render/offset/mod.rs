@@ -13,7 +13,7 @@ pub use none::NONE;
 use glam::Vec3;
 use raystone_accel::TriangleSoup;
 use raystone_core::params::{Kinds, Named, Sources};
-use raystone_gpu::Composition;
+use raystone_gpu::{Composition, UniformValues};
 use raystone_scene::{Instance, Transform, row_sum_norm};
 use std::fmt;
 
@@ -107,6 +107,13 @@ impl TransformError {
         Self::of_instances(soup.placed.iter().flat_map(|p| &p.instances))
     }
 
+    /// Adds it to the values of a job, by the names of the kernel.
+    pub(crate) fn uniform(&self, values: UniformValues) -> UniformValues {
+        values
+            .f32("transform_scale", self.scale)
+            .f32("transform_shift", self.shift)
+    }
+
     fn of_instances<'a>(instances: impl Iterator<Item = &'a Instance>) -> Self {
         let moved = instances.filter(|instance| !instance.is_identity());
         moved.fold(Self::default(), |worst, instance: &Instance| {
@@ -147,12 +154,21 @@ pub fn check_known() -> Result<(), String> {
             [1.0; 3],
         ),
     ];
-    let found = TransformError::of_instances(instances.iter());
-    if (found.scale, found.shift) == (8.0, 6.0) {
+    let error = TransformError::of_instances(instances.iter());
+    // What kernels multiply a distance by, and what they add to that.
+    let values = error.uniform(UniformValues::new());
+    let found = ["transform_scale", "transform_shift"].map(|name| {
+        let words = values.words(name).unwrap_or_default();
+        words.first().copied().map(f32::from_bits)
+    });
+    // A point 3 from the origin, on edges of 1: 8 · 3 + 6 for the instances, twice an edge, and what is within reach.
+    let point = position_error([1.0, 2.0, 3.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], &error);
+    let roundings = point.map(|x| x / POSITION_ERROR);
+    if found == [Some(8.0), Some(6.0)] && roundings == [34.0, 35.0, 35.0] {
         return Ok(());
     }
     Err(format!(
-        "the error of two known instances is {found:?}, and should be 8 and 6: this program offsets rays wrongly; build it anew, and \
+        "the error of two known instances is {found:?} and that of a point {roundings:?}, and should be 8 and 6 and 34, 35, 35: this program offsets rays wrongly; build it anew, and \
          report what stays wrong"
     ))
 }

@@ -222,9 +222,7 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         .filter_map(|s| Some((s, s.body.heat_map.as_deref()?)))
         .collect();
     let maxima: Vec<f64> = mapped.iter().filter_map(|(s, _)| s.heat_map_max).collect();
-    let shared = maxima
-        .first()
-        .filter(|top| maxima.iter().all(|max| max == *top));
+    let shared = shared_top(&maxima);
     let picture = |(s, path): &(&Measured<StructureRecord>, &str)| {
         let mut caption = s.structure.clone();
         if let Some(max) = s.heat_map_max.filter(|_| shared.is_none()) {
@@ -240,17 +238,29 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         pictures::load(dir, path, caption).described(alt)
     };
     let items: Vec<Picture> = mapped.iter().map(picture).collect();
+    let scale = color_scale(&maxima);
+    Block::gallery("Traversal cost of primary rays", items, scale)
+}
+
+/// The top of the colour scale, if all maps have the same.
+fn shared_top(maxima: &[f64]) -> Option<f64> {
+    let first = *maxima.first()?;
+    maxima.iter().all(|max| *max == first).then_some(first)
+}
+
+/// The scale below heat maps with these tops.
+pub(crate) fn color_scale(maxima: &[f64]) -> Option<ColorScale> {
+    let shared = shared_top(maxima);
     let label = |share: f64| match shared {
         Some(top) => format::number(top * share),
         None => format::percent(share),
     };
-    let scale = (!maxima.is_empty()).then(|| ColorScale {
+    (!maxima.is_empty()).then(|| ColorScale {
         gradient: viridis_css(),
         title: match shared {
             Some(_) => "nodes + triangle tests per primary ray; the same scale for all; what costs more has the top colour".into(),
             None => "nodes + triangle tests per primary ray, share of each map's own top".into(),
         },
         labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),
-    });
-    Block::gallery("Traversal cost of primary rays", items, scale)
+    })
 }

@@ -20,6 +20,7 @@ use raystone_core::parameters;
 use raystone_core::params::Parameters as _;
 use raystone_record::figure::{Better, Figure, Shown, Spread};
 use ready::Ready;
+pub(super) use ready::known;
 use scene::Scene;
 use std::rc::Rc;
 

@@ -254,16 +254,7 @@ impl Prepared for Ready {
     }
 
     fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
-        let [
-            deposit,
-            view,
-            dropped,
-            retries,
-            rmse,
-            bias,
-            bytes,
-            rest @ ..,
-        ] = &FIGURES;
+        let [_, _, dropped, retries, rmse, bias, bytes, rest @ ..] = &FIGURES;
         let [
             noise,
             count,
@@ -271,10 +262,10 @@ impl Prepared for Ready {
             density,
             equal,
             equal_all,
-            pilots_ms,
-            smooth_ms,
-            photons_ms,
-            frame_ms,
+            _,
+            _,
+            _,
+            _,
             conflicts,
             parts @ ..,
         ] = rest;
@@ -298,20 +289,7 @@ impl Prepared for Ready {
             Reading::exact(adds, self.adds.iter().sum::<u64>() as f64),
         ];
         for (passes, samples) in self.passes.iter().zip(samples) {
-            // Nanoseconds to milliseconds.
-            let ms = |figure| samples.ns_per_item(figure, 1e6);
-            match passes.part {
-                Part::Photons => {
-                    readings.push(samples.ns_per_item(deposit, deposits)?);
-                    readings.push(ms(photons_ms)?);
-                }
-                Part::View => {
-                    readings.push(samples.ns_per_item(view, f64::from(IMAGE * IMAGE))?);
-                }
-                Part::Pilots => readings.push(ms(pilots_ms)?),
-                Part::Smooth => readings.push(ms(smooth_ms)?),
-                Part::All => readings.push(ms(frame_ms)?),
-            }
+            readings.extend(times(passes.part, &samples, deposits)?);
         }
         for (figure, noise) in parts.iter().zip(self.parts.into_iter().flatten()) {
             readings.push(Reading::exact(figure, noise));
@@ -334,4 +312,42 @@ impl Prepared for Ready {
     fn picture(&self) -> Option<Picture> {
         self.picture.clone()
     }
+}
+
+/// Times of passes of one kind, with so many deposits.
+fn times(part: Part, samples: &Samples, deposits: f64) -> Result<Vec<Reading>, String> {
+    let [deposit, view, ..] = &FIGURES;
+    let [pilots, smooth, photons, frame] = [13, 14, 15, 16].map(|at| &FIGURES[at]);
+    // Nanoseconds to milliseconds.
+    let ms = |figure| samples.ns_per_item(figure, 1e6);
+    Ok(match part {
+        Part::Photons => vec![samples.ns_per_item(deposit, deposits)?, ms(photons)?],
+        Part::View => vec![samples.ns_per_item(view, f64::from(IMAGE * IMAGE))?],
+        Part::Pilots => vec![ms(pilots)?],
+        Part::Smooth => vec![ms(smooth)?],
+        Part::All => vec![ms(frame)?],
+    })
+}
+
+/// Times by name, and what they should be: two milliseconds for 4000 deposits, and for each other part.
+pub(crate) fn known() -> Result<Vec<(&'static str, f64, f64)>, String> {
+    let samples = Samples {
+        ms: vec![2.0; 3],
+        ..Samples::default()
+    };
+    let known = [
+        (Part::Photons, "scatter-deposit-ns/v1", 500.0),
+        (Part::Photons, "photon-march-ms/v1", 2.0),
+        (Part::View, "scatter-view-ns/v1", 1953.125),
+        (Part::Pilots, "photon-pilots-ms/v1", 2.0),
+        (Part::Smooth, "photon-smooth-ms/v1", 2.0),
+        (Part::All, "photon-frame-ms/v1", 2.0),
+    ];
+    let of = |(part, id, expected)| {
+        let readings = times(part, &samples, 4000.0)?;
+        let found = readings.iter().find(|reading| reading.figure == id);
+        let value = found.map_or(f64::NAN, |reading| reading.value.value);
+        Ok((id, value, expected))
+    };
+    known.into_iter().map(of).collect()
 }
