@@ -1,7 +1,8 @@
 //! Image file formats. By extension: PNG is for viewing, the others store linear radiance.
 
 use super::exr_file::encode_exr;
-use super::read::{Decode, read_hdr, read_npy, read_pfm};
+use super::hdr_read::read_hdr;
+use super::read::{Decode, read_npy, read_pfm};
 use super::{Attribute, Image, ImageError, automatic_exposure, encode_png, tone_map};
 use ::image::{ExtendedColorType, ImageFormat};
 use raystone_core::atomic::write_atomic;

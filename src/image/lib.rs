@@ -6,6 +6,7 @@ mod exr_file;
 #[cfg(feature = "exr")]
 mod exr_read;
 mod formats;
+mod hdr_read;
 mod picture;
 mod primaries;
 mod read;

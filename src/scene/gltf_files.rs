@@ -70,34 +70,34 @@ impl Files {
         let files = written.map(|name| self.folder.join(name));
         let exists = |file: &&PathBuf| raystone_core::files::files().real(file).is_ok();
         let as_written = files.iter().find(exists).cloned();
-        let in_any_case = || {
-            let other = written.iter().find_map(|name| found(&self.folder, name))?;
-            let note = format!("`{uri}` is not there: {} is read", other.display());
-            self.others.borrow_mut().push(note);
-            Some(other)
-        };
+        let in_any_case = || written.iter().find_map(|name| found(&self.folder, name));
+        let other = as_written.is_none().then(in_any_case).flatten();
+        let note = other.as_ref().map(|other| {
+            let other = other.display();
+            format!("`{uri}` is not there: {other} is read")
+        });
         // None exists: the name that is most likely meant, for the message.
-        let file = as_written
-            .or_else(in_any_case)
-            .unwrap_or_else(|| files[2].clone());
-        if self.allow_outside {
-            return Ok(file);
-        }
-        let outside = || {
-            format!(
+        let file = as_written.or(other).unwrap_or_else(|| files[2].clone());
+        if !self.allow_outside && !self.is_inside(&file) {
+            return Err(format!(
                 "`{uri}` lies outside the model's folder; --allow-outside reads it all the same"
-            )
-        };
+            ));
+        }
+        self.others.borrow_mut().extend(note);
+        Ok(file)
+    }
+
+    /// True for files in the model's folder, by name or by link.
+    fn is_inside(&self, file: &Path) -> bool {
         // With links resolved. The reader reports missing files, unless the name leads outside.
         let real = |path: &Path| raystone_core::files::files().real(path);
-        let inside = match (real(&file), real(&self.folder)) {
+        match (real(file), real(&self.folder)) {
             (Ok(file), Ok(folder)) => file.starts_with(folder),
             _ => file.strip_prefix(&self.folder).is_ok_and(|rest| {
                 let ordinary = |part| matches!(part, Component::Normal(_) | Component::CurDir);
                 rest.components().all(ordinary)
             }),
-        };
-        inside.then_some(file).ok_or_else(outside)
+        }
     }
 }
 

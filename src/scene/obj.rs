@@ -163,12 +163,8 @@ impl Model {
     /// Warns about everything drawn differently from the file.
     fn tell(&mut self) {
         let [uvs, normals] = self.read.lost;
-        let mut unused = Tally::default();
-        for (line, _) in self.read.broken.values() {
-            unused.see(*line);
-        }
         let notes = [
-            unused.note(
+            self.read.unused().note(
                 [
                     "vertex is not three numbers",
                     "vertices are not three numbers",

@@ -272,6 +272,14 @@ impl Statements {
         Ok(())
     }
 
+    /// The broken vertices that no checked face uses.
+    pub(crate) fn unused(&self) -> Tally {
+        let mut unused = Tally::default();
+        let lines = self.broken.values().map(|(line, _)| *line);
+        lines.for_each(|line| unused.see(line));
+        unused
+    }
+
     fn finish(&mut self, reader: Reader, text: &str) {
         for material in &mut self.materials {
             let known = material

@@ -281,7 +281,7 @@ impl Model {
             let position = positions.get(*corner as usize).ok_or_else(|| {
                 let (vertex, count) = (i64::from(*corner), positions.len());
                 let vertex = if *corner == NONE { -1 } else { vertex };
-                format!("it refers to vertex {vertex}, but there are {count}")
+                format!("it refers to vertex {vertex}, but there are {count}, the first of them 0")
             })?;
             places.push(*position);
         }

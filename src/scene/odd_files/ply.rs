@@ -94,7 +94,7 @@ const PLY: &[(&str, Outcome)] = &[
     ),
     (
         "F1V4E 3 0 1 4\nC",
-        Fails(&["face 0", "vertex 4, but there are 4"]),
+        Fails(&["face 0", "vertex 4, but there are 4, the first of them 0"]),
     ),
     (
         "element camera 1\nproperty float view\nproperty list uchar int ids\nV4F1E 0.5 2 1 2\nC4 0 1 2 3\n",
