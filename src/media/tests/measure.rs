@@ -444,8 +444,8 @@ const SWITCH_FAULTS: [(&str, &str, &str, &str); 13] = [
     ),
     (
         "photons",
-        "region.sigma.y > 0.0",
-        "region.sigma.y > 1.0",
+        "leave(ray, walk, core[0], core[1])",
+        "leave(ray, walk, region.low, region.high)",
         CLOUD,
     ),
     // Two sums, the third from another place, and directions that nothing has added.
@@ -610,7 +610,10 @@ fn a_fault_in_a_kernel_of_photons_fails_the_run() {
         let path = kernels.join(format!("{name}.wesl"));
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, sound.replace(text, fault)).unwrap();
-        let (failed, reason) = pipeline_run(folder.path(), kernels.to_str().unwrap(), &load);
+        // The blurred border of coarse glass does not reach the index of its mirror.
+        let side = if load.contains(MIRROR) { 32 } else { 12 };
+        let kernels = kernels.to_str().unwrap();
+        let (failed, reason) = pipeline_run_of(folder.path(), kernels, side, &load);
         println!("{file}: `{text}` as `{fault}`: {reason}");
         if failed != 1 {
             unseen.push(format!("{file}: `{text}` as `{fault}`"));
