@@ -1,7 +1,7 @@
 //! The medium of a scene in its tables. Kernel: `kernels/integrator/medium.wesl`.
 
 use glam::{DVec3, UVec3};
-use raystone_gpu::{Bindings, Composition, GpuError, UniformValues};
+use raystone_gpu::{Bindings, Composition, Gpu, GpuError, UniformValues};
 use raystone_scene::{SceneData, SceneMedium};
 use raystone_volume::{Bounds, Straight};
 
@@ -19,8 +19,16 @@ impl MediumTables {
     /// The medium of a scene, if it has one.
     ///
     /// # Errors
-    /// The path tracer cannot follow paths through it: see [`SceneMedium::new`].
-    pub(super) fn of(scene: &SceneData) -> Result<Option<Self>, GpuError> {
+    /// The path tracer cannot follow paths through it: see [`SceneMedium::new`]; or the driver cannot compile that.
+    pub(super) fn of(gpu: &Gpu, scene: &SceneData) -> Result<Option<Self>, GpuError> {
+        // Such drivers (Mesa 22.3) end the process while they compile loops of flights within those of paths.
+        if gpu.loop_limit.is_some() && scene.medium.is_some() {
+            return Err(GpuError::Kernel(format!(
+                "{}: this driver, which also ends loops early, crashes when it compiles paths through a medium; install a newer one \
+                 (Debian 12: `scripts/install-driver --backports`), or leave the medium out",
+                scene.name
+            )));
+        }
         let build = |medium: &SceneMedium| {
             let volume = &medium.volume;
             let straight = Straight::new(volume, &medium.structure)

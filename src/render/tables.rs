@@ -160,7 +160,7 @@ impl SceneBuffers {
         let surfaces = SurfaceFeatures::of(scene, |_| true);
         let materials = SceneKinds::of(scene.materials.iter().map(|material| material.kind));
         let mut lights = LightTables::of(scene, &LightList::of(scene));
-        let mut medium = MediumTables::of(scene)?;
+        let mut medium = MediumTables::of(gpu, scene)?;
         let tables = Tables::of(scene, &materials, &mut lights, &surfaces, medium.as_mut());
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
