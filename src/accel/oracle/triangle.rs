@@ -32,10 +32,16 @@
 //! Uᵢ, so an error of Uᵢ is scaled by the difference of tᵢ from it; [`AVERAGED`] = 16 roundings are
 //! its own.
 //!
+//! # Rays along a plane
+//!
+//! Components of a direction near 0 are raised, so that their reciprocals are finite. A ray that is so nearly in the plane of a
+//! triangle that raising alone may make it meet that plane counts as a miss of every test: no such hit is demanded.
+//!
 //! The bounds here are the wider of both kinds. A test that moves vertices into the triangle's own
 //! frame (Baldwin and Weber) has still wider ones, and is wrong by these.
 
 use super::holes::Weight;
+use crate::ray::{SMALLEST_COMPONENT, SMALLEST_SLOPE};
 use raystone_core::geometry::{Ray, Triangle};
 
 /// Half an ulp of 1 in f32.
@@ -70,6 +76,8 @@ pub(super) struct Crossing {
     barycentrics: [Bounded; 3],
     t: Bounded,
     sheared: Sheared,
+    /// True if the ray may meet the plane for its raised direction alone.
+    is_along: bool,
 }
 
 /// The additional errors of a test with sheared vertices.
@@ -106,6 +114,7 @@ impl Crossing {
             barycentrics,
             t: triple(c, e1, e2),
             sheared,
+            is_along: is_along(d, e1, e2, det.value),
         }
     }
 
@@ -133,7 +142,7 @@ impl Crossing {
         let in_reach = |t: Bounded| {
             t.value - t.error > f64::from(ray.t_min) && t.value + t.error < f64::from(ray.t_max)
         };
-        inside && self.distance().is_some_and(in_reach)
+        inside && !self.is_along && self.distance().is_some_and(in_reach)
     }
 
     /// Distance along the ray in units of its direction; `None` if the sign of det is uncertain.
@@ -179,6 +188,16 @@ impl Crossing {
         });
         terms.sum()
     }
+}
+
+/// True if raising may have tilted a direction against a plane as much as it is tilted; det is that of direction and edges.
+fn is_along(d: Vector, e1: Vector, e2: Vector, det: f64) -> bool {
+    // Each component by no more than twice what it is raised to, and a test in f32 may err by some roundings.
+    let longest = d.iter().fold(0.0, |longest: f64, x| longest.max(x.abs()));
+    let raised = (longest * f64::from(SMALLEST_SLOPE)).max(f64::from(SMALLEST_COMPONENT));
+    let normal = cross(e1, e2);
+    let sum: f64 = normal.iter().map(|x| x.abs()).sum();
+    det.abs() <= 2.0 * raised * sum * (1.0 + 2.0 * ROUNDINGS * EPSILON)
 }
 
 impl Sheared {
@@ -254,4 +273,44 @@ pub(super) fn dot(a: Vector, b: Vector) -> f64 {
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Fault, Verdict, judge};
+    use super::*;
+
+    /// A floor of which corners are some 10⁻¹⁴ too low, as rounding of a motion leaves them, and a ray along it.
+    #[test]
+    fn no_hit_is_demanded_of_a_plane_that_raising_may_have_tilted_the_ray_to() {
+        let [x, y] = [-5.882_838_2e-15, -2.399_931_3e-14];
+        let corners = [
+            [552.8, x, -1.599_954_3e-14],
+            [x, y, 559.2],
+            [549.6, y, 559.2],
+        ];
+        let floor = [Triangle {
+            vertices: corners.map(Into::into),
+        }];
+        // It begins so much below that it meets the floor ten units on.
+        let along = |times: f32| {
+            let direction = [
+                -9.198_513_5e-11,
+                times * SMALLEST_COMPONENT,
+                -3.922_672_3e-11,
+            ];
+            Ray::new([556.0, y - times * 5.333_2e-15, 559.2], direction)
+        };
+        let raised = along(1.0);
+        assert_eq!(judge(&floor[..], raised, None), Verdict::Ambiguous);
+        let crossed = Crossing::new(&floor[0], &raised);
+        assert!(crossed.is_along && crossed.is_possible(&raised));
+        // A ray that climbs as much by itself meets the floor.
+        let steep = along(4.0);
+        let verdict = judge(&floor[..], steep, None);
+        assert!(
+            matches!(verdict, Verdict::Wrong(Fault::FalseMiss { .. })),
+            "{verdict:?}"
+        );
+    }
 }
