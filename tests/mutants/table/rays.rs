@@ -134,8 +134,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the last node of a level is never met",
         text(
             "accel/ray_hierarchy/passes/expand",
-            "return child < below && meets",
-            "return child + 1u < below && meets",
+            "if (child.x >= below) {",
+            "if (child.x + 1u >= below) {",
         ),
         RAYS,
         Check::Lattice,
