@@ -107,7 +107,7 @@ struct Descent<'a> {
 }
 
 impl Descent<'_> {
-    /// Tests nodes of a level against a primitive, the how manieth of its own level, and then the children of those that
+    /// Tests nodes of a level against a primitive, which is numbered within its own level, and then the children of those that
     /// meet; adds tests and pairs of each level.
     fn below(
         &self,
