@@ -126,8 +126,8 @@ pub(crate) fn least_bytes(order: Order, flags: u64, [bytes, kept]: [u64; 2]) -> 
     read + 2 * bytes * kept
 }
 
-/// Bytes by which scratch may be longer than a method says: buffers of few words are rounded up.
-const ROUNDED_UP: u64 = 64;
+/// Bytes by which scratch may differ from what a method says: buffers of few words are rounded up, and a single element needs fewer.
+const FEW: u64 = 64;
 
 /// What a method says of its dispatches and scratch, and does not record.
 fn other_sizes(recording: &Recording, runs: u32, scratch_bytes: u64) -> Option<String> {
@@ -136,7 +136,7 @@ fn other_sizes(recording: &Recording, runs: u32, scratch_bytes: u64) -> Option<S
         recording.run_count() as u32,
         recording.scratch_bytes(is_own),
     );
-    let agrees = found.0 == runs && (scratch_bytes..=scratch_bytes + ROUNDED_UP).contains(&found.1);
+    let agrees = found.0 == runs && found.1.abs_diff(scratch_bytes) <= FEW;
     (!agrees).then(|| {
         format!(
             "it has (kernels, bytes) {found:?}, and says {:?}",
