@@ -1,7 +1,7 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
 use super::light_tables::LightTables;
-use super::medium::{self, MediumTables};
+use super::medium::{self, MediaFeatures, MediaTables};
 use super::mirror_tree::{MirrorPlaces, MirrorTree};
 use super::offset::TransformError;
 use super::scene_kinds::{SceneKind as _, SceneKinds};
@@ -38,11 +38,8 @@ pub struct SceneFeatures {
     pub transforms: bool,
     /// A triangle is mirrored, with reversed orientation.
     pub mirrored: bool,
-    /// Kernel module of the structure over the scene's medium, if it has one. Kernels cannot carry it: a medium takes
-    /// numbers from the sampler.
-    pub medium: Option<&'static str>,
-    /// The medium's coefficients differ by channel.
-    pub medium_colours: bool,
+    /// What the scene's media need, if it has any. Kernels cannot carry them: a medium takes numbers from the sampler.
+    pub(super) media: Option<MediaFeatures>,
 }
 
 /// Groups of features that kernels can be made to include although a scene does not need them.
@@ -103,7 +100,7 @@ impl SceneFeatures {
     /// The kernel with the scene's external kinds.
     pub(super) fn activate(&self, kernel: Composition) -> Composition {
         let kernel = self.light_kinds.activate(self.materials.activate(kernel));
-        medium::activate(kernel, self.medium, self.medium_colours)
+        medium::activate(kernel, self.media)
     }
 
     /// Features omitted by a kernel for surfaces of only this kind, by its number, or only misses.
@@ -160,16 +157,16 @@ impl SceneBuffers {
         let surfaces = SurfaceFeatures::of(scene, |_| true);
         let materials = SceneKinds::of(scene.materials.iter().map(|material| material.kind));
         let mut lights = LightTables::of(scene, &LightList::of(scene));
-        let mut medium = MediumTables::of(gpu, scene)?;
-        let tables = Tables::of(scene, &materials, &mut lights, &surfaces, medium.as_mut());
+        let mut media = MediaTables::of(gpu, scene)?;
+        let tables = Tables::of(scene, &materials, &mut lights, &surfaces, media.as_mut());
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
             "shading_tables",
             &gpu.storage("shading_tables", &tables.words)?,
         );
-        if let Some(medium) = &medium {
-            medium.bind(&mut bindings);
+        if let Some(media) = &media {
+            media.bind(&mut bindings);
         }
         let transform_error = TransformError::of(soup);
         let has_map = lights.has_map();
@@ -195,8 +192,7 @@ impl SceneBuffers {
                 materials,
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
                 mirrored: scene.mirrored.contains(&true),
-                medium: medium.as_ref().map(MediumTables::module),
-                medium_colours: medium.as_ref().is_some_and(|medium| medium.is_coloured),
+                media: media.as_ref().and_then(MediaTables::features),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
@@ -213,7 +209,7 @@ impl SceneBuffers {
 }
 
 /// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials,
-/// lights, the data of [`surface_tables`](super::surface_tables), the medium, and the tree over mirrors.
+/// lights, the data of [`surface_tables`](super::surface_tables), the media, and the tree over mirrors.
 ///
 /// A material: base colour and kind number, with the highest bit set if it emits only from its
 /// front; emission and index of its parameters, in `vec4`; indices of its texture placements, 0 for
@@ -230,7 +226,7 @@ impl Tables {
         kinds: &SceneKinds<MaterialKind>,
         lights: &mut LightTables,
         surfaces: &SurfaceFeatures,
-        medium: Option<&mut MediumTables>,
+        media: Option<&mut MediaTables>,
     ) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
@@ -247,8 +243,8 @@ impl Tables {
         }
         lights.append(&mut words);
         let places = append(scene, surfaces, &mut words);
-        if let Some(medium) = medium {
-            medium.append(&mut words);
+        if let Some(media) = media {
+            media.append(&mut words);
         }
         let mirrors = MirrorTree::of(scene).append(&mut words);
         words.resize(words.len().next_multiple_of(4), 0);

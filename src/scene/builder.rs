@@ -24,7 +24,7 @@ pub(super) struct Look {
     pub camera: Option<Camera>,
     pub environment: Vec3,
     pub lights: Vec<Light>,
-    pub medium: Option<SceneMedium>,
+    pub media: Vec<SceneMedium>,
 }
 
 impl Look {
@@ -275,7 +275,7 @@ impl SceneBuilder {
             environment: look.environment,
             lights: look.lights,
             daylight: None,
-            medium: look.medium,
+            media: look.media,
             framing: None,
             hash: String::new(),
             report: self.report,

@@ -139,8 +139,11 @@ impl SceneData {
                 .iter()
                 .map(|texture| size_of_val(&texture.texels[..]))
                 .sum::<usize>()
-            + (self.medium.as_ref())
-                .map_or(0, |medium| size_of_val(&medium.volume.scattering[..]) * 3)
+            + self
+                .media
+                .iter()
+                .map(|medium| size_of_val(&medium.volume.scattering[..]) * 3)
+                .sum::<usize>()
     }
 
     /// Indices of emissive triangles with non-zero area, ascending.
@@ -224,7 +227,7 @@ impl SceneData {
         if let Some(sky) = &self.daylight {
             hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
         }
-        if let Some(medium) = &self.medium {
+        for medium in &self.media {
             hash.bytes(b"medium");
             hash.bytes(&medium.words());
         }

@@ -209,7 +209,7 @@ fn taken_apart(
             scene.environment
         },
         lights: scene.lights,
-        medium: scene.medium,
+        media: scene.media,
     };
     (scene.name, look)
 }

@@ -48,6 +48,16 @@ pub enum SceneError {
         /// The reason.
         source: raystone_volume::MediaError,
     },
+    /// Further media that cannot be.
+    #[error("{name}: `more_media` of the scene{}: {problem}", .place.map_or(String::new(), |k| format!(", table {k}")))]
+    MoreMedia {
+        /// The scene, as typed.
+        name: String,
+        /// Which of its tables, from 1 on; all of them if none.
+        place: Option<usize>,
+        /// The reason.
+        problem: String,
+    },
     /// The file has no bytes.
     #[error("{}: the file is empty; export or copy the model again", path.display())]
     Empty {

@@ -262,7 +262,8 @@ impl Values {
                 ("scattering", ParamValue::Number(0.5)),
                 ("medium_voxels", ParamValue::Integer(4)),
             ])?;
-            Ok(scene.medium.ok_or("a known scene has no medium")?.volume)
+            let medium = scene.media.into_iter().next();
+            Ok(medium.ok_or("a known scene has no medium")?.volume)
         };
         for name in ["known:/a.vol", "known:/a.npy"] {
             let volume = medium(name)?;

@@ -123,7 +123,7 @@ fn parameters() -> Result<[Known; 6], String> {
         ("scattering", number(0.75)),
         ("absorption", number(0.25)),
     ])?;
-    let volume = fog.medium.as_ref().map(|medium| &medium.volume);
+    let volume = fog.media.first().map(|medium| &medium.volume);
     let first = |of: Option<&Vec<f32>>| {
         of.and_then(|all| all.first())
             .map_or(f64::NAN, |x| f64::from(*x))

@@ -43,6 +43,7 @@ mod light;
 mod mask;
 mod material;
 mod medium;
+mod more_media;
 mod mtl;
 mod mtl_statements;
 mod mtl_texture;
@@ -80,7 +81,7 @@ pub use material::{
     Lobes, Look, MATERIAL_KINDS, MIRROR, Masking, Material, MaterialKind, MaterialSource, PHONG,
     PRINCIPLED, reflectance_of_ior,
 };
-pub use medium::SceneMedium;
+pub use medium::{MOST_MEDIA, SceneMedium};
 pub use normals::{GEOMETRIC, decode_normal, encode_normal};
 pub use raystone_core::load::LoadReport;
 pub use shifts::{Shifts, parse_shifts, shifts_text};
@@ -144,8 +145,8 @@ pub struct SceneData {
     pub lights: Vec<Light>,
     /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
     pub daylight: Option<Daylight>,
-    /// The medium that light is scattered and absorbed in, if there is one.
-    pub medium: Option<SceneMedium>,
+    /// The media that light is scattered and absorbed in. Where they overlap, their coefficients add up.
+    pub media: Vec<SceneMedium>,
     /// Automatic framing, if the scene has no camera.
     pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
@@ -219,7 +220,15 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     let mut variant = variant.clone();
     let mut common = Params::default();
-    for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS, SHIFTS] {
+    let of_all = [
+        MOST_TRIANGLES,
+        COPIES,
+        ENVIRONMENT,
+        HUNG_LAMPS,
+        SHIFTS,
+        MORE_MEDIA,
+    ];
+    for name in of_all {
         common.0.extend(variant.params.0.remove_entry(name));
     }
     let mut medium = Params::default();
@@ -249,6 +258,9 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         Some(ParamValue::Name(text)) if !text.is_empty() => Some(text.as_str()),
         _ => None,
     };
+    if let Some(tables) = text(MORE_MEDIA) {
+        scene = more_media::added(scene, tables)?;
+    }
     if let Some(file) = text(ENVIRONMENT) {
         scene = scene.under(Path::new(file), options.table_bytes)?;
     }
@@ -265,6 +277,9 @@ const ENVIRONMENT: &str = "environment";
 
 /// Common parameter: ways of instances.
 pub const SHIFTS: &str = "shifts";
+
+/// Common parameter: media beside the first.
+const MORE_MEDIA: &str = "more_media";
 
 /// Common parameter: number of added lamps.
 const HUNG_LAMPS: &str = "hung_lamps";
@@ -307,6 +322,12 @@ pub(crate) fn common_parameters() -> ParameterSchema {
             description: "small square lamps that are hung into the scene, at places of their own, and shine down",
             default: ParamValue::Integer(0),
             range: ParamRange::Integer { min: 0, max: 4096 },
+        },
+        Parameter {
+            name: MORE_MEDIA,
+            description: "media beside the first, in braces each, with the parameters that the first one has: `{ medium = \"cloud\", scattering = 2 }, { … }`",
+            default: ParamValue::Name(String::new()),
+            range: ParamRange::Text,
         },
         Parameter {
             name: SHIFTS,

@@ -1,4 +1,4 @@
-//! The medium of a scene: fog, smoke or a cloud in a box or a ball.
+//! A medium of a scene: fog, smoke or a cloud in a box or a ball.
 
 use super::{SceneData, SceneError, extension, named};
 use glam::{DVec3, Vec3};
@@ -21,6 +21,9 @@ pub struct SceneMedium {
     pub structure: String,
 }
 
+/// How many media paths are followed through.
+pub const MOST_MEDIA: usize = 8;
+
 parameters! {
     /// What a medium fills of its box.
     enum Shape {
@@ -40,7 +43,7 @@ parameters! {
         HenyeyGreenstein = "henyey-greenstein",
     }
 
-    /// The medium of any scene.
+    /// The first medium of any scene, or one of `more_media`.
     pub(crate) struct MediumParameters {
         /// medium in the scene: `constant`, `cloud`, a grid of densities from a file (NumPy's .npy or Mitsuba's
         /// .vol), or what a closed mesh encloses (a model's file); that of the scene itself if empty
@@ -91,11 +94,18 @@ impl MediumParameters {
         })
     }
 
-    /// The scene with this medium, or as it is.
+    /// The scene with this medium alone, or as it is.
     pub(super) fn applied(&self, mut scene: SceneData) -> Result<SceneData, SceneError> {
         if self.medium.is_empty() {
             return Ok(scene);
         }
+        scene.media = vec![self.made(&scene)?];
+        scene.hash = scene.content_hash();
+        Ok(scene)
+    }
+
+    /// The medium, for this scene.
+    pub(super) fn made(&self, scene: &SceneData) -> Result<SceneMedium, SceneError> {
         let problem = |source: MediaError| SceneError::Medium {
             name: scene.name.clone(),
             source,
@@ -111,10 +121,8 @@ impl MediumParameters {
             "" => scatters.clone(),
             other => grid(other)?,
         };
-        let medium = self.built(&scene, [&scatters, &absorbs]);
-        scene.medium = Some(medium.map_err(problem)?);
-        scene.hash = scene.content_hash();
-        Ok(scene)
+        let medium = self.built(scene, [&scatters, &absorbs]);
+        medium.map_err(problem)
     }
 
     fn built(
@@ -295,7 +303,7 @@ mod tests {
                 ("absorber", name("cloud")),
             ],
         );
-        let volume = scene.medium.unwrap().volume;
+        let volume = scene.media[0].volume.clone();
         assert_eq!(volume.resolution, [8; 3]);
         assert_eq!(
             [volume.low, volume.high],
@@ -310,10 +318,10 @@ mod tests {
     #[test]
     fn a_medium_without_a_box_fills_that_of_the_scene_and_changes_its_hash() {
         let plain = load_default("cornell-box");
-        assert!(plain.medium.is_none());
+        assert!(plain.media.is_empty());
         let fog = load_with("cornell-box", &[("medium", name("constant"))]);
         assert_ne!(plain.hash, fog.hash);
-        let volume = fog.medium.unwrap().volume;
+        let volume = fog.media[0].volume.clone();
         assert_eq!(volume.high.as_vec3(), plain.bounds().max);
         let other = load_with(
             "cornell-box",
@@ -346,7 +354,7 @@ mod tests {
     #[test]
     fn a_closed_mesh_encloses_a_medium_where_it_is() {
         let scene = filled(&BOX.concat(), 12).unwrap();
-        let volume = scene.medium.unwrap().volume;
+        let volume = scene.media[0].volume.clone();
         assert_eq!(volume.resolution, [6, 12, 3]);
         assert_eq!(
             [volume.low, volume.high],
@@ -357,7 +365,7 @@ mod tests {
         // height z the part (1 - z / 2)².
         let pyramid = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 2\n\
                        f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n";
-        let volume = filled(pyramid, 32).unwrap().medium.unwrap().volume;
+        let volume = filled(pyramid, 32).unwrap().media[0].volume.clone();
         assert_eq!(volume.resolution, [32; 3]);
         for layer in 0..32_usize {
             let values = &volume.scattering[layer * 1024..][..1024];
@@ -403,7 +411,7 @@ mod tests {
     #[test]
     fn parameters_of_a_medium_that_is_not_there_are_named() {
         let scene = load_with("cornell-box", &[("scattering", Number(2.0))]);
-        assert!(scene.medium.is_none());
+        assert!(scene.media.is_empty());
         let said = scene.report.warnings.join("\n");
         assert!(
             said.contains("`scattering` of a medium say nothing"),
@@ -437,15 +445,15 @@ mod tests {
             &[("medium", name("constant")), ("scattering", Number(1.0))],
         );
         assert_eq!(grey.hash, plain.hash);
-        let grey = grey.medium.unwrap();
+        let grey = grey.media[0].clone();
         assert!(!grey.is_coloured());
         let coloured = tinted([0.25, 0.5, 0.0], [1.0; 3]);
         assert_ne!(coloured.hash, plain.hash);
-        let coloured = coloured.medium.unwrap();
+        let coloured = coloured.media[0].clone();
         assert!(coloured.is_coloured());
         assert_eq!(coloured.volume.scattering, [1.0]);
         assert_eq!(coloured.tints[0].to_array(), [0.5, 1.0, 0.0]);
-        let nothing = tinted([0.0; 3], [1.0; 3]).medium.unwrap();
+        let nothing = tinted([0.0; 3], [1.0; 3]).media[0].clone();
         assert!(!nothing.is_coloured() && nothing.volume.scattering == [0.0]);
         let fog = raystone_volume::Volume::constant(1.0, 0.0, 1.0).unwrap();
         for wrong in [[-0.1, 1.0, 1.0], [1.1, 1.0, 1.0], [f32::NAN, 1.0, 1.0]] {

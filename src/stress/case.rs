@@ -213,7 +213,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         environment: Vec3::ONE,
         lights: Vec::new(),
         daylight: None,
-        medium: None,
+        media: Vec::new(),
         framing: None,
         hash: String::new(),
         report: Default::default(),

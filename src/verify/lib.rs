@@ -29,6 +29,8 @@ pub mod ray_counts;
 pub mod rays;
 pub mod scene_record;
 pub mod self_test;
+#[cfg(test)]
+mod several_media_tests;
 pub mod shadow_rays;
 pub mod strained_copies;
 #[cfg(test)]

@@ -35,7 +35,7 @@ fn channels(volume: &Volume, tints: [Vec3; 2]) -> [Volume; 3] {
 fn tinted(mut scene: SceneData, volume: &Volume, tints: [Vec3; 2], structure: &str) -> SceneData {
     let medium = SceneMedium::tinted(volume.clone(), tints, structure).unwrap();
     assert!(medium.is_coloured() || tints == [Vec3::ONE; 2]);
-    scene.medium = Some(medium);
+    scene.media = vec![medium];
     scene
 }
 
@@ -439,7 +439,7 @@ const PATH: &str = "integrator/path";
 #[test]
 fn faults_of_coloured_media_are_seen_by_single_paths() {
     let mut trials = media(&KindChecks::default()).unwrap();
-    trials.retain(|t| (t.scene.medium.as_ref()).is_some_and(SceneMedium::is_coloured));
+    trials.retain(|t| t.scene.media.len() == 1 && t.scene.media[0].is_coloured());
     assert_eq!(trials.len(), 2);
     for (file, text, fault) in FAULTS {
         let whole = match file {

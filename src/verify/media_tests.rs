@@ -5,7 +5,7 @@ use crate::image_gate::{Choice, Pixels, answers, judge};
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
 use crate::path_oracle::{Estimator, Lens, PathOracle, View};
-use crate::trial_media::media;
+use crate::trial_media::{media, several_media};
 use glam::{DVec3, UVec3, Vec3, vec3};
 use raystone_accel::AccelRegistry;
 use raystone_core::geometry::Camera;
@@ -151,7 +151,7 @@ pub(crate) fn empty(volume: Volume, structure: &str) -> SceneData {
         black,
     );
     let mut scene = mesh.done(Vec::new());
-    scene.medium = Some(SceneMedium::new(volume, structure).unwrap());
+    scene.media = vec![SceneMedium::new(volume, structure).unwrap()];
     scene
 }
 
@@ -293,7 +293,7 @@ pub(crate) fn floor(volume: Volume, structure: &str) -> SceneData {
         grey,
     );
     let mut scene = mesh.done(Vec::new());
-    scene.medium = Some(SceneMedium::new(volume, structure).unwrap());
+    scene.media = vec![SceneMedium::new(volume, structure).unwrap()];
     scene
 }
 
@@ -452,7 +452,9 @@ fn organisations_follow_the_same_paths_through_media() {
     all.push(entry("wavefront").variant(&[by_kind]));
     all.push(entry("wavefront").variant(&[by_ray]));
     println!("{} organisations", all.len());
-    for trial in media(&KindChecks::default()).unwrap() {
+    let kinds = KindChecks::default();
+    let several = several_media(&kinds).unwrap();
+    for trial in media(&kinds).unwrap().into_iter().chain(several) {
         let one = path(&[depth(4)]);
         let truth = image(&gpu, &trial.scene, [40, 28], &one, 4).unwrap();
         for variant in &all {

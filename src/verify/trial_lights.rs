@@ -67,8 +67,11 @@ pub fn trials_of(
             scenes.extend((kind.trials)()?);
         }
     }
-    if scene.medium.is_some() {
+    if !scene.media.is_empty() {
         scenes.extend(crate::trial_media::media(kinds)?);
+    }
+    if scene.media.len() > 1 {
+        scenes.extend(crate::trial_media::several_media(kinds)?);
     }
     let choice = integrator.params.0.get("light_choice");
     if choice.is_some_and(|by| by.to_string() == "tree") {

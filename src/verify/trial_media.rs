@@ -1,5 +1,5 @@
 //! Trial scenes with media: fog and a cloud, lamps inside and outside, surfaces in them and around them, every phase function, and
-//! coefficients that differ by channel.
+//! coefficients that differ by channel; and several media at once.
 
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
@@ -73,6 +73,49 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
     ])
 }
 
+/// The scenes with several media, which overlap and stand apart.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub(crate) fn several_media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
+    const GREY: [Vec3; 2] = [Vec3::ONE; 2];
+    Ok(vec![
+        TrialScene {
+            scene: in_several(
+                "banks",
+                lamps()?,
+                [(fog(), GREY), (cloud(), GREY), (smoke(), GREY)],
+                "level-map",
+            )?,
+            trials: vec![
+                path(&[depth(5)]),
+                path(&[depth(3), word("lights", "all")]),
+                path(&[
+                    depth(3),
+                    word("light_choice", "tree"),
+                    word("roulette", "albedo"),
+                ]),
+            ],
+        },
+        TrialScene {
+            scene: in_several("veils", mirrors()?, [(cloud(), GREY), (fog(), GREY)], "dda")?,
+            trials: vec![path(&[depth(3), connected()])],
+        },
+        TrialScene {
+            scene: in_several(
+                "dyes",
+                points(&kinds.lights)?,
+                [(cloud(), HAZE), (fog(), AMBER), (smoke(), GREY)],
+                "bricks",
+            )?,
+            trials: vec![
+                path(&[depth(5)]),
+                path(&[depth(2), word("lights", "all"), word("roulette", "none")]),
+            ],
+        },
+    ])
+}
+
 /// Tints of scattering and absorption. One channel of the haze scatters nothing.
 const HAZE: [Vec3; 2] = [vec3(1.0, 0.4, 0.0), vec3(0.3, 0.0, 1.0)];
 const AMBER: [Vec3; 2] = [vec3(1.0, 0.7, 0.3), vec3(0.1, 0.5, 1.0)];
@@ -90,18 +133,30 @@ fn in_medium(
 /// The same with tints of scattering and absorption.
 fn in_colours(
     name: &str,
-    mut scene: SceneData,
+    scene: SceneData,
     volume: Result<Volume, MediaError>,
     tints: [Vec3; 2],
     structure: &str,
 ) -> Result<SceneData, SceneError> {
-    let problem = |source| SceneError::Medium {
+    in_several(name, scene, [(volume, tints)], structure)
+}
+
+/// The same with several media.
+fn in_several<const N: usize>(
+    name: &str,
+    mut scene: SceneData,
+    media: [(Result<Volume, MediaError>, [Vec3; 2]); N],
+    structure: &str,
+) -> Result<SceneData, SceneError> {
+    let media = media
+        .into_iter()
+        .map(|(volume, tints)| SceneMedium::tinted(volume?, tints, structure));
+    let media: Result<Vec<SceneMedium>, MediaError> = media.collect();
+    scene.media = media.map_err(|source| SceneError::Medium {
         name: name.to_owned(),
         source,
-    };
-    let volume = volume.map_err(problem)?;
+    })?;
     name.clone_into(&mut scene.name);
-    scene.medium = Some(SceneMedium::tinted(volume, tints, structure).map_err(problem)?);
     Ok(scene)
 }
 

@@ -96,6 +96,7 @@ pub fn trial_scenes_of(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError
     scenes.extend(crate::trial_slivers::scenes()?);
     scenes.extend(crate::trial_reach::scenes(kinds)?);
     scenes.extend(crate::trial_media::media(kinds)?);
+    scenes.extend(crate::trial_media::several_media(kinds)?);
     Ok(scenes)
 }
 

@@ -133,7 +133,7 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         environment: Vec3::ONE,
         lights: Vec::new(),
         daylight: None,
-        medium: None,
+        media: Vec::new(),
         framing: None,
         hash: String::new(),
         report: LoadReport::default(),

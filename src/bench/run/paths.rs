@@ -410,7 +410,7 @@ fn drawn(
     let seed = session.experiment.seeds().replicates.first().copied();
     let seed = seed.unwrap_or_default();
     let limit = made.demand.samples.unwrap_or(frame.summed).max(spp);
-    let pixels = match subject.stage.scene.medium.is_some() && shares_numbers(&made, seed) {
+    let pixels = match !subject.stage.scene.media.is_empty() && shares_numbers(&made, seed) {
         true => Pixels {
             samples: inner_samples(frame.samples, limit),
             ..frame.pixels(spp, seed)

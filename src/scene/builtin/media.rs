@@ -51,7 +51,7 @@ fn with_medium(
 ) -> (SceneBuilder, Look) {
     let medium = volume.and_then(|volume| SceneMedium::new(volume, "level-map"));
     match medium {
-        Ok(medium) => look.medium = Some(medium),
+        Ok(medium) => look.media = vec![medium],
         Err(source) => {
             let name = name.to_owned();
             builder.refused = Some(SceneError::Medium { name, source });
@@ -198,10 +198,10 @@ mod tests {
         for name in ["fog", "cloud"] {
             let scene = load_default(name);
             assert!(scene.daylight.is_none());
-            let volume = scene.medium.unwrap().volume;
+            let volume = scene.media[0].volume.clone();
             assert!(volume.scattering.iter().any(|s| *s > 0.0), "{name}");
             let clear = load_with(name, &[("albedo", Number(1.0))]);
-            let absorbs = clear.medium.unwrap().volume.absorption;
+            let absorbs = clear.media[0].volume.absorption.clone();
             assert!(absorbs.iter().all(|a| *a < 1e-5), "{name}");
         }
     }

@@ -120,7 +120,8 @@ impl Values {
                 ("medium", ParamValue::Name(name.to_owned())),
                 ("medium_voxels", ParamValue::Integer(side)),
             ])?;
-            let volume = scene.medium.ok_or("a known scene has no medium")?.volume;
+            let medium = scene.media.into_iter().next();
+            let volume = medium.ok_or("a known scene has no medium")?.volume;
             Ok((volume.resolution, volume.scattering))
         };
         let wedge = [0.25, 0.75, 1.0, 1.0, 0.25, 0.75, 1.0, 1.0];

@@ -1,4 +1,4 @@
-//! The medium of a scene for Mitsuba's `volpath`, and for `volpathmis` where its coefficients differ by channel.
+//! The media of a scene for Mitsuba's `volpath`, and for `volpathmis` where coefficients of one differ by channel.
 
 use super::{Export, ExportError, vector};
 use glam::{DVec3, Vec3};
@@ -6,21 +6,25 @@ use raystone_scene::SceneMedium;
 use raystone_volume::{Bounds, Volume, phase};
 use std::fmt::Write as _;
 
-/// The medium as its sensor and its shape refer to it.
-const ID: &str = "medium";
-const FILES: [&str; 2] = ["medium/extinction.vol", "medium/albedo.vol"];
-
-/// The integrator that knows media, or that does not.
-pub(super) fn integrator(medium: Option<&SceneMedium>) -> &'static str {
-    match medium {
-        Some(medium) if medium.is_coloured() => "volpathmis",
-        Some(_) => "volpath",
-        None => "path",
+/// A medium as its sensor and its shape refer to it, and the folder of its grids.
+fn id(number: usize) -> String {
+    match number {
+        0 => "medium".to_owned(),
+        _ => format!("medium-{}", number + 1),
     }
 }
 
-/// What a sensor in the medium says of it.
-pub(super) fn around(medium: Option<&SceneMedium>, eye: Vec3) -> String {
+/// The integrator that knows media, or that does not.
+pub(super) fn integrator(media: &[SceneMedium]) -> &'static str {
+    match media {
+        [] => "path",
+        _ if media.iter().any(SceneMedium::is_coloured) => "volpathmis",
+        _ => "volpath",
+    }
+}
+
+/// What a sensor in a medium says of it.
+pub(super) fn around(media: &[SceneMedium], eye: Vec3) -> String {
     let is_inside = |volume: &Volume| {
         let place = eye.as_dvec3();
         match volume.bounds {
@@ -31,19 +35,50 @@ pub(super) fn around(medium: Option<&SceneMedium>, eye: Vec3) -> String {
             }
         }
     };
-    if medium.is_some_and(|medium| is_inside(&medium.volume)) {
-        format!("        <ref name=\"medium\" id=\"{ID}\"/>\n")
-    } else {
-        String::new()
-    }
+    let around = media.iter().position(|medium| is_inside(&medium.volume));
+    around.map_or(String::new(), |number| {
+        format!("        <ref name=\"medium\" id=\"{}\"/>\n", id(number))
+    })
+}
+
+/// How far two of a scene's volumes are apart; not above 0 where they overlap or touch. Ellipsoids are refused before.
+fn gap(a: &Volume, b: &Volume) -> f64 {
+    // A ball is what is within its radius of its middle.
+    let core = |of: &Volume| match of.bounds {
+        Bounds::Box => ([of.low, of.high], 0.0),
+        Bounds::Sphere => (
+            [(of.low + of.high) / 2.0; 2],
+            (of.high - of.low).max_element() / 2.0,
+        ),
+    };
+    let ([a_low, a_high], a_radius) = core(a);
+    let ([b_low, b_high], b_radius) = core(b);
+    let apart = (a_low - b_high).max(b_low - a_high).max(DVec3::ZERO);
+    apart.length() - a_radius - b_radius
 }
 
 impl Export<'_> {
-    /// Writes the medium, its grids and its border.
-    pub(super) fn medium(&mut self) -> Result<(), ExportError> {
-        let Some(medium) = &self.scene.medium else {
-            return Ok(());
-        };
+    /// Writes all media.
+    pub(super) fn media(&mut self) -> Result<(), ExportError> {
+        let media = &self.scene.media;
+        for (number, medium) in media.iter().enumerate() {
+            self.medium(medium, number)?;
+            let before = &media[..number];
+            if before
+                .iter()
+                .any(|other| gap(&other.volume, &medium.volume) <= 0.0)
+            {
+                return Err(ExportError::Medium(
+                    "two media overlap or touch, and a place has one medium there: move them apart, or put both into one grid",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a medium, its grids and its border.
+    fn medium(&mut self, medium: &SceneMedium, number: usize) -> Result<(), ExportError> {
+        let id = id(number);
         let volume = &medium.volume;
         let size = volume.high - volume.low;
         let spread = size.max_element() - size.min_element();
@@ -67,7 +102,7 @@ impl Export<'_> {
         let (kind, coefficients) = if volume.scattering.len() == 1 {
             ("homogeneous", one_voxel(medium))
         } else {
-            ("heterogeneous", self.grids(medium)?)
+            ("heterogeneous", self.grids(medium, &id)?)
         };
         let (low, size) = (vector(volume.low.as_vec3()), vector(size.as_vec3()));
         let to_world = |scale: &str, place: &str| {
@@ -86,13 +121,13 @@ impl Export<'_> {
         let placed = to_world(&vector(half.as_vec3()), &centre);
         let _ = write!(
             self.xml,
-            r#"    <medium type="{kind}" id="{ID}">
+            r#"    <medium type="{kind}" id="{id}">
 {coefficients}        {scatters}
     </medium>
     <shape type="{shape}">
         {placed}
         <bsdf type="null"/>
-        <ref name="interior" id="{ID}"/>
+        <ref name="interior" id="{id}"/>
     </shape>
 "#
         );
@@ -100,7 +135,8 @@ impl Export<'_> {
     }
 
     /// Writes extinction and albedo as grids, with the channels of [`parts_of`].
-    fn grids(&mut self, medium: &SceneMedium) -> Result<String, ExportError> {
+    fn grids(&mut self, medium: &SceneMedium, folder: &str) -> Result<String, ExportError> {
+        let files = ["extinction", "albedo"].map(|name| format!("{folder}/{name}.vol"));
         let resolution = medium.volume.resolution;
         let (channels, parts) = parts_of(medium);
         let extinction: Vec<f32> = parts.iter().map(|[s, a]| s + a).collect();
@@ -109,9 +145,9 @@ impl Export<'_> {
         let even: Option<Vec<f32>> = (0..channels)
             .map(|channel| the_same(channel, channels, &albedo, &extinction))
             .collect();
-        let path = self.folder.join("medium");
+        let path = self.folder.join(folder);
         std::fs::create_dir_all(&path).map_err(super::unwritable(&path))?;
-        self.write(FILES[0], &vol(resolution, channels, &extinction))?;
+        self.write(&files[0], &vol(resolution, channels, &extinction))?;
         let grid = |name: &str, file: &str| {
             format!(
                 r#"        <volume name="{name}" type="gridvolume">
@@ -122,7 +158,7 @@ impl Export<'_> {
 "#
             )
         };
-        let sigma = grid("sigma_t", FILES[0]);
+        let sigma = grid("sigma_t", &files[0]);
         match even.as_deref() {
             Some([all]) => {
                 return Ok(sigma + &format!("        <float name=\"albedo\" value=\"{all}\"/>\n"));
@@ -138,8 +174,8 @@ impl Export<'_> {
             "the medium's albedo differs from voxel to voxel: between them Mitsuba mixes albedos, not scattering"
                 .to_owned(),
         );
-        self.write(FILES[1], &vol(resolution, channels, &albedo))?;
-        Ok(sigma + &grid("albedo", FILES[1]))
+        self.write(&files[1], &vol(resolution, channels, &albedo))?;
+        Ok(sigma + &grid("albedo", &files[1]))
     }
 }
 

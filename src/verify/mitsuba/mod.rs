@@ -130,7 +130,7 @@ pub fn export_mitsuba_of(
     for id in 0..scene.materials.len() {
         export.material(scene, id)?;
     }
-    export.medium()?;
+    export.media()?;
     export.lights()?;
     export.shapes(scene, settings.fronts_only)?;
     export.xml += "</scene>\n";
@@ -167,8 +167,8 @@ impl Export<'_> {
         let far = 2.0 * (bounds.center().distance(eye) + bounds.radius()).max(f32::MIN_POSITIVE);
         let near = 1e-4 * far;
         let (spp, depth) = (settings.spp, settings.bounces + 1);
-        let integrator = medium::integrator(scene.medium.as_ref());
-        let around = medium::around(scene.medium.as_ref(), eye);
+        let integrator = medium::integrator(&scene.media);
+        let around = medium::around(&scene.media, eye);
         let _ = write!(
             self.xml,
             r#"    <default name="spp" value="{spp}"/>

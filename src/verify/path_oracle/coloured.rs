@@ -1,8 +1,8 @@
 //! A medium whose coefficients differ by channel, in f64: from `docs/media.md`, "In the path tracer", *Colours*.
 
+use super::Walk;
 use super::hits::Segment;
-use super::medium::{FLIGHT, Flight, LAST_FLIGHT, Medium, Numbers, TO_LIGHT, depth_of};
-use super::{PathOracle, Walk};
+use super::medium::{Alone, Flight, Medium, Numbers, depth_of};
 use glam::{DVec2, DVec3};
 use raystone_volume::medium::Region;
 
@@ -22,7 +22,8 @@ fn extinction(there: DVec2, [scatters, absorbs]: [DVec3; 2]) -> DVec3 {
 impl Extinctions {
     /// Of a region: σ_s and σ are within its bounds, so that σ_a is between their differences; and each channel has
     /// between the products of σ and its tints.
-    fn of(medium: &Medium, region: &Region, tints: [DVec3; 2]) -> Self {
+    fn of(medium: &Medium, region: &Region) -> Self {
+        let tints = medium.tints;
         let density = f64::from(medium.straight.density);
         // The structure knows σ_s in the place of n.
         let [s, sigma] = [region.n, region.sigma].map(|shares| shares.as_dvec2() * density);
@@ -55,24 +56,21 @@ impl Extinctions {
     }
 }
 
-impl PathOracle<'_> {
+impl Medium<'_> {
     /// A free flight by spectral tracking (Kutz, Habel, Li & Novák 2017): one number decides for all channels, by their mean
     /// weighted with the path's throughput.
     pub(super) fn coloured_flight(
         &self,
         walk: &mut Walk,
         (ray, end): (&Segment, f64),
-        depth: u32,
-        first: Option<f64>,
-        (tints, throughput): ([DVec3; 2], &mut DVec3),
-    ) -> Option<Flight> {
-        let medium = self.medium.as_ref()?;
-        let first = first.unwrap_or_else(|| Numbers::new(walk, depth, LAST_FLIGHT).next());
-        let mut numbers = Numbers::new(walk, depth, FLIGHT);
+        first: f64,
+        mut numbers: Numbers,
+        mut throughput: DVec3,
+    ) -> Alone {
         let mut left = depth_of(first, &mut walk.rounding);
-        let mut found = None;
-        medium.regions(ray, end, |region, [enter, exit]| {
-            let bounds = Extinctions::of(medium, region, tints);
+        let mut alone = Alone::default();
+        self.regions(ray, end, |region, [enter, exit]| {
+            let bounds = Extinctions::of(self, region);
             let most = bounds.most.max_element();
             if most <= 0.0 {
                 return false;
@@ -85,52 +83,48 @@ impl PathOracle<'_> {
                     return false;
                 }
                 t += step;
-                let there = medium.at(medium.in_voxels(ray, t));
-                let own = walk.rounding.colour(extinction(there, tints));
+                let there = self.at(self.in_voxels(ray, t));
+                let own = walk.rounding.colour(extinction(there, self.tints));
                 if !bounds.hold(own) {
-                    *throughput = DVec3::NAN;
+                    alone.none.push((t, DVec3::NAN));
                 }
                 // Each channel's part of the path.
-                let parts = *throughput / throughput.element_sum();
+                let parts = throughput / throughput.element_sum();
                 let mean = parts.dot(own);
                 let none = (1.0 - mean / most).max(0.0);
                 let none = walk.rounding.share(none);
                 let collides = numbers.next() >= none;
                 walk.decide(collides.into());
                 if collides {
-                    let scattered = tints[0] * there.x;
-                    found = Some(Flight {
+                    let scattered = self.tints[0] * there.x;
+                    alone.scattered = Some(Flight {
                         distance: t,
                         albedo: scattered / mean,
+                        medium: self.number,
                     });
                     return true;
                 }
-                *throughput *= (most - own).max(DVec3::ZERO) / (most - mean);
+                let kept = (most - own).max(DVec3::ZERO) / (most - mean);
+                throughput *= kept;
+                alone.none.push((t, kept));
                 left = depth_of(numbers.next(), &mut walk.rounding);
             }
         });
-        walk.decide(5 + u64::from(found.is_some()));
-        found
+        alone
     }
 
-    /// What passes along the shadow ray to a light: the least extinction of each channel in closed form, its rest by ratio
+    /// What this medium lets pass along a shadow ray: the least extinction of each channel in closed form, its rest by ratio
     /// tracking at the greatest rest of a channel.
     pub(super) fn coloured_passes(
         &self,
         walk: &mut Walk,
         ray: &Segment,
-        depth: u32,
-        light: usize,
-        tints: [DVec3; 2],
+        mut numbers: Numbers,
     ) -> DVec3 {
-        let Some(medium) = &self.medium else {
-            return DVec3::ONE;
-        };
-        let mut numbers = Numbers::new(walk, depth, TO_LIGHT + light as u32);
         let mut result = DVec3::ONE;
         let mut collisions = 0;
-        medium.regions(ray, ray.length, |region, [enter, exit]| {
-            let bounds = Extinctions::of(medium, region, tints);
+        self.regions(ray, ray.length, |region, [enter, exit]| {
+            let bounds = Extinctions::of(self, region);
             result *= (-bounds.least * (exit - enter)).exp();
             if bounds.is_even {
                 return false;
@@ -147,7 +141,7 @@ impl PathOracle<'_> {
                     break;
                 }
                 collisions += 1;
-                let own = extinction(medium.at(medium.in_voxels(ray, t)), tints);
+                let own = extinction(self.at(self.in_voxels(ray, t)), self.tints);
                 let is_bounded = bounds.hold(own);
                 let own = walk.rounding.colour(own);
                 result *= if is_bounded {

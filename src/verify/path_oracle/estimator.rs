@@ -311,7 +311,7 @@ impl PathOracle<'_> {
                 .map_or(f64::INFINITY, |(_, distance)| *distance);
             let ball = self.sphere_met(&state.ray, end, rules.choice, &mut walk.rounding);
             let until = ball.as_ref().map_or(end, |ball| ball.distance);
-            let first = (self.medium.is_some() && depth < rules.max_depth)
+            let first = (!self.media.is_empty() && depth < rules.max_depth)
                 .then(|| walk.draw(at_bounce(depth, ROULETTE)));
             let way = (&state.ray, until);
             let flight = self.flight(walk, way, depth, first, &mut state.throughput);
@@ -404,7 +404,7 @@ impl PathOracle<'_> {
         if depth == rules.max_depth || flight.albedo == DVec3::ZERO {
             return false;
         }
-        let phase = self.phase(&point);
+        let phase = self.phase(&point, flight.medium);
         state.before = None;
         if !(self.lights.are_none() || rules.strategy == Strategy::Material) {
             let direct = self.direct(walk, &point, &phase, depth, rules);

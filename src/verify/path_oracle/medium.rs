@@ -1,4 +1,4 @@
-//! The medium of a scene, in f64: from `docs/media.md`, "In the path tracer".
+//! A medium of a scene, in f64: from `docs/media.md`, "In the path tracer".
 //!
 //! Regions and their bounds are read from the structure, since numbers are drawn by them: many would be right. That they
 //! hold is checked wherever the medium is read; a bound that does not makes the path no number, which no kernel gives.
@@ -17,9 +17,12 @@ use std::f64::consts::TAU;
 
 // Purposes of numbers beside the sampler's.
 pub(super) const FLIGHT: u32 = 0;
-const SURVIVAL: u32 = 1;
+pub(super) const SURVIVAL: u32 = 1;
 pub(super) const LAST_FLIGHT: u32 = 2;
 pub(super) const TO_LIGHT: u32 = 3;
+
+/// A medium's purposes are beyond 2 to this power times its number.
+const PURPOSE_BITS: u32 = 28;
 
 /// How far a region is entered before it is asked for, in voxels.
 const WITHIN: f64 = 1e-9;
@@ -30,12 +33,14 @@ const LEAST_HALF: f64 = 1.0 / 16384.0;
 
 /// A volume with the structure whose regions kernels ask for.
 pub(super) struct Medium<'a> {
-    volume: &'a Volume,
+    pub(super) volume: &'a Volume,
     pub(super) straight: Straight,
     /// σ_s and σ of each voxel, as kernels read them, per scene unit.
     field: Vec<DVec2>,
-    /// What σ_s and σ_a of each channel are multiplied by, where these differ.
-    tints: Option<[DVec3; 2]>,
+    /// What σ_s and σ_a of each channel are multiplied by.
+    pub(super) tints: [DVec3; 2],
+    /// Which of the scene's media it is.
+    pub(super) number: u32,
 }
 
 /// Where a ray is scattered.
@@ -43,6 +48,17 @@ pub(super) struct Flight {
     pub(super) distance: f64,
     /// What it multiplies the throughput by.
     pub(super) albedo: DVec3,
+    /// By which of the scene's media.
+    pub(super) medium: u32,
+}
+
+/// What a ray meets in one medium.
+#[derive(Default)]
+pub(super) struct Alone {
+    /// The first collision.
+    pub(super) scattered: Option<Flight>,
+    /// Where collisions before it were none, and what each multiplies the throughput by.
+    pub(super) none: Vec<(f64, DVec3)>,
 }
 
 /// Numbers of a purpose at a vertex of a path: a hash of all that they depend on.
@@ -65,11 +81,17 @@ fn keyed(key: u32, x: u32) -> u32 {
 }
 
 impl Numbers {
-    pub(super) fn new(walk: &Walk, depth: u32, purpose: u32) -> Self {
+    /// For a purpose of one of the scene's media.
+    pub(super) fn new(walk: &Walk, depth: u32, (purpose, medium): (u32, u32)) -> Self {
         let [x, y] = walk.id.pixel;
         let seed = permuted(walk.id.seed ^ 0x6d65_6469);
         let pixel = y * walk.view.size[0] + x;
-        let of = [pixel, walk.id.sample, depth, purpose];
+        let of = [
+            pixel,
+            walk.id.sample,
+            depth,
+            purpose + (medium << PURPOSE_BITS),
+        ];
         Self {
             key: of.into_iter().fold(seed, keyed),
             drawn: 0,
@@ -90,8 +112,8 @@ pub(super) fn depth_of(number: f64, rounding: &mut Rounding) -> f64 {
 }
 
 impl<'a> Medium<'a> {
-    /// The medium, if what kernels read of it is what the scene has.
-    pub(super) fn new(of: &'a SceneMedium) -> Result<Self, String> {
+    /// The medium of this number, if what kernels read of it is what the scene has.
+    pub(super) fn new(of: &'a SceneMedium, number: u32) -> Result<Self, String> {
         let volume = &of.volume;
         let straight = Straight::new(volume, &of.structure).map_err(|e| e.to_string())?;
         let density = f64::from(straight.density);
@@ -115,7 +137,8 @@ impl<'a> Medium<'a> {
             volume,
             straight,
             field,
-            tints: (of.is_coloured()).then(|| of.tints.map(|tint| tint.as_dvec3())),
+            tints: of.tints.map(|tint| tint.as_dvec3()),
+            number,
         })
     }
 
@@ -215,27 +238,20 @@ fn holds(value: f64, [least, most]: [f64; 2]) -> bool {
     value >= least * (1.0 - 1e-6) && value <= most * (1.0 + 1e-6)
 }
 
-impl PathOracle<'_> {
-    /// Where a ray is scattered first before `end`, by delta tracking: `first` is the number of the first collision that
-    /// there may be. In colours, the throughput changes on the way.
+impl Medium<'_> {
+    /// Where this medium alone scatters a ray first before `end`, by delta tracking: `first` is the number of the first
+    /// collision that there may be.
     pub(super) fn flight(
         &self,
         walk: &mut Walk,
         (ray, end): (&Segment, f64),
-        depth: u32,
-        first: Option<f64>,
-        throughput: &mut DVec3,
-    ) -> Option<Flight> {
-        let medium = self.medium.as_ref()?;
-        if let Some(tints) = medium.tints {
-            return self.coloured_flight(walk, (ray, end), depth, first, (tints, throughput));
-        }
-        let first = first.unwrap_or_else(|| Numbers::new(walk, depth, LAST_FLIGHT).next());
-        let mut numbers = Numbers::new(walk, depth, FLIGHT);
+        first: f64,
+        mut numbers: Numbers,
+    ) -> Alone {
         let mut left = depth_of(first, &mut walk.rounding);
         let mut found = None;
-        medium.regions(ray, end, |region, [enter, exit]| {
-            let [least, most] = medium.bounds(region);
+        self.regions(ray, end, |region, [enter, exit]| {
+            let [least, most] = self.bounds(region);
             let mut t = enter;
             if most <= 0.0 {
                 return false;
@@ -247,7 +263,7 @@ impl PathOracle<'_> {
                     break;
                 }
                 t += step;
-                let there = medium.at(medium.in_voxels(ray, t));
+                let there = self.at(self.in_voxels(ray, t));
                 let share = walk.rounding.number(there.y / most);
                 let collides = least == most || numbers.next() < share;
                 walk.decide(collides.into());
@@ -260,6 +276,7 @@ impl PathOracle<'_> {
                     found = Some(Flight {
                         distance: t,
                         albedo: DVec3::splat(albedo),
+                        medium: self.number,
                     });
                     return true;
                 }
@@ -267,30 +284,25 @@ impl PathOracle<'_> {
             }
             false
         });
-        walk.decide(5 + u64::from(found.is_some()));
-        found
+        Alone {
+            scattered: found,
+            none: Vec::new(),
+        }
     }
 
-    /// What passes along the shadow ray to a light, by residual-ratio tracking.
-    pub(super) fn passes(&self, walk: &mut Walk, ray: &Segment, depth: u32, light: usize) -> DVec3 {
-        let Some(medium) = &self.medium else {
-            return DVec3::ONE;
-        };
-        if let Some(tints) = medium.tints {
-            return self.coloured_passes(walk, ray, depth, light, tints);
-        }
-        let mut numbers = Numbers::new(walk, depth, TO_LIGHT + light as u32);
+    /// What this medium lets pass along a shadow ray, by residual-ratio tracking.
+    pub(super) fn passes(&self, walk: &mut Walk, ray: &Segment, mut numbers: Numbers) -> DVec3 {
         let mut result = 1.0;
         let mut collisions = 0;
-        medium.regions(ray, ray.length, |region, [enter, exit]| {
-            let [least, most] = medium.bounds(region);
+        self.regions(ray, ray.length, |region, [enter, exit]| {
+            let [least, most] = self.bounds(region);
             result *= (-least * (exit - enter)).exp();
             if most > least {
                 let rest = most - least;
                 let mut t = enter + depth_of(numbers.next(), &mut walk.rounding) / rest;
                 while t < exit {
                     collisions += 1;
-                    let there = medium.at(medium.in_voxels(ray, t)).y;
+                    let there = self.at(self.in_voxels(ray, t)).y;
                     let is_bounded = holds(there, [least, most]);
                     let there = walk.rounding.number(there);
                     result *= if is_bounded {
@@ -306,13 +318,9 @@ impl PathOracle<'_> {
         walk.decide(collisions);
         DVec3::splat(walk.rounding.number(result))
     }
+}
 
-    /// The number that decides whether a path survives, where flights have that of the sampler.
-    pub(super) fn survival(&self, walk: &Walk, depth: u32) -> Option<f64> {
-        let _ = self.medium.as_ref()?;
-        Some(Numbers::new(walk, depth, SURVIVAL).next())
-    }
-
+impl PathOracle<'_> {
     /// The point where a ray is scattered, noted in the place of the surface behind it.
     pub(super) fn scattered(
         &self,
@@ -336,10 +344,10 @@ impl PathOracle<'_> {
     }
 
     /// How light is scattered at a point of the medium that a path has come to in this direction.
-    pub(super) fn phase(&self, surface: &Surface) -> PhaseTwin {
-        let phase = self.medium.as_ref().map(|medium| medium.volume.phase);
+    pub(super) fn phase(&self, surface: &Surface, medium: u32) -> PhaseTwin {
+        let medium = self.media.get(medium as usize);
         PhaseTwin {
-            phase: phase.unwrap_or(Phase::ISOTROPIC),
+            phase: medium.map_or(Phase::ISOTROPIC, |medium| medium.volume.phase),
             before: -surface.out,
         }
     }

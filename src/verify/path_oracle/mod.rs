@@ -17,6 +17,7 @@ mod connection;
 mod estimator;
 pub(crate) mod hits;
 pub(crate) mod light;
+mod media;
 mod medium;
 mod rounding;
 mod surface;
@@ -41,7 +42,7 @@ use light::{Choice, Lights};
 use raystone_core::geometry::Camera;
 use raystone_render::CountedRays;
 use raystone_sampling::{Coordinate, Sampler, to_unit};
-use raystone_scene::{Material, SceneData};
+use raystone_scene::{Material, SceneData, SceneMedium};
 use std::fmt;
 use texture::Textures;
 
@@ -197,7 +198,9 @@ pub struct PathOracle<'a> {
     lights: Lights,
     textures: Textures<'a>,
     materials: Vec<&'static MaterialChecks>,
-    medium: Option<medium::Medium<'a>>,
+    media: Vec<medium::Medium<'a>>,
+    /// Coefficients of one of them differ by channel.
+    are_coloured: bool,
     diagonal: f64,
 }
 
@@ -241,9 +244,10 @@ impl<'a> PathOracle<'a> {
             hits: Hits::new(scene),
             lights: Lights::new(scene, &kinds.lights)?,
             textures: Textures::new(scene),
-            medium: (scene.medium.as_ref())
-                .map(medium::Medium::new)
-                .transpose()?,
+            media: (scene.media.iter().zip(0..))
+                .map(|(of, number)| medium::Medium::new(of, number))
+                .collect::<Result<_, _>>()?,
+            are_coloured: scene.media.iter().any(SceneMedium::is_coloured),
             diagonal: diagonal(scene),
         })
     }

@@ -108,10 +108,10 @@ fn independent() -> Sampler {
     sampler_of("pixel-hash", "none", 100_000)
 }
 
-/// Checks the trial scenes in a range, split into seven tests for their duration.
+/// Checks the trial scenes in a range, split into eight tests for their duration.
 fn check_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 28);
+    assert_eq!(scenes.len(), 31);
     for trial in &scenes[places] {
         for (name, changes) in in_turn("integrators path by path", &trial.trials) {
             let what = integrator_variant(name, changes);
@@ -155,6 +155,11 @@ fn single_paths_of_fences_veils_every_pair_and_rooms_of_other_sizes_are_those_of
 #[test]
 fn single_paths_through_media_are_those_of_the_oracle() {
     check_trials(22..28);
+}
+
+#[test]
+fn single_paths_through_several_media_are_those_of_the_oracle() {
+    check_trials(28..31);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.

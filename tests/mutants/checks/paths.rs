@@ -25,14 +25,14 @@ pub fn paths(bench: &Bench) -> Finding {
     let lamps = scenes.iter_mut().find(|s| s.scene.name == "lamps");
     let lamps = lamps.ok_or_else(|| CheckError::Stale("no trial scene of lamps".to_owned()))?;
     lamps.trials.push(("primary", Vec::new()));
-    scenes.retain(|s| s.scene.medium.is_none());
+    scenes.retain(|s| s.scene.media.is_empty());
     first_fault(bench, &scenes)
 }
 
 /// The same on the trial scenes with a medium.
 pub fn media(bench: &Bench) -> Finding {
     let mut scenes = trial_scenes().map_err(|e| CheckError::Other(e.to_string()))?;
-    scenes.retain(|s| s.scene.medium.is_some());
+    scenes.retain(|s| !s.scene.media.is_empty());
     if scenes.is_empty() {
         return Err(CheckError::Stale("no trial scene has a medium".to_owned()));
     }
