@@ -114,7 +114,7 @@ fn power(scene: &SceneData) -> f64 {
 }
 
 /// What parameters of every scene do.
-fn parameters() -> Result<[Known; 6], String> {
+fn parameters() -> Result<[Known; 7], String> {
     let lamps = |count: i64| with(&[("hung_lamps", ParamValue::Integer(count))]);
     let [one, eight] = [power(&lamps(1)?), power(&lamps(8)?)];
     let number = ParamValue::Number;
@@ -122,7 +122,12 @@ fn parameters() -> Result<[Known; 6], String> {
         ("medium", ParamValue::Name("constant".to_owned())),
         ("scattering", number(0.75)),
         ("absorption", number(0.25)),
+        (
+            "more_media",
+            ParamValue::Name("{ medium = 'constant', scattering = 0.5 }".to_owned()),
+        ),
     ])?;
+    let beside = fog.media.get(1).map(|medium| &medium.volume.scattering);
     let volume = fog.media.first().map(|medium| &medium.volume);
     let first = |of: Option<&Vec<f32>>| {
         of.and_then(|all| all.first())
@@ -151,6 +156,7 @@ fn parameters() -> Result<[Known; 6], String> {
             first(volume.map(|v| &v.absorption)),
             0.25,
         ),
+        ("scattering of a medium beside it", first(beside), 0.5),
         ("copies of a material", its.count() as f64, 3.0),
         (
             "number of triangles of copies",

@@ -38,6 +38,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged path by path by the oracle in f64 (src/verify/path_oracle/coloured.rs), and in src/verify/media_colour_tests.rs by closed forms and quadratures",
     ),
     (
+        "integrator/several_media",
+        "judged path by path by the oracle in f64 (src/verify/path_oracle/media.rs), and in src/verify/several_media_tests.rs by closed forms, quadratures and one medium",
+    ),
+    (
         "integrator/medium",
         "judged path by path by the oracle in f64 (src/verify/path_oracle/medium.rs), and in src/verify/media_tests.rs by closed forms and quadratures",
     ),

@@ -292,4 +292,99 @@ mod tests {
         );
         assert_eq!(albedos(&tinted(vec![0.5, 3.0])), [None, None, Some(0.0)]);
     }
+    /// A volume in the box between two corners, or in the ball of it.
+    fn at(bounds: Bounds, low: [f64; 3], high: [f64; 3]) -> Volume {
+        let [low, high] = [low, high].map(DVec3::from_array);
+        let fog = Volume::constant(1.0, 0.5, 1.0).unwrap();
+        Volume {
+            low,
+            high,
+            bounds,
+            ..fog
+        }
+    }
+
+    #[test]
+    fn gaps_between_boxes_and_balls_are_those_of_geometry() {
+        let (box_of, ball) = (Bounds::Box, Bounds::Sphere);
+        let unit = at(box_of, [0.0; 3], [1.0; 3]);
+        let beside = at(box_of, [1.5, 0.2, 0.2], [2.0, 3.0, 3.0]);
+        let across = at(box_of, [4.0, 5.0, 1.0], [5.0, 6.0, 2.0]);
+        // Of radius 1 around (3, 0.5, 0.5), and of radius 0.5 in a corner's direction.
+        let far = at(ball, [2.0, -0.5, -0.5], [4.0, 1.5, 1.5]);
+        let corner = at(ball, [1.0, 1.0, 0.0], [2.0, 2.0, 1.0]);
+        let inner = at(ball, [0.2; 3], [0.8; 3]);
+        for (a, b, expected) in [
+            (&unit, &beside, 0.5),
+            (&unit, &across, 5.0),
+            (&unit, &far, 1.0),
+            (&unit, &corner, 0.5_f64.sqrt() - 0.5),
+            (&far, &corner, 1.5_f64.hypot(1.0) - 1.5),
+            (&unit, &inner, -0.3),
+            (&unit, &unit, 0.0),
+        ] {
+            assert!((gap(a, b) - expected).abs() < 1e-12, "{a:?} {b:?}");
+            assert_eq!(gap(a, b), gap(b, a));
+        }
+    }
+
+    /// What an export of a room with these media says, or why there is none.
+    fn exported(volumes: &[Volume]) -> Result<String, String> {
+        let mut scene = raystone_scene::named("cornell-box").unwrap();
+        let media = volumes.iter().map(|v| SceneMedium::new(v.clone(), "dda"));
+        scene.media = media.map(Result::unwrap).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let mut export = Export {
+            folder: folder.path(),
+            kinds: &crate::kinds::KindChecks::default(),
+            scene: &scene,
+            warnings: Vec::new(),
+            needs_materials: false,
+            xml: String::new(),
+        };
+        export.media().map_err(|e| e.to_string())?;
+        for file in ["medium/extinction.vol", "medium-2/extinction.vol"] {
+            assert_eq!(
+                folder.path().join(file).exists(),
+                export.xml.contains(file),
+                "{file}"
+            );
+        }
+        Ok(export.xml)
+    }
+
+    #[test]
+    fn several_media_have_a_border_each_and_are_refused_where_they_overlap() {
+        let first = at(Bounds::Box, [0.0; 3], [1.0; 3]);
+        let grid = Volume::new([2, 1, 1], |p| [p.x as f32, 0.0, 1.0]).unwrap();
+        let second = Volume {
+            low: DVec3::new(2.0, 0.0, 0.0),
+            high: DVec3::new(3.0, 1.0, 1.0),
+            bounds: Bounds::Sphere,
+            ..grid
+        };
+        let xml = exported(&[first.clone(), second.clone()]).unwrap();
+        for (shape, id) in [("cube", "medium"), ("sphere", "medium-2")] {
+            let (_, after) = xml.split_once(&format!("id=\"{id}\">")).unwrap();
+            let shape = format!("<shape type=\"{shape}\">");
+            assert!(after.contains(&shape), "{xml}");
+            let interior = format!("<ref name=\"interior\" id=\"{id}\"/>");
+            assert_eq!(xml.matches(&interior).count(), 1, "{xml}");
+        }
+        assert!(xml.contains("medium-2/extinction.vol") && !xml.contains("medium/extinction.vol"));
+        let eye = |x: f32| around(&scene_of(&[&first, &second]), Vec3::new(x, 0.5, 0.5));
+        assert!(eye(0.5).contains("\"medium\"/>") && eye(2.5).contains("\"medium-2\"/>"));
+        assert_eq!(eye(1.5), "");
+        for (low, high) in [([0.5; 3], [2.0; 3]), ([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])] {
+            let refused = exported(&[first.clone(), at(Bounds::Box, low, high)]).unwrap_err();
+            assert!(refused.contains("overlap or touch"), "{refused}");
+        }
+    }
+
+    fn scene_of(volumes: &[&Volume]) -> Vec<SceneMedium> {
+        let media = volumes
+            .iter()
+            .map(|v| SceneMedium::new((*v).clone(), "dda"));
+        media.map(Result::unwrap).collect()
+    }
 }

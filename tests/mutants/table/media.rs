@@ -260,4 +260,103 @@ pub const MUTANTS: &[Mutant] = &[
             "extinction(there)",
         ),
     ),
+    fault(
+        "several-media-last-wins",
+        "of several media the last that scatters does, not the nearest",
+        text(
+            "integrator/several_media",
+            "flight_through(ray, nearest.t, first_number(index, first));",
+            "flight_through(ray, end, first_number(index, first));",
+        ),
+    ),
+    fault(
+        "several-media-pass-the-first-alone",
+        "shadow rays lose what the first medium takes",
+        text(
+            "integrator/several_media",
+            "var result = 1.0;\n    for (var index = 0u; index < media.count; index++)",
+            "var result = 1.0;\n    for (var index = 0u; index < 1u; index++)",
+        ),
+    ),
+    fault(
+        "several-media-phase-of-the-first",
+        "all media scatter by the phase function of the first",
+        text(
+            "integrator/several_media",
+            "scatterer = index;\n        }\n    }\n    follow_medium(scatterer);",
+            "scatterer = index;\n        }\n    }\n    follow_medium(0u);",
+        ),
+    ),
+    fault(
+        "several-media-grid-of-the-first",
+        "all media read the grid of the first",
+        text(
+            "integrator/several_media",
+            "let place = shading_row(row + 2u);",
+            "let place = shading_row(media.first + 2u);",
+        ),
+    ),
+    fault(
+        "several-media-place-of-the-first",
+        "all media are where the first one is, and as dense",
+        text(
+            "integrator/several_media",
+            "shading_row(row + 3u)",
+            "shading_row(media.first + 3u)",
+        ),
+    ),
+    fault(
+        "several-media-share-numbers",
+        "all media draw the same numbers",
+        text(
+            "integrator/several_media",
+            "numbered = index << PURPOSE_BITS;",
+            "numbered = 0u;",
+        ),
+    ),
+    fault(
+        "several-media-share-the-first-number",
+        "the sampler's number is that of the first collision in each medium",
+        text(
+            "integrator/several_media",
+            "if (index == 0u) { return of_sampler; }",
+            "return of_sampler;",
+        ),
+    ),
+    fault(
+        "several-media-share-numbers-to-lights",
+        "shadow rays draw the same numbers in all media",
+        text(
+            "integrator/medium",
+            "begin_purpose(TO_LIGHT + light + numbered);",
+            "begin_purpose(TO_LIGHT + light);",
+        ),
+    ),
+    fault(
+        "several-media-colours-of-the-last",
+        "collisions that are none in a medium leave the colours as they were where the next one scatters",
+        text(
+            "integrator/several_media",
+            "index < scatterer; index++",
+            "index < 0u; index++",
+        ),
+    ),
+    fault(
+        "several-media-colours-to-the-end",
+        "collisions that are none behind the nearest one change colours, too",
+        text(
+            "integrator/several_media",
+            "nearest.albedo *= flight_through(ray, nearest.t,",
+            "nearest.albedo *= flight_through(ray, end,",
+        ),
+    ),
+    fault(
+        "several-media-tints-of-the-first",
+        "what all media scatter has the colours of the first",
+        text(
+            "integrator/several_media",
+            "shading_row(row + 6u)",
+            "shading_row(media.first + 6u)",
+        ),
+    ),
 ];
