@@ -2,7 +2,7 @@
 
 use crate::medium::{MOST_MEDIA, MediumParameters};
 use crate::{SceneData, SceneError};
-use raystone_core::params::{ParamRange, ParamValue, Parameters as _, Params};
+use raystone_core::params::{ParamError, ParamRange, ParamValue, Parameters as _, Params};
 use toml::{Table, Value};
 
 /// What a text of tables looks like, for messages.
@@ -90,7 +90,13 @@ fn parameters(table: &Table, structure: Option<&str>) -> Result<MediumParameters
             ));
         }
     }
-    MediumParameters::from_params(&params).map_err(|e| e.to_string())
+    MediumParameters::from_params(&params).map_err(|e| match e {
+        ParamError::Unknown { nearest: None, .. } => {
+            let known: Vec<&str> = schema.iter().map(|parameter| parameter.name).collect();
+            format!("{e}; a medium has {}", known.join(", "))
+        }
+        _ => e.to_string(),
+    })
 }
 
 /// A value as a parameter of this range holds it; one that it cannot hold is refused later.
@@ -199,6 +205,10 @@ mod tests {
             (
                 format!("{good}, {{ medium = 'constant', scatering = 2 }}"),
                 "table 2: there is no parameter `scatering`; did you mean `scattering`?",
+            ),
+            (
+                "{ medium = 'constant', density = 2 }".to_owned(),
+                "table 1: there is no parameter `density`; a medium has medium, absorber, medium_box",
             ),
             (
                 "{ medium = 'constant', scattering = -1 }".to_owned(),
