@@ -3,7 +3,7 @@
 use super::{Ask, Query, RayBuffers, Traced, Tracer, TriangleBuffers};
 use crate::{Counters, Hit, Ray};
 use bytemuck::Pod;
-use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage, wait_for};
+use raystone_gpu::{Elapsed, Gpu, GpuError, Played, Player, Recording, Slices, Storage, wait_for};
 use std::cell::Cell;
 
 /// Fill word of the output before a trace; no answer of either query begins with it (as a distance
@@ -92,17 +92,44 @@ impl RayBatch {
     /// # Errors
     /// As [`RayBatch::trace`].
     pub async fn trace_async(&self) -> Result<Elapsed, GpuError> {
-        self.player.play_async(&self.wipe()).await?;
         let mut total = Elapsed::nothing(self.tracer.gpu.has_clock());
+        self.trace_slices(|played| total += played.elapsed())
+            .await?;
+        Ok(total)
+    }
+
+    /// Traces all rays, and passes on what each slice took.
+    async fn trace_slices(&self, mut note: impl FnMut(Played)) -> Result<(), GpuError> {
+        self.player.play_async(&self.wipe()).await?;
         let mut first = 0;
         while first < self.rays {
             let count = self.slices.next(first, self.rays);
-            let elapsed = self.play(first, count).await?;
-            total += elapsed;
-            self.slices.learn(u64::from(count), elapsed);
+            let played = self.play(first, count).await?;
+            self.slices.learn(u64::from(count), played.elapsed());
+            note(played);
             first += count;
         }
-        Ok(total)
+        Ok(())
+    }
+
+    /// Traces all rays, and returns the milliseconds of each pass by its name, of all slices and in the order in which they
+    /// first ran. Empty on an adapter without timestamps.
+    ///
+    /// # Errors
+    /// As [`RayBatch::trace`].
+    pub fn trace_by_pass(&self) -> Result<Vec<(String, f64)>, GpuError> {
+        let mut passes: Vec<(String, f64)> = Vec::new();
+        let note = |played: Played| {
+            for (name, ms) in played.runs {
+                let Some(ms) = ms else { continue };
+                match passes.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, sum)) => *sum += ms,
+                    None => passes.push((name, ms)),
+                }
+            }
+        };
+        wait_for(self.trace_slices(note))?;
+        Ok(passes)
     }
 
     fn wipe(&self) -> Recording {
@@ -168,15 +195,15 @@ impl RayBatch {
     /// # Errors
     /// As [`RayBatch::trace_nothing`].
     pub async fn trace_nothing_async(&self) -> Result<Elapsed, GpuError> {
-        self.play(0, 0).await
+        Ok(self.play(0, 0).await?.elapsed())
     }
 
-    async fn play(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
+    async fn play(&self, first: u32, count: u32) -> Result<Played, GpuError> {
         let mut recording = Recording::new();
         let (range, row) = (first..first + count, self.row.get());
         self.tracer
             .record_in_rows(&mut recording, &self.buffers, range, row)?;
-        Ok(self.player.play_async(&recording).await?.elapsed())
+        self.player.play_async(&recording).await
     }
 
     async fn read<T: Pod>(&self, buffer: &Storage) -> Result<Vec<T>, GpuError> {

@@ -1,32 +1,29 @@
 //! Sets of rays of one kind in a room of any size, traced through any structure: times with and without building it, and
 //! for trees over the rays what each level of a descent does.
 
+mod descent;
 pub(crate) mod readings;
+mod ready;
+mod refitted;
 mod room;
+mod world;
 
+use ready::Ready;
 use room::Lobes;
 pub use room::{Vertex, mirrored, on_mirror, room};
+use world::World;
 
-use crate::coherence::{Memory, of_rays, together};
 use crate::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
-use crate::timed_rays::TimedRays;
-use crate::timing::{Measured, Samples};
 use rayon::prelude::*;
-use raystone_accel::{
-    AccelError, Access, Anatomy, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters,
-    DivideAndConquer, Division, DivisionLevel, Hit, Ray, RayHierarchy, Space, StreamCounts,
-    Structure as _, Traced, Tracer, TriangleBuffers, TriangleSoup,
-};
-use raystone_config::{Axis, Catalogue, Cell, Coherence, Experiment, Plan, RAYS};
+use raystone_accel::{Hit, Ray};
+use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan, RAYS};
 use raystone_core::parameters;
 use raystone_core::params::{Entry, Parameters as _, Variant};
-use raystone_gpu::{Gpu, probe_arithmetic};
+use raystone_record::RayClass;
 use raystone_record::figure::Figure;
-use raystone_record::{RayClass, Reading};
 use raystone_sampling::{Coordinate, Demand, Sampler, to_unit};
 use raystone_verify::rays::RaySet;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::sync::Arc;
 
 parameters! {
     /// The room, and the image whose rays are traced.
@@ -206,68 +203,6 @@ impl Bounce {
     }
 }
 
-/// A room on the host, with what judges answers in it.
-struct World {
-    room: Room,
-    /// The triangles, and those of the first frame if they have moved.
-    soup: TriangleSoup,
-    first: Option<TriangleSoup>,
-    judge: BuiltBvh,
-    exact: bool,
-    truth: Mutex<Option<Truth>>,
-}
-
-/// What lobes see.
-struct Truth {
-    /// Edge of the image, waves and half-angle.
-    of: [f64; 3],
-    /// Pixel by pixel.
-    brightness: Arc<Vec<f64>>,
-}
-
-impl World {
-    fn new(gpu: &Gpu, room: &Room) -> Result<Self, Absent> {
-        let still = room::room(room.squares);
-        let (soup, first) = match room.moved > 0.0 {
-            true => (room::moved(&still, room.moved as f32), Some(still)),
-            false => (still, None),
-        };
-        let parameters = BvhParameters::default();
-        let judge = BuiltBvh::build(&soup, &parameters, &mut BuildLog::default());
-        let judge = judge.map_err(|error| Absent::Failed(error.to_string()))?;
-        Ok(Self {
-            room: room.clone(),
-            soup,
-            first,
-            judge,
-            exact: probe_arithmetic(gpu)?.is_exact(),
-            truth: Mutex::default(),
-        })
-    }
-
-    /// Whether it has the triangles of a room.
-    fn is_of(&self, room: &Room) -> bool {
-        (self.room.squares, self.room.moved) == (room.squares, room.moved)
-    }
-
-    /// The brightness that these lobes see; samplers and structures share the last one.
-    fn truth(&self, of: &Bounce, find: impl FnOnce() -> Vec<f64>) -> Arc<Vec<f64>> {
-        let of = [f64::from(of.room.side), of.waves, of.spread];
-        let mut last = self.truth.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*last {
-            Some(truth) if truth.of == of => Arc::clone(&truth.brightness),
-            _ => {
-                let brightness = Arc::new(find());
-                *last = Some(Truth {
-                    of,
-                    brightness: Arc::clone(&brightness),
-                });
-                brightness
-            }
-        }
-    }
-}
-
 /// Kinds of rays through structures.
 pub(crate) struct RaySets;
 
@@ -394,267 +329,6 @@ fn by_rays(mut cells: Vec<Cell>) -> Vec<Cell> {
 }
 
 /// Builds, of which the fastest counts: the first touches pages for the first time.
-const BUILDS: usize = 3;
-
-/// What passes over rays and triangles did, by the scalar twin and by the device.
-enum Descent {
-    /// Triangles through a tree over rays.
-    Tree {
-        anatomy: Option<Anatomy>,
-        streams: Vec<StreamCounts>,
-    },
-    /// Problems, of which the device had no room for the parts of some pairs.
-    Division { host: Division, without_room: u64 },
-}
-
-/// A tree of the first frame, its boxes fitted to the triangles as they have moved.
-struct Refitted {
-    rays: TimedRays,
-    space: Space,
-    /// What fitting and laying out took, the fastest of some.
-    ms: f64,
-}
-
-impl Refitted {
-    /// `None` for a structure that is no layout of one binary tree, and where nothing has moved.
-    fn new(at: &At, cell: &Cell, world: &World, set: &RaySet) -> Result<Option<Self>, Absent> {
-        let gpu = at.gpu(cell)?;
-        let text = |error: AccelError| Absent::Failed(error.to_string());
-        let accel = &cell[Axis::Accel];
-        let structure = at.registries.accel.named("structure", &accel.name);
-        let structure = structure.map_err(Absent::Failed)?;
-        let (Some(over), Some(first)) = (structure.over_tree(), &world.first) else {
-            return Ok(None);
-        };
-        let (soup, params) = (&world.soup, &accel.params);
-        let log = || BuildLog::with_gpu(gpu);
-        let of_first = over.tree(first, params, &mut log()).map_err(text)?;
-        let mut fastest: Option<(f64, Box<dyn BuiltAccel>)> = None;
-        for _ in 0..BUILDS {
-            let mut tree = of_first.clone();
-            let start = Instant::now();
-            tree.refit(soup).map_err(text)?;
-            let built = over
-                .lay_out(&tree, soup, params, &mut log())
-                .map_err(text)?;
-            let ms = start.elapsed().as_secs_f64() * 1e3;
-            if fastest.as_ref().is_none_or(|(least, _)| ms < *least) {
-                fastest = Some((ms, built));
-            }
-        }
-        let Some((ms, built)) = fastest else {
-            return Ok(None);
-        };
-        built.validate(soup).map_err(text)?;
-        let tracer = tracer_of(at, gpu, (&*built, soup), set)?;
-        Ok(Some(Self {
-            rays: TimedRays::new(tracer.batch(&set.rays)?),
-            space: built.space(),
-            ms,
-        }))
-    }
-}
-
-fn tracer_of(
-    at: &At,
-    gpu: &Gpu,
-    (built, soup): (&dyn BuiltAccel, &TriangleSoup),
-    set: &RaySet,
-) -> Result<Tracer, Absent> {
-    let triangles = TriangleBuffers::upload(gpu, soup)?;
-    let traced = Traced::upload(gpu, built)?;
-    let ask = Ask {
-        runtime_checks: at.experiment.run.runtime_checks,
-        ..set.query().into()
-    };
-    Ok(Tracer::new(gpu, &triangles, &traced, ask)?)
-}
-
-/// A structure on the device, with rays for it.
-struct Ready {
-    rays: TimedRays,
-    refitted: Option<Refitted>,
-    set: Arc<RaySet>,
-    world: Arc<World>,
-    space: Space,
-    live: usize,
-    error: Option<f64>,
-    cycles: Option<f64>,
-    build_ms: f64,
-    bytes: u64,
-    descent: Option<Descent>,
-}
-
-impl Ready {
-    fn new(
-        at: &At,
-        cell: &Cell,
-        (world, set): (Arc<World>, Arc<RaySet>),
-        error: Option<f64>,
-    ) -> Result<Self, Absent> {
-        let gpu = at.gpu(cell)?;
-        let text = |error: AccelError| Absent::Failed(error.to_string());
-        let accel = &cell[Axis::Accel];
-        let structure = at.registries.accel.named("structure", &accel.name);
-        let structure = structure.map_err(Absent::Failed)?;
-        let soup = &world.soup;
-        let build = || {
-            let start = Instant::now();
-            let built = structure.build(soup, &accel.params, &mut BuildLog::with_gpu(gpu));
-            built.map(|built| (start.elapsed().as_secs_f64() * 1e3, built))
-        };
-        let (mut build_ms, built) = build().map_err(text)?;
-        for _ in 1..BUILDS {
-            build_ms = build_ms.min(build().map_err(text)?.0);
-        }
-        built.validate(soup).map_err(text)?;
-        let tracer = tracer_of(at, gpu, (&*built, soup), &set)?;
-        let exact = world.exact;
-        let descent = match accel.name.as_str() {
-            RayHierarchy::NAME => Some(Descent::of_tree(
-                gpu,
-                (&tracer, &set),
-                (soup, accel),
-                exact,
-            )?),
-            DivideAndConquer::NAME => Some(Descent::of_division(
-                gpu,
-                (&tracer, &set),
-                (soup, accel),
-                exact,
-            )?),
-            _ => None,
-        };
-        Ok(Self {
-            rays: TimedRays::new(tracer.batch(&set.rays)?),
-            refitted: Refitted::new(at, cell, &world, &set)?,
-            live: readings::live(&set.rays),
-            build_ms,
-            bytes: built.stats().bytes,
-            space: built.space(),
-            error,
-            cycles: match &at.experiment.coherence {
-                Some(settings) => cycles(&*built, soup, &set, settings).map_err(Absent::Failed)?,
-                None => None,
-            },
-            descent,
-            set,
-            world,
-        })
-    }
-}
-
-/// Predicted cycles per ray in warps of rays that follow each other; `None` for a structure that answers rays together.
-fn cycles(
-    built: &dyn BuiltAccel,
-    soup: &TriangleSoup,
-    set: &RaySet,
-    settings: &Coherence,
-) -> Result<Option<f64>, String> {
-    let is_inline = matches!(built.access(), Access::Inline);
-    let Some(twin) = built.cpu_twin(soup).filter(|_| is_inline) else {
-        return Ok(None);
-    };
-    let memory = Memory::new(built, soup)?;
-    let rays: Vec<Ray> = set
-        .rays
-        .iter()
-        .filter(|ray| ray.is_ray())
-        .copied()
-        .collect();
-    let groups = of_rays(&rays, set.query(), (&*twin, &memory), settings)?;
-    let all = together(&groups).into_values().next().unwrap_or_default();
-    Ok((all.rays > 0).then(|| all.cost() as f64 / all.rays as f64))
-}
-
-impl Descent {
-    fn of_tree(
-        gpu: &Gpu,
-        (tracer, set): (&Tracer, &RaySet),
-        (soup, accel): (&TriangleSoup, &Variant),
-        exact: bool,
-    ) -> Result<Self, Absent> {
-        let streams = RayHierarchy::streams(gpu, tracer, &set.rays)?;
-        // There is none of sorted rays, and of parts.
-        let anatomy = Anatomy::new(soup, &accel.params, &set.rays).ok();
-        let is_whole = streams.iter().all(|level| level.walked == 0);
-        if let Some(anatomy) = anatomy.as_ref().filter(|_| exact && is_whole) {
-            let twin = anatomy.levels.iter().map(|level| level.pairs);
-            agree(twin, streams.iter().map(|level| u64::from(level.pairs)))?;
-        }
-        Ok(Self::Tree { anatomy, streams })
-    }
-
-    fn of_division(
-        gpu: &Gpu,
-        (tracer, set): (&Tracer, &RaySet),
-        (soup, accel): (&TriangleSoup, &Variant),
-        exact: bool,
-    ) -> Result<Self, Absent> {
-        let host = Division::new(soup, &accel.params, set.query(), &set.rays);
-        let host = host.map_err(|error| Absent::Failed(error.to_string()))?;
-        let levels = host.levels.len() as u32;
-        let found = DivideAndConquer::division(gpu, tracer, &set.rays, levels)?;
-        let without_room = found.iter().map(|level| level.without_room).sum();
-        if exact && without_room == 0 {
-            let pairs = |levels: &[DivisionLevel]| {
-                levels.iter().map(|level| level.pairs).collect::<Vec<_>>()
-            };
-            agree(pairs(&host.levels), pairs(&found))?;
-        }
-        Ok(Self::Division { host, without_room })
-    }
-}
-
-/// Compares pairs level by level.
-fn agree(
-    twin: impl IntoIterator<Item = u64>,
-    device: impl IntoIterator<Item = u64>,
-) -> Result<(), Absent> {
-    for (level, (twin, device)) in twin.into_iter().zip(device).enumerate() {
-        if twin != device {
-            return Err(Absent::Failed(format!(
-                "level {level} has {device} pairs on the device and {twin} in the scalar twin"
-            )));
-        }
-    }
-    Ok(())
-}
-
-impl Prepared for Ready {
-    fn timed(&self) -> Vec<&dyn Measured> {
-        let refitted = self.refitted.iter().map(|tree| &tree.rays as &dyn Measured);
-        std::iter::once(&self.rays as &dyn Measured)
-            .chain(refitted)
-            .collect()
-    }
-
-    fn readings(&self, samples: Vec<Samples>) -> Result<Vec<Reading>, String> {
-        let soup = &self.world.soup;
-        let exact = self.world.exact;
-        let wrong = self.rays.fault(&self.set, soup, self.space, exact);
-        if let Some(wrong) = wrong.map_err(|e| e.to_string())? {
-            return Err(wrong);
-        }
-        let mut samples = samples.into_iter();
-        let own = samples.next().unwrap_or_default();
-        let mut found = readings::times(&own, self.live as f64, self.build_ms)?;
-        if let Some((tree, samples)) = self.refitted.as_ref().zip(samples.next()) {
-            let wrong = tree.rays.fault(&self.set, soup, tree.space, exact);
-            if let Some(wrong) = wrong.map_err(|e| e.to_string())? {
-                return Err(format!("refitted: {wrong}"));
-            }
-            found.extend(readings::refitted(&samples, self.live as f64, tree.ms)?);
-        }
-        let triangles = self.world.soup.records.len();
-        found.extend(readings::counts(self.live, triangles, self.bytes));
-        found.extend(readings::of_sampler(self.error, self.cycles));
-        if let Some(descent) = &self.descent {
-            found.extend(readings::descent(descent, self.live as f64));
-        }
-        Ok(found)
-    }
-}
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Figures of sets of rays.
 
-use super::Descent;
+use super::descent::Descent;
 use crate::timing::Samples;
 use raystone_accel::{Anatomy, Division, LevelAnatomy, StreamCounts};
 use raystone_core::geometry::Ray;
@@ -44,8 +44,9 @@ const TRIANGLES: usize = 16;
 const ERROR: usize = 17;
 const REFIT: usize = 18;
 const REFIT_FRAME: usize = 19;
+const PASS: usize = 20;
 
-pub(super) static FIGURES: [Figure; 20] = [
+pub(super) static FIGURES: [Figure; 21] = [
     time("rays-ns/v1", "time"),
     time("rays-frame-ns/v1", "time with building"),
     Figure::new(
@@ -101,6 +102,14 @@ pub(super) static FIGURES: [Figure; 20] = [
         Spread::Single,
     ),
     time("rays-refit-frame-ns/v1", "time with refitting"),
+    Figure::new(
+        "pass-ns/v1",
+        "time of a pass",
+        "ns per ray",
+        Better::Lower,
+        Shown::Digits(3),
+        Spread::Single,
+    ),
 ];
 
 /// Rays that can hit something: the others end at once.
@@ -133,6 +142,14 @@ fn after(samples: &Samples, ms: f64) -> Samples {
         wall_ms: later(&samples.wall_ms),
         cpu_ms: Vec::new(),
     }
+}
+
+/// The time of each pass by its name, in one trace; none where the adapter has no timestamps.
+pub(super) fn passes(ms: &[(String, f64)], rays: f64) -> impl Iterator<Item = Reading> {
+    ms.iter().map(move |(name, ms)| {
+        let at = Key::default().with(axis::SUBJECT, format!("pass {name}"));
+        Reading::exact(&FIGURES[PASS], ms * 1e6 / rays).at(at)
+    })
 }
 
 pub(super) fn counts(rays: usize, triangles: usize, bytes: u64) -> [Reading; 3] {

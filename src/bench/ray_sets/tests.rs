@@ -84,6 +84,27 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
             let tests = whole("descent-tests/v1");
             assert!((sum / tests - 1.0).abs() < 1e-12 && tests > 1.0);
         }
+        let passes = cell.readings.iter().filter(|r| r.figure == "pass-ns/v1");
+        let named = passes.clone().map(|r| r.key.label(axis::SUBJECT));
+        let named: Vec<&str> = named.collect();
+        for pass in [
+            "gather",
+            "leaves",
+            "unions",
+            "begin",
+            "plan",
+            "expand",
+            "candidates",
+            "answers",
+        ] {
+            assert_eq!(
+                named.contains(&format!("pass {pass}").as_str()),
+                is_tree,
+                "{pass}"
+            );
+        }
+        let sum: f64 = passes.map(|r| r.value.value).sum();
+        assert_eq!(sum > 0.0, is_tree);
     }
     for file in [
         include_str!("../../../experiments/ray-hierarchy.toml"),
