@@ -15,7 +15,7 @@ use world::World;
 
 use crate::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use rayon::prelude::*;
-use raystone_accel::{Hit, Ray};
+use raystone_accel::{BuiltAccel as _, Hit, Ray};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan, RAYS};
 use raystone_core::parameters;
 use raystone_core::params::{Entry, Parameters as _, Variant};

@@ -1,5 +1,6 @@
 use super::*;
 use crate::run::{Registries, RunOptions, run};
+use raystone_accel::{Anatomy, BuildLog, BuiltBvh, BvhParameters};
 use raystone_record::{Line, MeasuredRecord, Recorded, all_of, axis};
 
 const SMALL: &str = r#"
@@ -85,7 +86,7 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
             assert!((sum / tests - 1.0).abs() < 1e-12 && tests > 1.0);
         }
         let passes = cell.readings.iter().filter(|r| r.figure == "pass-ns/v1");
-        let named = passes.clone().map(|r| r.key.label(axis::SUBJECT));
+        let named = passes.clone().map(|r| r.at.label(axis::SUBJECT));
         let named: Vec<&str> = named.collect();
         for pass in [
             "gather",

@@ -13,18 +13,16 @@ pub(crate) mod ways;
 pub use bending::Mirror;
 pub use light::{Photon, Source, photons};
 
-use crate::adaptive::{Adaptive, Pilots, Smoother, Smoothing};
+use crate::adaptive::{Adaptive, Filter, Pilots, Smoother, Smoothing};
 use crate::photons::ImportanceMap;
 use crate::rays::SegmentRay;
-use crate::scatter::{Adding, ScatterError, Strategy, Tallies};
+use crate::scatter::{Adding, ScatterError, Tallies};
 use crate::tracking::{TrackingError, albedo};
 use crate::{Bounds, Medium, Phase, Volume, phase};
 use bending::Bending;
 use glam::{DVec3, Vec3};
-use marched::{Counting, Marched, Through};
-use raystone_gpu::{
-    Bindings, Elapsed, Gpu, GpuError, Player, Recording, Storage, UniformValues, groups_for,
-};
+use marched::Marched;
+use raystone_gpu::{Elapsed, Gpu, GpuError, Player, Recording, Storage};
 
 /// Reasons why photons give no image.
 #[derive(Debug, thiserror::Error)]

@@ -3,7 +3,7 @@
 use super::bending;
 use super::light::{Photon, photons};
 use super::marched::{Counting, Marched, Through};
-use super::{Dirty, Grid, Mirror, Piloted, Pipeline, PipelineError, ViewRay};
+use super::{Grid, Mirror, Piloted, Pipeline, PipelineError, ViewRay};
 use crate::adaptive::{Adaptive, Filter, Pilots, Smoother, importance};
 use crate::photons::{Points, point_set};
 use crate::scatter::{Adding, Strategy};
@@ -211,7 +211,7 @@ impl Pipeline {
         Ok(played.elapsed())
     }
 
-    fn play(
+    pub(super) fn play(
         &self,
         recording: &Recording,
         passes: &mut Vec<String>,
