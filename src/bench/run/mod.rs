@@ -24,6 +24,7 @@ mod known_turns;
 mod ledger;
 mod measurement;
 mod merge;
+mod offsets;
 mod options;
 mod orders;
 mod paths;
