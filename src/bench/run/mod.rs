@@ -19,6 +19,7 @@ mod inventory;
 mod kernels;
 mod known_images;
 pub mod known_plan;
+mod known_scenes;
 mod known_settings;
 mod known_turns;
 mod ledger;
