@@ -14,20 +14,48 @@ type Sums = [f64; 6];
 const KNOWN: [(&str, Sums); 8] = [
     (
         "cornell-box",
-        [38.0, 1_920_695.7, 3.377_228_61e9, 6_158_370.87, 1_004_640.0, -1576.0],
+        [
+            38.0,
+            1_920_695.7,
+            3.377_228_61e9,
+            6_158_370.87,
+            1_004_640.0,
+            -1576.0,
+        ],
     ),
     (
         "displaced-sphere",
-        [100_000.0, 16.212_369_2, -0.335_950_122, 68.091_950_7, 0.0, 12.0],
+        [
+            100_000.0,
+            16.212_369_2,
+            -0.335_950_122,
+            68.091_950_7,
+            0.0,
+            12.0,
+        ],
     ),
     (
         "instances",
-        [20_480.0, 19.668_398_9, 58.666_136_4, 59.129_187_6, 0.0, 11.8],
+        [
+            20_480.0,
+            19.668_398_9,
+            58.666_136_4,
+            59.129_187_6,
+            0.0,
+            11.8,
+        ],
     ),
     ("furnace-box", [12.0, 6.0, 18.0, 18.0, 18.0, 1.7]),
     (
         "triangle-soup",
-        [10_000.0, 3.803_274_88, 11.353_208_3, 11.007_103_7, 0.0, 11.8],
+        [
+            10_000.0,
+            3.803_274_88,
+            11.353_208_3,
+            11.007_103_7,
+            0.0,
+            11.8,
+        ],
     ),
     (
         "city",
@@ -35,11 +63,25 @@ const KNOWN: [(&str, Sums); 8] = [
     ),
     (
         "foliage",
-        [294.0, 72.059_512_7, 18.527_686_2, 58.449_914_1, 34.829_999_9, 13.1],
+        [
+            294.0,
+            72.059_512_7,
+            18.527_686_2,
+            58.449_914_1,
+            34.829_999_9,
+            13.1,
+        ],
     ),
     (
         "hairball",
-        [60_000.0, 16.065_359_2, -0.262_757_984, 39.174_855_2, 0.0, 9.9],
+        [
+            60_000.0,
+            16.065_359_2,
+            -0.262_757_984,
+            39.174_855_2,
+            0.0,
+            9.9,
+        ],
     ),
 ];
 /// Difference of a sum, as a part of that of all absolute terms: single floats, by sines of any library.
@@ -100,7 +142,9 @@ mod tests {
     #[test]
     fn built_in_scenes_are_as_known_and_one_that_is_changed_is_told() {
         for (name, _) in KNOWN {
-            let entry = builtin_scenes().into_iter().find(|entry| entry.name == name);
+            let entry = builtin_scenes()
+                .into_iter()
+                .find(|entry| entry.name == name);
             let variant = entry.expect("a scene").default_variant();
             let mut scene = load(&variant, &LoadOptions::default()).expect("a scene");
             assert_eq!(fault(&variant, &scene), None);
