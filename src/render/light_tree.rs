@@ -262,7 +262,7 @@ fn known_lamp(k: u32, axis: usize) -> LightBounds {
     let mut place = [0.0; 3];
     place[axis] = f64::from(k % 2) * 100.0 + f64::from(k / 2);
     place[(axis + 1) % 3] = 2.0 * f64::from(k / 2);
-    let place = DVec3::from_array(place);
+    let place = DVec3::from_array(place) + DVec3::new(7.0, -40.0, 300.0);
     LightBounds::everywhere(place, place + 0.5, f64::from(k + 1))
 }
 
