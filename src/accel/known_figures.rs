@@ -4,6 +4,7 @@
 use crate::bounds::Bounds;
 use crate::instancing::BoxMap;
 use crate::known_parameters;
+use crate::known_rows;
 use crate::tree::{NodeKind, Tree, TreeNode};
 use crate::{AccelRegistry, BuildLog, StructureStats, TriangleSoup, triangle::TriangleRecord};
 use glam::Vec3;
@@ -34,7 +35,7 @@ pub fn check() -> Result<(), String> {
     costs()?;
     shapes()?;
     overlaps_of_copies()?;
-    row()?;
+    known_rows::check()?;
     phases()?;
     known_parameters::check()?;
     crate::wide::check_octants()?;
@@ -143,24 +144,6 @@ fn overlaps_of_copies() -> Result<(), String> {
         })
 }
 
-/// The least cost of a tree over a row of sixteen, by dynamic programming over all splits: 178 / 46.
-const LEAST_OF_ROW: f64 = 178.0 / 46.0;
-/// A builder that looks at few splits may miss so much of it.
-const MISSED: f64 = 1.1;
-
-/// A builder that takes bad splits makes trees that answer right, and a structure that looks slow.
-fn row() -> Result<(), String> {
-    let triangles: Vec<Triangle> = (0..16).map(half_a_square).collect();
-    let found = stats("bvh", &triangles)?.sah_cost.unwrap_or(f64::NAN);
-    let right = LEAST_OF_ROW * (1.0 - 1e-6)..=LEAST_OF_ROW * MISSED;
-    right.contains(&found).then_some(()).ok_or_else(|| {
-        format!(
-            "the SAH cost of a bvh over a known row is {found}, and should be {LEAST_OF_ROW} and at most a tenth more: this \
-             program builds other trees than it says; build it anew, and report what stays wrong"
-        )
-    })
-}
-
 /// A phase that waits takes at least as long, and no longer than the clock around it says.
 fn phases() -> Result<(), String> {
     const WAIT: Duration = Duration::from_micros(300);
@@ -199,15 +182,24 @@ fn soup_of(triangles: &[Triangle]) -> TriangleSoup {
 }
 
 fn stats(structure: &str, triangles: &[Triangle]) -> Result<StructureStats, String> {
+    stats_with(structure, &Params::default(), triangles)
+}
+
+/// What a structure with these parameters says of itself over these triangles.
+pub(crate) fn stats_with(
+    structure: &str,
+    params: &Params,
+    triangles: &[Triangle],
+) -> Result<StructureStats, String> {
     let registry = AccelRegistry::default();
     let kind = registry.named("structure", structure)?;
     let mut log = BuildLog::default().noting_quality();
-    let built = kind.build(&soup_of(triangles), &Params::default(), &mut log);
+    let built = kind.build(&soup_of(triangles), params, &mut log);
     Ok(built.map_err(|e| e.to_string())?.stats())
 }
 
-/// Of a row of squares with a gap of two between them.
-fn half_a_square(place: u32) -> Triangle {
+/// Of a row of squares along x with a gap of two between them.
+pub(crate) fn half_a_square(place: u32) -> Triangle {
     let x = 3.0 * place as f32;
     Triangle {
         vertices: [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]].map(Into::into),

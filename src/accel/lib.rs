@@ -27,6 +27,7 @@ mod irregular_grid;
 mod kd_tree;
 pub mod known_figures;
 mod known_parameters;
+mod known_rows;
 mod leaf;
 pub mod mask;
 mod octree;

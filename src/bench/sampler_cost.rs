@@ -7,7 +7,7 @@ use raystone_gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValue
 use raystone_record::Reading;
 use raystone_record::figure::{LOOP_NS, NS_PER_SAMPLE};
 use raystone_render::with_sampler;
-use raystone_sampling::Sampler;
+use raystone_sampling::{Coordinate, Sampler};
 use raystone_stats::statistics::median_interval;
 
 /// Invocations, one per pixel.
@@ -21,6 +21,8 @@ const TURNS_PER_DRAW: u32 = 33;
 /// Target time of a dispatch, milliseconds.
 const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
+/// Samples of the dispatch whose sums are compared with the host's.
+const CHECKED: u32 = 2;
 
 struct Loop<'a> {
     gpu: &'a Gpu,
@@ -50,6 +52,40 @@ pub(crate) fn ns_per_draw(ms: f64, pairs: u32, samples: u32) -> f64 {
     ms * 1e6 / (u64::from(PIXELS) * u64::from(pairs) * u64::from(samples)) as f64
 }
 
+/// Compares what a dispatch of a loop leaves in some pixels with the loop over the sampler's twin, or over none: one that draws
+/// fewer numbers than are counted looks cheap.
+fn check_sums(
+    sampler: Option<&Sampler>,
+    [pairs, samples]: [u32; 2],
+    found: &[u32],
+) -> Result<(), String> {
+    let expected = |pixel: u32| {
+        let draws = (0..samples).flat_map(|sample| (0..2 * pairs).map(move |d| (sample, d)));
+        draws.fold(0_u32, |sum, (sample, dimension)| {
+            let at = Coordinate {
+                pixel,
+                sample,
+                dimension,
+                seed: 1,
+            };
+            let drawn = sampler.map_or(sample + dimension, |sampler| sampler.sample_u32(at));
+            (sum ^ drawn).wrapping_add(pixel)
+        })
+    };
+    let wrong = [0, 1, 63, 64, PIXELS - 1]
+        .into_iter()
+        .find(|pixel| found.get(*pixel as usize) != Some(&expected(*pixel)));
+    wrong.map_or(Ok(()), |pixel| {
+        Err(format!(
+            "the loop whose time is the cost of {} leaves {:?} in pixel {pixel}, and should leave {}: it does not draw {samples} \
+             samples of {pairs} pairs",
+            sampler.map_or("nothing".to_owned(), Sampler::label),
+            found.get(pixel as usize),
+            expected(pixel)
+        ))
+    })
+}
+
 /// Measures a sampler's cost on this adapter: nanoseconds of adapter time per two-dimensional
 /// sample minus the empty loop (near zero it may be negative), and those of the empty loop, as
 /// medians of the rounds. Also returns the BLAKE3 hash of the drawing kernel. Uses the sampler's
@@ -67,21 +103,25 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<([Reading; 2], Strin
     }
     let drawing = with_sampler(Composition::new("sampling/sampler_cost"), sampler);
     let empty = Composition::new("sampling/sampler_cost").feature("empty", true);
+    let sums = gpu.zeroed("sums", u64::from(PIXELS) * 4)?;
     let mut bindings = Bindings::new();
     bindings
         .buffer(
             "sampler_table",
             &gpu.storage("sampler_table", sampler.table.words())?,
         )
-        .buffer("sums", &gpu.zeroed("sums", u64::from(PIXELS) * 4)?);
+        .buffer("sums", &sums);
     let work = Loop {
         gpu,
         bindings,
         pairs,
     };
     // First runs include the driver's compiler.
-    work.run(&empty, 1)?;
-    work.run(&drawing, 1)?;
+    let checked = CHECKED.min(sampler.demand.samples.unwrap_or(CHECKED));
+    for (kernel, draws) in [(&empty, None), (&drawing, Some(sampler))] {
+        work.run(kernel, checked)?;
+        check_sums(draws, [pairs, checked], &gpu.read(&sums)?).map_err(GpuError::Kernel)?;
+    }
     let most = sampler.demand.samples.unwrap_or(MOST_SAMPLES);
     let turns = 2 * pairs * TURNS_PER_DRAW;
     let allowed = gpu

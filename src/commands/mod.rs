@@ -170,6 +170,7 @@ fn known_figures() -> Result<()> {
         raystone::accel::known_figures::check,
         raystone::scene::known_figures::check,
         raystone::integrator::offset::check_known,
+        raystone::integrator::check_known_lights,
         raystone::measure::known_pictures::check,
         raystone::media::known_figures::check,
         raystone::specular::known_figures::check,

@@ -93,6 +93,24 @@ pub fn counted(found: &[Found<f32>], most: u32, triangles: usize) -> Result<(), 
     })
 }
 
+/// Compares the numbers of triangles that were cut with each cone with the least and the greatest that the oracle allows.
+///
+/// # Errors
+/// The first that is not between them.
+pub fn cut(found: &[Found<f32>], expected: &[[u32; 2]]) -> Result<(), String> {
+    let pairs = (0..).zip(found.iter().zip(expected));
+    let is_wrong = |(_, (pixel, [least, most])): &(usize, (&Found<f32>, &[u32; 2]))| {
+        !(*least..=*most).contains(&pixel.counts[2])
+    };
+    let wrong = pairs.into_iter().find(is_wrong);
+    wrong.map_or(Ok(()), |(k, (pixel, [least, most]))| {
+        Err(format!(
+            "pixel {k}: {} triangles were cut with the cone, and should be {least} to {most}",
+            pixel.counts[2]
+        ))
+    })
+}
+
 /// Triangles that meet the disk in all ways: of its size, tiny, slivers, and far larger.
 pub fn triangles(count: usize, seed: u64) -> Vec<[V3<f32>; 3]> {
     let mut random = Pcg32::new(seed);

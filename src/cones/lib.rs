@@ -18,6 +18,7 @@ pub mod quadrature;
 pub mod rays;
 pub mod sample;
 pub mod scene;
+mod spheres;
 pub mod trace;
 mod world;
 

@@ -201,6 +201,16 @@ impl World {
 
     /// What the oracle expects.
     pub(crate) fn by_oracle(&self, keep: &Keep) -> Vec<crate::oracle::Expected> {
+        self.of_oracle(keep, |oracle, pixel| oracle.pixel(pixel))
+    }
+
+    /// How many triangles may be cut with each cone, at least and at most.
+    pub(crate) fn cut_by_oracle(&self, keep: &Keep) -> Vec<[u32; 2]> {
+        self.of_oracle(keep, |oracle, pixel| oracle.cut(pixel))
+    }
+
+    /// What the oracle says of each pixel.
+    fn of_oracle<T: Send>(&self, keep: &Keep, of: impl Fn(&Oracle, u32) -> T + Sync) -> Vec<T> {
         let own = self.given(keep);
         let given = Given {
             camera: double(&own.camera),
@@ -218,7 +228,7 @@ impl World {
             lens: self.lens(),
         };
         let each = (0..self.pixels()).into_par_iter();
-        each.map(|pixel| oracle.pixel(pixel)).collect()
+        each.map(|pixel| of(&oracle, pixel)).collect()
     }
 
     /// The picture by cones, checked; cells share it.
@@ -234,6 +244,7 @@ impl World {
         let (found, _) = self.tracer(gpu, keep)?.trace()?;
         let most = self.given(keep).most;
         check::counted(&found, most, self.patches.len()).map_err(Absent::Failed)?;
+        check::cut(&found, &self.cut_by_oracle(keep)).map_err(Absent::Failed)?;
         let apart = check::near(&found, &self.by_oracle(keep)).map_err(Absent::Failed)?;
         let picture = Arc::new(Picture { found, apart });
         pictures.push((*keep, Arc::clone(&picture)));

@@ -44,6 +44,16 @@ impl PathsRecord {
         }
     }
 
+    /// Returns a record of one wrong path, with this fault.
+    pub fn wrong(fault: impl Into<String>) -> Self {
+        Self {
+            paths: 1,
+            wrong: 1,
+            fault: Some(fault.into()),
+            ..Self::default()
+        }
+    }
+
     /// Combines both; the median is the greater one.
     pub fn and(self, other: Self) -> Self {
         Self {

@@ -32,7 +32,7 @@ pub use environment_tables::environment_aliases;
 pub use kind::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts};
 pub use light_tables::LightTables;
 pub use light_tables::light_branches;
-pub use light_tree::TreeNode;
+pub use light_tree::{TreeNode, check_known as check_known_lights};
 pub use mirror_tree::MirrorPlaces;
 pub use offset::{OffsetRegistry, RayOffset};
 pub use order::Order;

@@ -227,6 +227,45 @@ pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
     rows
 }
 
+/// Builds trees over two known groups of lamps, far apart along each axis: a tree of bad splits chooses lights that are far
+/// away, which makes images noisier and no path wrong.
+///
+/// # Errors
+/// The root does not part the groups, or does not hold all of their power: along which axis.
+pub fn check_known() -> Result<(), String> {
+    for axis in 0..3 {
+        let lights: Vec<LightBounds> = (0..7).map(|k| known_lamp(k, axis)).collect();
+        let (nodes, leaves) = light_tree(&lights);
+        let child = nodes[ROOT].child as usize;
+        let group = |leaf: u32| {
+            let mut node = leaf as usize;
+            while node > child + 1 {
+                node = nodes[node].parent as usize;
+            }
+            node
+        };
+        let is_parted = (0..7).all(|k| group(leaves[k]) == child + usize::from(k % 2 == 1));
+        let power = nodes[ROOT].bounds.power;
+        if !is_parted || power != 28.0 {
+            return Err(format!(
+                "the tree over known lamps along axis {axis} does not part them in two groups, or has a power of {power}, and \
+                 should have 28: this program chooses lights badly; build it anew, and report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// One of four lamps at the origin, or of three a hundred units along the axis, in turn; each group is twice as wide along the
+/// next axis as along this one.
+fn known_lamp(k: u32, axis: usize) -> LightBounds {
+    let mut place = [0.0; 3];
+    place[axis] = f64::from(k % 2) * 100.0 + f64::from(k / 2);
+    place[(axis + 1) % 3] = 2.0 * f64::from(k / 2);
+    let place = DVec3::from_array(place) + DVec3::new(7.0, -40.0, 300.0);
+    LightBounds::everywhere(place, place + 0.5, f64::from(k + 1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -287,6 +326,11 @@ mod tests {
             assert!((nodes[ROOT].bounds.power / total - 1.0).abs() < 1e-12);
         }
         assert!(light_tree(&[]).0.is_empty());
+    }
+
+    #[test]
+    fn known_groups_are_parted() {
+        assert_eq!(check_known(), Ok(()));
     }
 
     #[test]

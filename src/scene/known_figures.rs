@@ -2,6 +2,7 @@
 
 use crate::Transform;
 use crate::colors::shown;
+use crate::known_lights;
 use crate::known_scenes;
 use crate::normals::{decode_normal, encode_normal, moved, of_normals};
 use glam::{DMat3, DVec3, Vec3};
@@ -29,6 +30,7 @@ const OF_SINGLE: f64 = 1e-6;
 pub fn check() -> Result<(), String> {
     colors()?;
     known_scenes::check()?;
+    known_lights::check()?;
     for columns in MAPS {
         let map = DMat3::from_cols_array_2d(&columns);
         let columns = columns.map(|column| DVec3::from_array(column).as_vec3());

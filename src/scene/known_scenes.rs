@@ -113,8 +113,28 @@ fn power(scene: &SceneData) -> f64 {
     (0..scene.triangles.len()).map(of).sum()
 }
 
+/// How far from the middle of an image, along the axis that it fills, the vertices of a scene without a camera are.
+fn filled() -> Result<f64, String> {
+    const ASPECT: f32 = 1.5;
+    let mut scene = with(&[])?;
+    (scene.camera, scene.framing) = (None, None);
+    let camera = scene.view(ASPECT);
+    let eye = camera.eye.as_dvec3();
+    let forward = (camera.target.as_dvec3() - eye).normalize();
+    let right = forward.cross(camera.up.as_dvec3()).normalize();
+    let up = right.cross(forward);
+    let half = (0.5 * f64::from(camera.vertical_fov_degrees).to_radians()).tan();
+    let place = |v: Vec3| {
+        let to = v.as_dvec3() - eye;
+        let [x, y] = [right, up].map(|axis| (to.dot(axis) / to.dot(forward) / half).abs());
+        y.max(x / f64::from(ASPECT))
+    };
+    let vertices = scene.triangles.iter().flat_map(|t| t.vertices);
+    Ok(vertices.map(place).fold(0.0, f64::max))
+}
+
 /// What parameters of every scene do.
-fn parameters() -> Result<[Known; 7], String> {
+fn parameters() -> Result<[Known; 8], String> {
     let lamps = |count: i64| with(&[("hung_lamps", ParamValue::Integer(count))]);
     let [one, eight] = [power(&lamps(1)?), power(&lamps(8)?)];
     let number = ParamValue::Number;
@@ -140,6 +160,7 @@ fn parameters() -> Result<[Known; 7], String> {
         .iter()
         .filter(|id| **id == single.material_ids[0]);
     Ok([
+        ("part of an image that a scene fills", filled()?, 0.9),
         ("power of eight hung lamps", eight / one, 1.0),
         (
             "number of triangles with eight lamps",

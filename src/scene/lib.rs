@@ -38,6 +38,7 @@ mod ies;
 mod instances;
 pub mod known_figures;
 mod known_files;
+mod known_lights;
 mod known_scenes;
 mod light;
 mod mask;

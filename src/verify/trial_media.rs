@@ -237,7 +237,8 @@ fn amber() -> Result<Volume, MediaError> {
         high: (low + size).as_dvec3(),
         phase: Phase {
             kind: phase::HENYEY_GREENSTEIN,
-            anisotropy: 0.3,
+            // Nearly even.
+            anisotropy: 0.1,
         },
         ..amber
     }

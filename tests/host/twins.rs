@@ -180,6 +180,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("common/probe", "compared with the host in src/gpu/probe.rs"),
     (
+        "integrator/known_offsets",
+        "a call of two functions that have twins, compared with them in src/render/offset/known.rs",
+    ),
+    (
         "common/ray_counts",
         "counts on the device, read by the renderer",
     ),

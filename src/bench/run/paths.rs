@@ -1,6 +1,7 @@
 //! Correctness check of integrators before rendering: single paths against the image oracle.
 
 use super::error::{Fault, RunError};
+use super::offsets;
 use super::session::Session;
 use super::world::World;
 use raystone_config::{Axis, Cell};
@@ -148,13 +149,15 @@ fn judge_and_record(
     Ok(record)
 }
 
-struct Subject<'a> {
-    stage: &'a Stage,
-    gpu: &'a Gpu,
+pub(super) struct Subject<'a> {
+    pub stage: &'a Stage,
+    pub gpu: &'a Gpu,
     traced: &'a Traced,
     camera: Camera,
-    cell: &'a Cell,
+    pub cell: &'a Cell,
     offset: RayOffset,
+    /// True if the adapter rounds as the host does.
+    pub is_exact: bool,
 }
 
 /// What is checked of a cell on its scene, or why nothing can be.
@@ -182,6 +185,7 @@ fn subject<'a>(
         camera: world.camera,
         cell,
         offset,
+        is_exact: world.probe.is_exact(),
     };
     Ok((subject, integrator))
 }
@@ -345,6 +349,10 @@ fn judged(
         };
         let (sampler, pixels) = drawn(session, subject, integrator, frame)?;
         let view = subject.view(integrator, &sampler, &pixels)?;
+        let job = subject.job(integrator, &sampler, &pixels);
+        if let Some(fault) = offsets::fault(session, subject, &job)? {
+            return Ok((all.and(PathsRecord::wrong(fault)), ran));
+        }
         let limit = sampler.demand.samples.unwrap_or(u32::MAX);
         let rendered = session.clock.time("gate", || {
             let renderer = subject.renderer(integrator, &sampler, &pixels, false)?;
@@ -359,13 +367,7 @@ fn judged(
             Ok(rendered) => rendered,
             // The renderer hands out no such image.
             Err(e @ (GpuError::Samples { .. } | GpuError::Kernels(_))) => {
-                let refused = PathsRecord {
-                    paths: 1,
-                    wrong: 1,
-                    fault: Some(e.to_string()),
-                    ..PathsRecord::default()
-                };
-                return Ok((all.and(refused), ran));
+                return Ok((all.and(PathsRecord::wrong(e.to_string())), ran));
             }
             Err(e) => return Err(e.to_string()),
         };
@@ -460,6 +462,22 @@ impl Subject<'_> {
         })
     }
 
+    fn job<'s>(
+        &self,
+        integrator: &'s ConfiguredIntegrator,
+        sampler: &'s Sampler,
+        pixels: &Pixels,
+    ) -> RenderJob<'s> {
+        RenderJob {
+            size: pixels.size,
+            camera: self.camera,
+            sampler,
+            integrator,
+            offset: self.offset,
+            runtime_checks: true,
+        }
+    }
+
     fn renderer(
         &self,
         integrator: &ConfiguredIntegrator,
@@ -467,14 +485,7 @@ impl Subject<'_> {
         pixels: &Pixels,
         ray_counts: bool,
     ) -> Result<Renderer<'_>, GpuError> {
-        let job = RenderJob {
-            size: pixels.size,
-            camera: self.camera,
-            sampler,
-            integrator,
-            offset: self.offset,
-            runtime_checks: true,
-        };
+        let job = self.job(integrator, sampler, pixels);
         Renderer::new(self.gpu, &self.stage.buffers, self.traced, &job, ray_counts)
     }
 }

@@ -11,7 +11,7 @@ use super::world::World;
 use crate::words::{Used, check_words, kernel_hash};
 use rayon::prelude::*;
 use raystone_config::{Axis, Cell, Plan};
-use raystone_core::params::{Entry, Variant};
+use raystone_core::params::{Entry, ParamRange, ParamValue, Variant};
 use raystone_gpu::Gpu;
 use raystone_record::PathsRecord;
 use raystone_sampling::{Demand, Sampler};
@@ -93,7 +93,7 @@ pub struct VerifiedSampler {
     pub fault: Option<String>,
 }
 
-/// Checks every sequence without and one with every decorrelation, with all kernels of a plan: words against
+/// Checks every sequence without and one with every decorrelation, with each choice of their parameters and all kernels of a plan: words against
 /// twins, and against what is known of them ([`crate::known_words`]).
 ///
 /// # Errors
@@ -109,17 +109,12 @@ pub fn verify_samplers(
         samplers.sequence_entries(),
         samplers.decorrelation_entries(),
     ]
-    .map(|entries| {
-        entries
-            .iter()
-            .map(Entry::default_variant)
-            .collect::<Vec<_>>()
-    });
+    .map(|entries| entries.iter().flat_map(variants).collect::<Vec<_>>());
     let is_plain = |d: &&Variant| d.name == DECORRELATION;
     let plain = sequences
         .iter()
         .flat_map(|s| decorrelations.iter().filter(is_plain).map(move |d| (s, d)));
-    let moved = sequences.iter().filter(|s| s.name == SEQUENCE);
+    let moved = sequences.iter().filter(|s| s.label == SEQUENCE);
     let moved = moved.flat_map(|s| {
         decorrelations
             .iter()
@@ -141,10 +136,29 @@ pub fn verify_samplers(
         } else {
             format!(" @{kernels}")
         };
-        let name = format!("{sequence} × {decorrelation}{folder}");
+        let name = format!("{} × {}{folder}", sequence.label, decorrelation.label);
         Ok(VerifiedSampler { name, fault })
     });
     verified.collect()
+}
+
+/// An entry with its defaults, and with each other choice of a parameter: they select other code of a kernel.
+fn variants(entry: &Entry) -> Vec<Variant> {
+    let others = entry.schema.iter().flat_map(|parameter| {
+        let values = match &parameter.range {
+            ParamRange::Choice(names) => names
+                .iter()
+                .map(|name| ParamValue::Name((*name).to_owned()))
+                .collect(),
+            ParamRange::Flag => vec![ParamValue::Flag(false), ParamValue::Flag(true)],
+            _ => Vec::new(),
+        };
+        let others = values.into_iter().filter(|v| *v != parameter.default);
+        others.map(|value| entry.variant(&[(parameter.name, value)]))
+    });
+    std::iter::once(entry.default_variant())
+        .chain(others)
+        .collect()
 }
 
 fn fault_of(

@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::error::{Fault, RunError};
+use super::known_scenes;
 use super::options::RunOptions;
 use super::session::Session;
 use raystone_config::{Axis, Cell};
@@ -88,6 +89,9 @@ impl Loaded {
             .time("load", || scene::load(variant, &options));
         let scene = loaded.map_err(|e| e.to_string())?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        if let Some(fault) = known_scenes::fault(variant, &scene) {
+            return Err(RunError::Wrong(fault).into());
+        }
         let own = || scene.view(session.experiment.aspect());
         let camera = session.experiment.camera.unwrap_or_else(own);
         raystone_scene::check_camera(&camera).map_err(|e| e.to_string())?;

@@ -92,8 +92,27 @@ fn cases() -> Vec<(World, Keep)> {
 #[test]
 fn the_twin_agrees_with_the_oracle() {
     for (world, keep) in cases() {
-        let apart = check::near(&world.by_twin(&keep), &world.by_oracle(&keep));
+        let mut found = world.by_twin(&keep);
+        let apart = check::near(&found, &world.by_oracle(&keep));
         let apart = apart.unwrap_or_else(|e| panic!("{:?} {keep:?}: {e}", world.view));
+        let cut = world.cut_by_oracle(&keep);
+        assert_eq!(
+            check::cut(&found, &cut),
+            Ok(()),
+            "{:?} {keep:?}",
+            world.view
+        );
+        // Half of the pixels know the number of triangles that are cut.
+        let certain = cut.iter().filter(|[least, most]| least == most).count();
+        assert!(2 * certain > cut.len(), "{:?} {keep:?}", world.view);
+        for pixel in &mut found {
+            pixel.counts[2] += 1;
+        }
+        assert!(
+            check::cut(&found, &cut).is_err(),
+            "{:?} {keep:?}",
+            world.view
+        );
         eprintln!("{:?}: {apart:?}", world.view);
     }
 }

@@ -3,11 +3,13 @@
 mod error_bound;
 mod fixed;
 mod integer;
+mod known;
 mod none;
 
 pub use error_bound::ERROR_BOUND;
 pub(crate) use fixed::FIXED;
 pub(crate) use integer::INTEGER;
+pub use known::fault_of_offset;
 pub use none::NONE;
 
 use glam::Vec3;
