@@ -328,7 +328,5 @@ fn by_rays(mut cells: Vec<Cell>) -> Vec<Cell> {
     cells
 }
 
-/// Builds, of which the fastest counts: the first touches pages for the first time.
-
 #[cfg(test)]
 mod tests;
