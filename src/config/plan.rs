@@ -54,6 +54,19 @@ pub struct Plan {
     pub only: Vec<String>,
 }
 
+/// Refuses a reference sampler whose sequence and decorrelation are incompatible.
+fn check_reference(
+    experiment: &Experiment,
+    is_randomised: impl Fn(&Variant, &Variant) -> Result<bool, String>,
+) -> Result<(), ConfigError> {
+    let reference = &experiment.reference;
+    let asked = is_randomised(&reference.sequence, &reference.decorrelation);
+    asked.map(|_| ()).map_err(|reason| ConfigError::Refused {
+        at: format!("{}: [reference]", experiment.source),
+        reason,
+    })
+}
+
 impl Plan {
     /// Expands the axes of `experiment` into cells, without its excludes.
     ///
@@ -69,13 +82,7 @@ impl Plan {
         only: &[String],
         is_randomised: impl Fn(&Variant, &Variant) -> Result<bool, String>,
     ) -> Result<Self, ConfigError> {
-        let reference = &experiment.reference;
-        if let Err(reason) = is_randomised(&reference.sequence, &reference.decorrelation) {
-            return Err(ConfigError::Refused {
-                at: format!("{}: [reference]", experiment.source),
-                reason,
-            });
-        }
+        check_reference(experiment, &is_randomised)?;
         let axes = &experiment.axes;
         check_size(experiment)?;
         let filter = filter(only, axes)?;

@@ -173,33 +173,7 @@ impl SceneData {
         hash.bytes(bytemuck::cast_slice::<Triangle, u8>(&self.triangles));
         hash.bytes(bytemuck::cast_slice::<[Vec2; 3], u8>(&self.uvs));
         hash.bytes(bytemuck::cast_slice::<u32, u8>(&self.material_ids));
-        hash.bytes(&self.materials.len().to_le_bytes());
-        for material in &self.materials {
-            let texture = material.base_color_texture;
-            let texture = texture.map_or(-1, |used| i64::from(used.texture));
-            hash.bytes(material.kind.name.as_bytes());
-            hash.bytes(bytemuck::cast_slice(&material.parameters));
-            hash.bytes(&texture.to_le_bytes());
-            hash.vectors(&[material.base_color, material.emission]);
-            if !material.emits_both_sides {
-                hash.bytes(b"one-sided");
-            }
-            // The derived Debug text is complete and deterministic for plain fields.
-            hash.bytes(format!("{:?}", material.source).as_bytes());
-        }
-        for (id, material) in self.materials.iter().enumerate() {
-            for (slot, used) in material.texture_uses().iter().enumerate() {
-                let used = used.filter(|used| slot > 0 || !used.is_plain());
-                if let Some(used) = used {
-                    hash.bytes(format!("{id} {slot} {used:?}").as_bytes());
-                }
-            }
-        }
-        for (id, material) in self.materials.iter().enumerate() {
-            if let Some(mask) = material.mask {
-                hash.bytes(format!("{id} {mask:?}").as_bytes());
-            }
-        }
+        self.hash_materials(&mut hash);
         if !self.normals.is_empty() {
             hash.bytes(bytemuck::cast_slice::<[u32; 3], u8>(&self.normals));
         }
@@ -241,6 +215,36 @@ impl SceneData {
             }
         }
         hash.0.finalize().to_hex().to_string()
+    }
+
+    fn hash_materials(&self, hash: &mut Hash) {
+        hash.bytes(&self.materials.len().to_le_bytes());
+        for material in &self.materials {
+            let texture = material.base_color_texture;
+            let texture = texture.map_or(-1, |used| i64::from(used.texture));
+            hash.bytes(material.kind.name.as_bytes());
+            hash.bytes(bytemuck::cast_slice(&material.parameters));
+            hash.bytes(&texture.to_le_bytes());
+            hash.vectors(&[material.base_color, material.emission]);
+            if !material.emits_both_sides {
+                hash.bytes(b"one-sided");
+            }
+            // The derived Debug text is complete and deterministic for plain fields.
+            hash.bytes(format!("{:?}", material.source).as_bytes());
+        }
+        for (id, material) in self.materials.iter().enumerate() {
+            for (slot, used) in material.texture_uses().iter().enumerate() {
+                let used = used.filter(|used| slot > 0 || !used.is_plain());
+                if let Some(used) = used {
+                    hash.bytes(format!("{id} {slot} {used:?}").as_bytes());
+                }
+            }
+        }
+        for (id, material) in self.materials.iter().enumerate() {
+            if let Some(mask) = material.mask {
+                hash.bytes(format!("{id} {mask:?}").as_bytes());
+            }
+        }
     }
 }
 

@@ -52,16 +52,8 @@ impl<'a> Geometry<'a> {
         self.see_attributes(attributes, set, matches!(moved, Moved::Each(_)), place);
         let uvs = self.read_uvs(attributes, set, place);
         let normals = self.read_normals(primitive, pose, &moved, place);
-        for (name, count) in [
-            ("colour", colors.len()),
-            ("normal", normals.len()),
-            ("texture coordinate", uvs.len()),
-        ] {
-            if (1..positions.len()).contains(&count) {
-                let what = format!("vertices beyond the last {name} are drawn without");
-                self.notes.tell(what, place);
-            }
-        }
+        let counts = [colors.len(), normals.len(), uvs.len()];
+        self.see_short(counts, positions.len(), place);
         let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
         let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
         let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);
@@ -123,6 +115,17 @@ impl<'a> Geometry<'a> {
         match is_colored {
             true => *self.white.get_or_insert(last + 1),
             false => last,
+        }
+    }
+
+    /// Records colours, normals and texture coordinates that do not reach to the last vertex.
+    fn see_short(&mut self, counts: [usize; 3], vertices: usize, place: Place<'_>) {
+        let names = ["colour", "normal", "texture coordinate"];
+        for (name, count) in names.into_iter().zip(counts) {
+            if (1..vertices).contains(&count) {
+                let what = format!("vertices beyond the last {name} are drawn without");
+                self.notes.tell(what, place);
+            }
         }
     }
 

@@ -127,6 +127,19 @@ impl Library {
     }
 }
 
+/// The mask of a material whose `map_d` is this, and whose `d` this factor; glass has none of `d` alone.
+fn mask(map_d: Option<Statement>, factor: f32, is_cut_by_d: bool) -> Option<AlphaMask> {
+    match map_d {
+        // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending.
+        Some(map) => {
+            let channel = map.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
+            let mask = AlphaMask::of(map.place, channel, Some(AlphaMask::CUTOFF));
+            Some(AlphaMask { factor, ..mask })
+        }
+        None => is_cut_by_d.then(|| AlphaMask::even(factor)),
+    }
+}
+
 impl Contents {
     /// Adds the materials of a library; returns their indices by name.
     fn add_all(&mut self, text: &str, path: &Path, options: &LoadOptions) -> HashMap<String, u32> {
@@ -216,17 +229,8 @@ impl Contents {
         let found =
             Material::described(name, &description, options.kinds, file, &mut self.warnings);
         let factor = source.opacity.unwrap_or(1.0);
-        let mask = match map_d {
-            // Images cut out leaves and fences: a cutoff of one half, in place of MTL's blending.
-            Some(map) => {
-                let found = self.texture(folder, &map, options, unread);
-                let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
-                let mask = AlphaMask::of(found.place, channel, Some(AlphaMask::CUTOFF));
-                Some(AlphaMask { factor, ..mask })
-            }
-            None if found.kind != &DIELECTRIC => Some(AlphaMask::even(factor)),
-            None => None,
-        };
+        let map_d = map_d.map(|map| self.texture(folder, &map, options, unread));
+        let mask = mask(map_d, factor, found.kind != &DIELECTRIC);
         self.unseen.see_if(mask.is_some() && factor <= 0.0, line);
         let mut texture = |map: Option<Map>, is_used: bool| {
             let map = map.filter(|_| is_used && options.textures)?;

@@ -265,15 +265,8 @@ impl<'g> Viewer<'g> {
                 continue;
             }
             let accel = &cell[Axis::Accel];
-            let of_structure = cell.on(&Cell::STRUCTURE);
-            let mut known = self
-                .sides
-                .iter()
-                .chain(&old)
-                .filter_map(|side| side.structure.as_ref());
-            let known = known.find(|known| known.cell == of_structure).cloned();
             let clock = Instant::now();
-            let structure = match known {
+            let structure = match known_structure(self.sides.iter().chain(&old), cell) {
                 Some(known) => {
                     note(done, Work::Kept, format!("{name}{accel}"), clock);
                     Ok(known)
@@ -493,6 +486,15 @@ impl<'g> Viewer<'g> {
         let side = self.sides.get(side).ok_or("there is no such image")?;
         Ok((world, side))
     }
+}
+
+/// The structure of a cell, where one of these sides has it already.
+fn known_structure<'a, 'g: 'a>(
+    mut sides: impl Iterator<Item = &'a Side<'g>>,
+    cell: &Cell,
+) -> Option<Structure> {
+    let wanted = cell.on(&Cell::STRUCTURE);
+    sides.find_map(|side| side.structure.clone().filter(|known| known.cell == wanted))
 }
 
 /// An error if the device is lost.

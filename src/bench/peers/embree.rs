@@ -127,6 +127,28 @@ enum Cast {
     },
 }
 
+impl Cast {
+    /// Looks the functions up.
+    ///
+    /// # Safety
+    /// The library is Embree's, of this major version.
+    unsafe fn of(library: &Library, major: u32) -> Result<Self, libloading::Error> {
+        // SAFETY: as promised by the caller, the signatures are those of the version's headers.
+        unsafe {
+            Ok(match major {
+                3 => Self::Three {
+                    nearest: *library.get(b"rtcIntersect1")?,
+                    any: *library.get(b"rtcOccluded1")?,
+                },
+                _ => Self::Four {
+                    nearest: *library.get(b"rtcIntersect1")?,
+                    any: *library.get(b"rtcOccluded1")?,
+                },
+            })
+        }
+    }
+}
+
 pub(super) struct Embree;
 
 struct Built<'a> {
@@ -194,16 +216,7 @@ unsafe fn build(
         let get = |name: &str| -> Result<Symbol<'_, Act>, libloading::Error> {
             library.get(name.as_bytes())
         };
-        let cast = match major {
-            3 => Cast::Three {
-                nearest: *library.get(b"rtcIntersect1")?,
-                any: *library.get(b"rtcOccluded1")?,
-            },
-            _ => Cast::Four {
-                nearest: *library.get(b"rtcIntersect1")?,
-                any: *library.get(b"rtcOccluded1")?,
-            },
-        };
+        let cast = Cast::of(&library, major)?;
         let new_device: Symbol<New> = library.get(b"rtcNewDevice")?;
         let new_scene: Symbol<New> = library.get(b"rtcNewScene")?;
         let new_geometry: Symbol<NewGeometry> = library.get(b"rtcNewGeometry")?;

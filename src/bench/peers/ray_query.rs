@@ -212,6 +212,15 @@ fn build_tree(raw: &RawDevice, vertices: &[[[f32; 3]; 3]]) -> (wgpu::Blas, wgpu:
     (blas, tlas)
 }
 
+/// Words of a ray for the kernel; an invalid ray has no direction, and gets a range that is empty.
+fn words(ray: &Ray) -> [f32; 8] {
+    if !ray.is_ray() {
+        return [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    }
+    let ([x, y, z], [dx, dy, dz]) = (ray.origin, ray.direction);
+    [x, y, z, ray.t_min, dx, dy, dz, ray.t_max.min(f32::MAX)]
+}
+
 impl BuiltPeer for Built {
     fn about(&self) -> String {
         format!("ray queries of {}", self.raw.adapter)
@@ -236,22 +245,7 @@ impl BuiltPeer for Built {
                 2 * bytes
             ));
         }
-        // An invalid ray has no direction; the kernel must not trace it.
-        let words = rays.iter().map(|ray| {
-            if ray.is_ray() {
-                [
-                    ray.origin,
-                    [ray.t_min, 0.0, 0.0],
-                    ray.direction,
-                    [ray.t_max.min(f32::MAX), 0.0, 0.0],
-                ]
-            } else {
-                [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]
-            }
-        });
-        let words: Vec<[f32; 8]> = words
-            .map(|[o, a, d, b]| [o[0], o[1], o[2], a[0], d[0], d[1], d[2], b[0]])
-            .collect();
+        let words: Vec<[f32; 8]> = rays.iter().map(words).collect();
         let asked = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("rays"),
             contents: bytemuck::cast_slice(&words),

@@ -18,6 +18,19 @@ const GROUPS: usize = 2;
 /// Replicates that tiles need to end on their own.
 pub const LEAST_FOR_TILES: usize = GROUPS * LEAST_GROUP;
 
+/// The records of all replicates, with no error yet.
+fn blank_records(session: &Session, cell: &Cell) -> Result<Vec<ErrorRecord>, Fault> {
+    let seeds = replicates(session, cell);
+    if seeds.len() < LEAST_FOR_TILES {
+        return Err(Fault::Cell(format!(
+            "tiles are ended by what {LEAST_FOR_TILES} replicates or more say of each other, and there are {}: raise `run.replicates`",
+            seeds.len()
+        )));
+    }
+    let records = seeds.iter().map(|of| blank_record(session, cell, *of));
+    Ok(records.collect())
+}
+
 /// Renders all replicates of one sampler, each tile with as many samples as it needs. Errors are
 /// recorded at the mean number of samples per pixel.
 pub(super) fn by_tile(
@@ -32,17 +45,7 @@ pub(super) fn by_tile(
         size: session.experiment.run.resolution,
         edge,
     };
-    let seeds = replicates(session, cell);
-    if seeds.len() < LEAST_FOR_TILES {
-        return Err(Fault::Cell(format!(
-            "tiles are ended by what {LEAST_FOR_TILES} replicates or more say of each other, and there are {}: raise `run.replicates`",
-            seeds.len()
-        )));
-    }
-    let mut records: Vec<ErrorRecord> = seeds
-        .iter()
-        .map(|of| blank_record(session, cell, *of))
-        .collect();
+    let mut records = blank_records(session, cell)?;
     let mut images: Vec<Image> = Vec::new();
     let mut needed = vec![vec![pass.spps[0]; tiles.len()]; GROUPS];
     let mut done = 0;

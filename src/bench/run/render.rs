@@ -15,11 +15,11 @@ use raystone_config::{Axis, Cell, Experiment, Plan};
 use raystone_core::geometry::Camera;
 use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, probe_arithmetic};
-use raystone_image::{FileFormat, Image, ImageError};
+use raystone_image::{Attribute, FileFormat, Image, ImageError};
 use raystone_render::{
     InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
 };
-use raystone_scene::{self as scene, LoadReport};
+use raystone_scene::{self as scene, LoadReport, SceneData};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -53,6 +53,24 @@ pub struct Rendering {
     pub in_order: Option<InOrder>,
 }
 
+impl Rendering {
+    /// Nothing rendered yet.
+    fn blank(scene: &SceneData, spp: u32) -> Self {
+        Self {
+            triangles: scene.triangles.len(),
+            spp,
+            first_picture_s: 0.0,
+            samples_s: 0.0,
+            total_s: 0.0,
+            rays: 0,
+            report: scene.report.clone(),
+            non_finite_pixels: 0,
+            uniform: None,
+            in_order: None,
+        }
+    }
+}
+
 /// Output files and pixel order.
 #[derive(Debug, Clone, Copy)]
 pub struct Pictures<'a> {
@@ -62,6 +80,15 @@ pub struct Pictures<'a> {
     pub order: Option<Order>,
     /// File for the first complete picture of an order; `None`: the main file.
     pub preview: Option<&'a Path>,
+}
+
+fn write_picture(image: &Image, file: &Path, about: &[Attribute<'_>]) -> Result<(), RunError> {
+    let format = FileFormat::of(file).map_err(input)?;
+    let written = format.write(file, image, about);
+    written.map_err(|error| match error {
+        ImageError::Altered { .. } => RunError::Wrong(error.to_string()),
+        _ => input(error),
+    })
 }
 
 /// Renders the first scene, structure, sampler and integrator of the axes at
@@ -103,30 +130,14 @@ pub fn render(
         return Err(RunError::Input(format!("{}: {reason}", cell[Axis::Accel])));
     }
     let job = estimator.job(&session, camera, true);
-    let mut rendering = Rendering {
-        triangles: stage.scene.triangles.len(),
-        spp,
-        first_picture_s: 0.0,
-        samples_s: 0.0,
-        total_s: 0.0,
-        rays: 0,
-        report: stage.scene.report.clone(),
-        non_finite_pixels: 0,
-        uniform: None,
-        in_order: None,
-    };
+    let mut rendering = Rendering::blank(&stage.scene, spp);
     let mut show = |image: &Image, done: u32, file: &Path| {
         if rendering.first_picture_s == 0.0 {
             rendering.first_picture_s = start.elapsed().as_secs_f64();
         }
         let sampler = estimator.sampler.label();
         let about = attributes(&options.program, cell, &sampler, done, experiment.run.seed);
-        let format = FileFormat::of(file).map_err(input)?;
-        let written = format.write(file, image, &about);
-        written.map_err(|error| match error {
-            ImageError::Altered { .. } => RunError::Wrong(error.to_string()),
-            _ => input(error),
-        })
+        write_picture(image, file, &about)
     };
     let compiled;
     let image = if let Some(order) = pictures.order {

@@ -43,15 +43,14 @@ fn fail_lost(
     Ok(Vec::new())
 }
 
-/// Times every class through every structure in interleaved rounds, then counts the work. Structures that
-/// fail at it are recorded and left out.
-pub(super) fn time_all(
+/// Prepares every timed class for every structure. What fails at it is entered under its structure; a lost device
+/// ends it, with the structure that lost it.
+fn all_prepared<'a>(
     session: &mut Session,
-    world: &World,
-    mut gated: Vec<Gated>,
-) -> Result<Vec<Gated>, RunError> {
-    session.say(format!("{}: timing structures", world.cell));
-    let mut failures: Vec<Option<String>> = vec![None; gated.len()];
+    world: &'a World,
+    gated: &[Gated],
+    failures: &mut [Option<String>],
+) -> Result<Result<Vec<Timed<'a>>, (usize, GpuError)>, RunError> {
     let mut timed = Vec::new();
     for (structure, one) in gated.iter().enumerate() {
         let gpu = world.device.of(&one.cell[Axis::Kernels])?;
@@ -63,14 +62,30 @@ pub(super) fn time_all(
                     set,
                     rays: TimedRays::new(batch),
                 }),
-                Err(error) if world.gpu.lost().is_some() => {
-                    return fail_lost(session, world, gated.swap_remove(structure), error);
-                }
+                Err(error) if world.gpu.lost().is_some() => return Ok(Err((structure, error))),
                 Err(error) => failures[structure] = Some(error.to_string()),
             }
         }
         session.recorder.note_kernels(&one.cell.to_string());
     }
+    Ok(Ok(timed))
+}
+
+/// Times every class through every structure in interleaved rounds, then counts the work. Structures that
+/// fail at it are recorded and left out.
+pub(super) fn time_all(
+    session: &mut Session,
+    world: &World,
+    mut gated: Vec<Gated>,
+) -> Result<Vec<Gated>, RunError> {
+    session.say(format!("{}: timing structures", world.cell));
+    let mut failures: Vec<Option<String>> = vec![None; gated.len()];
+    let timed = match all_prepared(session, world, &gated, &mut failures)? {
+        Ok(timed) => timed,
+        Err((structure, error)) => {
+            return fail_lost(session, world, gated.swap_remove(structure), error);
+        }
+    };
     let rivals = peers::build(session, world);
     let (cast, refused) = peers::batches(&rivals, world);
     session.recorder.note_kernels("peers");

@@ -394,16 +394,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     let (open, mut usable): (Vec<_>, Vec<_>) = gated.into_iter().partition(is_open);
     let timed = time_all(session, world, open)?;
     let mut timed = draw_heat_maps(session, world, timed)?;
-    if let Some(settings) = session.experiment.coherence.clone() {
-        for structure in &mut timed {
-            let modelled = {
-                let of = (&structure.cell, structure.traced.space);
-                of_recorded_rays(session, world, of, &settings)
-            };
-            // Why there is none is told of its cells.
-            structure.record.body.coherence = modelled.ok();
-        }
-    }
+    model_coherence(session, world, &mut timed);
     for structure in &timed {
         conclude(
             session,
@@ -415,6 +406,18 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     }
     usable.append(&mut timed);
     Ok(usable)
+}
+
+/// Models the coherence of the recorded rays through each structure, where the experiment asks for it.
+fn model_coherence(session: &mut Session, world: &World, timed: &mut [Gated]) {
+    if let Some(settings) = session.experiment.coherence.clone() {
+        for structure in timed {
+            let of = (&structure.cell, structure.traced.space);
+            let modelled = of_recorded_rays(session, world, of, &settings);
+            // Why there is none is told of its cells.
+            structure.record.body.coherence = modelled.ok();
+        }
+    }
 }
 
 /// Whether something that is not measured yet is of this structure.

@@ -265,6 +265,30 @@ fn compile<'a>(
     })
 }
 
+/// What is counted for all cells of the item's key, and the image that theirs must equal: taken from the first of them.
+fn first_of(
+    session: &mut Session,
+    world: &World,
+    structure: Option<&Gated>,
+    item: &Timed,
+    hash: &str,
+    shared: &mut Shared,
+) -> Result<(Counted, String), String> {
+    let key = key(&item.cell, item.space);
+    if !shared.contains_key(&key) {
+        let structure = structure.ok_or("its structure is gone")?;
+        let (counted, image) = count_rays(session, world, structure, item)?;
+        // Another kernel: on an adapter that is not exact it rounds otherwise.
+        let image = if world.probe.is_exact() {
+            image
+        } else {
+            hash.to_owned()
+        };
+        shared.insert(key.clone(), (counted, image));
+    }
+    Ok(shared[&key].clone())
+}
+
 /// Figures of a measured cell.
 fn finish(
     session: &mut Session,
@@ -278,19 +302,7 @@ fn finish(
         session.tell_warning(&format!("{}: {slow}", item.cell));
     }
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
-    let key = key(&item.cell, item.space);
-    if !shared.contains_key(&key) {
-        let structure = structure.ok_or("its structure is gone")?;
-        let (counted, image) = count_rays(session, world, structure, item)?;
-        // Another kernel: on an adapter that is not exact it rounds otherwise.
-        let image = if world.probe.is_exact() {
-            image
-        } else {
-            hash.clone()
-        };
-        shared.insert(key.clone(), (counted, image));
-    }
-    let (counted, first) = shared[&key].clone();
+    let (counted, first) = first_of(session, world, structure, item, &hash, shared)?;
     let rays = counted.rays;
     let total: u64 = rays[..TRACED_CLASSES].iter().sum();
     let spp = f64::from(item.spp);

@@ -216,20 +216,46 @@ fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
     Ok(())
 }
 
+/// Reads which angles the file's are.
+fn photometry(numbers: &mut Numbers) -> Result<Photometry, IesError> {
+    match numbers.number("the photometric type")? {
+        1.0 => Ok(Photometry::C),
+        2.0 => Ok(Photometry::B),
+        3.0 => Ok(Photometry::A),
+        other => Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3"))),
+    }
+}
+
+/// Reads the candela values of so many horizontal and vertical angles, times a factor.
+fn candela(
+    numbers: &mut Numbers,
+    [horizontal, vertical]: [usize; 2],
+    factor: f64,
+) -> Result<Vec<f32>, IesError> {
+    // The counts promise more than a file may hold.
+    let mut candela = Vec::new();
+    for _ in 0..horizontal {
+        for value in numbers.list(vertical, "candela value")? {
+            if value < 0.0 {
+                return Err(numbers.here(format!("the candela value {value} is below 0")));
+            }
+            let intensity = (f64::from(value) * factor) as f32;
+            if !intensity.is_finite() {
+                return Err(numbers.here(format!("{value} times {factor} candela is no number")));
+            }
+            candela.push(intensity);
+        }
+    }
+    Ok(candela)
+}
+
 fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
     let lamps = numbers.number("the number of lamps")?;
     let lumens = numbers.number("the lumens per lamp")?;
     let multiplier = numbers.number("the candela multiplier")?;
     let vertical_count = numbers.count("the number of vertical angles")?;
     let horizontal_count = numbers.count("the number of horizontal angles")?;
-    let photometry = match numbers.number("the photometric type")? {
-        1.0 => Photometry::C,
-        2.0 => Photometry::B,
-        3.0 => Photometry::A,
-        other => {
-            return Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3")));
-        }
-    };
+    let photometry = photometry(numbers)?;
     let unit = numbers.number("the unit of length")?;
     let opening = opening(unit, numbers)?;
     let ballast = numbers.number("the ballast factor")?;
@@ -247,20 +273,7 @@ fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, I
     check_vertical(photometry, &vertical).map_err(|problem| numbers.here(problem))?;
     let horizontal = numbers.angles(horizontal_count, "horizontal angle")?;
     let last_angle = numbers.line();
-    // The counts promise more than a file may hold.
-    let mut candela = Vec::new();
-    for _ in 0..horizontal_count {
-        for value in numbers.list(vertical_count, "candela value")? {
-            if value < 0.0 {
-                return Err(numbers.here(format!("the candela value {value} is below 0")));
-            }
-            let intensity = (f64::from(value) * factor) as f32;
-            if !intensity.is_finite() {
-                return Err(numbers.here(format!("{value} times {factor} candela is no number")));
-            }
-            candela.push(intensity);
-        }
-    }
+    let candela = candela(numbers, [horizontal_count, vertical_count], factor)?;
     let mut warnings: Vec<String> = opening.into_iter().collect();
     if (NO_LAMP_FACTOR..GENERATION_TYPE).contains(&year) && third != 1.0 {
         warnings.push(format!(
