@@ -212,6 +212,17 @@ fn build_tree(raw: &RawDevice, vertices: &[[[f32; 3]; 3]]) -> (wgpu::Blas, wgpu:
     (blas, tlas)
 }
 
+/// Refuses more rays than one buffer holds.
+fn check_size(device: &wgpu::Device, rays: usize, bytes: u64) -> Result<(), String> {
+    let limit = device.limits().max_storage_buffer_binding_size;
+    if bytes > limit {
+        return Err(format!(
+            "{rays} rays need {bytes} bytes in one buffer, the adapter binds {limit}"
+        ));
+    }
+    Ok(())
+}
+
 /// Words of a ray for the kernel; an invalid ray has no direction, and gets a range that is empty.
 fn words(ray: &Ray) -> [f32; 8] {
     if !ray.is_ray() {
@@ -237,14 +248,7 @@ impl BuiltPeer for Built {
     ) -> Result<Box<dyn PeerBatch + 'a>, String> {
         let device = &self.raw.device;
         let bytes = (16 * rays.len().max(1)) as u64;
-        let limit = device.limits().max_storage_buffer_binding_size;
-        if 2 * bytes > limit {
-            return Err(format!(
-                "{} rays need {} bytes in one buffer, the adapter binds {limit}",
-                rays.len(),
-                2 * bytes
-            ));
-        }
+        check_size(device, rays.len(), 2 * bytes)?;
         let words: Vec<[f32; 8]> = rays.iter().map(words).collect();
         let asked = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("rays"),

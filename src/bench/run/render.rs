@@ -82,6 +82,16 @@ pub struct Pictures<'a> {
     pub preview: Option<&'a Path>,
 }
 
+impl Pictures<'_> {
+    /// Refuses an unknown ending before anything is rendered.
+    fn check_formats(&self) -> Result<(), RunError> {
+        for file in [Some(self.file), self.preview].into_iter().flatten() {
+            FileFormat::of(file).map_err(input)?;
+        }
+        Ok(())
+    }
+}
+
 fn write_picture(image: &Image, file: &Path, about: &[Attribute<'_>]) -> Result<(), RunError> {
     let format = FileFormat::of(file).map_err(input)?;
     let written = format.write(file, image, about);
@@ -107,12 +117,7 @@ pub fn render(
     pictures: &Pictures,
 ) -> Result<Rendering, RunError> {
     let start = Instant::now();
-    for file in [Some(pictures.file), pictures.preview]
-        .into_iter()
-        .flatten()
-    {
-        FileFormat::of(file).map_err(input)?;
-    }
+    pictures.check_formats()?;
     let cell = plan
         .times
         .first()
