@@ -3,6 +3,7 @@
 
 use crate::bounds::Bounds;
 use crate::instancing::BoxMap;
+use crate::known_cells;
 use crate::known_parameters;
 use crate::known_rows;
 use crate::tree::{NodeKind, Tree, TreeNode};
@@ -36,6 +37,7 @@ pub fn check() -> Result<(), String> {
     shapes()?;
     overlaps_of_copies()?;
     known_rows::check()?;
+    known_cells::check()?;
     phases()?;
     known_parameters::check()?;
     crate::wide::check_octants()?;

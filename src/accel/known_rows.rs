@@ -30,6 +30,11 @@ const ROWS: [(&str, Option<&str>, f64); 10] = [
 /// Triangles from which a sweep splits at borders of two bins alone, the middle of a node, and its cost over a steep row: where all
 /// places are allowed the best is taken at each level, which is not the cheapest tree in the end (both by another program, in whole numbers).
 const SWEEPS: [(i64, f64); 2] = [(128, 1865.0 / 631.0), (2, 1784.0 / 631.0)];
+/// A kd-tree over a deep row, by another program in whole numbers: with the axis of a split for one of the sides it has 280 / 29.
+const DEEP: f64 = 276.0 / 29.0;
+/// Height and depth of its triangles, about half as long as the row.
+const HEIGHT: f32 = 20.0;
+const DEPTH: f32 = 30.0;
 /// Where rows begin: elsewhere along each axis.
 const AWAY: Vec3 = Vec3::new(7.0, 40.0, 300.0);
 /// Relative error of a cost.
@@ -51,6 +56,7 @@ pub(crate) fn check() -> Result<(), String> {
             same_along_all_axes(structure, &params, &label, uneven)?;
         }
     }
+    deep_kd_tree()?;
     for (bins_from, cost) in SWEEPS {
         let builder = ("builder", ParamValue::Name("sweep".to_owned()));
         let bins = ("bins", ParamValue::Integer(2));
@@ -69,6 +75,23 @@ pub(crate) fn check() -> Result<(), String> {
     }
     for entry in AccelRegistry::default().entries() {
         same_along_all_axes(&entry.name, &Params::default(), &entry.name, even)?;
+    }
+    Ok(())
+}
+
+/// Where both sides of a split count, as they do not in a flat row.
+fn deep_kd_tree() -> Result<(), String> {
+    for turn in 0..6 {
+        let row = row_of(turn, even, |place| {
+            let mut triangle = half_a_square(place);
+            triangle.vertices[1].z = DEPTH;
+            triangle.vertices[2].y = HEIGHT;
+            triangle
+        });
+        let found = stats_with("kd-tree", &Params::default(), &row)?.sah_cost;
+        if found.is_none_or(|found| (found / DEEP - 1.0).abs() > ROUNDING) {
+            return Err(wrong("kd-tree", &format!("{found:?}"), &DEEP.to_string()));
+        }
     }
     Ok(())
 }
@@ -128,6 +151,10 @@ fn is_same(a: &StructureStats, b: &StructureStats) -> bool {
 
 /// Sixteen triangles along an axis, at these places; along each of the three with their height along either of the others.
 fn row(turn: usize, places: fn(u32) -> u32) -> Vec<Triangle> {
+    row_of(turn, places, half_a_square)
+}
+
+fn row_of(turn: usize, places: fn(u32) -> u32, of: impl Fn(u32) -> Triangle) -> Vec<Triangle> {
     let turned = |v: Vec3| {
         let mut at = v.to_array();
         if turn >= 3 {
@@ -137,7 +164,7 @@ fn row(turn: usize, places: fn(u32) -> u32) -> Vec<Triangle> {
         Vec3::from(at) + AWAY
     };
     let along = |place| Triangle {
-        vertices: half_a_square(place).vertices.map(turned),
+        vertices: of(place).vertices.map(turned),
     };
     (0..16).map(places).map(along).collect()
 }

@@ -25,6 +25,7 @@ mod instancing;
 mod intersection;
 mod irregular_grid;
 mod kd_tree;
+mod known_cells;
 pub mod known_figures;
 mod known_parameters;
 mod known_rows;

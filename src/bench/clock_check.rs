@@ -1,11 +1,11 @@
 //! The clocks of a run against each other and against the work: twice the rays must take about twice
 //! the time, or as much more as passes on the clock around them, and a measurement must account for most
-//! of the time that passed around it, and for no more.
+//! of the time that passed around it, and for no more. Where one is too short to say, many in one submission are not.
 
 use std::time::Duration;
 
 use raystone_accel::RayBatch;
-use raystone_gpu::{Elapsed, GpuError, Stopwatch};
+use raystone_gpu::{Elapsed, GpuError, Stopwatch, wait_for};
 
 /// Bounds of the time of twice the rays over that of the rays.
 const TWICE: [f64; 2] = [1.5, 2.8];
@@ -19,6 +19,10 @@ const SPARE_MS: f64 = 2.0;
 const LEAST_WORKED: f64 = 0.1;
 /// Milliseconds below which a time says nothing about a clock.
 const LEAST_MS: f64 = 5.0;
+/// Milliseconds of many traces in one submission: so long that half of them with [`SPARE_MS`] is less than [`LEAST_CLAIMED`].
+const MANY_MS: f64 = 20.0;
+/// Most traces of one submission.
+const MOST_TRACES: u32 = 256;
 /// Rounds between two verdicts, and how long a wrong verdict asks for more of them: other work on the machine lengthens
 /// times, so the shortest of all rounds so far count.
 const ROUNDS: usize = 5;
@@ -64,8 +68,42 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
                 shortest.note(elapsed.ms(), around.wall_ms, around_cpu_ms);
             }
         }
-        let found = judge(shortest).or_else(|| idle(shortest[1], worked));
-        if found.is_none() || started.elapsed().wall_ms > PATIENCE.as_secs_f64() * 1e3 {
+        // What is too short to say anything is not judged alone.
+        let found = match shortest[0].around_ms < LEAST_MS {
+            true => None,
+            false => judge(shortest).or_else(|| idle(shortest[1], worked)),
+        };
+        if found.is_none() {
+            return fault_of_many(single);
+        }
+        if started.elapsed().wall_ms > PATIENCE.as_secs_f64() * 1e3 {
+            return Ok(found);
+        }
+    }
+}
+
+/// Compares the time of many traces in one submission with that around it: what one trace waits for beside its work does not
+/// count there. Returns what is wrong; `None` also where as many are still too short.
+fn fault_of_many(batch: &RayBatch) -> Result<Option<String>, GpuError> {
+    let started = Stopwatch::start();
+    let (mut times, mut rounds, mut shortest) = (1, 0, Shortest::NONE);
+    loop {
+        let around = Stopwatch::start();
+        let elapsed = wait_for(batch.trace_times_async(times))?.measured()?;
+        let around_ms = around.elapsed().wall_ms;
+        if around_ms < MANY_MS {
+            if times == MOST_TRACES {
+                return Ok(None);
+            }
+            times *= 2;
+            continue;
+        }
+        shortest.note(elapsed.ms(), around_ms, None);
+        rounds += 1;
+        let found = shortest.fault_of_span();
+        let is_certain = shortest.claimed[1] > MOST_CLAIMED;
+        let is_sound = found.is_none() && rounds >= ROUNDS;
+        if is_certain || is_sound || started.elapsed().wall_ms > PATIENCE.as_secs_f64() * 1e3 {
             return Ok(found);
         }
     }
@@ -109,13 +147,30 @@ impl Shortest {
         self.claimed = [least.min(claimed), most.max(claimed)];
         self.spared = self.spared.max((ms + SPARE_MS) / around_ms);
     }
+
+    /// What a measurement, whose passes may overlap, claims of the time around it is too much or too little.
+    fn fault(&self) -> Option<String> {
+        self.fault_if(self.claimed[0] > MOST_CLAIMED)
+    }
+
+    /// From the beginning of a first pass to the end of a last one no more time passes than around them, in any round.
+    fn fault_of_span(&self) -> Option<String> {
+        self.fault_if(self.claimed[1] > MOST_CLAIMED)
+    }
+
+    fn fault_if(&self, is_too_much: bool) -> Option<String> {
+        let is_wrong = is_too_much || self.spared < LEAST_CLAIMED;
+        is_wrong.then(|| {
+            format!(
+                "{:.3} ms are measured while {:.3} ms pass on the clock around it",
+                self.ms, self.around_ms
+            )
+        })
+    }
 }
 
 /// Judges the shortest times of the rays, and of twice as many.
 fn judge([single, double]: [Shortest; 2]) -> Option<String> {
-    if single.around_ms < LEAST_MS {
-        return None;
-    }
     let ratio = double.ms / single.ms;
     // NaN is no ratio.
     if !(is_twice(ratio) || is_kept_waiting(ratio, single, double)) {
@@ -124,12 +179,7 @@ fn judge([single, double]: [Shortest; 2]) -> Option<String> {
             double.ms, single.ms
         ));
     }
-    let is_wrong = |of: &Shortest| of.claimed[0] > MOST_CLAIMED || of.spared < LEAST_CLAIMED;
-    let wrong = [double, single].into_iter().find(is_wrong)?;
-    Some(format!(
-        "{:.3} ms are measured while {:.3} ms pass on the clock around it",
-        wrong.ms, wrong.around_ms
-    ))
+    [double, single].iter().find_map(Shortest::fault)
 }
 
 fn is_twice(ratio: f64) -> bool {
@@ -178,8 +228,6 @@ mod tests {
         assert_eq!(said(of(6.0, 6.5, 11.0), of(21.0, 22.0, 60.0)), "");
         assert_eq!(said(of(15.0, 16.0, 11.0), of(21.0, 22.0, 22.0)), "");
         assert_eq!(said(of(6.0, 6.5, 11.0), of(21.0, 22.0, 22.0)), "");
-        // Too short to say.
-        assert_eq!(said(of(0.2, 1.0, 0.2), of(0.2, 1.0, 0.2)), "");
         for (single, double, part) in [
             (of(10.0, 10.5, 18.0), of(11.0, 20.5, 36.0), "1.10 times"),
             // Short ones, of which the second is given the time of the first.
@@ -200,6 +248,18 @@ mod tests {
         ] {
             assert!(said(single, double).contains(part), "{part}");
         }
+    }
+
+    #[test]
+    fn many_traces_that_claim_twice_or_half_the_time_are_told() {
+        let many = |ms| {
+            let mut many = Shortest::NONE;
+            many.note(ms, 2.5 * MANY_MS, None);
+            many.note(ms, MANY_MS, None);
+            many.fault_of_span()
+        };
+        assert_eq!(many(0.95 * MANY_MS), None);
+        assert!(many(2.0 * 0.95 * MANY_MS).is_some() && many(0.5 * MANY_MS).is_some());
     }
 
     #[test]

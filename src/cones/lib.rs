@@ -19,6 +19,7 @@ pub mod rays;
 pub mod sample;
 pub mod scene;
 mod spheres;
+mod ties;
 pub mod trace;
 mod world;
 

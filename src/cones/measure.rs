@@ -6,6 +6,7 @@ use crate::cone::Mirror;
 use crate::device::{Tracer, overlaps};
 use crate::sample::{Crossing, DIMENSIONS, MOST, POWERS, budget, crossing, sampled, shimmer};
 use crate::scene::Place;
+use crate::ties::fault_of_ties;
 use crate::trace::{Blend, Found};
 use crate::world::{Keep, Picture as Traced, View, World};
 use glam::DVec3;
@@ -477,8 +478,11 @@ fn shimmer_of(
     Ok(Some(shimmer(&pictures)))
 }
 
-/// What the device is off quadrature in overlaps of random triangles.
+/// What the device is off quadrature in overlaps of random triangles, where it also has to know the first of equally near ones.
 fn area_off(gpu: &Gpu, seed: u32) -> Result<f64, Absent> {
+    if let Some(fault) = fault_of_ties(gpu)? {
+        return Err(Absent::Failed(fault));
+    }
     let triangles = check::triangles(CHECKED, seed.into());
     let found = overlaps(gpu, &triangles)?;
     let is_exact = probe_arithmetic(gpu)?.is_exact();

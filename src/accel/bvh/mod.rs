@@ -23,6 +23,7 @@ use boxes::Boxes;
 use octant_roped::Octants;
 pub use options::BvhParameters;
 use options::{LeafTriangles, RopedParameters, Traversal};
+pub(crate) use order::check as check_orders;
 use pairs::Pairs;
 use raystone_core::params::Parameters;
 use std::marker::PhantomData;

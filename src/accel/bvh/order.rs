@@ -1,7 +1,8 @@
 //! Memory order of the inner nodes of a tree. Parents always come before their children.
 
-use super::super::tree::{NodeKind, Tree};
+use super::super::tree::{NodeKind, Tree, TreeNode};
 use super::options::NodeOrder;
+use crate::bounds::Bounds;
 use std::collections::VecDeque;
 
 pub(super) struct InnerNodes {
@@ -50,6 +51,44 @@ impl InnerNodes {
     pub(super) fn children(&self, node: u32) -> Option<[u32; 2]> {
         self.children[node as usize]
     }
+}
+
+/// Orders the inner nodes of a full tree of sixteen leaves, whose nodes are numbered level by level.
+///
+/// # Errors
+/// They come otherwise: the order, and both lists.
+pub(crate) fn check() -> Result<(), String> {
+    const VAN_EMDE_BOAS: [u32; 15] = [0, 1, 2, 3, 7, 8, 4, 9, 10, 5, 11, 12, 6, 13, 14];
+    const DEPTH_FIRST: [u32; 15] = [0, 1, 3, 7, 8, 4, 9, 10, 2, 5, 11, 12, 6, 13, 14];
+    let node = |k: u32| TreeNode {
+        bounds: Bounds::EMPTY,
+        kind: match k.checked_sub(15) {
+            Some(first) => NodeKind::Leaf { first, count: 1 },
+            None => NodeKind::Inner {
+                left: 2 * k + 1,
+                right: 2 * k + 2,
+            },
+        },
+    };
+    let tree = Tree {
+        nodes: (0..31).map(node).collect(),
+        order: (0..16).collect(),
+        epo: None,
+    };
+    for (order, expected) in [
+        (NodeOrder::DepthFirst, DEPTH_FIRST),
+        (NodeOrder::BreadthFirst, std::array::from_fn(|k| k as u32)),
+        (NodeOrder::VanEmdeBoas, VAN_EMDE_BOAS),
+    ] {
+        let found = InnerNodes::new(&tree, order, |_, _| false).nodes;
+        if found != expected {
+            return Err(format!(
+                "nodes of a known tree come in the order {found:?}, and should come in {expected:?}: structures are laid out \
+                 otherwise than this program says; build it anew, and report what stays wrong"
+            ));
+        }
+    }
+    Ok(())
 }
 
 type Children = [Option<[u32; 2]>];

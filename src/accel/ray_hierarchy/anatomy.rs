@@ -4,7 +4,7 @@ use super::enclosing::enclosing;
 use super::layout::Layout;
 use super::node::{Bounding, FAR, Node, no_rays, node_of_ray};
 use super::primitives::{Primitive, Primitives};
-use super::{Bound, Options, Order, Union};
+use super::{Bound, Options, Union};
 use crate::{AccelError, Ray, TriangleSoup};
 use rayon::prelude::*;
 use raystone_core::params::{Parameters as _, Params};
@@ -18,6 +18,8 @@ pub struct LevelAnatomy {
     pub tests: u64,
     /// Those that met: the stream of this level.
     pub pairs: u64,
+    /// The most of them that come from one batch of primitives.
+    pub longest: u64,
     /// Mean and greatest half opening angle of nodes, radians.
     pub angle: [f64; 2],
     /// Mean and greatest radius of nodes, scene units.
@@ -34,16 +36,15 @@ pub struct Anatomy {
 }
 
 impl Anatomy {
-    /// Streams all triangles through a tree over `rays` on the host, in their order, without chunks.
+    /// Streams all triangles through a tree over `rays` on the host, in the order in which they are given, without chunks.
     ///
     /// # Errors
-    /// Unknown parameters, or an order or chunks that only the device has.
+    /// Unknown parameters, or chunks, which only the device has.
     pub fn new(soup: &TriangleSoup, params: &Params, rays: &[Ray]) -> Result<Self, AccelError> {
         let options = Options::from_params(params)?;
-        if options.order != Order::Natural || options.chunks > 1 {
+        if options.chunks > 1 {
             return Err(AccelError::Contradiction(
-                "the anatomy of a ray-hierarchy is that of order = \"natural\" and chunks = 1"
-                    .to_owned(),
+                "the anatomy of a ray-hierarchy is that of chunks = 1".to_owned(),
             ));
         }
         let primitives = Primitives::new(soup, &options);
@@ -67,10 +68,13 @@ impl Anatomy {
             descent.below(layout.begin, primitive, nodes, &mut counts);
             counts
         });
-        for counts in counts.collect::<Vec<_>>() {
-            for (level, [tests, pairs]) in found.iter_mut().zip(counts) {
-                level.tests += tests;
+        for batch in counts.collect::<Vec<_>>().chunks(layout.batch as usize) {
+            for (number, level) in found.iter_mut().enumerate() {
+                let sum = |of: usize| batch.iter().map(|counts| counts[number][of]).sum::<u64>();
+                let pairs = sum(1);
+                level.tests += sum(0);
                 level.pairs += pairs;
+                level.longest = level.longest.max(pairs);
             }
         }
         Ok(Self {
@@ -84,7 +88,7 @@ impl Anatomy {
         self.levels.iter().map(|level| level.tests).sum()
     }
 
-    /// Pairs of the longest stream.
+    /// Pairs of the longest stream, were all primitives one batch.
     pub fn peak(&self) -> u64 {
         self.levels
             .iter()

@@ -21,6 +21,7 @@ use super::triangle::TriangleRecord;
 use bytemuck::Pod;
 use collapse::{Shape, WideTree};
 pub(crate) use octants::check as check_octants;
+pub(crate) use quantise::check as check_planes;
 use std::marker::PhantomData;
 use std::ops::Range;
 

@@ -8,6 +8,7 @@ mod refitted;
 mod room;
 mod world;
 
+pub use descent::fault_of_passes;
 use ready::Ready;
 use room::Lobes;
 pub use room::{Vertex, mirrored, on_mirror, room};

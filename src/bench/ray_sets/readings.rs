@@ -226,3 +226,66 @@ fn of_level(number: usize, level: &LevelAnatomy, rays: f64) -> impl Iterator<Ite
     let readings = figures.zip(values);
     readings.map(move |(figure, value)| Reading::exact(figure, value).at(at.clone()))
 }
+
+/// Reads a known descent: the figures of its whole, and of each level, leaves first.
+///
+/// # Errors
+/// One is not what it should be: the figure, its level, and both values.
+pub(crate) fn check_known() -> Result<(), String> {
+    let level = |k: u64| LevelAnatomy {
+        nodes: 100 + k,
+        tests: 200 + 20 * k,
+        pairs: 300 + 10 * k,
+        longest: 300,
+        angle: [0.1, 0.2],
+        radius: [0.3, 0.4],
+    };
+    let stream = |k: u32| StreamCounts {
+        pairs: 300 + 10 * k,
+        longest: 70 - 10 * k,
+        walked: k,
+    };
+    let known = Descent::Tree {
+        anatomy: Some(Anatomy {
+            rays: 10,
+            levels: (0..3).map(level).collect(),
+        }),
+        streams: (0..3).map(stream).collect(),
+    };
+    // Of ten rays: 70 pairs in the longest stream; 1 + 2 without room; 200 + 220 + 240 tests; 300 candidates at the leaves.
+    let whole = [
+        (LONGEST, 7.0),
+        (WALKED, 0.3),
+        (TESTS, 66.0),
+        (CANDIDATES, 30.0),
+    ];
+    let of_level = |k: usize| {
+        let (tests, pairs) = (20.0 + 2.0 * k as f64, 30.0 + k as f64);
+        let shape = [100.0 + k as f64, 0.1, 0.2, 0.3, 0.4];
+        let values = [tests, pairs].into_iter().chain(shape);
+        (LEVEL..)
+            .zip(values)
+            .map(move |(figure, value)| (figure, value, Some(k)))
+    };
+    let whole = whole
+        .into_iter()
+        .map(|(figure, value)| (figure, value, None));
+    let expected = whole.chain((0..3).flat_map(of_level));
+    let found = descent(&known, 10.0);
+    let mut pairs = found.iter().zip(expected);
+    let wrong = pairs.find(|(found, (figure, value, level))| {
+        let key = level.map_or_else(Key::default, |k| {
+            Key::default().with(axis::SUBJECT, format!("level 0{k}"))
+        });
+        found.figure != FIGURES[*figure].id
+            || (found.value.value - value).abs() > 1e-9 * value
+            || found.at != key
+    });
+    wrong.map_or(Ok(()), |(found, (figure, value, level))| {
+        Err(format!(
+            "of a known descent {found:?} is read, and should be {value} of {} at level {level:?}: this program shows wrong \
+             figures; build it anew, and report what stays wrong",
+            FIGURES[figure].id
+        ))
+    })
+}

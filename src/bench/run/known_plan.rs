@@ -3,7 +3,7 @@
 
 use super::registries::Registries;
 use super::{adaptive, known_settings, known_turns};
-use crate::{animation, coherence};
+use crate::{animation, coherence, ray_sets};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 
 /// Two excludes leave a decorrelation to each sequence, one a structure to a scene, one a sequence to a structure.
@@ -64,6 +64,7 @@ pub fn check() -> Result<(), String> {
     known_settings::check()?;
     animation::check_known()?;
     coherence::check_origins()?;
+    ray_sets::readings::check_known()?;
     raystone_gpu::check_sizes()?;
     raystone_gpu::check_span()?;
     let found = planned(TEXT)?;

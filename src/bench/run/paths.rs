@@ -2,6 +2,7 @@
 
 use super::error::{Fault, RunError};
 use super::offsets;
+use super::path_orders;
 use super::session::Session;
 use super::world::World;
 use raystone_config::{Axis, Cell};
@@ -350,7 +351,11 @@ fn judged(
         let (sampler, pixels) = drawn(session, subject, integrator, frame)?;
         let view = subject.view(integrator, &sampler, &pixels)?;
         let job = subject.job(integrator, &sampler, &pixels);
-        if let Some(fault) = offsets::fault(session, subject, &job)? {
+        let fault = match offsets::fault(session, subject, &job)? {
+            None => path_orders::fault(session, subject, subject.traced, &job)?,
+            found => found,
+        };
+        if let Some(fault) = fault {
             return Ok((all.and(PathsRecord::wrong(fault)), ran));
         }
         let limit = sampler.demand.samples.unwrap_or(u32::MAX);

@@ -1,6 +1,7 @@
 //! Structures: build, validate, gate; what passes is timed, counted and drawn.
 
 use super::cost::{Cost, Work};
+use super::device_trees;
 use super::error::RunError;
 use super::measurement::{Measurement, Through};
 use super::session::{End, Session};
@@ -9,12 +10,14 @@ use super::twins::of_recorded_rays;
 use super::units::Unit;
 use super::world::World;
 use crate::memory::peak_bytes;
+use crate::ray_sets::fault_of_passes;
 use raystone_accel::tracer::kernel_hash;
 use raystone_accel::{AccelError, BuildLog, BuiltAccel, Traced};
 use raystone_config::{Axis, Cell, Experiment, Plan};
+use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, GpuError, fault_of_sort, wait_for};
 use raystone_record::fault_text;
-use raystone_record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
+use raystone_record::{Body, GateVerdict, Key, Line, Ran, RayClass, StructureRecord};
 use raystone_verify::gate::gate;
 use raystone_verify::ray_classes;
 use raystone_verify::self_test::unseen_hit;
@@ -144,6 +147,8 @@ fn build(session: &mut Session, world: &World, cell: &Cell) -> Candidate {
     let held = built.buffers().bytes() + held.sum::<u64>();
     let bytes = candidate.record.body.stats.bytes;
     let other = (bytes != held).then(|| format!("it has {held} bytes, and says {bytes}"));
+    let of_device = || device_trees::fault(world, kind, accel);
+    let other = other.or_else(|| (session.clock).time("gate", of_device));
     candidate.structural = valid.err().map(|e| e.to_string()).or(other);
     // One that is not sound fails, and may lead its twin in circles.
     if candidate.structural.is_none() {
@@ -184,7 +189,7 @@ fn gate_with(
     let gated = session.clock.time("gate", || {
         let mut verdict = gate_twice(checks, world, gpu, &traced)?;
         if verdict.passed {
-            verdict.work = work_fault(world, gpu, &traced, &candidate.work)?;
+            verdict.work = work_fault(world, gpu, (&cell[Axis::Accel], &traced), &candidate.work)?;
             verdict.passed = verdict.work.is_none();
         }
         let hash = kernel_hash(gpu, &world.buffers.triangles, &traced)?;
@@ -273,7 +278,7 @@ fn prove_sort(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
 fn work_fault(
     world: &World,
     gpu: &Gpu,
-    traced: &Traced,
+    (accel, traced): (&Variant, &Traced),
     expected: &[TwinWork],
 ) -> Result<Option<String>, GpuError> {
     let overridden = gpu.kernels.overridden();
@@ -281,9 +286,18 @@ fn work_fault(
         return Ok(None);
     }
     let triangles = &world.buffers.triangles;
-    wait_for(twin_work::fault_of_kernels(
+    let found = wait_for(twin_work::fault_of_kernels(
         gpu, triangles, traced, expected,
-    ))
+    ))?;
+    let mut sets = world.reference.of(traced.space).sets.iter();
+    match sets.find(|set| set.class == RayClass::Bounce) {
+        Some(set) if found.is_none() => {
+            let exact = world.probe.is_exact() && world.soup.intersection.triangle.is_exact();
+            let on_device = (triangles, traced);
+            fault_of_passes(gpu, on_device, (&world.soup, accel), set, exact)
+        }
+        _ => Ok(found),
+    }
 }
 
 /// Updates of which the median is taken.

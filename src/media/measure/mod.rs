@@ -25,6 +25,7 @@ pub(crate) fn known() -> Result<Vec<(&'static str, f64, f64)>, String> {
     let mut all = paths::known().to_vec();
     all.extend(paths::known_readings()?);
     all.extend(structures::known()?);
+    all.extend(structures::known_steps()?);
     all.extend(pipeline::known()?);
     Ok(all)
 }

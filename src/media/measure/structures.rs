@@ -4,8 +4,9 @@ use super::{cells_of, declare, name_of};
 use crate::measure::failed;
 use crate::medium::{Homogeneity, Medium};
 use crate::rays::{SegmentRay, random_and_hard};
-use crate::segments::{Walked, Walker, exact_depth, first_difference, wrong_segment};
+use crate::segments::{Walked, Walker, exact_depth, first_difference, walk_ray, wrong_segment};
 use crate::{Volume, procedures, structure};
+use glam::DVec3;
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_bench::timing::{Measured, Samples};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
@@ -317,6 +318,41 @@ pub(super) fn known() -> Result<[(&'static str, f64, f64); 3], String> {
         ("time of a step", per_step, 125_000.0),
         ("time of a ray", per_ray, 500_000.0),
     ])
+}
+
+/// Structures, and the steps of a ray along x through 16³ equal voxels but for one in the corner: a voxel each, or two cubes of half the
+/// grid. Cubes around voxels reach from the first to the fourteenth, which is two from the other, and from the next to the end.
+const STEPS: [(&str, f64); 7] = [
+    ("dda", 16.0),
+    ("level-map", 2.0),
+    ("min-max", 2.0),
+    ("bricks", 2.0),
+    ("sparse-tree", 2.0),
+    ("chebyshev", 2.0),
+    ("cube-bvh", 2.0),
+];
+
+/// Walks it: of each structure its name, the steps, and what they should be.
+pub(super) fn known_steps() -> Result<Vec<(&'static str, f64, f64)>, String> {
+    let corner = |x: DVec3| {
+        if x.min_element() > 15.0 / 16.0 {
+            2.0
+        } else {
+            1.0
+        }
+    };
+    let volume = Volume::new([16; 3], |x| [corner(x), 0.0, 1.0]).map_err(|e| e.to_string())?;
+    let registry = structure::registry();
+    let steps = |(name, expected): (&'static str, f64)| {
+        let kind = registry.find(name).ok_or("there is no such structure")?;
+        let made = kind.make(&Params::default()).map_err(|e| e.to_string())?;
+        let medium = Medium::new(&volume, made, Homogeneity::default());
+        let beside = DVec3::new(-1.0, 2.5 / 16.0, 2.5 / 16.0);
+        let ray = SegmentRay::new(&volume, &medium, beside, DVec3::X);
+        let steps = ray.map_or(0, |ray| walk_ray(&medium, &ray, |_, _, _| ()).steps);
+        Ok((name, f64::from(steps), expected))
+    };
+    STEPS.into_iter().map(steps).collect()
 }
 
 /// Mean of what each ray has.

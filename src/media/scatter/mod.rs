@@ -4,8 +4,10 @@
 //! A voxel has six sums: energy in red, green and blue, and direction times the mean of the three, which may be left out. They come
 //! out as floats whatever the strategy adds.
 
+mod known;
 mod record;
 
+pub use known::fault_of_strategy;
 pub use record::{Deposit, Scatter, scatter_list, sums_in_f64};
 
 use raystone_core::parameters;

@@ -4,12 +4,14 @@
 //! `docs/organisations.md`.
 
 mod bounces;
+mod known_order;
 mod queued;
 mod registry;
 mod shading;
 mod single;
 mod sorting;
 
+pub use known_order::fault_of_order;
 pub(crate) use queued::{MultiKernel, Wavefront};
 pub use registry::OrganisationRegistry;
 pub use registry::organisation_kind;

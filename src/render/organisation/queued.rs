@@ -216,14 +216,19 @@ impl<'a> Queues<'a> {
         steps.run("shade", kernel, self.live_groups(), &bindings)
     }
 
+    /// Answers the next ray of each live path.
+    pub(super) fn trace_rays(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        self.run(steps, "extend", self.live_groups())?;
+        self.trace(steps, Query::Closest, 0, LIVE)
+    }
+
     /// One ray of each live path.
     fn bounce(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
         let sorting = self.wavefront.map_or(Sorting::Never, |w| w.sorting);
         if sorting == Sorting::RayKey {
             sorting::by_ray(steps, self)?;
         }
-        self.run(steps, "extend", self.live_groups())?;
-        self.trace(steps, Query::Closest, 0, LIVE)?;
+        self.trace_rays(steps)?;
         let order = match sorting {
             Sorting::Material => Some(sorting::by_material(steps, self)?),
             _ => None,
@@ -242,6 +247,18 @@ fn rays_of_path(integrator: &dyn Integrator, params: &Params) -> u32 {
     let constants = integrator.constants(params);
     let depth = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");
     depth.map_or(1, |(_, depth)| depth + 1)
+}
+
+/// The first paths of a slice after their first bounce.
+pub(super) fn begin_and_bounce<'a>(
+    steps: &mut ImageSteps,
+    wavefront: &'a Wavefront,
+    integrator: &dyn Integrator,
+) -> Result<Queues<'a>, GpuError> {
+    let queues = Queues::new(steps, 0, Some(wavefront), integrator.kernel());
+    queues.run(steps, "generate", queues.all())?;
+    queues.bounce(steps)?;
+    Ok(queues)
 }
 
 /// All batches of a slice; adds its results to the sums.

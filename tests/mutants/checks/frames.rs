@@ -4,11 +4,12 @@ use super::{Bench, Finding};
 use crate::subject::{build, sampler};
 use crate::world::Stage;
 use crate::{CheckError, Plant};
-use raystone::accel::Traced;
+use raystone::accel::{Intersection, Traced};
 use raystone::gpu::GpuError;
+use raystone::integrator::organisation::fault_of_order;
 use raystone::integrator::{
     BLOCK_SAMPLES, ConfiguredIntegrator, IntegratorRegistry, OrganisationRegistry, RayOffset,
-    RenderJob, Renderer, SceneBuffers,
+    RenderJob, Renderer, SceneBuffers, Stage as StagedScene,
 };
 use raystone::measure::image_gate::{Choice, Frame, Pixels, answers, judge, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
@@ -114,7 +115,7 @@ fn integrator(name: &str, organisation: &str) -> Result<ConfiguredIntegrator, Ch
     plain.organised(by.map_err(stale)?).map_err(stale)
 }
 
-/// Pixels of a large image, and of queues that are exactly full and of one path more; sums.
+/// Pixels of a large image, and of queues that are exactly full and of one path more; sums; the order of paths in a wavefront.
 pub fn frames(bench: &Bench, organisation: &str) -> Finding {
     let stage = Stage::builtin("cornell-box", &[])?;
     let setup = Setup::new(bench, &stage)?;
@@ -132,7 +133,27 @@ pub fn frames(bench: &Bench, organisation: &str) -> Finding {
             return Ok(found);
         }
     }
-    Ok(None)
+    match organisation {
+        "wavefront" => order(bench, &stage, &path),
+        _ => Ok(None),
+    }
+}
+
+/// The order into which a wavefront can sort its paths.
+fn order(bench: &Bench, stage: &Stage, path: &ConfiguredIntegrator) -> Finding {
+    let sampler = independent(path, &SMALL)?;
+    let job = RenderJob {
+        size: SMALL.size,
+        camera: SMALL.camera(stage.camera),
+        sampler: &sampler,
+        integrator: path,
+        offset: RayOffset::default(),
+        runtime_checks: true,
+    };
+    let staged = StagedScene::new(bench.gpu, stage.scene.clone(), Intersection::default())?;
+    let built = build("bvh", &[], &staged.soup)?;
+    let traced = Traced::upload(bench.gpu, &*built)?;
+    Ok(fault_of_order(bench.gpu, &staged, &traced, &job)?)
 }
 
 /// Counted rays of all integrators against the oracle's.

@@ -9,7 +9,9 @@ use raystone::accel::{Counters, Intersection, Query, Ray, Traced, TriangleBuffer
 use raystone::gpu::ArithmeticProbe;
 use raystone::measure::full_stacks::FullStack;
 use raystone::measure::gate::gate;
+use raystone::measure::ray_sets::fault_of_passes;
 use raystone::measure::record::GateVerdict;
+use raystone::params::Variant;
 
 /// Rays whose work is counted, of each scene.
 const COUNTED_RAYS: usize = 2048;
@@ -69,8 +71,8 @@ fn evidence(verdict: &GateVerdict) -> String {
     )
 }
 
-/// Counted work of closest-hit and any-hit queries against the twin's, ray by ray, on one soup and one
-/// scene.
+/// Counted work of closest-hit and any-hit queries against the twin's, ray by ray, and what passes over many rays count, on one soup
+/// and one scene.
 pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
     let soups = bench.world.soups.iter().take(1);
     for Case { stage, reference } in soups.chain(bench.world.scenes.iter().skip(2).take(1)) {
@@ -86,6 +88,20 @@ pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
             .step_by((count / COUNTED_RAYS).max(1))
             .copied()
             .collect();
+        let accel = Variant {
+            name: name.to_owned(),
+            params: of_kind(name, changes, |_, params| Ok(params.clone()))?,
+            ..Variant::default()
+        };
+        let sets = reference.sets.iter();
+        if let Some(set) = sets.max_by_key(|set| set.rays.len()) {
+            let on_device = (&triangles, &traced);
+            let soup = &stage.soup;
+            let fault = fault_of_passes(bench.gpu, on_device, (soup, &accel), set, bench.exact)?;
+            if let Some(fault) = fault {
+                return Ok(Some(format!("{}: {fault}", stage.scene.name)));
+            }
+        }
         for query in [Query::Closest, Query::Any] {
             let found =
                 count_work(bench.gpu, &triangles, &traced, query, &rays)?.unwrap_or_default();

@@ -302,4 +302,48 @@ pub const MUTANTS: &[Mutant] = &[
         REGEN,
         Check::Frames,
     ),
+    row(
+        "paths-sorted-by-other-octants",
+        "the bits of x and y are exchanged in the octant of a sorted path: the same images in other times",
+        text(
+            "organisation/ray_keys",
+            "vec3<u32>(1u, 2u, 4u)",
+            "vec3<u32>(2u, 1u, 4u)",
+        ),
+        WAVES,
+        Check::Frames,
+    ),
+    row(
+        "sorted-paths-without-y",
+        "of the place of a sorted path the cell along y falls onto that along x: the same images in other times",
+        text(
+            "organisation/ray_keys",
+            "(spread(cell.y) << 1u)",
+            "spread(cell.y)",
+        ),
+        WAVES,
+        Check::Frames,
+    ),
+    row(
+        "paths-sorted-by-their-neighbours",
+        "a path is sorted by the ray of another slot: the same images in other times",
+        text(
+            "organisation/ray_keys",
+            "load_slot(slot).path.ray",
+            "load_slot(place).path.ray",
+        ),
+        WAVES,
+        Check::Frames,
+    ),
+    row(
+        "hits-sorted-by-triangles",
+        "hits are sorted by their triangles, not by their materials: the same images in other times",
+        text(
+            "organisation/material_keys",
+            "min(met_material(triangle), 0xfffdu)",
+            "min(triangle, 0xfffdu)",
+        ),
+        WAVES,
+        Check::Frames,
+    ),
 ];

@@ -305,4 +305,37 @@ pub const MUTANTS: &[Mutant] = &[
         BOTH_WALKED,
         Check::Lattice,
     ),
+    row(
+        "ray-longest-stream-one-more",
+        "the longest stream has one pair more than it had: no other answer",
+        text(
+            "accel/ray_hierarchy/passes/plan",
+            "atomicMax(&state[at + 2u], count);",
+            "atomicMax(&state[at + 2u], count + 1u);",
+        ),
+        RAYS,
+        Check::Work,
+    ),
+    row(
+        "ray-pairs-one-less",
+        "of each stream one pair is not counted: no other answer",
+        text(
+            "accel/ray_hierarchy/passes/plan",
+            "atomicAdd(&state[at + 1u], count);",
+            "atomicAdd(&state[at + 1u], count - min(count, 1u));",
+        ),
+        RAYS,
+        Check::Work,
+    ),
+    row(
+        "ray-curve-of-other-axes",
+        "rays are sorted along a curve with x and z exchanged: no other answer",
+        text(
+            "accel/ray_hierarchy/passes/keys",
+            "(interleave(cell) << 9u)",
+            "(interleave(cell.zyx) << 9u)",
+        ),
+        SORTED,
+        Check::Work,
+    ),
 ];

@@ -6,7 +6,7 @@ use super::{FIGURES, IMAGE, INTENSITY, Load, REACH};
 use crate::adaptive::{Filter, Smoothing};
 use crate::photons::Points;
 use crate::pipeline::{Part, Pipeline, PipelineError, Rendered, Source, camera};
-use crate::scatter::{Adding, Strategy, Tallies};
+use crate::scatter::{Adding, Strategy, Tallies, fault_of_strategy};
 use crate::{Medium, Phase, Volume, phase};
 use glam::{DVec3, Vec3};
 use raystone_bench::run::{Absent, At, Prepared};
@@ -68,6 +68,10 @@ impl Ready {
         let seed = u64::from(at.experiment.run.seed);
         let medium = (&scene.volume, &scene.medium);
         let adding = adding(load);
+        let fault = fault_of_strategy(gpu, adding.strategy);
+        if let Some(fault) = fault.map_err(|error| Absent::Failed(error.to_string()))? {
+            return Err(Absent::Failed(fault));
+        }
         let source = lamp();
         let mut pipeline = begun(gpu, medium, adding)?;
         turn_to(&mut pipeline, source, load.phase(), &scene.rays)?;
