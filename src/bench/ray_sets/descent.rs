@@ -33,6 +33,8 @@ impl Descent {
         let is_whole = streams.iter().all(|level| level.walked == 0);
         if let Some(anatomy) = anatomy.as_ref().filter(|_| exact && is_whole) {
             let twin = anatomy.levels.iter().map(|level| level.pairs);
+            // Nothing passes above the level that the descent begins at.
+            let twin = twin.chain(std::iter::repeat(0));
             agree(twin, streams.iter().map(|level| u64::from(level.pairs)))?;
         }
         Ok(Self::Tree { anatomy, streams })

@@ -45,8 +45,9 @@ const ERROR: usize = 17;
 const REFIT: usize = 18;
 const REFIT_FRAME: usize = 19;
 const PASS: usize = 20;
+const FIRST: usize = 21;
 
-pub(super) static FIGURES: [Figure; 21] = [
+pub(super) static FIGURES: [Figure; 22] = [
     time("rays-ns/v1", "time"),
     time("rays-frame-ns/v1", "time with building"),
     Figure::new(
@@ -109,6 +110,14 @@ pub(super) static FIGURES: [Figure; 21] = [
         Better::Lower,
         Shown::Digits(3),
         Spread::Single,
+    ),
+    Figure::new(
+        "descent-first/v1",
+        "nodes that a descent begins with",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
     ),
 ];
 
@@ -187,6 +196,8 @@ fn tree(anatomy: Option<&Anatomy>, streams: &[StreamCounts], rays: f64) -> Vec<R
     let candidates = anatomy.levels.first().map_or(0, |level| level.pairs);
     found.push(whole(TESTS, anatomy.tests() as f64));
     found.push(whole(CANDIDATES, candidates as f64));
+    let first = anatomy.levels.last().map_or(0, |level| level.nodes);
+    found.push(Reading::exact(&FIGURES[FIRST], first as f64));
     let levels = anatomy.levels.iter().enumerate();
     found.extend(levels.flat_map(|(number, level)| of_level(number, level, rays)));
     found
