@@ -271,12 +271,6 @@ fn faults_of_the_descent_are_seen() {
         ),
         (
             "passes/choose",
-            "(pairs + LANES - 1u) / LANES",
-            "pairs / LANES",
-            with(&[("start", number(0))]),
-        ),
-        (
-            "passes/choose",
             "place == best",
             "false",
             with(&[("start", number(0))]),

@@ -263,12 +263,12 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Lattice,
     ),
     row(
-        "ray-chosen-level-cut-short",
-        "the last nodes of the level that a descent chose to begin at have no workgroup",
+        "ray-no-level-begins",
+        "no level gets the workgroups to begin a descent whose level is chosen",
         text(
             "accel/ray_hierarchy/passes/choose",
-            "(pairs + LANES - 1u) / LANES",
-            "pairs / LANES",
+            "place == best",
+            "false",
         ),
         CHOSEN,
         Check::Lattice,
