@@ -137,6 +137,14 @@ fn streams_hold_the_pairs_of_the_scalar_twin_level_by_level() {
             ("cluster", number(3)),
             ("fused", ParamValue::Flag(false)),
         ]),
+        // From the level that a sample chooses.
+        with(&[("start", number(0))]),
+        with(&[
+            ("start", number(0)),
+            ("bound", name("both")),
+            ("branching", number(8)),
+            ("cluster", number(16)),
+        ]),
         // Two batches of primitives have the same pairs as one.
         with(&[("start", number(1024)), ("capacity", number(131_072))]),
     ] {
@@ -146,6 +154,8 @@ fn streams_hold_the_pairs_of_the_scalar_twin_level_by_level() {
         let pairs: Vec<u64> = found.iter().map(|[pairs, _]| u64::from(*pairs)).collect();
         assert!(expected.iter().sum::<u64>() > 1000, "{expected:?}");
         assert_eq!(pairs[..expected.len()], expected, "{params:?}");
+        let above = &pairs[expected.len()..];
+        assert!(above.iter().all(|pairs| *pairs == 0), "{params:?}");
         assert!(found.iter().all(|[_, walked]| *walked == 0), "{params:?}");
         assert_eq!(anatomy.rays, 999);
     }
@@ -258,6 +268,12 @@ fn faults_of_the_descent_are_seen() {
             "(count + LANES - 1u) / LANES",
             "count / LANES",
             with(&[]),
+        ),
+        (
+            "passes/choose",
+            "place == best",
+            "false",
+            with(&[("start", number(0))]),
         ),
     ] {
         let module = format!("accel/ray_hierarchy/{file}");

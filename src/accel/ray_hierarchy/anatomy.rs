@@ -4,6 +4,7 @@ use super::enclosing::enclosing;
 use super::layout::Layout;
 use super::node::{Bounding, FAR, Node, no_rays, node_of_ray};
 use super::primitives::{Primitive, Primitives};
+use super::start::Sample;
 use super::{Bound, Options, Union};
 use crate::{AccelError, Ray, TriangleSoup};
 use rayon::prelude::*;
@@ -33,6 +34,8 @@ pub struct Anatomy {
     pub rays: u64,
     /// Levels, leaves first.
     pub levels: Vec<LevelAnatomy>,
+    /// Tests of a sample of the primitives by which the level to begin at was chosen; 0 where it was given.
+    pub pilots: u64,
 }
 
 impl Anatomy {
@@ -48,9 +51,13 @@ impl Anatomy {
             ));
         }
         let primitives = Primitives::new(soup, &options);
-        let layout = Layout::new(rays.len() as u32, primitives.count, &options);
+        let mut layout = Layout::new(rays.len() as u32, primitives.count, &options);
         let levels = tree(soup, &options, &layout, rays);
         let live = rays.iter().filter(|ray| ray.is_ray()).count() as u64;
+        let mut pilots = 0;
+        if options.chooses_start() {
+            (layout.begin, pilots) = chosen(&layout, &levels, &primitives, &options);
+        }
         let mut found: Vec<LevelAnatomy> = levels.iter().map(|nodes| shape(nodes)).collect();
         found.truncate(layout.begin + 1);
         let descent = Descent {
@@ -80,12 +87,14 @@ impl Anatomy {
         Ok(Self {
             rays: live,
             levels: found,
+            pilots,
         })
     }
 
-    /// Tests of a node against a primitive.
+    /// Tests of a node against a primitive, with those of pilots.
     pub fn tests(&self) -> u64 {
-        self.levels.iter().map(|level| level.tests).sum()
+        let levels: u64 = self.levels.iter().map(|level| level.tests).sum();
+        levels + self.pilots
     }
 
     /// Pairs of the longest stream, were all primitives one batch.
@@ -141,6 +150,30 @@ impl Descent<'_> {
             self.below(level - 1, child, met.clone(), counts);
         }
     }
+}
+
+/// The level with the fewest tests of a sample of the primitives, and the tests that it took. CPU version of `pilot.wesl`.
+fn chosen(
+    layout: &Layout,
+    levels: &[Vec<Node>],
+    primitives: &Primitives,
+    options: &Options,
+) -> (usize, u64) {
+    let sample = Sample::of(primitives.count as u32);
+    let sampled = || primitives.all().iter().step_by(sample.stride as usize);
+    let bounding = options.bounding();
+    let met = |level: usize| -> u32 {
+        let meets = |node: &Node| {
+            let met = sampled().filter(|of| of.meets(node, options.bound, &bounding));
+            met.count() as u32
+        };
+        levels[level].iter().map(meets).sum()
+    };
+    let above = layout.beginnings().skip(1);
+    let tests = above.clone().map(|level| levels[level].len() as u64);
+    let tests = tests.sum::<u64>() * u64::from(sample.count);
+    let met: Vec<u32> = above.map(met).collect();
+    (layout.chosen(sample.count, &met), tests)
 }
 
 /// Nodes of all levels. CPU version of `leaves.wesl` and `unions.wesl`.

@@ -1,6 +1,7 @@
 //! Where rays, nodes and streams lie, for a set of rays.
 
 use super::Options;
+use super::start::{MOST_NODES, USUAL_NODES};
 
 /// Levels of a tree at most: each has at most a quarter of the nodes below.
 pub(super) const LEVELS: u32 = 18;
@@ -11,15 +12,17 @@ pub(super) struct Layout {
     pub rays: u32,
     /// First node and number of nodes of each level, from the leaves up.
     pub levels: Vec<[u32; 2]>,
-    /// The level that the descent begins at.
+    /// The level that the descent begins at; where it is chosen, the highest.
     pub begin: usize,
+    /// The lowest that it may begin at.
+    pub lowest: usize,
     /// Pairs that a stream has room for.
     pub capacity: u32,
     /// First primitive and number of primitives of each level that is descended, from those that have triangles up.
     pub primitives: Vec<[u32; 2]>,
     /// Primitives of a batch, of the level that comes in.
     pub batch: u32,
-    branching: u32,
+    pub branching: u32,
 }
 
 /// First and number of the level above one.
@@ -37,9 +40,14 @@ pub(super) fn tree_over(primitives: usize, options: &Options) -> Vec<[u32; 2]> {
 impl Layout {
     pub(super) fn new(rays: u32, primitives: usize, options: &Options) -> Self {
         let branching = options.branching;
+        let start = match options.start {
+            0 if options.chooses_start() => MOST_NODES,
+            0 => USUAL_NODES,
+            start => start,
+        };
         // No rays are as good as some that fill more than the first level: all kernels compile, and find nothing.
         let rays = if rays == 0 {
-            options.start * options.bundle + 1
+            start * options.bundle + 1
         } else {
             rays
         };
@@ -49,25 +57,37 @@ impl Layout {
         {
             levels.push(above(last, branching));
         }
-        let begin = levels.iter().position(|[_, count]| *count <= options.start);
-        let begin = begin.unwrap_or(levels.len() - 1);
+        let highest = levels.len() - 1;
+        let lowest = levels.iter().position(|[_, count]| *count <= start);
+        let lowest = lowest.unwrap_or(highest);
+        let begin = if options.chooses_start() {
+            highest
+        } else {
+            lowest
+        };
         let mut over = tree_over(primitives, options);
         over.truncate(begin + 1);
         let coming = over[over.len() - 1][1];
         let children = branching.pow(if over.len() > 1 { 2 } else { 1 });
         let most = u64::from(levels[0][1]) * primitives as u64 * u64::from(children);
-        let least = u64::from(options.start.max(children));
+        let least = u64::from(start.max(children));
         let capacity = most.clamp(least, u64::from(options.capacity).max(least)) as u32;
-        let batch = (capacity / levels[begin][1]).min(coming.div_ceil(options.chunks));
+        let batch = (capacity / levels[lowest][1]).min(coming.div_ceil(options.chunks));
         Self {
             rays,
             levels,
             begin,
+            lowest,
             capacity,
             primitives: over,
             batch: batch.max(1),
             branching,
         }
+    }
+
+    /// The levels that the descent may begin at; more than one where the level is chosen.
+    pub(super) fn beginnings(&self) -> std::ops::RangeInclusive<usize> {
+        self.lowest..=self.begin
     }
 
     /// The level of the primitives of a level's stream.

@@ -1,6 +1,7 @@
 //! The passes: rays to their places, a tree over them, and for each batch of primitives a descent.
 
 use super::layout::{LEVELS, Layout};
+use super::start::Sample;
 use super::{Options, Order};
 use crate::{TracePasses, TraceSteps};
 use raystone_gpu::compaction::{Stays, Stream};
@@ -29,6 +30,10 @@ impl TracePasses for Passes {
         ];
         if self.options.order != Order::Natural {
             all.extend([("ray_keys", 4 * rays), ("ray_places", 4 * rays)]);
+        }
+        if self.options.chooses_start() {
+            let levels = layout.beginnings().count() as u64;
+            all.extend([("met", 4 * levels), ("begin_groups", 16 * levels)]);
         }
         if self.options.chunks > 1 {
             let words = 4 * (self.primitives as u64).max(4);
@@ -66,6 +71,9 @@ impl Descent<'_, '_> {
         self.build()?;
         if self.options.chunks > 1 {
             self.order_primitives()?;
+        }
+        if self.options.chooses_start() {
+            self.choose_start()?;
         }
         let batch = self.layout.batch;
         let [_, coming] = self.layout.primitives[self.layout.primitives.len() - 1];
@@ -170,23 +178,64 @@ impl Descent<'_, '_> {
         self.sort("depth_keys", "depth_order", coming)
     }
 
+    /// Determines on the device which level has the workgroups to begin.
+    fn choose_start(&mut self) -> Result<(), GpuError> {
+        let [_, primitives] = self.layout.primitives[0];
+        let sample = Sample::of(primitives);
+        self.steps.clear("met")?;
+        for level in self.layout.beginnings().skip(1) {
+            let mut bindings = self.at_level(level);
+            let pilot = UniformValues::new()
+                .u32("stride", sample.stride)
+                .u32("count", sample.count)
+                .u32("place", (level - self.layout.lowest) as u32);
+            bindings.uniform("pilot", pilot);
+            let groups = (self.steps).groups(self.layout.levels[level][1] * sample.count);
+            self.run("pilot", kernel("pilot"), groups, &bindings)?;
+        }
+        let choice = UniformValues::new()
+            .u32("lowest", self.layout.lowest as u32)
+            .u32("levels", self.layout.beginnings().count() as u32)
+            .u32("sampled", sample.count)
+            .u32("batch", self.layout.batch);
+        let mut bindings = self.at_level(self.layout.begin);
+        bindings.uniform("choice", choice);
+        self.run("choose", kernel("choose"), [1, 1, 1], &bindings)
+    }
+
+    /// Workgroups that begin at a level.
+    fn groups_to_begin(&self, level: usize, count: u32) -> Result<Groups, GpuError> {
+        if !self.options.chooses_start() {
+            let pairs = self.layout.levels[level][1] * count;
+            return Ok(self.steps.groups(pairs).into());
+        }
+        let place = 16 * (level - self.layout.lowest) as u64;
+        Ok(Groups::Indirect(self.steps.storage("begin_groups")?, place))
+    }
+
     /// Descends with some primitives, level by level.
     fn descend(&mut self, first: u32, count: u32) -> Result<(), GpuError> {
         let begin = self.layout.begin;
         self.plan(begin + 1, false)?;
-        let mut bindings = self.at_level(begin);
         let part = UniformValues::new().u32("first", first).u32("count", count);
-        bindings.uniform("part", part);
         let mut pairs = self.steps.storage("pairs")?;
         let mut next = self.steps.storage("next_pairs")?;
-        bindings.buffer("next_pairs", &pairs);
-        let groups = self.steps.groups(self.layout.levels[begin][1] * count);
-        self.run("begin", kernel("begin"), groups, &bindings)?;
-        for level in (1..=begin).rev() {
+        for level in (0..=begin).rev() {
+            if self.layout.beginnings().contains(&level) {
+                let mut bindings = self.at_level(level);
+                bindings.uniform("part", part.clone());
+                bindings.buffer("next_pairs", &pairs);
+                let groups = self.groups_to_begin(level, count)?;
+                self.run("begin", kernel("begin"), groups, &bindings)?;
+            }
             let compacted = level < begin && !self.options.fused;
             let groups = self.plan(level, compacted)?;
             let mut bindings = self.at_level(level);
-            bindings.buffer("pairs", &pairs).buffer("next_pairs", &next);
+            bindings.buffer("pairs", &pairs);
+            if level == 0 {
+                return self.run("candidates", kernel("candidates"), groups, &bindings);
+            }
+            bindings.buffer("next_pairs", &next);
             let is_dual = self.layout.is_dual(level);
             let name = if is_dual { "expand both" } else { "expand" };
             let expand = kernel("expand")
@@ -199,10 +248,7 @@ impl Descent<'_, '_> {
                 self.compact(&pairs, &next)?;
             }
         }
-        let groups = self.plan(0, begin > 0 && !self.options.fused)?;
-        let mut bindings = self.at_level(0);
-        bindings.buffer("pairs", &pairs);
-        self.run("candidates", kernel("candidates"), groups, &bindings)
+        Ok(())
     }
 
     /// Determines the workgroups of a level on the device.

@@ -112,14 +112,16 @@ impl RayBatch {
         Ok(())
     }
 
-    /// Traces all rays, and returns the milliseconds of each pass by its name, of all slices and in the order in which they
-    /// first ran. Empty on an adapter without timestamps.
+    /// [`RayBatch::trace`], with the milliseconds of each pass by its name, of all slices and in the order in which they first
+    /// ran. These are of the same trace: the player marks each pass, whoever asks. None on an adapter without timestamps.
     ///
     /// # Errors
     /// As [`RayBatch::trace`].
-    pub fn trace_by_pass(&self) -> Result<Vec<(String, f64)>, GpuError> {
+    pub fn trace_by_pass(&self) -> Result<(Elapsed, Vec<(String, f64)>), GpuError> {
+        let mut total = Elapsed::nothing(self.tracer.gpu.has_clock());
         let mut passes: Vec<(String, f64)> = Vec::new();
         let note = |played: Played| {
+            total += played.elapsed();
             for (name, ms) in played.runs {
                 let Some(ms) = ms else { continue };
                 match passes.iter_mut().find(|(known, _)| *known == name) {
@@ -129,7 +131,7 @@ impl RayBatch {
             }
         };
         wait_for(self.trace_slices(note))?;
-        Ok(passes)
+        Ok((total, passes))
     }
 
     fn wipe(&self) -> Recording {

@@ -78,6 +78,8 @@ impl Descent {
         if let Some(anatomy) = anatomy.as_ref().filter(|_| exact && is_whole) {
             let twin = anatomy.levels.iter();
             let twin = twin.flat_map(|level| [level.pairs, level.longest]);
+            // Nothing passes above the level that the descent begins at.
+            let twin = twin.chain(std::iter::repeat(0));
             let device = streams.iter();
             agree(
                 twin,

@@ -45,8 +45,9 @@ const ERROR: usize = 17;
 const REFIT: usize = 18;
 const REFIT_FRAME: usize = 19;
 const PASS: usize = 20;
+const FIRST: usize = 21;
 
-pub(super) static FIGURES: [Figure; 21] = [
+pub(super) static FIGURES: [Figure; 22] = [
     time("rays-ns/v1", "time"),
     time("rays-frame-ns/v1", "time with building"),
     Figure::new(
@@ -109,6 +110,14 @@ pub(super) static FIGURES: [Figure; 21] = [
         Better::Lower,
         Shown::Digits(3),
         Spread::Single,
+    ),
+    Figure::new(
+        "descent-first/v1",
+        "nodes that a descent begins with",
+        "",
+        Better::Neither,
+        Shown::Count,
+        Spread::Exact,
     ),
 ];
 
@@ -187,6 +196,8 @@ fn tree(anatomy: Option<&Anatomy>, streams: &[StreamCounts], rays: f64) -> Vec<R
     let candidates = anatomy.levels.first().map_or(0, |level| level.pairs);
     found.push(whole(TESTS, anatomy.tests() as f64));
     found.push(whole(CANDIDATES, candidates as f64));
+    let first = anatomy.levels.last().map_or(0, |level| level.nodes);
+    found.push(Reading::exact(&FIGURES[FIRST], first as f64));
     let levels = anatomy.levels.iter().enumerate();
     found.extend(levels.flat_map(|(number, level)| of_level(number, level, rays)));
     found
@@ -249,15 +260,18 @@ pub(crate) fn check_known() -> Result<(), String> {
         anatomy: Some(Anatomy {
             rays: 10,
             levels: (0..3).map(level).collect(),
+            pilots: 0,
         }),
         streams: (0..3).map(stream).collect(),
     };
-    // Of ten rays: 70 pairs in the longest stream; 1 + 2 without room; 200 + 220 + 240 tests; 300 candidates at the leaves.
+    // Of ten rays: 70 pairs in the longest stream; 1 + 2 without room; 200 + 220 + 240 tests; 300 candidates at the leaves, and
+    // 102 nodes at the level that it begins at.
     let whole = [
         (LONGEST, 7.0),
         (WALKED, 0.3),
         (TESTS, 66.0),
         (CANDIDATES, 30.0),
+        (FIRST, 102.0),
     ];
     let of_level = |k: usize| {
         let (tests, pairs) = (20.0 + 2.0 * k as f64, 30.0 + k as f64);

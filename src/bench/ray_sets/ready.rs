@@ -9,8 +9,8 @@ use crate::run::{Absent, At, Prepared};
 use crate::timed_rays::TimedRays;
 use crate::timing::{Measured, Samples};
 use raystone_accel::{
-    AccelError, Access, Ask, BuildLog, BuiltAccel, DivideAndConquer, Ray, RayBatch, RayHierarchy,
-    Space, Structure as _, Traced, Tracer, TriangleBuffers, TriangleSoup,
+    AccelError, Access, Ask, BuildLog, BuiltAccel, DivideAndConquer, Ray, RayHierarchy, Space,
+    Structure as _, Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
 use raystone_config::{Axis, Cell, Coherence};
 use raystone_gpu::Gpu;
@@ -21,9 +21,6 @@ use std::time::Instant;
 
 /// Builds, of which the fastest counts: the first touches pages for the first time.
 pub(super) const BUILDS: usize = 3;
-
-/// Traces whose passes are timed one by one, of which the fastest counts.
-const TRACES: usize = 3;
 
 pub(super) fn tracer_of(
     at: &At,
@@ -114,15 +111,6 @@ impl Ready {
     }
 }
 
-/// Milliseconds of each pass in the fastest of some traces, by name.
-fn fastest(batch: &RayBatch) -> Result<Vec<(String, f64)>, String> {
-    let trace = |_| batch.trace_by_pass().map_err(|e| e.to_string());
-    let all = (0..TRACES).map(trace).collect::<Result<Vec<_>, _>>()?;
-    let whole = |passes: &Vec<(String, f64)>| passes.iter().map(|(_, ms)| ms).sum::<f64>();
-    let least = all.into_iter().min_by(|a, b| whole(a).total_cmp(&whole(b)));
-    Ok(least.unwrap_or_default())
-}
-
 /// Predicted cycles per ray in warps of rays that follow each other; `None` for a structure that answers rays together.
 fn cycles(
     built: &dyn BuiltAccel,
@@ -177,7 +165,7 @@ impl Prepared for Ready {
         if let Some(descent) = &self.descent {
             let rays = self.live as f64;
             found.extend(readings::descent(descent, rays));
-            found.extend(readings::passes(&fastest(&self.rays.batch)?, rays));
+            found.extend(readings::passes(&self.rays.passes(), rays));
         }
         Ok(found)
     }

@@ -106,6 +106,14 @@ fn rays_need_no_scene_and_leave_times_counts_and_levels() {
         }
         let sum: f64 = passes.map(|r| r.value.value).sum();
         assert_eq!(sum > 0.0, is_tree);
+        // They are the parts of the fastest turn.
+        let time = cell.reading("rays-ns/v1").unwrap();
+        let raystone_record::Samples::Rounds { adapter, .. } = &time.samples else {
+            panic!("no rounds");
+        };
+        let least = adapter.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(sum <= least * (1.0 + 1e-9), "{sum} of {least}");
+        assert!(!is_tree || sum > 0.1 * least, "{sum} of {least}");
     }
     for file in [
         include_str!("../../../experiments/ray-hierarchy.toml"),

@@ -1,9 +1,11 @@
 //! Photons where they matter: pilots find where light changes, a map of importance of the light's square follows, and a
 //! filter widens where photons are few (Pfeuti 2009, §3.6).
 
+mod choice;
 mod map;
 mod smooth;
 
+pub use choice::break_even;
 pub use map::importance;
 pub(crate) use smooth::{Cell as SmoothCell, Smoothed, Smoother};
 
@@ -18,6 +20,8 @@ parameters! {
         Reference = "reference",
         /// by a map of importance from pilot photons
         Adaptive = "adaptive",
+        /// by a map of importance from that number of photons on from which pilots pay with the filter
+        Auto = "auto",
     }
 
     /// How the grid of radiance is smoothed before a view gathers it.

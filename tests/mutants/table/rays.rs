@@ -15,6 +15,7 @@ const APART: Subject = structure("ray-hierarchy", &[("fused", "false")]);
 const BUNDLES: Subject = structure("ray-hierarchy", &[("bundle", "4"), ("cluster", "6")]);
 const SORTED: Subject = structure("ray-hierarchy", &[("order", "morton")]);
 const PARTS: Subject = structure("ray-hierarchy", &[("chunks", "3")]);
+const CHOSEN: Subject = structure("ray-hierarchy", &[("start", "0")]);
 const BOTH: Subject = structure("ray-hierarchy", &[("dual", "2")]);
 const BOTH_WALKED: Subject = structure(
     "ray-hierarchy",
@@ -259,6 +260,17 @@ pub const MUTANTS: &[Mutant] = &[
             "item / nodes",
         ),
         PARTS,
+        Check::Lattice,
+    ),
+    row(
+        "ray-no-level-begins",
+        "no level gets the workgroups to begin a descent whose level is chosen",
+        text(
+            "accel/ray_hierarchy/passes/choose",
+            "place == best",
+            "false",
+        ),
+        CHOSEN,
         Check::Lattice,
     ),
     row(

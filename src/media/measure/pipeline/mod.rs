@@ -1,5 +1,7 @@
 //! Photons to an image of fog, by one strategy of scatter: times, what is dropped, and the error against a quadrature.
 
+#[cfg(test)]
+mod break_even;
 mod checks;
 mod ready;
 mod scene;
@@ -7,7 +9,7 @@ mod scene;
 mod tests;
 
 use super::{cells_of, declare};
-use crate::adaptive::{Adaptive, Filter, Mode, Smoothing};
+use crate::adaptive::{Adaptive, Filter, Mode, Smoothing, break_even};
 use crate::photons::{Order, Points, Warp, ordered, point_set};
 use crate::pipeline::{Generality, Mirror, PipelineError};
 use crate::scatter::{ScatterError, Strategy};
@@ -17,7 +19,7 @@ use glam::{DVec3, Vec3};
 use raystone_bench::run::{Absent, At, Cost, Measurement, Preparation, Prepared, Work};
 use raystone_config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone_core::parameters;
-use raystone_core::params::Parameters as _;
+use raystone_core::params::{Choice as _, Parameters as _};
 use raystone_record::figure::{Better, Figure, Shown, Spread};
 use ready::Ready;
 pub(super) use ready::known;
@@ -168,8 +170,28 @@ impl Load {
         })
     }
 
+    /// The pipeline that is run.
+    fn chosen(&self) -> Mode {
+        self.mode.at(self.photons.pow(2), self.filter, self.points)
+    }
+
+    /// What was chosen and why, where that is left to the program.
+    fn choice(&self) -> Option<String> {
+        let name = self.chosen().name();
+        let why = match break_even(self.filter, self.points) {
+            Some(least) => format!("pilots pay from {least} photons on"),
+            None => "pilots pay at no number of photons".to_owned(),
+        };
+        let (photons, filter) = (self.photons.pow(2), self.filter.name());
+        (self.mode == Mode::Auto).then(|| {
+            format!(
+                "{name}, for {photons} photons: with the filter `{filter}` and these points {why}"
+            )
+        })
+    }
+
     fn adaptive(&self, seed: u64) -> Option<Adaptive> {
-        (self.mode == Mode::Adaptive).then_some(Adaptive {
+        (self.chosen() == Mode::Adaptive).then_some(Adaptive {
             pilots: self.pilots,
             cells: self.pilot_cells,
             edges: self.edges,
@@ -184,7 +206,7 @@ impl Load {
 
     /// True if points are sent to cells by a table, which undoes how even they are.
     fn is_shuffled(&self) -> bool {
-        self.mode == Mode::Adaptive && self.warp == Warp::Alias
+        self.chosen() == Mode::Adaptive && self.warp == Warp::Alias
     }
 
     fn smoothing(&self) -> Smoothing {
@@ -391,7 +413,11 @@ impl Measurement for Photons {
     }
 
     fn unit_name(&self, cell: &Cell) -> String {
-        cell.to_string()
+        let load = Load::from_checked(&cell[Axis::Integrator].params);
+        match load.choice() {
+            Some(_) => format!("{cell}: {}", load.chosen().name()),
+            None => cell.to_string(),
+        }
     }
 
     fn settings(&self, experiment: &Experiment, _: &str) -> String {
@@ -402,9 +428,9 @@ impl Measurement for Photons {
         let load = Load::from_checked(&cell[Axis::Integrator].params);
         let rays = load.photons * load.photons + IMAGE * IMAGE;
         let deposits = f64::from(load.photons).powi(2) * f64::from(load.side);
-        let (kernels, runs) = match load.mode {
-            Mode::Reference => (3, 3.0),
+        let (kernels, runs) = match load.chosen() {
             Mode::Adaptive => (8, 30.0),
+            _ => (3, 3.0),
         };
         let seconds = 0.5 + runs * deposits * SECONDS_PER_DEPOSIT;
         Work::kernels(kernels) + cost.timed(Work::rays(rays)) + Work::other(seconds)

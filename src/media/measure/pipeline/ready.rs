@@ -14,7 +14,7 @@ use raystone_bench::timing::{Measured, Samples};
 use raystone_config::Cell;
 use raystone_gpu::{Elapsed, Gpu, GpuError};
 use raystone_image::Picture;
-use raystone_record::Reading;
+use raystone_record::{Key, Note, Reading};
 use std::rc::Rc;
 
 /// Steps of the search for the photons of an equal error: quarters of an octave of photons along an axis, from a quarter to twice.
@@ -51,6 +51,8 @@ pub(super) struct Ready {
     /// Additions to sums, of photons and of pilots.
     adds: [u64; 2],
     pilots: Option<Piloted>,
+    /// The mode that was chosen, and why, where that is left to the program.
+    choice: Option<String>,
 }
 
 /// What is told of pilots.
@@ -143,6 +145,7 @@ impl Ready {
             photons,
             adds,
             pilots,
+            choice: load.choice(),
         })
     }
 }
@@ -311,6 +314,15 @@ impl Prepared for Ready {
             ]);
         }
         Ok(readings)
+    }
+
+    fn notes(&self) -> Vec<Note> {
+        let note = |text: &String| Note {
+            at: Key::default(),
+            what: "mode".to_owned(),
+            text: text.clone(),
+        };
+        self.choice.iter().map(note).collect()
     }
 
     fn picture(&self) -> Option<Picture> {
