@@ -139,6 +139,21 @@ pub(super) fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3
     .collect()
 }
 
+/// A ray from a random point of a box through another.
+fn chord(bounds: &Bounds, random: &mut Pcg32) -> Ray {
+    let mut inside = || {
+        let u = Vec3::new(
+            random.uniform() as f32,
+            random.uniform() as f32,
+            random.uniform() as f32,
+        );
+        bounds.min + u * (bounds.max - bounds.min)
+    };
+    let from = inside();
+    let direction = (inside() - from).try_normalize().unwrap_or(Vec3::X);
+    Ray::new(from, direction)
+}
+
 /// Records all classes with about `settings.rays` rays each, then a fixed number of hard rays.
 /// Classes that start on surfaces are missing if no primary ray hits anything.
 pub fn record_rays(
@@ -196,21 +211,7 @@ pub fn record_rays(
         sets.push(RaySet::new(RayClass::Ao, ao, reference));
         sets.push(RaySet::new(RayClass::Bounce, bounce, reference));
     }
-    let inside = |random: &mut Pcg32| {
-        let u = Vec3::new(
-            random.uniform() as f32,
-            random.uniform() as f32,
-            random.uniform() as f32,
-        );
-        bounds.min + u * (bounds.max - bounds.min)
-    };
-    let chords = (0..primary.rays.len()).map(|_| {
-        let from = inside(&mut random);
-        let direction = (inside(&mut random) - from)
-            .try_normalize()
-            .unwrap_or(Vec3::X);
-        Ray::new(from, direction)
-    });
+    let chords = (0..primary.rays.len()).map(|_| chord(&bounds, &mut random));
     sets.push(RaySet::new(RayClass::Chord, chords.collect(), reference));
     if soup.intersection.bears_hard_rays() {
         sets.push(RaySet::hard(soup, reference, seed));

@@ -4,7 +4,7 @@ use super::bending::{Bending, kernel};
 use super::{Photon, PipelineError};
 use crate::Medium;
 use crate::scatter::{Adding, Scatter};
-use raystone_gpu::{Gpu, Recording, Storage, UniformValues, groups_for};
+use raystone_gpu::{Gpu, GpuError, Recording, Storage, UniformValues, groups_for};
 
 /// What is counted of photons beside their energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +40,20 @@ impl Counting {
         }
     }
 
+    /// Zeros for so many voxels or cells.
+    fn storage(self, gpu: &Gpu, places: u32) -> Result<Storage, GpuError> {
+        let bytes = u64::from(places) * self.words() * 4;
+        Ok(Storage::from(&gpu.zeroed("counts", bytes)?))
+    }
+
+    /// How many cells along each axis photons are counted in; 0 where it is in voxels.
+    const fn cells(self) -> u32 {
+        match self {
+            Self::Origins { cells, .. } => cells,
+            _ => 0,
+        }
+    }
+
     /// What the kernel counts of a photon.
     fn marks(self, photon: &Photon) -> [f32; 2] {
         match self {
@@ -62,6 +76,35 @@ pub(super) struct Through<'a> {
     pub(super) crosses: bool,
     /// All points of the light, to have those whose photons miss the medium in the list, too.
     pub(super) missed: Option<&'a [([f64; 2], f64)]>,
+}
+
+/// The greatest energy of a photon.
+fn brightest(photons: &[Photon]) -> Result<f32, PipelineError> {
+    let energies = photons.iter().map(|p| p.energy.max_element());
+    let brightest = energies.fold(0.0, f32::max);
+    if brightest > 0.0 {
+        Ok(brightest)
+    } else {
+        Err(PipelineError::Dark(photons.len()))
+    }
+}
+
+/// Words of the photons; with all points of the light, those that miss the medium have a place among them, too.
+fn words_of(
+    photons: &[Photon],
+    points: Option<&[([f64; 2], f64)]>,
+    counting: Counting,
+) -> Vec<[[f32; 4]; 4]> {
+    let words = |photon: &Photon| photon.words(counting.marks(photon));
+    let Some(points) = points else {
+        return photons.iter().map(words).collect();
+    };
+    let mut left = photons.iter().peekable();
+    let meets = |(point, _): &([f64; 2], f64)| {
+        let photon = left.next_if(|photon| photon.point == *point);
+        photon.map_or(Photon::MISSED, words)
+    };
+    points.iter().map(meets).collect()
 }
 
 /// Photons with what they leave.
@@ -95,33 +138,19 @@ impl Marched {
             crosses,
             missed,
         } = through;
-        let brightest = photons.iter().map(|p| p.energy.max_element());
-        let brightest = brightest.fold(0.0, f32::max);
-        if brightest <= 0.0 {
-            return Err(PipelineError::Dark(photons.len()));
-        }
+        let brightest = brightest(photons)?;
         // No piece within a voxel is longer than its diagonal; rounding may make it a little so.
         let longest = medium.size_of_voxel().length() * 1.001;
-        let places = match counting {
-            Counting::Origins { cells, .. } => cells.pow(3),
-            _ => medium.field.len() as u32,
+        let cells = counting.cells();
+        let places = match cells {
+            0 => medium.field.len() as u32,
+            cells => cells.pow(3),
         };
         let scatter = Scatter::new(gpu, adding, places, brightest * longest as f32)?;
         // A power of two with which all weights together stay below 2³¹.
         let all: f64 = photons.iter().map(|p| p.weight).sum();
         let units = (30.0 - all.max(1.0).log2().ceil()).exp2();
-        let words = |photon: &Photon| photon.words(counting.marks(photon));
-        let words: Vec<_> = match missed {
-            None => photons.iter().map(words).collect(),
-            Some(points) => {
-                let mut left = photons.iter().peekable();
-                let meets = |(point, _): &([f64; 2], f64)| {
-                    let photon = left.next_if(|photon| photon.point == *point);
-                    photon.map_or(Photon::MISSED, words)
-                };
-                points.iter().map(meets).collect()
-            }
-        };
+        let words = words_of(photons, missed, counting);
         let status = Storage::scratch("status", 64);
         let mut bindings = crate::upload::bindings(medium, gpu)?;
         scatter.bind(&mut bindings);
@@ -129,10 +158,6 @@ impl Marched {
             bending.bind(gpu, &mut bindings)?;
         }
         let count = words.len() as u32;
-        let cells = match counting {
-            Counting::Origins { cells, .. } => cells,
-            _ => 0,
-        };
         let values = UniformValues::new().u32("count", count).u32("cells", cells);
         bindings
             .uniform("photons", values)
@@ -149,8 +174,7 @@ impl Marched {
         let counts = match counting.module() {
             None => None,
             Some(module) => {
-                let bytes = u64::from(places) * counting.words() * 4;
-                let counts = Storage::from(&gpu.zeroed("counts", bytes)?);
+                let counts = counting.storage(gpu, places)?;
                 kernel = kernel.with("counts", module).feature("counted", true);
                 bindings
                     .uniform("counting", UniformValues::new().f32("units", units as f32))

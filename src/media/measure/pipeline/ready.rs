@@ -107,7 +107,6 @@ impl Ready {
             mirror: load.mirror(INTENSITY),
         };
         let judged = judge.check(&pipeline, &rendered).map_err(Absent::Failed)?;
-        let photons = pipeline.photons().len();
         let pilots = match pipeline.pilots() {
             None => None,
             Some((pilots, _, map)) => Some(Piloted {
@@ -116,34 +115,19 @@ impl Ready {
                 equal: equal(gpu, load, scene, seed)?,
             }),
         };
-        let bytes = pipeline.bytes() as f64;
-        let adds = pipeline.additions()?;
-        let steps = pipeline.view_steps() as f64 / f64::from(IMAGE * IMAGE);
-        let mut parts = vec![Part::Photons, Part::View, Part::All];
-        if pilots.is_some() {
-            parts.push(Part::Pilots);
-        }
-        if load.filter != Filter::None {
-            parts.push(Part::Smooth);
-        }
-        let pipeline = Rc::new(pipeline);
-        let passes = parts.into_iter().map(|part| Passes {
-            pipeline: Rc::clone(&pipeline),
-            part,
-        });
         Ok(Self {
-            passes: passes.collect(),
+            photons: pipeline.photons().len(),
+            bytes: pipeline.bytes() as f64,
+            adds: pipeline.additions()?,
+            steps: pipeline.view_steps() as f64 / f64::from(IMAGE * IMAGE),
+            passes: timed_parts(pipeline, pilots.is_some(), load.filter != Filter::None),
             picture: drawn(&rendered.image),
-            bytes,
             tallies: rendered.tallies,
             judged,
             noise: scene.noise(&rendered.image),
             parts: scene.noise_of_parts(&rendered.image),
             flip: scene.flip(&rendered.image),
             flips: scene.flip_of_parts(&rendered.image),
-            steps,
-            photons,
-            adds,
             pilots,
             choice: load.choice(),
         })
@@ -328,6 +312,23 @@ impl Prepared for Ready {
     fn picture(&self) -> Option<Picture> {
         self.picture.clone()
     }
+}
+
+/// The parts of a pipeline that are timed, each with all of its passes.
+fn timed_parts(pipeline: Pipeline, has_pilots: bool, is_smoothed: bool) -> Vec<Passes> {
+    let mut parts = vec![Part::Photons, Part::View, Part::All];
+    if has_pilots {
+        parts.push(Part::Pilots);
+    }
+    if is_smoothed {
+        parts.push(Part::Smooth);
+    }
+    let pipeline = Rc::new(pipeline);
+    let passes = |part| Passes {
+        pipeline: Rc::clone(&pipeline),
+        part,
+    };
+    parts.into_iter().map(passes).collect()
 }
 
 /// Times of passes of one kind, with so many deposits.

@@ -114,6 +114,19 @@ impl Content {
         self.blur(side) * times
     }
 
+    /// What regions that are crossed in one step have in common.
+    fn homogeneity(self) -> Homogeneity {
+        if self.is_refractive() {
+            // As in the thesis; where n is the same, steps are long.
+            Homogeneity {
+                key: Key::Refraction,
+                epsilon: 0.0,
+            }
+        } else {
+            Homogeneity::default()
+        }
+    }
+
     /// Whether light is refracted in it.
     pub(super) fn is_refractive(self) -> bool {
         matches!(
@@ -243,16 +256,7 @@ impl Scene {
         let Some(Ok(structure)) = made else {
             return Err(Absent::Failed("there is no level map".to_owned()));
         };
-        let homogeneity = if load.content.is_refractive() {
-            // As in the thesis; where n is the same, steps are long.
-            Homogeneity {
-                key: Key::Refraction,
-                epsilon: 0.0,
-            }
-        } else {
-            Homogeneity::default()
-        };
-        let medium = Medium::new(&volume, structure, homogeneity);
+        let medium = Medium::new(&volume, structure, load.content.homogeneity());
         let rays = view();
         let truth = if load.content.is_refractive() {
             refracted_truth(
