@@ -9,7 +9,7 @@ pub(super) const USUAL_NODES: u32 = 16;
 /// Primitives of a sample, at most.
 const SAMPLE: u32 = 256;
 
-/// Every so manieth primitive, and how many these are.
+/// Every `stride`-th primitive, `count` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sample {
     pub stride: u32,
