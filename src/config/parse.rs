@@ -188,10 +188,13 @@ impl<'t> Reader<'t> {
                 continue;
             }
             used.push(name.to_owned());
-            let entry = variants::resolve(axis, &item.at, name, self.catalogue);
-            let tables = match parameters.get(name) {
-                Some(item) => parameter_tables(axis, name, item),
-                None => Ok(vec![&empty]),
+            let label = variants::of_label(axis, item, name, self.catalogue);
+            let plain = label.as_ref().map_or(name, |(plain, _)| plain);
+            let entry = variants::resolve(axis, &item.at, plain, self.catalogue);
+            let tables = match (&label, parameters.get(name)) {
+                (Some((_, own)), _) => Ok(vec![own]),
+                (None, Some(item)) => parameter_tables(axis, name, item),
+                (None, None) => Ok(vec![&empty]),
             };
             let Some((entry, tables)) = faults.keep(both(entry, tables)) else {
                 continue;

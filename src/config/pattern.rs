@@ -135,13 +135,13 @@ fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
     found.ok_or_else(|| format!("unknown axis `{name}`{}", did_you_mean_or_known(name, axes)))
 }
 
-/// Splits at separators outside parentheses, as labels such as `grid(a=1,b=2)` contain them.
-fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
+/// Splits at separators outside parentheses and brackets, as labels such as `grid(a=1,b=2)` contain them.
+pub(super) fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let mut depth = 0usize;
     text.split(move |c| {
         match c {
-            '(' => depth += 1,
-            ')' => depth = depth.saturating_sub(1),
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth = depth.saturating_sub(1),
             _ => {}
         }
         c == separator && depth == 0

@@ -4,6 +4,7 @@
 //! [`Place`], a single pass checks both and can still locate an error.
 
 use super::error::{ConfigError, Place};
+use super::pattern::split_outside_brackets;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
@@ -204,7 +205,9 @@ fn parse_override_value(text: &str, at: &Place) -> Result<Value, String> {
     if text.starts_with(['[', '{', '"', '\'']) {
         return Err(format!("bad value: {}", one_line(error.message())));
     }
-    if !text.contains(',') {
+    // Commas in labels such as `grid(a=1,b=2)` are theirs.
+    let parts: Vec<&str> = split_outside_brackets(text, ',').collect();
+    if parts.len() == 1 {
         return Ok(Value::Text(text.to_owned()));
     }
     let element = |part: &str| {
@@ -213,10 +216,16 @@ fn parse_override_value(text: &str, at: &Place) -> Result<Value, String> {
             value: parse_override_value(part.trim(), at)?,
         })
     };
-    text.split(',')
-        .map(element)
-        .collect::<Result<_, _>>()
-        .map(Value::List)
+    let elements = parts.into_iter().map(element);
+    elements.collect::<Result<_, _>>().map(Value::List)
+}
+
+/// One value, as on the command line: TOML, or a text.
+pub(super) fn loose_value(text: &str, at: &Place) -> Value {
+    match DeValue::parse(text) {
+        Ok(value) => convert(value.get_ref(), &|_| at.clone()),
+        Err(_) => Value::Text(text.to_owned()),
+    }
 }
 
 /// The leaf of a tree with a single branch.

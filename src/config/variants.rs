@@ -4,7 +4,8 @@ use super::Catalogue;
 use super::axis::Axis;
 use super::error::{ConfigError, Place};
 use super::faults::Faults;
-use super::tree::{Item, Table, Value};
+use super::pattern::split_outside_brackets;
+use super::tree::{Item, Table, Value, loose_value};
 use super::values::value;
 use raystone_core::files::MODEL_ENDINGS;
 use raystone_core::params::{
@@ -43,6 +44,25 @@ pub(super) fn resolve(
     };
     let known = entries.iter().map(|entry| entry.name.as_str());
     Err(ConfigError::unknown(at, what, text, known))
+}
+
+/// The name and the parameters of a label as reports write it, such as `bvh(builder=sbvh)`; `None` for a name alone.
+pub(super) fn of_label<'a>(
+    axis: Axis,
+    item: &Item,
+    text: &'a str,
+    catalogue: &Catalogue,
+) -> Option<(&'a str, Table)> {
+    let (name, rest) = text.split_once('(')?;
+    let inner = rest.strip_suffix(')')?;
+    resolve(axis, &item.at, name, catalogue).ok()?;
+    let parameter = |part: &str| {
+        let (key, value) = part.split_once('=')?;
+        let (at, value) = (item.at.clone(), loose_value(value.trim(), &item.at));
+        Some((key.trim().to_owned(), Item { at, value }))
+    };
+    let parts = split_outside_brackets(inner, ',');
+    Some((name, parts.map(parameter).collect::<Option<_>>()?))
 }
 
 /// Parameters shared by all entries of an axis, including files.

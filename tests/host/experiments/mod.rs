@@ -111,6 +111,71 @@ fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
 }
 
 #[test]
+fn names_with_parameters_are_written_as_reports_write_them() {
+    let accels = |overrides: &[&str]| {
+        let experiment = parse_with(
+            &format!("{AXES}[accel.uniform-grid]\nlambda = [3, 4]\n"),
+            overrides,
+        );
+        let experiment = experiment.unwrap_or_else(|error| panic!("{overrides:?}: {error}"));
+        let accels = &experiment.axes[Axis::Accel];
+        labels(accels).join(" ")
+    };
+    // Beside others, without quotes, and with all other parameters at their defaults, whatever a section says.
+    let set = "axes.accel=bvh,uniform-grid(lambda=3,max_cells=64)";
+    assert_eq!(accels(&[set]), "bvh uniform-grid(lambda=3,max_cells=64)");
+    let set = "axes.accel=[\"uniform-grid( max_cells = 64 )\"]";
+    assert_eq!(accels(&[set]), "uniform-grid(max_cells=64)");
+    // One that a section has, too, is there once.
+    let set = "axes.accel=uniform-grid,uniform-grid(lambda=4)";
+    assert_eq!(
+        accels(&[set]),
+        "uniform-grid(lambda=3) uniform-grid(lambda=4)"
+    );
+    let text = AXES.replace("\"pixel-hash\"", "\"pixel-hash(hash=wang,shuffle=true)\"");
+    let experiment = parse_with(&text, &[]).unwrap();
+    let sequences = &experiment.axes[Axis::Sequence];
+    assert_eq!(
+        labels(sequences),
+        ["pixel-hash(hash=wang,shuffle=true)", "sobol"]
+    );
+    assert_eq!(sequences[0].name, "pixel-hash");
+    for (accel, pieces) in [
+        (
+            "uniform-grid(lamda=3)",
+            ["`lamda`", "did you mean `lambda`?"],
+        ),
+        (
+            "uniform-grid(lambda=300)",
+            ["accel.uniform-grid.lambda", "100"],
+        ),
+        (
+            "uniform-grid(3)",
+            ["unknown accel `uniform-grid(3)`", "did you mean"],
+        ),
+        (
+            "gird(lambda=3)",
+            ["unknown accel `gird(lambda=3)`", "known:"],
+        ),
+    ] {
+        assert_says(
+            parse_with(AXES, &[&format!("axes.accel=[\"{accel}\"]")]),
+            &pieces,
+        );
+    }
+    // A section whose entry is not on the axis under its own name would not be read.
+    let text = "[accel.uniform-grid]\nlambda = 3\n";
+    let text = format!(
+        "{}{text}",
+        AXES.replace("\"uniform-grid\"", "\"uniform-grid(lambda=4)\"")
+    );
+    assert_says(
+        parse_with(&text, &[]),
+        &["uniform-grid", "is not in axes.accel"],
+    );
+}
+
+#[test]
 fn a_minimal_file_gets_the_documented_defaults() {
     let experiment = good("");
     assert_eq!(experiment.name, "trial");
