@@ -189,7 +189,7 @@ mod tests {
         let bounds = [[0.0; 3], [1.0; 3]];
         let keys =
             [0, 1, 2].map(|slot: usize| key(paths[ROWS * slot], paths[ROWS * slot + 1], bounds));
-        let (x, y) = (0b11 << 18 | 1 << 15, 1 << 16);
+        let (x, y) = (1 << 18 | 1 << 15, 1 << 16);
         assert_eq!(keys, [Some(0), Some(1 << 21 | x | y), Some(4)]);
         let fault = |queue: &[u32]| fault_of_rays(queue, paths, bounds);
         assert_eq!(fault(&[0, 2, 1]), None);
