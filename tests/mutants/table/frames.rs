@@ -325,17 +325,6 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Frames,
     ),
     row(
-        "paths-sorted-by-their-neighbours",
-        "a path is sorted by the ray of another slot: the same images in other times",
-        text(
-            "organisation/ray_keys",
-            "load_slot(slot).path.ray",
-            "load_slot(place).path.ray",
-        ),
-        WAVES,
-        Check::Frames,
-    ),
-    row(
         "hits-sorted-by-triangles",
         "hits are sorted by their triangles, not by their materials: the same images in other times",
         text(
