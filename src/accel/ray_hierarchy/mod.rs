@@ -91,8 +91,8 @@ parameters! {
         reach: bool = true;
         /// parts in which primitives come, front to back; between two of them rays are shortened to their hits
         chunks: u32 = 1, in 1..=16;
-        /// the descent begins at the lowest level with at most this many nodes; 0: at the best of those of at most 64, by a sample of the primitives (16 with `dual` or without `fused`)
-        start: u32 = 16, in 0..=4096;
+        /// the descent begins at the lowest level with at most this many nodes; 0: at the best of those of at most 64, by a sample of the triangles (16 with clusters, with `dual` or without `fused`)
+        start: u32 = 0, in 0..=4096;
         /// pairs of a stream; a batch of primitives fills at most one, and pairs without room are answered at once
         capacity: u32 = 2_097_152, in 16_384..=4_194_240;
         /// whether a pass tests and compacts; else a compaction follows each
@@ -115,8 +115,9 @@ impl Options {
 
     /// Whether the level that the descent begins at is chosen for each set of rays.
     fn chooses_start(&self) -> bool {
-        // Streams of both sides, and those that are compacted, have to come from the level above.
-        self.start == 0 && self.dual == 0 && self.fused
+        // Streams of both sides, and those that are compacted, have to come from the level above. Clusters are tested so
+        // seldom that the choice costs more than it saves.
+        self.start == 0 && self.cluster == 1 && self.dual == 0 && self.fused
     }
 
     /// Features of the kernels.

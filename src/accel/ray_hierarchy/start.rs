@@ -8,6 +8,8 @@ pub(super) const MOST_NODES: u32 = 64;
 pub(super) const USUAL_NODES: u32 = 16;
 /// Primitives of a sample, at most.
 const SAMPLE: u32 = 256;
+/// Primitives for one of a sample, at least: what is chosen by a larger part costs more than it saves.
+const LEAST_STRIDE: u32 = 32;
 
 /// Every `stride`-th primitive, `count` of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +21,7 @@ pub(super) struct Sample {
 impl Sample {
     pub(super) fn of(primitives: u32) -> Self {
         // Odd, so that neither of the two triangles of each square is left out.
-        let stride = primitives.div_ceil(SAMPLE) | 1;
+        let stride = primitives.div_ceil(SAMPLE).max(LEAST_STRIDE) | 1;
         Self {
             stride,
             count: primitives.div_ceil(stride),
