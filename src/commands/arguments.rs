@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use raystone::config::{Axis, Cell, Experiment, Plan};
+use raystone::config::{Axis, Cell, Experiment, Plan, split_outside_brackets};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
 use raystone::run::{LEAST_FOR_TILES, Registries, RunOptions, kernel_library};
 use raystone::scene::{SceneData, check_files, check_model};
@@ -92,6 +92,14 @@ const CELL: &str =
 pub fn on_axis<T: ToString>(axis: Axis, names: impl IntoIterator<Item = T>) -> Option<String> {
     let names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
     (!names.is_empty()).then(|| format!("axes.{axis}={}", toml::Value::from(names)))
+}
+
+/// Returns the names of a flag that may be given many times and may have several at once, as in `bvh,cwbvh`.
+pub fn listed(names: &[String]) -> impl Iterator<Item = &str> {
+    let parts = names
+        .iter()
+        .flat_map(|some| split_outside_brackets(some, ','));
+    parts.map(str::trim)
 }
 
 /// Returns the experiment of a command without a file: its flags, and `--set`, which overrides them.
@@ -209,5 +217,17 @@ pub fn plan(experiment: &Experiment, only: &[String], registries: &Registries) -
 pub fn warn_of(scene: &SceneData) {
     for line in scene.report.lines() {
         super::output::warn(&format!("{}: {line}", scene.name));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_a_flag_are_separated_by_commas_outside_brackets() {
+        let given = ["bvh(leaf_size=2,builder=sbvh), cwbvh", "kd-tree"].map(str::to_owned);
+        let names: Vec<_> = listed(&given).collect();
+        assert_eq!(names, ["bvh(leaf_size=2,builder=sbvh)", "cwbvh", "kd-tree"]);
     }
 }

@@ -1,6 +1,6 @@
 //! `raystone stress`.
 
-use super::arguments::{DeviceArguments, ValueArguments, on_axis, plan, warn_of};
+use super::arguments::{DeviceArguments, ValueArguments, listed, on_axis, plan, warn_of};
 use super::faults::plant_faults;
 use super::output::OutputArguments;
 use super::run::carry_out;
@@ -23,10 +23,10 @@ pub struct Stress {
     /// Few rungs and shots: a minute at most
     #[arg(long)]
     quick: bool,
-    /// Triangle test; may be given many times [default: all]
+    /// Triangle tests, such as `watertight,integer`; may be given many times [default: all]
     #[arg(long)]
     triangle: Vec<String>,
-    /// Structure; may be given many times; brute force always takes part [default: all]
+    /// Structures, such as `bvh,cwbvh`; may be given many times; brute force always takes part [default: all]
     #[arg(long)]
     accel: Vec<String>,
     /// Family; may be given many times [default: all, and the shots]
@@ -98,10 +98,9 @@ impl Stress {
         if self.quick {
             overrides.extend(Thesis::parse(EXPERIMENT, FILE)?.unwrap_or_default().quick);
         }
-        overrides.extend(on_axis(Axis::Triangle, &self.triangle));
+        overrides.extend(on_axis(Axis::Triangle, listed(&self.triangle)));
         if !self.accel.is_empty() {
-            let others = self.accel.iter().map(String::as_str);
-            let others = others.filter(|name| *name != BRUTE_FORCE);
+            let others = listed(&self.accel).filter(|name| *name != BRUTE_FORCE);
             overrides.extend(on_axis(
                 Axis::Accel,
                 [BRUTE_FORCE].into_iter().chain(others),

@@ -1,6 +1,6 @@
 //! `raystone verify`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, of_flags, on_axis, plan};
+use super::arguments::{DeviceArguments, ExperimentArguments, listed, of_flags, on_axis, plan};
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{OutputArguments, screen, tell};
 use super::verify_images;
@@ -42,7 +42,7 @@ pub struct Verify {
     /// Built-in scene or path of a model; may be given many times
     #[arg(long)]
     scene: Vec<String>,
-    /// Structure; may be given many times
+    /// Structures, such as `bvh,cwbvh`; may be given many times
     #[arg(long)]
     accel: Vec<String>,
     /// Rays of each class [default: gate.rays of the experiment]
@@ -119,7 +119,7 @@ impl Verify {
         let rays = self.rays.map(|rays| format!("gate.rays={rays}"));
         let flags = [
             on_axis(Axis::Scene, &self.scene),
-            on_axis(Axis::Accel, &self.accel),
+            on_axis(Axis::Accel, listed(&self.accel)),
             rays,
             self.device.kernels_override(),
         ];

@@ -31,7 +31,7 @@ pub use catalogue::Catalogue;
 pub use cells::{COMPACTIONS, CONES, Cell, MEDIA, NO_PEER, RAYS, SPECULAR, STRESS, is_bench};
 pub use error::{ConfigError, Place};
 pub use experiment::{Axes, CellSet, Condition, Experiment, REFERENCE_PARTS, Seeds};
-pub use pattern::{Pattern, Selector};
+pub use pattern::{Pattern, Selector, split_outside_brackets};
 pub use plan::{Plan, Skipped};
 pub use sections::{
     Animation, Coherence, Discrepancy, Follow, Gate, Map, Motion, Pace, Reference, Rule, Run,

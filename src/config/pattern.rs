@@ -136,7 +136,7 @@ fn known(name: &str, axes: &[&'static str]) -> Result<&'static str, String> {
 }
 
 /// Splits at separators outside parentheses and brackets, as labels such as `grid(a=1,b=2)` contain them.
-pub(super) fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
+pub fn split_outside_brackets(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let mut depth = 0usize;
     text.split(move |c| {
         match c {

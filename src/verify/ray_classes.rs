@@ -16,6 +16,8 @@ const MOST_ERRORS: f64 = 6.0;
 const FEWEST: usize = 256;
 /// Relative error of lengths and directions in f32.
 const ROUNDING: f64 = 1e-4;
+/// Steps of f32 in a range whose points are judged, at least: rounding to them adds 1/STEPS² to the variance, less than chance.
+const STEPS: f64 = 32.0;
 /// Edge of the tiles of primary rays, pixels.
 const TILE: u32 = 8;
 
@@ -149,21 +151,29 @@ fn of_lights(set: &RaySet, scene: &SceneData) -> Option<&'static str> {
     is_wrong.then_some("do not go to all points of all lights alike")
 }
 
+/// Whether f32 has so many numbers in a range that points of it can be even: a scene may be far away or tiny.
+fn is_divided([low, high]: [f64; 2]) -> bool {
+    let largest = low.abs().max(high.abs()) as f32;
+    high - low > STEPS * f64::from(largest.next_up() - largest)
+}
+
 /// From points that are even in the box of the scene.
 fn of_chords(set: &RaySet, [low, high]: [DVec3; 2]) -> Option<&'static str> {
-    let is_wrong = (0..3).filter(|&axis| high[axis] > low[axis]).any(|axis| {
-        let place =
-            |ray: &Ray| (f64::from(ray.origin[axis]) - low[axis]) / (high[axis] - low[axis]);
-        is_off(set.rays.iter().map(place), 0.5)
-            || is_off(
-                set.rays.iter().map(|ray| (place(ray) - 0.5).powi(2)),
-                1.0 / 12.0,
-            )
-            || is_off(
-                set.rays.iter().map(|ray| f64::from(ray.direction[axis])),
-                0.0,
-            )
-    });
+    let is_wrong = (0..3)
+        .filter(|&axis| is_divided([low[axis], high[axis]]))
+        .any(|axis| {
+            let place =
+                |ray: &Ray| (f64::from(ray.origin[axis]) - low[axis]) / (high[axis] - low[axis]);
+            is_off(set.rays.iter().map(place), 0.5)
+                || is_off(
+                    set.rays.iter().map(|ray| (place(ray) - 0.5).powi(2)),
+                    1.0 / 12.0,
+                )
+                || is_off(
+                    set.rays.iter().map(|ray| f64::from(ray.direction[axis])),
+                    0.0,
+                )
+        });
     is_wrong.then_some("do not begin at all points of the box alike")
 }
 
@@ -175,6 +185,14 @@ mod tests {
 
     /// A change of one class.
     type Change = (RayClass, fn(&mut RaySet));
+
+    #[test]
+    fn points_of_far_and_tiny_scenes_are_not_even() {
+        assert!(is_divided([-1.0, 1.0]) && is_divided([-1e-40, 1e-40]));
+        for few in [[1e7 - 1.0, 1e7 + 1.0], [-1.4e-45, 1.4e-45], [2.0, 2.0]] {
+            assert!(!is_divided(few), "{few:?}");
+        }
+    }
 
     #[test]
     fn rays_of_another_distribution_order_or_length_are_told() {

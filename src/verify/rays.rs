@@ -6,7 +6,7 @@
 
 use crate::hard_rays::hard_rays;
 use crate::shadow_rays::{Segment, lights_of, other_orders};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use raystone_accel::{Counters, CpuTwin, Hit, NO_HIT, Query, Ray, TriangleSoup};
 use raystone_config::Gate;
@@ -128,7 +128,8 @@ pub(super) fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3
         let record = &soup.records[hit.triangle as usize];
         let [v0, v1, v2] = record.vertices().map(Vec3::from);
         let (e1, e2) = (v0 - v1, v2 - v0);
-        let normal = e1.cross(e2).try_normalize()?;
+        let normal =
+            (e1.cross(e2).try_normalize()).or_else(|| unit(e1.as_dvec3().cross(e2.as_dvec3())))?;
         let facing = if normal.dot(Vec3::from(ray.direction)) > 0.0 {
             -normal
         } else {
@@ -150,8 +151,14 @@ fn chord(bounds: &Bounds, random: &mut Pcg32) -> Ray {
         bounds.min + u * (bounds.max - bounds.min)
     };
     let from = inside();
-    let direction = (inside() - from).try_normalize().unwrap_or(Vec3::X);
-    Ray::new(from, direction)
+    let across = inside() - from;
+    let direction = across.try_normalize().or_else(|| unit(across.as_dvec3()));
+    Ray::new(from, direction.unwrap_or(Vec3::X))
+}
+
+/// A vector of length 1, for those that are so short that their squares are 0 in f32.
+fn unit(short: DVec3) -> Option<Vec3> {
+    Some(short.try_normalize()?.as_vec3())
 }
 
 /// Records all classes with about `settings.rays` rays each, then a fixed number of hard rays.
@@ -251,4 +258,22 @@ fn cosine_direction(n: Vec3, random: &mut Pcg32) -> Vec3 {
         + bitangent * (radius * angle.sin())
         + n * (1.0 - u).max(0.0).sqrt())
     .normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chords_of_a_box_whose_squares_are_0_in_f32_go_everywhere() {
+        let mut random = Pcg32::new(5);
+        let bounds = Bounds {
+            min: Vec3::ZERO,
+            max: Vec3::splat(1e-30),
+        };
+        for _ in 0..512 {
+            let direction = Vec3::from(chord(&bounds, &mut random).direction);
+            assert!((direction.length() - 1.0).abs() < 1e-6 && direction != Vec3::X);
+        }
+    }
 }
