@@ -220,11 +220,27 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     record.fault = match first_wrong {
         Some((&i, _)) => {
             let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
-            Some(describe(&answers[i], &truth[i]) + &played)
+            let share = 100.0 * parting_share(oracle, view, answers, &truth);
+            let all = format!("; of all paths rounding makes {share:.1} % take another branch");
+            Some(describe(&answers[i], &truth[i]) + &played + &all)
         }
-        None => out_of_bounds(&record, oracle.texturing()),
+        None => out_of_bounds(&record, FLIPS, oracle.texturing()).and_then(|_| {
+            // Far from the origin f32 has few steps between edges, at which more paths part.
+            let share = parting_share(oracle, view, answers, &truth);
+            out_of_bounds(&record, share.max(FLIPS), oracle.texturing())
+        }),
     };
     record
+}
+
+/// The share of paths that take another branch, but for other surfaces, where each is played once with the roundings of f32.
+fn parting_share(oracle: &PathOracle, view: &View, answers: &[Answer], truth: &[Path]) -> f64 {
+    let parts = |(answer, path): &(&Answer, &Path)| {
+        let played = oracle.trace(view, answer.id, Rounding::played(SCALES[0], 0));
+        (played.parting(path)).is_some_and(|parting| parting != Parting::Surfaces)
+    };
+    let parted = answers.par_iter().zip(truth).filter(parts).count();
+    parted as f64 / answers.len().max(1) as f64
 }
 
 /// The radiance below which differences of these paths are ignored.
@@ -269,6 +285,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     let mut spread = 0.0_f64;
     let mut near = TOLERANCE;
     let mut others: Vec<Path> = Vec::new();
+    let mut is_ever_taken = false;
     let off = difference(answer.radiance, truth.radiance, floor);
     let least = (TRIALS << truth.layers.min(8)).min(MOST_TRIALS);
     for (index, scale) in (0..).zip(SCALES) {
@@ -283,6 +300,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
             trial += 1;
             since_new += 1;
             if played.parting(truth).is_none() {
+                is_ever_taken = true;
                 spread = spread.max(difference(played.radiance, truth.radiance, floor));
             } else {
                 if others.iter().all(|other| other.parting(&played).is_some()) {
@@ -305,7 +323,7 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
         }
     }
     // Too many choices to find all of the kernel's; so few as flips are allowed.
-    if truth.by_chance > 0 {
+    if truth.by_chance > 0 || !is_ever_taken {
         return Class::Flip(Parting::Decision);
     }
     Class::Wrong
@@ -359,8 +377,9 @@ fn most(paths: usize, share: f64) -> usize {
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// Checks the totals of a record against their bounds; `texturing` comes from the oracle.
-pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
+/// Checks the totals of a record against their bounds: `parting` is the share of paths that may take another branch, `texturing`
+/// comes from the oracle.
+pub fn out_of_bounds(record: &PathsRecord, parting: f64, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
         paths,
@@ -381,7 +400,7 @@ pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let strange = strange.then(|| {
         format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
     });
-    over("take another branch", flips - surfaces, FLIPS)
+    over("take another branch", flips - surfaces, parting)
         .or(strange)
         .or_else(|| over("are ill-conditioned", ill_conditioned, share))
         .or_else(|| {

@@ -231,7 +231,7 @@ fn each_kind_of_difference_has_a_bound() {
         layered: 100,
         ..PathsRecord::default()
     };
-    let said = |record: &PathsRecord| out_of_bounds(record, 0).unwrap_or_default();
+    let said = |record: &PathsRecord| out_of_bounds(record, 1e-3, 0).unwrap_or_default();
     // 0.1 % and 2 % of 3952 paths, and six standard deviations.
     for (few, many, part) in [
         (

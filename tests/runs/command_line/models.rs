@@ -141,7 +141,28 @@ fn verify_passes_models_of_awkward_shapes() {
         [[cos, sin, 0.0], [-cos, -sin, 1.0], [0.0, 0.0, -1.0]]
     };
     let sized = |size: f32| [[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];
+    // Edges of one unit, at which coordinates have 128 steps.
+    let hilly = |k: u16| {
+        let at = |x: u16, z: u16| {
+            let height = (1.3 * f32::from(x)).sin() * (1.7 * f32::from(z)).sin();
+            [1e5 + f32::from(x), height - 1e5, f32::from(z)]
+        };
+        let (x, z) = (k % 40, k / 40);
+        [
+            [at(x, z), at(x, z + 1), at(x + 1, z)],
+            [at(x, z + 1), at(x + 1, z + 1), at(x + 1, z)],
+        ]
+    };
     let models = [
+        ("hills far away", triangles_of((0..1600).flat_map(hilly))),
+        (
+            "1e-30",
+            triangles_of([unit, turned(7)].map(|t| t.map(|v| v.map(|x| 1e-30 * x)))),
+        ),
+        (
+            "two units at 1e7",
+            triangles_of((0..9).map(|k| turned(k).map(|[x, y, z]| [1e7 + x, y, z]))),
+        ),
         ("flat, and a needle of 2e6 units", triangles_of(flat)),
         ("sixty times one triangle", triangles_of([unit; 60])),
         ("one middle", triangles_of((0..60).map(turned))),
