@@ -6,6 +6,7 @@ use crate::instancing::BoxMap;
 use crate::known_cells;
 use crate::known_parameters;
 use crate::known_rows;
+use crate::known_trees;
 use crate::tree::{NodeKind, Tree, TreeNode};
 use crate::{AccelRegistry, BuildLog, StructureStats, TriangleSoup, triangle::TriangleRecord};
 use glam::Vec3;
@@ -38,6 +39,7 @@ pub fn check() -> Result<(), String> {
     overlaps_of_copies()?;
     known_rows::check()?;
     known_cells::check()?;
+    known_trees::check()?;
     phases()?;
     known_parameters::check()?;
     crate::wide::check_octants()?;

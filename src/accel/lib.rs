@@ -29,6 +29,7 @@ mod known_cells;
 pub mod known_figures;
 mod known_parameters;
 mod known_rows;
+mod known_trees;
 mod leaf;
 pub mod mask;
 mod octree;

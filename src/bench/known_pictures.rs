@@ -2,8 +2,8 @@
 //! sides exchanged, looks like another result.
 
 use crate::heat_map::{heat_map, scale_of};
-use crate::spectrum::{SIGMAS, error_spectrum, spectrum_of};
-use raystone_image::{Image, automatic_exposure};
+use crate::spectrum::{ErrorSpectrum, SIGMAS, error_spectrum, mean_power, spectrum_of};
+use raystone_image::{Image, automatic_exposure, viridis};
 use std::f64::consts::TAU;
 
 /// The ends of the colour map viridis, as Matplotlib 3.9 prints them: violet for nothing, yellow for the most.
@@ -58,8 +58,65 @@ pub fn check() -> Result<(), String> {
             return Err(wrong(what, format!("{found:?}"), expected.to_string()));
         }
     }
+    rings(found.power.first().copied())?;
+    between_colours()?;
     filtered()?;
     exposed()
+}
+
+/// Below a quarter of a cycle per pixel the wave's two frequencies are alone in their ring. And of three images with powers of 1, 3 and 5 and
+/// variances of 1, 2 and 3 the quantiles of the power over the mean variance, 1/2, 3 and 15/2, as `numpy.quantile` has them.
+fn rings(first: Option<(f64, f64)>) -> Result<(), String> {
+    let of = |power: f64, variance: f64| ErrorSpectrum {
+        power: vec![(0.25, power)],
+        variance,
+        low_frequency: None,
+        loudest: None,
+        autocorrelation: None,
+        filtered: Vec::new(),
+    };
+    let all = mean_power(&[of(5.0, 3.0), of(1.0, 1.0), of(3.0, 2.0)]);
+    let at = all.first();
+    let quantiles = at.and_then(|at| at.quantiles).unwrap_or_default();
+    let known = [
+        ("frequency of a ring", first.map(|at| at.0), 0.125),
+        ("power of a ring", first.map(|at| at.1), 15.5),
+        ("mean power", at.map(|at| at.power.value), 3.0),
+        ("median power", Some(quantiles[0]), 3.0),
+        ("third quarter of a power", Some(quantiles[1]), 5.25),
+        ("95th hundredth of a power", Some(quantiles[2]), 7.05),
+        ("greatest power of an image", Some(quantiles[3]), 7.5),
+    ];
+    let is_other = |(_, found, expected): &(&str, Option<f64>, f64)| {
+        !found.is_some_and(|x| (x - expected).abs() <= ROUNDING * expected)
+    };
+    match known.into_iter().find(is_other) {
+        None => Ok(()),
+        Some((what, found, expected)) => {
+            Err(wrong(what, format!("{found:?}"), expected.to_string()))
+        }
+    }
+}
+
+/// Eighths of viridis between those that a heat map has to the bit: `viridis(9)` of R's viridisLite, which rounds otherwise.
+fn between_colours() -> Result<(), String> {
+    const ODD: [[u8; 3]; 4] = [
+        [0x47, 0x2d, 0x7b],
+        [0x2c, 0x72, 0x8e],
+        [0x27, 0xad, 0x81],
+        [0xaa, 0xdc, 0x32],
+    ];
+    for (place, expected) in ODD.into_iter().enumerate() {
+        let found = viridis((2.0 * place as f32 + 1.0) / 8.0);
+        if found.iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 4) {
+            return Err(wrong(
+                "colour",
+                format!("{found:?}"),
+                format!("{expected:?}"),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// An impulse after a Gaussian: along each axis the squares of its weights sum to 0.282 (σ = 1) and 0.141 (σ = 2), as

@@ -2,6 +2,7 @@
 //! another unit, looks like a measurement.
 
 use crate::coherence::Tally;
+use crate::known_cells;
 use crate::{
     BiasRecord, ClassTiming, CountersPerRay, FigureAtCount, FilteredError, GateVerdict,
     IntegrandFigures, Interval, PixelsAtCount, RayClass, Reading, ReferenceCheck, ReferenceRecord,
@@ -29,6 +30,7 @@ pub fn check() -> Result<(), String> {
     }
     structures.chain(cells).try_for_each(agree)?;
     cycles()?;
+    known_cells::check(cell())?;
     let (bias, spectrum, stream, reference) = further();
     let others = [
         (bias.readings(), &BIAS[..]),

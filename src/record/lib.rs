@@ -9,6 +9,7 @@ mod environment;
 mod error;
 pub mod figure;
 mod key;
+mod known_cells;
 pub mod known_readings;
 mod old;
 mod paths;

@@ -5,7 +5,8 @@ use crate::colors::shown;
 use crate::known_lights;
 use crate::known_scenes;
 use crate::normals::{decode_normal, encode_normal, moved, of_normals};
-use glam::{DMat3, DVec3, Vec3};
+use crate::reduce::{Texels, area_means, reduced};
+use glam::{DMat3, DVec3, Vec3, Vec4};
 
 /// Columns of maps: sheared; mirrored and stretched; both, and turned.
 const MAPS: [[[f64; 3]; 3]; 3] = [
@@ -29,6 +30,7 @@ const OF_SINGLE: f64 = 1e-6;
 /// A normal is not perpendicular to its triangle, or points to the other side; or a colour is another.
 pub fn check() -> Result<(), String> {
     colors()?;
+    smaller()?;
     known_scenes::check()?;
     known_lights::check()?;
     for columns in MAPS {
@@ -60,6 +62,37 @@ fn colors() -> Result<(), String> {
         format!(
             "the radiance of a known colour is {found}, and should be {expected}: this program lights surfaces wrongly; build it \
              anew, and report what stays wrong"
+        )
+    })
+}
+
+/// Images that are reduced: half of the light of white is byte 188 by IEC 61966-2-1, half of a number 127.5, and a clear texel has no colour; a row of
+/// weight 3 counts three times.
+fn smaller() -> Result<(), String> {
+    let (black, white, clear) = ([0, 0, 0, 255], [255; 4], [255, 0, 0, 0]);
+    let of = |texels: &[[u8; 4]], kind| reduced(texels, [2, 2], [1, 1], kind).concat();
+    let rows = area_means(
+        [1, 2],
+        [1, 1],
+        |row| Vec4::splat([1.0, 3.0][row]),
+        |row| [1.0, 3.0][row as usize],
+    );
+    let found = (
+        of(&[black, white, white, black], Texels::Colours),
+        of(&[white, clear, clear, white], Texels::Colours),
+        of(&[black, white, white, black], Texels::Numbers),
+        rows[0].x,
+    );
+    let expected = (
+        vec![188, 188, 188, 255],
+        vec![255, 255, 255, 128],
+        vec![128, 128, 128, 255],
+        2.5,
+    );
+    (found == expected).then_some(()).ok_or_else(|| {
+        format!(
+            "known texels are reduced to {found:?}, and should be to {expected:?}: this program shows other textures; build it anew, and \
+             report what stays wrong"
         )
     })
 }

@@ -9,6 +9,7 @@ use crate::tally::Unread;
 use crate::{LoadOptions, SceneData, load};
 use glam::{DVec3, Vec3};
 use raystone_core::params::{ParamValue, Params, Variant};
+use raystone_core::random::Pcg32;
 
 /// A value by name, and what it should be.
 pub(crate) type Known = (&'static str, f64, f64);
@@ -19,6 +20,8 @@ const ROUNDING: f64 = 1e-5;
 /// Of 50 cd times a multiplier of 2.5 and a ballast of 0.8, straight down twice as much as to the sides, all around.
 const LUMINAIRE: &str =
     "IESNA:LM-63-2002\nTILT=NONE\n1 1000 2.5 3 1 1 2 0 0 0\n0.8 1 40\n0 90 180\n0\n100 50 50\n";
+/// A quarter of a luminaire, in planes at 0°, 30° and 90°: what is not measured is its mirror image.
+const QUARTER: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 2 3 1 2 0 0 0\n1 1 40\n0 90\n0 30 90\n5 10\n5 20\n5 40\n";
 const LIBRARY: &str = "newmtl a\nTr .25\nNs 30\nnewmtl b\nd .25\nNi 1.5\nKd .1 .2 .3\n";
 
 /// Reads them.
@@ -28,7 +31,9 @@ const LIBRARY: &str = "newmtl a\nTr .25\nNs 30\nnewmtl b\nd .25\nNi 1.5\nKd .1 .
 pub(crate) fn check() -> Result<(), String> {
     let all = luminaire()?
         .into_iter()
+        .chain(quarter()?)
         .chain(library())
+        .chain(direction())
         .chain(parameters()?)
         .chain(known_files::values()?);
     for (what, found, expected) in all {
@@ -64,6 +69,25 @@ fn luminaire() -> Result<[Known; 4], String> {
             tau * (200.0 + 100.0 * (1.0 - 2.0 / std::f64::consts::PI)),
         ),
     ])
+}
+
+/// To the sides, at these angles.
+fn quarter() -> Result<[Known; 6], String> {
+    let profile = IesProfile::parse("a quarter", QUARTER).map_err(|e| e.to_string())?;
+    let at = |degrees: f64| {
+        let (y, x) = degrees.to_radians().sin_cos();
+        profile.intensity(DVec3::new(x, y, 0.0))
+    };
+    let of = |(degrees, expected)| ("intensity of a mirrored side", at(degrees), expected);
+    Ok([
+        (30.0, 20.0),
+        (150.0, 20.0),
+        (180.0, 10.0),
+        (210.0, 20.0),
+        (270.0, 40.0),
+        (345.0, 15.0),
+    ]
+    .map(of))
 }
 
 /// Materials of a library: `Tr` is what `d` lacks, and a lobe's exponent n has a Beckmann roughness of √(2 / (n + 2)),
@@ -131,6 +155,19 @@ fn filled() -> Result<f64, String> {
     };
     let vertices = scene.triangles.iter().flat_map(|t| t.vertices);
     Ok(vertices.map(place).fold(0.0, f64::max))
+}
+
+/// A direction of the generator in the author's example (pcg32-demo, seed 42, stream 54), whose second and third words are 0x7b47f409 and
+/// 0xba1d3330: z = 2 · 0x7b47f409 / 2³² − 1, turned by 0xba1d3330 / 2³² of a circle.
+fn direction() -> [Known; 3] {
+    let mut random = Pcg32::with_stream(42, 54);
+    random.next_u32();
+    let found = random.direction();
+    [
+        ("x of a random direction", found.x, -0.143_862_827_904),
+        ("y of a random direction", found.y, -0.988_910_681_546),
+        ("z of a random direction", found.z, -0.036_866_660_696),
+    ]
 }
 
 /// What parameters of every scene do.

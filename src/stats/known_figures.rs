@@ -10,7 +10,7 @@ use crate::comparison::Pairs;
 use crate::hypothesis::{
     benjamini_hochberg, capped_t_test, holm, student_t_quantile, student_t_two_sided, t_test_power,
 };
-use crate::interval::Interval;
+use crate::interval::{Interval, Spread};
 use crate::log_figure::LogFigure;
 use crate::metrics::{Reference, measure};
 use crate::rates::{millions_per_second, without_overhead};
@@ -56,6 +56,7 @@ pub fn check() -> Result<(), String> {
         (ROUNDING, known_tests::front()),
         (OF_FUNCTIONS, known_tests::laws()),
         (OF_PIXELS, known_tests::biases()?),
+        (OF_POWER, known_tests::verdicts()?),
         (ROUNDING, known_metrics::metrics()?),
         (OF_PIXELS, known_metrics::pictures()?),
         (OF_SINGLE, known_metrics::flip()),
@@ -154,12 +155,13 @@ fn ranks() -> Vec<Known> {
     // max over ranks of min(1, (m − rank) p)
     let holm = holm(&[0.01, 0.04, 0.03, 0.005, 0.2]);
     // false_discovery_control(p) <= 0.05
-    let rejected = benjamini_hochberg(&[0.01, 0.04, 0.03, 0.005, 0.2], 0.05);
-    let rejected = rejected
-        .iter()
-        .enumerate()
-        .map(|(i, &is)| f64::from(u8::from(is) << i))
-        .sum();
+    let chosen = |p: &[f64]| {
+        let rejected = benjamini_hochberg(p, 0.05).into_iter().enumerate();
+        Some(rejected.map(|(i, is)| f64::from(u8::from(is) << i)).sum())
+    };
+    let rejected = chosen(&[0.01, 0.04, 0.03, 0.005, 0.2]);
+    // The second is above its own bound, 0.02, and the fourth below 0.04.
+    let stepped = chosen(&[0.035, 0.9, 0.001, 0.028, 0.025]);
     let differences = [0.1, 0.4, -0.2, 0.5, 0.3, 0.6, 0.25, -0.05, 0.31, 0.44];
     let wilcoxon = SignedRank::new(&differences);
     let end = |k: usize| wilcoxon.as_ref().map(|test| test.interval(0.05)[k]);
@@ -181,7 +183,8 @@ fn ranks() -> Vec<Known> {
             holm.get(3).copied(),
             0.025,
         ),
-        ("choice by Benjamini and Hochberg", Some(rejected), 15.0),
+        ("choice by Benjamini and Hochberg", rejected, 15.0),
+        ("choice from the greatest p down", stepped, 29.0),
         // wilcoxon(d, method="exact").pvalue; median and order statistics of Walsh averages
         (
             "p by Wilcoxon's test",
@@ -205,6 +208,9 @@ fn student() -> Vec<Known> {
     let times = [5.1, 4.9, 5.3, 5.0, 7.7, 5.2, 4.8, 5.05, 5.15, 4.95];
     let others = [6.1, 5.9, 6.5, 6.2, 6.05, 9.3, 5.8, 6.15, 6.3, 5.95];
     let [times, others] = [&times, &others].map(|times| LogFigure::of_rounds("rounds", times));
+    let seven = LogFigure::of_rounds("rounds", &Y);
+    let of_seven = seven.as_ref().map(LogFigure::interval);
+    let spread = |variance, freedom| Spread { variance, freedom };
     let compared = times
         .as_ref()
         .zip(others.as_ref())
@@ -272,6 +278,32 @@ fn student() -> Vec<Known> {
             "p of Yuen's test",
             compared.map(|c| c.p),
             2.257_597_732_265_080_7e-7,
+        ),
+        // Of seven a fifth is one, not two.
+        (
+            "trimmed mean of seven times",
+            of_seven.map(|i| i.value),
+            1.489_090_865_963_998_3,
+        ),
+        (
+            "lower end of a trimmed mean",
+            of_seven.map(|i| i.low),
+            0.682_921_446_909_095_1,
+        ),
+        (
+            "upper end of a trimmed mean",
+            of_seven.map(|i| i.high),
+            3.246_920_443_241_800_4,
+        ),
+        (
+            "upper end at 1 % of a trimmed mean",
+            seven.map(|seven| seven.upper(0.01)),
+            5.424_118_376_660_227,
+        ),
+        (
+            "freedom of a difference",
+            Some(Spread::of_difference(spread(2.0, 4.0), spread(3.0, 9.0)).freedom),
+            4.0,
         ),
     ]
 }

@@ -4,10 +4,11 @@
 //! Values are those of NumPy 2 and SciPy 1.17.
 
 use super::known_figures::Known;
-use crate::bias::{BiasCheck, BiasOptions, check_bias};
+use crate::bias::{BiasCheck, BiasOptions, BiasVerdict, check_bias};
 use crate::comparison::{LogFigure, Place, places};
 use crate::growth::{Model, growth};
 use crate::interval::Interval;
+use crate::statistics::pareto_front;
 use raystone_image::Image;
 
 /// 3 in [2, 4] of ten degrees of freedom against 5 in [4, 8] of twenty: the side of each that lies towards the other counts.
@@ -42,7 +43,20 @@ pub(super) fn front() -> Vec<Known> {
     let found = places(&points.map(|point| point.map(LogFigure::exact)));
     let expected = [Place::Front, Place::Front, Place::Beaten];
     let right = found.iter().zip(&expected).filter(|(a, b)| a == b).count();
-    vec![("number of places on a front", Some(right as f64), 3.0)]
+    // The first of two at 1, the next, and an equal one.
+    let line = pareto_front(&[
+        (3.0, 2.0),
+        (1.0, 4.0),
+        (2.0, 3.0),
+        (2.5, 3.0),
+        (1.0, 5.0),
+        (3.0, 2.0),
+    ]);
+    let is_line = line == [1, 2, 0, 5];
+    vec![
+        ("number of places on a front", Some(right as f64), 3.0),
+        ("line of a front", Some(f64::from(u8::from(is_line))), 1.0),
+    ]
 }
 
 /// Residuals of relative least squares, `numpy.linalg.lstsq`, of times that follow the other law.
@@ -91,6 +105,47 @@ fn columns(values: &[f32], height: u32) -> Image {
         pixels: row.repeat(height as usize),
     }
 }
+
+const FEW: [f32; 3] = [1.125, 0.375, 2.0];
+
+/// Two tiles alike, of which the reference has three parts, too few for weights: p of the image and of both tiles is that of
+/// ttest_ind with 7 degrees of freedom, the chance that any of three tests gives so little 3 p, and a bias of 6.17 standard errors
+/// is found in 90 % of all cases at a third of 0.01: nct.sf(t.isf(0.01 / 6, 7), 7, 6.1695) = 0.9.
+pub(super) fn verdicts() -> Result<Vec<Known>, String> {
+    let images = |values: &[f32], off: f32| -> Vec<Image> {
+        let each = values.iter().map(|value| columns(&[value + off; 2], 4));
+        each.collect()
+    };
+    let found = checked(images(&X, -1.25), images(&FEW, 0.0), 4)?;
+    let tiles = found.p_histogram[2] as f64;
+    // Tiles of much noise the other way round, which the whole image has not.
+    let opposite = |values: &[f32], off: f32| -> Vec<Image> {
+        let each = values.iter().enumerate().map(|(place, value)| {
+            let noise = if place % 3 == 0 { 24.0 } else { -12.0 } * (1.0 + value / 16.0);
+            columns(&[64.0 + off + value / 64.0 + noise, 64.0 + off - noise], 4)
+        });
+        each.collect()
+    };
+    let biased = checked(opposite(&X, 1.0 / 16.0), opposite(&FEW, 0.0), 4)?;
+    let is_biased = biased.rejected.is_empty() && biased.verdict == BiasVerdict::Biased;
+    Ok(vec![
+        (
+            "p of all tests of a bias",
+            Some(found.p),
+            3.0 * 0.260_325_340_418_422_26,
+        ),
+        ("tiles with a p from 0.2 to 0.3", Some(tiles), 2.0),
+        ("bias that would be found", found.detectable, DETECTABLE),
+        (
+            "verdict on an image without biased tiles",
+            Some(f64::from(u8::from(is_biased))),
+            1.0,
+        ),
+    ])
+}
+
+/// 6.169536 times the standard error, over the mean of the reference.
+const DETECTABLE: f64 = 6.169_535_487_668_701 * 1.063_251_076_737_070_4 / (3.5 / 3.0);
 
 /// Two blocks, one with a twelfth of the other's noise, and weights of each half of the reference from the other; and a
 /// tile where replicates show less noise than a quarter of what the reference and the other tiles foretell.

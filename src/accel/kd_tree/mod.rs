@@ -10,6 +10,8 @@
 mod build;
 mod validate;
 
+pub(crate) use build::check_depth;
+
 use super::bounds::{Bounds, slab};
 use super::structure::prelude::*;
 use bytemuck::{Pod, Zeroable};

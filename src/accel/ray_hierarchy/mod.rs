@@ -21,6 +21,7 @@ mod streams;
 mod tests;
 
 pub use anatomy::{Anatomy, LevelAnatomy};
+pub(crate) use primitives::check_order;
 pub use streams::StreamCounts;
 pub(crate) use streams::trace_state;
 

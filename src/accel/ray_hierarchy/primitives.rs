@@ -5,9 +5,12 @@ use super::node::{Bounding, Node, meets_ball, meets_box};
 use super::{Bound, Options};
 use crate::bounds::Bounds;
 use crate::tree::parallel::morton::{cell_of, grid_scale, morton_code};
+use crate::triangle::TriangleRecord;
 use crate::{AccelError, TriangleSoup};
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use rayon::prelude::*;
+use raystone_core::geometry::Triangle;
 
 /// A ball and a box around some triangles, and where their indices lie. 48 bytes, as in
 /// `kernels/accel/ray_hierarchy/tree.wesl`.
@@ -184,4 +187,28 @@ fn ordered(soup: &TriangleSoup, by_place: bool) -> Vec<u32> {
     };
     order.par_sort_unstable_by_key(code);
     order
+}
+
+/// Orders a triangle in each corner of a cube: x counts most, then y, then z.
+///
+/// # Errors
+/// They come otherwise: both orders.
+pub(crate) fn check_order() -> Result<(), String> {
+    let in_corner = |(id, corner): (u32, &u32)| {
+        let [x, y, z] = [4, 2, 1].map(|bit| f32::from(u8::from(corner & bit != 0)));
+        let low = Vec3::new(5.0 + x, y, z);
+        let vertices = [low, low + 0.25 * Vec3::X, low + 0.25 * Vec3::Y];
+        TriangleRecord::new(&Triangle { vertices }, id, 0)
+    };
+    let corners = [6, 1, 4, 3, 7, 0, 5, 2];
+    let records: Vec<TriangleRecord> = (0..).zip(&corners).map(in_corner).collect();
+    let found = ordered(&TriangleSoup::from(records), true);
+    let found: Vec<u32> = found.iter().map(|id| corners[*id as usize]).collect();
+    if found.iter().copied().eq(0..8) {
+        return Ok(());
+    }
+    Err(format!(
+        "triangles in the corners of a cube are ordered as {found:?}, and should be from 0 to 7: clusters of `ray-hierarchy` are larger than \
+         they need to be; build this program anew, and report what stays wrong"
+    ))
 }

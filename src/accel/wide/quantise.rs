@@ -97,11 +97,23 @@ pub(crate) fn check() -> Result<(), String> {
         min: [10.0, 10.0, 10.0],
         max: [19.5, 21.0, 20.0],
     };
-    let found = Quantisation::new(&whole).around(&part);
-    let expected = Planes {
-        low: [10, 5, 20],
-        high: [20, 11, 40],
+    // The same, a thousandth as large, and far from the origin: 2¹² is 2²² planes away.
+    let far = |bounds: &Bounds| Bounds {
+        min: bounds.min.map(|x| 4096.0 + x / 1024.0),
+        max: bounds.max.map(|x| 4096.0 + x / 1024.0),
     };
+    let planes = |whole, part| Quantisation::new(whole).around(part);
+    let found = [planes(&whole, &part), planes(&far(&whole), &far(&part))];
+    let expected = [
+        Planes {
+            low: [10, 5, 20],
+            high: [20, 11, 40],
+        },
+        Planes {
+            low: [10, 5, 10],
+            high: [20, 11, 20],
+        },
+    ];
     (found == expected).then_some(()).ok_or_else(|| {
         format!(
             "a known box has the planes {found:?}, and should have {expected:?}: boxes of wide nodes are larger than they need \

@@ -4,8 +4,10 @@
 use super::inputs::{Current, kernel_set};
 use super::kernels::Kernels;
 use super::registries::Registries;
+use super::resume::Earlier;
+use super::units::Unit;
 use raystone_config::{Experiment, Plan};
-use raystone_record::{CellRecord, Outcome};
+use raystone_record::{Body, CellRecord, Line, Outcome, SkippedRecord};
 use std::collections::{BTreeMap, HashMap};
 
 const TEXT: &str = r#"
@@ -181,6 +183,7 @@ fn stale(registries: &Registries) -> Result<(), String> {
     inputs[2].scene.push('x');
     inputs[3].device.push('x');
     inputs[4].kernels.clone_from(&set.id);
+    kept(unit, &current, &record)?;
     let names = ["program", "set of settings", "scene", "device", "kernel"];
     for (what, inputs) in names.into_iter().zip(inputs) {
         let record = CellRecord {
@@ -192,6 +195,39 @@ fn stale(registries: &Registries) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Of a cell that was measured twice, its last line is kept and counts once; one that failed at last is measured again.
+fn kept(unit: &Unit, current: &Current, record: &CellRecord) -> Result<(), String> {
+    let hash = "a line";
+    let mut record = record.clone();
+    record.lines = vec![hash.to_owned()];
+    let line = |body| Line::about_all(body);
+    let measured = line(Body::Skipped(SkippedRecord {
+        cell: unit.name.clone(),
+        reason: String::new(),
+    }));
+    let measured = measured.hashed(hash);
+    let cell = line(Body::Cell(record.clone()));
+    let failed = line(Body::Cell(CellRecord {
+        outcome: Outcome::Failed,
+        ..record
+    }));
+    let units = std::slice::from_ref(unit);
+    let count = |lines: Vec<Line>| {
+        let kept = Earlier::new(lines).kept(units, current);
+        [kept.cells.len(), kept.stale.len(), kept.lines.len()]
+    };
+    let all = [&failed, &measured, &cell, &measured, &cell].map(Line::clone);
+    let found = [count(all.to_vec()), count(vec![measured, cell, failed])];
+    let expected = [[1, 0, 2], [0, 1, 0]];
+    (found == expected).then_some(()).ok_or_else(|| {
+        format!(
+            "of a known cell that was measured twice, and of one that failed, cells, stale ones and lines that are kept are {found:?}, and \
+             should be {expected:?}: a run that goes on with this program would count lines twice, or keep failures; build it anew, and \
+             report what stays wrong"
+        )
+    })
 }
 
 #[cfg(test)]

@@ -5,20 +5,23 @@ use super::compactions::rates;
 use super::orders::of_turns;
 use super::primary::Turns;
 use super::structure_times::of_rounds;
+use super::times::median_stages;
 use crate::animation::last_rounds;
 use crate::coherence::known;
 use crate::compaction::least_bytes;
 use crate::ray_sets::readings;
 use crate::sampler_cost::ns_per_draw;
+use crate::stopping::is_met;
 use crate::timing::{Measured, Samples, interleave};
 use raystone_accel::{Hit, NO_HIT};
-use raystone_config::Timing;
+use raystone_config::{StopRule, Timing};
 use raystone_core::geometry::Ray;
 use raystone_core::params::Choice as _;
 use raystone_gpu::compaction::Order;
 use raystone_gpu::{Elapsed, GpuError};
 use raystone_record::{PrimaryRecord, RayClass, Reading};
 use raystone_render::{InOrder, Order as PixelOrder};
+use raystone_stats::comparison::LogFigure;
 use raystone_stats::interval::Interval;
 use raystone_verify::rays::RaySet;
 use std::cell::RefCell;
@@ -41,6 +44,8 @@ pub(super) fn check() -> Result<(), String> {
         .into_iter()
         .chain(turns())
         .chain(per_item()?)
+        .chain(stages())
+        .chain(stops())
         .chain(frames());
     for (what, found, expected) in all {
         let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
@@ -111,8 +116,11 @@ fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
     if !ordered.iter().all(is_round) {
         return wrong("a measurement has no turn, or two, in a round");
     }
-    if ordered.iter().all(|round| *round == ordered[0]) {
-        return wrong("the order is the same in all rounds");
+    let stood_at = |place, turn| ordered.iter().any(|round| round[turn] == place);
+    if !(0..9).all(|k| stood_at(k / 3, k % 3)) {
+        return wrong(
+            "a measurement never has the first turn of a round, or the second or the last",
+        );
     }
     for (place, found) in found.into_iter().enumerate() {
         let samples = found.map_err(|e| e.to_string())?;
@@ -238,6 +246,48 @@ fn per_item() -> Result<Vec<Known>, String> {
             2.0,
         ),
     ])
+}
+
+/// Medians, not means or the longest; one stage alone is none.
+fn stages() -> [Known; 3] {
+    let measured = [[2.0, 7.0], [9.0, 1.0], [3.0, 2.0]].map(|[a, b]| {
+        let stages = [("a", a), ("b", b)].map(|(name, ms)| (name.to_owned(), ms));
+        std::collections::BTreeMap::from(stages)
+    });
+    let found = median_stages(&measured);
+    let at = |name: &str| found.get(name).copied().unwrap_or(f64::NAN);
+    let mut alone = measured.to_vec();
+    alone.iter_mut().for_each(|stages| {
+        stages.remove("b");
+    });
+    let alone = median_stages(&alone).len();
+    [
+        ("time of a stage", at("a"), 3.0),
+        ("time of another stage", at("b"), 2.0),
+        ("number of stages of one", alone as f64, 0.0),
+    ]
+}
+
+/// Seven errors about 1.49, whose upper end is 3.25 with a chance of 5 % and 5.42 with 1 %: five looks share the first.
+fn stops() -> [Known; 3] {
+    let errors = [1.1, 0.4, 2.0, 1.6, 2.9, 0.8, 2.6];
+    let error = LogFigure::of_rounds("rounds", &errors);
+    let met = |relmse, looks| {
+        let rule = StopRule {
+            relmse,
+            confidence: 0.95,
+            tile: None,
+        };
+        let is_met = error
+            .as_ref()
+            .is_some_and(|error| is_met(&rule, error, looks));
+        f64::from(u8::from(is_met))
+    };
+    [
+        ("end after one look", met(3.3, 1), 1.0),
+        ("end after five looks", met(5.4, 5), 0.0),
+        ("later end after five looks", met(5.5, 5), 1.0),
+    ]
 }
 
 /// The last three of four notes, the first of which warmed up.

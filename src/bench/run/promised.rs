@@ -3,8 +3,8 @@
 
 use raystone_config::{Experiment, REFERENCE_PARTS};
 use raystone_record::{
-    AnimationRecord, Body, Cost, ErrorRecord, FrameRecord, Line, ReferenceRecord, SpectrumRecord,
-    StreamRecord, StructureRecord, TimeRecord,
+    AnimationRecord, BiasRecord, Body, Cost, ErrorRecord, FrameRecord, Line, ReferenceRecord,
+    SpectrumRecord, StreamRecord, StructureRecord, TimeRecord,
 };
 use std::collections::BTreeMap;
 
@@ -16,6 +16,8 @@ pub(super) struct Promised {
     experiment: Experiment,
     /// Replicates of each sampler, by the key of their lines.
     replicates: BTreeMap<String, Seen>,
+    /// Sum of the levels at which samplers were tested for a bias.
+    levels: f64,
 }
 
 /// The replicates of a sampler.
@@ -35,6 +37,7 @@ impl Promised {
         Self {
             experiment: experiment.clone(),
             replicates: BTreeMap::new(),
+            levels: 0.0,
         }
     }
 
@@ -56,11 +59,26 @@ impl Promised {
                 let written = self.replicates.remove(&line.key.to_string());
                 self.spectrum(record, written.unwrap_or_default())
             }
+            Body::Bias(record) => self.bias(record),
             Body::Stream(record) => self.stream(record),
             Body::Animation(record) => self.animation(record),
             _ => None,
         };
         found.map(|fault| format!("{}: {fault}", line.key))
+    }
+
+    /// All samplers that claim to have no bias share the chance of a false alarm.
+    fn bias(&mut self, record: &BiasRecord) -> Option<String> {
+        let of_run = record.alpha_of_run?;
+        if record.p.is_some() && !record.by_design {
+            self.levels += record.alpha;
+        }
+        (self.levels > of_run * (1.0 + 1e-9)).then(|| {
+            format!(
+                "samplers are tested for a bias at levels of {} together, which were to be {of_run}",
+                self.levels
+            )
+        })
     }
 
     fn structure(&self, record: &StructureRecord) -> Option<String> {
@@ -225,6 +243,14 @@ mod tests {
             line("reference", body)
         };
         assert_eq!(said(&[reference(80)]), "");
+        let bias = |alpha: f64| {
+            let body = serde_json::json!({
+                "tiles": 4, "rejected": 0, "alpha": alpha, "alpha_of_run": 0.01, "min_p": 0.5, "p_histogram": [], "p": 0.5,
+                "verdict": "no-bias-found",
+            });
+            line("bias", body)
+        };
+        assert_eq!(said(&[bias(0.005), bias(0.005)]), "");
         for (lines, part) in [
             (vec![replicate(0, 8, &[1, 4])], "seed"),
             (vec![replicate(1, 8, &[1, 4])], "number of a replicate"),
@@ -239,6 +265,7 @@ mod tests {
                 "images of replicates",
             ),
             (vec![reference(40)], "samples of the reference"),
+            (vec![bias(0.01), bias(0.01)], "levels of 0.02 together"),
         ] {
             assert!(said(&lines).contains(part), "{part}: {}", said(&lines));
         }

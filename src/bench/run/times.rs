@@ -355,7 +355,7 @@ fn finish(
 }
 
 /// The median of each stage over all measurements, the first ones among them; nothing where there is one stage alone.
-fn median_stages(measured: &[BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
+pub(super) fn median_stages(measured: &[BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
     let names = measured.first().into_iter().flat_map(BTreeMap::keys);
     let of = |name: &String| {
         let ms: Vec<f64> = measured
