@@ -27,6 +27,7 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+mod verify_others;
 mod view;
 
 use anyhow::Result;

@@ -4,6 +4,7 @@ use super::arguments::{DeviceArguments, ExperimentArguments, listed, of_flags, o
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{OutputArguments, screen, tell};
 use super::verify_images;
+use super::verify_others::{Others, verify_others};
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Axis, Cell, Experiment, Plan, Skipped};
@@ -34,7 +35,8 @@ const BRUTE_FORCE_TRIANGLES: usize = 5_000;
 ///
 /// Without a file: every structure (brute force only where a scene has fewer than 5,000 triangles),
 /// on `cornell-box` and `displaced-sphere`, and the integrators there and on small trial scenes of every material, light and
-/// estimator; every organisation of the path tracer on the first scene.
+/// estimator; every organisation of the path tracer on the first scene. Unless structures or cells are chosen, also the kernels
+/// that parameters choose, and those of measurements without a scene.
 #[derive(Args)]
 pub struct Verify {
     /// Experiment file whose scenes and structures to check
@@ -93,6 +95,10 @@ impl Verify {
             true => raystone::run::verify_samplers(&plan, &registries, &options)?,
             false => Vec::new(),
         };
+        let others = match trials && self.accel.is_empty() && self.experiment.only.is_empty() {
+            true => verify_others(&self.of_others(), &raystone::registries(), &options)?,
+            false => Others::default(),
+        };
         let failed_samplers = samplers.iter().filter(|s| s.fault.is_some()).count();
         let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
         let refused = verified.iter().filter(|v| v.refused).count();
@@ -105,14 +111,18 @@ impl Verify {
             text += &format!("{right} of {all} integrators did not fail\n");
         }
         text += &of_samplers(&samplers);
-        let fields = as_json(&verified, &samplers, &plan.skipped);
+        text += &others.text();
+        let mut fields = as_json(&verified, &samplers, &plan.skipped);
+        fields["others"] = others.as_json();
         self.output.show("verify", fields, &text)?;
         let bad_input = verified.iter().any(|v| v.bad_input);
-        Ok(match failed + failed_paths + failed_samplers {
-            0 => ExitCode::SUCCESS,
-            _ if bad_input => ExitCode::from(BAD_INPUT),
-            _ => ExitCode::from(FAILED),
-        })
+        Ok(
+            match failed + failed_paths + failed_samplers + others.faults().len() {
+                0 => ExitCode::SUCCESS,
+                _ if bad_input => ExitCode::from(BAD_INPUT),
+                _ => ExitCode::from(FAILED),
+            },
+        )
     }
 
     fn flags(&self) -> impl Iterator<Item = String> {
@@ -124,6 +134,14 @@ impl Verify {
             self.device.kernels_override(),
         ];
         flags.into_iter().flatten()
+    }
+
+    /// Returns what is laid over the experiments of what is checked beside: kernels, from wherever they are chosen.
+    fn of_others(&self) -> Vec<String> {
+        let set = self.experiment.values.set.iter();
+        let kernels = set.filter(|text| text.starts_with("axes.kernels"));
+        let flag = self.device.kernels_override().into_iter();
+        flag.chain(kernels.cloned()).collect()
     }
 }
 
@@ -389,7 +407,7 @@ fn oracle(check: &ReferenceCheck) -> String {
 }
 
 /// Returns everything that went wrong, in words.
-fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
+pub(super) fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
     let verdict = match verdict {
         Ok(verdict) => verdict,
         Err(reason) => return vec![reason.clone()],

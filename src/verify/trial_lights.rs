@@ -21,19 +21,25 @@ fn tree() -> (&'static str, ParamValue) {
 }
 
 pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
-    Ok(vec![TrialScene {
-        scene: sky()?,
-        trials: vec![
-            path(&[depth(4)]),
-            path(&[
-                depth(3),
-                word("lights", "all"),
-                word("strategy", "mis-power"),
-            ]),
-            path(&[depth(2), word("strategy", "light"), tree()]),
-            path(&[depth(2), word("light_choice", "uniform")]),
-        ],
-    }])
+    Ok(vec![
+        TrialScene {
+            scene: sky()?,
+            trials: vec![
+                path(&[depth(4)]),
+                path(&[
+                    depth(3),
+                    word("lights", "all"),
+                    word("strategy", "mis-power"),
+                ]),
+                path(&[depth(2), word("strategy", "light"), tree()]),
+                path(&[depth(2), word("light_choice", "uniform")]),
+            ],
+        },
+        TrialScene {
+            scene: open_sky()?,
+            trials: vec![path(&[depth(3)])],
+        },
+    ])
 }
 
 /// Lights of all kinds in a tree.
@@ -138,6 +144,40 @@ fn sky() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
+/// Balls in mid-air under a map of more columns than a texture is wide, so that rays leave to all sides: also straight down, and
+/// over the seam of the map.
+fn open_sky() -> Result<SceneData, SceneError> {
+    const SIZE: [u32; 2] = [1030, 6];
+    let camera = camera(vec3(0.4, 0.3, 4.1), Vec3::ZERO, Vec3::Y);
+    let mut mesh = Mesh::new("open-sky", camera, Vec3::ZERO)?;
+    let [mirror, grey] = [
+        Material::mirror("mirror", vec3(0.9, 0.8, 0.7)),
+        Material::diffuse("grey", vec3(0.5, 0.6, 0.4)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.ball(vec3(-0.8, 0.1, 0.0), 0.9, mirror);
+    mesh.ball(vec3(1.0, -0.2, 0.3), 0.7, grey);
+    let mut scene = mesh.done(Vec::new());
+    // Neighbours in a row are alike: a direction is rounded to a part of a narrow texel.
+    let texel = |at: u32| {
+        let (row, column) = (at / SIZE[0], at % SIZE[0]);
+        let around = std::f32::consts::TAU * column as f32 / SIZE[0] as f32;
+        let shade = |k: u32| 0.6 + mixed(7 * row + k) + 0.5 * (around + k as f32).cos();
+        vec3(shade(0), shade(1), shade(2))
+    };
+    scene.lights = vec![Light::Environment {
+        map: Arc::new(EnvironmentMap {
+            name: "wide map".to_owned(),
+            width: SIZE[0],
+            height: SIZE[1],
+            texels: (0..SIZE[0] * SIZE[1]).map(texel).collect(),
+        }),
+        scale: 0.8,
+        turn: -2.3,
+    }];
+    Ok(scene)
+}
+
 /// A luminaire of this type; all intensities differ except where angles meet.
 fn profile(photometry: Photometry, axial: bool) -> IesProfile {
     let (vertical, horizontal) = match (photometry, axial) {
@@ -185,7 +225,7 @@ fn luminaire(photometry: Photometry, axial: bool, position: Vec3, turn: Quat) ->
     }
 }
 
-pub(super) fn luminaire_lights() -> [Light; 4] {
+pub(super) fn luminaire_lights() -> [Light; 5] {
     let turn = |x: f32, y: f32, z: f32, w: f32| Quat::from_xyzw(x, y, z, w);
     [
         luminaire(
@@ -212,7 +252,21 @@ pub(super) fn luminaire_lights() -> [Light; 4] {
             vec3(1.3, 0.7, -0.4),
             turn(0.7, 0.1, 0.1, 0.7),
         ),
+        half_a_turn(vec3(-0.2, 1.2, 1.1), turn(0.6, 0.2, -0.3, 0.6)),
     ]
+}
+
+/// A luminaire measured at the ends of half a turn alone, which lights nothing beyond.
+fn half_a_turn(position: Vec3, turn: Quat) -> Light {
+    let mut half = profile(Photometry::C, false);
+    half.candela.truncate(2 * half.vertical.len());
+    half.horizontal = vec![0.0, 180.0];
+    Light::Ies {
+        position,
+        rotation: turn.normalize(),
+        color: vec3(0.7, 1.1, 0.9),
+        profile: Arc::new(half),
+    }
 }
 
 /// A corner with a block between luminaires of all types.

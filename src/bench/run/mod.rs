@@ -3,6 +3,7 @@
 //! config → scene → accel → gpu → integrator → measure → records. Reports use only records.
 
 mod adaptive;
+mod alone;
 mod animation;
 mod built_in;
 mod coherence;
@@ -56,6 +57,7 @@ mod words;
 mod world;
 
 pub use adaptive::LEAST_FOR_TILES;
+pub use alone::{VerifiedMeasurement, verify_measurements};
 pub use cost::{Cost, Work};
 pub use error::RunError;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder, records_in};

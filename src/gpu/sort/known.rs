@@ -11,8 +11,9 @@ const SIZES: [(u32, u32, u32, u64); 4] = [
     (2049, 9, 6, 19_464),
     (5000, 32, 12, 44_096),
 ];
-/// Pairs and bits that are sorted: two tiles and one key, with as many digits as bring it back; and few, which end elsewhere.
-const SORTED: [(u32, u32); 2] = [(4097, 32), (301, 17)];
+/// Pairs and bits that are sorted: two tiles and one key, with as many digits as bring it back; few, which end elsewhere; and more
+/// tiles than a workgroup has lanes, which are scanned in two turns.
+const SORTED: [(u32, u32); 3] = [(4097, 32), (301, 17), (2048 * 64 + 1, 8)];
 
 /// Computes the sizes.
 ///

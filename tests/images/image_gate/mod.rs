@@ -111,7 +111,7 @@ fn independent() -> Sampler {
 /// Checks the trial scenes in a range, split into eight tests for their duration.
 fn check_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 31);
+    assert_eq!(scenes.len(), 32);
     for trial in &scenes[places] {
         for (name, changes) in in_turn("integrators path by path", &trial.trials) {
             let what = integrator_variant(name, changes);
@@ -134,32 +134,32 @@ fn single_paths_of_gloss_textures_and_instances_are_those_of_the_oracle() {
 
 #[test]
 fn single_paths_of_maps_luminaires_and_many_lamps_are_those_of_the_oracle() {
-    check_trials(6..9);
+    check_trials(6..10);
 }
 
 #[test]
 fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
-    check_trials(9..12);
+    check_trials(10..13);
 }
 
 #[test]
 fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_oracle() {
-    check_trials(12..15);
+    check_trials(13..16);
 }
 
 #[test]
 fn single_paths_of_fences_veils_every_pair_and_rooms_of_other_sizes_are_those_of_the_oracle() {
-    check_trials(15..22);
+    check_trials(16..23);
 }
 
 #[test]
 fn single_paths_through_media_are_those_of_the_oracle() {
-    check_trials(22..28);
+    check_trials(23..29);
 }
 
 #[test]
 fn single_paths_through_several_media_are_those_of_the_oracle() {
-    check_trials(28..31);
+    check_trials(29..32);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.

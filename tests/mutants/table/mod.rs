@@ -11,6 +11,7 @@ mod image;
 mod instanced;
 mod late_samples;
 mod media;
+mod narrow;
 mod path_lights;
 mod paths;
 mod rays;
@@ -49,6 +50,7 @@ pub fn mutants() -> Vec<Mutant> {
         rays::MUTANTS,
         stacks::MUTANTS,
         divide::MUTANTS,
+        narrow::MUTANTS,
     ]
     .concat()
 }
