@@ -12,12 +12,18 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
+    const NONE: Self = Self {
+        corners: [[0.0; 3]; 9],
+        count: 0,
+    };
+
     pub(crate) fn new(triangle: &TriangleRecord) -> Self {
-        let mut corners = [[0.0; 3]; 9];
-        for (corner, vertex) in corners.iter_mut().zip(triangle.vertices()) {
+        let mut polygon = Self::NONE;
+        for (corner, vertex) in polygon.corners.iter_mut().zip(triangle.vertices()) {
             *corner = vertex.map(f64::from);
         }
-        Self { corners, count: 3 }
+        polygon.count = 3;
+        polygon
     }
 
     /// Its corners; none if nothing is left.
@@ -39,7 +45,8 @@ impl Polygon {
 
     /// The part inside a grown box (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
     pub(crate) fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
-        let mut polygon = *self;
+        let (mut whole, mut cut) = (*self, Self::NONE);
+        let (mut polygon, mut part) = (&mut whole, &mut cut);
         for axis in 0..3 {
             for (border, sign) in [
                 (f64::from(bounds.min[axis]) - margin, 1.0),
@@ -47,25 +54,31 @@ impl Polygon {
             ] {
                 let is_inside = |corner: &[f64; 3]| (corner[axis] - border) * sign >= 0.0;
                 if !polygon.corners().iter().all(is_inside) {
-                    polygon.cut(axis, border, sign);
+                    polygon.cut_into(part, axis, border, sign);
+                    std::mem::swap(&mut polygon, &mut part);
                 }
             }
         }
-        polygon
+        *polygon
     }
 
-    /// Keeps the part where `sign · (x − border)` is not negative.
-    pub(crate) fn cut(&mut self, axis: usize, border: f64, sign: f64) {
-        let before = *self;
-        self.count = 0;
+    /// The part where `sign · (x − border)` is not negative.
+    pub(crate) fn cut(&self, axis: usize, border: f64, sign: f64) -> Polygon {
+        let mut part = Self::NONE;
+        self.cut_into(&mut part, axis, border, sign);
+        part
+    }
+
+    fn cut_into(&self, part: &mut Polygon, axis: usize, border: f64, sign: f64) {
+        part.count = 0;
         let mut push = |corner| {
             // Rounding may make a sliver cross a plane once more than geometry allows.
-            if let Some(place) = self.corners.get_mut(self.count) {
+            if let Some(place) = part.corners.get_mut(part.count) {
                 *place = corner;
-                self.count += 1;
+                part.count += 1;
             }
         };
-        let corners = before.corners();
+        let corners = self.corners();
         let Some(mut b) = corners.first() else { return };
         let mut to = sign * (b[axis] - border);
         for next in corners.iter().skip(1).chain(corners.first()) {
@@ -77,15 +90,43 @@ impl Polygon {
             if (from < 0.0) != (to < 0.0) {
                 let along = from / (from - to);
                 // Between both ends despite rounding: earlier cuts stay valid.
-                let mut crossing: [f64; 3] = std::array::from_fn(|i| {
-                    let place = a[i] + (b[i] - a[i]) * along;
-                    place.max(a[i].min(b[i])).min(a[i].max(b[i]))
-                });
+                let mut crossing: [f64; 3] =
+                    std::array::from_fn(|i| between(a[i] + (b[i] - a[i]) * along, a[i], b[i]));
                 crossing[axis] = border;
                 push(crossing);
             }
         }
     }
+
+    /// Its box, grown by `margin` and rounded outwards; `None` if nothing is left.
+    pub(crate) fn bounds(&self, margin: f64) -> Option<Bounds> {
+        let least = |sign: f64, axis: usize| {
+            let along = self.corners().iter().map(|corner| sign * corner[axis]);
+            // Rounding is monotone: the least is rounded once for all.
+            rounded_down(along.fold(f64::INFINITY, |a, b| if b < a { b } else { a }) - margin)
+        };
+        (self.count > 0).then(|| Bounds {
+            min: std::array::from_fn(|a| least(1.0, a)),
+            max: std::array::from_fn(|a| -least(-1.0, a)),
+        })
+    }
+}
+
+/// The largest f32 that is at most `x`.
+pub(crate) fn rounded_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x {
+        nearest.next_down()
+    } else {
+        nearest
+    }
+}
+
+/// `x`, or the end that it lies beyond. Comparisons are one instruction each, unlike f64::min; there is no NaN.
+fn between(x: f64, a: f64, b: f64) -> f64 {
+    let [low, high] = if a < b { [a, b] } else { [b, a] };
+    let x = if x > low { x } else { low };
+    if x < high { x } else { high }
 }
 
 #[cfg(test)]

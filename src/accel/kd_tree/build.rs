@@ -6,7 +6,8 @@
 
 use super::{Node, Options};
 use crate::bounds::Bounds;
-use crate::spatial::{Margin, clip};
+use crate::polygon::Polygon;
+use crate::spatial::Margin;
 use crate::tree::NodeKind;
 use crate::tree::grow::{Grown, PARALLEL_GRAIN, grow};
 use crate::{AccelError, BuildLog, TriangleSoup};
@@ -165,28 +166,13 @@ struct Split {
     cost: f32,
 }
 
-enum Side {
-    Below,
-    Above,
-}
-
 impl Split {
-    /// The side on which all of a box lies; `None` if the plane cuts it.
-    fn side(&self, bounds: &Bounds) -> Option<Side> {
+    /// Whether all of a box lies below the plane, or all of it above; the plane cuts it if neither.
+    fn sides(&self, bounds: &Bounds) -> [bool; 2] {
         let (low, high) = (bounds.min[self.axis], bounds.max[self.axis]);
-        if low == high && low == self.position {
-            Some(if self.planar_below {
-                Side::Below
-            } else {
-                Side::Above
-            })
-        } else if high <= self.position {
-            Some(Side::Below)
-        } else if low >= self.position {
-            Some(Side::Above)
-        } else {
-            None
-        }
+        let is_planar = (low == self.position) & (high == self.position);
+        let is_below = (high <= self.position) & (!is_planar | self.planar_below);
+        [is_below, (low >= self.position) & !is_below]
     }
 }
 
@@ -269,12 +255,15 @@ impl Region {
         let mut next = 0;
         while next < events.len() {
             let position = events[next].position;
-            let mut kinds = [0; 3];
+            // Counters in registers: in an array each count would wait for the one before.
+            let (mut ending, mut planar, mut starting) = (0, 0, 0);
             while next < events.len() && events[next].position == position {
-                kinds[(events[next].word >> 30) as usize] += 1;
+                let kind = events[next].word >> 30;
+                ending += u32::from(kind == PlaneKind::End as u32);
+                planar += u32::from(kind == PlaneKind::Planar as u32);
+                starting += u32::from(kind == PlaneKind::Start as u32);
                 next += 1;
             }
-            let [ending, planar, starting] = kinds;
             above -= ending + planar;
             if low < position && position < high {
                 let cost_below = scale * half_area(position - low);
@@ -315,37 +304,43 @@ impl Region {
         bounds[1].min[split.axis] = split.position;
         let mut places = Vec::with_capacity(self.items.len());
         let mut cut = [Vec::new(), Vec::new()];
-        let (mut kept, mut above) = (0, Vec::with_capacity(split.above as usize));
+        // As in `distribute`, an item is written to both lists, one of which counts it. No list is longer than the
+        // number of items so far, so nothing is overwritten that is still to come.
+        let (mut kept, mut moved) = (0, 0);
+        let mut above = vec![Item::NONE; split.above as usize + 1];
         for index in 0..self.items.len() {
+            let [is_below, is_above] = split.sides(&self.items[index].bounds);
+            if is_below | is_above {
+                places.push(if is_below {
+                    kept as u32
+                } else {
+                    moved as u32 | ABOVE
+                });
+                above[moved] = self.items[index];
+                self.items[kept] = self.items[index];
+                kept += usize::from(is_below);
+                moved += usize::from(is_above);
+                continue;
+            }
+            places.push(CUT);
             let item = self.items[index];
-            let [here, there] = match split.side(&item.bounds) {
-                Some(Side::Below) => {
-                    places.push(kept as u32);
-                    [Some(item), None]
-                }
-                Some(Side::Above) => {
-                    places.push(above.len() as u32 | ABOVE);
-                    [None, Some(item)]
-                }
-                None => {
-                    places.push(CUT);
-                    let parts = bounds.map(|half| item.part_within(&half, settings));
-                    cut[0].extend(parts[0].map(|_| kept as u32));
-                    cut[1].extend(parts[1].map(|_| above.len() as u32));
-                    parts
-                }
-            };
-            // No more than one for each item so far, so nothing is overwritten that is still to come.
-            if let Some(item) = here {
-                self.items[kept] = item;
+            let parts = item.parts(&self.bounds, split, settings);
+            if let Some(part) = parts[0] {
+                cut[0].push(kept as u32);
+                self.items[kept] = part;
                 kept += 1;
             }
-            above.extend(there);
+            if let Some(part) = parts[1] {
+                cut[1].push(moved as u32);
+                above[moved] = part;
+                moved += 1;
+            }
         }
         self.items.truncate(kept);
+        above.truncate(moved);
         let below = self.items;
         let divide_events = |(axis, events): (usize, &mut Vec<Event>)| {
-            let mut others = Vec::with_capacity(2 * split.above as usize);
+            let mut others = Vec::with_capacity(2 * split.above as usize + 1);
             distribute(events, &places, &mut others);
             merge(events, new_events(&below, &cut[0], axis));
             merge(&mut others, new_events(&above, &cut[1], axis));
@@ -378,18 +373,30 @@ const CUT: u32 = u32::MAX;
 const ABOVE: u32 = 1 << 31;
 
 impl Item {
-    /// The part within half a cell; `None` if the half is clearly missed.
-    fn part_within(&self, half: &Bounds, settings: &Settings) -> Option<Item> {
-        let by_box = self.bounds.intersection(half);
-        let within = |bounds| Item { bounds, ..*self };
+    const NONE: Self = Self {
+        bounds: Bounds::EMPTY,
+        id: 0,
+    };
+
+    /// The parts in the halves of a cell; `None` where a half is clearly missed.
+    fn parts(&self, cell: &Bounds, split: &Split, settings: &Settings) -> [Option<Item>; 2] {
+        let mut halves = [self.bounds; 2];
+        halves[0].max[split.axis] = split.position;
+        halves[1].min[split.axis] = split.position;
         let Some(margins) = &settings.margins else {
-            return Some(within(by_box));
+            return halves.map(|bounds| Some(Item { bounds, ..*self }));
         };
-        let record = &settings.soup.records[self.id as usize];
-        let part = clip(record, half, margins[self.id as usize])?;
-        let clipped = by_box.intersection(&part);
-        let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
-        Some(within(if overlaps { clipped } else { by_box }))
+        let margin = margins[self.id as usize];
+        let inside = Polygon::new(&settings.soup.records[self.id as usize]).clipped(cell, margin);
+        [0, 1].map(|half| {
+            let sign = [-1.0, 1.0][half];
+            let border = f64::from(split.position) - sign * margin;
+            let part = inside.cut(split.axis, border, sign).bounds(margin)?;
+            let clipped = halves[half].intersection(&part);
+            let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
+            let bounds = if overlaps { clipped } else { halves[half] };
+            Some(Item { bounds, ..*self })
+        })
     }
 }
 
@@ -403,20 +410,23 @@ fn new_events(items: &[Item], places: &[u32], axis: usize) -> Vec<Event> {
     events
 }
 
-/// Keeps the events of items below, and moves those of items above; both stay sorted.
+/// Keeps the events of items below, and moves those of items above; both stay sorted. Each event is written to
+/// both lists, one of which counts it: a branch between them would be guessed wrong every other time.
 fn distribute(events: &mut Vec<Event>, places: &[u32], above: &mut Vec<Event>) {
-    let mut kept = 0;
+    let (mut kept, mut moved) = (0, 0);
+    // One more for what is written and not counted.
+    above.resize(above.capacity().max(1), Event::new(0.0, 0, PlaneKind::End));
     for index in 0..events.len() {
         let event = events[index];
         let place = places[event.item()];
-        if place & ABOVE == 0 {
-            events[kept] = event.of_item(place);
-            kept += 1;
-        } else if place != CUT {
-            above.push(event.of_item(place & !ABOVE));
-        }
+        let event = event.of_item(place & !ABOVE);
+        events[kept] = event;
+        above[moved] = event;
+        kept += usize::from(place & ABOVE == 0);
+        moved += usize::from(place & ABOVE != 0 && place != CUT);
     }
     events.truncate(kept);
+    above.truncate(moved);
 }
 
 /// Merges sorted events into a sorted list, from its end, so that each is moved once.

@@ -2,7 +2,7 @@
 
 use super::{INNER_SHIFT, LAST, LEAF, Options, RootCell};
 use crate::bounds::Bounds;
-use crate::spatial::{Margin, Overlap, corners};
+use crate::spatial::{ABOVE, Margin, missed_octants};
 use crate::triangle::TriangleRecord;
 use crate::{AccelError, TriangleSoup};
 use rayon::prelude::*;
@@ -78,13 +78,25 @@ struct Settings<'a> {
     space: &'a RootCell,
     options: &'a Options,
     max_depth: u32,
-    /// By triangle, scene units; set if they are clipped.
-    margins: Option<Vec<f64>>,
-    boxes: Vec<Bounds>,
+    /// By triangle.
+    extents: Vec<Extent>,
+}
+
+/// What most cells need of a triangle, side by side in memory: lists of cells read it at random.
+#[derive(Clone, Copy)]
+struct Extent {
+    bounds: Bounds,
+    /// Scene units; none if triangles are not clipped.
+    margin: Option<f64>,
 }
 
 impl<'a> Settings<'a> {
     fn new(soup: &'a TriangleSoup, space: &'a RootCell, options: &'a Options) -> Self {
+        let margin = Margin::new(&soup.bounds());
+        let extent = |record: &TriangleRecord| Extent {
+            bounds: record.bounds(),
+            margin: options.clip.then(|| margin.of(record)),
+        };
         Self {
             soup,
             space,
@@ -93,11 +105,7 @@ impl<'a> Settings<'a> {
                 depth => depth,
             },
             options,
-            margins: options.clip.then(|| {
-                let margin = Margin::new(&soup.bounds());
-                soup.records.par_iter().map(|r| margin.of(r)).collect()
-            }),
-            boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
+            extents: soup.records.par_iter().map(extent).collect(),
         }
     }
 
@@ -137,82 +145,86 @@ impl<'a> Settings<'a> {
         if cost >= triangles.len() as f64 {
             return None;
         }
-        let mut children = Children {
-            ends: [0; 8],
-            triangles: Vec::with_capacity(listed as usize),
-        };
-        for octant in 0..8 {
-            let inside = triangles.iter().zip(&octants);
-            let inside = inside.filter(|(_, mask)| *mask >> octant & 1 == 1);
-            children.triangles.extend(inside.map(|(id, _)| id));
-            children.ends[octant] = children.triangles.len();
-        }
-        Some(children)
+        Some(Children::new(triangles, &octants))
     }
 
     /// The children of a cell that list a triangle, one bit each.
     fn octants(&self, id: u32, cell: &Divided) -> u8 {
-        let mask = by_box(&self.boxes[id as usize], cell.middle);
-        let Some(margins) = self.margins.as_ref().filter(|_| !mask.is_power_of_two()) else {
+        let extent = &self.extents[id as usize];
+        let mask = by_box(&extent.bounds, cell.middle);
+        let Some(margin) = extent.margin.filter(|_| !mask.is_power_of_two()) else {
             return mask;
         };
-        let record = &self.soup.records[id as usize];
-        // A child that holds a corner is touched; margins are wider than planes are rounded.
-        let open = mask & !cell.with_corner(record);
-        if open == 0 {
+        let vertices = self.soup.records[id as usize].vertices();
+        let from_centre =
+            vertices.map(|v| std::array::from_fn(|a| f64::from(v[a]) - cell.centre[a]));
+        // An octant that holds a corner is touched; margins are wider than planes are rounded.
+        let held = from_centre.iter().fold(0, |held, v: &[f64; 3]| {
+            let within = (0..3).all(|a| v[a].abs() <= cell.size[a]);
+            let above = |a: usize| u8::from(v[a] > 0.0) << a;
+            held | u8::from(within) << (above(0) | above(1) | above(2))
+        });
+        if mask & !held == 0 {
             return mask;
         }
-        let margin = margins[id as usize];
-        let overlap = Overlap::new(&corners(record), cell.half.map(|h| h + margin));
-        let is_missed =
-            |octant: &usize| open >> octant & 1 == 1 && !overlap.touches(cell.centres[*octant]);
-        (0..8)
-            .filter(is_missed)
-            .fold(mask, |mask, octant| mask & !(1 << octant))
+        mask & !missed_octants(&from_centre, cell.size, margin)
+    }
+}
+
+impl Children {
+    fn new(triangles: &[u32], octants: &[u8]) -> Self {
+        let mut ends = [0; 8];
+        for mask in octants {
+            (0..8).for_each(|octant| ends[octant] += usize::from(mask >> octant & 1));
+        }
+        let mut places = [0; 8];
+        for octant in 1..8 {
+            places[octant] = ends[octant - 1];
+            ends[octant] += ends[octant - 1];
+        }
+        let mut listed = vec![0; ends[7]];
+        for (id, mask) in triangles.iter().zip(octants) {
+            let mut left = *mask;
+            while left != 0 {
+                let octant = left.trailing_zeros() as usize;
+                listed[places[octant]] = *id;
+                places[octant] += 1;
+                left &= left - 1;
+            }
+        }
+        Self {
+            ends,
+            triangles: listed,
+        }
     }
 }
 
 /// A cell that may be split.
 struct Divided {
-    bounds: Bounds,
     middle: [f32; 3],
-    /// Half extent and centres of its children.
-    half: [f64; 3],
-    centres: [[f64; 3]; 8],
+    centre: [f64; 3],
+    /// Size of its children.
+    size: [f64; 3],
 }
 
 impl Divided {
     fn new(space: &RootCell, position: [u32; 3], depth: u32) -> Self {
-        let centre = |octant| space.centre(RootCell::child(position, octant as u32), depth + 1);
         Self {
-            bounds: space.cell(position, depth),
             middle: space.middle(position, depth),
-            half: space.half(depth + 1),
-            centres: std::array::from_fn(centre),
+            centre: space.centre(position, depth),
+            size: space.half(depth),
         }
-    }
-
-    /// The children in which a triangle has a corner.
-    fn with_corner(&self, record: &TriangleRecord) -> u8 {
-        record.vertices().iter().fold(0, |mask, corner| {
-            let within = |a: usize| (self.bounds.min[a]..=self.bounds.max[a]).contains(&corner[a]);
-            let above = |a: usize| u8::from(corner[a] > self.middle[a]) << a;
-            let is_here = within(0) && within(1) && within(2);
-            mask | u8::from(is_here) << (above(0) | above(1) | above(2))
-        })
     }
 }
 
 /// The octants around `middle` that a box overlaps; a box that ends in a plane is only below it.
 pub(super) fn by_box(bounds: &Bounds, middle: [f32; 3]) -> u8 {
-    const ABOVE: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
     let mut mask = 0xff;
     for axis in 0..3 {
-        if bounds.max[axis] <= middle[axis] {
-            mask &= !ABOVE[axis];
-        } else if bounds.min[axis] >= middle[axis] {
-            mask &= ABOVE[axis];
-        }
+        let is_below = bounds.max[axis] <= middle[axis];
+        let is_above = bounds.min[axis] >= middle[axis] && !is_below;
+        // Without branches, which nobody can predict.
+        mask &= !(ABOVE[axis] * u8::from(is_below)) & !(!ABOVE[axis] * u8::from(is_above));
     }
     mask
 }

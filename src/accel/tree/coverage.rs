@@ -183,12 +183,10 @@ fn covers(boxes: &[Bounds], mut rest: Polygon) -> bool {
             let border = f64::from(border);
             let is_outside = |corner: &[f64; 3]| (corner[axis] - border) * sign < 0.0;
             if rest.corners().iter().any(is_outside) {
-                let mut outside = rest;
-                outside.cut(axis, border, -sign);
-                if !covers(others, outside) {
+                if !covers(others, rest.cut(axis, border, -sign)) {
                     return false;
                 }
-                rest.cut(axis, border, sign);
+                rest = rest.cut(axis, border, sign);
             }
         }
     }
