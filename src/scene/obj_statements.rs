@@ -164,6 +164,11 @@ impl Statements {
                 let group = words.clone().next().unwrap_or("off");
                 reader.is_smooth = !matches!(group, "off" | "0");
             }
+            // Keywords are in small letters, but for those of a few programs.
+            "V" | "VT" | "VN" | "F" => {
+                let small = keyword.to_ascii_lowercase();
+                self.statement(reader, library, line, &small, rest, words)?;
+            }
             _ => reader.unread.see(keyword, line),
         }
         Ok(())
@@ -219,7 +224,11 @@ impl Statements {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         let first = self.corners.len();
         for word in words {
-            self.corners.push(corner(word, counts)?);
+            let (corner, is_all) = corner(word, counts)?;
+            self.corners.push(corner);
+            reader
+                .unread
+                .see_if(!is_all, "further numbers of a corner", line);
         }
         let corners = self.corners.len() - first;
         if corners < 3 {
@@ -394,8 +403,8 @@ pub(super) fn no_number(word: &str) -> String {
     format!("`{word}` is not a number{hint}")
 }
 
-/// Parses a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, given the number of each so far.
-fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
+/// Parses a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, given the number of each so far; false if the word goes on.
+fn corner(word: &str, counts: [usize; 3]) -> Result<(Corner, bool), String> {
     let none = || format!("`{word}` is not a face corner");
     let mut corner = [NONE; 3];
     let mut parts = word.split('/');
@@ -417,10 +426,7 @@ fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
             found => found.unwrap_or(LOST),
         };
     }
-    match parts.all(str::is_empty) {
-        true => Ok(Corner(corner)),
-        false => Err(none()),
-    }
+    Ok((Corner(corner), parts.all(str::is_empty)))
 }
 
 fn beyond(vertex: i64, count: usize, place: &str) -> String {

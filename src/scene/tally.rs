@@ -55,6 +55,12 @@ impl Unread {
         }
     }
 
+    pub(crate) fn see_if(&mut self, is_so: bool, what: &str, line: usize) {
+        if is_so {
+            self.see(what, line);
+        }
+    }
+
     /// One warning for everything.
     pub(crate) fn note(&self) -> Option<String> {
         unread_warning(self.0.iter().map(|(what, tally)| {

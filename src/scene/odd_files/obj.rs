@@ -27,6 +27,14 @@ const OBJ: &[(&str, Outcome)] = &[
         "mtllib a.mtl m.mtl\nusemtl red\nf 1 2 3\n",
         Reads("r", &["a.mtl: "]),
     ),
+    (
+        "mtllib m.mtl\nusemtl red\nF 1///1 2 3//\n",
+        Reads("r", &["further numbers of a corner (line 7)"]),
+    ),
+    (
+        "V 1 1 1\nmtllib m.mtl\nusemtl red\nF -2 -3 -4\n",
+        Reads("r", &[]),
+    ),
     ("mtllib \"m.mtl\"\nusemtl red\nf 1 2 3\n", Reads("r", &[])),
     (
         "mtllib C:\\work\\m.mtl\nusemtl red\nf 1 2 3\n",
