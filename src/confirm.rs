@@ -265,9 +265,10 @@ fn ended_badly(program: &Path, ended: &Output) -> String {
     let words = String::from_utf8_lossy(&ended.stderr);
     let lines: Vec<&str> = words.lines().filter(|l| !l.trim().is_empty()).collect();
     let last = &lines[lines.len().saturating_sub(LAST_LINES)..];
-    let said = match last.is_empty() {
-        true => "it said nothing".to_owned(),
-        false => last.join("; "),
+    let said = if last.is_empty() {
+        "it said nothing".to_owned()
+    } else {
+        last.join("; ")
     };
     format!("{} ended with {}: {said}", program.display(), ended.status)
 }
@@ -297,9 +298,10 @@ fn only(cells: &[&Finding]) -> Vec<String> {
         let names: BTreeSet<&str> = cells.iter().map(|f| f.key.name(axis)).collect();
         let plain =
             |name: &&str| !name.is_empty() && !name.contains([',', '=', '*', '?', '[', '!']);
-        match names.iter().all(plain) {
-            true => names.iter().map(|name| format!("{axis}={name}")).collect(),
-            false => Vec::new(),
+        if names.iter().all(plain) {
+            names.iter().map(|name| format!("{axis}={name}")).collect()
+        } else {
+            Vec::new()
         }
     };
     axes.iter().flat_map(|axis| of(axis)).collect()

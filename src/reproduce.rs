@@ -45,9 +45,10 @@ pub fn reproduce(
         let plan = Plan::new(experiment, &[], randomised)?;
         let mut options = options.clone();
         options.out = out.clone();
-        options.existing = match !settings.force && is_of(&out.join(PARTIAL), &experiment.text) {
-            true => Existing::Resume,
-            false => Existing::Replace,
+        options.existing = if !settings.force && is_of(&out.join(PARTIAL), &experiment.text) {
+            Existing::Resume
+        } else {
+            Existing::Replace
         };
         run(experiment, &plan, registries, &options)?;
         write_report(&out)?;

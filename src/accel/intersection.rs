@@ -123,12 +123,13 @@ impl Intersection {
     /// The tests of the reference tracer: these, or where the triangle test is not exact, the default one.
     #[must_use]
     pub fn exact(self) -> Self {
-        match self.triangle.is_exact() {
-            true => self,
-            false => Self {
+        if self.triangle.is_exact() {
+            self
+        } else {
+            Self {
                 triangle: Self::default().triangle,
                 ..self
-            },
+            }
         }
     }
 

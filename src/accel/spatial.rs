@@ -77,8 +77,8 @@ pub(super) fn corners(record: &TriangleRecord) -> Corners {
 }
 
 /// The octants of a box whose `corners` are given from its centre that the triangle misses by more than `margin`, one
-/// bit each, bit `a` of an octant its half along axis `a`; `size` is that of an octant. Octants outside of the
-/// triangle's box are none of its business: the caller knows them.
+/// bit each, bit `a` of an octant its half along axis `a`; `size` is that of an octant. Of octants outside of the
+/// triangle's box it says nothing.
 ///
 /// Separating axes (T. Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001); in a projection only the outer
 /// side of each edge can separate (M. Schwarz, H.-P. Seidel, "Fast parallel surface and solid voxelization on GPUs",
@@ -87,9 +87,10 @@ pub(super) fn missed_octants(corners: &Corners, size: [f64; 3], margin: f64) -> 
     let edges = edges(corners);
     let normal = cross(edges[0], edges[1]);
     let mut missed = beside_plane(dot(corners[0], normal), normal, size, margin);
-    for axis in 0..3 {
+    for (axis, height) in normal.iter().enumerate() {
         let [b, c] = others(axis);
-        let sign = 1.0_f64.copysign(normal[axis]);
+        // Seen along this axis, the corners turn left or right.
+        let sign = 1.0_f64.copysign(*height);
         for (corner, edge) in corners.iter().zip(&edges) {
             // Outwards, and how far the centre lies outside.
             let out = [sign * edge[c], -sign * edge[b]];

@@ -143,9 +143,12 @@ fn ridge(points: &[(Weights, f64)], terms: &[usize], penalty: f64) -> Weights {
     let mean_of = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / count;
     let means: [f64; TERMS] = std::array::from_fn(|i| mean_of(&|(x, _)| x[i]));
     let level = mean_of(&|(_, y)| *y);
-    let scales: [f64; TERMS] = std::array::from_fn(|i| match terms.contains(&i) {
-        true => mean_of(&|(x, _)| (x[i] - means[i]).powi(2)).sqrt(),
-        false => 0.0,
+    let scales: [f64; TERMS] = std::array::from_fn(|i| {
+        if terms.contains(&i) {
+            mean_of(&|(x, _)| (x[i] - means[i]).powi(2)).sqrt()
+        } else {
+            0.0
+        }
     });
     let normal = |x: &[f64; TERMS], i: usize| match scales[i] {
         scale if scale > 1e-9 => (x[i] - means[i]) / scale,

@@ -69,9 +69,10 @@ pub(crate) fn fault(single: &RayBatch, double: &RayBatch) -> Result<Option<Strin
             }
         }
         // What is too short to say anything is not judged alone.
-        let found = match shortest[0].around_ms < LEAST_MS {
-            true => None,
-            false => judge(shortest).or_else(|| idle(shortest[1], worked)),
+        let found = if shortest[0].around_ms < LEAST_MS {
+            None
+        } else {
+            judge(shortest).or_else(|| idle(shortest[1], worked))
         };
         if found.is_none() {
             return fault_of_many(single);

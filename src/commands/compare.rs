@@ -96,9 +96,10 @@ fn percent(text: &str) -> Result<f64, String> {
     let value: f64 = text
         .parse()
         .map_err(|_| "a number of percent is wanted".to_owned())?;
-    match (0.0..100.0).contains(&value) {
-        true => Ok(value),
-        false => Err("a number from 0 to below 100 is wanted".into()),
+    if (0.0..100.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err("a number from 0 to below 100 is wanted".into())
     }
 }
 
@@ -265,9 +266,10 @@ impl Compare {
             write_atomic(path, text.as_bytes())
                 .with_context(|| format!("cannot write {}", path.display()))?;
         }
-        match self.json {
-            true => print_json("compare", show::json(found)),
-            false => print(&show::terminal(found, screen())),
+        if self.json {
+            print_json("compare", show::json(found))
+        } else {
+            print(&show::terminal(found, screen()))
         }
     }
 }

@@ -176,17 +176,19 @@ impl Examined {
         for (name, what) in &self.rows {
             let _ = writeln!(text, "  {name:<10}  {what}");
         }
-        text + match self.whole_loops {
-            true => "\nEverything that Raystone needs works here.\n",
-            false => "\nRaystone works here, but for what loops long: see above.\n",
+        text + if self.whole_loops {
+            "\nEverything that Raystone needs works here.\n"
+        } else {
+            "\nRaystone works here, but for what loops long: see above.\n"
         }
     }
 }
 
 fn denormals(probe: ArithmeticProbe) -> &'static str {
-    match probe.denormals {
-        true => "kept, as on the host",
-        false => "taken for 0: hits of rays and scenes of such sizes may differ from the host's",
+    if probe.denormals {
+        "kept, as on the host"
+    } else {
+        "taken for 0: hits of rays and scenes of such sizes may differ from the host's"
     }
 }
 
@@ -195,9 +197,10 @@ fn loops(gpu: &Gpu, system: &System) -> String {
     let Some(limit) = gpu.loop_limit else {
         return "run to their end".to_owned();
     };
-    let remedy = match system.has_backports() {
-        true => "type: scripts/install-driver --backports",
-        false => "install a newer driver",
+    let remedy = if system.has_backports() {
+        "type: scripts/install-driver --backports"
+    } else {
+        "install a newer driver"
     };
     format!(
         "END IN SILENCE once an invocation took {} turns in all: kernels check for it,\n              \

@@ -30,9 +30,10 @@ impl Report {
         for warning in &paths.warnings {
             warn(warning);
         }
-        match self.output.json {
-            true => print_json("report", findings(dir, &paths.html)?)?,
-            false => print(&format!("report: {}\n", paths.html.display()))?,
+        if self.output.json {
+            print_json("report", findings(dir, &paths.html)?)?
+        } else {
+            print(&format!("report: {}\n", paths.html.display()))?
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -88,17 +88,16 @@ impl Repro {
         for (index, source) in sources.iter().enumerate() {
             let is_its = |shard: Shard| index % shard.of == shard.number - 1;
             let mine = self.shard.is_none_or(is_its);
-            let found = match self.pages || !mine {
-                true => recorded(source, &settings, &catalogue).map_err(ReproError::from),
-                false => {
-                    tell(&format!(
-                        "{} ({} of {})",
-                        source.name,
-                        index + 1,
-                        sources.len()
-                    ));
-                    reproduce(source, &settings, &registries, &options).map(Some)
-                }
+            let found = if self.pages || !mine {
+                recorded(source, &settings, &catalogue).map_err(ReproError::from)
+            } else {
+                tell(&format!(
+                    "{} ({} of {})",
+                    source.name,
+                    index + 1,
+                    sources.len()
+                ));
+                reproduce(source, &settings, &registries, &options).map(Some)
             };
             match found {
                 Ok(table) => tables.extend(table),

@@ -233,13 +233,14 @@ fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
     }
     let page = write_report(&summary.out)?.html;
     let lines = read_records(&summary.out)?.lines;
-    print(&match quiet {
-        true => format!("{}\n", page.display()),
-        false => format!(
+    print(&if quiet {
+        format!("{}\n", page.display())
+    } else {
+        format!(
             "{}\n\nreport: {}\n",
             screen().tables(&lines).trim_end(),
             page.display()
-        ),
+        )
     })?;
     tell_failures(summary, lenient)
 }

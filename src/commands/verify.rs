@@ -91,13 +91,15 @@ impl Verify {
         let trials = self.file.is_none() && self.scene.is_empty();
         let verified =
             raystone::run::verify(&experiment, &plan, &registries, &options, rays, trials)?;
-        let samplers = match trials {
-            true => raystone::run::verify_samplers(&plan, &registries, &options)?,
-            false => Vec::new(),
+        let samplers = if trials {
+            raystone::run::verify_samplers(&plan, &registries, &options)?
+        } else {
+            Vec::new()
         };
-        let others = match trials && self.accel.is_empty() && self.experiment.only.is_empty() {
-            true => verify_others(&self.of_others(), &raystone::registries(), &options)?,
-            false => Others::default(),
+        let others = if trials && self.accel.is_empty() && self.experiment.only.is_empty() {
+            verify_others(&self.of_others(), &raystone::registries(), &options)?
+        } else {
+            Others::default()
         };
         let failed_samplers = samplers.iter().filter(|s| s.fault.is_some()).count();
         let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
@@ -359,9 +361,10 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
             let _ = writeln!(details, "{cell}: {detail}");
         }
     }
-    match judged.is_empty() {
-        true => String::new(),
-        false => format!("{}{details}", screen().table(&table)),
+    if judged.is_empty() {
+        String::new()
+    } else {
+        format!("{}{details}", screen().table(&table))
     }
 }
 

@@ -9,6 +9,7 @@ pub mod check;
 pub mod cone;
 pub mod device;
 pub mod disk;
+mod figures;
 pub mod known_figures;
 pub mod level;
 pub mod lobe;

@@ -4,6 +4,7 @@
 use crate::check;
 use crate::cone::Mirror;
 use crate::device::{Tracer, overlaps};
+use crate::figures::*;
 use crate::sample::{Crossing, DIMENSIONS, MOST, POWERS, budget, crossing, sampled, shimmer};
 use crate::scene::Place;
 use crate::ties::fault_of_ties;
@@ -17,7 +18,7 @@ use raystone_core::parameters;
 use raystone_core::params::{Entry, Parameters as _};
 use raystone_gpu::{Elapsed, Gpu, GpuError, probe_arithmetic};
 use raystone_image::{Image, Picture, tone_map};
-use raystone_record::figure::{Better, Figure, Shown, Spread};
+use raystone_record::figure::Figure;
 use raystone_record::{Note, Reading};
 use raystone_sampling::{Demand, Sampler};
 use std::sync::Arc;
@@ -132,119 +133,6 @@ impl Load {
         }
     }
 }
-
-const fn figure(id: &'static str, title: &'static str, unit: &'static str, shown: Shown) -> Figure {
-    Figure::new(id, title, unit, Better::Lower, shown, Spread::Exact)
-}
-
-/// Places of figures after the errors with 1, 2, 4, … samples.
-const BIAS: usize = POWERS;
-const CROSSING: usize = POWERS + 1;
-const ADAPTIVE: usize = POWERS + 2;
-const LAYERS: usize = POWERS + 3;
-const LAYERS_99: usize = POWERS + 4;
-const OPEN: usize = POWERS + 5;
-const APART: usize = POWERS + 6;
-const AREA: usize = POWERS + 7;
-const TIME: usize = POWERS + 8;
-const EDGES: usize = POWERS + 9;
-const EDGE_BIAS: usize = POWERS + 10;
-const EDGE_CROSSING: usize = POWERS + 11;
-const SHIMMER: usize = POWERS + 12;
-
-static FIGURES: [Figure; POWERS + 13] = [
-    figure("cones-error-1/v1", "RMSE of 1 sample", "", Shown::Digits(3)),
-    figure("cones-error-2/v1", "of 2", "", Shown::Digits(3)),
-    figure("cones-error-4/v1", "of 4", "", Shown::Digits(3)),
-    figure("cones-error-8/v1", "of 8", "", Shown::Digits(3)),
-    figure("cones-error-16/v1", "of 16", "", Shown::Digits(3)),
-    figure("cones-error-32/v1", "of 32", "", Shown::Digits(3)),
-    figure("cones-error-64/v1", "of 64", "", Shown::Digits(3)),
-    figure("cones-error-128/v1", "of 128", "", Shown::Digits(3)),
-    figure("cones-error-256/v1", "of 256", "", Shown::Digits(3)),
-    figure(
-        "cones-bias/v1",
-        "RMSE of the cone (biased by design)",
-        "",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-crossing/v1",
-        "samples with which the sampler is as good",
-        "spp",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-adaptive/v1",
-        "RMSE with samples by footprint over that with as many everywhere",
-        "",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-layers/v1",
-        "layers of a cone, mean",
-        "",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-layers-99/v1",
-        "layers of 99 % of the cones, greatest",
-        "",
-        Shown::Count,
-    ),
-    figure(
-        "cones-open/v1",
-        "part of the cones that no kept layer covers",
-        "",
-        Shown::Percent,
-    ),
-    figure(
-        "cones-apart/v1",
-        "f32 from the oracle, greatest",
-        "",
-        Shown::Digits(2),
-    ),
-    figure(
-        "cones-area-off/v1",
-        "area of an overlap in f32 from quadrature, greatest",
-        "",
-        Shown::Digits(2),
-    ),
-    Figure::new(
-        "cones-ns/v1",
-        "time",
-        "ns per cone",
-        Better::Lower,
-        Shown::Digits(3),
-        Spread::Median,
-    ),
-    Figure::new(
-        "cones-edges/v1",
-        "pixels at silhouettes",
-        "",
-        Better::Neither,
-        Shown::Percent,
-        Spread::Exact,
-    ),
-    figure(
-        "cones-edge-bias/v1",
-        "RMSE of the cone there",
-        "",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-edge-crossing/v1",
-        "samples with which the sampler is as good there",
-        "spp",
-        Shown::Digits(3),
-    ),
-    figure(
-        "cones-shimmer/v1",
-        "deviation of the error over frames",
-        "",
-        Shown::Digits(3),
-    ),
-];
 
 /// Adds the measurement.
 ///

@@ -79,9 +79,10 @@ pub(crate) fn beam(camera: &Camera<f64>, lens: &Lens, pixel: u32) -> Beam {
     let curvature = if camera.mirror == 1 { 1.0 } else { 0.0 };
     let tangential = 1.0 + 2.0 * t * curvature / cosine;
     let sagittal = 1.0 + 2.0 * t * curvature * cosine;
-    let wider = match camera.is_mean {
-        true => (tangential * sagittal).sqrt(),
-        false => tangential,
+    let wider = if camera.is_mean {
+        (tangential * sagittal).sqrt()
+    } else {
+        tangential
     };
     let own = (tangent * wider).min(WIDEST);
     let angle = own.atan() + camera.gloss.atan();

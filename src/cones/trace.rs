@@ -237,9 +237,10 @@ impl<T: Angle> Tracing<'_, T> {
             out.weight = lobe_weight(self.lobes, out.share, beside, cone.narrow);
         }
         if self.has_mask() {
-            out.bits = match covered.sum.area < zero {
-                true => covered.right,
-                false => covered.left,
+            out.bits = if covered.sum.area < zero {
+                covered.right
+            } else {
+                covered.left
             };
             if part.area == T::PI {
                 out.bits = [u32::MAX; 2];

@@ -80,9 +80,12 @@ impl Catalogue {
         if !changed.range.allows(value) {
             return None;
         }
-        let value_of = |known: &Parameter| match known.name == name {
-            true => Some(value.clone()),
-            false => now.params.0.get(known.name).cloned(),
+        let value_of = |known: &Parameter| {
+            if known.name == name {
+                Some(value.clone())
+            } else {
+                now.params.0.get(known.name).cloned()
+            }
         };
         let set: Vec<(&'static str, ParamValue)> = (entry.schema.iter())
             .filter_map(|known| Some((known.name, value_of(known)?)))

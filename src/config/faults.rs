@@ -38,9 +38,10 @@ impl Faults {
     /// # Errors
     /// The only mistake, or [`ConfigError::Several`].
     pub(crate) fn end(self) -> Result<(), ConfigError> {
-        match self.0.is_empty() {
-            true => Ok(()),
-            false => Err(self.error()),
+        if self.0.is_empty() {
+            Ok(())
+        } else {
+            Err(self.error())
         }
     }
 

@@ -114,9 +114,12 @@ impl Plan {
             cells.retain(|cell| renders && !is_bench(&cell[Axis::Integrator]));
             cells
         };
-        let of_images = |which: &[Axis]| match experiment.run.images {
-            true => rendering(which),
-            false => Vec::new(),
+        let of_images = |which: &[Axis]| {
+            if experiment.run.images {
+                rendering(which)
+            } else {
+                Vec::new()
+            }
         };
         let mut benches = cells(&Cell::BENCH);
         benches.retain(|cell| is_bench(&cell[Axis::Integrator]));

@@ -135,9 +135,12 @@ fn differing_pixel(read: &Image, written: &Image, is_exact: bool) -> Option<Stri
     }
     let bits = |pixel: &[f32; 3]| pixel.map(|v| if v.is_nan() { f32::NAN } else { v }.to_bits());
     let mut pairs = read.pixels.iter().zip(&written.pixels);
-    let place = pairs.position(|(read, written)| match is_exact {
-        true => bits(read) != bits(written),
-        false => !is_near(read, written),
+    let place = pairs.position(|(read, written)| {
+        if is_exact {
+            bits(read) != bits(written)
+        } else {
+            !is_near(read, written)
+        }
     })?;
     let [x, y] = [place as u32 % read.width, place as u32 / read.width];
     let (read, written) = (read.pixels[place], written.pixels[place]);

@@ -207,9 +207,10 @@ pub fn read_npy_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f32>), String> {
         value(word)
     };
     let values: Vec<f32> = data.chunks_exact(width as usize).map(number).collect();
-    let values = match is_fortran {
-        true => in_c_order(&sizes, &values),
-        false => values,
+    let values = if is_fortran {
+        in_c_order(&sizes, &values)
+    } else {
+        values
     };
     Ok((sizes, values))
 }

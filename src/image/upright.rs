@@ -46,9 +46,10 @@ pub(super) fn upright(bytes: &[u8]) -> Option<(Vec<u8>, Turn)> {
 impl Turn {
     pub(super) fn undone(&self, image: &Image) -> Result<Image, String> {
         let [lines, within] = [image.height, image.width];
-        let [width, height] = match self.is_column {
-            true => [lines, within],
-            false => [within, lines],
+        let [width, height] = if self.is_column {
+            [lines, within]
+        } else {
+            [within, lines]
         };
         let turned =
             |k: u32, count: u32, is_turned: bool| if is_turned { count - 1 - k } else { k };

@@ -66,10 +66,12 @@ impl Cost {
     /// Returns the times that count: those of the processor on a software adapter, which shares it with other
     /// processes.
     pub fn ms(&self, software: bool) -> &[f64] {
-        match software && !self.processor_ms.is_empty() {
-            true => &self.processor_ms,
-            false if self.passes_ms.is_empty() => &self.wall_ms,
-            false => &self.passes_ms,
+        if software && !self.processor_ms.is_empty() {
+            &self.processor_ms
+        } else if self.passes_ms.is_empty() {
+            &self.wall_ms
+        } else {
+            &self.passes_ms
         }
     }
 }

@@ -106,9 +106,10 @@ impl Figure {
 
     /// Returns title and unit, as the head of a column.
     pub fn heading(&self) -> String {
-        match self.unit.is_empty() {
-            true => self.title.to_string(),
-            false => format!("{}, {}", self.title, self.unit),
+        if self.unit.is_empty() {
+            self.title.to_string()
+        } else {
+            format!("{}, {}", self.title, self.unit)
         }
     }
 }

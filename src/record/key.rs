@@ -117,9 +117,10 @@ impl From<PlainOrWhole> for Written {
 
 impl From<Written> for PlainOrWhole {
     fn from(Written(variant): Written) -> Self {
-        match variant.params.0.is_empty() && variant.name == variant.label {
-            true => Self::Plain(variant.label),
-            false => Self::Whole(variant),
+        if variant.params.0.is_empty() && variant.name == variant.label {
+            Self::Plain(variant.label)
+        } else {
+            Self::Whole(variant)
         }
     }
 }

@@ -37,9 +37,10 @@ pub(crate) fn renewed(line: Value) -> serde_json::Result<Value> {
     if !line.is_object() {
         return Err(serde::de::Error::custom("a line is an object"));
     }
-    let mut line = match line.get("schema").and_then(Value::as_str) == Some(OLD_SCHEMAS[0]) {
-        true => with_key(line),
-        false => line,
+    let mut line = if line.get("schema").and_then(Value::as_str) == Some(OLD_SCHEMAS[0]) {
+        with_key(line)
+    } else {
+        line
     };
     line["schema"] = SCHEMA.into();
     let body = &line["body"];

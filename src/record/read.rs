@@ -96,9 +96,10 @@ pub fn records_file(dir: &Path) -> PathBuf {
     let plain = dir.join(RECORDS_FILE);
     let packed = dir.join(PACKED_FILE);
     let is_there = |path: &Path| std::fs::symlink_metadata(path).is_ok();
-    match !is_there(&plain) && is_there(&packed) {
-        true => packed,
-        false => plain,
+    if !is_there(&plain) && is_there(&packed) {
+        packed
+    } else {
+        plain
     }
 }
 
@@ -185,9 +186,10 @@ pub fn read_lines<B: DeserializeOwned + Sound>(
         }
         records.lines.push(parsed);
     }
-    match records.lines.is_empty() {
-        true => Err(RecordError::NoRecords { path: path.into() }),
-        false => Ok(records),
+    if records.lines.is_empty() {
+        Err(RecordError::NoRecords { path: path.into() })
+    } else {
+        Ok(records)
     }
 }
 

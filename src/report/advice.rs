@@ -90,9 +90,10 @@ pub(crate) fn table(data: &RunData, scene: &SceneGroup) -> Table {
     let trials = demands
         .iter()
         .filter_map(|d| trial(&advice, scene.name, &measured, d));
-    let seen = match advice.scenes.iter().any(|known| known == scene.name) {
-        true => "the scene is one of those",
-        false => "the scene is none of those",
+    let seen = if advice.scenes.iter().any(|known| known == scene.name) {
+        "the scene is one of those"
+    } else {
+        "the scene is none of those"
     };
     let caption = format!(
         "What `accel = \"auto\"` would have chosen among these for so many rays of all classes, and the cost of build and rays over that of the cheapest: a table fitted on {} scenes ({}; {seen})",

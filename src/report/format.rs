@@ -64,9 +64,10 @@ pub fn interval(interval: &Interval) -> String {
 }
 
 fn with_bounds(i: &Interval, text: impl Fn(f64) -> String) -> String {
-    match i.low == i.high {
-        true => text(i.value),
-        false => format!("{} [{}, {}]", text(i.value), text(i.low), text(i.high)),
+    if i.low == i.high {
+        text(i.value)
+    } else {
+        format!("{} [{}, {}]", text(i.value), text(i.low), text(i.high))
     }
 }
 

@@ -214,14 +214,12 @@ impl Device {
         let structures: Vec<&Structure> = of.flat_map(|s| &s.structures).collect();
         let passed = structures.iter().filter(|s| s.fault.is_none()).count();
         let all = structures.len();
-        let text = match passed == all {
-            true => format!("{all} passed"),
-            false => format!("{passed} of {all} passed"),
+        let text = if passed == all {
+            format!("{all} passed")
+        } else {
+            format!("{passed} of {all} passed")
         };
-        TableCell::from(text).toned(match passed == all {
-            true => Tone::Good,
-            false => Tone::Bad,
-        })
+        TableCell::from(text).toned(if passed == all { Tone::Good } else { Tone::Bad })
     }
 
     fn scene(&self, name: &str) -> Option<&Scene> {

@@ -23,9 +23,10 @@ fn block(of: &Block) -> String {
     match of {
         Block::Heading(text) => format!("### {}\n", escape(text)),
         Block::Fold(fold) => {
-            let note = match fold.note.is_empty() {
-                true => String::new(),
-                false => format!("{}\n", escape(&fold.note)),
+            let note = if fold.note.is_empty() {
+                String::new()
+            } else {
+                format!("{}\n", escape(&fold.note))
             };
             let inside: Vec<String> = fold.blocks.iter().map(block).collect();
             format!(

@@ -124,9 +124,10 @@ impl PointPage {
             let cloud = Cloud::new(Domain::Square, self.pairs(i, j)?);
             panels.push(Panel::new(title, "", cloud));
         }
-        let of = match self.dims.len() > shown {
-            true => format!("the first {shown} dimensions given"),
-            false => "all dimensions given".into(),
+        let of = if self.dims.len() > shown {
+            format!("the first {shown} dimensions given")
+        } else {
+            "all dimensions given".into()
         };
         let caption = format!("Every pair of {of}: {}.", drawn_in_words(self.points.len()));
         let projections = panels::figure("projections", caption, &panels, 4);
@@ -160,9 +161,10 @@ impl PointPage {
         let all: Vec<Pair> = self.copies.concat();
         let own = self.copies.first().cloned().unwrap_or_default();
         let first = own.len();
-        let highlighted = match first <= MOST_HIGHLIGHTED {
-            true => own,
-            false => Vec::new(),
+        let highlighted = if first <= MOST_HIGHLIGHTED {
+            own
+        } else {
+            Vec::new()
         };
         let cloud = |domain| Cloud {
             highlighted: highlighted.clone(),

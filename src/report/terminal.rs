@@ -82,9 +82,10 @@ impl Screen {
             Tone::Note => 33,
             Tone::Plain => return text.to_owned(),
         };
-        match self.colour && !text.is_empty() {
-            true => format!("\u{1b}[{colour}m{text}\u{1b}[0m"),
-            false => text.to_owned(),
+        if self.colour && !text.is_empty() {
+            format!("\u{1b}[{colour}m{text}\u{1b}[0m")
+        } else {
+            text.to_owned()
         }
     }
 
@@ -161,9 +162,12 @@ struct Grid {
 impl Grid {
     fn new(table: &Table) -> Self {
         let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
-        let text = |cell: &TableCell| match wordy {
-            true => visible(&cell.flat()),
-            false => visible(&cell.text),
+        let text = |cell: &TableCell| {
+            if wordy {
+                visible(&cell.flat())
+            } else {
+                visible(&cell.text)
+            }
         };
         let heads = table.columns.iter().map(|column| visible(&column.title));
         let rows = table.rows.iter().map(|row| row.iter().map(text).collect());
@@ -273,9 +277,10 @@ impl Grid {
                     let text = text.map_or("", String::as_str);
                     let blanks = " ".repeat(inner(*column).saturating_sub(width_of(text)));
                     let text = screen.toned(text, self.tone(number, *column));
-                    parts.push(match self.is_text[*column] {
-                        true => format!("{text}{blanks}"),
-                        false => format!("{blanks}{text}"),
+                    parts.push(if self.is_text[*column] {
+                        format!("{text}{blanks}")
+                    } else {
+                        format!("{blanks}{text}")
                     });
                 }
                 out += &(parts.join(&" ".repeat(GAP)).trim_end().to_owned() + "\n");
@@ -298,9 +303,10 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line) = (Vec::new(), String::new());
     for word in text.split(' ') {
-        let joined = match line.is_empty() {
-            true => word.to_owned(),
-            false => format!("{line} {word}"),
+        let joined = if line.is_empty() {
+            word.to_owned()
+        } else {
+            format!("{line} {word}")
         };
         if width_of(&joined) <= width {
             line = joined;

@@ -342,9 +342,10 @@ fn biased_samplers(level: Option<f64>, found: usize) -> usize {
             b.alpha = 0.0025;
             b.alpha_of_run = level;
             b.p_of_all = Some(if seen == 1 { 0.003 } else { 0.9 });
-            b.verdict = match (2..2 + found).contains(&seen) {
-                true => BiasVerdict::Biased,
-                false => BiasVerdict::NoBiasFound,
+            b.verdict = if (2..2 + found).contains(&seen) {
+                BiasVerdict::Biased
+            } else {
+                BiasVerdict::NoBiasFound
             };
         }
     });

@@ -61,9 +61,10 @@ pub enum Estimate {
 impl Estimate {
     /// Returns a value with its interval; `heavy_tailed` if that is unreliable.
     pub fn of(interval: Interval, heavy_tailed: bool) -> Self {
-        match heavy_tailed {
-            true => Self::HeavyTailed(interval),
-            false => Self::Known(interval),
+        if heavy_tailed {
+            Self::HeavyTailed(interval)
+        } else {
+            Self::Known(interval)
         }
     }
 }
@@ -429,16 +430,20 @@ fn rows_of(text: &str) -> Vec<Vec<String>> {
 
 /// Returns a name, with an apostrophe before it if a spreadsheet would read it as a formula.
 fn no_formula(name: &str) -> String {
-    match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
-        true => format!("'{}", visible(name)),
-        false => visible(name),
+    if name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+        format!("'{}", visible(name))
+    } else {
+        visible(name)
     }
 }
 
 fn line(fields: impl Iterator<Item = String>) -> String {
-    let quoted = |field: String| match field.contains(['"', ',', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field,
+    let quoted = |field: String| {
+        if field.contains(['"', ',', '\n', '\r']) {
+            format!("\"{}\"", field.replace('"', "\"\""))
+        } else {
+            field
+        }
     };
     fields.map(quoted).collect::<Vec<_>>().join(",") + "\n"
 }

@@ -265,9 +265,10 @@ impl Corners<'_> {
     /// A triangle without a recent edge, by a byte of two codes.
     fn apart(&mut self, code: u8, table: &[u8]) -> Option<[u32; 3]> {
         let is_listed = code < 14;
-        let pair = match is_listed {
-            true => table[usize::from(code)],
-            false => self.bytes.byte()?,
+        let pair = if is_listed {
+            table[usize::from(code)]
+        } else {
+            self.bytes.byte()?
         };
         if !is_listed && pair == 0 {
             self.next = 0;

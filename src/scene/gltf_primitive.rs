@@ -112,9 +112,10 @@ impl<'a> Geometry<'a> {
             self.notes.tell(what, place);
         }
         // The standard default is white; grey is for surfaces without any colour.
-        match is_colored {
-            true => *self.white.get_or_insert(last + 1),
-            false => last,
+        if is_colored {
+            *self.white.get_or_insert(last + 1)
+        } else {
+            last
         }
     }
 
@@ -182,9 +183,12 @@ impl<'a> Geometry<'a> {
             self.notes.tell(what, place);
         }
         let as_is = self.data.is_quantised();
-        let uvs = self.read(attributes, &name, place, |values| match as_is {
-            true => values.vectors::<2>(),
-            false => values.unit_vectors::<2>(),
+        let uvs = self.read(attributes, &name, place, |values| {
+            if as_is {
+                values.vectors::<2>()
+            } else {
+                values.unit_vectors::<2>()
+            }
         });
         uvs.into_iter().map(Vec2::from).collect()
     }

@@ -268,14 +268,14 @@ impl Statements {
                 {
                     return Err(broken);
                 }
-                match *index == NONE || number <= count as u64 {
-                    true => {}
-                    false if k == 0 => return Err((line, beyond(number as i64, count, ""))),
-                    false => {
-                        *index = NONE;
-                        self.lost[k - 1].see(line);
-                    }
+                if *index == NONE || number <= count as u64 {
+                    continue;
                 }
+                if k == 0 {
+                    return Err((line, beyond(number as i64, count, "")));
+                }
+                *index = NONE;
+                self.lost[k - 1].see(line);
             }
         }
         Ok(())

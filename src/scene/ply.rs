@@ -230,18 +230,20 @@ impl Model {
                 .face_colors
                 .see_if(color.is_some_and(|color| !is_color(color)), index);
             let color = color.map(shown);
-            let mut face = |corners: &[u32]| match is_early {
-                true => {
+            let mut face = |corners: &[u32]| {
+                if is_early {
                     self.early.extend([index as u32, corners.len() as u32]);
                     self.early.extend(corners);
                     self.early_colors.push(color);
                     Ok(())
+                } else {
+                    self.push_face(index, corners, color)
                 }
-                false => self.push_face(index, corners, color),
             };
-            match element.name == STRIPS {
-                true => strip(&corners).try_for_each(|triangle| face(&triangle)),
-                false => face(&corners),
+            if element.name == STRIPS {
+                strip(&corners).try_for_each(|triangle| face(&triangle))
+            } else {
+                face(&corners)
             }
         })
     }

@@ -65,9 +65,10 @@ impl Unread {
     pub(crate) fn note(&self) -> Option<String> {
         unread_warning(self.0.iter().map(|(what, tally)| {
             let Tally { count, first } = tally;
-            let what = match what.contains(' ') {
-                true => what.clone(),
-                false => format!("`{what}`"),
+            let what = if what.contains(' ') {
+                what.clone()
+            } else {
+                format!("`{what}`")
             };
             match count {
                 1 => format!("{what} (line {first})"),

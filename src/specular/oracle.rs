@@ -338,9 +338,10 @@ fn changes(felt: &[Option<(DVec2, f64)>], at: [usize; 2]) -> bool {
 fn on_circle(eye: DVec3, vertex: DVec3) -> Vec<DVec3> {
     let first = eye.normalize();
     let across = vertex - first * first.dot(vertex);
-    let second = match across.length() > 1e-12 {
-        true => across.normalize(),
-        false => first.any_orthonormal_vector(),
+    let second = if across.length() > 1e-12 {
+        across.normalize()
+    } else {
+        first.any_orthonormal_vector()
     };
     let p = |angle: f64| first * angle.cos() + second * angle.sin();
     let derivative = |angle: f64| {

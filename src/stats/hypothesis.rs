@@ -57,10 +57,11 @@ pub fn student_t_two_sided(t: f64, degrees_of_freedom: f64) -> f64 {
     if n.is_infinite() {
         return 2.0 * normal_above(t.abs());
     }
-    let p = match tt < 1.0 {
+    let p = if tt < 1.0 {
         // Near 1 the complementary argument preserves digits.
-        true => checked_beta_reg(0.5, 0.5 * n, tt / (n + tt)).map(|rest| 1.0 - rest),
-        false => checked_beta_reg(0.5 * n, 0.5, n / (n + tt)),
+        checked_beta_reg(0.5, 0.5 * n, tt / (n + tt)).map(|rest| 1.0 - rest)
+    } else {
+        checked_beta_reg(0.5 * n, 0.5, n / (n + tt))
     };
     p.unwrap_or(f64::NAN)
 }

@@ -31,9 +31,12 @@ pub fn explain(
         .ok_or_else(|| format!("{} has no twin on the host", kind.name()))?;
     let mut counters = Counters::default();
     let is_ray = ray.is_ray();
-    let (hit, events) = watch(|| match is_ray {
-        true => twin.closest_hit(ray, &mut counters),
-        false => Hit::miss(ray),
+    let (hit, events) = watch(|| {
+        if is_ray {
+            twin.closest_hit(ray, &mut counters)
+        } else {
+            Hit::miss(ray)
+        }
     });
     let mut text = steps(&events);
     // Writing to a string cannot fail.
@@ -50,9 +53,10 @@ pub fn explain(
     let _ = writeln!(text, "{:12} {expected}", reference_name(&*built));
     let _ = writeln!(text, "{:12} {}", "any hit", if any { "yes" } else { "no" });
     text += &oracle_text(scene, ray);
-    text += match equal {
-        true => "equal to the bit\n",
-        false => "DIFFERENT: the structure does not answer what brute force does\n",
+    text += if equal {
+        "equal to the bit\n"
+    } else {
+        "DIFFERENT: the structure does not answer what brute force does\n"
     };
     Ok((text, equal))
 }
@@ -88,9 +92,10 @@ fn oracle_text(scene: &SceneData, ray: &Ray) -> String {
     }
     let truths = exact_truths(&scene.triangles, &[*ray]);
     let hits = truths.first().map_or(&[][..], |truth| &truth.hits);
-    let mut text = match hits.is_empty() {
-        true => format!("{:12} nothing is hit\n", "oracle"),
-        false => format!("{:12} exactly hit, the nearest first:\n", "oracle"),
+    let mut text = if hits.is_empty() {
+        format!("{:12} nothing is hit\n", "oracle")
+    } else {
+        format!("{:12} exactly hit, the nearest first:\n", "oracle")
     };
     for hit in hits.iter().take(MOST_CROSSED) {
         let _ = writeln!(

@@ -37,12 +37,13 @@ impl Placement {
             scale: 1.0,
             shift: 10f64.powi(exponent),
         };
-        let (scales, shifts): (&[i32], &[i32]) = match quick {
-            true => (&[0, -8, 8], &[]),
-            false => (
+        let (scales, shifts): (&[i32], &[i32]) = if quick {
+            (&[0, -8, 8], &[])
+        } else {
+            (
                 &[0, -8, -6, -4, -2, 2, 4, 6, 8],
                 &[-8, -6, -4, -2, 0, 2, 4, 6, 8],
-            ),
+            )
         };
         let scales = scales.iter().copied().map(scaled);
         let shifts = shifts.iter().copied().map(shifted);

@@ -95,12 +95,13 @@ pub(crate) fn figures(side: &Side, reference: Option<&Reference>) -> Figures {
         spp: side.shown,
         of: side.lens.spp,
         sample_ms: side.history.iter().copied().collect(),
-        rays: match is_counted {
-            true => (0..TRACED_CLASSES)
+        rays: if is_counted {
+            (0..TRACED_CLASSES)
                 .map(class)
                 .filter(|rays| rays.per_sample > 0.0)
-                .collect(),
-            false => Vec::new(),
+                .collect()
+        } else {
+            Vec::new()
         },
         mrays_s: is_counted.then(|| all as f64 / side.rays_ms / 1e3),
         relmse,

@@ -294,9 +294,10 @@ impl<'g> Side<'g> {
         if !self.add(with, stop).await? {
             return Ok(Step::Stopped);
         }
-        Ok(match shows && self.refresh().await? {
-            true => Step::Shown,
-            false => Step::Worked,
+        Ok(if shows && self.refresh().await? {
+            Step::Shown
+        } else {
+            Step::Worked
         })
     }
 
@@ -334,9 +335,10 @@ impl<'g> Side<'g> {
     ) -> Result<bool, GpuError> {
         let lens = self.lens;
         self.by = 1;
-        let (is_torn, done) = match self.is_torn {
-            true => (true, 0),
-            false => (false, self.done),
+        let (is_torn, done) = if self.is_torn {
+            (true, 0)
+        } else {
+            (false, self.done)
         };
         let last = f64::from(self.history.back().copied().unwrap_or(STEP_MS as f32));
         let fitting = (STEP_MS / last.max(0.01)).clamp(1.0, 64.0) as u32;
@@ -414,10 +416,7 @@ impl<'g> Side<'g> {
         let Some(structure) = &self.structure else {
             return Ok(None);
         };
-        let by = match self.is_coarse() {
-            true => self.by * 4,
-            false => 1,
-        };
+        let by = if self.is_coarse() { self.by * 4 } else { 1 };
         let of = Counted {
             registries,
             world,

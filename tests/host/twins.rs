@@ -297,11 +297,11 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     (
         "media/adaptive/",
-        "judged in f64 by every run of media:pipeline (src/media/measure/pipeline/checks.rs), whose faults src/media/tests/measure.rs plants",
+        "judged in f64 by every run of media:pipeline (src/media/measure/pipeline/checks.rs), whose faults src/media/tests/pipeline_faults.rs plants",
     ),
     (
         "media/curved/",
-        "judged in f64 by every run of media:pipeline (src/media/pipeline/ways.rs), whose faults src/media/tests/measure.rs plants",
+        "judged in f64 by every run of media:pipeline (src/media/pipeline/ways.rs), whose faults src/media/tests/pipeline_faults.rs plants",
     ),
     (
         "media/voxels/",

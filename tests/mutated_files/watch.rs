@@ -153,9 +153,12 @@ pub fn says_where(message: &str) -> bool {
 /// Keeps the message of a panic while a file is read, and prints all others.
 fn watch_panics() {
     let usual = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| match lock(&CURRENT).is_some() {
-        true => *lock(&PANIC) = Some(info.to_string()),
-        false => usual(info),
+    std::panic::set_hook(Box::new(move |info| {
+        if lock(&CURRENT).is_some() {
+            *lock(&PANIC) = Some(info.to_string())
+        } else {
+            usual(info)
+        }
     }));
 }
 

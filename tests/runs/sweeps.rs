@@ -558,9 +558,10 @@ fn times_of_another_device_and_cells_of_another_program_are_measured_again() {
     // Something is missing, so that an adapter is opened and looked at.
     let take_out = |line: &mut Line| {
         if let Body::Cell(cell) = &mut line.body {
-            match cell.inputs.device.is_empty() {
-                true => cell.inputs.program = "another".to_owned(),
-                false => cell.inputs.device = "another machine".to_owned(),
+            if cell.inputs.device.is_empty() {
+                cell.inputs.program = "another".to_owned()
+            } else {
+                cell.inputs.device = "another machine".to_owned()
             }
         }
     };

@@ -145,9 +145,10 @@ pub fn trace_by(
     features: &[&str],
 ) -> Batch {
     let ask = Ask {
-        query: match features.contains(&"any") {
-            true => Query::Any,
-            false => Query::Closest,
+        query: if features.contains(&"any") {
+            Query::Any
+        } else {
+            Query::Closest
         },
         counters: features.contains(&"counters"),
         coherent: false,
@@ -159,9 +160,10 @@ pub fn trace_by(
         let batch = Tracer::new(gpu, &triangles, &traced, ask)?.batch(rays)?;
         batch.trace()?;
         gpu.check_error_word(batch.error_word()?)?;
-        let (work, hits) = match ask.counters {
-            true => batch.work()?,
-            false => (Vec::new(), batch.hits()?),
+        let (work, hits) = if ask.counters {
+            batch.work()?
+        } else {
+            (Vec::new(), batch.hits()?)
         };
         Ok::<_, raystone::gpu::GpuError>(Batch { hits, work })
     };

@@ -50,8 +50,9 @@ pub fn refusal(required: &str, need: &str, why: &dyn Display) -> Result<(), Stri
             ));
         }
     }
-    match required.split_whitespace().any(|word| word == need) {
-        true => Err(format!("RAYSTONE_REQUIRE names {need}, but {why}")),
-        false => Ok(()),
+    if required.split_whitespace().any(|word| word == need) {
+        Err(format!("RAYSTONE_REQUIRE names {need}, but {why}"))
+    } else {
+        Ok(())
     }
 }

@@ -252,9 +252,12 @@ pub fn lattice_plane_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> V
         (diagonal * 2.0_f32.powi(-18) + far * 2.0_f32.powi(-22)).max(1e-18)
     };
     let ray = |i: usize| {
-        let pad = |axis: usize| match i.is_multiple_of(2) {
-            true => margin(axis),
-            false => 0.0,
+        let pad = |axis: usize| {
+            if i.is_multiple_of(2) {
+                margin(axis)
+            } else {
+                0.0
+            }
         };
         let divisions = 1 + rng.below(8);
         let origin = std::array::from_fn(|axis| {

@@ -66,11 +66,12 @@ fn differences(table: &str, kinds: &[&str], lines: &[String]) -> Result<(), Stri
     let new: Vec<_> = lines.iter().filter(is_new).collect();
     let is_gone = |known: &&&str| !lines.iter().any(|line| line == **known);
     let gone: Vec<_> = known.iter().filter(is_gone).collect();
-    match new.is_empty() && gone.is_empty() {
-        true => Ok(()),
-        false => Err(format!(
+    if new.is_empty() && gone.is_empty() {
+        Ok(())
+    } else {
+        Err(format!(
             "changed or new: {new:#?}\nchanged or no longer there: {gone:#?}"
-        )),
+        ))
     }
 }
 
@@ -233,9 +234,10 @@ fn images() {
             let traced = stage.traced(gpu(), kind);
             for (at, what) in integrators.iter().enumerate() {
                 let subject = format!("image {scene}/{}/{what}", kind.name());
-                let hash = match taken.contains(&(kind.name(), at)) {
-                    true => image_hash(&stage, &traced, &one, what),
-                    false => known(&subject),
+                let hash = if taken.contains(&(kind.name(), at)) {
+                    image_hash(&stage, &traced, &one, what)
+                } else {
+                    known(&subject)
                 };
                 found.insert(subject, hash);
             }
@@ -246,9 +248,10 @@ fn images() {
             let taken = in_turn("samplers of unchanged images", 0..samplers.len());
             for (at, sampler) in samplers.iter().enumerate() {
                 let subject = format!("image {scene}/{}/path", sampler.label().replace(' ', ""));
-                let hash = match taken.contains(&at) {
-                    true => image_hash(&stage, &traced, sampler, &path(3)),
-                    false => known(&subject),
+                let hash = if taken.contains(&at) {
+                    image_hash(&stage, &traced, sampler, &path(3))
+                } else {
+                    known(&subject)
                 };
                 found.insert(subject, hash);
             }

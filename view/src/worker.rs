@@ -387,10 +387,10 @@ impl Inside {
             error.to_string()
         };
         self.say(text, true);
-        match is_lost {
-            true => Err(End::Lost(viewer.screen().cloned().map(Box::new))),
-            false => Ok(()),
+        if is_lost {
+            return Err(End::Lost(viewer.screen().cloned().map(Box::new)));
         }
+        Ok(())
     }
 
     fn publish(&self, viewer: &Viewer) {

@@ -68,10 +68,10 @@ impl Files for Memory {
         let names = files.filter_map(|file| file.strip_prefix(&inside).ok()?.components().next());
         let mut found: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
         found.dedup();
-        match found.is_empty() {
-            true => Err(io::ErrorKind::NotFound.into()),
-            false => Ok(found),
+        if found.is_empty() {
+            return Err(io::ErrorKind::NotFound.into());
         }
+        Ok(found)
     }
 
     fn is_folder(&self, path: &Path) -> bool {
@@ -80,10 +80,10 @@ impl Files for Memory {
 
     fn real(&self, path: &Path) -> io::Result<PathBuf> {
         let (path, held) = (plain(path), self.held());
-        match held.contains_key(&path) || has_folder(&held, &path) {
-            true => Ok(path),
-            false => Err(io::ErrorKind::NotFound.into()),
+        if held.contains_key(&path) || has_folder(&held, &path) {
+            return Ok(path);
         }
+        Err(io::ErrorKind::NotFound.into())
     }
 }
 

@@ -96,9 +96,10 @@ impl Octants {
             );
             count += 1;
             let OctantNode { node, ropes } = self.0[current as usize];
-            current = match node.content < LEAF {
-                true => (node.content & CHILD_MASK) + near_side(node.content, octant),
-                false => ropes[octant as usize],
+            current = if node.content < LEAF {
+                (node.content & CHILD_MASK) + near_side(node.content, octant)
+            } else {
+                ropes[octant as usize]
             };
         }
         let reachable = self.0.iter().filter(|of| of.node.content < LEAF).count() * 2 + 1;

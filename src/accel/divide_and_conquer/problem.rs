@@ -59,9 +59,12 @@ impl Division {
         rays: &[Ray],
     ) -> Result<Self, AccelError> {
         let options = Options::from_params(params)?;
-        let raised = |ray: &Ray| match ray.is_ray() {
-            true => soup.intersection.raised(ray),
-            false => *ray,
+        let raised = |ray: &Ray| {
+            if ray.is_ray() {
+                soup.intersection.raised(ray)
+            } else {
+                *ray
+            }
         };
         let rays: Vec<Ray> = rays.iter().map(raised).collect();
         let mut division = Self {

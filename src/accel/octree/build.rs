@@ -177,10 +177,11 @@ impl Children {
         for mask in octants {
             (0..8).for_each(|octant| ends[octant] += usize::from(mask >> octant & 1));
         }
-        let mut places = [0; 8];
-        for octant in 1..8 {
-            places[octant] = ends[octant - 1];
-            ends[octant] += ends[octant - 1];
+        let (mut places, mut end) = ([0; 8], 0);
+        for (place, count) in places.iter_mut().zip(&mut ends) {
+            *place = end;
+            end += *count;
+            *count = end;
         }
         let mut listed = vec![0; ends[7]];
         for (id, mask) in triangles.iter().zip(octants) {

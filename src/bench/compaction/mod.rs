@@ -181,9 +181,10 @@ impl Bench {
             .copy(&not_counted, &stream.count)
             .clear(&stream.kept);
         // Nothing is compacted in fewer steps than are said.
-        let other_sizes = match flags.is_empty() {
-            true => None,
-            false => other_sizes(&compact, runs, scratch_bytes),
+        let other_sizes = if flags.is_empty() {
+            None
+        } else {
+            other_sizes(&compact, runs, scratch_bytes)
         };
         Ok(Self {
             player: Arc::clone(player),

@@ -166,9 +166,10 @@ fn expected(variant: &Variant, samples: u32, at: Coordinate) -> Option<u32> {
 pub fn fault(sampler: &Sampler) -> Option<String> {
     let samples = sampler.demand.samples.unwrap_or(1);
     let facts = sampler.sequence.facts();
-    let end = match facts.by_count || facts.samples.is_some() {
-        true => samples,
-        false => u32::MAX,
+    let end = if facts.by_count || facts.samples.is_some() {
+        samples
+    } else {
+        u32::MAX
     };
     let samples_at = borders(end);
     for dimension in 0..sampler.demand.dimensions {

@@ -48,9 +48,10 @@ pub fn fault_of_passes(
         ..*set
     };
     let (of_set, of_scene) = ((&tracer, &some), (soup, accel));
-    let found = match is_tree {
-        true => Descent::of_tree(gpu, of_set, of_scene, exact),
-        false => Descent::of_division(gpu, of_set, of_scene, exact),
+    let found = if is_tree {
+        Descent::of_tree(gpu, of_set, of_scene, exact)
+    } else {
+        Descent::of_division(gpu, of_set, of_scene, exact)
     };
     Ok(match found {
         Err(Absent::Failed(fault)) => Some(fault),

@@ -124,9 +124,12 @@ impl Kind {
                 room::bounced(seen, (bounce.bounce, spread), &draw, host)
             }
         };
-        let truth = |ray: &Ray| match ray.is_ray() {
-            true => twin.closest_hit(ray, &mut Default::default()),
-            false => Hit::miss(ray),
+        let truth = |ray: &Ray| {
+            if ray.is_ray() {
+                twin.closest_hit(ray, &mut Default::default())
+            } else {
+                Hit::miss(ray)
+            }
         };
         Ok(RaySet {
             class: self.class(),

@@ -245,9 +245,10 @@ impl Lobes<'_> {
             let hit = twin.closest_hit(&Ray::new(vertex.place, direction), &mut Default::default());
             let place = vertex.place + direction * hit.t;
             // Balls touch no wall.
-            match place.abs().max_element() > HALF * (1.0 - 1e-4) {
-                true => f64::from((place.y / HALF + 1.0) / 2.0),
-                false => 0.0,
+            if place.abs().max_element() > HALF * (1.0 - 1e-4) {
+                f64::from((place.y / HALF + 1.0) / 2.0)
+            } else {
+                0.0
             }
         };
         let mean = |vertex: &Vertex| {

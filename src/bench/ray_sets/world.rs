@@ -28,9 +28,10 @@ struct Truth {
 impl World {
     pub(super) fn new(gpu: &Gpu, room: &Room) -> Result<Self, Absent> {
         let still = room::room(room.squares);
-        let (soup, first) = match room.moved > 0.0 {
-            true => (room::moved(&still, room.moved as f32), Some(still)),
-            false => (still, None),
+        let (soup, first) = if room.moved > 0.0 {
+            (room::moved(&still, room.moved as f32), Some(still))
+        } else {
+            (still, None)
         };
         let parameters = BvhParameters::default();
         let judge = BuiltBvh::build(&soup, &parameters, &mut BuildLog::default());

@@ -201,11 +201,10 @@ fn passes<'a>(
     let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
         let words = bytemuck::cast_slice(estimator.sampler.table.words());
         Ok(Pass {
-            renderer: match by_blocks {
-                true => estimator.by_blocks(session, world, &fastest.traced, &seeds)?,
-                false => {
-                    estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?
-                }
+            renderer: if by_blocks {
+                estimator.by_blocks(session, world, &fastest.traced, &seeds)?
+            } else {
+                estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?
             },
             spps,
             table: blake3::hash(words).to_hex().to_string(),

@@ -327,9 +327,10 @@ impl Folder {
         if let Ok(text) = serde_json::to_string(&line) {
             let _ = self.append_to(&mut records, &format!("{text}\n"));
         }
-        let folder = match self.replaces || self.commit(&mut records).is_err() {
-            true => self.out.join(PARTIAL),
-            false => self.out.clone(),
+        let folder = if self.replaces || self.commit(&mut records).is_err() {
+            self.out.join(PARTIAL)
+        } else {
+            self.out.clone()
         };
         Interrupted::Kept(folder)
     }
@@ -444,9 +445,10 @@ fn promote_images(out: &Path) -> io::Result<()> {
 /// The folder with the records of a run: those that it left in `partial/` where it goes on or was killed before it had results.
 pub fn records_in(dir: &Path) -> PathBuf {
     let partial = dir.join(PARTIAL);
-    match !is_there(&records_file(dir)) && partial.is_dir() {
-        true => partial,
-        false => dir.to_owned(),
+    if !is_there(&records_file(dir)) && partial.is_dir() {
+        partial
+    } else {
+        dir.to_owned()
     }
 }
 

@@ -316,9 +316,10 @@ fn of_trial(
         camera: trial.scene.view(1.0),
         ..*subject
     };
-    let frame = match session.checked.on_all_trials {
-        true => TRIAL,
-        false => RUN,
+    let frame = if session.checked.on_all_trials {
+        TRIAL
+    } else {
+        RUN
     };
     for integrator in integrators {
         let (mut record, _) = judged(session, &on_trial, integrator, &[frame])?;
@@ -417,12 +418,13 @@ fn drawn(
     let seed = session.experiment.seeds().replicates.first().copied();
     let seed = seed.unwrap_or_default();
     let limit = made.demand.samples.unwrap_or(frame.summed).max(spp);
-    let pixels = match !subject.stage.scene.media.is_empty() && shares_numbers(&made, seed) {
-        true => Pixels {
+    let pixels = if !subject.stage.scene.media.is_empty() && shares_numbers(&made, seed) {
+        Pixels {
             samples: inner_samples(frame.samples, limit),
             ..frame.pixels(spp, seed)
-        },
-        false => frame.pixels(spp, seed),
+        }
+    } else {
+        frame.pixels(spp, seed)
     };
     Ok((made, pixels))
 }

@@ -30,9 +30,10 @@ impl ReferenceFile {
         let [width, height] = experiment.run.resolution;
         if [image.width, image.height] != [width, height] {
             let [w, h] = [image.width, image.height];
-            let or_else = match w.min(h) >= LEAST_SIDE {
-                true => format!(", or set run.resolution=[{w}, {h}]"),
-                false => String::new(),
+            let or_else = if w.min(h) >= LEAST_SIDE {
+                format!(", or set run.resolution=[{w}, {h}]")
+            } else {
+                String::new()
             };
             return Err(RunError::Input(format!(
                 "reference {name} has {w}×{h} pixels, and run.resolution is {width}×{height}: render one \

@@ -339,9 +339,10 @@ fn stream_record(
     }
     let drawn = settings.pairs.iter().find(|p| is_direction(**p));
     let is_drawn = drawn.or(settings.pairs.first()) == Some(&dimensions);
-    let points = match is_drawn {
-        true => Some(recorded_points(session, gpu, cell, dimensions, seed)?),
-        false => None,
+    let points = if is_drawn {
+        Some(recorded_points(session, gpu, cell, dimensions, seed)?)
+    } else {
+        None
     };
     let record = StreamRecord {
         dimensions,

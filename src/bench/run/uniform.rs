@@ -136,14 +136,13 @@ impl Sight {
         }
         let lights = LightList::of(scene).lights;
         let emissive = |light: &ListedLight| matches!(light.source, Source::Triangle(_));
-        match scene.environment == Vec3::ZERO && lights.iter().all(emissive) {
-            true => format!(
+        if scene.environment == Vec3::ZERO && lights.iter().all(emissive) {
+            format!(
                 "all that shines are {} emissive triangles, which light little of what the camera sees; give the scene a lamp or an environment",
                 lights.len()
-            ),
-            false => {
-                "its lights reach little of what the camera sees, or are weak beside the size of the scene".to_owned()
-            }
+            )
+        } else {
+            "its lights reach little of what the camera sees, or are weak beside the size of the scene".to_owned()
         }
     }
 

@@ -7,6 +7,7 @@ mod generality;
 mod march;
 mod measure;
 mod pipeline;
+mod pipeline_faults;
 mod scatter;
 pub(crate) mod segments;
 #[allow(dead_code, unreachable_pub, reason = "other tests use the rest")]

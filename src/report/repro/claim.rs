@@ -48,9 +48,10 @@ pub struct Row {
 /// Compares an expectation with the values in each of its places.
 pub fn judge(expect: &Expect, values: &[Value], context: &Context) -> Vec<Row> {
     let everywhere = [At::default()];
-    let places = match expect.at.is_empty() {
-        true => &everywhere[..],
-        false => &expect.at[..],
+    let places = if expect.at.is_empty() {
+        &everywhere[..]
+    } else {
+        &expect.at[..]
     };
     let at = |at: &At| Place::new(expect, at, context).rows(values);
     places.iter().flat_map(at).collect()
@@ -180,9 +181,10 @@ impl<'e> Place<'e> {
     }
 
     fn row(&self, ours: Option<Interval>, verdict: ClaimVerdict, reason: String) -> Row {
-        let column = match self.at.column.is_empty() {
-            true => &self.expect.column,
-            false => &self.at.column,
+        let column = if self.at.column.is_empty() {
+            &self.expect.column
+        } else {
+            &self.at.column
         };
         let place = self.at.on.as_ref().filter(|_| self.at.row.is_empty());
         Row {
@@ -205,12 +207,13 @@ impl<'e> Place<'e> {
         pick: &Pick,
     ) -> Result<Vec<&'v Value<'a>>, (Pick, String)> {
         let chosen = select(values, figure, pick);
-        match chosen.is_empty() {
-            false => Ok(chosen),
-            true => Err((
+        if chosen.is_empty() {
+            Err((
                 pick.clone(),
                 format!("no {figure} was found where {}", words(pick)),
-            )),
+            ))
+        } else {
+            Ok(chosen)
         }
     }
 
@@ -234,9 +237,10 @@ impl<'e> Place<'e> {
         let Some(thesis) = self.at.thesis else {
             return Ok(None);
         };
-        let from = match self.expect.unit.is_empty() {
-            true => unit,
-            false => self.expect.unit.as_str(),
+        let from = if self.expect.unit.is_empty() {
+            unit
+        } else {
+            self.expect.unit.as_str()
         };
         let problem = || format!("the thesis's {from} cannot be given in the figure's \"{unit}\"");
         Ok(Some(thesis * factor(from, unit).ok_or_else(problem)?))
@@ -364,9 +368,10 @@ impl<'e> Place<'e> {
     /// the gain of each over another one that should ascend.
     fn orders(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
         let picks = self.steps(&self.expect.of, &self.at.of);
-        let lower = match self.expect.over.is_empty() && self.at.over.is_empty() {
-            true => Vec::new(),
-            false => self.steps(&self.expect.over, &self.at.over),
+        let lower = if self.expect.over.is_empty() && self.at.over.is_empty() {
+            Vec::new()
+        } else {
+            self.steps(&self.expect.over, &self.at.over)
         };
         let all: Vec<&Pick> = picks.iter().chain(&lower).collect();
         let figure = &self.expect.figure;

@@ -78,9 +78,10 @@ impl Reproduced {
         let found = ClaimVerdict::of_all(self.claims[index].iter().map(|row| row.verdict));
         // A row that is only shown is no claim, whether there is something to show or not.
         let only_shown = self.thesis.expects[index].compare == Compare::Shown;
-        match found != ClaimVerdict::Faulty && only_shown {
-            true => ClaimVerdict::Shown,
-            false => found,
+        if found != ClaimVerdict::Faulty && only_shown {
+            ClaimVerdict::Shown
+        } else {
+            found
         }
     }
 }
@@ -149,9 +150,10 @@ fn scene_of(substitute: &Substitute, settings: &Settings) -> Result<String, Stri
         return Ok(scene);
     }
     let path = settings.scenes.join(&scene);
-    match path.is_file() {
-        true => Ok(path.display().to_string()),
-        false => Err(what_to_get(&scene, &settings.scenes)),
+    if path.is_file() {
+        Ok(path.display().to_string())
+    } else {
+        Err(what_to_get(&scene, &settings.scenes))
     }
 }
 
@@ -251,9 +253,10 @@ fn pattern(scene: &str) -> String {
     }
     let file = Path::new(scene).file_name();
     let file = file.map_or(scene.into(), |file| file.to_string_lossy());
-    match is_model(scene) {
-        true => format!("*{file}*"),
-        false => format!("{file}*"),
+    if is_model(scene) {
+        format!("*{file}*")
+    } else {
+        format!("{file}*")
     }
 }
 

@@ -107,13 +107,14 @@ impl<'a> Cells<'a> {
             return None;
         }
         let mut section = Section::new("cells", "Every cell, and how to repeat it");
-        match self.is_inside() {
-            true => section.blocks = self.blocks(data),
-            false => section.blocks.push(Block::Paragraph(format!(
+        if self.is_inside() {
+            section.blocks = self.blocks(data)
+        } else {
+            section.blocks.push(Block::Paragraph(format!(
                 "{} stand in {FILE} beside this page: what each is, which kernel ran, its figures, and the command that \
                  repeats it.",
                 format::plural(self.found.len(), "cell")
-            ))),
+            )))
         }
         Some(section)
     }
@@ -248,9 +249,10 @@ fn visible(text: &str) -> String {
 /// Quotes one word for a POSIX shell.
 fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text.to_owned(),
-        false => format!("'{}'", visible(text).replace('\'', r"'\''")),
+    if !text.is_empty() && text.chars().all(is_plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", visible(text).replace('\'', r"'\''"))
     }
 }
 

@@ -101,11 +101,10 @@ fn against_times(data: &RunData, stem: &str, view: &View) -> Option<Illustration
     let (x_title, y_title) = ("predicted cycles per path", "measured ms per spp");
     let plot = CurvePlot::new(x_title, Ticks::PowersOfTen, y_title, curves);
     let software = data.run.is_some_and(|run| run.environment.software);
-    let adapter = match software {
-        true => {
-            " The times are those of a software adapter, whose lanes and caches are others than the model's."
-        }
-        false => "",
+    let adapter = if software {
+        " The times are those of a software adapter, whose lanes and caches are others than the model's."
+    } else {
+        ""
     };
     plot.figure(
         format!("{stem}-predicted-times"),

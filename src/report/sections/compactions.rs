@@ -59,9 +59,10 @@ fn label_without(key: &Key, left_out: &[&str]) -> String {
     };
     let parts = parameters.trim_end_matches(')').split(',');
     let parts: Vec<&str> = parts.filter(|p| !p.is_empty() && !is_left_out(p)).collect();
-    let mut text = match parts.is_empty() {
-        true => name.to_owned(),
-        false => format!("{name}({})", parts.join(",")),
+    let mut text = if parts.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name}({})", parts.join(","))
     };
     if let Some(kernels) = key.get(axis::KERNELS) {
         text += &format!(", @{kernels}");
@@ -143,9 +144,10 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
         let numbered = curves.iter_mut().enumerate();
         numbered.for_each(|(place, curve)| curve.look = place);
     }
-    let (y_title, says) = match whole {
-        true => ("time, ms", "Time of a compaction"),
-        false => ("time per element, ns", "Time per element of the stream"),
+    let (y_title, says) = if whole {
+        ("time, ms", "Time of a compaction")
+    } else {
+        ("time per element, ns", "Time per element of the stream")
     };
     let (x_title, x_ticks) = match parameter {
         "elements" => ("elements", Ticks::PowersOfTwo),

@@ -87,9 +87,12 @@ fn linear(dir: &Path, picture: &str) -> Option<Image> {
 
 /// Returns 16-bit floats in Base64; values beyond their range become the largest.
 fn radiance(image: &Image) -> String {
-    let bits = |v: &f32| match v.is_finite() {
-        true => f16::from_f32(v.clamp(-65504.0, 65504.0)),
-        false => f16::from_f32(*v),
+    let bits = |v: &f32| {
+        if v.is_finite() {
+            f16::from_f32(v.clamp(-65504.0, 65504.0))
+        } else {
+            f16::from_f32(*v)
+        }
     };
     let halves = image.pixels.as_flattened().iter().map(bits);
     let bytes: Vec<u8> = halves.flat_map(f16::to_le_bytes).collect();

@@ -103,9 +103,10 @@ fn answer(findings: &[&Finding]) -> (String, Tone) {
         let moved = findings
             .iter()
             .any(|f| f.verdict == ChangeVerdict::Undecided);
-        let (text, tone) = match moved {
-            true => ("unchanged control, which moved all the same", Tone::Bad),
-            false => ("unchanged control", Tone::Plain),
+        let (text, tone) = if moved {
+            ("unchanged control, which moved all the same", Tone::Bad)
+        } else {
+            ("unchanged control", Tone::Plain)
         };
         return (text.into(), tone);
     }
@@ -246,9 +247,12 @@ fn without_carry(label: &str) -> Option<String> {
     let parameters = rest.strip_suffix(')')?.split(',');
     let is_carry = |p: &&str| p.split_once('=').is_some_and(|(name, _)| name == CARRY);
     let (carry, others): (Vec<&str>, Vec<&str>) = parameters.partition(is_carry);
-    (!carry.is_empty()).then(|| match others.is_empty() {
-        true => name.to_owned(),
-        false => format!("{name}({})", others.join(",")),
+    (!carry.is_empty()).then(|| {
+        if others.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name}({})", others.join(","))
+        }
     })
 }
 

@@ -156,9 +156,10 @@ pub(crate) fn histograms(stem: &str, view: &View) -> Option<Illustration> {
         let bias = sampler.bias.as_ref()?;
         let biased = bias.verdict == BiasVerdict::Biased;
         let counts = bias.p_histogram.clone();
-        let title = match biased {
-            true => format!("biased: {}", sampler.name),
-            false => sampler.name.clone(),
+        let title = if biased {
+            format!("biased: {}", sampler.name)
+        } else {
+            sampler.name.clone()
         };
         let histogram = Histogram { counts, biased };
         let counted: usize = bias.p_histogram.iter().sum();

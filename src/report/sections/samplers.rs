@@ -215,9 +215,10 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
             (None, Some(file)) => format!("reference: {file}"),
             (None, None) => {
                 let spp = format::count(u64::from(reference.spp));
-                let origin = match reference.cached {
-                    true => "kept from an earlier run".to_owned(),
-                    false => format!("{} s", format::number(reference.seconds)),
+                let origin = if reference.cached {
+                    "kept from an earlier run".to_owned()
+                } else {
+                    format!("{} s", format::number(reference.seconds))
                 };
                 format!("reference: {spp} spp of {}, {origin}", reference.sampler)
             }

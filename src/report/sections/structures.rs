@@ -141,9 +141,12 @@ pub(crate) fn speed_table(names: &Names, scene: &SceneGroup, values: &[Value]) -
 pub(crate) fn prices(scene: &SceneGroup) -> Vec<Value<'static>> {
     let timed = || scene.structures.iter().filter(|s| s.fault().is_none());
     let price = |exact: &ClassTiming, bare: &ClassTiming| {
-        let of = |t: &ClassTiming| match t.cpu_ms.is_empty() {
-            true => LogFigure::of_times(&t.ms),
-            false => LogFigure::of_times(&t.cpu_ms),
+        let of = |t: &ClassTiming| {
+            if t.cpu_ms.is_empty() {
+                LogFigure::of_times(&t.ms)
+            } else {
+                LogFigure::of_times(&t.cpu_ms)
+            }
         };
         Some(of(exact)?.compared_with(&of(bare)?).ratio)
     };
@@ -177,9 +180,10 @@ pub(crate) fn prices(scene: &SceneGroup) -> Vec<Value<'static>> {
 /// Returns the table of the cost of builds.
 fn build_table(names: &Names, scene: &SceneGroup, values: &[Value]) -> Table {
     let built = || scene.structures.iter().filter(|s| s.is_built());
-    let update = match built().any(|s| s.update_ms.is_some()) {
-        true => "; update: all instances moved, objects kept (median of 5)",
-        false => "",
+    let update = if built().any(|s| s.update_ms.is_some()) {
+        "; update: all instances moved, objects kept (median of 5)"
+    } else {
+        ""
     };
     let phases = |s: &StructureRecord| {
         let phase = |phase: &Phase| format!("{} {}", phase.name, format::number(phase.ms));

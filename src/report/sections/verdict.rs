@@ -40,9 +40,10 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
     }
     for (index, scene) in data.scenes.iter().enumerate() {
         let answers = of_scene(scene);
-        match index < OPEN_SCENES {
-            true => blocks.extend(answers),
-            false => blocks.extend(Block::fold(format!("Verdict on {}", scene.name), answers)),
+        if index < OPEN_SCENES {
+            blocks.extend(answers)
+        } else {
+            blocks.extend(Block::fold(format!("Verdict on {}", scene.name), answers))
         }
     }
     let mut pairs = point_sets(data);

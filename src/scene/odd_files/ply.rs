@@ -258,9 +258,12 @@ fn binary_ply_files_have_any_types_and_orders_and_line_ends() {
             .replace("ORDER", order)
             .replace('\n', end)
             .into_bytes();
-        let mut put = |value: &[u8]| match is_big {
-            true => bytes.extend(value.iter().rev()),
-            false => bytes.extend(value),
+        let mut put = |value: &[u8]| {
+            if is_big {
+                bytes.extend(value.iter().rev())
+            } else {
+                bytes.extend(value)
+            }
         };
         put(&4_u16.to_le_bytes());
         (0..4_u8).for_each(|corner| put(&[corner]));

@@ -1,6 +1,7 @@
 //! The table of the digest (§2.10) at 3,000 vertices: f64, the eye at distance 4.
 
 use super::search::newton;
+use super::tier::in_turn;
 use crate::judge::{Summary, judged, summary};
 use crate::newton::Search;
 use crate::path::Form;
@@ -108,7 +109,9 @@ fn bumps_have_the_figures_of_the_digest() {
         ),
         ((0.05, 10.0), &[(BY_AREA, 20.9, 0.743)], (4.7, 0.123)),
     ];
-    for ((amplitude, frequency), rows, (mean, wrong)) in reflectors {
+    for ((amplitude, frequency), rows, (mean, wrong)) in
+        in_turn("reflectors with bumps", reflectors)
+    {
         let world = World::new(bumpy(amplitude, frequency));
         for (stop, mean, wrong) in rows {
             let found = told(&world, Form::Transposed, secants(*stop));

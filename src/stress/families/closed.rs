@@ -19,9 +19,10 @@ const INSIDE: f64 = 0.98;
 
 /// Returns the source of the right answers: a mesh crushed by rounding is as closed as before, but has no inside.
 pub(super) fn truth(place: &Placement) -> Truth {
-    match place.keeps_shape() {
-        true => Truth::Closed,
-        false => Truth::Exact,
+    if place.keeps_shape() {
+        Truth::Closed
+    } else {
+        Truth::Exact
     }
 }
 

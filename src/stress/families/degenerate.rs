@@ -133,9 +133,10 @@ pub(super) fn huge_and_tiny(maker: &mut Maker) {
             let far = place.point(1e6 * RADIUS * random.in_cube());
             let near = inside(random, &place);
             let from = if random.below(2) == 0 { far } else { near };
-            match from == target {
-                true => Ray::new(from, Vec3::X),
-                false => towards(from, target),
+            if from == target {
+                Ray::new(from, Vec3::X)
+            } else {
+                towards(from, target)
             }
         });
     }

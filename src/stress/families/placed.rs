@@ -58,9 +58,10 @@ fn scaled(maker: &mut Maker) {
 
 pub(super) fn instances(maker: &mut Maker) {
     scaled(maker);
-    let thicknesses: &[f64] = match maker.quick {
-        true => &[1.0, 1e-5],
-        false => &[1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5],
+    let thicknesses: &[f64] = if maker.quick {
+        &[1.0, 1e-5]
+    } else {
+        &[1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
     };
     for &thickness in thicknesses {
         // The flat list of triangles is rounded in the world: far off, thinner copies have no inside.

@@ -73,9 +73,10 @@ fn errors(gpu: &Gpu, sampler: &Sampler, terms: u32) -> Result<[f64; 5], Numerics
     for constant in [true, false] {
         let totals = totals(gpu, sampler, terms, constant)?;
         for (lane, totals) in (0..).zip(totals) {
-            let exact = match constant {
-                true => f64::from(terms) * f64::from(0.1_f32),
-                false => exact_noise(sampler, terms, lane),
+            let exact = if constant {
+                f64::from(terms) * f64::from(0.1_f32)
+            } else {
+                exact_noise(sampler, terms, lane)
             };
             for (worst, total) in worst.iter_mut().zip(totals) {
                 let error = (f64::from(total) / exact - 1.0).abs();

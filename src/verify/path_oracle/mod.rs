@@ -366,9 +366,10 @@ impl Walk<'_> {
 
     /// Of a light that is there by chance.
     fn decide_shining(&mut self, is_there: bool) {
-        self.branch.push(match is_there {
-            true => Decision::Blocked(false),
-            false => Decision::BlockedByLayer,
+        self.branch.push(if is_there {
+            Decision::Blocked(false)
+        } else {
+            Decision::BlockedByLayer
         });
         self.layers += 1;
     }

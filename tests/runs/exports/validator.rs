@@ -33,9 +33,10 @@ pub fn bencher(file: &Value) -> Checked {
             }
         }
     }
-    match benchmarks.is_empty() {
-        true => Err("no benchmark".into()),
-        false => Ok(()),
+    if benchmarks.is_empty() {
+        Err("no benchmark".into())
+    } else {
+        Ok(())
     }
 }
 
@@ -60,9 +61,10 @@ pub fn github(file: &Value) -> Checked {
             return fail("a name twice", entry);
         }
     }
-    match entries.is_empty() {
-        true => Err("no entry".into()),
-        false => Ok(()),
+    if entries.is_empty() {
+        Err("no entry".into())
+    } else {
+        Ok(())
     }
 }
 
@@ -91,9 +93,10 @@ pub fn google_benchmark(file: &Value) -> Checked {
             next = 0;
         }
     }
-    match next == 0 && !benchmarks.is_empty() {
-        true => Ok(()),
-        false => Err("a family with too few repetitions, or none".into()),
+    if next == 0 && !benchmarks.is_empty() {
+        Ok(())
+    } else {
+        Err("a family with too few repetitions, or none".into())
     }
 }
 
@@ -121,9 +124,10 @@ pub fn hyperfine(file: &Value) -> Checked {
         }
         number(one, "median")?;
     }
-    match results.is_empty() {
-        true => Err("no result".into()),
-        false => Ok(()),
+    if results.is_empty() {
+        Err("no result".into())
+    } else {
+        Ok(())
     }
 }
 
@@ -178,9 +182,10 @@ fn of_type(schema: &Value, value: &Value) -> Checked {
         _ => true,
     };
     let least = schema["minimum"].as_f64().zip(value.as_f64());
-    match fits && least.is_none_or(|(least, value)| value >= least) {
-        true => Ok(()),
-        false => fail(&format!("not of type {}", schema["type"]), value),
+    if fits && least.is_none_or(|(least, value)| value >= least) {
+        Ok(())
+    } else {
+        fail(&format!("not of type {}", schema["type"]), value)
     }
 }
 

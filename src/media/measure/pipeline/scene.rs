@@ -282,9 +282,10 @@ impl Scene {
         pipeline.set_smoothing(Smoothing::default());
         pipeline.set_view(&rays);
         let bare = pipeline.render()?.image;
-        let parts = match load.content.is_refractive() {
-            true => Some(parts_of(gpu, (&volume, &medium), &rays, &bare, points)?),
-            false => None,
+        let parts = if load.content.is_refractive() {
+            Some(parts_of(gpu, (&volume, &medium), &rays, &bare, points)?)
+        } else {
+            None
         };
         // Parts are those of refraction alone.
         let mirror = load.mirror(INTENSITY);
