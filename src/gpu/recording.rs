@@ -10,8 +10,9 @@ use bytemuck::Pod;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// WebGPU's limit on workgroups per dimension.
-const MAX_GROUPS: u32 = 65535;
+/// Workgroups in a row of a one-dimensional dispatch. WebGPU allows 65,535 of them; in shorter rows ordinary loads fill several, so
+/// that a kernel whose index is wrong beyond the first row is seen.
+const ROW: u32 = 256;
 
 /// The number of workgroups of a kernel.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,15 +35,11 @@ pub fn groups_for(items: u32) -> [u32; 3] {
     grid_of(items.div_ceil(WORKGROUP_SIZE))
 }
 
-/// At least one workgroup and at least `workgroups`; beyond the row limit in several rows, the last
+/// At least one workgroup and at least `workgroups`; beyond 256 in several rows, the last
 /// of which may have too many. A kernel's workgroup index is `x + y * num_workgroups.x`.
 pub fn grid_of(workgroups: u32) -> [u32; 3] {
     let groups = workgroups.max(1);
-    if groups <= MAX_GROUPS {
-        [groups, 1, 1]
-    } else {
-        [MAX_GROUPS, groups.div_ceil(MAX_GROUPS), 1]
-    }
+    [groups.min(ROW), groups.div_ceil(ROW), 1]
 }
 
 #[derive(Clone)]

@@ -16,6 +16,7 @@
 use crate::holes::SceneHoles;
 use crate::instance_reference;
 use crate::kept_checks::KeptChecks;
+use crate::no_rays::{self, no_rays};
 use crate::peer_check::{EXPLAINED, off_by};
 use crate::rays::{RaySet, record_rays};
 use raystone_accel::oracle::{self, Holes, Surfaces, Verdict};
@@ -281,13 +282,17 @@ pub async fn gate_async(
     let mut errors = 0;
     let mut classes = Vec::new();
     for set in &reference.sets {
+        let mut rays = set.rays.clone();
+        if !set.is_timed() {
+            rays.extend(no_rays(set));
+        }
         let batch = |query: Query| {
             let ask = Ask {
                 coherent: set.is_coherent(),
                 runtime_checks,
                 ..query.into()
             };
-            Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)
+            Tracer::new(gpu, triangles, traced, ask)?.batch(&rays)
         };
         let (closest, any) = (batch(Query::Closest)?, batch(Query::Any)?);
         closest.trace_async().await?;
@@ -299,14 +304,14 @@ pub async fn gate_async(
             any.trace_in_rows_async().await?;
         }
         errors |= closest.error_word_async().await? | any.error_word_async().await?;
-        classes.push(compare(
-            set,
-            &closest.hits_async().await?,
-            &any.found_async().await?,
-            soup,
-            traced.space,
-            probe.is_exact(),
-        ));
+        let (mut hits, mut found) = (closest.hits_async().await?, any.found_async().await?);
+        let other_hits = hits.split_off(set.rays.len().min(hits.len()));
+        let other_found = found.split_off(set.rays.len().min(found.len()));
+        let is_exact = probe.is_exact();
+        let mut class = compare(set, &hits, &found, soup, traced.space, is_exact);
+        let others = &rays[set.rays.len()..];
+        no_rays::note(&mut class, others, &other_hits, &other_found);
+        classes.push(class);
     }
     if let Err(refused @ GpuError::LoopsCut { .. }) = gpu.check_error_word(errors) {
         return Err(refused);

@@ -21,6 +21,7 @@ mod media_colour_tests;
 mod media_tests;
 mod mesh;
 pub mod mitsuba;
+mod no_rays;
 pub mod path_oracle;
 pub mod peer_check;
 mod pixels;

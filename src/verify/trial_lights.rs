@@ -2,7 +2,7 @@
 
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
-use crate::trial_scenes::{Trial, TrialScene, camera, depth, word};
+use crate::trial_scenes::{Trial, TrialScene, camera, clamp, depth, word};
 use glam::{Quat, Vec3, vec3};
 use raystone_core::params::ParamValue;
 use raystone_render::ConfiguredIntegrator;
@@ -32,7 +32,7 @@ pub(super) fn skies() -> Result<Vec<TrialScene>, SceneError> {
                     word("strategy", "mis-power"),
                 ]),
                 path(&[depth(2), word("strategy", "light"), tree()]),
-                path(&[depth(2), word("light_choice", "uniform")]),
+                path(&[depth(2), word("light_choice", "uniform"), clamp()]),
             ],
         },
         TrialScene {
@@ -147,7 +147,8 @@ fn sky() -> Result<SceneData, SceneError> {
 /// Balls in mid-air under a map of more columns than a texture is wide, so that rays leave to all sides: also straight down, and
 /// over the seam of the map.
 fn open_sky() -> Result<SceneData, SceneError> {
-    const SIZE: [u32; 2] = [1030, 6];
+    // The numbers of rows and columns are above and at a power of two.
+    const SIZE: [u32; 2] = [1030, 8];
     let camera = camera(vec3(0.4, 0.3, 4.1), Vec3::ZERO, Vec3::Y);
     let mut mesh = Mesh::new("open-sky", camera, Vec3::ZERO)?;
     let [mirror, grey] = [

@@ -4,7 +4,7 @@
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
 use crate::trial_mirrors::{connected, mirrors};
-use crate::trial_scenes::{Trial, TrialScene, depth, lamps, points, word};
+use crate::trial_scenes::{Trial, TrialScene, clamp, depth, lamps, points, word};
 use glam::{DVec3, Vec3, vec3};
 use raystone_scene::{Light, Material, SceneData, SceneError, SceneMedium};
 use raystone_volume::{Bounds, MediaError, Phase, Volume, phase, procedures};
@@ -27,6 +27,7 @@ pub(crate) fn media(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> {
                     depth(4),
                     word("strategy", "mis-power"),
                     word("roulette", "albedo"),
+                    clamp(),
                 ]),
                 path(&[depth(3), word("light_choice", "tree")]),
                 path(&[depth(3), word("strategy", "bsdf"), word("roulette", "none")]),

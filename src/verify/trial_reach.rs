@@ -4,7 +4,7 @@
 
 use crate::kinds::KindChecks;
 use crate::mesh::Mesh;
-use crate::trial_scenes::{TrialScene, camera, depth, lamps, word};
+use crate::trial_scenes::{TrialScene, camera, clamp, depth, lamps, word};
 use glam::{Vec3, vec2, vec3};
 use raystone_core::params::ParamValue;
 use raystone_scene::{
@@ -34,7 +34,7 @@ pub(super) fn scenes(kinds: &KindChecks) -> Result<Vec<TrialScene>, SceneError> 
         },
         TrialScene {
             scene: within_a_lamp()?,
-            trials: vec![path(&[depth(3)])],
+            trials: vec![path(&[depth(3)]), path(&[depth(3), clamp()])],
         },
     ];
     for (name, factor) in [("large-room", LARGE), ("small-room", SMALL)] {

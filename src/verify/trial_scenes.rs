@@ -106,19 +106,23 @@ fn trials_of_lamps() -> Vec<Trial> {
         let words = [word("strategy", strategy), word("roulette", roulette)];
         ("path", [&words[..], &[depth(5)]].concat())
     };
-    let clamp = ("clamp", ParamValue::Number(0.25));
     let late = ("roulette_depth", ParamValue::Integer(1));
     vec![
         ("path", vec![depth(8)]),
         with("mis-power", "albedo"),
         with("bsdf", "none"),
         with("light", "albedo"),
-        ("path", vec![clamp, depth(4), late]),
+        ("path", vec![clamp(), depth(4), late]),
     ]
 }
 
 pub(super) fn depth(depth: i64) -> (&'static str, ParamValue) {
     ("max_depth", ParamValue::Integer(depth))
+}
+
+/// Below most of what paths find after their first bounce.
+pub(super) fn clamp() -> (&'static str, ParamValue) {
+    ("clamp", ParamValue::Number(0.25))
 }
 
 pub(super) fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {

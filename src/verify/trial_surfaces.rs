@@ -117,6 +117,12 @@ fn mapped() -> Result<SceneData, SceneError> {
         uv,
         lamp,
     );
+    // The map of normals runs the other way round.
+    mesh.quad(
+        [vec3(-1.1, 0.2, -0.9), vec3(0.9, 0.0, 0.2), 1.2 * Vec3::Y],
+        [vec2(1.7, 0.1), vec2(-0.4, 1.9)],
+        wall,
+    );
     let mut scene = mesh.done(vec![
         texture("colours", [5, 3], |i| {
             [73 * i + 40, 31 * i * i + 90, 17 * i + 120]

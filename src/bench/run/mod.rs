@@ -36,6 +36,7 @@ mod peers;
 mod primary;
 mod progress;
 mod promised;
+mod rasterised;
 mod recorder;
 mod reference;
 mod reference_file;

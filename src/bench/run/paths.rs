@@ -3,6 +3,8 @@
 use super::error::{Fault, RunError};
 use super::offsets;
 use super::path_orders;
+use super::rasterised;
+use super::registries::Registries;
 use super::session::Session;
 use super::world::World;
 use raystone_config::{Axis, Cell};
@@ -14,6 +16,7 @@ use raystone_render::{
     BLOCK_SAMPLES, ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stage, Traced,
 };
 use raystone_sampling::{Coordinate, Sampler};
+use raystone_scene::SceneData;
 use raystone_verify::image_gate::{Choice, Frame, Pixels, answers, judge, sums};
 use raystone_verify::path_oracle::{Estimator, PathOracle, View};
 use raystone_verify::ray_counts;
@@ -42,7 +45,7 @@ const RUN: Frame = Frame {
     view: 1.0,
 };
 /// On a trial scene by `verify`: 1976 paths, since a material may cover a twentieth of the image.
-const TRIAL: Frame = Frame {
+pub(super) const TRIAL: Frame = Frame {
     choice: Choice::Every(1),
     ..RUN
 };
@@ -154,7 +157,7 @@ pub(super) struct Subject<'a> {
     pub stage: &'a Stage,
     pub gpu: &'a Gpu,
     traced: &'a Traced,
-    camera: Camera,
+    pub camera: Camera,
     pub cell: &'a Cell,
     offset: RayOffset,
     /// True if the adapter rounds as the host does.
@@ -162,7 +165,7 @@ pub(super) struct Subject<'a> {
 }
 
 /// What is checked of a cell on its scene, or why nothing can be.
-fn subject<'a>(
+pub(super) fn subject<'a>(
     session: &Session,
     world: &'a World,
     traced: &'a Traced,
@@ -200,6 +203,9 @@ fn made(
     cell: &Cell,
     frame: Frame,
 ) -> Result<(PathsRecord, Ran), String> {
+    if let Some(record) = rasterised::judged(session, world, traced, cell)? {
+        return Ok((record, Ran::default()));
+    }
     let (subject, integrator) = subject(session, world, traced, cell)?;
     let frames = frames(session, frame);
     let (mut record, ran) = judged(session, &subject, &integrator, &frames)?;
@@ -307,15 +313,8 @@ fn of_trial(
     if integrators.is_empty() {
         return Ok(all);
     }
-    let tests = subject.stage.soup.intersection;
-    let stage = Stage::new(subject.gpu, trial.scene.clone(), tests).map_err(|e| e.to_string())?;
-    let traced = stage.structure(&registries.accel, STRUCTURE);
-    let on_trial = Subject {
-        stage: &stage,
-        traced: &traced.map_err(|e| e.to_string())?,
-        camera: trial.scene.view(1.0),
-        ..*subject
-    };
+    let (stage, traced) = subject.stage_of(registries, &trial.scene)?;
+    let on_trial = subject.on(&stage, &traced);
     let frame = if session.checked.on_all_trials {
         TRIAL
     } else {
@@ -399,7 +398,7 @@ fn judged(
 
 /// The paths of a frame, and what they draw: the sampler of the experiment's samples, and of as many
 /// as are summed if it has them.
-fn drawn(
+pub(super) fn drawn(
     session: &Session,
     subject: &Subject,
     integrator: &ConfiguredIntegrator,
@@ -454,7 +453,33 @@ fn inner_samples(count: u32, limit: u32) -> Vec<u32> {
     samples
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// A trial scene on the device, with a structure.
+    pub(super) fn stage_of(
+        &self,
+        registries: &Registries,
+        scene: &SceneData,
+    ) -> Result<(Stage, Traced), String> {
+        let tests = self.stage.soup.intersection;
+        let stage = Stage::new(self.gpu, scene.clone(), tests).map_err(|e| e.to_string())?;
+        let traced = stage.structure(&registries.accel, STRUCTURE);
+        let traced = traced.map_err(|e| e.to_string())?;
+        Ok((stage, traced))
+    }
+
+    /// The same there.
+    pub(super) fn on<'s>(&self, stage: &'s Stage, traced: &'s Traced) -> Subject<'s>
+    where
+        'a: 's,
+    {
+        Subject {
+            stage,
+            traced,
+            camera: stage.scene.view(1.0),
+            ..*self
+        }
+    }
+
     fn view<'s>(
         &self,
         integrator: &ConfiguredIntegrator,
@@ -485,7 +510,7 @@ impl Subject<'_> {
         }
     }
 
-    fn renderer(
+    pub(super) fn renderer(
         &self,
         integrator: &ConfiguredIntegrator,
         sampler: &Sampler,

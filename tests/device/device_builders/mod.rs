@@ -235,9 +235,9 @@ fn the_gate_passes_compressed_wide_trees_built_on_the_device() {
 
 #[test]
 fn clusters_may_be_more_than_a_row_of_workgroups_has_lanes() {
-    // Rows of three workgroups instead of 65535, which is 4.2 million triangles.
+    // Rows of three workgroups instead of 256, which is 16,384 clusters, and 65,536 of tiles.
     let state = "accel/tree/parallel/device/state";
-    let rows = ("MOST_IN_A_ROW: u32 = 65535u", "MOST_IN_A_ROW: u32 = 3u");
+    let rows = ("ROW: u32 = 256u", "ROW: u32 = 3u");
     let gpu = open(kernels_with(state, &[rows]));
     let soup = clusters(&mut Pcg::new(13), 5000);
     for settings in settings() {

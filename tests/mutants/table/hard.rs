@@ -352,6 +352,17 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Gate,
     ),
     row(
+        "too-short-is-a-ray",
+        "a direction may be as short as it likes",
+        text(
+            "integrator/trace_rays",
+            "&& direction >= bitcast<u32>(SMALLEST_DIRECTION)",
+            "",
+        ),
+        BVH,
+        Check::Gate,
+    ),
+    row(
         "rays-of-a-later-slice",
         "a dispatch that does not begin with the first ray begins with it all the same",
         text(

@@ -18,6 +18,15 @@ pub const MUTANTS: &[Mutant] = &[
         ),
     ),
     fault(
+        "medium-without-a-limit",
+        "what is scattered in a medium has no limit",
+        text(
+            "integrator/path",
+            "@if(!queued) *result += limited(throughput * direct_light(point, depth, sampler), depth);",
+            "@if(!queued) *result += throughput * direct_light(point, depth, sampler);",
+        ),
+    ),
+    fault(
         "medium-albedo-twice",
         "the albedo counts twice",
         text(

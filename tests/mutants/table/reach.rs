@@ -30,6 +30,42 @@ const fn half_a_stack(
 
 pub const MUTANTS: &[Mutant] = &[
     path(
+        "limit-not-for-balls",
+        "what a path finds of a ball of light has no limit",
+        text(
+            "integrator/path",
+            "limited(throughput * load_light(ball.light).b.xyz * weight, depth)",
+            "throughput * load_light(ball.light).b.xyz * weight",
+        ),
+    ),
+    path(
+        "limit-not-for-the-sky",
+        "what a path finds beyond the scene has no limit",
+        text(
+            "integrator/path",
+            "limited(throughput * escaped_radiance(ray.direction) * weight, depth)",
+            "throughput * escaped_radiance(ray.direction) * weight",
+        ),
+    ),
+    path(
+        "normals-turned-one-way",
+        "a map of normals that is mirrored on its surface is taken for one that is not",
+        text(
+            "shading/normals",
+            "let turn = sign(d1.x * d2.y - d1.y * d2.x);",
+            "let turn = 1.0;",
+        ),
+    ),
+    path(
+        "map-of-a-power-of-two",
+        "of as many rows or columns as a power of two the parts are half as large",
+        text(
+            "shading/light/environment",
+            "countLeadingZeros(count - 1u) - 8u",
+            "countLeadingZeros(count) - 8u",
+        ),
+    ),
+    path(
         "rows-wrap-like-columns",
         "a mask wraps in v as it does in u",
         text("accel/mask", "image.z >> 2u", "image.z & 3u"),
