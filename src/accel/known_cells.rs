@@ -29,6 +29,10 @@ const LATTICE: [Row; 4] = [
 /// Eight cells in a row, of which the first and the last hold eight triangles each: those between become one.
 const ENDS: Row = ("irregular-grid", &[("lambda1", 0.5), ("lambda2", 0.001)], 3);
 
+/// A triangle across 4³ cells of edge 1 overlaps 28 of them, by separating axes in whole fractions; without its plane 39.
+const SLANTED: [[f32; 3]; 3] = [[0.0, 0.3, 4.0], [4.0, 0.0, 0.2], [0.3, 4.0, 0.0]];
+const OVERLAPPED: u64 = 28;
+
 /// Computes them.
 ///
 /// # Errors
@@ -49,6 +53,15 @@ pub(crate) fn check() -> Result<(), String> {
                  builds others than it says; build it anew, and report what stays wrong"
             ));
         }
+    }
+    let params = Params([("lambda".to_owned(), ParamValue::Number(64.0))].into());
+    let slanted = Triangle::from(SLANTED.map(Vec3::from));
+    let found = stats_with("uniform-grid", &params, &[slanted])?.references;
+    if found != OVERLAPPED {
+        return Err(format!(
+            "a known triangle is in {found} cells of a uniform-grid, and should be in {OVERLAPPED}: this program lists triangles where they \
+             are not; build it anew, and report what stays wrong"
+        ));
     }
     check_planes()?;
     check_orders()

@@ -1,7 +1,7 @@
 //! Trees over a few triangles of which another program knows the cost: a spatial split, subtrees that are moved, ways through a grid
 //! whose cells grow, triangles along a curve. What is done worse here answers as right.
 
-use crate::kd_tree::check_depth;
+use crate::instancing::check_room;
 use crate::known_figures::stats_with;
 use crate::ray_hierarchy::check_order;
 use crate::{AccelRegistry, BuildLog, Counters, Ray, TriangleSoup, triangle::TriangleRecord};
@@ -88,6 +88,14 @@ const OF_FOUR: f64 = 472.0 / 210.0;
 /// passes. The first one, [0, 1), grows to 2, 4 and 7: each time to the end of the box of the cell there, which has grown, too.
 const PASSED: [u32; 4] = [8, 5, 3, 2];
 
+/// Of trees over 1, 2¹⁰ and 2²⁰ triangles where none is asked for: 8 + 1.3 log₂ n (Wald and Havran 2006), and of an octree the level at
+/// which a surface of n triangles has as many cells, 4 for each above, and two more.
+type Depths = (&'static str, fn(usize) -> u32, [u32; 3]);
+const DEPTHS: [Depths; 2] = [
+    ("kd-tree", crate::kd_tree::default_depth, [8, 21, 34]),
+    ("octree", crate::octree::default_depth, [2, 7, 12]),
+];
+
 /// Builds them.
 ///
 /// # Errors
@@ -153,8 +161,9 @@ pub(crate) fn check() -> Result<(), String> {
             ));
         }
     }
-    check_depth()?;
+    depths()?;
     expansions()?;
+    check_room()?;
     check_order()
 }
 
@@ -205,6 +214,17 @@ fn within([low, high]: [[f32; 3]; 2]) -> Triangle {
     Triangle {
         vertices: [low.into(), high.into(), beside],
     }
+}
+
+fn depths() -> Result<(), String> {
+    DEPTHS.iter().try_for_each(|(structure, depth, expected)| {
+        let found = [1, 1 << 10, 1 << 20].map(*depth);
+        let what = format!("{structure} over known numbers of triangles");
+        let text = |depths| format!("depths of {depths:?}");
+        (found == *expected)
+            .then_some(())
+            .ok_or_else(|| wrong(&what, &text(found), &text(*expected)))
+    })
 }
 
 /// Half of 16 in the first unit of a box of 16 × 2 × 2, the others in the last; a ray beside them.

@@ -14,6 +14,6 @@ mod trial;
 
 pub use features::{FEATURES, SceneFeatures};
 pub use fit::{Sample, fit};
-pub use predict::{Demand, Prediction};
+pub use predict::{Demand, Prediction, check_known};
 pub use table::{AdviceError, AdviceTable, CLASSES, Choice, Costs};
 pub use trial::{Regret, Trial, leave_one_out, trial};

@@ -150,10 +150,12 @@ pub fn main() -> ExitCode {
     let command = CommandLine::parse_from(words(std::env::args_os().collect())).command;
     let checked = match command {
         Command::List(_) | Command::Doctor(_) | Command::Help(_) => Ok(()),
-        Command::Compare(_) | Command::History(_) | Command::Export(_) | Command::Repro(_) => {
-            known_figures()
-                .and_then(|()| raystone::report::check_texts().map_err(anyhow::Error::msg))
-        }
+        Command::Compare(_)
+        | Command::History(_)
+        | Command::Export(_)
+        | Command::Repro(_)
+        | Command::Verify(_) => known_figures()
+            .and_then(|()| raystone::report::check_texts().map_err(anyhow::Error::msg)),
         _ => known_figures(),
     };
     checked
@@ -179,6 +181,7 @@ fn known_figures() -> Result<()> {
         raystone::run::known_plan::check,
         raystone::report::plot::known::check,
         raystone::report::check_rulings,
+        raystone::stress::tally::check,
     ];
     checks
         .into_iter()

@@ -45,6 +45,25 @@ pub(super) fn alias_table(units: &[u32]) -> Vec<AliasEntry> {
     table
 }
 
+/// Makes the table of a half, an eighth and three eighths, and of one that is never chosen.
+///
+/// # Errors
+/// A choice has more or fewer values than it should.
+pub(super) fn check() -> Result<(), String> {
+    let units = [UNITS / 2, UNITS / 8, 0, 3 * (UNITS / 8)];
+    let mut found = [0; 4];
+    for (own, entry) in alias_table(&units).into_iter().enumerate() {
+        found[own] += entry.threshold;
+        found[entry.alias as usize] += UNITS / 4 - entry.threshold;
+    }
+    (found == units).then_some(()).ok_or_else(|| {
+        format!(
+            "the choices of a known table have {found:?} values, and should have {units:?}: this program chooses lights wrongly; build it \
+             anew, and report what stays wrong"
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::units::shared_out;

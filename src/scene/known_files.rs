@@ -11,6 +11,7 @@ use raystone_core::geometry::Camera;
 use raystone_core::params::ParamValue;
 
 mod defaults;
+mod further;
 
 /// In a folder that no machine has.
 static FILES: &[(&str, &[u8])] = &[
@@ -28,6 +29,12 @@ static FILES: &[(&str, &[u8])] = &[
     ("known:/b.xml", include_bytes!("known_files/b.xml")),
     ("known:/b.vol", include_bytes!("known_files/b.vol")),
     ("known:/b.npy", include_bytes!("known_files/b.npy")),
+    ("known:/c.gltf", include_bytes!("known_files/c.gltf")),
+    ("known:/c.obj", include_bytes!("known_files/c.obj")),
+    ("known:/c.mtl", include_bytes!("known_files/c.mtl")),
+    ("known:/c.ply", include_bytes!("known_files/c.ply")),
+    ("known:/c.hdr", include_bytes!("known_files/c.hdr")),
+    ("known:/c.pfm", include_bytes!("known_files/c.pfm")),
 ];
 
 /// What they say.
@@ -44,6 +51,7 @@ pub(crate) fn values() -> Result<Vec<Known>, String> {
     all.nori(&read("known:/a.xml")?)?;
     all.media()?;
     defaults::values(&mut all)?;
+    further::values(&mut all)?;
     Ok(all.0)
 }
 

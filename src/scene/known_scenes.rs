@@ -171,7 +171,7 @@ fn direction() -> [Known; 3] {
 }
 
 /// What parameters of every scene do.
-fn parameters() -> Result<[Known; 8], String> {
+fn parameters() -> Result<[Known; 9], String> {
     let lamps = |count: i64| with(&[("hung_lamps", ParamValue::Integer(count))]);
     let [one, eight] = [power(&lamps(1)?), power(&lamps(8)?)];
     let number = ParamValue::Number;
@@ -191,6 +191,11 @@ fn parameters() -> Result<[Known; 8], String> {
             .map_or(f64::NAN, |x| f64::from(*x))
     };
     let copies = with(&[("copies", ParamValue::Integer(3))])?;
+    let placed = copies.assembly.as_ref().map(|a| a.instances());
+    let place = |k: usize| Some(placed?.get(k)?.to_world.point(Vec3::ZERO));
+    let apart = place(0)
+        .zip(place(1))
+        .map(|(a, b)| f64::from(a.distance(b)));
     let single = with(&[])?;
     let its = copies
         .material_ids
@@ -215,6 +220,12 @@ fn parameters() -> Result<[Known; 8], String> {
             0.25,
         ),
         ("scattering of a medium beside it", first(beside), 0.5),
+        // Corners turn at √½ about its middle, and a fiftieth is between.
+        (
+            "distance of copies",
+            apart.unwrap_or(f64::NAN),
+            1.02 * std::f64::consts::SQRT_2,
+        ),
         ("copies of a material", its.count() as f64, 3.0),
         (
             "number of triangles of copies",

@@ -26,6 +26,7 @@ pub use judge::{InstanceReference, brute_force_instances};
 pub use meta_bvh::MetaBvh;
 pub use object_list::ObjectList;
 pub use placed::Placed;
+pub(crate) use top::check as check_room;
 pub(crate) use world_box::BoxMap;
 
 use super::bvh::pairs::Pair;

@@ -11,8 +11,13 @@ use super::super::bvh::pairs::Pair;
 use super::super::leaf::{LEAF, leaf_reference};
 use super::forest::Forest;
 use super::instance::Entry;
+use super::placed::Placed;
 use super::world_box::BoxMap;
-use raystone_scene::Instance;
+use crate::TriangleSoup;
+use crate::known_figures::{half_a_square, soup_of, stats_of};
+use glam::Vec3;
+use raystone_core::params::{ParamValue, Params};
+use raystone_scene::{Assembly, Instance, Transform};
 
 const BINS: usize = 16;
 /// Depth limit of SAH splits; below it the median is used, which bounds the depth by `SAH_DEPTH +
@@ -63,6 +68,76 @@ impl Top {
         }
         builder.top
     }
+}
+
+/// A copy: the length of a row of triangles, of which one alone cannot be opened; its size along the row, half of that across, and place.
+type Copy = (u32, f32, [f32; 3]);
+
+/// Copies, and how many nodes they have above them for parts if two entries for each are allowed, by hand. Of two that are alike each is
+/// opened once. Far from two others, large ones have all room but one, by their areas. And beside one that fills the box, two with a fifth
+/// of it are opened at once, and the largest has the rest.
+const ROOMS: [(&[Copy], u64); 3] = [
+    (&[(16, 1.0, [0.0; 3]), (16, 1.0, [0.0, 0.25, 0.0])], 2),
+    (
+        &[
+            (16, 10.0, [0.0; 3]),
+            (16, 10.0, [0.0, 2.5, 0.0]),
+            (1, 1.0, [1000.0, 0.0, 0.0]),
+            (1, 1.0, [1000.0, 0.25, 0.0]),
+        ],
+        3,
+    ),
+    (
+        &[
+            (1, 230.0, [0.0; 3]),
+            (16, 1.0, [0.0; 3]),
+            (16, 1.0, [0.0, 0.25, 0.0]),
+        ],
+        2,
+    ),
+];
+
+/// Builds trees over them.
+///
+/// # Errors
+/// They have other numbers of nodes than they should.
+pub(crate) fn check() -> Result<(), String> {
+    ROOMS.iter().try_for_each(|(copies, expected)| {
+        let soup = known(copies)?;
+        let nodes = |entries| {
+            let set = [("rebraid".to_owned(), ParamValue::Integer(entries))];
+            let stats = stats_of("meta-bvh", &Params(set.into()), &soup);
+            stats.map(|stats| stats.nodes)
+        };
+        let found = nodes(2)? - nodes(0)?;
+        (found == *expected).then_some(()).ok_or_else(|| {
+            format!(
+                "a meta-bvh over known copies has {found} more nodes where these are opened, and should have {expected}: this program \
+                 builds others than it says; build it anew, and report what stays wrong"
+            )
+        })
+    })
+}
+
+fn known(copies: &[Copy]) -> Result<TriangleSoup, String> {
+    let mut assembly = Assembly::default();
+    let mut all = Vec::new();
+    for (length, size, place) in copies {
+        let deep = |place| {
+            let mut triangle = half_a_square(place);
+            triangle.vertices[1].z = 1.0;
+            triangle
+        };
+        let row = (0..*length).map(deep).collect();
+        let object = assembly.add_object(row).map_err(|e| e.to_string())?;
+        let columns = [Vec3::X * *size, 0.5 * *size * Vec3::Y, Vec3::Z];
+        let placed = assembly.place(object, Transform::new(columns, Vec3::from(*place)));
+        all.extend(assembly.copy(&placed.map_err(|e| e.to_string())?));
+    }
+    Ok(TriangleSoup {
+        placed: Some(Placed::new(&assembly)),
+        ..soup_of(&all)
+    })
 }
 
 /// An instance, or the part below a node of its object.

@@ -70,22 +70,8 @@ pub(super) fn build(
 }
 
 /// Depth beyond which trees usually stop to improve: 8 + 1.3 log2 N (Havran 2000).
-pub(super) fn default_depth(triangles: usize) -> u32 {
+pub(crate) fn default_depth(triangles: usize) -> u32 {
     (8.0 + 1.3 * (triangles.max(1) as f64).log2()) as u32
-}
-
-/// Havran's depth of known numbers of triangles.
-///
-/// # Errors
-/// One is another.
-pub(crate) fn check_depth() -> Result<(), String> {
-    let found = [1, 1024, 1 << 20].map(default_depth);
-    (found == [8, 21, 34]).then_some(()).ok_or_else(|| {
-        format!(
-            "leaves of a kd-tree over 1, 2^10 and 2^20 triangles are at most {found:?} deep, and should be 8, 21 and 34: this program builds \
-             others than it says; build it anew, and report what stays wrong"
-        )
-    })
 }
 
 struct Settings<'a> {

@@ -10,7 +10,7 @@
 mod build;
 mod validate;
 
-pub(crate) use build::check_depth;
+pub(crate) use build::default_depth;
 
 use super::bounds::{Bounds, slab};
 use super::structure::prelude::*;

@@ -69,7 +69,7 @@ pub(super) fn build(
 }
 
 /// Default depth: the level at which cells along a surface are as many as the triangles, plus two.
-pub(super) fn default_depth(triangles: usize) -> u32 {
+pub(crate) fn default_depth(triangles: usize) -> u32 {
     ((triangles.max(1) as f64).log2() / 2.0).ceil() as u32 + 2
 }
 

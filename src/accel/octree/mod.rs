@@ -10,6 +10,8 @@
 mod build;
 mod validate;
 
+pub(crate) use build::default_depth;
+
 use super::structure::prelude::*;
 use raystone_gpu::UniformValues;
 

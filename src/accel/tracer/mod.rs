@@ -7,7 +7,7 @@
 mod batch;
 mod load;
 mod passes;
-mod refill;
+pub(crate) mod refill;
 mod traced;
 mod workgroup;
 

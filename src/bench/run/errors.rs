@@ -322,6 +322,15 @@ fn spectrum_record(
 
 /// The probability of a false alarm is shared out among all samplers of the run that claim to have no
 /// bias, so that a run of many sound samplers does not cry wolf.
+pub(super) fn bias_options(tested: usize, spp: u32, of_reference: f64) -> BiasOptions {
+    let defaults = BiasOptions::default();
+    BiasOptions {
+        alpha: defaults.alpha / tested.max(1) as f64,
+        rounding: rounding_bound(spp) + of_reference,
+        ..defaults
+    }
+}
+
 fn bias_record(
     session: &Session,
     cell: &Cell,
@@ -331,11 +340,11 @@ fn bias_record(
     let claims = |s: &Cell| s.randomised && session.registries.is_unbiased(s);
     let tested = session.plan.samplers.iter().filter(|s| claims(s)).count();
     let defaults = BiasOptions::default();
-    let options = BiasOptions {
-        alpha: defaults.alpha / tested.max(1) as f64,
-        rounding: rounding_bound(session.experiment.run.spp.max()) + reference_image.rounding,
-        ..defaults
-    };
+    let options = bias_options(
+        tested,
+        session.experiment.run.spp.max(),
+        reference_image.rounding,
+    );
     let check = check_bias(images, reference_image.reference.parts(), options);
     let check = check.map_err(|e| e.to_string())?;
     let verdict = if cell.randomised {

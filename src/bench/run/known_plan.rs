@@ -2,7 +2,7 @@
 //! nothing fails.
 
 use super::registries::Registries;
-use super::{adaptive, known_settings, known_turns};
+use super::{adaptive, known_scenes, known_settings, known_turns};
 use crate::{animation, coherence, ray_sets};
 use raystone_config::{Axis, Cell, Experiment, Plan};
 
@@ -61,6 +61,7 @@ left out: 6, 6, 4, 8";
 pub fn check() -> Result<(), String> {
     adaptive::check()?;
     known_turns::check()?;
+    known_scenes::check()?;
     known_settings::check()?;
     animation::check_known()?;
     coherence::check_origins()?;

@@ -2,6 +2,7 @@
 //! of it need contradict.
 
 use super::compactions::rates;
+use super::errors::bias_options;
 use super::orders::of_turns;
 use super::primary::Turns;
 use super::structure_times::of_rounds;
@@ -9,6 +10,7 @@ use super::times::median_stages;
 use crate::animation::last_rounds;
 use crate::coherence::known;
 use crate::compaction::least_bytes;
+use crate::memory;
 use crate::ray_sets::readings;
 use crate::sampler_cost::ns_per_draw;
 use crate::stopping::is_met;
@@ -24,6 +26,7 @@ use raystone_render::{InOrder, Order as PixelOrder};
 use raystone_stats::comparison::LogFigure;
 use raystone_stats::interval::Interval;
 use raystone_verify::rays::RaySet;
+use raystone_verify::shadow_rays::unlike_shadow;
 use std::cell::RefCell;
 
 /// A value by name, and what it should be.
@@ -39,6 +42,7 @@ const ROUNDS: usize = 12;
 /// One is reported as something else: which, and both values.
 pub(super) fn check() -> Result<(), String> {
     known::check()?;
+    memory::check()?;
     WARM_UPS.into_iter().try_for_each(rounds)?;
     let all = classes()
         .into_iter()
@@ -46,7 +50,8 @@ pub(super) fn check() -> Result<(), String> {
         .chain(per_item()?)
         .chain(stages())
         .chain(stops())
-        .chain(frames());
+        .chain(frames())
+        .chain(margins());
     for (what, found, expected) in all {
         let agrees = (found - expected).abs() <= ROUNDING * expected.abs();
         if !agrees {
@@ -89,14 +94,10 @@ impl Measured for Counting<'_> {
 /// the twentieth; the others are as steady from the first two on.
 const WARM_UPS: [(u32, usize); 2] = [(0, 9), (60_000, 26)];
 
-/// Three measurements in rounds: each has one turn in each, none of which warms up, and they do not always take the same
-/// places.
-fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
-    let wrong = |what: &str| {
-        Err(format!(
-            "{what} of known turns: this program times wrongly; build it anew, and report what stays wrong"
-        ))
-    };
+/// Whose turn it was, and what three measurements say.
+type Turned = (Vec<usize>, Vec<Result<Samples, GpuError>>);
+
+fn interleaved(max_warmup_ms: u32, seed: u64) -> Result<Turned, String> {
     let log = RefCell::default();
     let all = [0, 1, 2].map(|place| Counting { place, turns: &log });
     let timing = Timing {
@@ -105,8 +106,23 @@ fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
         max_warmup_ms,
         ..Timing::default()
     };
-    let found = interleave(&all, &timing, 1, || ()).map_err(|(_, e)| e.to_string())?;
-    let log = log.borrow();
+    let found = interleave(&all, &timing, seed, || ()).map_err(|(_, e)| e.to_string())?;
+    Ok((log.take(), found))
+}
+
+/// Three measurements in rounds, in an order by the seed: each has one turn in each, none of which warms up, and they do not always take the same
+/// places.
+fn rounds((max_warmup_ms, warm_up): (u32, usize)) -> Result<(), String> {
+    let wrong = |what: &str| {
+        Err(format!(
+            "{what} of known turns: this program times wrongly; build it anew, and report what stays wrong"
+        ))
+    };
+    let (log, found) = interleaved(max_warmup_ms, 1)?;
+    let order = |seed| interleaved(0, seed).map(|(log, _)| log);
+    if order(1)? != order(1)? || order(1)? == order(2)? {
+        return wrong("a seed has two orders, or two seeds have the same one");
+    }
     let begin = log.len().saturating_sub(3 * ROUNDS);
     let ordered: Vec<&[usize]> = log[begin..].chunks(3).collect();
     let is_round = |round: &&[usize]| (0..3).all(|place| round.contains(&place));
@@ -145,8 +161,8 @@ fn last(of: &[f64]) -> f64 {
     of.last().copied().unwrap_or(f64::NAN)
 }
 
-/// Four rays, three of which hit; one of five is none.
-fn classes() -> [Known; 5] {
+/// Four rays, three of which hit, and two of which do what the shadow rays that they stand for do not; one of five is none.
+fn classes() -> [Known; 6] {
     let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let hit = |triangle| Hit {
         triangle,
@@ -173,7 +189,22 @@ fn classes() -> [Known; 5] {
         direction: [f32::NAN; 3],
         ..ray
     });
+    let reversed = RaySet {
+        class: RayClass::ShadowReversed,
+        shadow: vec![0, 2, 1, 3],
+        ..set.clone()
+    };
+    let shadow = RaySet {
+        class: RayClass::Shadow,
+        ..set.clone()
+    };
+    let unlike = unlike_shadow(&reversed, &[set.clone(), shadow]);
     [
+        (
+            "number of rays unlike their shadow rays",
+            unlike.map_or(f64::NAN, |count| count as f64),
+            2.0,
+        ),
         ("share of hits", own.hit_fraction, 0.75),
         ("time by the wall", last(&own.wall_ms), 2.0),
         ("time of processors", last(&own.cpu_ms), 3.0),
@@ -310,6 +341,16 @@ fn frames() -> [Known; 3] {
             sum(&cost.processor_ms),
             600.0,
         ),
+    ]
+}
+
+/// A hundredth is shared by four; sixteen samples are rounded to half an ulp each, 2⁻²⁴, beside the reference.
+fn margins() -> [Known; 2] {
+    let options = bias_options(4, 16, 1e-6);
+    let rounding = 16.0 * 0.5_f64.powi(24) * (1.0 + 1e-6) + 1e-6;
+    [
+        ("level of a bias", options.alpha, 0.0025),
+        ("margin of a bias", options.rounding, rounding),
     ]
 }
 

@@ -116,7 +116,7 @@ fn same_experiment(first: &Earlier, other: &Earlier) -> Result<(), RunError> {
 }
 
 /// The cells that are taken of each folder.
-fn choose(
+pub(super) fn choose(
     parts: &[Earlier],
     units: &[Unit],
     device: Option<&str>,

@@ -18,6 +18,7 @@ use raystone_core::params::Variant;
 use raystone_gpu::{Gpu, GpuError, fault_of_sort, wait_for};
 use raystone_record::fault_text;
 use raystone_record::{Body, GateVerdict, Key, Line, Ran, RayClass, StructureRecord};
+use raystone_stats::statistics::median;
 use raystone_verify::gate::gate;
 use raystone_verify::ray_classes;
 use raystone_verify::self_test::unseen_hit;
@@ -318,8 +319,7 @@ fn update_ms(built: &mut dyn BuiltAccel, world: &World) -> Result<Option<f64>, A
         }
         samples.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    samples.sort_by(f64::total_cmp);
-    Ok(Some(samples[UPDATES / 2]))
+    Ok(median(&samples))
 }
 
 /// The gate with the driver's checks; without them only if that passed.

@@ -74,6 +74,16 @@ impl Values {
         (self.0).push(("roughness of a gloss", rough(1)?[0], 0.75));
         let specular = Vec3::from(of(1)?.source.specular.unwrap_or([-1.0; 3]));
         self.vector("specular colour of a gloss", specular, [0.5, 0.25, 0.125]);
+        // By Khronos's converter: https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Archived/KHR_materials_pbrSpecularGlossiness/examples
+        let metallic = f64::from(*part(&of(1)?.parameters, 0, "parameters")?);
+        self.0
+            .push(("metal of a gloss", metallic, 0.766_204_538_683_868_5));
+        let base = [
+            0.467_926_683_321_688,
+            0.368_365_368_373_841,
+            0.364_579_620_761_474,
+        ];
+        self.vector("colour of a gloss", of(1)?.base_color, base);
         let mask = of(2)?.mask.ok_or("a known material has no mask")?;
         let cut = Vec3::new(mask.factor, mask.cutoff.unwrap_or(-1.0), 0.0);
         self.vector("factor and cut of a mask", cut, [0.75, 0.5, 0.0]);
@@ -110,6 +120,13 @@ impl Values {
         self.0.push(("index of Nori's glass", f64::from(*ior), 1.5));
         let alpha = part(&of(1)?.parameters, 3, "parameters")?;
         self.0.push(("alpha of Nori", f64::from(*alpha), 0.25));
+        // What a microfacet has without being told: BK7 in air.
+        let ior = part(&of(1)?.parameters, 4, "parameters")?;
+        (self.0).push((
+            "index of Nori's facets",
+            f64::from(*ior),
+            1.5046 / 1.000_277,
+        ));
         Ok(())
     }
 
