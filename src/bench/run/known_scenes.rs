@@ -205,7 +205,13 @@ mod tests {
         for (name, _) in KNOWN {
             let (variant, mut scene) = default(name).expect("a scene");
             assert_eq!(fault(&variant, &scene), None);
-            scene.triangles[0].vertices[1].z += 1e6;
+            // The walls of the stadium are thousands of units long, and its sums as much larger.
+            let moved = if name == "teapot-in-a-stadium" {
+                1e6
+            } else {
+                1.0
+            };
+            scene.triangles[0].vertices[1].z += moved;
             assert!(fault(&variant, &scene).is_some(), "{name}");
         }
     }
